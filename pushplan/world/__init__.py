@@ -1,0 +1,83 @@
+"""The ground floor: what a scene is, what a plan is, errors, stop rules, seeds."""
+
+from pushplan.world.actions import Action, Twist, WheelSpeeds
+from pushplan.world.episode import Episode
+from pushplan.world.errors import (
+    InvalidInputError,
+    MissingDependencyError,
+    PushplanError,
+    ScenarioError,
+    SchemaError,
+    UnknownNameError,
+)
+from pushplan.world.files import load_world, save_world, world_from_dict, world_to_dict
+from pushplan.world.goals import (
+    ClearanceArea,
+    Goal,
+    GoalDisc,
+    GoalLine,
+    ManipulationGoal,
+    NavigationGoal,
+    Receptacle,
+)
+from pushplan.world.movables import Movables
+from pushplan.world.plan import Plan, PlanResult, PlanStats, PlanStatus, SubTask
+from pushplan.world.protocols import Controller, Planner, Policy
+from pushplan.world.robot import Drive, RobotModel
+from pushplan.world.scene import World
+from pushplan.world.seeds import stream
+from pushplan.world.static_map import StaticMap
+from pushplan.world.stop import (
+    AnyOf,
+    Cancellation,
+    Deadline,
+    FirstSolution,
+    MaxIterations,
+    Stop,
+    StopCheck,
+)
+
+__all__ = [
+    "Action",
+    "AnyOf",
+    "Cancellation",
+    "ClearanceArea",
+    "Controller",
+    "Deadline",
+    "Drive",
+    "Episode",
+    "FirstSolution",
+    "Goal",
+    "GoalDisc",
+    "GoalLine",
+    "InvalidInputError",
+    "ManipulationGoal",
+    "MaxIterations",
+    "MissingDependencyError",
+    "Movables",
+    "NavigationGoal",
+    "Plan",
+    "PlanResult",
+    "PlanStats",
+    "PlanStatus",
+    "Planner",
+    "Policy",
+    "PushplanError",
+    "Receptacle",
+    "RobotModel",
+    "ScenarioError",
+    "SchemaError",
+    "StaticMap",
+    "Stop",
+    "StopCheck",
+    "SubTask",
+    "Twist",
+    "UnknownNameError",
+    "WheelSpeeds",
+    "World",
+    "load_world",
+    "save_world",
+    "stream",
+    "world_from_dict",
+    "world_to_dict",
+]

@@ -1,0 +1,200 @@
+"""Validation of input at the doors: each check returns a clean value or raises one clear error."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import numbers
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, DTypeLike, NDArray
+
+from pushplan.world.errors import InvalidInputError, SchemaError, unknown_name_message
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+BoolArray = NDArray[np.bool_]
+
+
+def number(
+    name: str,
+    value: object,
+    *,
+    low: float = -math.inf,
+    high: float = math.inf,
+    open_low: bool = False,
+    finite: bool = True,
+) -> float:
+    """Check that ``value`` is a real number in the stated range and return it as a float.
+
+    Raises:
+        InvalidInputError: if it is not a number, not finite, or out of range.
+    """
+    if isinstance(value, bool) or not isinstance(value, numbers.Real):
+        raise InvalidInputError(f"{name} must be a number, got {value!r}")
+    result = float(value)
+    if math.isnan(result) or (finite and math.isinf(result)):
+        raise InvalidInputError(f"{name} must be finite, got {result}")
+    if result < low or result > high or (open_low and result == low):
+        bracket = "(" if open_low else "["
+        raise InvalidInputError(f"{name} must lie in {bracket}{low:g}, {high:g}], got {result:g}")
+    return result
+
+
+def integer(name: str, value: object, *, low: int | None = None, high: int | None = None) -> int:
+    """Check that ``value`` is a whole number in the stated range and return it as an int.
+
+    Raises:
+        InvalidInputError: if it is not a whole number or out of range.
+    """
+    if isinstance(value, bool) or not isinstance(value, numbers.Integral):
+        raise InvalidInputError(f"{name} must be a whole number, got {value!r}")
+    result = int(value)
+    if (low is not None and result < low) or (high is not None and result > high):
+        limits = f"at least {low}" if high is None else f"in [{low}, {high}]"
+        raise InvalidInputError(f"{name} must be {limits}, got {result}")
+    return result
+
+
+def choice(kind: str, value: object, valid: Sequence[str]) -> str:
+    """Check that ``value`` is one of the valid names and return it.
+
+    Raises:
+        InvalidInputError: naming the nearest valid choice otherwise.
+    """
+    if not isinstance(value, str) or value not in valid:
+        raise InvalidInputError(unknown_name_message(kind, value, valid))
+    return value
+
+
+def array(
+    name: str,
+    value: ArrayLike,
+    shape: tuple[int | None, ...],
+    *,
+    dtype: DTypeLike = np.float64,
+) -> NDArray[Any]:
+    """Copy ``value`` into a read-only, C-contiguous array of the stated shape.
+
+    Args:
+        name: what the value is called in an error.
+        value: anything that NumPy reads as an array.
+        shape: expected shape; ``None`` leaves a dimension free.
+        dtype: element type of the result; floats must be finite.
+
+    Raises:
+        InvalidInputError: if the type, the shape or an element is wrong.
+    """
+    wanted = np.dtype(dtype)
+    try:
+        source = np.asarray(value)
+        if source.size == 0:
+            source = source.astype(wanted)
+        if wanted.kind == "f" and source.dtype.kind not in "iuf":
+            raise TypeError
+        if wanted.kind in "ib" and source.dtype.kind not in ("iu" if wanted.kind == "i" else "b"):
+            raise TypeError
+        result = np.array(source, dtype=wanted, order="C")
+    except (TypeError, ValueError, OverflowError) as error:
+        raise InvalidInputError(
+            f"{name} must be an array of {wanted.name} of shape {_shape_text(shape)}, "
+            f"got {_short(value)}"
+        ) from error
+    if result.size == 0 and len(shape) > 1 and shape[0] is None:
+        result = result.reshape((0, *(n or 0 for n in shape[1:])))
+    if result.ndim != len(shape) or any(
+        want is not None and have != want for have, want in zip(result.shape, shape, strict=True)
+    ):
+        raise InvalidInputError(f"{name} must have shape {_shape_text(shape)}, got {result.shape}")
+    if wanted.kind == "f" and not np.isfinite(result).all():
+        bad = np.argwhere(~np.isfinite(result))[0]
+        raise InvalidInputError(
+            f"{name} must be finite, got {result[tuple(bad)]} at index {tuple(int(i) for i in bad)}"
+        )
+    result.flags.writeable = False
+    return result
+
+
+def frozen(values: NDArray[Any]) -> NDArray[Any]:
+    """Mark an array that we own as read-only and return it."""
+    values.flags.writeable = False
+    return values
+
+
+def known_keys(kind: str, data: object, valid: Sequence[str], required: Sequence[str]) -> None:
+    """Check the keys of a mapping that was read from a file.
+
+    Raises:
+        SchemaError: if it is no mapping, a required key is missing, or a key is unknown.
+    """
+    if not isinstance(data, Mapping):
+        raise SchemaError(f"{kind} must be a mapping, got {_short(data)}")
+    for key in data:
+        if key not in valid:
+            raise SchemaError(unknown_name_message(f"key in {kind}", key, valid))
+    for key in required:
+        if key not in data:
+            raise SchemaError(f"{kind} lacks the required key {key!r}")
+
+
+def _shape_text(shape: tuple[int | None, ...]) -> str:
+    inner = ", ".join("N" if n is None else str(n) for n in shape)
+    return f"({inner},)" if len(shape) == 1 else f"({inner})"
+
+
+def _short(value: object) -> str:
+    text = repr(value)
+    return text if len(text) <= 60 else text[:57] + "..."
+
+
+class ArrayRecord:
+    """Mixin for frozen dataclasses that hold arrays: equality and hash by content.
+
+    Fields declared with ``compare=False`` are left out, as in an ordinary dataclass.
+    """
+
+    def _content(self) -> tuple[object, ...]:
+        assert dataclasses.is_dataclass(self)
+        return tuple(
+            _hashable(getattr(self, field.name))
+            for field in dataclasses.fields(self)
+            if field.compare
+        )
+
+    def __eq__(self, other: object) -> bool:
+        if self is other:
+            return True
+        if type(self) is not type(other):
+            return NotImplemented
+        assert isinstance(other, ArrayRecord)
+        return self._content() == other._content()
+
+    def __hash__(self) -> int:
+        cached = self.__dict__.get("_hash")
+        if cached is None:
+            cached = hash((type(self).__name__, self._content()))
+            object.__setattr__(self, "_hash", cached)
+        return int(cached)
+
+    def __getstate__(self) -> dict[str, object]:
+        """Leave caches behind: string hashes differ between processes."""
+        return {key: value for key, value in self.__dict__.items() if not key.startswith("_")}
+
+    def __setstate__(self, state: dict[str, object]) -> None:
+        for value in state.values():  # arrays come back writeable from a pickle
+            for item in value if isinstance(value, tuple) else (value,):
+                if isinstance(item, np.ndarray):
+                    item.flags.writeable = False
+        self.__dict__.update(state)
+
+
+def _hashable(value: object) -> object:
+    if isinstance(value, np.ndarray):
+        # adding 0.0 turns -0.0 into 0.0, so that equal arrays give equal bytes
+        clean = value + 0.0 if value.dtype.kind == "f" else value
+        return value.shape, clean.tobytes()
+    if isinstance(value, tuple):
+        return tuple(_hashable(item) for item in value)
+    return value

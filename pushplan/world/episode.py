@@ -1,0 +1,133 @@
+"""A recorded run: everything that is needed to compute any metric later."""
+
+from __future__ import annotations
+
+import json
+import zipfile
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from pushplan.world.checks import ArrayRecord, BoolArray, FloatArray, array
+from pushplan.world.errors import InvalidInputError, SchemaError
+from pushplan.world.files import world_from_dict, world_to_dict
+from pushplan.world.scene import World
+
+SCHEMA = "pushplan-episode/1"
+_ARRAYS = (
+    "times",
+    "robot_poses",
+    "object_poses",
+    "completed",
+    "actions",
+    "rewards",
+    "act_times_s",
+    "plan_times_s",
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Episode(ArrayRecord):
+    """What happened from one start to one end, whoever recorded it.
+
+    Args:
+        world: the start.
+        times: (T + 1,) instants at which poses were recorded [s], increasing.
+        robot_poses: (T + 1, 3) x, y [m], theta [rad].
+        object_poses: (T + 1, K, 3), in the order of ``world.movables``; an object that has left
+            the floor keeps its last pose.
+        success: whether the task's goal was reached.
+        reason: why the episode ended, such as ``"goal"``, ``"wall"`` or ``"time_limit"``.
+        completed: (K,) whether the sub-task of each object was done; all false by default.
+        actions: (S, A) what was sent to the environment in each of its S steps.
+        rewards: (S,) reward of each step.
+        act_times_s: (S,) wall-clock time of each call of the policy [s].
+        plan_times_s: (P,) wall-clock time of each planning call [s].
+        about: who ran what: policy, scenario, seed, versions; JSON values only.
+
+    Raises:
+        InvalidInputError: if shapes disagree or a value is not finite.
+    """
+
+    world: World
+    times: FloatArray
+    robot_poses: FloatArray
+    object_poses: FloatArray
+    success: bool
+    reason: str
+    completed: BoolArray | None = None
+    actions: FloatArray = field(default_factory=lambda: np.zeros((0, 0)))
+    rewards: FloatArray = field(default_factory=lambda: np.zeros(0))
+    act_times_s: FloatArray = field(default_factory=lambda: np.zeros(0), compare=False)
+    plan_times_s: FloatArray = field(default_factory=lambda: np.zeros(0), compare=False)
+    about: Mapping[str, Any] = field(default_factory=dict, compare=False)
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.world, World):
+            raise InvalidInputError(f"episode.world must be a World, got {self.world!r:.60}")
+        count = len(self.world.movables)
+        put = object.__setattr__
+        put(self, "times", array("episode.times", self.times, (None,)))
+        length = len(self.times)
+        if length == 0 or (np.diff(self.times) <= 0.0).any():
+            raise InvalidInputError("episode.times must hold at least one instant and increase")
+        put(self, "robot_poses", array("episode.robot_poses", self.robot_poses, (length, 3)))
+        poses = (
+            np.asarray(self.object_poses, dtype=np.float64).reshape(length, count, 3)
+            if (count == 0)
+            else self.object_poses
+        )
+        put(self, "object_poses", array("episode.object_poses", poses, (length, count, 3)))
+        done = np.zeros(count, dtype=bool) if self.completed is None else self.completed
+        put(self, "completed", array("episode.completed", done, (count,), dtype=np.bool_))
+        put(self, "actions", array("episode.actions", self.actions, (None, None)))
+        for key in ("rewards", "act_times_s", "plan_times_s"):
+            put(self, key, array(f"episode.{key}", getattr(self, key), (None,)))
+        put(self, "success", bool(self.success))
+
+    def world_at(self, index: int) -> World:
+        """The scene at recorded instant ``index``."""
+        return self.world.moved(
+            robot_pose=self.robot_poses[index],
+            movable_poses=self.object_poses[index],
+            time=float(self.times[index]),
+        )
+
+    def save(self, path: str | Path) -> None:
+        """Write to a compressed ``.npz`` file that holds no pickles."""
+        header = {
+            "schema": SCHEMA,
+            "world": world_to_dict(self.world),
+            "success": self.success,
+            "reason": self.reason,
+            "about": dict(self.about),
+        }
+        arrays: dict[str, Any] = {key: getattr(self, key) for key in _ARRAYS}
+        with Path(path).open("wb") as file:
+            np.savez_compressed(file, header=np.array(json.dumps(header)), **arrays)
+
+    @classmethod
+    def load(cls, path: str | Path) -> Episode:
+        """Read what `save` wrote.
+
+        Raises:
+            SchemaError: if the file is missing, truncated, or not an episode of this version.
+        """
+        try:
+            with np.load(path, allow_pickle=False) as data:
+                header = json.loads(str(data["header"]))
+                arrays = {key: data[key] for key in _ARRAYS}
+        except (OSError, KeyError, ValueError, EOFError, zipfile.BadZipFile) as error:
+            raise SchemaError(f"{path} is not a readable episode file: {error}") from error
+        if not isinstance(header, dict) or header.get("schema") != SCHEMA:
+            raise SchemaError(f"{path}: this pushplan reads schema {SCHEMA!r}")
+        return cls(
+            world=world_from_dict(header["world"]),
+            success=header["success"],
+            reason=header["reason"],
+            about=header["about"],
+            **arrays,
+        )

@@ -1,0 +1,233 @@
+"""Worlds in JSON and YAML files, exact both ways. The schema is described in docs/world-file.md."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import yaml
+
+from pushplan.world.checks import known_keys, number
+from pushplan.world.errors import InvalidInputError, SchemaError, unknown_name_message
+from pushplan.world.goals import ClearanceArea, Goal, GoalDisc, GoalLine, Receptacle
+from pushplan.world.movables import Movables
+from pushplan.world.outline import signed_area
+from pushplan.world.robot import Drive, RobotModel
+from pushplan.world.scene import World
+from pushplan.world.static_map import StaticMap
+
+SCHEMA = "pushplan-world/1"
+"""Name and version of the file format; files of another version are refused."""
+
+_ROBOT_LIMITS = ("min_speed", "max_acceleration", "max_turn_acceleration", "wheel_separation")
+_GOALS: dict[str, tuple[type[Any], tuple[str, ...]]] = {
+    "disc": (GoalDisc, ("center", "radius")),
+    "line": (GoalLine, ("point", "normal")),
+    "receptacle": (Receptacle, ("polygon",)),
+    "clearance_area": (ClearanceArea, ("polygon", "open_edges")),
+}
+
+
+def world_to_dict(world: World) -> dict[str, Any]:
+    """The world as plain lists, numbers and texts, ready for JSON or YAML."""
+    robot: dict[str, Any] = {
+        "name": world.robot.name,
+        "drive": world.robot.drive.value,
+        "parts": [part.tolist() for part in world.robot.parts],
+        "mass": world.robot.mass,
+        "max_speed": world.robot.max_speed,
+        "max_turn_rate": world.robot.max_turn_rate,
+    }
+    for key in _ROBOT_LIMITS:
+        value = getattr(world.robot, key)
+        if math.isfinite(value):
+            robot[key] = value
+    assert world.robot_twist is not None
+    robot["pose"] = world.robot_pose.tolist()
+    robot["twist"] = world.robot_twist.tolist()
+    objects = world.movables
+    movables = [
+        {
+            "id": int(objects.ids[k]),
+            "pose": objects.poses[k].tolist(),
+            "twist": objects.twists[k].tolist(),
+            "outline": objects.outline(k).tolist(),
+            "mass": float(objects.masses[k]),
+            "wheeled": bool(objects.wheeled[k]),
+        }
+        for k in range(len(objects))
+    ]
+    static = {
+        "bounds": world.static.bounds.tolist(),
+        "polygons": [polygon.tolist() for polygon in world.static.polygons],
+        "segments": [
+            {"from": line[:2].tolist(), "to": line[2:].tolist(), "radius": float(radius)}
+            for line, radius in zip(world.static.segments, world.static.radii, strict=True)
+        ],
+    }
+    kind, keys = next(
+        (kind, keys) for kind, (cls, keys) in _GOALS.items() if isinstance(world.goal, cls)
+    )
+    goal: dict[str, Any] = {"kind": kind}
+    for key in keys:
+        value = getattr(world.goal, key)
+        goal[key] = value.tolist() if isinstance(value, np.ndarray) else value
+    return {
+        "schema": SCHEMA,
+        "time": world.time,
+        "robot": robot,
+        "static": static,
+        "movables": movables,
+        "goal": goal,
+    }
+
+
+def world_from_dict(data: object) -> World:
+    """Read what `world_to_dict` wrote, or what a person wrote by the same schema.
+
+    Raises:
+        SchemaError: an unknown or missing key, or another schema version.
+        InvalidInputError: a value that the types of `pushplan.world` refuse.
+    """
+    known_keys(
+        "world file",
+        data,
+        ("schema", "time", "robot", "static", "movables", "goal"),
+        ("schema", "robot", "goal"),
+    )
+    assert isinstance(data, Mapping)
+    if data["schema"] != SCHEMA:
+        raise SchemaError(f"this pushplan reads schema {SCHEMA!r}, got {data['schema']!r}")
+    robot, pose, twist = _robot(data["robot"])
+    return World(
+        robot=robot,
+        robot_pose=pose,
+        robot_twist=twist,
+        static=_static(data.get("static", {})),
+        movables=_movables(data.get("movables", [])),
+        goal=_goal(data["goal"]),
+        time=number("time", data.get("time", 0.0)),
+    )
+
+
+def load_world(path: str | Path) -> World:
+    """Read a world from a ``.json``, ``.yaml`` or ``.yml`` file.
+
+    Raises:
+        SchemaError: if the file is missing, not readable as JSON or YAML, or off the schema.
+    """
+    path = Path(path)
+    try:
+        text = path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise SchemaError(f"cannot read world file {path}: {error}") from error
+    try:
+        data = json.loads(text) if path.suffix == ".json" else yaml.safe_load(text)
+    except (json.JSONDecodeError, yaml.YAMLError) as error:
+        problem = " ".join(str(error).split())
+        raise SchemaError(f"{path} is not valid {path.suffix[1:] or 'YAML'}: {problem}") from error
+    try:
+        return world_from_dict(data)
+    except SchemaError as error:
+        raise SchemaError(f"{path}: {error}") from error
+    except InvalidInputError as error:
+        raise InvalidInputError(f"{path}: {error}") from error
+
+
+def save_world(world: World, path: str | Path) -> None:
+    """Write a world to a ``.json``, ``.yaml`` or ``.yml`` file; `load_world` gives it back equal.
+
+    Raises:
+        SchemaError: if the ending is none of these.
+    """
+    path = Path(path)
+    data = world_to_dict(world)
+    if path.suffix == ".json":
+        text = json.dumps(data, indent=1)
+    elif path.suffix in (".yaml", ".yml"):
+        text = yaml.safe_dump(data, sort_keys=False, default_flow_style=None)
+    else:
+        raise SchemaError(f"a world file ends in .json, .yaml or .yml, got {path.name!r}")
+    path.write_text(text, encoding="utf-8")
+
+
+def _robot(data: object) -> tuple[RobotModel, Any, Any]:
+    needed = ("parts", "mass", "drive", "max_speed", "max_turn_rate", "pose")
+    known_keys("robot", data, (*needed, *_ROBOT_LIMITS, "name", "twist"), needed)
+    assert isinstance(data, Mapping)
+    fields = {key: value for key, value in data.items() if key not in ("pose", "twist")}
+    if not isinstance(fields["parts"], list):
+        raise SchemaError("robot.parts must be a list of convex outlines")
+    fields["parts"] = tuple(fields["parts"])
+    if fields["drive"] not in [drive.value for drive in Drive]:
+        raise SchemaError(unknown_name_message("drive", fields["drive"], [d.value for d in Drive]))
+    return RobotModel(**fields), data["pose"], data.get("twist")
+
+
+def _static(data: object) -> StaticMap:
+    known_keys("static", data, ("bounds", "polygons", "segments"), ())
+    assert isinstance(data, Mapping)
+    lines, radii = [], []
+    for i, segment in enumerate(_list("static.segments", data.get("segments", []))):
+        known_keys(f"static.segments[{i}]", segment, ("from", "to", "radius"), ("from", "to"))
+        ends = [_list(f"static.segments[{i}].{end}", segment[end]) for end in ("from", "to")]
+        lines.append([*ends[0], *ends[1]])
+        radii.append(segment.get("radius", 0.0))
+    return StaticMap.build(
+        polygons=_list("static.polygons", data.get("polygons", [])),
+        segments=lines,
+        radii=radii,
+        bounds=data.get("bounds"),
+    )
+
+
+def _movables(data: object) -> Movables:
+    outlines, poses, twists, masses, wheeled, ids = [], [], [], [], [], []
+    for i, item in enumerate(_list("movables", data)):
+        name = f"movables[{i}]"
+        valid = ("id", "pose", "twist", "outline", "polygon", "mass", "wheeled")
+        known_keys(name, item, valid, ())
+        if ("polygon" in item) == ("outline" in item) or ("outline" in item) != ("pose" in item):
+            raise SchemaError(
+                f"{name} needs either 'polygon' (world frame) or 'outline' (body frame) and 'pose'"
+            )
+        if "polygon" in item:
+            shape = Movables.from_polygons([item["polygon"]])
+            outline, pose = shape.outline(0), shape.poses[0]
+        else:
+            outline, pose = np.asarray(item["outline"]), item["pose"]
+        outlines.append(outline)
+        poses.append(pose)
+        twists.append(item.get("twist", [0.0, 0.0, 0.0]))
+        mass = item.get("mass")
+        masses.append(abs(signed_area(np.asarray(outline, float))) if mass is None else mass)
+        wheeled.append(item.get("wheeled", False))
+        ids.append(item.get("id", i))
+    return Movables.from_outlines(
+        outlines,
+        np.asarray(poses) if poses else np.zeros((0, 3)),
+        masses=masses,
+        wheeled=wheeled,
+        twists=np.asarray(twists) if twists else np.zeros((0, 3)),
+        ids=ids,
+    )
+
+
+def _goal(data: object) -> Goal:
+    if not isinstance(data, Mapping) or data.get("kind") not in _GOALS:
+        kind = data.get("kind") if isinstance(data, Mapping) else data
+        raise SchemaError(unknown_name_message("goal kind", kind, _GOALS))
+    cls, keys = _GOALS[data["kind"]]
+    known_keys("goal", data, ("kind", *keys), keys)
+    goal: Goal = cls(**{key: data[key] for key in keys})
+    return goal
+
+
+def _list(name: str, value: object) -> Sequence[Any]:
+    if not isinstance(value, list):
+        raise SchemaError(f"{name} must be a list, got {value!r}")
+    return value

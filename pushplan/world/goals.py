@@ -1,0 +1,100 @@
+"""Where the robot, or what it pushes, has to end up."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pushplan.world.checks import ArrayRecord, BoolArray, FloatArray, array, number
+from pushplan.world.errors import InvalidInputError
+from pushplan.world.outline import convex_outline
+
+
+@dataclass(frozen=True, eq=False)
+class GoalDisc(ArrayRecord):
+    """Reached when the robot's origin is within ``radius`` of ``center``.
+
+    Args:
+        center: (2,) x, y [m], world frame.
+        radius: [m], positive.
+    """
+
+    center: FloatArray
+    radius: float
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "center", array("goal.center", self.center, (2,)))
+        radius = number("goal.radius", self.radius, low=0.0, open_low=True)
+        object.__setattr__(self, "radius", radius)
+
+    def distance(self, x: float, y: float) -> float:
+        """Straight distance [m] from a point to the nearest point that counts, 0 inside."""
+        gap = float(np.hypot(x - self.center[0], y - self.center[1])) - self.radius
+        return max(0.0, gap)
+
+
+@dataclass(frozen=True, eq=False)
+class GoalLine(ArrayRecord):
+    """Reached when the robot's origin is on or beyond a line.
+
+    Args:
+        point: (2,) any point of the line [m], world frame.
+        normal: (2,) direction in which the line is crossed; stored with unit length.
+    """
+
+    point: FloatArray
+    normal: FloatArray
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "point", array("goal.point", self.point, (2,)))
+        normal = array("goal.normal", self.normal, (2,))
+        length = float(np.hypot(normal[0], normal[1]))
+        if length == 0.0:
+            raise InvalidInputError("goal.normal must not be zero")
+        object.__setattr__(self, "normal", array("goal.normal", normal / length, (2,)))
+
+    def distance(self, x: float, y: float) -> float:
+        """Straight distance [m] from a point to the line, 0 on it or beyond."""
+        return max(0.0, float(np.dot(self.point - np.array([x, y]), self.normal)))
+
+
+@dataclass(frozen=True, eq=False)
+class Receptacle(ArrayRecord):
+    """An object is delivered when all its corners are inside ``polygon``.
+
+    Args:
+        polygon: convex (N, 2) corners [m], world frame.
+    """
+
+    polygon: FloatArray
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "polygon", convex_outline("goal.polygon", self.polygon))
+
+
+@dataclass(frozen=True, eq=False)
+class ClearanceArea(ArrayRecord):
+    """An object is cleared when its outline no longer touches ``polygon``.
+
+    Args:
+        polygon: convex (N, 2) corners [m], world frame, counter-clockwise.
+        open_edges: (N,) whether the edge from corner i to i + 1 can be crossed.
+    """
+
+    polygon: FloatArray
+    open_edges: BoolArray
+
+    def __post_init__(self) -> None:
+        given = array("goal.polygon", self.polygon, (None, 2))
+        polygon = convex_outline("goal.polygon", given)
+        if not np.array_equal(given, polygon):
+            raise InvalidInputError("goal.polygon of a clearance area must be counter-clockwise")
+        object.__setattr__(self, "polygon", polygon)
+        edges = array("goal.open_edges", self.open_edges, (len(polygon),), dtype=np.bool_)
+        object.__setattr__(self, "open_edges", edges)
+
+
+NavigationGoal = GoalDisc | GoalLine
+ManipulationGoal = Receptacle | ClearanceArea
+Goal = NavigationGoal | ManipulationGoal

@@ -1,0 +1,196 @@
+"""The objects that may be pushed, as a structure of arrays."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from pushplan.world.checks import (
+    ArrayRecord,
+    BoolArray,
+    FloatArray,
+    IntArray,
+    array,
+    frozen,
+    number,
+)
+from pushplan.world.errors import InvalidInputError
+from pushplan.world.outline import centroid, convex_outline, flatten, signed_area, transform
+
+
+@dataclass(frozen=True, eq=False)
+class Movables(ArrayRecord):
+    """K convex objects that the robot may push.
+
+    The origin of each body frame is the centroid of its outline, where the pressure on the
+    ground is centred; `from_polygons` does that for corners in the world frame.
+
+    Args:
+        ids: (K,) distinct labels, kept for as long as the object exists.
+        poses: (K, 3) x, y [m] and theta [rad], world frame.
+        twists: (K, 3) velocities in the world frame [m/s, m/s, rad/s].
+        masses: (K,) masses as the metrics count them [kg], positive.
+        wheeled: (K,) whether the object stands on casters and rolls.
+        vertices: (V, 2) convex outlines in body frames, flattened, counter-clockwise [m].
+        offsets: (K + 1,) where each outline starts in ``vertices``.
+
+    Raises:
+        InvalidInputError: if shapes disagree, an outline is not convex or off its centroid.
+    """
+
+    ids: IntArray
+    poses: FloatArray
+    twists: FloatArray
+    masses: FloatArray
+    wheeled: BoolArray
+    vertices: FloatArray
+    offsets: IntArray
+
+    def __post_init__(self) -> None:
+        put = object.__setattr__
+        put(self, "ids", array("movables.ids", self.ids, (None,), dtype=np.int64))
+        count = len(self.ids)
+        put(self, "poses", array("movables.poses", self.poses, (count, 3)))
+        put(self, "twists", array("movables.twists", self.twists, (count, 3)))
+        put(self, "masses", array("movables.masses", self.masses, (count,)))
+        put(self, "wheeled", array("movables.wheeled", self.wheeled, (count,), dtype=np.bool_))
+        put(self, "vertices", array("movables.vertices", self.vertices, (None, 2)))
+        put(self, "offsets", array("movables.offsets", self.offsets, (count + 1,), dtype=np.int64))
+        if len(np.unique(self.ids)) != count:
+            raise InvalidInputError(f"movables.ids must be distinct, got {self.ids.tolist()}")
+        if (self.masses <= 0.0).any():
+            raise InvalidInputError(f"movables.masses must be positive, got {self.masses.min()}")
+        if self.offsets[0] != 0 or self.offsets[-1] != len(self.vertices):
+            raise InvalidInputError("movables.offsets must run from 0 to the number of vertices")
+        for k in range(count):
+            name = f"outline of movable {self.ids[k]}"
+            outline = self.vertices[self.offsets[k] : self.offsets[k + 1]]
+            clean = convex_outline(name, outline)
+            if signed_area(outline) < 0.0:
+                raise InvalidInputError(f"{name} must be counter-clockwise")
+            off = centroid(clean)
+            if np.abs(off).max() > 1e-6 * np.ptp(clean, axis=0).max():
+                raise InvalidInputError(
+                    f"{name} must have its centroid at the body origin, it is at "
+                    f"({off[0]:g}, {off[1]:g}); Movables.from_polygons shifts it"
+                )
+
+    def __len__(self) -> int:
+        return len(self.ids)
+
+    @classmethod
+    def empty(cls) -> Movables:
+        """No objects."""
+        return cls.from_outlines([], np.zeros((0, 3)))
+
+    @classmethod
+    def from_outlines(
+        cls,
+        outlines: Sequence[ArrayLike],
+        poses: ArrayLike,
+        *,
+        masses: ArrayLike | None = None,
+        density: float = 1.0,
+        wheeled: ArrayLike | None = None,
+        twists: ArrayLike | None = None,
+        ids: ArrayLike | None = None,
+    ) -> Movables:
+        """Objects from body-frame outlines whose centroid is the body origin.
+
+        Args:
+            outlines: K convex outlines, each (N, 2) [m].
+            poses: (K, 3) x, y [m], theta [rad].
+            masses: (K,) [kg]; by default area times ``density``.
+            density: [kg/m²].
+            wheeled: (K,) flags, by default all false.
+            twists: (K, 3), by default zero.
+            ids: (K,), by default 0 to K - 1.
+        """
+        clean = [convex_outline(f"outline {i}", outline) for i, outline in enumerate(outlines)]
+        vertices, offsets = flatten(clean)
+        count = len(clean)
+        if masses is None:
+            density = number("density", density, low=0.0, open_low=True)
+            masses = np.array([signed_area(c) for c in clean]) * density
+        return cls(
+            ids=np.asarray(np.arange(count) if ids is None else ids),
+            poses=np.asarray(poses),
+            twists=np.asarray(np.zeros((count, 3)) if twists is None else twists),
+            masses=np.asarray(masses),
+            wheeled=np.asarray(np.zeros(count, dtype=bool) if wheeled is None else wheeled),
+            vertices=vertices,
+            offsets=offsets,
+        )
+
+    @classmethod
+    def from_polygons(
+        cls,
+        polygons: Sequence[ArrayLike],
+        *,
+        masses: ArrayLike | None = None,
+        density: float = 1.0,
+        wheeled: ArrayLike | None = None,
+        ids: ArrayLike | None = None,
+    ) -> Movables:
+        """Objects from convex polygons in the world frame, as perception reports them.
+
+        Each gets a pose at its centroid with theta = 0. Arguments as in `from_outlines`.
+        """
+        clean = [convex_outline(f"polygon {i}", polygon) for i, polygon in enumerate(polygons)]
+        centres = [centroid(c) for c in clean]
+        poses = np.array([[c[0], c[1], 0.0] for c in centres]).reshape(-1, 3)
+        outlines = [c - centre for c, centre in zip(clean, centres, strict=True)]
+        return cls.from_outlines(
+            outlines, poses, masses=masses, density=density, wheeled=wheeled, ids=ids
+        )
+
+    def outline(self, k: int) -> FloatArray:
+        """(N, 2) corners of object ``k`` in its body frame [m]."""
+        return self.vertices[self.offsets[k] : self.offsets[k + 1]]
+
+    def outline_world(self, k: int) -> FloatArray:
+        """(N, 2) corners of object ``k`` in the world frame [m]."""
+        return transform(self.poses[k], self.outline(k))
+
+    def moved_to(self, poses: ArrayLike, twists: ArrayLike | None = None) -> Movables:
+        """The same objects at other poses (K, 3); at rest unless twists (K, 3) are given.
+
+        Outlines are not checked again, so this is cheap enough for every control step.
+        """
+        count = len(self)
+        still = frozen(np.zeros((count, 3)))
+        clone = object.__new__(Movables)
+        clone.__dict__.update(
+            {key: value for key, value in self.__dict__.items() if key != "_hash"}
+        )
+        clone.__dict__["poses"] = array("poses", poses, (count, 3))
+        clone.__dict__["twists"] = still if twists is None else array("twists", twists, (count, 3))
+        return clone
+
+    def select(self, keep: ArrayLike) -> Movables:
+        """The objects whose index or flag is in ``keep``."""
+        index = np.arange(len(self))[np.asarray(keep)]
+        vertices, offsets = flatten([self.outline(int(k)) for k in index])
+        return replace(
+            self,
+            ids=self.ids[index],
+            poses=self.poses[index],
+            twists=self.twists[index],
+            masses=self.masses[index],
+            wheeled=self.wheeled[index],
+            vertices=vertices,
+            offsets=offsets,
+        )
+
+    @cached_property
+    def radii(self) -> FloatArray:
+        """(K,) radius [m] of the disc about each origin that holds the object."""
+        reach = np.hypot(self.vertices[:, 0], self.vertices[:, 1])
+        ends = self.offsets
+        return frozen(
+            np.array([reach[ends[k] : ends[k + 1]].max() for k in range(len(self))], dtype=float)
+        )

@@ -1,0 +1,86 @@
+"""What makes a list of corners a valid outline, and how ragged outlines are flattened."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from pushplan.world.checks import FloatArray, IntArray, array, frozen
+from pushplan.world.errors import InvalidInputError
+
+
+def signed_area(corners: FloatArray) -> float:
+    """Shoelace area of a polygon [m²], positive when counter-clockwise.
+
+    Args:
+        corners: (N, 2) corners [m], in order.
+    """
+    shifted = corners - corners[0]  # far from the origin the plain formula loses digits
+    x, y = shifted[:, 0], shifted[:, 1]
+    return 0.5 * float(np.dot(x, np.roll(y, -1)) - np.dot(np.roll(x, -1), y))
+
+
+def centroid(corners: FloatArray) -> FloatArray:
+    """Centre of area (2,) [m] of a simple polygon given by its (N, 2) corners [m]."""
+    shifted = corners - corners[0]
+    x, y = shifted[:, 0], shifted[:, 1]
+    cross = x * np.roll(y, -1) - np.roll(x, -1) * y
+    sums = np.array([np.dot(x + np.roll(x, -1), cross), np.dot(y + np.roll(y, -1), cross)])
+    return corners[0] + sums / (3.0 * cross.sum())
+
+
+def convex_outline(name: str, corners: ArrayLike) -> FloatArray:
+    """Check one convex outline and return it counter-clockwise, as (N, 2) [m].
+
+    Raises:
+        InvalidInputError: fewer than 3 corners, no area, repeated corners, or not convex.
+    """
+    points: FloatArray = array(name, corners, (None, 2))
+    if len(points) < 3:
+        raise InvalidInputError(f"{name} must have at least 3 corners, got {len(points)}")
+    size = float(np.ptp(points, axis=0).max())
+    area = signed_area(points)
+    if abs(area) <= 1e-9 * size * size:
+        raise InvalidInputError(f"{name} must have an area, got {abs(area):g} m²")
+    if area < 0.0:
+        points = frozen(np.ascontiguousarray(points[::-1]))
+    edges = np.roll(points, -1, axis=0) - points
+    if (np.hypot(edges[:, 0], edges[:, 1]) <= 1e-9 * size).any():
+        raise InvalidInputError(f"{name} must not repeat a corner, got {points.tolist()}")
+    following = np.roll(edges, -1, axis=0)
+    cross = edges[:, 0] * following[:, 1] - edges[:, 1] * following[:, 0]
+    turns = np.arctan2(cross, (edges * following).sum(axis=1))
+    if (cross < -1e-9 * size * size).any() or abs(turns.sum() - 2.0 * np.pi) > 1e-6:
+        raise InvalidInputError(
+            f"{name} must be convex: split it into convex parts first, got {points.tolist()}"
+        )
+    return points
+
+
+def flatten(outlines: Sequence[FloatArray]) -> tuple[FloatArray, IntArray]:
+    """Pack ragged outlines into one (V, 2) array and (K + 1,) offsets, both read-only."""
+    offsets = np.zeros(len(outlines) + 1, dtype=np.int64)
+    np.cumsum([len(outline) for outline in outlines], out=offsets[1:])
+    vertices = np.concatenate(outlines) if outlines else np.zeros((0, 2))
+    return frozen(np.ascontiguousarray(vertices)), frozen(offsets)
+
+
+def unflatten(vertices: FloatArray, offsets: IntArray) -> tuple[FloatArray, ...]:
+    """The inverse of `flatten`; the outlines are views."""
+    return tuple(vertices[a:b] for a, b in pairwise(offsets.tolist()))
+
+
+def transform(pose: ArrayLike, points_body: FloatArray) -> FloatArray:
+    """Carry (N, 2) points [m] from a body frame to the world.
+
+    Args:
+        pose: (3,) x, y [m] and theta [rad] of the body in the world frame.
+        points_body: (N, 2) points in the body frame.
+    """
+    x, y, theta = np.asarray(pose, dtype=np.float64)
+    c, s = np.cos(theta), np.sin(theta)
+    rotation = np.array([[c, -s], [s, c]])
+    return points_body @ rotation.T + np.array([x, y])

@@ -1,0 +1,163 @@
+"""What a planner returns."""
+
+from __future__ import annotations
+
+import enum
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from pushplan.world.checks import ArrayRecord, FloatArray, array, number
+from pushplan.world.errors import InvalidInputError
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+
+class PlanStatus(enum.Enum):
+    """How a planning call ended; ``remedy`` says what the caller can do about it."""
+
+    SOLVED = ("solved", "Follow the plan.")
+    APPROXIMATE = (
+        "approximate",
+        "The plan ends short of the goal: follow it and plan again from there, or allow more time.",
+    )
+    TIMED_OUT = (
+        "timed_out",
+        "No plan was found before the stop rule fired: allow more time or iterations, "
+        "or lower the price of pushing.",
+    )
+    CANCELLED = ("cancelled", "The call was cancelled before there was a plan: call again.")
+    START_BLOCKED = (
+        "start_blocked",
+        "The robot starts in collision with something static: check the pose and the footprint, "
+        "or drive clear first.",
+    )
+    GOAL_UNREACHABLE = (
+        "goal_unreachable",
+        "No path leads to the goal around the static obstacles: check the map, the bounds and "
+        "the footprint.",
+    )
+
+    def __init__(self, label: str, remedy: str) -> None:
+        self.label = label
+        self.remedy = remedy
+
+    @property
+    def has_plan(self) -> bool:
+        """Whether a result of this status carries a plan."""
+        return self in (PlanStatus.SOLVED, PlanStatus.APPROXIMATE)
+
+
+@dataclass(frozen=True, eq=False)
+class SubTask(ArrayRecord):
+    """One step of a manipulation plan: which objects are pushed, over which poses of the plan.
+
+    Args:
+        object_ids: the objects that this push takes along.
+        first: index of the first pose of the plan that belongs to it.
+        last: index of the last pose, inclusive.
+    """
+
+    object_ids: tuple[int, ...]
+    first: int
+    last: int
+
+
+@dataclass(frozen=True, eq=False)
+class Plan(ArrayRecord):
+    """A time-stamped path of the robot with its expected price.
+
+    Args:
+        times: (N,) seconds since the snapshot that was planned from, not decreasing, from 0.
+        poses: (N, 3) x, y [m], theta [rad], world frame.
+        speeds: (N,) forward speed from each pose on [m/s].
+        turn_rates: (N,) turn rate from each pose on [rad/s].
+        travel_cost: robot mass times path length [kg m].
+        interaction_cost: expected sum of object mass times path length [kg m].
+        object_poses: (N, K, 3) where the objects are expected to be at each time, or None where
+            the planner makes no prediction.
+        subtasks: the pushes in order, for manipulation.
+    """
+
+    times: FloatArray
+    poses: FloatArray
+    speeds: FloatArray
+    turn_rates: FloatArray
+    travel_cost: float
+    interaction_cost: float = 0.0
+    object_poses: FloatArray | None = None
+    subtasks: tuple[SubTask, ...] = ()
+
+    def __post_init__(self) -> None:
+        put = object.__setattr__
+        put(self, "times", array("plan.times", self.times, (None,)))
+        count = len(self.times)
+        if count == 0:
+            raise InvalidInputError("a plan needs at least one pose")
+        if self.times[0] < 0.0 or (np.diff(self.times) < 0.0).any():
+            raise InvalidInputError("plan.times must start at 0 or later and not decrease")
+        put(self, "poses", array("plan.poses", self.poses, (count, 3)))
+        put(self, "speeds", array("plan.speeds", self.speeds, (count,)))
+        put(self, "turn_rates", array("plan.turn_rates", self.turn_rates, (count,)))
+        put(self, "travel_cost", number("plan.travel_cost", self.travel_cost, low=0.0))
+        cost = number("plan.interaction_cost", self.interaction_cost, low=0.0)
+        put(self, "interaction_cost", cost)
+        if self.object_poses is not None:
+            put(
+                self,
+                "object_poses",
+                array("plan.object_poses", self.object_poses, (count, None, 3)),
+            )
+
+    @property
+    def cost(self) -> float:
+        """Travel plus interaction [kg m]."""
+        return self.travel_cost + self.interaction_cost
+
+    @property
+    def duration(self) -> float:
+        """Time from the first to the last pose [s]."""
+        return float(self.times[-1] - self.times[0])
+
+    @property
+    def length(self) -> float:
+        """Path length of the robot [m]."""
+        steps = np.diff(self.poses[:, :2], axis=0)
+        return float(np.hypot(steps[:, 0], steps[:, 1]).sum())
+
+
+@dataclass(frozen=True)
+class PlanStats:
+    """What a planning call did.
+
+    Args:
+        wall_time_s: time inside the call [s].
+        first_solution_s: time until the first plan that reaches the goal [s], NaN if none.
+        iterations: how often the planner's main loop ran.
+        nodes: how many states it kept.
+        detail: further numbers of the algorithm, by name.
+    """
+
+    wall_time_s: float
+    first_solution_s: float = float("nan")
+    iterations: int = 0
+    nodes: int = 0
+    detail: Mapping[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class PlanResult:
+    """Outcome of one planning call. ``plan`` is set exactly when ``status.has_plan``."""
+
+    status: PlanStatus
+    plan: Plan | None
+    stats: PlanStats
+
+    def __post_init__(self) -> None:
+        if (self.plan is not None) != self.status.has_plan:
+            raise InvalidInputError(
+                f"a result with status {self.status.label} must "
+                f"{'have a' if self.status.has_plan else 'not have a'} plan"
+            )

@@ -1,0 +1,68 @@
+"""The three contracts that everything is built on."""
+
+from __future__ import annotations
+
+from typing import Any, Protocol, runtime_checkable
+
+import numpy as np
+
+from pushplan.world.actions import Action, Twist
+from pushplan.world.plan import Plan, PlanResult
+from pushplan.world.scene import World
+from pushplan.world.stop import Stop
+
+
+@runtime_checkable
+class Planner(Protocol):
+    """Finds a path for the robot in a snapshot of the world."""
+
+    def plan(
+        self,
+        world: World,
+        *,
+        stop: Stop | None = None,
+        rng: np.random.Generator | None = None,
+    ) -> PlanResult:
+        """Plan from ``world`` until done or until ``stop`` fires.
+
+        Args:
+            world: the snapshot; it is not changed.
+            stop: when to return; the planner's own default if None. Wall clock enters only here.
+            rng: the only source of randomness; a generator seeded with 0 if None.
+
+        Returns:
+            A status, and a plan where there is one. Not finding a path is a status.
+        """
+        ...
+
+
+@runtime_checkable
+class Controller(Protocol):
+    """Follows a plan."""
+
+    def command(self, world: World, plan: Plan) -> Twist:
+        """The velocity to drive now, within the robot's limits.
+
+        Args:
+            world: the snapshot now; its time says how far the plan has run.
+            plan: the plan to follow.
+        """
+        ...
+
+
+@runtime_checkable
+class Policy(Protocol):
+    """Chooses what to do, step after step: a planner with a controller, a network, a person."""
+
+    def reset(self, world: World, rng: np.random.Generator) -> None:
+        """Forget the last episode; ``world`` is the start of the next one."""
+        ...
+
+    def act(self, world: World, observation: Any) -> Action:
+        """The action for this step.
+
+        Args:
+            world: the exact snapshot.
+            observation: what the environment observed, for policies that were trained on it.
+        """
+        ...

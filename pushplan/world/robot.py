@@ -1,0 +1,127 @@
+"""What a robot is to a planner: a footprint, a mass, and how it may move."""
+
+from __future__ import annotations
+
+import enum
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from pushplan.world.checks import ArrayRecord, FloatArray, IntArray, choice, number
+from pushplan.world.errors import InvalidInputError
+from pushplan.world.outline import convex_outline, flatten
+
+
+class Drive(enum.StrEnum):
+    """How the robot may move."""
+
+    CONSTANT_SPEED = "constant_speed"
+    """Always forward at ``max_speed``; only the turn rate is free (Maze robot, ship)."""
+    DIFFERENTIAL = "differential"
+    """Forward speed in [min_speed, max_speed] and turn rate are free; may turn on the spot."""
+
+
+@dataclass(frozen=True, eq=False)
+class RobotModel(ArrayRecord):
+    """Footprint, mass and motion limits of a robot. Body frame: x forward, y left.
+
+    Args:
+        parts: convex parts of the footprint, each (N, 2) corners in the body frame [m].
+        mass: mass as the metrics count it [kg].
+        drive: how it may move.
+        max_speed: greatest forward speed [m/s]; the speed itself for a constant-speed drive.
+        max_turn_rate: greatest |turn rate| [rad/s].
+        min_speed: least forward speed [m/s], negative if it may reverse.
+        max_acceleration: limit of |dv/dt| [m/s²]; infinite where speed can jump.
+        max_turn_acceleration: limit of |dω/dt| [rad/s²].
+        wheel_separation: distance between the driven wheels [m], 0 if there are none.
+        name: for logs and pictures.
+
+    Raises:
+        InvalidInputError: if a part is not convex or a limit has no sense.
+    """
+
+    parts: tuple[FloatArray, ...]
+    mass: float
+    drive: Drive
+    max_speed: float
+    max_turn_rate: float
+    min_speed: float = 0.0
+    max_acceleration: float = math.inf
+    max_turn_acceleration: float = math.inf
+    wheel_separation: float = 0.0
+    name: str = "robot"
+
+    def __post_init__(self) -> None:
+        if isinstance(self.parts, str) or not isinstance(self.parts, Sequence) or not self.parts:
+            raise InvalidInputError("robot.parts must be a non-empty list of convex outlines")
+        put = object.__setattr__
+        put(
+            self,
+            "parts",
+            tuple(convex_outline(f"robot.parts[{i}]", p) for i, p in enumerate(self.parts)),
+        )
+        put(self, "mass", number("robot.mass", self.mass, low=0.0, open_low=True))
+        put(self, "drive", Drive(choice("drive", self.drive, [d.value for d in Drive])))
+        speed = number("robot.max_speed", self.max_speed, low=0.0, open_low=True)
+        put(self, "max_speed", speed)
+        low = number("robot.min_speed", self.min_speed, high=speed)
+        put(self, "min_speed", speed if self.drive is Drive.CONSTANT_SPEED else low)
+        for key in ("max_turn_rate",):
+            put(self, key, number(f"robot.{key}", getattr(self, key), low=0.0, open_low=True))
+        for key in ("max_acceleration", "max_turn_acceleration"):
+            value = number(f"robot.{key}", getattr(self, key), low=0.0, open_low=True, finite=False)
+            put(self, key, value)
+        put(
+            self,
+            "wheel_separation",
+            number("robot.wheel_separation", self.wheel_separation, low=0.0),
+        )
+        if not isinstance(self.name, str):
+            raise InvalidInputError(f"robot.name must be a text, got {self.name!r}")
+
+    @classmethod
+    def from_outline(cls, outline: ArrayLike, **limits: object) -> RobotModel:
+        """A robot whose footprint is one convex outline (N, 2) [m]; the rest as in the class."""
+        return cls(parts=(np.asarray(outline),), **limits)  # type: ignore[arg-type]
+
+    @cached_property
+    def _flat(self) -> tuple[FloatArray, IntArray]:
+        return flatten(self.parts)
+
+    @property
+    def vertices(self) -> FloatArray:
+        """(V, 2) corners of all parts in the body frame [m], one part after the other."""
+        return self._flat[0]
+
+    @property
+    def offsets(self) -> IntArray:
+        """(P + 1,) where each part starts in `vertices`."""
+        return self._flat[1]
+
+    @cached_property
+    def circumscribed_radius(self) -> float:
+        """Radius [m] of the disc about the body origin that holds the footprint."""
+        return float(np.hypot(self.vertices[:, 0], self.vertices[:, 1]).max())
+
+    @cached_property
+    def inscribed_radius(self) -> float:
+        """Radius [m] of the largest disc about the body origin inside one part, 0 if none."""
+        best = 0.0
+        for part in self.parts:
+            edges = np.roll(part, -1, axis=0) - part
+            # distance of the origin to each edge line, positive inside a counter-clockwise part
+            inside = (edges[:, 1] * part[:, 0] - edges[:, 0] * part[:, 1]) / np.hypot(
+                edges[:, 0], edges[:, 1]
+            )
+            best = max(best, float(inside.min()))
+        return best
+
+    @property
+    def turning_radius(self) -> float:
+        """Least turning radius at full speed [m]."""
+        return self.max_speed / self.max_turn_rate

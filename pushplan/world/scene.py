@@ -1,0 +1,97 @@
+"""`World`: a frozen snapshot of everything that a planner may know."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from pushplan.world.checks import ArrayRecord, FloatArray, array, number
+from pushplan.world.errors import InvalidInputError
+from pushplan.world.goals import ClearanceArea, Goal, GoalDisc, GoalLine, NavigationGoal, Receptacle
+from pushplan.world.movables import Movables
+from pushplan.world.outline import transform
+from pushplan.world.robot import RobotModel
+from pushplan.world.static_map import StaticMap
+
+
+@dataclass(frozen=True, eq=False)
+class World(ArrayRecord):
+    """A scene at one instant, filled in by a simulator or by perception.
+
+    SI units, radians, x forward and y left in body frames, one world frame for all poses.
+
+    Args:
+        robot: footprint, mass and limits.
+        robot_pose: (3,) x, y [m], theta [rad].
+        static: what never moves.
+        movables: what may be pushed.
+        goal: where the robot, or the objects, have to go.
+        robot_twist: (3,) velocity in the world frame [m/s, m/s, rad/s]; at rest if None.
+        time: [s].
+
+    Raises:
+        InvalidInputError: if a member has the wrong type or shape or is not finite.
+    """
+
+    robot: RobotModel
+    robot_pose: FloatArray
+    static: StaticMap
+    movables: Movables
+    goal: Goal
+    robot_twist: FloatArray | None = None
+    time: float = 0.0
+
+    def __post_init__(self) -> None:
+        for key, kind in (("robot", RobotModel), ("static", StaticMap), ("movables", Movables)):
+            if not isinstance(getattr(self, key), kind):
+                raise InvalidInputError(
+                    f"world.{key} must be a {kind.__name__}, got {type(getattr(self, key)).__name__}"
+                )
+        if not isinstance(self.goal, GoalDisc | GoalLine | Receptacle | ClearanceArea):
+            raise InvalidInputError(
+                "world.goal must be a GoalDisc, GoalLine, Receptacle or ClearanceArea, "
+                f"got {type(self.goal).__name__}"
+            )
+        put = object.__setattr__
+        put(self, "robot_pose", array("world.robot_pose", self.robot_pose, (3,)))
+        twist = np.zeros(3) if self.robot_twist is None else self.robot_twist
+        put(self, "robot_twist", array("world.robot_twist", twist, (3,)))
+        put(self, "time", number("world.time", self.time))
+
+    @property
+    def navigation_goal(self) -> NavigationGoal:
+        """The goal, where it is one for the robot itself.
+
+        Raises:
+            InvalidInputError: if it is a goal for the objects.
+        """
+        if not isinstance(self.goal, GoalDisc | GoalLine):
+            raise InvalidInputError(
+                "this needs a goal for the robot (GoalDisc or GoalLine), "
+                f"got {type(self.goal).__name__}"
+            )
+        return self.goal
+
+    def robot_outline_world(self) -> tuple[FloatArray, ...]:
+        """Footprint parts, each (N, 2) corners in the world frame [m]."""
+        return tuple(transform(self.robot_pose, part) for part in self.robot.parts)
+
+    def moved(
+        self,
+        *,
+        robot_pose: ArrayLike | None = None,
+        movable_poses: ArrayLike | None = None,
+        time: float | None = None,
+    ) -> World:
+        """The same scene with the robot or the objects elsewhere, and at rest."""
+        changes: dict[str, Any] = {}
+        if robot_pose is not None:
+            changes.update(robot_pose=robot_pose, robot_twist=None)
+        if movable_poses is not None:
+            changes["movables"] = self.movables.moved_to(movable_poses)
+        if time is not None:
+            changes["time"] = time
+        return replace(self, **changes)

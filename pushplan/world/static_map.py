@@ -1,0 +1,116 @@
+"""What never moves: walls, columns, dividers."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from pushplan.world.checks import ArrayRecord, FloatArray, array, frozen
+from pushplan.world.errors import InvalidInputError
+from pushplan.world.outline import convex_outline
+
+CAP_CORNERS = 9
+"""Corners of each half circle where a thick segment is turned into a polygon."""
+
+
+@dataclass(frozen=True, eq=False)
+class StaticMap(ArrayRecord):
+    """Walls and columns: convex polygons and thick segments, in the world frame.
+
+    Args:
+        polygons: convex outlines, each (N, 2) [m]; cut other shapes into convex parts.
+        segments: (S, 4) centre lines x1, y1, x2, y2 [m].
+        radii: (S,) half thickness of each segment [m].
+        bounds: (4,) x_min, y_min, x_max, y_max [m]: where planners may look for paths. By
+            default the box around everything static.
+
+    Raises:
+        InvalidInputError: if an outline is not convex, a radius is negative, or the bounds are
+            empty.
+    """
+
+    polygons: tuple[FloatArray, ...]
+    segments: FloatArray
+    radii: FloatArray
+    bounds: FloatArray
+
+    def __post_init__(self) -> None:
+        if isinstance(self.polygons, str) or not isinstance(self.polygons, Sequence):
+            raise InvalidInputError("static.polygons must be a list of convex outlines")
+        put = object.__setattr__
+        clean = [convex_outline(f"static.polygons[{i}]", p) for i, p in enumerate(self.polygons)]
+        put(self, "polygons", tuple(clean))
+        put(self, "segments", array("static.segments", self.segments, (None, 4)))
+        put(self, "radii", array("static.radii", self.radii, (len(self.segments),)))
+        put(self, "bounds", array("static.bounds", self.bounds, (4,)))
+        if (self.radii < 0.0).any():
+            raise InvalidInputError(f"static.radii must not be negative, got {self.radii.min()}")
+        if (self.bounds[:2] >= self.bounds[2:]).any():
+            raise InvalidInputError(
+                "static.bounds must be x_min, y_min, x_max, y_max with min < max, "
+                f"got {self.bounds.tolist()}"
+            )
+
+    @classmethod
+    def build(
+        cls,
+        polygons: Sequence[ArrayLike] = (),
+        segments: ArrayLike = (),
+        radii: ArrayLike | float = 0.0,
+        bounds: ArrayLike | None = None,
+    ) -> StaticMap:
+        """A map with defaults filled in: one radius for all segments, bounds around all.
+
+        Raises:
+            InvalidInputError: as the class; also if there is neither an obstacle nor bounds.
+        """
+        lines: FloatArray = array("static.segments", segments, (None, 4))
+        try:
+            thick = np.broadcast_to(np.asarray(radii, dtype=np.float64), (len(lines),))
+        except (ValueError, TypeError) as error:
+            raise InvalidInputError(
+                f"static.radii must be one number or {len(lines)} of them, got {radii!r}"
+            ) from error
+        shapes = tuple(np.asarray(p) for p in polygons)
+        if bounds is None:
+            corners = [
+                *(convex_outline("static polygon", p) for p in shapes),
+                lines[:, :2] - thick[:, None],
+                lines[:, :2] + thick[:, None],
+                lines[:, 2:] - thick[:, None],
+                lines[:, 2:] + thick[:, None],
+            ]
+            every = np.concatenate(corners)
+            if len(every) == 0:
+                raise InvalidInputError("a static map without obstacles needs bounds")
+            bounds = np.concatenate([every.min(axis=0), every.max(axis=0)])
+        return cls(shapes, lines, thick, np.asarray(bounds))
+
+    @cached_property
+    def convex_parts(self) -> tuple[FloatArray, ...]:
+        """Every obstacle as a convex polygon (N, 2) [m].
+
+        A thick segment becomes a polygon around its rounded outline, at most
+        1.6 % of the radius too large at the caps and nowhere too small; a segment of radius 0
+        becomes one that is 1 mm thick.
+        """
+        ends = [
+            _capsule(line[:2], line[2:], max(float(radius), 5e-4))
+            for line, radius in zip(self.segments, self.radii, strict=True)
+        ]
+        return (*self.polygons, *ends)
+
+
+def _capsule(a: FloatArray, b: FloatArray, radius: float) -> FloatArray:
+    """Circumscribed convex polygon of the points within ``radius`` of the segment a-b."""
+    along = b - a
+    heading = float(np.arctan2(along[1], along[0])) if along.any() else 0.0
+    # corners of a circumscribed circle lie between its points of tangency
+    step = np.pi / CAP_CORNERS
+    angles = heading - np.pi / 2 + step * (np.arange(CAP_CORNERS) + 0.5)
+    cap = radius / np.cos(step / 2) * np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    return frozen(np.ascontiguousarray(np.concatenate([b + cap, a - cap])))

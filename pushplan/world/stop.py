@@ -1,0 +1,147 @@
+"""When a planner has to return. Rules compose with ``|``: the first to fire ends the call.
+
+A rule is plain data and may be used for any number of calls. A planner arms it with `start`
+at the beginning of each call and asks the running check once per iteration.
+"""
+
+from __future__ import annotations
+
+import math
+import threading
+import time
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from typing import Protocol
+
+from pushplan.world.checks import integer, number
+from pushplan.world.errors import InvalidInputError
+
+
+class StopCheck(Protocol):
+    """A rule that has been armed for one planning call."""
+
+    def __call__(self, iterations: int, cost: float) -> bool:
+        """Whether to return now.
+
+        Args:
+            iterations: main-loop iterations so far.
+            cost: cost of the best plan so far [kg m], infinite while there is none.
+        """
+        ...
+
+
+class Stop(ABC):
+    """A rule that says when a planning call has to return."""
+
+    @abstractmethod
+    def start(self) -> StopCheck:
+        """Arm the rule for one call."""
+
+    def __or__(self, other: Stop) -> Stop:
+        if not isinstance(other, Stop):
+            return NotImplemented
+        return AnyOf((*_rules(self), *_rules(other)))
+
+    @property
+    def seconds(self) -> float:
+        """Wall-clock budget of the rule [s], infinite if it has none."""
+        return math.inf
+
+    @property
+    def cancelled(self) -> bool:
+        """Whether a cancellation token in the rule has been used."""
+        return False
+
+
+@dataclass(frozen=True)
+class Deadline(Stop):
+    """Return after this much wall-clock time.
+
+    Args:
+        budget_s: seconds from the beginning of the call, not negative.
+    """
+
+    budget_s: float
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "budget_s", number("Deadline seconds", self.budget_s, low=0.0))
+
+    @property
+    def seconds(self) -> float:
+        return self.budget_s
+
+    def start(self) -> StopCheck:
+        end = time.perf_counter() + self.budget_s
+        return lambda iterations, cost: time.perf_counter() >= end
+
+
+@dataclass(frozen=True)
+class MaxIterations(Stop):
+    """Return after this many main-loop iterations: the same result on every machine."""
+
+    limit: int
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "limit", integer("MaxIterations limit", self.limit, low=0))
+
+    def start(self) -> StopCheck:
+        return lambda iterations, cost: iterations >= self.limit
+
+
+@dataclass(frozen=True)
+class FirstSolution(Stop):
+    """Return as soon as there is a plan."""
+
+    def start(self) -> StopCheck:
+        return lambda iterations, cost: cost < math.inf
+
+
+class Cancellation(Stop):
+    """A token that another thread may use to end the call, and every later one.
+
+    Example:
+        >>> token = Cancellation()
+        >>> rule = Deadline(1.0) | token
+        >>> token.cancel()
+        >>> rule.cancelled
+        True
+    """
+
+    def __init__(self) -> None:
+        self._event = threading.Event()
+
+    def cancel(self) -> None:
+        """End the calls that use this token."""
+        self._event.set()
+
+    @property
+    def cancelled(self) -> bool:
+        return self._event.is_set()
+
+    def start(self) -> StopCheck:
+        return lambda iterations, cost: self._event.is_set()
+
+
+class AnyOf(Stop):
+    """Return when any of the rules says so; what ``|`` makes."""
+
+    def __init__(self, rules: tuple[Stop, ...]) -> None:
+        if not rules or not all(isinstance(rule, Stop) for rule in rules):
+            raise InvalidInputError(f"AnyOf needs stop rules, got {rules!r}")
+        self.rules = rules
+
+    @property
+    def seconds(self) -> float:
+        return min(rule.seconds for rule in self.rules)
+
+    @property
+    def cancelled(self) -> bool:
+        return any(rule.cancelled for rule in self.rules)
+
+    def start(self) -> StopCheck:
+        checks = [rule.start() for rule in self.rules]
+        return lambda iterations, cost: any(check(iterations, cost) for check in checks)
+
+
+def _rules(stop: Stop) -> tuple[Stop, ...]:
+    return stop.rules if isinstance(stop, AnyOf) else (stop,)
