@@ -1,1 +1,28 @@
-"""TODO."""
+"""Compiled geometry: polygons, rasters, grids, shortest paths and distance fields."""
+
+from pushplan.geometry.convex import convex_distance, convex_overlap, convex_penetration
+from pushplan.geometry.grid import Grid, clearance_field, occupancy
+from pushplan.geometry.polygon import (
+    point_in_polygon,
+    polygon_area,
+    polygon_centroid,
+    polygon_inertia,
+    transform_points,
+)
+from pushplan.geometry.raster import fill_convex, fill_convex_parts
+
+__all__ = [
+    "Grid",
+    "clearance_field",
+    "convex_distance",
+    "convex_overlap",
+    "convex_penetration",
+    "fill_convex",
+    "fill_convex_parts",
+    "occupancy",
+    "point_in_polygon",
+    "polygon_area",
+    "polygon_centroid",
+    "polygon_inertia",
+    "transform_points",
+]

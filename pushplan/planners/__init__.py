@@ -1,1 +1,40 @@
-"""TODO."""
+"""Planners and the policies made of them. Imports no simulator and no learning library."""
+
+from pushplan.planners.registry import make_planner, make_policy, planner_names, policy_names
+from pushplan.world import Deadline, MaxIterations, Planner, PlanResult, PlanStatus, Policy, World
+
+__all__ = [
+    "Deadline",
+    "GeometricRRT",
+    "KinodynamicRRT",
+    "MaxIterations",
+    "PlanFollower",
+    "PlanResult",
+    "PlanStatus",
+    "Planner",
+    "Policy",
+    "ShortestPath",
+    "World",
+    "make_planner",
+    "make_policy",
+    "planner_names",
+    "policy_for",
+    "policy_names",
+]
+
+_LAZY = {
+    "GeometricRRT": "pushplan.planners.geometric",
+    "KinodynamicRRT": "pushplan.planners.kinodynamic",
+    "PlanFollower": "pushplan.planners.policy",
+    "ShortestPath": "pushplan.planners.straight",
+    "policy_for": "pushplan.planners.policy",
+}
+
+
+def __getattr__(name: str) -> object:
+    """Import a planner when it is first asked for."""
+    if name not in _LAZY:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    import importlib
+
+    return getattr(importlib.import_module(_LAZY[name]), name)

@@ -33,6 +33,12 @@ class GoalDisc(ArrayRecord):
         gap = float(np.hypot(x - self.center[0], y - self.center[1])) - self.radius
         return max(0.0, gap)
 
+    def contains(self, points: FloatArray) -> BoolArray:
+        """Which of the (..., 2) points [m] count as the goal."""
+        offset = points - self.center
+        inside: BoolArray = np.hypot(offset[..., 0], offset[..., 1]) <= self.radius
+        return inside
+
 
 @dataclass(frozen=True, eq=False)
 class GoalLine(ArrayRecord):
@@ -57,6 +63,11 @@ class GoalLine(ArrayRecord):
     def distance(self, x: float, y: float) -> float:
         """Straight distance [m] from a point to the line, 0 on it or beyond."""
         return max(0.0, float(np.dot(self.point - np.array([x, y]), self.normal)))
+
+    def contains(self, points: FloatArray) -> BoolArray:
+        """Which of the (..., 2) points [m] are on the line or beyond."""
+        beyond: BoolArray = (points - self.point) @ self.normal >= 0.0
+        return beyond
 
 
 @dataclass(frozen=True, eq=False)

@@ -68,9 +68,11 @@ class Deadline(Stop):
 
     @property
     def seconds(self) -> float:
+        """The budget [s]."""
         return self.budget_s
 
     def start(self) -> StopCheck:
+        """Arm the rule: the clock starts now."""
         end = time.perf_counter() + self.budget_s
         return lambda iterations, cost: time.perf_counter() >= end
 
@@ -85,6 +87,7 @@ class MaxIterations(Stop):
         object.__setattr__(self, "limit", integer("MaxIterations limit", self.limit, low=0))
 
     def start(self) -> StopCheck:
+        """Arm the rule for one call."""
         return lambda iterations, cost: iterations >= self.limit
 
 
@@ -93,6 +96,7 @@ class FirstSolution(Stop):
     """Return as soon as there is a plan."""
 
     def start(self) -> StopCheck:
+        """Arm the rule for one call."""
         return lambda iterations, cost: cost < math.inf
 
 
@@ -116,9 +120,11 @@ class Cancellation(Stop):
 
     @property
     def cancelled(self) -> bool:
+        """Whether `cancel` was called."""
         return self._event.is_set()
 
     def start(self) -> StopCheck:
+        """Arm the rule for one call."""
         return lambda iterations, cost: self._event.is_set()
 
 
@@ -132,13 +138,16 @@ class AnyOf(Stop):
 
     @property
     def seconds(self) -> float:
+        """The least budget among the rules [s]."""
         return min(rule.seconds for rule in self.rules)
 
     @property
     def cancelled(self) -> bool:
+        """Whether any token among the rules was used."""
         return any(rule.cancelled for rule in self.rules)
 
     def start(self) -> StopCheck:
+        """Arm the rule for one call."""
         checks = [rule.start() for rule in self.rules]
         return lambda iterations, cost: any(check(iterations, cost) for check in checks)
 

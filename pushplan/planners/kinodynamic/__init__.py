@@ -1,1 +1,5 @@
-"""TODO."""
+"""Planning with the robot's own way of moving, and with the price of what it pushes."""
+
+from pushplan.planners.kinodynamic.rrt import KinodynamicRRT, KinodynamicRRTConfig
+
+__all__ = ["KinodynamicRRT", "KinodynamicRRTConfig"]

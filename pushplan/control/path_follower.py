@@ -1,0 +1,95 @@
+"""`PathFollower`: drive a smooth plan exactly, with feedback on what is left of the error."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from pushplan.control.limits import TwistLimiter, clamp_twist
+from pushplan.control.tracking import Progress
+from pushplan.world import Drive, Plan, Twist, World
+from pushplan.world.checks import number
+
+
+@dataclass
+class PathFollower:
+    """The plan's own curvature, plus feedback on offset and heading.
+
+    With offset d (left of the path positive), heading error ψ and path curvature κ the command is
+    ω = v (κ cos ψ / (1 - κ d) - d / l² - 2 sin ψ / l): a critically damped return to the path over
+    the distance l (the chained-form path follower of Samson, 1995, linearised). The curvature is
+    taken half a control period ahead, since a command is held for one. Ruckig keeps speed and
+    turn rate within the robot's acceleration limits.
+
+    Args:
+        distance: l, in units of the robot's circumscribed radius.
+        period: time for which the first command is held [s]; later ones are held for as long as
+            the clock of the world shows.
+    """
+
+    distance: float = 0.8
+    period: float = 0.1
+
+    def __post_init__(self) -> None:
+        number("distance", self.distance, low=0.0, open_low=True)
+        number("period", self.period, low=0.0, open_low=True)
+        self._progress = Progress(window=1.0)
+        self._limiter: TwistLimiter | None = None
+        self._held = self.period
+        self._last_time = math.inf
+
+    def command(self, world: World, plan: Plan) -> Twist:
+        """See `pushplan.world.Controller`.
+
+        Past the end of the plan a differential drive stops; a constant-speed robot drives on
+        along the last heading.
+        """
+        robot = world.robot
+        size = robot.circumscribed_radius
+        progress = self._prepare(world)
+        x, y, theta = (float(value) for value in world.robot_pose)
+        along = progress.update(plan, x, y)
+        path_x, path_y, path_theta = (float(value) for value in progress.pose(along))
+        index = progress.index(along)
+        speed = float(plan.speeds[index])
+        over = along >= progress.total - 1e-9
+        if over and robot.drive is Drive.DIFFERENTIAL:
+            return self._limit(Twist(0.0, 0.0))
+        ahead = progress.index(min(along + 0.5 * self._held * speed, progress.total))
+        curvature = 0.0 if over else float(plan.turn_rates[ahead]) / max(plan.speeds[ahead], 1e-9)
+        offset = math.cos(path_theta) * (y - path_y) - math.sin(path_theta) * (x - path_x)
+        error = (theta - path_theta + math.pi) % (2.0 * math.pi) - math.pi
+        length = self.distance * size
+        wanted = curvature * math.cos(error) / max(1.0 - curvature * offset, 0.2)
+        # a large offset asks for a heading across the path, not for ever sharper turns
+        wanted -= max(min(offset / length**2, 1.2 / length), -1.2 / length)
+        wanted -= 2.0 * math.sin(error) / length
+        if abs(error) > math.pi / 2:
+            wanted = -math.copysign(math.inf, error)
+        if robot.drive is Drive.DIFFERENTIAL:
+            if abs(error) > math.pi / 4:
+                turn = math.copysign(robot.max_turn_rate, -error)
+                return self._limit(clamp_twist(robot, 0.0, turn))
+            speed = min(speed, robot.max_turn_rate / max(abs(wanted), 1e-9))
+        turn = max(min(speed * wanted, robot.max_turn_rate), -robot.max_turn_rate)
+        return self._limit(Twist(speed, turn))
+
+    def _prepare(self, world: World) -> Progress:
+        """Start afresh where the clock has been set back or the robot is another one."""
+        robot = world.robot
+        if self._limiter is None or world.time <= self._last_time or self._limiter.robot != robot:
+            self._progress = Progress(window=2.0 * robot.circumscribed_radius)
+            self._limiter = TwistLimiter(robot)
+            assert world.robot_twist is not None
+            vx, vy, omega = (float(value) for value in world.robot_twist)
+            theta = float(world.robot_pose[2])
+            self._limiter.reset(vx * math.cos(theta) + vy * math.sin(theta), omega)
+            self._held = self.period
+        else:
+            self._held = world.time - self._last_time
+        self._last_time = world.time
+        return self._progress
+
+    def _limit(self, wanted: Twist) -> Twist:
+        assert self._limiter is not None
+        return self._limiter.step(wanted, self._held)

@@ -1,0 +1,54 @@
+"""`PurePursuit`: steer at a point on the path a fixed distance ahead."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from pushplan.control.limits import clamp_twist
+from pushplan.control.tracking import Progress
+from pushplan.world import Drive, Plan, Twist, World
+from pushplan.world.checks import number
+
+
+@dataclass
+class PurePursuit:
+    """Pure pursuit (Coulter, CMU-RI-TR-92-01): the arc through a point ahead on the path.
+
+    Good for paths with corners, which it rounds; it cuts curves by about l² κ / 8. Where a plan is
+    smooth and its turn rates matter, use `PathFollower`.
+
+    Args:
+        lookahead: l, in units of the robot's circumscribed radius.
+    """
+
+    lookahead: float = 1.0
+
+    def __post_init__(self) -> None:
+        number("lookahead", self.lookahead, low=0.0, open_low=True)
+        self._progress: Progress | None = None
+
+    def command(self, world: World, plan: Plan) -> Twist:
+        """See `pushplan.world.Controller`. Past the end of the plan it drives straight on."""
+        robot = world.robot
+        reach = self.lookahead * robot.circumscribed_radius
+        if self._progress is None:
+            self._progress = Progress(window=2.0 * reach)
+        progress = self._progress
+        x, y, theta = (float(value) for value in world.robot_pose)
+        along = progress.update(plan, x, y)
+        aim = progress.pose(min(along + reach, progress.total))
+        overrun = along + reach - progress.total
+        if overrun > 0.0:  # continue the last heading beyond the end
+            aim = aim + [overrun * math.cos(aim[2]), overrun * math.sin(aim[2]), 0.0]
+        dx, dy = aim[0] - x, aim[1] - y
+        bearing = (math.atan2(dy, dx) - theta + math.pi) % (2.0 * math.pi) - math.pi
+        speed = float(plan.speeds[progress.index(along)])
+        if robot.drive is Drive.DIFFERENTIAL and abs(bearing) > math.pi / 4:
+            return clamp_twist(robot, 0.0, math.copysign(robot.max_turn_rate, bearing))
+        curvature = 2.0 * math.sin(bearing) / max(math.hypot(dx, dy), 1e-9)
+        if robot.drive is Drive.DIFFERENTIAL and abs(curvature) * speed > robot.max_turn_rate:
+            speed = robot.max_turn_rate / abs(curvature)
+        if abs(bearing) > math.pi / 2:  # the point is behind: turn as fast as possible
+            return clamp_twist(robot, speed, math.copysign(robot.max_turn_rate, bearing))
+        return clamp_twist(robot, speed, speed * curvature)

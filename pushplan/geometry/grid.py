@@ -1,0 +1,136 @@
+"""Regular grids over the floor, and the static map on them."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+from numpy.typing import ArrayLike
+
+from pushplan.geometry.obstacles import obstacle_distance, obstacles_of
+from pushplan.world import InvalidInputError, StaticMap
+from pushplan.world.checks import (
+    ArrayRecord,
+    BoolArray,
+    FloatArray,
+    IntArray,
+    array,
+    frozen,
+    integer,
+    number,
+)
+
+MAX_CELLS = 50_000_000
+
+
+@dataclass(frozen=True, eq=False)
+class Grid(ArrayRecord):
+    """Square cells; row i runs along y, column j along x.
+
+    The centre of cell (i, j) is at ``origin + ((j + 0.5), (i + 0.5)) * resolution``.
+
+    Args:
+        origin: (2,) corner of the grid with least x and y [m], world frame.
+        resolution: side of a cell [m].
+        shape: rows, columns.
+    """
+
+    origin: FloatArray
+    resolution: float
+    shape: tuple[int, int]
+
+    def __post_init__(self) -> None:
+        put = object.__setattr__
+        put(self, "origin", array("grid.origin", self.origin, (2,)))
+        step = number("grid.resolution", self.resolution, low=0.0, open_low=True)
+        put(self, "resolution", step)
+        if len(self.shape) != 2:
+            raise InvalidInputError(f"grid.shape must be (rows, columns), got {self.shape!r}")
+        rows, cols = (integer("grid.shape", n, low=1) for n in self.shape)
+        if rows * cols > MAX_CELLS:
+            raise InvalidInputError(
+                f"a grid may have at most {MAX_CELLS} cells, {rows} x {cols} are too many: "
+                "use a coarser resolution"
+            )
+        put(self, "shape", (rows, cols))
+
+    @classmethod
+    def cover(cls, bounds: ArrayLike, resolution: float) -> Grid:
+        """The smallest grid from the lower corner of ``bounds`` (4,) [m] that covers them."""
+        box: FloatArray = array("bounds", bounds, (4,))
+        step = number("resolution", resolution, low=0.0, open_low=True)
+        if (box[:2] >= box[2:]).any():
+            raise InvalidInputError(
+                f"bounds must be x_min, y_min, x_max, y_max with min < max, got {box.tolist()}"
+            )
+        # a width of 15.000000000001 cells is 15 cells
+        cols, rows = (max(1, math.ceil(w / step - 1e-9)) for w in (box[2:] - box[:2]).tolist())
+        return cls(box[:2], step, (rows, cols))
+
+    @property
+    def x(self) -> FloatArray:
+        """(columns,) x of the cell centres [m]."""
+        centres: FloatArray = self.origin[0] + (np.arange(self.shape[1]) + 0.5) * self.resolution
+        return centres
+
+    @property
+    def y(self) -> FloatArray:
+        """(rows,) y of the cell centres [m]."""
+        centres: FloatArray = self.origin[1] + (np.arange(self.shape[0]) + 0.5) * self.resolution
+        return centres
+
+    def cell(self, x: float, y: float) -> tuple[int, int]:
+        """Row and column of the cell that holds a point; may lie outside the grid."""
+        col = math.floor((x - self.origin[0]) / self.resolution)
+        row = math.floor((y - self.origin[1]) / self.resolution)
+        return row, col
+
+
+@njit(cache=True, nogil=True)
+def _fill_clearance(
+    out: FloatArray,
+    ox: float,
+    oy: float,
+    step: float,
+    vertices: FloatArray,
+    offsets: IntArray,
+    radii: FloatArray,
+) -> None:
+    for i in range(out.shape[0]):
+        y = oy + (i + 0.5) * step
+        for j in range(out.shape[1]):
+            x = ox + (j + 0.5) * step
+            out[i, j] = obstacle_distance(x, y, vertices, offsets, radii)
+
+
+def clearance_field(static: StaticMap, grid: Grid) -> FloatArray:
+    """Distance [m] of each cell centre to the nearest static obstacle, as (rows, columns).
+
+    Exact Euclidean distance outside the obstacles, negative inside (minus the depth in the
+    obstacle in which the cell lies deepest), inf in a map without obstacles. The bounds of the
+    map are no obstacle.
+    """
+    shapes = obstacles_of(static)
+    out = np.empty(grid.shape)
+    _fill_clearance(
+        out,
+        float(grid.origin[0]),
+        float(grid.origin[1]),
+        grid.resolution,
+        shapes.vertices,
+        shapes.offsets,
+        shapes.radii,
+    )
+    return frozen(out)
+
+
+def occupancy(static: StaticMap, grid: Grid, clearance: float = 0.0) -> BoolArray:
+    """Whether each cell centre is inside a static obstacle or within ``clearance`` [m] of one.
+
+    Returns:
+        (rows, columns) flags.
+    """
+    margin = number("clearance", clearance, low=0.0)
+    return frozen(clearance_field(static, grid) <= margin)

@@ -1,0 +1,163 @@
+"""Static obstacles as compiled kernels read them: convex cores, each with a radius around it.
+
+A thick segment is exactly the points within its radius of its centre line, and a polygon grown by
+a clearance the points within that clearance of the polygon. Both are a *core* (2 or more corners)
+and a radius, so distances and lines of sight need no approximation of round corners.
+"""
+
+from __future__ import annotations
+
+import math
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from pushplan.geometry.convex import point_segment_distance_sq
+from pushplan.world import StaticMap
+from pushplan.world.checks import FloatArray, IntArray, frozen
+from pushplan.world.outline import flatten
+
+
+class Obstacles(NamedTuple):
+    """C grown convex cores; a plain tuple of arrays, so that it can be passed into kernels.
+
+    Attributes:
+        vertices: (V, 2) corners of the cores [m], each counter-clockwise; a segment has two.
+        offsets: (C + 1,) where each core starts.
+        radii: (C,) how far each obstacle reaches beyond its core [m].
+        boxes: (C, 4) x_min, y_min, x_max, y_max of each obstacle [m].
+    """
+
+    vertices: FloatArray
+    offsets: IntArray
+    radii: FloatArray
+    boxes: FloatArray
+
+
+@lru_cache(maxsize=64)
+def obstacles_of(static: StaticMap, clearance: float = 0.0) -> Obstacles:
+    """The cores of a static map, grown by ``clearance`` [m]; kept for the maps used last."""
+    cores = [*static.polygons, *(line.reshape(2, 2) for line in static.segments)]
+    vertices, offsets = flatten(cores)
+    radii = np.concatenate([np.zeros(len(static.polygons)), static.radii]) + clearance
+    boxes = np.zeros((len(cores), 4))
+    for box, core, radius in zip(boxes, cores, radii, strict=True):
+        box[:2] = core.min(axis=0) - radius
+        box[2:] = core.max(axis=0) + radius
+    return Obstacles(vertices, offsets, frozen(radii), frozen(boxes))
+
+
+@njit(cache=True, nogil=True)
+def core_distance(x: float, y: float, vertices: FloatArray, first: int, last: int) -> float:
+    """Signed distance [m] of a point to the core ``vertices[first:last]``, negative inside."""
+    best_sq, inside = math.inf, last - first > 2
+    for i in range(first, last):
+        j = i + 1 if i + 1 < last else first
+        ax, ay, bx, by = vertices[i, 0], vertices[i, 1], vertices[j, 0], vertices[j, 1]
+        best_sq = min(best_sq, point_segment_distance_sq(x, y, ax, ay, bx, by))
+        if (bx - ax) * (y - ay) - (by - ay) * (x - ax) < 0.0:
+            inside = False
+    distance = math.sqrt(best_sq)
+    return -distance if inside else distance
+
+
+@njit(cache=True, nogil=True)
+def obstacle_distance(
+    x: float, y: float, vertices: FloatArray, offsets: IntArray, radii: FloatArray
+) -> float:
+    """Distance [m] of a point to the nearest obstacle, negative inside one, inf if there is none.
+
+    Outside it is the exact Euclidean distance; inside, minus the depth in the obstacle in which
+    the point lies deepest.
+    """
+    best = math.inf
+    for k in range(radii.shape[0]):
+        best = min(best, core_distance(x, y, vertices, offsets[k], offsets[k + 1]) - radii[k])
+    return best
+
+
+@njit(cache=True, nogil=True)
+def _segments_closer(
+    px: float,
+    py: float,
+    qx: float,
+    qy: float,
+    ax: float,
+    ay: float,
+    bx: float,
+    by: float,
+    reach_sq: float,
+) -> bool:
+    """Whether the segments p-q and a-b cross or come closer than the root of ``reach_sq``."""
+    dx, dy = qx - px, qy - py
+    ex, ey = bx - ax, by - ay
+    sa = dx * (ay - py) - dy * (ax - px)
+    sb = dx * (by - py) - dy * (bx - px)
+    sp = ex * (py - ay) - ey * (px - ax)
+    sq = ex * (qy - ay) - ey * (qx - ax)
+    if ((sa > 0.0) != (sb > 0.0)) and ((sp > 0.0) != (sq > 0.0)):
+        return True
+    return (
+        point_segment_distance_sq(px, py, ax, ay, bx, by) < reach_sq
+        or point_segment_distance_sq(qx, qy, ax, ay, bx, by) < reach_sq
+        or point_segment_distance_sq(ax, ay, px, py, qx, qy) < reach_sq
+        or point_segment_distance_sq(bx, by, px, py, qx, qy) < reach_sq
+    )
+
+
+@njit(cache=True, nogil=True)
+def line_of_sight(
+    px: float,
+    py: float,
+    qx: float,
+    qy: float,
+    vertices: FloatArray,
+    offsets: IntArray,
+    radii: FloatArray,
+    boxes: FloatArray,
+    margin: float,
+) -> bool:
+    """Whether the segment p-q stays ``margin`` [m] or more away from every obstacle.
+
+    Args:
+        px: start of the segment [m]; so are ``py`` and, for its end, ``qx`` and ``qy``.
+        py: see ``px``.
+        qx: see ``px``.
+        qy: see ``px``.
+        vertices: as in `Obstacles`; so are ``offsets``, ``radii`` and ``boxes``.
+        offsets: see ``vertices``.
+        radii: see ``vertices``.
+        boxes: see ``vertices``.
+        margin: [m], may be slightly negative to let a path touch.
+    """
+    dx, dy = qx - px, qy - py
+    length = math.sqrt(dx * dx + dy * dy)
+    ux, uy = (dx / length, dy / length) if length > 0.0 else (1.0, 0.0)
+    x_low, x_high, y_low, y_high = min(px, qx), max(px, qx), min(py, qy), max(py, qy)
+    for k in range(radii.shape[0]):
+        if (
+            x_high < boxes[k, 0] - margin
+            or x_low > boxes[k, 2] + margin
+            or y_high < boxes[k, 1] - margin
+            or y_low > boxes[k, 3] + margin
+        ):
+            continue
+        reach = max(0.0, radii[k] + margin)
+        first, last = offsets[k], offsets[k + 1]
+        low, high = math.inf, -math.inf  # extent of the core across the line
+        for i in range(first, last):
+            side = ux * (vertices[i, 1] - py) - uy * (vertices[i, 0] - px)
+            low = min(low, side)
+            high = max(high, side)
+        if low >= reach or high <= -reach:
+            continue
+        if last - first > 2 and core_distance(px, py, vertices, first, last) < 0.0:
+            return False
+        for i in range(first, last):
+            j = i + 1 if i + 1 < last else first
+            ax, ay, bx, by = vertices[i, 0], vertices[i, 1], vertices[j, 0], vertices[j, 1]
+            if _segments_closer(px, py, qx, qy, ax, ay, bx, by, reach * reach):
+                return False
+    return True

@@ -1,0 +1,111 @@
+"""Compiled measures of simple polygons: area, centroid, inertia, point inside, rigid motion."""
+
+from __future__ import annotations
+
+import math
+
+from numba import njit
+
+from pushplan.world.checks import FloatArray
+
+
+@njit(cache=True, nogil=True)
+def polygon_area(v: FloatArray) -> float:
+    """Shoelace area [m²] of the polygon with corners ``v`` (N, 2) [m], positive if CCW."""
+    total = 0.0
+    n = v.shape[0]
+    x0, y0 = v[0, 0], v[0, 1]  # far from the origin the plain formula loses digits
+    for i in range(1, n - 1):
+        ax, ay = v[i, 0] - x0, v[i, 1] - y0
+        bx, by = v[i + 1, 0] - x0, v[i + 1, 1] - y0
+        total += ax * by - ay * bx
+    return 0.5 * total
+
+
+@njit(cache=True, nogil=True)
+def polygon_centroid(v: FloatArray) -> tuple[float, float]:
+    """Centre of area x, y [m] of the polygon with corners ``v`` (N, 2) [m].
+
+    A polygon without area gets the mean of its corners.
+    """
+    n = v.shape[0]
+    x0, y0 = v[0, 0], v[0, 1]
+    twice, mx, my, sx, sy = 0.0, 0.0, 0.0, 0.0, 0.0
+    for i in range(n):
+        ax, ay = v[i, 0] - x0, v[i, 1] - y0
+        j = i + 1 if i + 1 < n else 0
+        bx, by = v[j, 0] - x0, v[j, 1] - y0
+        cross = ax * by - ay * bx
+        twice += cross
+        mx += (ax + bx) * cross
+        my += (ay + by) * cross
+        sx += ax
+        sy += ay
+    if twice == 0.0:
+        return x0 + sx / n, y0 + sy / n
+    return x0 + mx / (3.0 * twice), y0 + my / (3.0 * twice)
+
+
+@njit(cache=True, nogil=True)
+def polygon_inertia(v: FloatArray) -> float:
+    """Polar second moment about the centroid per unit mass [m²] of a uniform polygon.
+
+    Args:
+        v: (N, 2) corners [m] of a simple polygon, either orientation.
+
+    Returns:
+        ∫ |r|² dA / A; multiply by the mass [kg] for the moment of inertia [kg m²]. 0 where the
+        polygon has no area.
+    """
+    n = v.shape[0]
+    cx, cy = polygon_centroid(v)
+    twice, moment = 0.0, 0.0
+    for i in range(n):
+        ax, ay = v[i, 0] - cx, v[i, 1] - cy
+        j = i + 1 if i + 1 < n else 0
+        bx, by = v[j, 0] - cx, v[j, 1] - cy
+        cross = ax * by - ay * bx
+        twice += cross
+        moment += cross * (ax * ax + ay * ay + ax * bx + ay * by + bx * bx + by * by)
+    if twice == 0.0:
+        return 0.0
+    return moment / (6.0 * twice)
+
+
+@njit(cache=True, nogil=True)
+def point_in_polygon(x: float, y: float, v: FloatArray) -> bool:
+    """Whether the point lies inside the simple polygon ``v`` (N, 2) [m], by crossing number.
+
+    Points exactly on the outline may count either way.
+    """
+    inside = False
+    n = v.shape[0]
+    j = n - 1
+    for i in range(n):
+        yi, yj = v[i, 1], v[j, 1]
+        if (yi > y) != (yj > y):
+            cut = v[i, 0] + (v[j, 0] - v[i, 0]) * (y - yi) / (yj - yi)
+            if x < cut:
+                inside = not inside
+        j = i
+    return inside
+
+
+@njit(cache=True, nogil=True)
+def transform_points(
+    x: float, y: float, theta: float, points_body: FloatArray, out: FloatArray
+) -> None:
+    """Carry points from a body frame to the world, into ``out``.
+
+    Args:
+        x: position of the body [m], world frame.
+        y: as ``x``.
+        theta: heading of the body [rad].
+        points_body: (N, 2) points in the body frame [m].
+        out: (N, 2) receives the points in the world frame [m]; may be ``points_body`` itself.
+    """
+    c, s = math.cos(theta), math.sin(theta)
+    for i in range(points_body.shape[0]):
+        px, py = points_body[i, 0], points_body[i, 1]
+        out[i, 0] = x + c * px - s * py
+        out[i, 1] = y + s * px + c * py

@@ -1,0 +1,79 @@
+"""Compiled filling of convex polygons into images, one row of pixels at a time.
+
+Pixel coordinates: x to the right along columns, y down along rows; pixel (r, c) covers
+[c, c + 1] × [r, r + 1], so that its centre is at (c + 0.5, r + 0.5).
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from numba import njit
+from numpy.typing import NDArray
+
+from pushplan.world.checks import FloatArray, IntArray
+
+
+@njit(cache=True, nogil=True)
+def fill_convex(image: NDArray[Any], vertices_px: FloatArray, value: Any) -> None:
+    """Set every pixel whose centre is inside a convex polygon, clipped to the image.
+
+    Args:
+        image: (H, W) of any number type or bool, changed in place.
+        vertices_px: (N, 2) corners x, y [px], either orientation.
+        value: what the pixels are set to.
+    """
+    rows, cols = image.shape
+    n = vertices_px.shape[0]
+    low, high = math.inf, -math.inf
+    for i in range(n):
+        low = min(low, vertices_px[i, 1])
+        high = max(high, vertices_px[i, 1])
+    if not (low <= rows and high >= 0.0):  # also false for NaN
+        return
+    first = max(0, math.ceil(max(low, 0.0) - 0.5))
+    last = min(rows - 1, math.floor(min(high, float(rows)) - 0.5))
+    for r in range(first, last + 1):
+        y = r + 0.5
+        left, right = math.inf, -math.inf
+        j = n - 1
+        for i in range(n):
+            x0, y0, x1, y1 = (
+                vertices_px[j, 0],
+                vertices_px[j, 1],
+                vertices_px[i, 0],
+                vertices_px[i, 1],
+            )
+            j = i
+            if (y0 < y and y1 < y) or (y0 > y and y1 > y):
+                continue
+            if y0 == y1:
+                left = min(left, min(x0, x1))
+                right = max(right, max(x0, x1))
+            else:
+                x = x0 + (x1 - x0) * (y - y0) / (y1 - y0)
+                left = min(left, x)
+                right = max(right, x)
+        if right < 0.0 or left > cols:
+            continue
+        start = max(0, math.ceil(max(left, 0.0) - 0.5))
+        stop = min(cols - 1, math.floor(min(right, float(cols)) - 0.5))
+        for c in range(start, stop + 1):
+            image[r, c] = value
+
+
+@njit(cache=True, nogil=True)
+def fill_convex_parts(
+    image: NDArray[Any], vertices_px: FloatArray, offsets: IntArray, value: Any
+) -> None:
+    """`fill_convex` for each of P polygons that are flattened into one array.
+
+    Args:
+        image: (H, W), changed in place.
+        vertices_px: (V, 2) corners of all polygons [px].
+        offsets: (P + 1,) where each polygon starts.
+        value: what the pixels are set to.
+    """
+    for k in range(offsets.shape[0] - 1):
+        fill_convex(image, vertices_px[offsets[k] : offsets[k + 1]], value)

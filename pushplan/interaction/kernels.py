@@ -1,0 +1,444 @@
+"""Compiled quasi-static pushing: overlaps are resolved by the least total motion.
+
+Objects rest unless something moves them. When the robot advances by a small step, every overlap
+is removed by the motion that is least in the norm sum of m (dx² + dy² + c² dθ²), object by object
+and point by point (projected Gauss-Seidel). That is Gauss's principle for bodies whose velocity
+dies at once, so it is what a simulator with full damping computes, and it is the ellipsoidal
+limit surface of Goyal, Ruina and Papadopoulos (1991) for a body pushed on the ground:
+(v_x, v_y, ω) is proportional to (f_x, f_y, τ / c²).
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from pushplan.interaction.contact import contacts
+from pushplan.world.checks import FloatArray, IntArray
+
+
+class Bodies(NamedTuple):
+    """What the kernels know of the robot, the objects and the walls; arrays in SI units."""
+
+    robot_vertices: FloatArray
+    """(V, 2) convex parts of the robot in its body frame."""
+    robot_offsets: IntArray
+    """(P + 1,)"""
+    robot_radius: float
+    vertices: FloatArray
+    """(W, 2) outlines of the objects in their body frames."""
+    offsets: IntArray
+    """(K + 1,)"""
+    radii: FloatArray
+    """(K,) circumscribed radii."""
+    inverse_masses: FloatArray
+    """(K,)"""
+    inverse_gyration: FloatArray
+    """(K,) 1 / c² [1/m²]"""
+    static_vertices: FloatArray
+    """(X, 2) convex static parts in the world frame."""
+    static_offsets: IntArray
+    """(S + 1,)"""
+    static_boxes: FloatArray
+    """(S, 4) x_min, y_min, x_max, y_max of each part."""
+
+
+class Settings(NamedTuple):
+    """Numerical settings of the kernels."""
+
+    max_step: float
+    """Longest motion of a robot corner in one resolution step [m]."""
+    tolerance: float
+    """Overlap that counts as resolved [m]."""
+    jam_depth: float
+    """Overlap that cannot be resolved and counts as a jam [m]."""
+    iterations: int
+    """Gauss-Seidel rounds in one step."""
+    friction: float
+    """Coulomb coefficient between robot and objects."""
+
+
+@njit(cache=True, nogil=True)
+def place(pose: FloatArray, points: FloatArray, out: FloatArray) -> None:
+    """Carry (N, 2) body-frame points to the world frame, into ``out``."""
+    c, s = np.cos(pose[2]), np.sin(pose[2])
+    for i in range(points.shape[0]):
+        out[i, 0] = pose[0] + c * points[i, 0] - s * points[i, 1]
+        out[i, 1] = pose[1] + s * points[i, 0] + c * points[i, 1]
+
+
+@njit(cache=True, nogil=True)
+def _nudge(pose: FloatArray, x: float, y: float, ix: float, iy: float, inv: float) -> None:
+    """Move a body by (ix, iy) applied at the world point (x, y)."""
+    arm = (x - pose[0]) * iy - (y - pose[1]) * ix
+    pose[0] += ix
+    pose[1] += iy
+    pose[2] += arm * inv
+
+
+@njit(cache=True, nogil=True)
+def _separate(
+    points: FloatArray,
+    found: int,
+    a: FloatArray,
+    weight_a: float,
+    inv_a: float,
+    b: FloatArray,
+    weight_b: float,
+    inv_b: float,
+) -> float:
+    """Move two bodies apart by the least total motion; returns the sum of the impulses.
+
+    Args:
+        points: (2, 5) contact points from ``a`` to ``b``, as `contacts` gives them.
+        found: how many of them count.
+        a: (3,) pose of the first body, changed in place.
+        weight_a: its inverse mass; 0 if it cannot move.
+        inv_a: its 1 / c².
+        b: (3,) pose of the second body, likewise.
+        weight_b: its inverse mass.
+        inv_b: its 1 / c².
+    """
+    nx, ny = points[0, 2], points[0, 3]
+    arms_a, arms_b = np.zeros(2), np.zeros(2)
+    for i in range(found):
+        x, y = points[i, 0], points[i, 1]
+        arms_a[i] = (x - a[0]) * ny - (y - a[1]) * nx
+        arms_b[i] = (x - b[0]) * ny - (y - b[1]) * nx
+    base = weight_a + weight_b
+    wa, wb = weight_a * inv_a, weight_b * inv_b
+    k00 = base + wa * arms_a[0] ** 2 + wb * arms_b[0] ** 2
+    first, second = points[0, 4] / k00, 0.0
+    if found == 2:
+        # the exact solution of the 2 x 2 complementarity problem: both points, or only one
+        k11 = base + wa * arms_a[1] ** 2 + wb * arms_b[1] ** 2
+        k01 = base + wa * arms_a[0] * arms_a[1] + wb * arms_b[0] * arms_b[1]
+        d0, d1 = points[0, 4], points[1, 4]
+        det = k00 * k11 - k01 * k01
+        if det > 1e-12 * k00 * k11:
+            first, second = (k11 * d0 - k01 * d1) / det, (k00 * d1 - k01 * d0) / det
+            if first < 0.0:
+                first, second = 0.0, d1 / k11
+            elif second < 0.0:
+                first, second = d0 / k00, 0.0
+    for i in range(found):
+        impulse = first if i == 0 else second
+        x, y = points[i, 0], points[i, 1]
+        _nudge(a, x, y, -impulse * weight_a * nx, -impulse * weight_a * ny, inv_a)
+        _nudge(b, x, y, impulse * weight_b * nx, impulse * weight_b * ny, inv_b)
+    return first + second
+
+
+@njit(cache=True, nogil=True)
+def _drag_along(
+    point: FloatArray,
+    limit: float,
+    robot_from: FloatArray,
+    robot_to: FloatArray,
+    before: FloatArray,
+    pose: FloatArray,
+    inv: float,
+) -> None:
+    """Coulomb friction: carry the contact point sideways with the robot, up to ``limit`` [m]."""
+    x, y, nx, ny = point[0], point[1], point[2], point[3]
+    tx, ty = -ny, nx
+    turn = robot_to[2] - robot_from[2]
+    robot = (robot_to[0] - robot_from[0] - turn * (y - robot_to[1])) * tx
+    robot += (robot_to[1] - robot_from[1] + turn * (x - robot_to[0])) * ty
+    turn = pose[2] - before[2]
+    body = (pose[0] - before[0] - turn * (y - pose[1])) * tx
+    body += (pose[1] - before[1] + turn * (x - pose[0])) * ty
+    arm = (x - pose[0]) * ty - (y - pose[1]) * tx
+    by = min(max((robot - body) / (1.0 + arm * arm * inv), -limit), limit)
+    _nudge(pose, x, y, by * tx, by * ty, inv)
+
+
+@njit(cache=True, nogil=True)
+def _gather_near(
+    bodies: Bodies,
+    poses: FloatArray,
+    x: float,
+    y: float,
+    reach: float,
+    active: IntArray,
+    count: int,
+) -> int:
+    """Add to ``active`` every object whose disc comes within ``reach`` of (x, y)."""
+    for k in range(poses.shape[0]):
+        dx, dy = poses[k, 0] - x, poses[k, 1] - y
+        far = reach + bodies.radii[k]
+        if dx * dx + dy * dy < far * far:
+            known = False
+            for i in range(count):
+                if active[i] == k:
+                    known = True
+                    break
+            if not known:
+                active[count] = k
+                count += 1
+    return count
+
+
+class Scratch(NamedTuple):
+    """Memory that one caller reuses from step to step."""
+
+    robot: FloatArray
+    """(V, 2) robot corners in the world frame."""
+    outlines: FloatArray
+    """(W, 2) object corners in the world frame."""
+    active: IntArray
+    """(K,) objects that may move in this step."""
+    before: FloatArray
+    """(K, 3) poses before this step."""
+    points: FloatArray
+    """(2, 5) contact points."""
+    fixed: FloatArray
+    """(3,) a pose that stands for whatever cannot move."""
+
+
+@njit(cache=True, nogil=True)
+def make_scratch(bodies: Bodies) -> Scratch:
+    """Memory for `advance`; one per thread."""
+    count = bodies.radii.shape[0]
+    return Scratch(
+        np.empty_like(bodies.robot_vertices),
+        np.empty_like(bodies.vertices),
+        np.empty(count, np.int64),
+        np.empty((count, 3)),
+        np.empty((2, 5)),
+        np.zeros(3),
+    )
+
+
+@njit(cache=True, nogil=True)
+def _outline(k: int, bodies: Bodies, poses: FloatArray, scratch: Scratch) -> FloatArray:
+    a, b = bodies.offsets[k], bodies.offsets[k + 1]
+    out = scratch.outlines[a:b]
+    place(poses[k], bodies.vertices[a:b], out)
+    return out
+
+
+@njit(cache=True, nogil=True)
+def _against_robot(
+    k: int,
+    robot_from: FloatArray,
+    robot_to: FloatArray,
+    poses: FloatArray,
+    bodies: Bodies,
+    settings: Settings,
+    scratch: Scratch,
+) -> float:
+    """Move object ``k`` out of the robot; returns the deepest overlap found."""
+    deepest = 0.0
+    points = scratch.points
+    for part in range(bodies.robot_offsets.shape[0] - 1):
+        piece = scratch.robot[bodies.robot_offsets[part] : bodies.robot_offsets[part + 1]]
+        found = contacts(piece, _outline(k, bodies, poses, scratch), points)
+        if found == 0:
+            continue
+        for i in range(found):
+            deepest = max(deepest, points[i, 4])
+        inv = bodies.inverse_gyration[k]
+        pushed = _separate(points, found, scratch.fixed, 0.0, 0.0, poses[k], 1.0, inv)
+        if settings.friction > 0.0:
+            if found == 2:
+                points[0, :2] = 0.5 * (points[0, :2] + points[1, :2])
+            limit = settings.friction * pushed
+            before = scratch.before[k]
+            _drag_along(points[0], limit, robot_from, robot_to, before, poses[k], inv)
+    return deepest
+
+
+@njit(cache=True, nogil=True)
+def _against_static(k: int, poses: FloatArray, bodies: Bodies, scratch: Scratch) -> float:
+    """Move object ``k`` out of the walls; returns the deepest overlap found."""
+    deepest = 0.0
+    points = scratch.points
+    x, y, r = poses[k, 0], poses[k, 1], bodies.radii[k]
+    for part in range(bodies.static_boxes.shape[0]):
+        box = bodies.static_boxes[part]
+        if x + r <= box[0] or x - r >= box[2] or y + r <= box[1] or y - r >= box[3]:
+            continue
+        a, b = bodies.static_offsets[part], bodies.static_offsets[part + 1]
+        wall = bodies.static_vertices[a:b]
+        found = contacts(wall, _outline(k, bodies, poses, scratch), points)
+        for i in range(found):
+            deepest = max(deepest, points[i, 4])
+        if found > 0:
+            inv = bodies.inverse_gyration[k]
+            _separate(points, found, scratch.fixed, 0.0, 0.0, poses[k], 1.0, inv)
+    return deepest
+
+
+@njit(cache=True, nogil=True)
+def _against_objects(
+    i: int, count: int, poses: FloatArray, bodies: Bodies, settings: Settings, scratch: Scratch
+) -> tuple[float, int]:
+    """Move active object ``i`` and its neighbours apart; neighbours that move become active."""
+    deepest = 0.0
+    points = scratch.points
+    k = scratch.active[i]
+    outline = _outline(k, bodies, poses, scratch)
+    for other in range(poses.shape[0]):
+        dx, dy = poses[other, 0] - poses[k, 0], poses[other, 1] - poses[k, 1]
+        reach = bodies.radii[other] + bodies.radii[k]
+        if other == k or dx * dx + dy * dy >= reach * reach:
+            continue
+        found = contacts(outline, _outline(other, bodies, poses, scratch), points)
+        if found == 0:
+            continue
+        depth = points[0, 4] if found == 1 else max(points[0, 4], points[1, 4])
+        known = False
+        for j in range(count):
+            known = known or scratch.active[j] == other
+        if depth <= settings.tolerance:
+            continue
+        if not known:
+            scratch.before[other] = poses[other]
+            scratch.active[count] = other
+            count += 1
+        deepest = max(deepest, depth)
+        _separate(
+            points,
+            found,
+            poses[k],
+            bodies.inverse_masses[k],
+            bodies.inverse_gyration[k],
+            poses[other],
+            bodies.inverse_masses[other],
+            bodies.inverse_gyration[other],
+        )
+        _outline(k, bodies, poses, scratch)
+    return deepest, count
+
+
+@njit(cache=True, nogil=True)
+def _resolve(
+    robot_from: FloatArray,
+    robot_to: FloatArray,
+    poses: FloatArray,
+    bodies: Bodies,
+    settings: Settings,
+    scratch: Scratch,
+) -> float:
+    """One small robot step: move the objects out of the way; returns what overlap is left."""
+    place(robot_to, bodies.robot_vertices, scratch.robot)
+    count = _gather_near(
+        bodies, poses, robot_to[0], robot_to[1], bodies.robot_radius, scratch.active, 0
+    )
+    for i in range(count):
+        scratch.before[scratch.active[i]] = poses[scratch.active[i]]
+    touched = count  # the robot itself reaches only these
+    left = 0.0
+    for _ in range(settings.iterations):
+        left = 0.0
+        i = 0
+        while i < count:
+            k = scratch.active[i]
+            if i < touched:
+                depth = _against_robot(k, robot_from, robot_to, poses, bodies, settings, scratch)
+                left = max(left, depth)
+            moved = (
+                poses[k, 0] != scratch.before[k, 0]
+                or poses[k, 1] != scratch.before[k, 1]
+                or poses[k, 2] != scratch.before[k, 2]
+            )
+            if moved:
+                depth, count = _against_objects(i, count, poses, bodies, settings, scratch)
+                left = max(left, depth)
+                left = max(left, _against_static(k, poses, bodies, scratch))
+            i += 1
+        if left <= settings.tolerance:
+            break
+    return left
+
+
+@njit(cache=True, nogil=True)
+def advance(
+    robot_from: FloatArray,
+    robot_to: FloatArray,
+    poses: FloatArray,
+    lengths: FloatArray,
+    bodies: Bodies,
+    settings: Settings,
+    scratch: Scratch,
+) -> bool:
+    """Drive the robot from one pose to a near one, pushing what is in the way.
+
+    Args:
+        robot_from: (3,) where it is.
+        robot_to: (3,) where it goes, along a straight line.
+        poses: (K, 3) poses of the objects, changed in place.
+        lengths: (K,) path lengths of the objects [m], added to in place.
+        bodies: shapes and masses.
+        settings: numerical settings.
+        scratch: from `make_scratch`.
+
+    Returns:
+        False where the robot jams: ``poses`` are then those of the last small step without a jam.
+    """
+    dx, dy = robot_to[0] - robot_from[0], robot_to[1] - robot_from[1]
+    turn = robot_to[2] - robot_from[2]
+    motion = np.sqrt(dx * dx + dy * dy) + abs(turn) * bodies.robot_radius
+    mid_x, mid_y = robot_from[0] + 0.5 * dx, robot_from[1] + 0.5 * dy
+    reach = bodies.robot_radius + 0.5 * np.sqrt(dx * dx + dy * dy)
+    if _gather_near(bodies, poses, mid_x, mid_y, reach, scratch.active, 0) == 0:
+        return True
+    steps = max(1, int(np.ceil(motion / settings.max_step)))
+    here, there = robot_from.copy(), np.empty(3)
+    for step in range(1, steps + 1):
+        part = step / steps
+        there[0] = robot_from[0] + part * dx
+        there[1] = robot_from[1] + part * dy
+        there[2] = robot_from[2] + part * turn
+        saved = poses.copy()
+        left = _resolve(here, there, poses, bodies, settings, scratch)
+        if left > settings.jam_depth:
+            poses[:] = saved
+            return False
+        for k in range(poses.shape[0]):
+            if poses[k, 0] != saved[k, 0] or poses[k, 1] != saved[k, 1]:
+                lengths[k] += np.sqrt(
+                    (poses[k, 0] - saved[k, 0]) ** 2 + (poses[k, 1] - saved[k, 1]) ** 2
+                )
+        here[:] = there
+    return True
+
+
+@njit(cache=True, nogil=True)
+def sweep_path(
+    path: FloatArray, poses: FloatArray, bodies: Bodies, settings: Settings, out: FloatArray
+) -> tuple[float, int]:
+    """Sweep the robot along a path; the compiled heart of `QuasiStatic.sweep`.
+
+    Args:
+        path: (N, 3) robot poses.
+        poses: (K, 3) poses of the objects, changed in place.
+        bodies: shapes and masses.
+        settings: numerical settings.
+        out: (N, K, 3) receives the poses at each path pose; (0, K, 3) if they are not wanted.
+
+    Returns:
+        Work, sum of mass times path length [kg m], and the first pose that is not reached or -1.
+    """
+    scratch = make_scratch(bodies)
+    lengths = np.zeros(poses.shape[0])
+    keep = out.shape[0] > 0
+    jammed = -1
+    if keep:
+        out[0] = poses
+    for n in range(1, path.shape[0]):
+        if jammed < 0 and not advance(
+            path[n - 1], path[n], poses, lengths, bodies, settings, scratch
+        ):
+            jammed = n
+        if keep:
+            out[n] = poses
+        elif jammed >= 0:
+            break
+    work = 0.0
+    for k in range(lengths.shape[0]):
+        work += lengths[k] / bodies.inverse_masses[k]
+    return work, jammed

@@ -1,0 +1,67 @@
+"""The one question every planner asks: what would driving this path do to the objects?"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol, runtime_checkable
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from pushplan.world import World
+from pushplan.world.checks import ArrayRecord, FloatArray, array, integer
+
+
+@dataclass(frozen=True, eq=False)
+class Interaction(ArrayRecord):
+    """Predicted effect of sweeping the robot along a path of N poses among K objects.
+
+    Args:
+        object_poses: (N, K, 3) x, y [m], theta [rad] of each object when the robot is at each
+            pose of the path; the first entry is the start.
+        masses: (K,) masses of the objects [kg].
+        jammed_at: index of the first pose that the robot cannot reach, because it or what it
+            pushes is held by something static; -1 if it reaches them all. Objects rest where they
+            were from there on.
+    """
+
+    object_poses: FloatArray
+    masses: FloatArray
+    jammed_at: int = -1
+
+    def __post_init__(self) -> None:
+        put = object.__setattr__
+        put(self, "masses", array("interaction.masses", self.masses, (None,)))
+        shape = (None, len(self.masses), 3)
+        put(self, "object_poses", array("interaction.object_poses", self.object_poses, shape))
+        put(self, "jammed_at", integer("interaction.jammed_at", self.jammed_at, low=-1))
+
+    @property
+    def lengths(self) -> FloatArray:
+        """(K,) path length of each object's centre [m], not its displacement."""
+        steps = np.diff(self.object_poses[..., :2], axis=0)
+        lengths: FloatArray = np.hypot(steps[..., 0], steps[..., 1]).sum(axis=0)
+        return lengths
+
+    @property
+    def work(self) -> float:
+        """Sum over the objects of mass times path length [kg m]: what the metrics measure."""
+        return float(self.masses @ self.lengths)
+
+
+@runtime_checkable
+class InteractionModel(Protocol):
+    """Predicts what happens to the objects when the robot sweeps along a path."""
+
+    def sweep(self, world: World, path: ArrayLike) -> Interaction:
+        """Predict the motion of every object.
+
+        Args:
+            world: the snapshot from which the robot starts; it is not changed.
+            path: (N, 3) robot poses x, y [m], theta [rad], close enough together that the
+                straight line between two of them is what the robot drives.
+
+        Raises:
+            InvalidInputError: if the path is not (N, 3), empty, or not finite.
+        """
+        ...

@@ -1,0 +1,116 @@
+"""The default interaction model: quasi-static pushing, compiled."""
+
+from __future__ import annotations
+
+import functools
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from pushplan.geometry import polygon_inertia
+from pushplan.interaction.kernels import Bodies, Settings, sweep_path
+from pushplan.interaction.model import Interaction
+from pushplan.world import Movables, RobotModel, StaticMap, World
+from pushplan.world.checks import FloatArray, array, integer, number
+from pushplan.world.errors import InvalidInputError
+from pushplan.world.outline import flatten
+
+
+@dataclass(frozen=True)
+class QuasiStatic:
+    """Objects move only while they are pushed, by the least total motion.
+
+    The robot pushes objects, objects push objects, walls hold both; friction on the ground gives
+    each object an ellipsoidal limit surface (Goyal, Ruina and Papadopoulos 1991; Lynch and Mason
+    1996). Wheeled objects are treated like the others: the way they roll on is not predicted.
+
+    Args:
+        friction: Coulomb coefficient between robot and objects.
+        gyration_scale: factor on the radius c of the limit surface, where c² = inertia / mass at
+            1. That is exact for a simulator with full damping; 0.94 fits a square box whose weight
+            rests evenly on the ground, 1.73 one that stands on its four corners.
+        step: longest motion of the robot between two contact resolutions, as a fraction of the
+            smallest object's circumscribed radius.
+        iterations: Gauss-Seidel rounds for each resolution.
+
+    Raises:
+        InvalidInputError: if a value is out of range.
+    """
+
+    friction: float = 0.0
+    gyration_scale: float = 1.0
+    step: float = 0.1
+    iterations: int = 12
+
+    def __post_init__(self) -> None:
+        number("friction", self.friction, low=0.0)
+        number("gyration_scale", self.gyration_scale, low=0.0, open_low=True)
+        number("step", self.step, low=0.0, high=1.0, open_low=True)
+        integer("iterations", self.iterations, low=1)
+
+    def bodies(self, world: World) -> Bodies:
+        """The world's shapes as the compiled kernels read them; cached."""
+        return _bodies(world.robot, _Shapes(world.movables), world.static, self.gyration_scale)
+
+    def settings(self, world: World) -> Settings:
+        """The numerical settings for the sizes in this world."""
+        radii = world.movables.radii
+        size = float(radii.min()) if len(radii) else world.robot.circumscribed_radius
+        return Settings(
+            max_step=self.step * size,
+            tolerance=1e-3 * size,
+            jam_depth=0.25 * self.step * size,
+            iterations=self.iterations,
+            friction=float(self.friction),
+        )
+
+    def sweep(self, world: World, path: ArrayLike) -> Interaction:
+        """Predict the motion of every object; see `InteractionModel.sweep`."""
+        robot_path: FloatArray = array("path", path, (None, 3))
+        if len(robot_path) == 0:
+            raise InvalidInputError("path must hold at least one pose, got none")
+        poses = world.movables.poses.copy()
+        out = np.empty((len(robot_path), len(poses), 3))
+        _, jammed = sweep_path(robot_path, poses, self.bodies(world), self.settings(world), out)
+        return Interaction(out, world.movables.masses, int(jammed))
+
+
+class _Shapes:
+    """Movables compared by what does not change when they are pushed, as a cache key."""
+
+    def __init__(self, movables: Movables) -> None:
+        self.movables = movables
+        self.key = (
+            movables.vertices.tobytes(),
+            movables.offsets.tobytes(),
+            movables.masses.tobytes(),
+        )
+
+    def __hash__(self) -> int:
+        return hash(self.key)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Shapes) and self.key == other.key
+
+
+@functools.lru_cache(maxsize=32)
+def _bodies(robot: RobotModel, shapes: _Shapes, static: StaticMap, gyration: float) -> Bodies:
+    movables = shapes.movables
+    squares = [polygon_inertia(movables.outline(k)) for k in range(len(movables))]
+    parts = static.convex_parts
+    vertices, offsets = flatten(parts)
+    boxes = [np.concatenate([part.min(axis=0), part.max(axis=0)]) for part in parts]
+    return Bodies(
+        robot_vertices=robot.vertices,
+        robot_offsets=robot.offsets,
+        robot_radius=robot.circumscribed_radius,
+        vertices=movables.vertices,
+        offsets=movables.offsets,
+        radii=movables.radii,
+        inverse_masses=1.0 / movables.masses,
+        inverse_gyration=1.0 / (np.array(squares) * gyration**2) if squares else np.zeros(0),
+        static_vertices=vertices,
+        static_offsets=offsets,
+        static_boxes=np.array(boxes).reshape(-1, 4),
+    )

@@ -1,0 +1,220 @@
+"""`GeometricRRT`: the two-pass random tree that the Bench-Push paper compares with."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass, field
+
+import numpy as np
+from numba import njit
+from ompl import base, geometric
+
+from pushplan.geometry import point_in_polygon
+from pushplan.planners.kinodynamic.collision import Obstacles, obstacles
+from pushplan.planners.ompl_lock import seeded_ompl
+from pushplan.planners.polyline import polyline_plan
+from pushplan.world import (
+    MaxIterations,
+    NavigationGoal,
+    Plan,
+    PlanResult,
+    PlanStats,
+    PlanStatus,
+    Stop,
+    StopCheck,
+    World,
+)
+from pushplan.world.checks import FloatArray, integer, number
+
+
+@dataclass(frozen=True)
+class GeometricRRTConfig:
+    """Parameters of `GeometricRRT`. Lengths are in units of the robot's circumscribed radius R.
+
+    Args:
+        step: longest edge of the tree [R].
+        goal_bias: share of samples drawn from the goal.
+        resolution: distance between collision checks along an edge [R].
+        pass_iterations: samples in each of the two passes.
+        spacing: distance between the poses of the plan [R].
+    """
+
+    step: float = 1.0
+    goal_bias: float = 0.1
+    resolution: float = 0.1
+    pass_iterations: int = 20_000
+    spacing: float = 0.15
+
+    def __post_init__(self) -> None:
+        for name in ("step", "resolution", "spacing"):
+            number(name, getattr(self, name), low=0.0, open_low=True)
+        number("goal_bias", self.goal_bias, low=0.0, high=1.0)
+        integer("pass_iterations", self.pass_iterations, low=1)
+
+
+@dataclass(frozen=True)
+class GeometricRRT:
+    """RRT for a disc (LaValle 1998): first around the objects, then, if that fails, through them.
+
+    The plan is the raw path of the tree, a zigzag that ignores how the robot turns and what
+    pushing costs: the reference that the other planners improve on.
+
+    Args:
+        config: parameters.
+    """
+
+    config: GeometricRRTConfig = field(default_factory=GeometricRRTConfig)
+
+    def plan(
+        self,
+        world: World,
+        *,
+        stop: Stop | None = None,
+        rng: np.random.Generator | None = None,
+    ) -> PlanResult:
+        """Plan from ``world``; see `pushplan.world.Planner`. One iteration is one sample."""
+        began = time.perf_counter()
+        config = self.config
+        stop = MaxIterations(2 * config.pass_iterations) if stop is None else stop
+        rng = np.random.default_rng(0) if rng is None else rng
+        check = stop.start()
+        objects = world.movables
+        boxes = [objects.outline_world(k) for k in range(len(objects))]
+        iterations, status, plan = 0, PlanStatus.TIMED_OUT, None
+        start = np.ascontiguousarray(world.robot_pose[:2])
+        for passed, blocked in enumerate((boxes, [])):
+            among = obstacles(world.static, blocked)
+            radius = world.robot.circumscribed_radius
+            if _near(start, among, radius):
+                # a robot that starts close to something keeps what clearance it has
+                radius = world.robot.inscribed_radius
+                if _near(start, among, radius):
+                    if passed == 1:
+                        status = PlanStatus.START_BLOCKED
+                    continue
+            points, used = self._grow(world, among, radius, check, iterations, rng)
+            iterations += used
+            if points is not None:
+                spacing = config.spacing * world.robot.circumscribed_radius
+                plan, status = polyline_plan(world, points, spacing), PlanStatus.SOLVED
+                break
+            if check(iterations, np.inf):
+                break
+        if plan is None and stop.cancelled:
+            status = PlanStatus.CANCELLED
+        return _result(status, plan, iterations, time.perf_counter() - began)
+
+    def _grow(
+        self,
+        world: World,
+        among: Obstacles,
+        radius: float,
+        check: StopCheck,
+        before: int,
+        rng: np.random.Generator,
+    ) -> tuple[FloatArray | None, int]:
+        """One pass: the corners of a path, or None, and the samples that it took."""
+        config = self.config
+        used = 0
+
+        def done() -> bool:
+            nonlocal used
+            used += 1
+            return used >= config.pass_iterations or check(before + used, np.inf)
+
+        with seeded_ompl(int(rng.integers(1, 2**31))):
+            space = base.RealVectorStateSpace(2)
+            bounds = base.RealVectorBounds(2)
+            for axis in range(2):
+                bounds.setLow(axis, float(among.bounds[axis]))
+                bounds.setHigh(axis, float(among.bounds[axis + 2]))
+            space.setBounds(bounds)
+            info = base.SpaceInformation(space)
+            point = np.empty(2)
+
+            def valid(state: base.State) -> bool:
+                point[0], point[1] = state[0], state[1]
+                return not _near(point, among, radius)
+
+            info.setStateValidityChecker(valid)
+            size = world.robot.circumscribed_radius
+            step = config.resolution * size / space.getMaximumExtent()
+            info.setStateValidityCheckingResolution(min(step, 1.0))
+            info.setup()
+            problem = base.ProblemDefinition(info)
+            start = space.allocState()
+            start[0], start[1] = float(world.robot_pose[0]), float(world.robot_pose[1])
+            problem.addStartState(start)
+            region = _GoalRegion(info, world.navigation_goal, among.bounds, rng)
+            problem.setGoal(region)
+            planner = geometric.RRT(info)
+            planner.setRange(config.step * size)
+            planner.setGoalBias(config.goal_bias)
+            planner.setProblemDefinition(problem)
+            planner.setup()
+            planner.solve(base.PlannerTerminationCondition(done))
+            if not problem.hasExactSolution():
+                return None, used
+            states = problem.getSolutionPath().getStates()
+            return np.array([[state[0], state[1]] for state in states]), used
+
+
+class _GoalRegion(base.GoalSampleableRegion):  # type: ignore[misc]
+    """The goal as OMPL wants it: points to grow towards, and whether a point is inside."""
+
+    def __init__(
+        self,
+        info: base.SpaceInformation,
+        goal: NavigationGoal,
+        bounds: FloatArray,
+        rng: np.random.Generator,
+    ) -> None:
+        super().__init__(info)
+        self.goal, self.bounds, self.rng = goal, bounds, rng
+        self.setThreshold(1e-9)
+
+    def sampleGoal(self, state: base.State) -> None:
+        low, high = self.bounds[:2], self.bounds[2:]
+        point = low + self.rng.random(2) * (high - low)
+        for _ in range(30):
+            candidate = low + self.rng.random(2) * (high - low)
+            if self.goal.contains(candidate):
+                point = candidate
+                break
+        else:
+            point = getattr(self.goal, "center", point)
+        state[0], state[1] = float(point[0]), float(point[1])
+
+    def maxSampleCount(self) -> int:
+        return 1_000_000_000
+
+    def distanceGoal(self, state: base.State) -> float:
+        return self.goal.distance(state[0], state[1])
+
+
+@njit(cache=True, nogil=True)
+def _near(point: FloatArray, among: Obstacles, radius: float) -> bool:
+    """Whether a disc about ``point`` (2,) touches an obstacle."""
+    x, y = point[0], point[1]
+    for s in range(among.boxes.shape[0]):
+        box = among.boxes[s]
+        if x + radius < box[0] or x - radius > box[2] or y + radius < box[1] or y - radius > box[3]:
+            continue
+        corners = among.vertices[among.offsets[s] : among.offsets[s + 1]]
+        if point_in_polygon(x, y, corners):
+            return True
+        count = corners.shape[0]
+        for i in range(count):
+            j = i + 1 if i + 1 < count else 0
+            ex, ey = corners[j, 0] - corners[i, 0], corners[j, 1] - corners[i, 1]
+            px, py = x - corners[i, 0], y - corners[i, 1]
+            t = min(max((px * ex + py * ey) / (ex * ex + ey * ey), 0.0), 1.0)
+            dx, dy = px - t * ex, py - t * ey
+            if dx * dx + dy * dy < radius * radius:
+                return True
+    return False
+
+
+def _result(status: PlanStatus, plan: Plan | None, iterations: int, wall: float) -> PlanResult:
+    first = wall if plan is not None else float("nan")
+    return PlanResult(status, plan, PlanStats(wall, first, iterations))

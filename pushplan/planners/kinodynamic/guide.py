@@ -1,0 +1,155 @@
+"""A coarse shortest path that trades length against boxes: where sampling is worth while."""
+
+from __future__ import annotations
+
+import heapq
+
+import numpy as np
+from numba import njit
+
+from pushplan.world import World
+from pushplan.world.checks import BoolArray, FloatArray
+
+_SIDE = 96
+"""Cells along the longer side of the workspace."""
+
+
+@njit(cache=True, nogil=True)
+def _gap(x: float, y: float, corners: FloatArray) -> float:
+    """Distance [m] from a point to a convex polygon, 0 inside."""
+    inside = True
+    best = np.inf
+    count = corners.shape[0]
+    for i in range(count):
+        j = i + 1 if i + 1 < count else 0
+        ex, ey = corners[j, 0] - corners[i, 0], corners[j, 1] - corners[i, 1]
+        px, py = x - corners[i, 0], y - corners[i, 1]
+        if ex * py - ey * px < 0.0:
+            inside = False
+        t = min(max((px * ex + py * ey) / (ex * ex + ey * ey), 0.0), 1.0)
+        dx, dy = px - t * ex, py - t * ey
+        best = min(best, dx * dx + dy * dy)
+    return 0.0 if inside else np.sqrt(best)
+
+
+@njit(cache=True, nogil=True)
+def _prices(
+    origin: FloatArray,
+    cell: float,
+    rows: int,
+    cols: int,
+    vertices: FloatArray,
+    offsets: FloatArray,
+    reach: FloatArray,
+    weight: FloatArray,
+) -> FloatArray:
+    """Price per metre of each cell: the sum over polygons of weight where they are near.
+
+    The weight applies in full on the polygon and fades to nothing at its reach.
+    """
+    price = np.zeros((rows, cols))
+    for k in range(offsets.shape[0] - 1):
+        corners = vertices[offsets[k] : offsets[k + 1]]
+        far = reach[k]
+        x0, x1 = corners[:, 0].min() - far, corners[:, 0].max() + far
+        y0, y1 = corners[:, 1].min() - far, corners[:, 1].max() + far
+        c0, c1 = int((x0 - origin[0]) / cell), int((x1 - origin[0]) / cell) + 1
+        r0, r1 = int((y0 - origin[1]) / cell), int((y1 - origin[1]) / cell) + 1
+        for r in range(max(r0, 0), min(r1, rows)):
+            for c in range(max(c0, 0), min(c1, cols)):
+                x, y = origin[0] + (c + 0.5) * cell, origin[1] + (r + 0.5) * cell
+                gap = _gap(x, y, corners)
+                if gap < far:
+                    price[r, c] += weight[k] * (1.0 - gap / far)
+    return price
+
+
+@njit(cache=True, nogil=True)
+def _search(price: FloatArray, start: int, goal: BoolArray, cell: float) -> FloatArray:
+    """Dijkstra over 8 neighbours from ``start``; returns the cells to the cheapest goal cell."""
+    rows, cols = price.shape
+    cost = np.full(rows * cols, np.inf)
+    parent = np.full(rows * cols, -1)
+    cost[start] = 0.0
+    queue = [(0.0, start)]
+    end = -1
+    while len(queue) > 0:
+        so_far, at = heapq.heappop(queue)
+        if so_far > cost[at]:
+            continue
+        r, c = at // cols, at % cols
+        if goal[r, c]:
+            end = at
+            break
+        for dr in range(-1, 2):
+            for dc in range(-1, 2):
+                nr, nc = r + dr, c + dc
+                if (dr == 0 and dc == 0) or nr < 0 or nc < 0 or nr >= rows or nc >= cols:
+                    continue
+                if np.isinf(price[nr, nc]):
+                    continue
+                length = cell * np.sqrt(float(dr * dr + dc * dc))
+                total = so_far + length * (1.0 + price[nr, nc])
+                there = nr * cols + nc
+                if total < cost[there]:
+                    cost[there] = total
+                    parent[there] = at
+                    heapq.heappush(queue, (total, there))
+    steps = 0
+    at = end
+    while at >= 0:
+        steps += 1
+        at = parent[at]
+    path = np.empty((steps, 2))
+    at = end
+    for i in range(steps - 1, -1, -1):
+        path[i, 0], path[i, 1] = float(at % cols), float(at // cols)
+        at = parent[at]
+    return path
+
+
+def guide_path(world: World, push_weight: float) -> FloatArray:
+    """A path of the robot's centre from its pose to the goal, coarse and cheap.
+
+    Args:
+        world: the snapshot, with a goal for the robot.
+        push_weight: price of a unit of pushing work against a unit of travel; infinite treats
+            objects as obstacles.
+
+    Returns:
+        (N, 2) points about one cell apart [m]; empty where there is no such path.
+    """
+    bounds = world.static.bounds
+    goal = world.navigation_goal
+    cell = float((bounds[2:] - bounds[:2]).max()) / _SIDE
+    cols, rows = (int(np.ceil(side / cell)) for side in bounds[2:] - bounds[:2])
+    inner, outer = world.robot.inscribed_radius, world.robot.circumscribed_radius
+    objects = world.movables
+    walls = list(world.static.convex_parts)
+    boxes = [objects.outline_world(k) for k in range(len(objects))]
+    # passing through the middle of a box pushes it for about a robot's width
+    per_metre = push_weight * objects.masses / world.robot.mass
+    # walls hold the inscribed disc for certain; the rest of the footprint is a matter of heading
+    shapes = [*walls, *walls, *boxes]
+    reach = [inner] * len(walls) + [1.3 * outer] * len(walls) + [outer] * len(boxes)
+    weight = [np.inf] * len(walls) + [2.0] * len(walls) + list(per_metre)
+    offsets = np.zeros(len(shapes) + 1, dtype=np.int64)
+    np.cumsum([len(shape) for shape in shapes], out=offsets[1:])
+    price = _prices(
+        bounds[:2],
+        cell,
+        rows,
+        cols,
+        np.concatenate(shapes) if shapes else np.zeros((0, 2)),
+        offsets,
+        np.array(reach, dtype=np.float64),
+        np.array(weight, dtype=np.float64),
+    )
+    x = bounds[0] + (np.arange(cols) + 0.5) * cell
+    y = bounds[1] + (np.arange(rows) + 0.5) * cell
+    at = world.robot_pose
+    col = int(np.clip((at[0] - bounds[0]) / cell, 0, cols - 1))
+    row = int(np.clip((at[1] - bounds[1]) / cell, 0, rows - 1))
+    reached = goal.contains(np.stack(np.meshgrid(x, y), axis=-1))
+    cells = _search(price, row * cols + col, reached, cell)
+    return bounds[:2] + (cells + 0.5) * cell

@@ -1,0 +1,79 @@
+"""From a geometric path to a plan with times, and what can be said before the search begins."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pushplan.geometry import geodesic_field
+from pushplan.planners.kinodynamic.collision import footprint, is_free, obstacles
+from pushplan.planners.kinodynamic.improve import Path
+from pushplan.world import Drive, Plan, RobotModel, World
+
+
+def turning_radius(robot: RobotModel, turn_share: float) -> float:
+    """Least turning radius that plans use [m].
+
+    A constant-speed robot cannot turn tighter than v / ω. A differential drive can, by slowing
+    down; half its own radius is tight enough for any corridor that it fits.
+    """
+    least = robot.turning_radius / turn_share
+    if robot.drive is Drive.DIFFERENTIAL:
+        return min(least, 0.5 * robot.circumscribed_radius)
+    return least
+
+
+def start_margin(world: World, margin: float) -> float | None:
+    """The clearance [m] that can be kept from the start on, or None if the robot overlaps.
+
+    A robot that starts nearer to a wall than ``margin`` keeps what it has.
+    """
+    walls = obstacles(world.static)
+    for share in (1.0, 0.5, 0.25, 0.1, 0.0):
+        shape = footprint(world.robot, share * margin)
+        if is_free(world.robot_pose, shape, walls, np.empty_like(shape.vertices)):
+            return share * margin
+    return None
+
+
+def reachable(world: World) -> bool:
+    """Whether the robot's inscribed disc can get from the start to the goal around the walls."""
+    extent = world.static.bounds[2:] - world.static.bounds[:2]
+    cell = max(float(extent.max()) / 150.0, 0.05 * world.robot.inscribed_radius)
+    # a cell less than the disc: a narrow gap is left for the search to find out about
+    clearance = max(world.robot.inscribed_radius - cell, 0.0)
+    field = geodesic_field(
+        world.static, world.navigation_goal, resolution=cell, clearance=clearance
+    )
+    x, y = world.robot_pose[:2]
+    return bool(np.isfinite(field.sample(float(x), float(y))))
+
+
+def timed_plan(world: World, path: Path, turn_share: float) -> Plan:
+    """Give a path speeds and times: full speed, slower where the curvature asks for it.
+
+    Args:
+        world: the snapshot that the path starts from.
+        path: poses, curvatures, predicted objects, lengths and works.
+        turn_share: share of the greatest turn rate that is used.
+    """
+    robot = world.robot
+    count = len(path.poses)
+    ahead = np.append(path.curvatures[1:], 0.0)  # curvature from each pose on
+    fastest = turn_share * robot.max_turn_rate / np.maximum(np.abs(ahead), 1e-12)
+    speeds = np.minimum(robot.max_speed, fastest)
+    if robot.drive is Drive.CONSTANT_SPEED:
+        speeds = np.full(count, robot.max_speed)
+    # the length of an arc, where `path.lengths` has its chord
+    chords = np.diff(path.lengths)
+    half = np.clip(0.5 * np.abs(ahead[:-1]) * chords, 1e-9, 1.0)
+    arcs = chords * np.arcsin(half) / half
+    times = np.concatenate([[0.0], np.cumsum(arcs / speeds[:-1])])
+    return Plan(
+        times=times,
+        poses=path.poses,
+        speeds=speeds,
+        turn_rates=speeds * ahead,
+        travel_cost=robot.mass * float(path.lengths[-1]),
+        interaction_cost=float(path.works[-1]),
+        object_poses=path.objects,
+    )

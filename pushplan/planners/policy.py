@@ -1,0 +1,163 @@
+"""A planner with a controller and a replanning rule is a policy."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from pushplan.control import PathFollower
+from pushplan.control.tracking import Progress
+from pushplan.interaction import InteractionModel, QuasiStatic
+from pushplan.world import (
+    Controller,
+    InvalidInputError,
+    Plan,
+    Planner,
+    PlanResult,
+    Stop,
+    Twist,
+    World,
+)
+from pushplan.world.checks import number
+
+
+@dataclass(frozen=True)
+class Replanning:
+    """When a plan no longer fits the world. Lengths in units of the circumscribed radius R.
+
+    Args:
+        offset: distance from the path that makes a new plan necessary [R].
+        surprise: how much more the rest of the plan may cost than was predicted, in units of
+            driving R further.
+        interval: least time between two plans for the same reason [s of travel of R at full
+            speed]; a plan on which the robot would jam is replaced at once.
+        never: follow the first plan to its end, as the paper's RRT does.
+    """
+
+    offset: float = 0.3
+    surprise: float = 0.1
+    interval: float = 0.5
+    never: bool = False
+
+    def __post_init__(self) -> None:
+        for name in ("offset", "surprise", "interval"):
+            number(name, getattr(self, name), low=0.0)
+
+
+class PlanFollower:
+    """Plans, drives the plan, and plans again when the world departs from the prediction.
+
+    At every step the rest of the plan is swept again from where everything is now; where that
+    costs more than was predicted, or jams, or the robot has left the path, or the plan is used
+    up, a new plan is made. If none is found the old one is kept.
+
+    Args:
+        planner: makes the plans.
+        controller: drives them; `pushplan.control.PathFollower` by default.
+        replanning: when to plan again.
+        interaction: predicts what the rest of a plan will do; quasi-static by default.
+        stop: stop rule of each planning call; the planner's own default if None.
+    """
+
+    def __init__(
+        self,
+        planner: Planner,
+        controller: Controller | None = None,
+        *,
+        replanning: Replanning | None = None,
+        interaction: InteractionModel | None = None,
+        stop: Stop | None = None,
+    ) -> None:
+        self.planner = planner
+        self.controller = PathFollower() if controller is None else controller
+        self.replanning = Replanning() if replanning is None else replanning
+        self.interaction = QuasiStatic() if interaction is None else interaction
+        self.stop = stop
+        self.plan_log: list[PlanResult] = []
+        """Every planning call since the last reset."""
+        self.current_plan: Plan | None = None
+        self._rng = np.random.default_rng(0)
+        self._planned_at = -np.inf
+        self._progress: Progress | None = None
+
+    def reset(self, world: World, rng: np.random.Generator) -> None:
+        """Forget the last episode."""
+        self.plan_log = []
+        self.current_plan = None
+        self._rng = rng
+        self._planned_at = -np.inf
+        self._progress = Progress(window=2.0 * world.robot.circumscribed_radius)
+
+    def act(self, world: World, observation: Any = None) -> Twist:
+        """The twist for this step; plans first where that is necessary."""
+        if self._progress is None:
+            self.reset(world, self._rng)
+        if self._needs_plan(world):
+            result = self.planner.plan(world, stop=self.stop, rng=self._rng)
+            self.plan_log.append(result)
+            self._planned_at = world.time
+            if result.plan is not None:
+                self.current_plan = result.plan
+        if self.current_plan is None:
+            return Twist(world.robot.min_speed, 0.0)
+        return self.controller.command(world, self.current_plan)
+
+    def _needs_plan(self, world: World) -> bool:
+        plan, rule = self.current_plan, self.replanning
+        size = world.robot.circumscribed_radius
+        waited = world.time - self._planned_at
+        rested = waited >= rule.interval * size / world.robot.max_speed - 1e-9
+        if plan is None:
+            return rested
+        if rule.never:
+            return False
+        assert self._progress is not None
+        x, y = (float(value) for value in world.robot_pose[:2])
+        along = self._progress.update(plan, x, y)
+        index = self._progress.index(along)
+        here = self._progress.pose(along)
+        if rested and np.hypot(x - here[0], y - here[1]) > rule.offset * size:
+            return True
+        if along >= self._progress.total - 1e-9:
+            return rested
+        if plan.object_poses is None or len(world.movables) == 0:
+            return False
+        rest = np.concatenate([world.robot_pose[None], plan.poses[index + 1 :]])
+        now = self.interaction.sweep(world, rest)
+        if now.jammed_at >= 0:
+            return rested or now.jammed_at <= 3
+        steps = np.diff(plan.object_poses[index:, :, :2], axis=0)
+        expected = float(np.hypot(steps[..., 0], steps[..., 1]).sum(axis=0) @ world.movables.masses)
+        return rested and now.work - expected > rule.surprise * size * world.robot.mass
+
+
+class RandomTwist:
+    """Draws every command uniformly from the robot's limits: the zero of every scale."""
+
+    def __init__(self) -> None:
+        self._rng = np.random.default_rng(0)
+
+    def reset(self, world: World, rng: np.random.Generator) -> None:
+        """Take the generator of the new episode."""
+        self._rng = rng
+
+    def act(self, world: World, observation: Any = None) -> Twist:
+        """A random twist."""
+        robot = world.robot
+        linear = self._rng.uniform(robot.min_speed, robot.max_speed)
+        return Twist(linear, self._rng.uniform(-robot.max_turn_rate, robot.max_turn_rate))
+
+
+def policy_for(planner: Planner) -> PlanFollower:
+    """The default policy around a planner: follow its plans, plan again when they do not fit.
+
+    Raises:
+        InvalidInputError: if the object has no ``plan`` method.
+    """
+    if not isinstance(planner, Planner):
+        raise InvalidInputError(
+            f"a planner needs a method plan(world, *, stop, rng), {type(planner).__name__} has none"
+        )
+    return PlanFollower(planner)
