@@ -29,7 +29,11 @@ class PurePursuit:
         self._progress: Progress | None = None
 
     def command(self, world: World, plan: Plan) -> Twist:
-        """See `pushplan.world.Controller`. Past the end of the plan it drives straight on."""
+        """See `pushplan.world.Controller`.
+
+        Past the end of the plan a differential drive stops; a constant-speed robot drives on
+        along the last heading.
+        """
         robot = world.robot
         reach = self.lookahead * robot.circumscribed_radius
         if self._progress is None:
@@ -37,11 +41,14 @@ class PurePursuit:
         progress = self._progress
         x, y, theta = (float(value) for value in world.robot_pose)
         along = progress.update(plan, x, y)
+        if robot.drive is Drive.DIFFERENTIAL and along >= progress.total - 1e-9:
+            return clamp_twist(robot, 0.0, 0.0)
         aim = progress.pose(min(along + reach, progress.total))
+        dx, dy = float(aim[0]) - x, float(aim[1]) - y
         overrun = along + reach - progress.total
         if overrun > 0.0:  # continue the last heading beyond the end
-            aim = aim + [overrun * math.cos(aim[2]), overrun * math.sin(aim[2]), 0.0]
-        dx, dy = aim[0] - x, aim[1] - y
+            dx += overrun * math.cos(aim[2])
+            dy += overrun * math.sin(aim[2])
         bearing = (math.atan2(dy, dx) - theta + math.pi) % (2.0 * math.pi) - math.pi
         speed = float(plan.speeds[progress.index(along)])
         if robot.drive is Drive.DIFFERENTIAL and abs(bearing) > math.pi / 4:

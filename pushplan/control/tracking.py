@@ -63,9 +63,11 @@ class Progress:
         i = self.index(along)
         poses = self._plan.poses
         if i == len(poses) - 1:
-            return poses[i]
+            last: FloatArray = poses[i]
+            return last
         length = self._lengths[i + 1] - self._lengths[i]
         share = (along - self._lengths[i]) / length if length > 0.0 else 0.0
         turn = (poses[i + 1, 2] - poses[i, 2] + np.pi) % (2.0 * np.pi) - np.pi
         change = np.array([*(poses[i + 1, :2] - poses[i, :2]), turn])
-        return poses[i] + min(share, 1.0) * change
+        pose: FloatArray = poses[i] + min(share, 1.0) * change
+        return pose

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 
 from pushplan.world import Plan, World
@@ -17,7 +19,7 @@ def polyline_plan(world: World, points: FloatArray, spacing: float) -> Plan:
         spacing: greatest distance between two poses [m].
     """
     pieces = [points[:1]]
-    for a, b in zip(points[:-1], points[1:], strict=True):
+    for a, b in pairwise(points):
         steps = max(1, int(np.ceil(float(np.hypot(*(b - a))) / spacing)))
         pieces.append(a + (b - a) * (np.arange(1, steps + 1) / steps)[:, None])
     path = np.concatenate(pieces)

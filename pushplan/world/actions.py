@@ -1,4 +1,4 @@
-"""What a policy may ask of a robot. An array stands for an action in the environment's own space."""
+"""What a policy may ask of a robot; an array is an action in the environment's own space."""
 
 from __future__ import annotations
 

@@ -102,7 +102,7 @@ def array(
             f"{name} must be an array of {wanted.name} of shape {_shape_text(shape)}, "
             f"got {_short(value)}"
         ) from error
-    if result.size == 0 and len(shape) > 1 and shape[0] is None:
+    if result.size == 0 and result.ndim != len(shape) and shape[0] is None:
         result = result.reshape((0, *(n or 0 for n in shape[1:])))
     if result.ndim != len(shape) or any(
         want is not None and have != want for have, want in zip(result.shape, shape, strict=True)

@@ -58,7 +58,9 @@ class GoalLine(ArrayRecord):
         length = float(np.hypot(normal[0], normal[1]))
         if length == 0.0:
             raise InvalidInputError("goal.normal must not be zero")
-        object.__setattr__(self, "normal", array("goal.normal", normal / length, (2,)))
+        if abs(length - 1.0) > 1e-12:  # dividing a unit vector again could change its last digit
+            normal = array("goal.normal", normal / length, (2,))
+        object.__setattr__(self, "normal", normal)
 
     def distance(self, x: float, y: float) -> float:
         """Straight distance [m] from a point to the line, 0 on it or beyond."""

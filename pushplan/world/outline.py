@@ -29,7 +29,8 @@ def centroid(corners: FloatArray) -> FloatArray:
     x, y = shifted[:, 0], shifted[:, 1]
     cross = x * np.roll(y, -1) - np.roll(x, -1) * y
     sums = np.array([np.dot(x + np.roll(x, -1), cross), np.dot(y + np.roll(y, -1), cross)])
-    return corners[0] + sums / (3.0 * cross.sum())
+    centre: FloatArray = corners[0] + sums / (3.0 * cross.sum())
+    return centre
 
 
 def convex_outline(name: str, corners: ArrayLike) -> FloatArray:
@@ -83,4 +84,5 @@ def transform(pose: ArrayLike, points_body: FloatArray) -> FloatArray:
     x, y, theta = np.asarray(pose, dtype=np.float64)
     c, s = np.cos(theta), np.sin(theta)
     rotation = np.array([[c, -s], [s, c]])
-    return points_body @ rotation.T + np.array([x, y])
+    points_world: FloatArray = points_body @ rotation.T + np.array([x, y])
+    return points_world

@@ -46,9 +46,10 @@ class World(ArrayRecord):
 
     def __post_init__(self) -> None:
         for key, kind in (("robot", RobotModel), ("static", StaticMap), ("movables", Movables)):
-            if not isinstance(getattr(self, key), kind):
+            value = getattr(self, key)
+            if not isinstance(value, kind):
                 raise InvalidInputError(
-                    f"world.{key} must be a {kind.__name__}, got {type(getattr(self, key)).__name__}"
+                    f"world.{key} must be a {kind.__name__}, got {type(value).__name__}"
                 )
         if not isinstance(self.goal, GoalDisc | GoalLine | Receptacle | ClearanceArea):
             raise InvalidInputError(

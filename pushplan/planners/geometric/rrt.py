@@ -159,7 +159,7 @@ class GeometricRRT:
             return np.array([[state[0], state[1]] for state in states]), used
 
 
-class _GoalRegion(base.GoalSampleableRegion):  # type: ignore[misc]
+class _GoalRegion(base.GoalSampleableRegion):
     """The goal as OMPL wants it: points to grow towards, and whether a point is inside."""
 
     def __init__(

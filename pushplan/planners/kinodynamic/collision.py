@@ -11,7 +11,7 @@ from numba import njit
 from shapely import Polygon
 
 from pushplan.geometry import convex_overlap
-from pushplan.interaction.kernels import place
+from pushplan.interaction.separation import place
 from pushplan.world import RobotModel, StaticMap
 from pushplan.world.checks import FloatArray, IntArray
 from pushplan.world.outline import convex_outline, flatten

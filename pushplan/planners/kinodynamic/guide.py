@@ -8,7 +8,8 @@ import numpy as np
 from numba import njit
 
 from pushplan.world import World
-from pushplan.world.checks import BoolArray, FloatArray
+from pushplan.world.checks import BoolArray, FloatArray, IntArray
+from pushplan.world.outline import flatten
 
 _SIDE = 96
 """Cells along the longer side of the workspace."""
@@ -39,7 +40,7 @@ def _prices(
     rows: int,
     cols: int,
     vertices: FloatArray,
-    offsets: FloatArray,
+    offsets: IntArray,
     reach: FloatArray,
     weight: FloatArray,
 ) -> FloatArray:
@@ -133,14 +134,13 @@ def guide_path(world: World, push_weight: float) -> FloatArray:
     shapes = [*walls, *walls, *boxes]
     reach = [inner] * len(walls) + [1.3 * outer] * len(walls) + [outer] * len(boxes)
     weight = [np.inf] * len(walls) + [2.0] * len(walls) + list(per_metre)
-    offsets = np.zeros(len(shapes) + 1, dtype=np.int64)
-    np.cumsum([len(shape) for shape in shapes], out=offsets[1:])
+    vertices, offsets = flatten(shapes)
     price = _prices(
         bounds[:2],
         cell,
         rows,
         cols,
-        np.concatenate(shapes) if shapes else np.zeros((0, 2)),
+        vertices,
         offsets,
         np.array(reach, dtype=np.float64),
         np.array(weight, dtype=np.float64),

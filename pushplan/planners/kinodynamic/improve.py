@@ -20,7 +20,7 @@ from pushplan.world import GoalDisc, NavigationGoal
 from pushplan.world.checks import FloatArray
 
 JAM_COST = 1e6
-"""Added to the length [m] at each pose where the robot jams, so far above any path that it shows."""
+"""Added to a path's length at each pose where the robot jams [m], to tell it from any other."""
 
 
 class Pricing(NamedTuple):
@@ -79,8 +79,10 @@ def make_path(capacity: int, objects: int) -> Path:
 def in_goal(x: float, y: float, goal: FloatArray) -> bool:
     """Whether a point counts as the goal."""
     if goal[0] == 0.0:
-        return (x - goal[1]) ** 2 + (y - goal[2]) ** 2 <= goal[3] ** 2
-    return (x - goal[1]) * goal[3] + (y - goal[2]) * goal[4] >= 0.0
+        inside: bool = (x - goal[1]) ** 2 + (y - goal[2]) ** 2 <= goal[3] ** 2
+    else:
+        inside = (x - goal[1]) * goal[3] + (y - goal[2]) * goal[4] >= 0.0
+    return inside
 
 
 @njit(cache=True, nogil=True)
@@ -128,7 +130,8 @@ def price_from(
             path.lengths[n] += JAM_COST
         if m0 * path.lengths[n] + weight * path.works[n] >= limit:
             return np.inf
-    return m0 * path.lengths[count - 1] + weight * path.works[count - 1]
+    cost: float = m0 * path.lengths[count - 1] + weight * path.works[count - 1]
+    return cost
 
 
 @njit(cache=True, nogil=True)

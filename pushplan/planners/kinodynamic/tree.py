@@ -240,7 +240,7 @@ class _Growth:
         return np.array(arcs[::-1]).reshape(-1, 2)
 
 
-class _Region(base.GoalSampleableRegion):  # type: ignore[misc]
+class _Region(base.GoalSampleableRegion):
     """Hands OMPL our targets, and tells it when a state is in the goal."""
 
     def __init__(self, info: control.SpaceInformation, growth: _Growth) -> None:

@@ -1,0 +1,104 @@
+"""Moving overlapping bodies apart by the least total motion, compiled."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from pushplan.world.checks import FloatArray
+
+
+@njit(cache=True, nogil=True)
+def place(pose: FloatArray, points: FloatArray, out: FloatArray) -> None:
+    """Carry (N, 2) body-frame points to the world frame, into ``out``."""
+    c, s = np.cos(pose[2]), np.sin(pose[2])
+    for i in range(points.shape[0]):
+        out[i, 0] = pose[0] + c * points[i, 0] - s * points[i, 1]
+        out[i, 1] = pose[1] + s * points[i, 0] + c * points[i, 1]
+
+
+@njit(cache=True, nogil=True)
+def _nudge(pose: FloatArray, x: float, y: float, ix: float, iy: float, inv: float) -> None:
+    """Move a body by (ix, iy) applied at the world point (x, y)."""
+    arm = (x - pose[0]) * iy - (y - pose[1]) * ix
+    pose[0] += ix
+    pose[1] += iy
+    pose[2] += arm * inv
+
+
+@njit(cache=True, nogil=True)
+def separate(
+    points: FloatArray,
+    found: int,
+    a: FloatArray,
+    weight_a: float,
+    inv_a: float,
+    b: FloatArray,
+    weight_b: float,
+    inv_b: float,
+) -> float:
+    """Move two bodies apart by the least total motion; returns the sum of the impulses.
+
+    Args:
+        points: (2, 5) contact points from ``a`` to ``b``, as `contacts` gives them.
+        found: how many of them count.
+        a: (3,) pose of the first body, changed in place.
+        weight_a: its inverse mass; 0 if it cannot move.
+        inv_a: its 1 / c².
+        b: (3,) pose of the second body, likewise.
+        weight_b: its inverse mass.
+        inv_b: its 1 / c².
+    """
+    nx, ny = points[0, 2], points[0, 3]
+    arms_a, arms_b = np.zeros(2), np.zeros(2)
+    for i in range(found):
+        x, y = points[i, 0], points[i, 1]
+        arms_a[i] = (x - a[0]) * ny - (y - a[1]) * nx
+        arms_b[i] = (x - b[0]) * ny - (y - b[1]) * nx
+    base = weight_a + weight_b
+    wa, wb = weight_a * inv_a, weight_b * inv_b
+    k00 = base + wa * arms_a[0] ** 2 + wb * arms_b[0] ** 2
+    first, second = points[0, 4] / k00, 0.0
+    if found == 2:
+        # the exact solution of the 2 x 2 complementarity problem: both points, or only one
+        k11 = base + wa * arms_a[1] ** 2 + wb * arms_b[1] ** 2
+        k01 = base + wa * arms_a[0] * arms_a[1] + wb * arms_b[0] * arms_b[1]
+        d0, d1 = points[0, 4], points[1, 4]
+        det = k00 * k11 - k01 * k01
+        if det > 1e-12 * k00 * k11:
+            first, second = (k11 * d0 - k01 * d1) / det, (k00 * d1 - k01 * d0) / det
+            if first < 0.0:
+                first, second = 0.0, d1 / k11
+            elif second < 0.0:
+                first, second = d0 / k00, 0.0
+    for i in range(found):
+        impulse = first if i == 0 else second
+        x, y = points[i, 0], points[i, 1]
+        _nudge(a, x, y, -impulse * weight_a * nx, -impulse * weight_a * ny, inv_a)
+        _nudge(b, x, y, impulse * weight_b * nx, impulse * weight_b * ny, inv_b)
+    total: float = first + second
+    return total
+
+
+@njit(cache=True, nogil=True)
+def drag_along(
+    point: FloatArray,
+    limit: float,
+    robot_from: FloatArray,
+    robot_to: FloatArray,
+    before: FloatArray,
+    pose: FloatArray,
+    inv: float,
+) -> None:
+    """Coulomb friction: carry the contact point sideways with the robot, up to ``limit`` [m]."""
+    x, y, nx, ny = point[0], point[1], point[2], point[3]
+    tx, ty = -ny, nx
+    turn = robot_to[2] - robot_from[2]
+    robot = (robot_to[0] - robot_from[0] - turn * (y - robot_to[1])) * tx
+    robot += (robot_to[1] - robot_from[1] + turn * (x - robot_to[0])) * ty
+    turn = pose[2] - before[2]
+    body = (pose[0] - before[0] - turn * (y - pose[1])) * tx
+    body += (pose[1] - before[1] + turn * (x - pose[0])) * ty
+    arm = (x - pose[0]) * ty - (y - pose[1]) * tx
+    by = min(max((robot - body) / (1.0 + arm * arm * inv), -limit), limit)
+    _nudge(pose, x, y, by * tx, by * ty, inv)
