@@ -1,0 +1,200 @@
+"""One call of the kinodynamic planner."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+
+import numpy as np
+
+from pushplan.interaction import QuasiStatic
+from pushplan.planners.kinodynamic.collision import footprint, is_free, obstacles
+from pushplan.planners.kinodynamic.config import KinodynamicRRTConfig
+from pushplan.planners.kinodynamic.guide import guide_path
+from pushplan.planners.kinodynamic.improve import (
+    JAM_COST,
+    Path,
+    Pricing,
+    goal_numbers,
+    improve,
+    lay_out,
+    make_path,
+    price_from,
+)
+from pushplan.planners.kinodynamic.targets import Targets
+from pushplan.planners.kinodynamic.timing import reachable, start_margin, timed_plan, turning_radius
+from pushplan.planners.kinodynamic.tree import TreeLimits, grow_tree
+from pushplan.world import Plan, PlanStatus, StopCheck, World
+
+
+class Search:
+    """One planning call: trees, their paths, and the best path so far."""
+
+    def __init__(
+        self,
+        world: World,
+        config: KinodynamicRRTConfig,
+        interaction: QuasiStatic,
+        check: StopCheck,
+        rng: np.random.Generator,
+        began: float,
+    ) -> None:
+        self.world, self.config, self.check, self.rng, self.began = world, config, check, rng, began
+        self.size = world.robot.circumscribed_radius
+        self.goal = world.navigation_goal
+        radius = turning_radius(world.robot, config.turn_share)
+        self.pricing = Pricing(
+            robot_mass=world.robot.mass,
+            push_weight=float(config.push_weight),
+            radius=radius,
+            spacing=config.spacing * self.size,
+            spread=1.5 * self.size,
+            goal=goal_numbers(self.goal, config.inset * self.size),
+        )
+        self.limits = TreeLimits(
+            max_curvature=1.0 / radius,
+            edge_length=config.edge * self.size,
+            spacing=config.spacing * self.size,
+            turn_weight=0.5 * self.size,
+        )
+        self.bodies, self.settings = interaction.bodies(world), interaction.settings(world)
+        self.walls = obstacles(world.static)
+        self.shape = footprint(world.robot)
+        self.iterations = self.nodes = self.trees = 0
+        self.best: Path | None = None
+        self.best_cost = np.inf
+        self.first_solution_s = float("nan")
+
+    def run(self) -> PlanStatus | None:
+        """Search until the stop rule fires; None where there is no plan by then."""
+        margin = start_margin(self.world, self.config.margin * self.size)
+        if margin is None:
+            return PlanStatus.START_BLOCKED
+        if not reachable(self.world):
+            return PlanStatus.GOAL_UNREACHABLE
+        self.shape = footprint(self.world.robot, margin)
+        if self.goal.distance(*self.world.robot_pose[:2]) <= 0.0:
+            here = make_path(1, len(self.world.movables))
+            here.poses[0] = self.world.robot_pose
+            here.objects[0] = self.world.movables.poses
+            self._keep(here, 1, 0.0)
+            return PlanStatus.SOLVED
+        while not self.stopped():
+            self._one_round()
+        return PlanStatus.SOLVED if self._solved(self.best_cost) else None
+
+    def stopped(self) -> bool:
+        """Whether the stop rule fires now."""
+        solved = self._solved(self.best_cost)
+        return self.check(self.iterations, self.best_cost if solved else np.inf)
+
+    def _solved(self, cost: float) -> bool:
+        """Whether a path of this cost is free of jams."""
+        return cost < JAM_COST * self.pricing.robot_mass
+
+    def _one_round(self) -> None:
+        """A path around the objects and one among them; the cheaper is worked out further."""
+        config = self.config
+        cheaper: _Candidate | None = None
+        for weight, budget in (
+            (np.inf, config.avoid_iterations),
+            (config.push_weight, config.tree_iterations),
+        ):
+            if self.stopped():
+                return
+            candidate = self._grow(weight, budget)
+            if candidate is None:
+                continue
+            self._repair(candidate, config.repairs)
+            if cheaper is None or candidate.cost < cheaper.cost:
+                cheaper = candidate
+        while cheaper is not None and not self.stopped():
+            before = cheaper.cost
+            self._repair(cheaper, config.repairs)
+            if cheaper.cost > (1.0 - config.least_gain) * before:
+                return
+
+    def _grow(self, push_weight: float, budget: int) -> _Candidate | None:
+        """The path of a new tree; an infinite weight treats objects as obstacles."""
+        world = self.world
+        self.trees += 1
+        self.iterations += 1
+        among = self.walls
+        if np.isinf(push_weight):
+            boxes = [world.movables.outline_world(k) for k in range(len(world.movables))]
+            among = obstacles(world.static, boxes)
+            if not is_free(world.robot_pose, self.shape, among, np.empty_like(self.shape.vertices)):
+                return None  # the robot touches an object already: only pushing helps
+        guide = guide_path(world, push_weight)
+        if len(guide) == 0:
+            return None
+        last = self.iterations + budget
+
+        def done() -> bool:
+            self.iterations += 1
+            return self.iterations >= last or self.stopped()
+
+        arcs = grow_tree(
+            world.robot_pose,
+            self.goal,
+            Targets(guide, self.config, self.size, world.static.bounds, self.rng),
+            self.limits,
+            self.shape,
+            among,
+            int(self.rng.integers(1, 2**31)),
+            done,
+        )
+        if arcs is None:
+            return None
+        self.nodes += len(arcs)
+        capacity = 3 * int(arcs[:, 0].sum() / self.pricing.spacing + len(arcs)) + 200
+        path = make_path(capacity, len(world.movables))
+        count = lay_out(world.robot_pose, arcs, path, self.pricing)
+        path.objects[0] = world.movables.poses
+        cost = price_from(path, 0, count, np.inf, self.pricing, self.bodies, self.settings)
+        self._keep(path, count, cost)
+        return _Candidate(path, make_path(capacity, len(world.movables)), count, cost)
+
+    def _repair(self, candidate: _Candidate, repairs: int) -> None:
+        """Try a number of repairs, as long as the stop rule allows."""
+        for _ in range(0, repairs, self.config.batch):
+            if self.stopped():
+                return
+            candidate.count, candidate.cost = improve(
+                candidate.path,
+                candidate.count,
+                candidate.cost,
+                self.rng.random((self.config.batch, 4)),
+                self.rng.standard_normal((self.config.batch, 2)),
+                candidate.trial,
+                self.pricing,
+                self.shape,
+                self.walls,
+                self.bodies,
+                self.settings,
+            )
+            self.iterations += self.config.batch
+            self._keep(candidate.path, candidate.count, candidate.cost)
+
+    def _keep(self, path: Path, count: int, cost: float) -> None:
+        if cost >= self.best_cost:
+            return
+        if np.isnan(self.first_solution_s) and self._solved(cost):
+            self.first_solution_s = time.perf_counter() - self.began
+        self.best_cost = cost
+        self.best = Path(*(part[:count].copy() for part in path))
+
+    def plan(self) -> Plan:
+        """The best path so far as a plan."""
+        assert self.best is not None
+        return timed_plan(self.world, self.best, self.config.turn_share)
+
+
+@dataclass
+class _Candidate:
+    """A path that is being repaired, with the memory for it."""
+
+    path: Path
+    trial: Path
+    count: int
+    cost: float

@@ -1,0 +1,50 @@
+"""Where a tree grows: mostly near a coarse path, sometimes anywhere."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pushplan.planners.kinodynamic.config import KinodynamicRRTConfig
+from pushplan.world.checks import FloatArray
+
+
+class Targets:
+    """Draws the poses that a tree grows towards."""
+
+    def __init__(
+        self,
+        guide: FloatArray,
+        config: KinodynamicRRTConfig,
+        size: float,
+        bounds: FloatArray,
+        rng: np.random.Generator,
+    ) -> None:
+        self.guide, self.config, self.bounds, self.rng = guide, config, bounds, rng
+        self.spread = config.guide_spread * size
+        index = np.arange(len(guide))
+        ahead, behind = (
+            guide[np.minimum(index + 3, len(guide) - 1)],
+            guide[np.maximum(index - 3, 0)],
+        )
+        self.headings = np.arctan2(ahead[:, 1] - behind[:, 1], ahead[:, 0] - behind[:, 0])
+        self.block = np.empty((0, 3))
+        self.used = 0
+
+    def __call__(self) -> FloatArray:
+        """The next target (3,)."""
+        if self.used == len(self.block):
+            self.block, self.used = self._draw(128), 0
+        self.used += 1
+        target: FloatArray = self.block[self.used - 1]
+        return target
+
+    def _draw(self, count: int) -> FloatArray:
+        rng, bounds = self.rng, self.bounds
+        near = rng.random(count) < self.config.guide_share
+        index = rng.integers(len(self.guide), size=count)
+        offsets = rng.standard_normal((count, 3)) * [self.spread, self.spread, 0.4]
+        guided = np.column_stack([self.guide[index], self.headings[index]]) + offsets
+        spread = rng.random((count, 3))
+        low, high = [*bounds[:2], -np.pi], [*bounds[2:], np.pi]
+        uniform = low + spread * (np.asarray(high) - low)
+        return np.where(near[:, None], guided, uniform)
