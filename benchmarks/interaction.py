@@ -37,7 +37,7 @@ def random_drive(world: World, rng: np.random.Generator) -> FloatArray:
 
 def compare(boxes: int, scenes: int) -> None:
     quick, slow = QuasiStatic(), RolloutInteraction()
-    rows: list[tuple[float, float, float, float]] = []
+    rows: list[tuple[float, float, float]] = []
     per_object: list[tuple[float, float]] = []
     quick_s = slow_s = 0.0
     jams = agree = steps = 0
@@ -65,7 +65,7 @@ def compare(boxes: int, scenes: int) -> None:
             if m > 0.01
         ]
         cut = [Interaction(m.object_poses[:last], m.masses).work for m in (a, b)]
-        rows.append((cut[0], cut[1], abs(cut[0] - cut[1]), 0.0))
+        rows.append((cut[0], cut[1], abs(cut[0] - cut[1])))
     work = np.array(rows)
     errors = np.array(per_object).reshape(-1, 2)
     print(f"{boxes} boxes, {scenes} scenes, {len(errors)} objects moved by more than 1 cm")

@@ -55,9 +55,8 @@ def main() -> None:
     world = maze()
     whole = ImageObservation()
     whole.observe(world)  # compile
-    print(
-        f"{'whole image ' + str(whole.shape):32}{milliseconds(lambda: whole.observe(world)):8.3f} ms"
-    )
+    title, median = f"whole image {whole.shape}", milliseconds(lambda: whole.observe(world))
+    print(f"{title:32}{median:8.3f} ms")
     for name in whole.channels:
         one = ImageObservation(channels=(name,))
         print(f"{'  ' + name:32}{milliseconds(lambda one=one: one.observe(world)):8.3f} ms")

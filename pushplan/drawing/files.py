@@ -49,9 +49,10 @@ def save_animation(path: str | Path, frames: Iterable[Frame], fps: float = 20.0)
     if first is None:
         raise InvalidInputError("an animation needs at least one frame, got none")
     try:
-        if path.suffix == ".mp4":
+        ending = path.suffix.lower()
+        if ending == ".mp4":
             _write_mp4(path, first, pictures, fps)
-        elif path.suffix == ".gif":
+        elif ending == ".gif":
             _write_gif(path, first, pictures, fps)
         else:
             for last in pictures:
@@ -62,12 +63,14 @@ def save_animation(path: str | Path, frames: Iterable[Frame], fps: float = 20.0)
 
 
 def _write_gif(path: Path, first: Frame, rest: Iterable[Frame], fps: float) -> None:
-    # one palette for all frames keeps flat colours from flickering
-    palette = Image.fromarray(first).quantize(128)
-    quantized = [
-        Image.fromarray(frame).quantize(palette=palette, dither=Image.Dither.NONE) for frame in rest
-    ]
-    palette.save(path, save_all=True, append_images=quantized, duration=round(1000.0 / fps), loop=0)
+    # one palette for all frames, from a few of them, keeps flat colours from flickering
+    frames = [first, *rest]
+    palette = Image.fromarray(np.concatenate(frames[:: max(1, len(frames) // 8)])).quantize(255)
+    head, *tail = (
+        Image.fromarray(frame).quantize(palette=palette, dither=Image.Dither.NONE)
+        for frame in frames
+    )
+    head.save(path, save_all=True, append_images=tail, duration=round(1000.0 / fps), loop=0)
 
 
 def _write_mp4(path: Path, first: Frame, rest: Iterable[Frame], fps: float) -> None:

@@ -1,1 +1,54 @@
-"""TODO."""
+"""Environments: tasks and simulators behind one `PushEnv`.
+
+Importing this package registers the Gymnasium ids and loads neither an engine nor a kernel; the
+rest comes on first use. Since release 1.0 Gymnasium no longer looks for environments in installed
+packages, so either import this package first, or let Gymnasium do it::
+
+    gymnasium.make("pushplan.envs:pushplan/Maze-v0")
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from pushplan.envs.push_env import EpisodeOverError, PushEnv, make
+    from pushplan.envs.rollout import RolloutInteraction
+    from pushplan.envs.trace import Trace
+
+__all__ = ["EpisodeOverError", "PushEnv", "RolloutInteraction", "Trace", "make", "register_all"]
+
+_LAZY = {
+    "EpisodeOverError": "pushplan.envs.push_env",
+    "PushEnv": "pushplan.envs.push_env",
+    "RolloutInteraction": "pushplan.envs.rollout",
+    "Trace": "pushplan.envs.trace",
+    "make": "pushplan.envs.push_env",
+}
+
+
+def __getattr__(name: str) -> Any:
+    if name in _LAZY:
+        return getattr(import_module(_LAZY[name]), name)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return __all__
+
+
+def register_all() -> None:
+    """Tell Gymnasium about every task; does nothing where it knows already."""
+    from gymnasium.envs.registration import register, registry
+
+    from pushplan.envs.registry import GYM_IDS
+
+    for gym_id, task in GYM_IDS.items():
+        if gym_id not in registry:
+            register(
+                id=gym_id, entry_point="pushplan.envs.push_env:make_env", kwargs={"task": task}
+            )
+
+
+register_all()

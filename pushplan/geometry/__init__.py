@@ -1,6 +1,7 @@
 """Compiled geometry: polygons, rasters, grids, shortest paths and distance fields."""
 
 from pushplan.geometry.convex import convex_distance, convex_overlap, convex_penetration
+from pushplan.geometry.distance_field import GeodesicField, geodesic_field, sample_values
 from pushplan.geometry.grid import Grid, clearance_field, occupancy
 from pushplan.geometry.polygon import (
     point_in_polygon,
@@ -10,19 +11,27 @@ from pushplan.geometry.polygon import (
     transform_points,
 )
 from pushplan.geometry.raster import fill_convex, fill_convex_parts
+from pushplan.geometry.shortest_path import GoalDistances, Path, VisibilityGraph, goal_distances
 
 __all__ = [
+    "GeodesicField",
+    "GoalDistances",
     "Grid",
+    "Path",
+    "VisibilityGraph",
     "clearance_field",
     "convex_distance",
     "convex_overlap",
     "convex_penetration",
     "fill_convex",
     "fill_convex_parts",
+    "geodesic_field",
+    "goal_distances",
     "occupancy",
     "point_in_polygon",
     "polygon_area",
     "polygon_centroid",
     "polygon_inertia",
+    "sample_values",
     "transform_points",
 ]

@@ -122,14 +122,8 @@ def line_of_sight(
     """Whether the segment p-q stays ``margin`` [m] or more away from every obstacle.
 
     Args:
-        px: start of the segment [m]; so are ``py`` and, for its end, ``qx`` and ``qy``.
-        py: see ``px``.
-        qx: see ``px``.
-        qy: see ``px``.
-        vertices: as in `Obstacles`; so are ``offsets``, ``radii`` and ``boxes``.
-        offsets: see ``vertices``.
-        radii: see ``vertices``.
-        boxes: see ``vertices``.
+        px, py, qx, qy: ends of the segment [m].
+        vertices, offsets, radii, boxes: as in `Obstacles`.
         margin: [m], may be slightly negative to let a path touch.
     """
     dx, dy = qx - px, qy - py

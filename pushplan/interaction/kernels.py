@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from pushplan.interaction.contact import contacts
+from pushplan.interaction.contact import contacts, least_overlap
 from pushplan.interaction.separation import drag_along, place, separate
 from pushplan.world.checks import FloatArray, IntArray
 
@@ -314,6 +314,29 @@ def advance(
 
 
 @njit(cache=True, nogil=True)
+def robot_held(pose: FloatArray, bodies: Bodies, settings: Settings, scratch: Scratch) -> bool:
+    """Whether the robot at ``pose`` (3,) overlaps something static by more than the jam depth."""
+    x, y, r = pose[0], pose[1], bodies.robot_radius
+    placed = False
+    for part in range(bodies.static_boxes.shape[0]):
+        box = bodies.static_boxes[part]
+        if x + r <= box[0] or x - r >= box[2] or y + r <= box[1] or y - r >= box[3]:
+            continue
+        if not placed:
+            place(pose, bodies.robot_vertices, scratch.robot)
+            placed = True
+        a, b = bodies.static_offsets[part], bodies.static_offsets[part + 1]
+        wall = bodies.static_vertices[a:b]
+        for piece in range(bodies.robot_offsets.shape[0] - 1):
+            c, d = bodies.robot_offsets[piece], bodies.robot_offsets[piece + 1]
+            corners = scratch.robot[c:d]
+            gap = max(least_overlap(wall, corners)[0], least_overlap(corners, wall)[0])
+            if gap < -settings.jam_depth:
+                return True
+    return False
+
+
+@njit(cache=True, nogil=True)
 def sweep_path(
     path: FloatArray, poses: FloatArray, bodies: Bodies, settings: Settings, out: FloatArray
 ) -> tuple[float, int]:
@@ -336,8 +359,9 @@ def sweep_path(
     if keep:
         out[0] = poses
     for n in range(1, path.shape[0]):
-        if jammed < 0 and not advance(
-            path[n - 1], path[n], poses, lengths, bodies, settings, scratch
+        if jammed < 0 and (
+            robot_held(path[n], bodies, settings, scratch)
+            or not advance(path[n - 1], path[n], poses, lengths, bodies, settings, scratch)
         ):
             jammed = n
         if keep:

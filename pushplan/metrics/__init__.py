@@ -1,1 +1,16 @@
-"""TODO."""
+"""Scores of a recorded episode. A metric is a function of an `Episode` and of nothing else."""
+
+from pushplan.metrics.lengths import interaction_work, object_path_lengths, path_length
+from pushplan.metrics.navigation import NavigationScores, navigation_scores
+from pushplan.metrics.registry import METRICS, compute, metric_names
+
+__all__ = [
+    "METRICS",
+    "NavigationScores",
+    "compute",
+    "interaction_work",
+    "metric_names",
+    "navigation_scores",
+    "object_path_lengths",
+    "path_length",
+]

@@ -1,1 +1,7 @@
-"""TODO."""
+"""A `pushplan.world.World` as what a policy observes. No simulator, no Gymnasium."""
+
+from pushplan.observation.channels import CHANNELS
+from pushplan.observation.image import ImageObservation
+from pushplan.observation.state import StateObservation
+
+__all__ = ["CHANNELS", "ImageObservation", "StateObservation"]

@@ -1,1 +1,5 @@
-"""TODO."""
+"""Tasks: how an episode starts, what counts, when it ends. None of them names an engine."""
+
+from pushplan.envs.tasks.base import Outcome, Task
+
+__all__ = ["Outcome", "Task"]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -24,7 +24,7 @@ from pushplan.planners.kinodynamic.improve import (
 from pushplan.planners.kinodynamic.targets import Targets
 from pushplan.planners.kinodynamic.timing import reachable, start_margin, timed_plan, turning_radius
 from pushplan.planners.kinodynamic.tree import TreeLimits, grow_tree
-from pushplan.world import Plan, PlanStatus, StopCheck, World
+from pushplan.world import Drive, Plan, PlanStatus, StopCheck, World
 
 
 class Search:
@@ -81,6 +81,9 @@ class Search:
             return PlanStatus.SOLVED
         while not self.stopped():
             self._one_round()
+            if not self._solved(self.best_cost):
+                margin *= 0.5
+                self._relax(margin)
         return PlanStatus.SOLVED if self._solved(self.best_cost) else None
 
     def stopped(self) -> bool:
@@ -113,6 +116,19 @@ class Search:
             self._repair(cheaper, config.repairs)
             if cheaper.cost > (1.0 - config.least_gain) * before:
                 return
+
+    def _relax(self, margin: float) -> None:
+        """Allow tighter turns and less clearance [m], for starts in a tight place.
+
+        A constant-speed robot may then use its whole turn rate; one that can slow down turns on
+        half the radius, to a tenth of its size.
+        """
+        radius = self.world.robot.turning_radius
+        if self.world.robot.drive is Drive.DIFFERENTIAL:
+            radius = max(0.5 * self.pricing.radius, 0.1 * self.size)
+        self.pricing = self.pricing._replace(radius=radius)
+        self.limits = replace(self.limits, max_curvature=1.0 / radius)
+        self.shape = footprint(self.world.robot, margin)
 
     def _grow(self, push_weight: float, budget: int) -> _Candidate | None:
         """The path of a new tree; an infinite weight treats objects as obstacles."""

@@ -11,15 +11,15 @@ from pushplan.world import Drive, Plan, RobotModel, World
 
 
 def turning_radius(robot: RobotModel, turn_share: float) -> float:
-    """Least turning radius that plans use [m].
+    """Least turning radius that plans use at first [m].
 
     A constant-speed robot cannot turn tighter than v / ω. A differential drive can, by slowing
-    down; half its own radius is tight enough for any corridor that it fits.
+    down; its own circumscribed radius is easy to follow, and the search halves it where there is no way
+    otherwise.
     """
-    least = robot.turning_radius / turn_share
     if robot.drive is Drive.DIFFERENTIAL:
-        return min(least, 0.5 * robot.circumscribed_radius)
-    return least
+        return robot.circumscribed_radius
+    return robot.turning_radius / turn_share
 
 
 def start_margin(world: World, margin: float) -> float | None:
@@ -59,7 +59,8 @@ def timed_plan(world: World, path: Path, turn_share: float) -> Plan:
     robot = world.robot
     count = len(path.poses)
     ahead = np.append(path.curvatures[1:], 0.0)  # curvature from each pose on
-    fastest = turn_share * robot.max_turn_rate / np.maximum(np.abs(ahead), 1e-12)
+    bend = np.maximum(np.abs(ahead), 1e-12)
+    fastest = turn_share * robot.max_turn_rate / bend
     speeds = np.minimum(robot.max_speed, fastest)
     if robot.drive is Drive.CONSTANT_SPEED:
         speeds = np.full(count, robot.max_speed)

@@ -1,0 +1,73 @@
+"""The command line. Nothing heavy is imported until a command needs it."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from collections.abc import Sequence
+
+from pushplan import __version__
+from pushplan.cli import bench, compiling, listing, plan, report, run, score
+
+COMMANDS = (run, plan, bench, listing, score, report, compiling)
+
+_DESCRIPTION = "Plan, push, score and compare: baselines for robots that push things."
+_EXAMPLES = """\
+examples:
+  pushplan bench maze-2d-5 --policies straight,kinodynamic-rrt --episodes 20 --out runs/first
+  pushplan run maze-2d-5 --policy kinodynamic-rrt --seed 3 --render episode.gif
+  pushplan plan room.yaml --planner kinodynamic-rrt --deadline 1.0 --render plan.png
+  pushplan list policies
+
+'pushplan COMMAND --help' explains a command.
+"""
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run one command.
+
+    Args:
+        arguments: what follows the program's name; from the command line if None.
+
+    Returns:
+        0 on success, 1 for a failure, 2 for bad usage, 130 after Ctrl-C.
+    """
+    try:
+        options = _parser().parse_args(arguments)
+    except SystemExit as error:  # argparse has written why
+        return error.code if isinstance(error.code, int) else 2
+    try:
+        code: int = options.run(options)
+        sys.stdout.flush()
+        return code
+    except KeyboardInterrupt:
+        return _fail("interrupted", 130)
+    except BrokenPipeError:  # the reader of our output has gone
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 1
+    except Exception as error:
+        from pushplan.world import PushplanError, UnknownNameError
+
+        if not isinstance(error, PushplanError | OSError):
+            raise
+        return _fail(str(error), 2 if isinstance(error, UnknownNameError) else 1)
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="pushplan",
+        description=_DESCRIPTION,
+        epilog=_EXAMPLES,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("--version", action="version", version=f"pushplan {__version__}")
+    commands = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
+    for command in COMMANDS:
+        command.add(commands)
+    return parser
+
+
+def _fail(message: str, code: int) -> int:
+    sys.stderr.write(f"pushplan: {' '.join(message.split())}\n")
+    return code

@@ -1,0 +1,153 @@
+"""``pushplan bench``: compare policies on a suite."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any
+
+from pushplan.cli.common import add_command, positive, say, whole
+
+if TYPE_CHECKING:
+    from pushplan.evaluation import ResultRow
+
+_EXAMPLES = """\
+  pushplan bench maze-2d-5 --policies straight,kinodynamic-rrt --episodes 20 --out runs/first
+  pushplan bench maze-2d-5 --policies straight,my_planner.py:MyPlanner --out runs/mine
+  pushplan bench maze-2d-10 --policies fast=my_planner.py:fast,slow=my_planner.py:slow
+
+A run that was interrupted or killed continues when the same command is given again.
+"""
+_LINE_EVERY_S = 10.0
+
+
+def add(commands: Any) -> None:
+    """Add the command."""
+    parser = add_command(commands, "bench", "compare policies on a suite", _EXAMPLES, run)
+    parser.add_argument("suite", metavar="SUITE", help="see 'pushplan list suites'")
+    parser.add_argument(
+        "--policies",
+        required=True,
+        metavar="A,B",
+        help="names ('pushplan list policies'), 'file.py:Class' or 'module:Class' of a policy or "
+        "a planner, each with 'label=' in front if wanted",
+    )
+    parser.add_argument("--episodes", type=whole(1), metavar="N", help="default: the suite's own")
+    parser.add_argument(
+        "--workers",
+        type=whole(0),
+        default=os.cpu_count() or 1,
+        metavar="W",
+        help="processes (default: all %(default)s cores; 0: this process)",
+    )
+    parser.add_argument("--out", metavar="DIR", help="run directory (default: runs/SUITE)")
+    parser.add_argument(
+        "--seed", type=whole(0), default=0, metavar="FIRST", help="seed of the first scenario"
+    )
+    parser.add_argument(
+        "--timeout",
+        type=positive,
+        default=300.0,
+        metavar="S",
+        help="wall-clock limit of an episode [s] (default %(default)g)",
+    )
+    parser.add_argument(
+        "--observation",
+        choices=("auto", "image", "state"),
+        default="auto",
+        help="what the environment observes; auto: what the policy asks for, else state",
+    )
+    parser.add_argument(
+        "--memory", type=positive, metavar="MB", help="memory of a worker beyond which it fails"
+    )
+    parser.add_argument(
+        "--retry-failed", action="store_true", help="run jobs again that raised, hung or crashed"
+    )
+
+
+def run(options: argparse.Namespace) -> int:
+    """Run the batch, print the table, write plots and page."""
+    from pushplan.cli.report import show
+    from pushplan.evaluation import bench
+
+    out = options.out or os.path.join("runs", options.suite)
+    with _progress() as progress:
+        try:
+            results = bench(
+                options.suite,
+                options.policies,
+                episodes=options.episodes,
+                seed=options.seed,
+                workers=options.workers,
+                out=out,
+                timeout_s=options.timeout,
+                observation=options.observation,
+                memory_limit_mb=options.memory,
+                retry_failed=options.retry_failed,
+                progress=progress,
+            )
+        except KeyboardInterrupt:
+            sys.stderr.write(f"stopped; the same command continues the run in {out}\n")
+            raise
+    show(results)
+    failed = sum(row.failed for row in results.rows)
+    if failed:
+        say(f"{failed} of {len(results.rows)} jobs failed: see the page, or status and reason in ")
+        say(f"{os.path.join(out, 'results.csv')}")
+    return 0
+
+
+@contextmanager
+def _progress() -> Iterator[Callable[[int, int, ResultRow | None], None]]:
+    """A bar where there is a terminal, else a line now and then."""
+    if not sys.stderr.isatty():
+        yield _Lines()
+        return
+    from rich.console import Console
+    from rich.progress import (
+        BarColumn,
+        MofNCompleteColumn,
+        Progress,
+        TextColumn,
+        TimeElapsedColumn,
+        TimeRemainingColumn,
+    )
+
+    columns = (
+        BarColumn(),
+        MofNCompleteColumn(),
+        TimeElapsedColumn(),
+        TextColumn("left"),
+        TimeRemainingColumn(),
+        TextColumn("{task.description}"),
+    )
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task("", total=None)
+        failed = 0
+
+        def update(done: int, total: int, row: ResultRow | None) -> None:
+            nonlocal failed
+            failed += row is not None and row.failed
+            text = f"[red]{failed} failed" if failed else ""
+            bar.update(task, completed=done, total=total, description=text)
+
+        yield update
+
+
+class _Lines:
+    """Progress for a log file."""
+
+    def __init__(self) -> None:
+        self._next = time.monotonic() + _LINE_EVERY_S
+
+    def __call__(self, done: int, total: int, row: ResultRow | None) -> None:
+        now = time.monotonic()
+        if row is None and done:
+            sys.stderr.write(f"{done} of {total} episodes are there already\n")
+        elif row is not None and (done == total or now >= self._next):
+            self._next = now + _LINE_EVERY_S
+            sys.stderr.write(f"{done} of {total} episodes\n")

@@ -1,0 +1,107 @@
+"""``pushplan plan``: plan in a world from a file. Loads no simulator."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from pushplan.cli.common import add_command, milliseconds, positive, say, whole
+
+if TYPE_CHECKING:
+    from pushplan.world import PlanResult, Stop
+
+SCHEMA = "pushplan-plan/1"
+_EXAMPLES = """\
+  pushplan plan room.yaml --planner kinodynamic-rrt
+  pushplan plan room.yaml --planner kinodynamic-rrt --deadline 0.5 --out plan.json
+  pushplan plan room.yaml --planner geometric-rrt --iterations 2000 --seed 7 --render plan.png
+"""
+
+
+def add(commands: Any) -> None:
+    """Add the command."""
+    parser = add_command(
+        commands, "plan", "plan in a world from a file, without a simulator", _EXAMPLES, run
+    )
+    parser.add_argument("world", metavar="WORLD.yaml", help="world file (.yaml, .yml or .json)")
+    parser.add_argument("--planner", required=True, metavar="NAME", help="see 'pushplan list'")
+    budget = parser.add_mutually_exclusive_group()
+    budget.add_argument("--deadline", type=positive, metavar="S", help="wall-clock limit [s]")
+    budget.add_argument(
+        "--iterations", type=whole(1), metavar="N", help="limit that repeats on every machine"
+    )
+    parser.add_argument("--seed", type=whole(0), default=0, help="of the planner (default 0)")
+    parser.add_argument("--out", metavar="plan.json", help="write the plan and its statistics")
+    parser.add_argument("--render", metavar="plan.png", help="write a picture of the plan")
+
+
+def run(options: argparse.Namespace) -> int:
+    """Plan, say what came of it, write files."""
+    from pushplan.planners import make_planner
+    from pushplan.world import load_world, stream
+
+    world = load_world(options.world)
+    planner = make_planner(options.planner)
+    result = planner.plan(world, stop=_stop(options), rng=stream(options.seed, "policy"))
+    _print(options.planner, result)
+    if options.out:
+        text = json.dumps(_as_dict(options, result), indent=1) + "\n"
+        Path(options.out).write_text(text, encoding="utf-8")
+        say(f"wrote {options.out}")
+    if options.render:
+        from pushplan.drawing import draw_world, save_image
+
+        save_image(options.render, draw_world(world, plan=result.plan))
+        say(f"wrote {options.render}")
+    return 0 if result.plan is not None else 1
+
+
+def _stop(options: argparse.Namespace) -> Stop | None:
+    from pushplan.world import Deadline, MaxIterations
+
+    if options.deadline is not None:
+        return Deadline(options.deadline)
+    return None if options.iterations is None else MaxIterations(options.iterations)
+
+
+def _print(name: str, result: PlanResult) -> None:
+    stats = result.stats
+    say(f"{name}: {result.status.label} in {milliseconds(stats.wall_time_s)}")
+    say(f"  {result.status.remedy}")
+    if result.plan is not None:
+        plan = result.plan
+        say(
+            f"  length {plan.length:.2f} m, duration {plan.duration:.1f} s, {len(plan.times)} poses"
+        )
+        say(
+            f"  cost {plan.cost:.2f} kg m: travel {plan.travel_cost:.2f}, "
+            f"interaction {plan.interaction_cost:.2f}"
+        )
+    say(f"  {stats.iterations} iterations, {stats.nodes} nodes")
+
+
+def _as_dict(options: argparse.Namespace, result: PlanResult) -> dict[str, Any]:
+    stats, plan = result.stats, result.plan
+    data: dict[str, Any] = {
+        "schema": SCHEMA,
+        "planner": options.planner,
+        "seed": options.seed,
+        "status": result.status.label,
+        "stats": {
+            "wall_time_s": stats.wall_time_s,
+            "iterations": stats.iterations,
+            "nodes": stats.nodes,
+            **({"first_solution_s": t} if (t := stats.first_solution_s) == t else {}),
+        },
+        "plan": None,
+    }
+    if plan is not None:
+        arrays = ("times", "poses", "speeds", "turn_rates")
+        data["plan"] = {
+            **{key: getattr(plan, key).tolist() for key in arrays},
+            "travel_cost": plan.travel_cost,
+            "interaction_cost": plan.interaction_cost,
+        }
+    return data

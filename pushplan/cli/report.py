@@ -1,0 +1,68 @@
+"""``pushplan report``: table, plots and page of a stored run."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+from pushplan.cli.common import add_command, say
+
+if TYPE_CHECKING:
+    from pushplan.evaluation.sheets import Sheet
+
+_EXAMPLES = """\
+  pushplan report runs/first
+  pushplan report runs/first --metrics E_nav_to_goal_point,my_metrics:jerk
+"""
+
+
+def add(commands: Any) -> None:
+    """Add the command."""
+    parser = add_command(
+        commands, "report", "table, plots and page again from stored results", _EXAMPLES, run
+    )
+    parser.add_argument("directory", metavar="DIR", help="run directory of 'pushplan bench'")
+    parser.add_argument(
+        "--metrics",
+        metavar="A,B",
+        help="only print these, computed from the stored episodes: names ('pushplan list "
+        "metrics') or 'module:function'",
+    )
+
+
+def run(options: argparse.Namespace) -> int:
+    """Print the table and write the files."""
+    from pushplan.evaluation import Results
+
+    results = Results.load(options.directory)
+    if options.metrics:
+        _print(results.measure(options.metrics.split(",")))
+    else:
+        show(results)
+    return 0
+
+
+def show(results: Any) -> None:
+    """Print the tables of a run, write its report, say where it is."""
+    _print(results.sheets())
+    page = results.report()
+    for name in ("tradeoff.png", "scores.png", "planning_time.png"):
+        if (page.parent / name).is_file():
+            say(f"picture: {page.parent / name}")
+    say(f"page:    {page}")
+
+
+def _print(sheets: Sequence[Sheet]) -> None:
+    """In colour and to the width of a terminal, or as plain text."""
+    from rich.console import Console
+
+    from pushplan.evaluation.sheets import rich_table, text
+
+    if not sys.stdout.isatty():
+        say(text(sheets))
+        return
+    console = Console()
+    for sheet in sheets:
+        console.print(rich_table(sheet), end="\n\n")

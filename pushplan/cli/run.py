@@ -1,0 +1,128 @@
+"""``pushplan run``: one scenario, one policy."""
+
+from __future__ import annotations
+
+import argparse
+from typing import TYPE_CHECKING, Any
+
+from pushplan.cli.common import add_command, milliseconds, say, whole
+
+if TYPE_CHECKING:
+    from pushplan.scenarios import Scenario
+    from pushplan.world import Episode
+
+_EXAMPLES = """\
+  pushplan run maze-2d-5 --policy kinodynamic-rrt --seed 3 --render episode.gif
+  pushplan run --task maze --boxes 8 --shape z --policy straight --out episode.npz
+  pushplan run maze-2d-5 --policy my_planner.py:MyPlanner --render path.png
+  pushplan run --task maze --set wheeled=0.5 --set random_start=true --policy straight --live
+"""
+
+
+def add(commands: Any) -> None:
+    """Add the command."""
+    parser = add_command(commands, "run", "run one policy on one scenario", _EXAMPLES, run)
+    parser.add_argument("suite", nargs="?", metavar="SUITE", help="take its scenario of --seed")
+    parser.add_argument("--task", metavar="NAME", help="a task instead of a suite, such as maze")
+    parser.add_argument("--simulator", default="pymunk", metavar="NAME", help="default pymunk")
+    parser.add_argument("--preset", default="benchmark", metavar="NAME", help="default benchmark")
+    parser.add_argument("--boxes", type=whole(0), metavar="N", help="number of boxes")
+    parser.add_argument("--shape", metavar="NAME", help="shape of the maze: u or z")
+    parser.add_argument(
+        "--set",
+        action="append",
+        default=[],
+        metavar="NAME=VALUE",
+        dest="variations",
+        help="any other variation of the task; may be repeated",
+    )
+    parser.add_argument("--seed", type=whole(0), default=0, help="of the scenario (default 0)")
+    parser.add_argument("--policy", required=True, metavar="NAME", help="as in 'pushplan bench'")
+    parser.add_argument("--observation", choices=("auto", "image", "state"), default="auto")
+    parser.add_argument("--render", metavar="FILE", help="picture or film: .png, .gif or .mp4")
+    parser.add_argument("--live", action="store_true", help="show the episode in a window")
+    parser.add_argument("--out", metavar="episode.npz", help="write the recorded episode")
+
+
+def run(options: argparse.Namespace) -> int:
+    """Run the episode, print its scores, write files."""
+    from pushplan.cli.film import Camera
+    from pushplan.evaluation import Job, JobSettings, parse_policy, run_episode
+    from pushplan.evaluation.execute import rehearse
+
+    scenario = _scenario(options)
+    camera = Camera(options.render) if options.render else None
+    spec = parse_policy(options.policy)
+    policy = spec.make()
+    settings = JobSettings(observation=options.observation)
+    mode = "human" if options.live else None
+    env = settings.environment(scenario, policy, render_mode=mode)
+    rehearse(Job(spec, scenario), settings)  # so that no timing holds loading and compiling
+    try:
+        episode = run_episode(env, policy, scenario, observer=camera)
+    finally:
+        env.close()
+    _print(spec.label, scenario, episode)
+    if options.out:
+        episode.save(options.out)
+        say(f"wrote {options.out}")
+    if camera is not None:
+        camera.write(episode)
+        say(f"wrote {options.render}")
+    return 0
+
+
+def _scenario(options: argparse.Namespace) -> Scenario:
+    from pushplan.scenarios import Scenario, suite
+    from pushplan.world import InvalidInputError
+
+    shown = {"boxes": options.boxes, "shape": options.shape}
+    given: dict[str, Any] = {key: value for key, value in shown.items() if value is not None}
+    given.update(_variation(text) for text in options.variations)
+    if (options.suite is None) == (options.task is None):
+        raise InvalidInputError("give either a SUITE or --task NAME, see 'pushplan run --help'")
+    if options.suite is None:
+        return Scenario(options.task, options.simulator, options.preset, given, options.seed)
+    if given:
+        raise InvalidInputError(
+            f"a suite says what its scenarios are: {', '.join(sorted(given))} needs --task instead"
+        )
+    return suite(options.suite, episodes=1, first_seed=options.seed).scenarios[0]
+
+
+def _variation(text: str) -> tuple[str, Any]:
+    import yaml
+
+    from pushplan.world import InvalidInputError
+
+    name, equals, value = text.partition("=")
+    if not equals or not name:
+        raise InvalidInputError(f"--set takes NAME=VALUE, got {text!r}")
+    return name, yaml.safe_load(value)
+
+
+def _print(label: str, scenario: Scenario, episode: Episode) -> None:
+    import numpy as np
+
+    from pushplan.metrics import compute
+
+    values = compute(episode)
+    say(f"{label} on {scenario.key}: {'success' if episode.success else episode.reason}")
+    scores = [f"{key} {values[key]:.3f}" for key in values if key[:2] in ("E_", "I_", "S_")]
+    say("  " + "   ".join(scores))
+    say(
+        f"  path {values['path_length_m']:.2f} m, work {values['interaction_work_kg_m']:.3f} kg m, "
+        f"{len(episode.actions)} steps, {values['sim_time_s']:.1f} s simulated"
+    )
+    if len(episode.plan_times_s):
+        times = episode.plan_times_s
+        say(
+            f"  planning: {len(times)} calls, median {milliseconds(np.median(times))}, "
+            f"max {milliseconds(times.max())}"
+        )
+    if len(episode.act_times_s):
+        times = episode.act_times_s
+        say(
+            f"  policy: median {milliseconds(np.median(times))} a step, "
+            f"max {milliseconds(times.max())}"
+        )

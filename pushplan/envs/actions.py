@@ -1,0 +1,147 @@
+"""Action modes: what an array in the action space asks of the robot, and back."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from typing import ClassVar
+
+import numpy as np
+from gymnasium.spaces import Box
+from numpy.typing import ArrayLike, NDArray
+
+from pushplan.world import Action, Drive, InvalidInputError, RobotModel, Twist, WheelSpeeds, World
+from pushplan.world.checks import FloatArray
+
+Motion = Callable[[World], Twist | None]
+"""Asked before every control step of one action: the next command, or None when it is done."""
+
+
+class ActionMode(ABC):
+    """One way to command a robot. Actions are arrays in ``[-1, 1]``; others are clipped to it.
+
+    Args:
+        robot: the robot that is driven, with its limits.
+    """
+
+    drive: ClassVar[Drive]
+    """How a robot driven this way may move."""
+    size: ClassVar[int]
+    """Number of elements of an action."""
+
+    def __init__(self, robot: RobotModel) -> None:
+        self.robot = robot
+
+    @property
+    def space(self) -> Box:
+        """A new action space."""
+        return Box(-1.0, 1.0, (self.size,), np.float32)
+
+    def read(self, action: ArrayLike) -> FloatArray:
+        """Check an action and clip it to the space.
+
+        Raises:
+            InvalidInputError: if it has the wrong shape or type or is not finite.
+        """
+        try:
+            values = np.asarray(action, dtype=np.float64)
+        except (TypeError, ValueError) as error:
+            raise InvalidInputError(
+                f"an action must be numbers of shape ({self.size},), got {action!r:.80}"
+            ) from error
+        if values.shape != (self.size,):
+            raise InvalidInputError(
+                f"an action must have shape ({self.size},), got shape {values.shape}: "
+                f"{action!r:.80}"
+            )
+        if not np.isfinite(values).all():
+            raise InvalidInputError(f"an action must be finite, got {values.tolist()}")
+        return np.clip(values, -1.0, 1.0)
+
+    @abstractmethod
+    def start(self, action: FloatArray, world: World) -> Motion:
+        """Begin to carry out an action that `read` has returned."""
+
+    def encode(self, action: Action) -> NDArray[np.float32]:
+        """The array in the action space nearest to a command.
+
+        Raises:
+            InvalidInputError: if the command is not finite or has the wrong shape.
+        """
+        if isinstance(action, Twist | WheelSpeeds):
+            action = self._from_twist(self._twist(action))
+        return self.read(action).astype(np.float32)
+
+    @abstractmethod
+    def _from_twist(self, twist: Twist) -> FloatArray:
+        """The array that asks for a twist, not clipped."""
+
+    def _twist(self, action: Twist | WheelSpeeds) -> Twist:
+        if isinstance(action, Twist):
+            return action
+        separation = self.robot.wheel_separation
+        if separation == 0.0:
+            raise InvalidInputError(f"robot {self.robot.name!r} has no wheels, send a Twist")
+        return Twist(0.5 * (action.left + action.right), (action.right - action.left) / separation)
+
+
+def _once(command: Twist) -> Motion:
+    """A motion of one control step."""
+    commands = iter((command,))
+    return lambda world: next(commands, None)
+
+
+class TurnRateAction(ActionMode):
+    """Turn rate at constant speed: one element, times ``robot.max_turn_rate``."""
+
+    drive = Drive.CONSTANT_SPEED
+    size = 1
+
+    def start(self, action: FloatArray, world: World) -> Motion:
+        """One command at full speed."""
+        return _once(Twist(self.robot.max_speed, float(action[0]) * self.robot.max_turn_rate))
+
+    def _from_twist(self, twist: Twist) -> FloatArray:
+        return np.array([twist.angular / self.robot.max_turn_rate])
+
+
+class VelocityAction(ActionMode):
+    """Forward speed and turn rate of a differential drive, times the robot's limits."""
+
+    drive = Drive.DIFFERENTIAL
+    size = 2
+
+    def start(self, action: FloatArray, world: World) -> Motion:
+        """One command within the speed limits."""
+        speed = max(float(action[0]) * self.robot.max_speed, self.robot.min_speed)
+        return _once(Twist(speed, float(action[1]) * self.robot.max_turn_rate))
+
+    def _from_twist(self, twist: Twist) -> FloatArray:
+        return np.array(
+            [twist.linear / self.robot.max_speed, twist.angular / self.robot.max_turn_rate]
+        )
+
+
+class WheelsAction(ActionMode):
+    """Rim speeds of the left and the right wheel, times ``robot.max_speed``.
+
+    Where the difference asks for more than the robot's turn rate, the turn rate is limited and
+    the mean of the two, the forward speed, is kept.
+    """
+
+    drive = Drive.DIFFERENTIAL
+    size = 2
+
+    def start(self, action: FloatArray, world: World) -> Motion:
+        """One command within the limits of speed and turn rate."""
+        left, right = (float(value) * self.robot.max_speed for value in action)
+        twist = self._twist(WheelSpeeds(left, right))
+        limit = self.robot.max_turn_rate
+        speed = max(twist.linear, self.robot.min_speed)
+        return _once(Twist(speed, min(max(twist.angular, -limit), limit)))
+
+    def _from_twist(self, twist: Twist) -> FloatArray:
+        half = 0.5 * twist.angular * self.robot.wheel_separation
+        wheels = np.array([twist.linear - half, twist.linear + half]) / self.robot.max_speed
+        # slowing both wheels alike keeps to the curve
+        return wheels / max(1.0, float(np.abs(wheels).max()))

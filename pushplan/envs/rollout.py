@@ -1,0 +1,34 @@
+"""The simulator, run ahead from a snapshot, as an interaction model: slow, and the reference."""
+
+from __future__ import annotations
+
+from numpy.typing import ArrayLike
+
+from pushplan.envs.registry import SIMULATORS, look_up
+from pushplan.envs.simulators.base import Materials, Simulator
+from pushplan.interaction.model import Interaction
+from pushplan.world import World
+
+
+class RolloutInteraction:
+    """What a simulator says that sweeping the robot along a path does.
+
+    Args:
+        simulator: name of the simulator.
+        materials: friction and rolling; those of the task that is planned for. Objects grip
+            nothing by default.
+    """
+
+    def __init__(self, simulator: str = "pymunk", materials: Materials | None = None) -> None:
+        engine: type[Simulator] = look_up("simulator", SIMULATORS, simulator)
+        self._simulator = engine()
+        self._materials = materials or Materials()
+
+    def sweep(self, world: World, path: ArrayLike) -> Interaction:
+        """Predict the motion of every object along (N, 3) robot poses x, y [m], theta [rad].
+
+        Raises:
+            InvalidInputError: if the path is not (N, 3), empty, or not finite.
+        """
+        self._simulator.build(world, self._materials)
+        return self._simulator.follow(path)

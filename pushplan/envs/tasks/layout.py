@@ -1,0 +1,186 @@
+"""Where a scene starts: square objects on free floor, without overlaps."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+
+from pushplan.world import ScenarioError, StaticMap
+from pushplan.world.checks import BoolArray, FloatArray
+
+_BATCH = 64
+_LATTICE_SHIFTS = 16
+_LATTICE_CELLS = 20_000
+_CORNERS = np.array([(-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5)])
+
+
+@dataclass(frozen=True)
+class Floor:
+    """The free floor among static obstacles.
+
+    Args:
+        static: the obstacles; thick segments count with their exact round outline.
+    """
+
+    static: StaticMap
+
+    @cached_property
+    def _pieces(self) -> tuple[tuple[Any, float], ...]:
+        """Each obstacle as a geometry and how far it reaches around it [m]."""
+        static = self.static
+        polygons = [(shapely.Polygon(polygon), 0.0) for polygon in static.polygons]
+        lines = [
+            (shapely.LineString(line.reshape(2, 2)), float(radius))
+            for line, radius in zip(static.segments, static.radii, strict=True)
+        ]
+        return (*polygons, *lines)
+
+    def is_free(self, shapes: NDArray[Any], gap: float) -> BoolArray:
+        """Which of some Shapely geometries stay more than ``gap`` [m] off every obstacle."""
+        free = np.ones(len(shapes), dtype=bool)
+        for piece, reach in self._pieces:
+            free &= shapely.distance(shapes, piece) > reach + gap
+        return free
+
+    def place_squares(
+        self,
+        rng: np.random.Generator,
+        count: int,
+        size: float,
+        *,
+        keep_off: Sequence[tuple[Any, float]] = (),
+        gap: float = 0.0,
+        random_yaw: bool = False,
+    ) -> FloatArray:
+        """Poses of squares that overlap nothing: (count, 3) x, y [m], theta [rad].
+
+        Centres are drawn uniformly over the bounds of the map and rejected where they do not fit.
+        When that fails too often, squares go to random cells of a shifted lattice, which packs
+        nearly as many as fit at all.
+
+        Args:
+            rng: the only source of randomness.
+            count: number of squares.
+            size: side [m].
+            keep_off: what else must stay free: Shapely geometries, each with a radius [m]
+                around it.
+            gap: least distance to anything [m].
+            random_yaw: any heading instead of 0; on the lattice, multiples of a right angle.
+
+        Raises:
+            ScenarioError: if there is no room for them.
+        """
+        if count == 0:
+            return np.zeros((0, 3))
+        low, high = self.static.bounds[:2], self.static.bounds[2:]
+        if count * size * size < float(np.prod(high - low)):
+            placed = self._throw(rng, count, size, keep_off, gap, random_yaw)
+            if len(placed) == count:
+                return placed
+            cells = self._lattice(rng, count, size, keep_off, gap)
+            if len(cells) >= count:
+                poses = np.zeros((count, 3))
+                poses[:, :2] = rng.permutation(cells)[:count]
+                if random_yaw:
+                    poses[:, 2] = rng.integers(0, 4, count) * (np.pi / 2.0)
+                return poses
+            room = f"room for {len(cells)} was found"
+        else:
+            room = f"the floor is {high[0] - low[0]:g} x {high[1] - low[1]:g} m"
+        raise ScenarioError(
+            f"{count} boxes of {size:g} m do not fit: {room}; ask for fewer or smaller boxes"
+        )
+
+    def _fits(
+        self, poses: FloatArray, size: float, keep_off: Sequence[tuple[Any, float]], gap: float
+    ) -> BoolArray:
+        shapes = shapely.polygons(squares(poses, size))
+        fits = self.is_free(shapes, gap)
+        for shape, reach in keep_off:
+            fits &= shapely.distance(shapes, shape) > reach + gap
+        return fits
+
+    def _throw(
+        self,
+        rng: np.random.Generator,
+        count: int,
+        size: float,
+        keep_off: Sequence[tuple[Any, float]],
+        gap: float,
+        random_yaw: bool,
+    ) -> FloatArray:
+        """Random sequential placement within a budget; fewer than ``count`` if it runs out."""
+        low, high = self.static.bounds[:2], self.static.bounds[2:]
+        placed = np.zeros((count, 3))
+        done = 0
+        for _ in range(max(8, math.ceil(8 * count / _BATCH))):
+            poses = np.zeros((_BATCH, 3))
+            poses[:, :2] = rng.uniform(low, high, (_BATCH, 2))
+            if random_yaw:
+                poses[:, 2] = rng.uniform(-np.pi, np.pi, _BATCH)
+            for pose in poses[self._fits(poses, size, keep_off, gap)]:
+                if not squares_overlap(pose, placed[:done], size + gap).any():
+                    placed[done] = pose
+                    done += 1
+                    if done == count:
+                        return placed
+        return placed[:done]
+
+    def _lattice(
+        self,
+        rng: np.random.Generator,
+        count: int,
+        size: float,
+        keep_off: Sequence[tuple[Any, float]],
+        gap: float,
+    ) -> FloatArray:
+        """(N, 2) free centres of the best of some shifted square lattices."""
+        low, high = self.static.bounds[:2], self.static.bounds[2:]
+        area = float(np.prod(high - low))
+        pitch = max((size + gap) * (1.0 + 1e-9), math.sqrt(area / _LATTICE_CELLS))
+        best = np.zeros((0, 2))
+        for shift in rng.uniform(0.0, pitch, (_LATTICE_SHIFTS, 2)):
+            x = np.arange(low[0] + shift[0], high[0], pitch)
+            y = np.arange(low[1] + shift[1], high[1], pitch)
+            poses = np.stack(
+                [np.repeat(x, len(y)), np.tile(y, len(x)), np.zeros(len(x) * len(y))], axis=1
+            )
+            cells = poses[self._fits(poses, size, keep_off, gap)][:, :2]
+            if len(cells) > len(best):
+                best = cells
+            if len(best) >= count:
+                break
+        return best
+
+
+def squares(poses: FloatArray, size: float) -> FloatArray:
+    """(N, 4, 2) corners [m] of squares of side ``size`` at poses (N, 3)."""
+    c, s = np.cos(poses[:, 2]), np.sin(poses[:, 2])
+    turn = np.stack([np.stack([c, -s], -1), np.stack([s, c], -1)], -2)  # (N, 2, 2)
+    corners: FloatArray = np.einsum("nij,kj->nki", turn, _CORNERS * size) + poses[:, None, :2]
+    return corners
+
+
+def squares_overlap(pose: FloatArray, others: FloatArray, size: float) -> BoolArray:
+    """(N,) whether a square overlaps each of others (N, 3) of the same side ``size`` [m].
+
+    Separating axes: the four edge normals, along which a square of heading ``phi`` reaches
+    ``size / 2 (|cos phi| + |sin phi|)``.
+    """
+    offset = others[:, :2] - pose[:2]
+    turn = others[:, 2] - pose[2]
+    reach = 0.5 * size * (1.0 + np.abs(np.cos(turn)) + np.abs(np.sin(turn)))
+    apart = np.zeros(len(others), dtype=bool)
+    for heading in (np.broadcast_to(pose[2], turn.shape), others[:, 2]):
+        c, s = np.cos(heading), np.sin(heading)
+        along = np.abs(c * offset[:, 0] + s * offset[:, 1])
+        across = np.abs(c * offset[:, 1] - s * offset[:, 0])
+        apart |= (along >= reach) | (across >= reach)
+    return ~apart

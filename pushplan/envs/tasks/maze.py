@@ -1,0 +1,259 @@
+"""Maze: drive to the goal through a U- or Z-shaped way with boxes in it, moving them little."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, fields, replace
+from functools import cached_property
+from typing import Any, ClassVar
+
+import numpy as np
+import shapely
+
+from pushplan.envs.tasks.base import ObservationBuilder, Outcome, Task
+from pushplan.envs.tasks.layout import Floor
+from pushplan.envs.tasks.maze_presets import PRESETS, MazePreset
+from pushplan.envs.trace import Trace
+from pushplan.geometry.distance_field import GeodesicField, geodesic_field
+from pushplan.observation import ImageObservation, StateObservation
+from pushplan.world import (
+    Drive,
+    GoalDisc,
+    InvalidInputError,
+    Movables,
+    ScenarioError,
+    UnknownNameError,
+    World,
+)
+from pushplan.world.checks import FloatArray, choice, integer, number
+from pushplan.world.outline import transform
+
+WALL_REWARD = -50.0
+SUCCESS_REWARD = 200.0
+GAP = 0.01
+"""Least distance between bodies at the start, as a share of the box size."""
+STATE_OBJECTS = 20
+"""Boxes that the state observation has room for; more if there are more."""
+_IMAGE_CHANNELS = ("footprint", "movable", "static", "goal_distance")
+_START_TRIES = 2000
+
+
+@dataclass(frozen=True)
+class MazeVariations:
+    """What may depart from a preset; None leaves the preset's value.
+
+    Args:
+        shape: ``"u"`` or ``"z"``.
+        boxes: number of boxes.
+        box_size: side of the boxes [m].
+        box_yaw: headings of the boxes at the start, ``"aligned"`` with the walls or ``"random"``.
+        wheeled: share of the boxes that stand on casters, 0 to 1.
+        random_start: whether the robot starts anywhere instead of at the preset's start.
+        bumper_friction: friction coefficient between robot and boxes.
+    """
+
+    shape: str = "u"
+    boxes: int = 5
+    box_size: float | None = None
+    box_yaw: str = "aligned"
+    wheeled: float = 0.0
+    random_start: bool | None = None
+    bumper_friction: float | None = None
+
+    def __post_init__(self) -> None:
+        put = object.__setattr__
+        choice("shape", self.shape, ("u", "z"))
+        choice("box_yaw", self.box_yaw, ("aligned", "random"))
+        put(self, "boxes", integer("boxes", self.boxes, low=0))
+        put(self, "wheeled", number("wheeled", self.wheeled, low=0.0, high=1.0))
+        if self.box_size is not None:
+            size = number("box_size", self.box_size, low=0.0, open_low=True)
+            put(self, "box_size", size)
+        if self.random_start is not None and not isinstance(self.random_start, bool | np.bool_):
+            raise InvalidInputError(
+                f"random_start must be true or false, got {self.random_start!r}"
+            )
+        if self.bumper_friction is not None:
+            friction = number("bumper_friction", self.bumper_friction, low=0.0)
+            put(self, "bumper_friction", friction)
+
+    @classmethod
+    def read(cls, values: Mapping[str, Any]) -> MazeVariations:
+        """Variations from a mapping.
+
+        Raises:
+            UnknownNameError: if a name is none of the fields.
+            ScenarioError: if a value makes no sense.
+        """
+        valid = [field.name for field in fields(cls)]
+        for name in values:
+            if name not in valid:
+                raise UnknownNameError("variation of the maze", name, valid)
+        try:
+            return cls(**values)
+        except InvalidInputError as error:
+            raise ScenarioError(f"maze: {error}") from error
+
+
+class MazeTask(Task):
+    """The maze, as in the Bench-Push paper.
+
+    Reward of a step: ``progress_reward`` times the decrease of the normalised goal distance,
+    minus ``work_reward`` times the work on the boxes; -50 at a wall, +200 at the goal. The goal
+    distance is the shortest way of a point around the walls to the goal disc, divided by its
+    greatest finite value in the maze, so a whole way pays at most ``progress_reward``.
+    """
+
+    name = "maze"
+    presets = tuple(PRESETS)
+    actions: ClassVar[tuple[str, ...]] = ("turn_rate", "wheels", "velocity")
+    observations: ClassVar[tuple[str, ...]] = ("image", "state")
+
+    def __init__(
+        self,
+        *,
+        preset: str = "benchmark",
+        variations: Mapping[str, object] | None = None,
+        drive: Drive = Drive.CONSTANT_SPEED,
+    ) -> None:
+        if preset not in PRESETS:
+            raise UnknownNameError("preset of the maze", preset, PRESETS)
+        self.preset: MazePreset = PRESETS[preset]
+        self.variations = MazeVariations.read(variations or {})
+        self.robot = self.preset.robot(drive)
+        self.control_step = self.preset.control_step
+        friction = self.variations.bumper_friction
+        self.materials = (
+            self.preset.materials
+            if friction is None
+            else replace(self.preset.materials, robot_object=friction)
+        )
+        shape = self.variations.shape
+        self.static = self.preset.static(shape)
+        self.goal = GoalDisc(
+            np.array(self.preset.goals[shape]), self.preset.goal_radius + self.preset.robot_radius
+        )
+        self._floor = Floor(self.static)
+        room = self.static.bounds[2:] - self.static.bounds[:2]
+        self.reach = 2.0 * float(np.hypot(*room))
+        self._steps = 0
+
+    @property
+    def box_size(self) -> float:
+        """Side of the boxes [m]."""
+        return self.variations.box_size or self.preset.box_size
+
+    @cached_property
+    def field(self) -> GeodesicField:
+        """Distance of a point to the goal disc around the walls [m]."""
+        return geodesic_field(self.static, self.goal, resolution=self.preset.field_resolution)
+
+    @cached_property
+    def _farthest(self) -> float:
+        return float(self.field.values[np.isfinite(self.field.values)].max())
+
+    def start(self, rng: np.random.Generator) -> World:
+        """A new start: the robot, then boxes off it, off each other, the walls and the goal."""
+        self._steps = 0
+        pose = self._start_pose(rng)
+        movables = self._boxes(rng, pose)
+        return World(
+            robot=self.robot,
+            robot_pose=pose,
+            static=self.static,
+            movables=movables,
+            goal=self.goal,
+        )
+
+    def _boxes(self, rng: np.random.Generator, robot_pose: FloatArray) -> Movables:
+        wanted, size = self.variations, self.box_size
+        footprint = [shapely.Polygon(transform(robot_pose, p)) for p in self.robot.parts]
+        poses = self._floor.place_squares(
+            rng,
+            wanted.boxes,
+            size,
+            keep_off=[
+                (shapely.Point(self.goal.center), self.goal.radius),
+                *((part, 0.0) for part in footprint),
+            ],
+            gap=GAP * size,
+            random_yaw=wanted.box_yaw == "random",
+        )
+        wheeled = np.zeros(wanted.boxes, dtype=bool)
+        wheeled[rng.permutation(wanted.boxes)[: round(wanted.wheeled * wanted.boxes)]] = True
+        half = 0.5 * size
+        outline = np.array([(-half, -half), (half, -half), (half, half), (-half, half)])
+        mass = self.preset.box_mass
+        return Movables.from_outlines(
+            [outline] * wanted.boxes,
+            poses,
+            masses=None if mass is None else np.full(wanted.boxes, mass),
+            wheeled=wheeled,
+        )
+
+    def _start_pose(self, rng: np.random.Generator) -> FloatArray:
+        """The preset's start, or a random one from which the robot can get away.
+
+        A random start is clear of the walls, outside the goal, joined to the goal by a way for
+        the robot's inscribed disc, and not doomed: a robot that cannot stop can turn by a right
+        angle to one side at least without touching a wall.
+        """
+        random = self.variations.random_start
+        if not (self.preset.random_start if random is None else random):
+            return np.array(self.preset.starts[self.variations.shape])
+        reachable = geodesic_field(
+            self.static,
+            self.goal,
+            resolution=self.preset.field_resolution,
+            clearance=self.robot.inscribed_radius,
+        )
+        low = [*self.static.bounds[:2], -np.pi]
+        high = [*self.static.bounds[2:], np.pi]
+        for _ in range(_START_TRIES):
+            pose = rng.uniform(low, high)
+            row, col = reachable.grid.cell(pose[0], pose[1])
+            distance = reachable.values[row, col]
+            if np.isfinite(distance) and distance > 0.0 and self._can_leave(pose):
+                return pose
+        raise ScenarioError("maze: no free start was found from which the goal can be reached")
+
+    def _can_leave(self, pose: FloatArray) -> bool:
+        angles = np.linspace(0.0, np.pi / 2.0, 13)
+        if self.robot.drive is not Drive.CONSTANT_SPEED:
+            angles = angles[:1]
+        for side in (1.0, -1.0):
+            radius = side * self.robot.turning_radius
+            center = pose[:2] + radius * np.array([-np.sin(pose[2]), np.cos(pose[2])])
+            headings = pose[2] + side * angles
+            around = np.stack([np.sin(headings), -np.cos(headings)], axis=1)
+            places = np.column_stack([center + radius * around, headings])
+            outlines = [transform(place, part) for place in places for part in self.robot.parts]
+            shapes = np.array([shapely.Polygon(outline) for outline in outlines])
+            if self._floor.is_free(shapes, GAP * self.box_size).all():
+                return True
+        return False
+
+    def score(self, before: World, after: World, trace: Trace, *, touched_static: bool) -> Outcome:
+        """The reward above; a wall is a failure even where the goal is reached at once."""
+        self._steps += 1
+        lengths = trace.object_lengths(before.movables.poses)
+        work = float(before.movables.masses @ lengths)
+        x0, y0, _ = before.robot_pose.tolist()
+        x1, y1, _ = after.robot_pose.tolist()
+        progress = (self.field.sample(x0, y0) - self.field.sample(x1, y1)) / self._farthest
+        reward = self.preset.progress_reward * progress - self.preset.work_reward * work
+        if touched_static:
+            return Outcome(reward + WALL_REWARD, False, "wall", True, False, work)
+        if self.goal.distance(x1, y1) == 0.0:
+            return Outcome(reward + SUCCESS_REWARD, True, "goal", True, False, work)
+        late = self._steps >= self.preset.max_steps
+        return Outcome(reward, False, "time_limit" if late else "", False, late, work)
+
+    def observation(self, name: str) -> ObservationBuilder:
+        """``"image"`` or ``"state"``."""
+        if name == "image":
+            window = self.preset.window
+            return ImageObservation(channels=_IMAGE_CHANNELS, window=(window, window))
+        if name == "state":
+            return StateObservation(max_objects=max(STATE_OBJECTS, self.variations.boxes))
+        raise UnknownNameError("observation of the maze", name, self.observations)

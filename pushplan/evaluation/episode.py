@@ -1,0 +1,206 @@
+"""Run one episode and record everything that a metric may ask for later."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+import pushplan
+from pushplan.world import (
+    Episode,
+    Policy,
+    PushplanError,
+    Twist,
+    WheelSpeeds,
+    World,
+    stream,
+)
+from pushplan.world.checks import FloatArray
+
+Observer = Callable[[int, World, Policy], None]
+"""Called after the reset with 0 and after step i with i; sees the world and the policy."""
+
+
+class PolicyError(PushplanError):
+    """A policy raised an exception; the cause is attached."""
+
+
+class InvalidActionError(PolicyError):
+    """A policy returned something that is no action of its environment."""
+
+
+def run_episode(
+    env: Any, policy: Policy, scenario: Any, *, observer: Observer | None = None
+) -> Episode:
+    """Run ``policy`` in ``env`` from the start of ``scenario`` to the end of the episode.
+
+    The policy draws from a stream that depends on the scenario's seed only, and from another one
+    than the layout.
+
+    Args:
+        env: a `pushplan.envs.PushEnv`, or anything with its ``reset``, ``step``, ``world``,
+            ``trace``, ``encode`` and ``action_space``.
+        policy: chooses the actions.
+        scenario: what ``env`` was made for; gives the seed.
+        observer: sees each step; for pictures and windows.
+
+    Raises:
+        PolicyError: if the policy raises.
+        InvalidActionError: if it returns an action that is not finite or has the wrong shape.
+    """
+    recording = Recording(policy, scenario)
+    recording.run(env, observer)
+    return recording.episode()
+
+
+class Recording:
+    """An episode in the making; what was recorded before a failure stays available.
+
+    Args:
+        policy: chooses the actions.
+        scenario: what is run.
+        label: what results call the policy.
+    """
+
+    def __init__(self, policy: Policy, scenario: Any, label: str = "") -> None:
+        self.policy = policy
+        self.scenario = scenario
+        self.label = label or type(policy).__name__
+        self.started = False
+        self.success = False
+        self.reason = ""
+        self._world: World | None = None
+        self._completed: Any = None
+        self._times: list[FloatArray] = []
+        self._robot: list[FloatArray] = []
+        self._objects: list[FloatArray] = []
+        self._actions: list[FloatArray] = []
+        self._rewards: list[float] = []
+        self._act_times: list[float] = []
+
+    def run(self, env: Any, observer: Observer | None = None, *, limit: int | None = None) -> None:
+        """Reset and step until the episode ends, or for ``limit`` steps.
+
+        Raises as `run_episode`.
+        """
+        observation, _ = env.reset(seed=self.scenario.seed)
+        world = env.world
+        self._begin(world)
+        rng = stream(self.scenario.seed, "policy")
+        self._ask(self.policy.reset, world, rng)
+        if observer is not None:
+            observer(0, world, self.policy)
+        ended = False
+        while not ended:
+            begin = time.perf_counter()
+            action = self._ask(self.policy.act, world, observation)
+            elapsed = time.perf_counter() - begin
+            command = checked_action(env, action)
+            observation, reward, terminated, truncated, info = env.step(command)
+            world = env.world
+            self._step(env.trace, command, float(reward), elapsed)
+            self._completed = info.get("completed", self._completed)
+            ended = bool(terminated or truncated) or len(self._actions) == limit
+            if observer is not None:
+                observer(len(self._actions), world, self.policy)
+        self.success = bool(info.get("success", False))
+        self.reason = str(info.get("reason") or ("time_limit" if truncated else "ended"))
+
+    def episode(self, reason: str | None = None) -> Episode:
+        """What has been recorded.
+
+        Args:
+            reason: why it ended, where that was a failure.
+        """
+        assert self._world is not None
+        actions = np.array(self._actions) if self._actions else np.zeros((0, 0))
+        return Episode(
+            world=self._world,
+            times=np.concatenate(self._times),
+            robot_poses=np.concatenate(self._robot),
+            object_poses=np.concatenate(self._objects),
+            success=self.success,
+            reason=self.reason if reason is None else reason,
+            completed=self._completed,
+            actions=actions,
+            rewards=np.array(self._rewards),
+            act_times_s=np.array(self._act_times),
+            plan_times_s=np.array(plan_times(self.policy) or []),
+            about={
+                "policy": self.label,
+                "scenario": self.scenario.to_dict(),
+                "key": self.scenario.key,
+                "seed": self.scenario.seed,
+                "pushplan": pushplan.__version__,
+            },
+        )
+
+    def _begin(self, world: World) -> None:
+        self.started = True
+        self._world = world
+        self._times = [np.array([world.time])]
+        self._robot = [np.array(world.robot_pose)[None]]
+        self._objects = [np.array(world.movables.poses)[None]]
+
+    def _step(self, trace: Any, command: FloatArray, reward: float, elapsed_s: float) -> None:
+        self._times.append(np.array(trace.times))
+        self._robot.append(np.array(trace.robot_poses))
+        self._objects.append(np.array(trace.object_poses))
+        self._actions.append(np.array(command, dtype=np.float64).reshape(-1))
+        self._rewards.append(reward)
+        self._act_times.append(elapsed_s)
+
+    def _ask(self, method: Callable[..., Any], *arguments: Any) -> Any:
+        try:
+            return method(*arguments)
+        except MemoryError:
+            raise
+        except (Exception, SystemExit) as error:
+            raise PolicyError(describe(error)) from error
+
+
+def checked_action(env: Any, action: object) -> FloatArray:
+    """``action`` in the action space of ``env``, within its bounds.
+
+    Raises:
+        InvalidActionError: if it is no twist, wheel speeds or finite array of the right shape.
+    """
+    if not isinstance(action, Twist | WheelSpeeds):
+        shape = env.action_space.shape
+        try:
+            values = np.asarray(action, dtype=np.float64)
+        except (TypeError, ValueError):
+            raise InvalidActionError(
+                f"an action is a Twist, WheelSpeeds or an array of shape {shape}, "
+                f"got {describe_value(action)}"
+            ) from None
+        if values.shape != shape:
+            raise InvalidActionError(f"an action has shape {shape} here, got {values.shape}")
+        if not np.isfinite(values).all():
+            raise InvalidActionError(f"an action must be finite, got {values.tolist()}")
+        action = values
+    command: FloatArray = env.encode(action)
+    return command
+
+
+def plan_times(policy: Policy) -> list[float] | None:
+    """Wall-clock time of each planning call since the reset [s]; None if no log is kept."""
+    log = getattr(policy, "plan_log", None)
+    if log is None:
+        return None
+    return [float(result.stats.wall_time_s) for result in log]
+
+
+def describe(error: BaseException) -> str:
+    """One line for an exception: its type and its message."""
+    text = " ".join(str(error).split())
+    name = type(error).__name__
+    return f"{name}: {text}" if text else name
+
+
+def describe_value(value: object) -> str:
+    """A short text for a value that should have been something else."""
+    return f"{type(value).__name__} {value!r:.60}"

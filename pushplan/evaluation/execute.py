@@ -1,0 +1,134 @@
+"""Run one job. Whatever goes wrong becomes part of its outcome."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import random
+import re
+import tempfile
+import time
+import traceback
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from pushplan.evaluation.episode import (
+    InvalidActionError,
+    PolicyError,
+    Recording,
+    describe,
+    plan_times,
+)
+from pushplan.evaluation.jobs import Job, JobSettings, Outcome, failed_outcome, timeout_reason
+from pushplan.evaluation.limits import EpisodeTimeout, hard_limit, soft_limit
+from pushplan.evaluation.rows import Status, blank_row, scored_row
+
+REHEARSAL_STEPS = 2
+_rehearsed: set[tuple[str, str, str]] = set()
+
+REASON_LENGTH = 300
+"""A reason in the results is cut to this many characters; the detail file has all of it."""
+
+
+def execute(job: Job, settings: JobSettings, owner_pid: int | None = None) -> Outcome:
+    """Run one job. Whatever goes wrong is in the outcome, unless it ends the process.
+
+    Args:
+        job: what to run.
+        settings: what all jobs share.
+        owner_pid: process that waits for the outcome and cannot end this one by force. Given
+            from another process, a job that ignores its limit ends its own process.
+    """
+    by_force = settings.force_after_s if owner_pid not in (None, os.getpid()) else None
+    try:
+        with hard_limit(by_force), soft_limit(settings.timeout_s):
+            return _execute(job, settings)
+    except EpisodeTimeout:
+        reason = timeout_reason(settings.timeout_s)
+        return failed_outcome(job, Status.TIMEOUT, reason, traceback.format_exc())
+    except MemoryError:
+        return failed_outcome(
+            job, Status.OUT_OF_MEMORY, "an allocation failed", traceback.format_exc()
+        )
+
+
+def _execute(job: Job, settings: JobSettings) -> Outcome:
+    if settings.rehearse:
+        rehearse(job, settings)
+    # a policy that uses the global generators against our advice repeats all the same
+    random.seed(job.scenario.seed)
+    np.random.seed(job.scenario.seed % 2**32)  # noqa: NPY002
+    try:
+        policy = job.policy.make()
+    except MemoryError:
+        raise
+    except (Exception, SystemExit) as error:
+        return failed_outcome(
+            job, Status.POLICY_ERROR, _short(describe(error)), traceback.format_exc()
+        )
+    recording = Recording(policy, job.scenario, job.policy.label)
+    begin = time.perf_counter()
+    status, reason, detail = Status.DONE, None, ""
+    try:
+        env = settings.environment(job.scenario, policy)
+        begin = time.perf_counter()
+        try:
+            recording.run(env)
+        finally:
+            getattr(env, "close", _nothing)()
+    except MemoryError:
+        raise
+    except Exception as error:
+        status, reason = _failure(error)
+        detail = traceback.format_exc()
+    row = blank_row(job.policy.label, job.scenario, status, _short(reason or recording.reason))
+    row = replace(row, wall_time_s=time.perf_counter() - begin)
+    if not recording.started:
+        return Outcome(row, detail=detail)
+    episode = recording.episode(reason)
+    calls = plan_times(policy)
+    row = scored_row(row, episode, None if calls is None else len(calls))
+    return Outcome(row, _as_bytes(episode.save), detail)
+
+
+def rehearse(job: Job, settings: JobSettings) -> None:
+    """Load and compile what a job needs; what goes wrong here goes wrong again in the job."""
+    what = (job.policy.label, job.policy.identity, job.title)
+    if what in _rehearsed:
+        return
+    _rehearsed.add(what)
+    with contextlib.suppress(Exception, SystemExit):
+        policy = job.policy.make()
+        env = settings.environment(job.scenario, policy)
+        try:
+            Recording(policy, job.scenario).run(env, limit=REHEARSAL_STEPS)
+        finally:
+            getattr(env, "close", _nothing)()
+
+
+def _failure(error: Exception) -> tuple[Status, str]:
+    if isinstance(error, InvalidActionError):
+        return Status.INVALID_ACTION, str(error)
+    if isinstance(error, PolicyError):
+        return Status.POLICY_ERROR, str(error)
+    return Status.ENV_ERROR, describe(error)
+
+
+def _short(reason: str) -> str:
+    # addresses of objects differ from run to run
+    reason = re.sub(r"0x[0-9a-f]{6,}", "0x...", reason)
+    return reason if len(reason) <= REASON_LENGTH else reason[: REASON_LENGTH - 3] + "..."
+
+
+def _as_bytes(save: Callable[[Path], None]) -> bytes:
+    with tempfile.TemporaryDirectory(prefix="pushplan-") as folder:
+        path = Path(folder) / "episode.npz"
+        save(path)
+        return path.read_bytes()
+
+
+def _nothing() -> None:
+    """An environment without ``close`` needs none."""

@@ -1,0 +1,128 @@
+"""A job is one policy on one scenario; what became of it is an outcome."""
+
+from __future__ import annotations
+
+import re
+import zlib
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from pushplan.evaluation.loading import load_object
+from pushplan.evaluation.policies import PolicySpec
+from pushplan.evaluation.rows import ResultRow, Status, blank_row
+from pushplan.world import Policy
+from pushplan.world.checks import number
+
+DEFAULT_ENV = "pushplan.envs:make"
+
+
+@dataclass(frozen=True)
+class Job:
+    """One policy on one scenario.
+
+    Args:
+        policy: how to make the policy.
+        scenario: a `pushplan.scenarios.Scenario`, or anything with ``task``, ``simulator``,
+            ``key``, ``seed`` and ``to_dict``.
+    """
+
+    policy: PolicySpec
+    scenario: Any
+
+    @property
+    def id(self) -> tuple[str, str, int]:
+        """What identifies the job in a run directory: policy, scenario key, seed."""
+        return (self.policy.label, str(self.scenario.key), int(self.scenario.seed))
+
+    @property
+    def file_stem(self) -> str:
+        """Name, without ending, of the files that belong to the job."""
+        return file_stem(*self.id)
+
+    @property
+    def title(self) -> str:
+        """The scenario without its seed, in words."""
+        data = self.scenario.to_dict()
+        words = [str(data[key]) for key in ("task", "simulator", "preset") if key in data]
+        extra = [f"{key}={value}" for key, value in data.get("variations", {}).items()]
+        return " ".join([*words, *extra])
+
+
+def file_stem(policy: str, scenario: str, seed: int) -> str:
+    """Name, without ending, of the files that belong to a job."""
+    clean = re.sub(r"[^A-Za-z0-9_.+@=-]", "_", scenario)
+    if clean != scenario or len(clean) > 120:
+        clean = f"{clean[:110]}-{zlib.crc32(scenario.encode()):08x}"
+    ending = "" if re.search(rf"(^|[^0-9]){seed}$", clean) else f"--{seed}"
+    return f"{policy}--{clean}{ending}"
+
+
+@dataclass(frozen=True)
+class JobSettings:
+    """What all jobs of a batch share.
+
+    Args:
+        make_env: factory of environments, as a callable or as ``"module:function"``; called as
+            ``make_env(scenario, observation=...)``.
+        observation: kind of observation; ``"auto"`` takes what the policy's attribute
+            ``observation`` asks for, else ``"state"``.
+        timeout_s: wall-clock limit of one job [s], None for none.
+        grace_s: how much later a job is ended by force [s].
+        rehearse: run the first steps of a policy's first job in each process once without
+            recording them, so that loading and compiling are in nobody's planning times.
+    """
+
+    make_env: str | Callable[..., Any] = DEFAULT_ENV
+    observation: str = "auto"
+    timeout_s: float | None = 300.0
+    grace_s: float = 2.0
+    rehearse: bool = True
+
+    def __post_init__(self) -> None:
+        if self.timeout_s is not None:
+            number("timeout_s", self.timeout_s, low=0.0, open_low=True)
+        number("grace_s", self.grace_s, low=0.0)
+
+    @property
+    def force_after_s(self) -> float | None:
+        """When a job is ended by force [s]."""
+        return None if self.timeout_s is None else self.timeout_s + self.grace_s
+
+    def environment(self, scenario: Any, policy: Policy, **options: Any) -> Any:
+        """A fresh environment for one job; ``options`` go to its factory."""
+        observation = self.observation
+        if observation == "auto":
+            observation = getattr(policy, "observation", "state")
+        make = load_object(self.make_env) if isinstance(self.make_env, str) else self.make_env
+        return make(scenario, observation=observation, **options)
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What became of a job.
+
+    Args:
+        row: its row of the results.
+        trace: the recorded episode as the bytes of an ``.npz`` file, if anything was recorded.
+        detail: traceback of a failure.
+    """
+
+    row: ResultRow
+    trace: bytes | None = None
+    detail: str = ""
+
+    @property
+    def tainted(self) -> bool:
+        """Whether the process that ran the job should not run another one."""
+        return self.row.status in (Status.TIMEOUT, Status.OUT_OF_MEMORY)
+
+
+def failed_outcome(job: Job, status: Status, reason: str, detail: str = "") -> Outcome:
+    """The outcome of a job of which nothing was recorded."""
+    return Outcome(blank_row(job.policy.label, job.scenario, status, reason), detail=detail)
+
+
+def timeout_reason(timeout_s: float | None) -> str:
+    """Why a job was ended."""
+    return f"not done after {timeout_s:g} s of wall-clock time"

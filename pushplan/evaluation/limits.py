@@ -1,0 +1,69 @@
+"""Limits on what one job may use: wall-clock time and memory."""
+
+from __future__ import annotations
+
+import contextlib
+import faulthandler
+import resource
+import signal
+import threading
+from collections.abc import Iterator
+from types import FrameType
+
+
+class EpisodeTimeout(BaseException):
+    """Raised inside a job that takes too long.
+
+    Not an `Exception`, so that a policy which catches those does not swallow it.
+    """
+
+
+@contextlib.contextmanager
+def soft_limit(seconds: float | None) -> Iterator[None]:
+    """Raise `EpisodeTimeout` in the body after this much wall-clock time.
+
+    Works in the main thread of a process and between two instructions of Python: code that
+    never returns to the interpreter has to be ended from outside. Elsewhere it does nothing.
+    """
+    if seconds is None or threading.current_thread() is not threading.main_thread():
+        yield
+        return
+
+    def expire(signum: int, frame: FrameType | None) -> None:
+        raise EpisodeTimeout
+
+    previous = signal.signal(signal.SIGALRM, expire)
+    signal.setitimer(signal.ITIMER_REAL, seconds)
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+        signal.signal(signal.SIGALRM, previous)
+
+
+@contextlib.contextmanager
+def hard_limit(seconds: float | None) -> Iterator[None]:
+    """End this whole process after this much wall-clock time, even if the GIL is held.
+
+    For workers of an executor that cannot end them itself. A thread that needs no interpreter
+    prints where the process hangs and exits.
+    """
+    if seconds is None:
+        yield
+        return
+    faulthandler.dump_traceback_later(seconds, exit=True)
+    try:
+        yield
+    finally:
+        faulthandler.cancel_dump_traceback_later()
+
+
+def limit_memory(megabytes: float | None) -> None:
+    """Let allocations of this process fail beyond this much private memory [MB], for good."""
+    if megabytes is None:
+        return
+    limit = int(megabytes * 1e6)
+    _, hard = resource.getrlimit(resource.RLIMIT_DATA)
+    if hard != resource.RLIM_INFINITY:
+        limit = min(limit, hard)
+    resource.setrlimit(resource.RLIMIT_DATA, (limit, hard))

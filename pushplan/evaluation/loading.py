@@ -1,0 +1,67 @@
+"""Objects named by text: ``"module:Name"`` or ``"path/to/file.py:Name"``."""
+
+from __future__ import annotations
+
+import hashlib
+import importlib
+import importlib.util
+import sys
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+from pushplan.world import InvalidInputError
+from pushplan.world.errors import unknown_name_message
+
+
+def load_object(spec: str) -> Any:
+    """Import what a text names.
+
+    A file is imported once a process, with its folder on the import path, so that it may import
+    its neighbours. Whatever the file raises passes through.
+
+    Args:
+        spec: ``"module:Name"`` or ``"path/to/file.py:Name"``.
+
+    Raises:
+        InvalidInputError: if the text has no such form, or there is no such file or name.
+    """
+    where, colon, name = spec.rpartition(":")
+    if not colon or not where or not name.isidentifier():
+        raise InvalidInputError(f"expected 'module:Name' or 'path/to/file.py:Name', got {spec!r}")
+    module = _load_file(Path(where)) if where.endswith(".py") else _load_module(where, spec)
+    if not hasattr(module, name):
+        choices = [key for key in vars(module) if not key.startswith("_")]
+        raise InvalidInputError(unknown_name_message(f"name in {where}", name, choices))
+    return getattr(module, name)
+
+
+def _load_module(name: str, spec: str) -> ModuleType:
+    try:
+        return importlib.import_module(name)
+    except ModuleNotFoundError as error:
+        if error.name is None or not f"{name}.".startswith(f"{error.name}."):
+            raise  # the module is there, something that it imports is not
+        raise InvalidInputError(f"cannot load {spec!r}: {error}") from error
+
+
+def _load_file(path: Path) -> ModuleType:
+    path = path.expanduser().resolve()
+    if not path.is_file():
+        raise InvalidInputError(f"there is no file {path}")
+    digest = hashlib.sha256(str(path).encode()).hexdigest()[:8]
+    name = f"pushplan_user_{path.stem}_{digest}"
+    if name in sys.modules:
+        return sys.modules[name]
+    spec = importlib.util.spec_from_file_location(name, path)
+    assert spec is not None and spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    if str(path.parent) not in sys.path:
+        sys.path.append(str(path.parent))
+    sys.modules[name] = module
+    try:
+        spec.loader.exec_module(module)
+    except BaseException:
+        del sys.modules[name]
+        raise
+    return module

@@ -1,0 +1,153 @@
+"""Which policy a job runs: a name, a text that names a class, or a factory."""
+
+from __future__ import annotations
+
+import functools
+import hashlib
+import re
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, cast
+
+from pushplan.evaluation.loading import load_object
+from pushplan.world import InvalidInputError, Policy, UnknownNameError
+
+_LABEL = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.+@-]{0,63}")
+
+
+@dataclass(frozen=True)
+class PolicySpec:
+    """How to make a policy, in whatever process the job runs.
+
+    Args:
+        label: what results call it: letters, digits and ``_ . + @ -``, 64 at most.
+        source: a name of `pushplan.planners.policy_names`, ``"module:Class"``,
+            ``"path/to/file.py:Class"``, or a callable without required arguments. The class or
+            callable gives a policy, or a planner, which is then wrapped in the default policy.
+        options: keyword arguments for it.
+    """
+
+    label: str
+    source: str | Callable[..., Any]
+    options: Mapping[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        if not _LABEL.fullmatch(self.label):
+            raise InvalidInputError(
+                "a policy's label is 1 to 64 letters, digits and '_.+@-', "
+                f"not beginning with '.+@-', got {self.label!r}"
+            )
+
+    @property
+    def identity(self) -> str:
+        """A text that tells sources apart when a run is resumed."""
+        options = "".join(f" {key}={value!r}" for key, value in sorted(self.options.items()))
+        if isinstance(self.source, str):
+            where, _, name = self.source.rpartition(":")
+            if where.endswith(".py"):  # edited code is another policy, a moved file is not
+                digest = hashlib.sha256(Path(where).read_bytes()).hexdigest()[:12]
+                return f"{Path(where).name}:{name} sha256:{digest}{options}"
+            return f"{self.source}{options}"
+        source: Any = self.source
+        while isinstance(source, functools.partial):
+            options += f" {source.args!r} {sorted(source.keywords.items())!r}"
+            source = source.func
+        where = getattr(source, "__module__", type(source).__module__)
+        name = getattr(source, "__qualname__", type(source).__qualname__)
+        return re.sub(r"0x[0-9a-f]+", "0x", f"{where}:{name}{options}")
+
+    def make(self) -> Policy:
+        """A fresh policy.
+
+        Raises:
+            UnknownNameError: if there is no policy of that name.
+            InvalidInputError: if the source gives neither a policy nor a planner.
+        """
+        if not isinstance(self.source, str):
+            return as_policy(self.source(**self.options), self.label)
+        if ":" in self.source:
+            return as_policy(load_object(self.source)(**self.options), self.label)
+        from pushplan.planners import make_policy
+
+        return make_policy(self.source, **self.options)
+
+
+def as_policy(thing: Any, label: str) -> Policy:
+    """A policy as it is; a planner wrapped in the default policy.
+
+    Raises:
+        InvalidInputError: if it is neither.
+    """
+    if callable(getattr(thing, "act", None)) and callable(getattr(thing, "reset", None)):
+        return cast(Policy, thing)
+    if callable(getattr(thing, "plan", None)):
+        from pushplan.planners.policy import policy_for
+
+        return policy_for(thing)
+    raise InvalidInputError(
+        f"policy {label!r} is a {type(thing).__name__}, which has neither the methods of a policy "
+        "(reset, act) nor of a planner (plan)"
+    )
+
+
+def parse_policy(given: str | Callable[..., Any] | PolicySpec) -> PolicySpec:
+    """Read one policy as users give it.
+
+    A text may begin with ``label=``; without it the label is the name, or the class's name.
+
+    Raises:
+        UnknownNameError: if it looks like a name and is not one.
+        InvalidInputError: if it can be no policy at all.
+    """
+    if isinstance(given, PolicySpec):
+        return given
+    if isinstance(given, str):
+        label, equals, source = given.partition("=")
+        if not equals:
+            label, source = "", given
+        if ":" in source:
+            where, _, name = source.rpartition(":")
+            if where.endswith(".py"):
+                path = Path(where).expanduser().resolve()
+                if not path.is_file():
+                    raise InvalidInputError(f"policy {given!r}: there is no file {where}")
+                source = f"{path}:{name}"
+            return PolicySpec(label or name, source)
+        from pushplan.planners import policy_names
+
+        if source not in policy_names():
+            raise UnknownNameError("policy", source, policy_names())
+        return PolicySpec(label or source, source)
+    if not callable(given):
+        raise InvalidInputError(
+            "a policy is given as a name, 'module:Class', 'file.py:Class' or a callable that "
+            f"makes one, got {type(given).__name__}"
+        )
+    name = getattr(given, "__name__", type(given).__name__)
+    return PolicySpec(re.sub(r"[^A-Za-z0-9_.-]", "", name) or "policy", given)
+
+
+def parse_policies(
+    given: str | Sequence[str | Callable[..., Any] | PolicySpec],
+) -> list[PolicySpec]:
+    """Read several policies: a list, or one text with commas.
+
+    Raises:
+        InvalidInputError: if there is none, or two share a label.
+    """
+    items: Sequence[Any] = given.split(",") if isinstance(given, str) else given
+    specs = [
+        parse_policy(item.strip() if isinstance(item, str) else item)
+        for item in items
+        if not isinstance(item, str) or item.strip()
+    ]
+    if not specs:
+        raise InvalidInputError("at least one policy is needed")
+    labels = [spec.label for spec in specs]
+    for label in labels:
+        if labels.count(label) > 1:
+            raise InvalidInputError(
+                f"two policies are labelled {label!r}: tell them apart as 'label=policy'"
+            )
+    return specs

@@ -1,0 +1,250 @@
+"""Tables of a run as plain data, and as Markdown, CSV and text."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from pushplan.evaluation.rows import SCORES
+from pushplan.evaluation.statistics import Estimate
+from pushplan.evaluation.summary import PairedDifference, PolicySummary
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+HEADINGS = {
+    "E_nav": "E_nav",
+    "I_nav": "I_nav",
+    "S_manip": "S_manip",
+    "E_manip": "E_manip",
+    "I_manip": "I_manip",
+    "interaction_work_kg_m": "work [kg m]",
+    "path_length_m": "path [m]",
+    "plan_time_median_s": "plan [ms]",
+    "wall_time_s": "wall [s]",
+}
+
+
+@dataclass(frozen=True)
+class Sheet:
+    """A table of texts. A line break in a cell separates a value from its interval.
+
+    Args:
+        title: one line.
+        headings: one a column.
+        cells: rows of as many texts.
+        note: what the numbers are.
+    """
+
+    title: str
+    headings: tuple[str, ...]
+    cells: tuple[tuple[str, ...], ...]
+    note: str = ""
+
+
+SCORE_NOTE = (
+    "mean ± standard deviation over episodes, 95 % bootstrap interval of the mean below; success "
+    "with its Wilson interval; a failed job counts as no success and E_nav = 0; plan is the "
+    "median over episodes of each episode's median planning call, its slowest call below"
+)
+MEASURED_NOTE = (
+    "mean ± standard deviation over the episodes that did not fail, 95 % bootstrap interval of "
+    "the mean below; med is the median"
+)
+PAIR_NOTE = (
+    "same scenarios, second policy minus first: mean with 95 % bootstrap interval; * where the "
+    "interval leaves out 0; wins are scenarios in which the second policy has the greater value"
+)
+
+
+def score_sheets(
+    summaries: Sequence[PolicySummary], titles: dict[str, str], *, wide: bool = False
+) -> list[Sheet]:
+    """One sheet a setting with a row for each policy.
+
+    Args:
+        summaries: of a run.
+        titles: text for each setting.
+        wide: with medians and further columns, for files and pages.
+    """
+    sheets = []
+    for setting in dict.fromkeys(s.setting for s in summaries):
+        mine = [s for s in summaries if s.setting == setting]
+        metrics = [name for name in SCORES if any(name in s.metrics for s in mine)]
+        if wide:
+            more = ("interaction_work_kg_m", "path_length_m", "wall_time_s")
+            metrics += [name for name in more if any(name in s.metrics for s in mine)]
+        if any("plan_time_median_s" in s.metrics for s in mine):
+            metrics.append("plan_time_median_s")
+        headings = ("policy", "runs", "success", *(HEADINGS[name] for name in metrics))
+        cells = tuple(_policy_cells(summary, metrics, wide) for summary in mine)
+        note = SCORE_NOTE + ("; med is the median" if wide else "")
+        sheets.append(Sheet(titles.get(setting, setting), headings, cells, note))
+    return sheets
+
+
+def measured_sheets(
+    estimates: Mapping[tuple[str, str, str], Estimate],
+    policies: Sequence[str],
+    metrics: Sequence[str],
+    titles: Mapping[str, str],
+) -> list[Sheet]:
+    """One sheet a setting of metrics that were computed from stored episodes.
+
+    Args:
+        estimates: (setting, policy, metric) -> estimate.
+        policies: rows, in order.
+        metrics: columns, in order.
+        titles: text for each setting, in order.
+    """
+    sheets = []
+    for setting, title in titles.items():
+        cells = []
+        for policy in policies:
+            found = [estimates.get((setting, policy, name)) for name in metrics]
+            if any(found):
+                cells.append((policy, *("" if e is None else _estimate(e) for e in found)))
+        sheets.append(Sheet(title, ("policy", *metrics), tuple(cells), MEASURED_NOTE))
+    return sheets
+
+
+def pair_sheets(
+    pairs: Sequence[PairedDifference], titles: dict[str, str], *, wide: bool = False
+) -> list[Sheet]:
+    """One sheet a setting with a row for each pair of policies and metric."""
+    sheets = []
+    if not wide:
+        pairs = [pair for pair in pairs if pair.metric in SCORES]
+    for setting in dict.fromkeys(pair.setting for pair in pairs):
+        cells = tuple(
+            (
+                HEADINGS[pair.metric],
+                f"{pair.second} - {pair.first}",
+                _number(pair.difference.mean, sign=True) + (" *" if pair.clear else ""),
+                _interval(pair.difference, sign=True),
+                f"{pair.wins} / {pair.losses} / {pair.difference.count}",
+            )
+            for pair in pairs
+            if pair.setting == setting
+        )
+        headings = ("metric", "pair", "difference", "95 % interval", "wins / losses / of")
+        title = f"Paired differences: {titles.get(setting, setting)}"
+        sheets.append(Sheet(title, headings, cells, PAIR_NOTE))
+    return sheets
+
+
+def markdown(sheets: Sequence[Sheet]) -> str:
+    """The sheets as a Markdown document."""
+    blocks = []
+    for sheet in sheets:
+        lines = [f"## {sheet.title}", "", _line(sheet.headings)]
+        lines.append(_line(["---"] * len(sheet.headings)))
+        lines += [_line([cell.replace("\n", "<br>") for cell in row]) for row in sheet.cells]
+        if sheet.note:
+            lines += ["", f"{sheet.note[0].upper()}{sheet.note[1:]}."]
+        blocks.append("\n".join(lines))
+    return "\n\n".join(blocks) + "\n"
+
+
+def summary_csv(summaries: Sequence[PolicySummary], titles: dict[str, str]) -> str:
+    """One line for each setting, policy and metric, with all digits."""
+    buffer = io.StringIO()
+    writer = csv.writer(buffer, lineterminator="\n")
+    writer.writerow(("setting", "policy", "metric", "count", "mean", "sd", "median", "low", "high"))
+    for summary in summaries:
+        who = (titles.get(summary.setting, summary.setting), summary.policy)
+        rate = summary.success
+        writer.writerow((*who, "success", rate.count, rate.share, "", "", rate.low, rate.high))
+        for name, value in summary.metrics.items():
+            numbers = (value.count, value.mean, value.sd, value.median, value.low, value.high)
+            writer.writerow((*who, name, *numbers))
+    return buffer.getvalue()
+
+
+def differences_csv(pairs: Sequence[PairedDifference], titles: dict[str, str]) -> str:
+    """One line for each setting, metric and pair of policies, with all digits."""
+    buffer = io.StringIO()
+    writer = csv.writer(buffer, lineterminator="\n")
+    names = "setting,metric,first,second,count,mean,sd,median,low,high,wins,losses"
+    writer.writerow(names.split(","))
+    for pair in pairs:
+        d = pair.difference
+        who = (titles.get(pair.setting, pair.setting), pair.metric, pair.first, pair.second)
+        numbers = (d.count, d.mean, d.sd, d.median, d.low, d.high, pair.wins, pair.losses)
+        writer.writerow((*who, *numbers))
+    return buffer.getvalue()
+
+
+def rich_table(sheet: Sheet) -> Table:
+    """The sheet for a terminal."""
+    from rich import box
+    from rich.table import Table
+    from rich.text import Text
+
+    table = Table(
+        title=Text(sheet.title),
+        box=box.SIMPLE_HEAD,
+        show_edge=False,
+        title_justify="left",
+        padding=(0, 1, 0, 0),
+    )
+    for i, heading in enumerate(sheet.headings):
+        table.add_column(Text(heading), justify="left" if i == 0 else "right", no_wrap=i == 0)
+    for row in sheet.cells:
+        table.add_row(*(Text(cell) for cell in row))
+    return table
+
+
+def text(sheets: Sequence[Sheet], width: int = 160) -> str:
+    """The sheets as plain text."""
+    from rich.console import Console
+
+    console = Console(file=io.StringIO(), width=width, force_terminal=False, color_system=None)
+    with console.capture() as capture:
+        for sheet in sheets:
+            console.print(rich_table(sheet), end="\n\n")
+    return "\n".join(line.rstrip() for line in capture.get().rstrip().splitlines()) + "\n"
+
+
+def _policy_cells(summary: PolicySummary, metrics: Sequence[str], wide: bool) -> tuple[str, ...]:
+    failed = f"\n{summary.failed} failed" if summary.failed else ""
+    rate = summary.success
+    cells = [
+        summary.policy,
+        f"{summary.episodes}{failed}",
+        f"{rate.share:.2f}\n[{rate.low:.2f}, {rate.high:.2f}]",
+    ]
+    for name in metrics:
+        value = summary.metrics.get(name)
+        if value is None:
+            cells.append("")
+        elif name == "plan_time_median_s":
+            worst = summary.metrics["plan_time_max_s"].highest
+            cells.append(f"{_digits(1e3 * value.median)}\nmax {_digits(1e3 * worst)}")
+        else:
+            cells.append(_estimate(value, wide=wide))
+    return tuple(cells)
+
+
+def _estimate(value: Estimate, *, wide: bool = True) -> str:
+    middle = f"\nmed {_number(value.median)}" if wide else ""
+    return f"{_number(value.mean)} ± {_number(value.sd)}\n{_interval(value)}{middle}"
+
+
+def _interval(value: Estimate, *, sign: bool = False) -> str:
+    return f"[{_number(value.low, sign=sign)}, {_number(value.high, sign=sign)}]"
+
+
+def _number(value: float, *, sign: bool = False) -> str:
+    return f"{value:+.3f}" if sign else f"{value:.3f}"
+
+
+def _digits(value: float) -> str:
+    return f"{value:.0f}" if value >= 100.0 else f"{value:.3g}"
+
+
+def _line(cells: Sequence[str]) -> str:
+    return "| " + " | ".join(cells) + " |"

@@ -1,0 +1,128 @@
+"""Estimates with intervals. Deterministic: resampling draws from a fixed stream."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.special import ndtr, ndtri
+
+from pushplan.world import InvalidInputError, stream
+from pushplan.world.checks import FloatArray, array
+
+RESAMPLES = 9999
+_CHUNK = 2_000_000
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """Location and spread of a sample.
+
+    Attributes:
+        count: sample size.
+        mean: arithmetic mean.
+        sd: standard deviation with n - 1 in the denominator; 0 for one value.
+        median: 50th percentile.
+        low: lower end of the 95 % interval of the mean.
+        high: its upper end.
+        highest: greatest value.
+    """
+
+    count: int
+    mean: float
+    sd: float
+    median: float
+    low: float
+    high: float
+    highest: float
+
+
+@dataclass(frozen=True)
+class Proportion:
+    """A share of successes with its Wilson 95 % interval."""
+
+    count: int
+    share: float
+    low: float
+    high: float
+
+
+def estimate(values: Sequence[float] | FloatArray) -> Estimate:
+    """Mean, spread, median and bootstrap interval of a sample.
+
+    Raises:
+        InvalidInputError: if the sample is empty or not finite.
+    """
+    sample: FloatArray = array("sample", np.asarray(values, dtype=np.float64), (None,))
+    if len(sample) == 0:
+        raise InvalidInputError("an estimate needs at least one value")
+    low, high = bootstrap_interval(sample)
+    return Estimate(
+        count=len(sample),
+        mean=float(sample.mean()),
+        sd=float(sample.std(ddof=1)) if len(sample) > 1 else 0.0,
+        median=float(np.median(sample)),
+        low=low,
+        high=high,
+        highest=float(sample.max()),
+    )
+
+
+def bootstrap_interval(
+    values: Sequence[float] | FloatArray, *, level: float = 0.95, resamples: int = RESAMPLES
+) -> tuple[float, float]:
+    """Bias-corrected and accelerated bootstrap interval of the mean.
+
+    Efron, Better Bootstrap Confidence Intervals, JASA 82 (1987). A sample without spread has an
+    interval without width.
+
+    Args:
+        values: the sample, finite and not empty.
+        level: confidence level in (0, 1).
+        resamples: how many samples are drawn with replacement.
+    """
+    sample = np.asarray(values, dtype=np.float64)
+    mean = float(sample.mean())
+    if np.ptp(sample) <= 1e-12 * max(1.0, abs(mean)):
+        return mean, mean
+    means = _resampled_means(sample, resamples)
+    below = (np.sum(means < mean) + 0.5 * np.sum(means == mean)) / resamples
+    bias = float(ndtri(np.clip(below, 1.0 / resamples, 1.0 - 1.0 / resamples)))
+    # jackknife: leaving value i out moves the mean by (mean - value i) / (n - 1)
+    gaps = sample - mean
+    acceleration = float((gaps**3).sum() / (6.0 * (gaps**2).sum() ** 1.5))
+    tails = ndtri(np.array([(1.0 - level) / 2.0, (1.0 + level) / 2.0]))
+    shifted = bias + tails
+    shares = ndtr(bias + shifted / (1.0 - acceleration * shifted))
+    low, high = np.quantile(means, shares)
+    return float(low), float(high)
+
+
+def wilson(successes: int, count: int, *, z: float = 1.959963984540054) -> Proportion:
+    """Share of successes with Wilson's score interval (JASA 22, 1927).
+
+    Raises:
+        InvalidInputError: if there are more successes than trials, or no trial.
+    """
+    if not 0 <= successes <= count or count == 0:
+        raise InvalidInputError(f"need 0 <= successes <= trials > 0, got {successes} of {count}")
+    share = successes / count
+    scale = 1.0 + z * z / count
+    centre = (share + z * z / (2.0 * count)) / scale
+    half = z / scale * math.sqrt(share * (1.0 - share) / count + z * z / (4.0 * count * count))
+    low = 0.0 if successes == 0 else centre - half
+    high = 1.0 if successes == count else centre + half
+    return Proportion(count, share, low, high)
+
+
+def _resampled_means(sample: FloatArray, resamples: int) -> FloatArray:
+    rng = stream(0, "bootstrap")
+    step = max(1, _CHUNK // len(sample))
+    parts = [
+        sample[rng.integers(0, len(sample), (min(step, resamples - k), len(sample)))].mean(axis=1)
+        for k in range(0, resamples, step)
+    ]
+    means: FloatArray = np.concatenate(parts)
+    return means

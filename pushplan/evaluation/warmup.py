@@ -1,0 +1,79 @@
+"""Run everything once for a moment, so that its kernels are compiled and cached."""
+
+from __future__ import annotations
+
+import time
+
+from pushplan.evaluation.episode import Recording
+from pushplan.evaluation.loading import load_object
+
+WARMUPS: dict[str, str] = {
+    "policies": "pushplan.evaluation.warmup:policies",
+    "observations": "pushplan.evaluation.warmup:observations",
+    "planners": "pushplan.evaluation.warmup:planners",
+    "metrics": "pushplan.evaluation.warmup:metrics",
+}
+"""What -> "module:function" that is called without arguments."""
+
+STEPS = 3
+
+
+def warm_up(name: str) -> float:
+    """Run one entry of `WARMUPS`.
+
+    Returns:
+        How long it took [s].
+    """
+    begin = time.perf_counter()
+    load_object(WARMUPS[name])()
+    return time.perf_counter() - begin
+
+
+def policies() -> None:
+    """A few steps of every policy in every kind of start of the smoke suite."""
+    from pushplan.planners import policy_names
+
+    for name in policy_names():
+        _record(name, "state")
+
+
+def observations() -> None:
+    """A few steps with image observations."""
+    _record("random", "image")
+
+
+def planners() -> None:
+    """A short call of every planner."""
+    from pushplan.envs import make
+    from pushplan.planners import make_planner, planner_names
+    from pushplan.scenarios import suite
+    from pushplan.world import MaxIterations
+
+    for scenario in suite("smoke", episodes=2).scenarios:
+        env = make(scenario, observation="state")
+        env.reset(seed=scenario.seed)
+        for name in planner_names():
+            make_planner(name).plan(env.world, stop=MaxIterations(50))
+        env.close()
+
+
+def metrics() -> None:
+    """Every metric of a short episode."""
+    from pushplan.metrics import compute
+
+    for recording in _record("random", "state"):
+        compute(recording.episode())
+
+
+def _record(policy: str, observation: str) -> list[Recording]:
+    from pushplan.envs import make
+    from pushplan.planners import make_policy
+    from pushplan.scenarios import suite
+
+    recordings = []
+    for scenario in suite("smoke", episodes=2).scenarios:
+        env = make(scenario, observation=observation)
+        recordings.append(Recording(make_policy(policy), scenario))
+        recordings[-1].run(env, limit=STEPS)
+        env.close()
+    return recordings

@@ -1,0 +1,171 @@
+"""The outlines around which shortest paths bend, as polygons drawn just outside the obstacles."""
+
+from __future__ import annotations
+
+import math
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from pushplan.geometry.obstacles import Obstacles, obstacle_distance, obstacles_of
+from pushplan.world import StaticMap
+from pushplan.world.checks import BoolArray, FloatArray, IntArray, frozen
+
+ARC_STEP = math.pi / 36.0
+"""Turn per corner where a round outline becomes a polygon [rad]; an arc gets 0.06 % longer."""
+SMALL_RADIUS = 1e-3
+"""Arcs below this share of the map's diagonal get fewer corners: the same error in metres."""
+GAP = 1e-7
+"""Share of the map's diagonal by which paths stay off obstacles, so that touching ones close."""
+
+
+class Contours(NamedTuple):
+    """Corners of polygons around every obstacle, each corner with its neighbours' directions.
+
+    Attributes:
+        corners: (V, 2) all corners [m]; each obstacle's run counter-clockwise.
+        incoming: (V, 2) unit direction from the previous corner of the same obstacle.
+        outgoing: (V, 2) unit direction to the next corner.
+        owner: (V,) index of the obstacle.
+        following: (V,) index of the next corner of the same obstacle.
+    """
+
+    corners: FloatArray
+    incoming: FloatArray
+    outgoing: FloatArray
+    owner: IntArray
+    following: IntArray
+
+
+def gap_of(static: StaticMap) -> float:
+    """How far paths stay off obstacles [m]; two obstacles closer than this leave no passage."""
+    return GAP * _diagonal(static)
+
+
+def standoff_of(static: StaticMap, clearance: float) -> float:
+    """Greatest distance [m] of a contour polygon from the outline that it is drawn around."""
+    radius = max(float(obstacles_of(static, clearance).radii.max(initial=0.0)), 0.0)
+    # 1 / cos(step / 2) - 1, which is step² / 8 for small steps and 1.35 times that at the coarsest
+    share = 1.5 * ARC_STEP**2 / 8.0
+    return share * max(radius, SMALL_RADIUS * _diagonal(static)) + 4.0 * gap_of(static)
+
+
+def _diagonal(static: StaticMap) -> float:
+    return float(np.hypot(*(static.bounds[2:] - static.bounds[:2])))
+
+
+@lru_cache(maxsize=64)
+def contours_of(static: StaticMap, clearance: float = 0.0) -> Contours:
+    """Polygons around the obstacles grown by ``clearance`` [m]: nowhere inside, tangent to arcs."""
+    shapes = obstacles_of(static, clearance)
+    diagonal = _diagonal(static)
+    loops = []
+    for k, radius in enumerate(shapes.radii.tolist()):
+        core = shapes.vertices[shapes.offsets[k] : shapes.offsets[k + 1]]
+        small = math.sqrt(max(1.0, SMALL_RADIUS * diagonal / max(radius, 1e-300)))
+        step = min(math.pi / 2.0, ARC_STEP * small)
+        loops.append(_loop(core, radius + 2.0 * gap_of(static), step))
+    corners, following, owner, start = [], [], [], 0
+    for k, loop in enumerate(loops):
+        corners.append(loop)
+        following.append(start + np.roll(np.arange(len(loop)), -1))
+        owner.append(np.full(len(loop), k))
+        start += len(loop)
+    if not loops:
+        none = np.zeros(0, dtype=np.int64)
+        empty = frozen(np.zeros((0, 2)))
+        return Contours(empty, empty, empty, frozen(none), frozen(none))
+    points, after = np.concatenate(corners), np.concatenate(following)
+    outgoing = points[after] - points
+    outgoing /= np.hypot(outgoing[:, 0], outgoing[:, 1])[:, None]
+    incoming = np.empty_like(outgoing)
+    incoming[after] = outgoing
+    return Contours(
+        frozen(points),
+        frozen(incoming),
+        frozen(outgoing),
+        frozen(np.concatenate(owner).astype(np.int64)),
+        frozen(after.astype(np.int64)),
+    )
+
+
+def _loop(core: FloatArray, radius: float, step: float) -> FloatArray:
+    """Corners (N, 2) [m] of a polygon tangent to the outline ``radius`` around a convex core."""
+    edges = np.roll(core, -1, axis=0) - core
+    if len(core) == 2 and not edges.any():
+        normals, turns, core = np.zeros(1), np.array([2.0 * math.pi]), core[:1]
+    else:
+        normals = np.arctan2(-edges[:, 0], edges[:, 1])  # outward, of the edge that leaves
+        before = np.roll(normals, 1)
+        turns = (normals - before) % (2.0 * math.pi)
+        turns = np.where(turns > 1.5 * math.pi, 0.0, turns)  # rounding of a straight corner
+        normals = before
+    points = []
+    for corner, first, turn in zip(core, normals.tolist(), turns.tolist(), strict=True):
+        count = math.ceil(turn / step - 1e-9)
+        if count == 0:
+            continue
+        part = turn / count
+        angles = first + part * (np.arange(count) + 0.5)
+        reach = radius / math.cos(part / 2.0)
+        points.append(corner + reach * np.stack([np.cos(angles), np.sin(angles)], axis=1))
+    return np.ascontiguousarray(np.concatenate(points))
+
+
+@njit(cache=True, nogil=True)
+def free_points(points: FloatArray, obstacles: Obstacles, box: FloatArray, gap: float) -> BoolArray:
+    """Which of the points (N, 2) [m] lie in the box (4,) and ``gap`` or more off every obstacle."""
+    keep = np.empty(points.shape[0], dtype=np.bool_)
+    for i in range(points.shape[0]):
+        x, y = points[i, 0], points[i, 1]
+        inside = box[0] - gap <= x <= box[2] + gap and box[1] - gap <= y <= box[3] + gap
+        keep[i] = inside and (
+            obstacle_distance(x, y, obstacles.vertices, obstacles.offsets, obstacles.radii) >= gap
+        )
+    return keep
+
+
+@njit(cache=True, nogil=True)
+def segment_crossings(first: FloatArray, second: FloatArray) -> FloatArray:
+    """Points (N, 2) [m] where a segment of one list crosses one of the other.
+
+    Args:
+        first: (A, 4) segments x1, y1, x2, y2 [m].
+        second: (B, 4) segments.
+    """
+    found = np.empty((16, 2))
+    count = 0
+    for i in range(first.shape[0]):
+        px, py = first[i, 0], first[i, 1]
+        dx, dy = first[i, 2] - px, first[i, 3] - py
+        for j in range(second.shape[0]):
+            ax, ay = second[j, 0], second[j, 1]
+            ex, ey = second[j, 2] - ax, second[j, 3] - ay
+            across = dx * ey - dy * ex
+            if across == 0.0:
+                continue
+            t = ((ax - px) * ey - (ay - py) * ex) / across
+            u = ((ax - px) * dy - (ay - py) * dx) / across
+            if t < 0.0 or t > 1.0 or u < 0.0 or u > 1.0:
+                continue
+            if count == found.shape[0]:
+                larger = np.empty((2 * count, 2))
+                larger[:count] = found
+                found = larger
+            found[count, 0] = px + t * dx
+            found[count, 1] = py + t * dy
+            count += 1
+    return found[:count].copy()
+
+
+def box_edges(box: FloatArray) -> FloatArray:
+    """The four sides (4, 4) of a box x_min, y_min, x_max, y_max [m], as segments."""
+    x0, y0, x1, y1 = box.tolist()
+    return np.array([[x0, y0, x1, y0], [x1, y0, x1, y1], [x1, y1, x0, y1], [x0, y1, x0, y0]])
+
+
+def contour_edges(contours: Contours) -> FloatArray:
+    """All sides (V, 4) of the contours as segments [m], in the order of their first corner."""
+    return np.ascontiguousarray(np.hstack([contours.corners, contours.corners[contours.following]]))

@@ -1,0 +1,156 @@
+"""Goals as unions of convex regions: the nearest point of each, and where their outlines cross."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import ArrayLike
+
+from pushplan.geometry.contours import segment_crossings
+from pushplan.world import Goal, GoalDisc, GoalLine, InvalidInputError, Receptacle
+from pushplan.world.checks import FloatArray, IntArray, array, frozen
+from pushplan.world.outline import convex_outline, flatten
+
+Target = GoalDisc | GoalLine | Receptacle | tuple[FloatArray, ...]
+
+
+class Regions(NamedTuple):
+    """A union of discs, half-planes and convex polygons; a plain tuple for kernels.
+
+    Attributes:
+        discs: (D, 3) x, y, radius [m]; a radius of 0 is a point.
+        lines: (H, 4) point x, y [m] and unit normal; everything on or beyond the line belongs.
+        corners: (V, 2) corners of convex polygons [m], counter-clockwise; two make a segment.
+        offsets: (P + 1,) where each polygon starts.
+    """
+
+    discs: FloatArray
+    lines: FloatArray
+    corners: FloatArray
+    offsets: IntArray
+
+
+def as_target(goal: Goal | Sequence[ArrayLike]) -> Target:
+    """Check what distances are asked to.
+
+    Args:
+        goal: a goal, or convex polygons (N, 2) and segments (2, 2) [m].
+
+    Raises:
+        InvalidInputError: if it is neither, or there is nothing in the list.
+    """
+    if isinstance(goal, GoalDisc | GoalLine | Receptacle):
+        return goal
+    if isinstance(goal, str | np.ndarray) or not isinstance(goal, Sequence) or not len(goal):
+        raise InvalidInputError(
+            "distances are measured to a GoalDisc, GoalLine, Receptacle, or to a list of convex "
+            f"polygons and segments, got {type(goal).__name__}"
+        )
+    parts = []
+    for i, part in enumerate(goal):
+        points: FloatArray = array(f"targets[{i}]", part, (None, 2))
+        parts.append(points if len(points) == 2 else convex_outline(f"targets[{i}]", points))
+    return tuple(parts)
+
+
+def regions_of(target: Target, *, to_center: bool = False) -> Regions:
+    """The regions of a checked target; ``to_center`` shrinks a disc to its centre."""
+    discs, lines = np.zeros((0, 3)), np.zeros((0, 4))
+    parts: tuple[FloatArray, ...] = ()
+    if isinstance(target, GoalDisc):
+        discs = np.array([[*target.center, 0.0 if to_center else target.radius]])
+    elif isinstance(target, GoalLine):
+        lines = np.array([[*target.point, *target.normal]])
+    elif isinstance(target, Receptacle):
+        parts = (target.polygon,)
+    else:
+        parts = target
+    corners, offsets = flatten(parts)
+    return Regions(frozen(discs), frozen(lines), corners, offsets)
+
+
+@njit(cache=True, nogil=True)
+def _nearest_in_polygon(
+    x: float, y: float, corners: FloatArray, first: int, last: int
+) -> tuple[float, float]:
+    inside = last - first > 2
+    best, bx, by = math.inf, x, y
+    for i in range(first, last):
+        j = i + 1 if i + 1 < last else first
+        ax, ay = corners[i, 0], corners[i, 1]
+        dx, dy = corners[j, 0] - ax, corners[j, 1] - ay
+        if dx * (y - ay) - dy * (x - ax) < 0.0:
+            inside = False
+        length_sq = dx * dx + dy * dy
+        t = 0.0
+        if length_sq > 0.0:
+            t = min(1.0, max(0.0, ((x - ax) * dx + (y - ay) * dy) / length_sq))
+        qx, qy = ax + t * dx, ay + t * dy
+        d = (qx - x) ** 2 + (qy - y) ** 2
+        if d < best:
+            best, bx, by = d, qx, qy
+    if inside:
+        return x, y
+    return bx, by
+
+
+@njit(cache=True, nogil=True)
+def nearest_in_region(k: int, x: float, y: float, regions: Regions) -> tuple[float, float]:
+    """Point of region ``k`` that is nearest to x, y [m]: the point itself if it is inside."""
+    discs, lines = regions.discs.shape[0], regions.lines.shape[0]
+    if k < discs:
+        cx, cy, radius = regions.discs[k, 0], regions.discs[k, 1], regions.discs[k, 2]
+        distance = math.hypot(x - cx, y - cy)
+        if distance <= radius:
+            return x, y
+        share = radius / distance
+        return cx + share * (x - cx), cy + share * (y - cy)
+    k -= discs
+    if k < lines:
+        px, py, nx, ny = (
+            regions.lines[k, 0],
+            regions.lines[k, 1],
+            regions.lines[k, 2],
+            regions.lines[k, 3],
+        )
+        short = (px - x) * nx + (py - y) * ny
+        if short <= 0.0:
+            return x, y
+        return x + short * nx, y + short * ny
+    k -= lines
+    return _nearest_in_polygon(x, y, regions.corners, regions.offsets[k], regions.offsets[k + 1])
+
+
+def region_crossings(regions: Regions, edges: FloatArray) -> FloatArray:
+    """Points (N, 2) [m] where outlines of the regions cross segments (E, 4) [m].
+
+    A shortest path to a region ends at the region's nearest point or, where an obstacle covers
+    that, at one of these.
+    """
+    found = [np.zeros((0, 2))]
+    if len(edges) == 0:
+        return found[0]
+    start, along = edges[:, :2], edges[:, 2:] - edges[:, :2]
+    for cx, cy, radius in regions.discs.tolist():
+        a = np.maximum((along**2).sum(axis=1), 1e-300)
+        offset = start - np.array([cx, cy])
+        b = (along * offset).sum(axis=1) / a
+        square = b**2 - ((offset**2).sum(axis=1) - radius**2) / a
+        root = np.sqrt(np.maximum(square, 0.0))
+        for t in (-b - root, -b + root):
+            hit = (square >= 0.0) & (t >= 0.0) & (t <= 1.0)
+            found.append(start[hit] + t[hit, None] * along[hit])
+    reach = 2.0 * np.abs(edges).max() + 1.0
+    for px, py, nx, ny in regions.lines.tolist():
+        span = reach + math.hypot(px, py)
+        line = np.array([[px - span * ny, py + span * nx, px + span * ny, py - span * nx]])
+        found.append(segment_crossings(line, edges))
+    for i in range(len(regions.offsets) - 1):
+        loop = regions.corners[regions.offsets[i] : regions.offsets[i + 1]]
+        sides = np.ascontiguousarray(np.hstack([loop, np.roll(loop, -1, axis=0)]))
+        found.append(segment_crossings(sides, edges))
+    return np.ascontiguousarray(np.concatenate(found))

@@ -1,0 +1,323 @@
+"""Exact shortest paths around static obstacles, to a point or to the nearest point of a goal."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import ArrayLike
+
+from pushplan.geometry.contours import (
+    Contours,
+    box_edges,
+    contour_edges,
+    contours_of,
+    free_points,
+    gap_of,
+    segment_crossings,
+)
+from pushplan.geometry.obstacles import Obstacles, line_of_sight, obstacle_distance, obstacles_of
+from pushplan.geometry.regions import Regions, Target, as_target, region_crossings, regions_of
+from pushplan.geometry.visibility import (
+    GOAL_LEG,
+    NO_LEG,
+    Nodes,
+    goal_leg,
+    node_leg,
+    relax,
+    visible_pairs,
+)
+from pushplan.world import Goal, StaticMap
+from pushplan.world.checks import ArrayRecord, FloatArray, IntArray, array, frozen, number
+
+
+@dataclass(frozen=True, eq=False)
+class Path(ArrayRecord):
+    """A polygonal path; without a way, ``length`` is inf and there are no points.
+
+    Args:
+        length: [m].
+        points: (N, 2) from the start to the end, world frame [m].
+    """
+
+    length: float
+    points: FloatArray = field(default_factory=lambda: np.zeros((0, 2)))
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "points", array("path.points", self.points, (None, 2)))
+
+
+class _Graph(NamedTuple):
+    """What depends on the map alone."""
+
+    contours: Contours  # only corners where a path can be
+    starts: IntArray
+    ends: IntArray
+    lengths: FloatArray
+
+
+@lru_cache(maxsize=32)
+def _graph_of(static: StaticMap, clearance: float) -> _Graph:
+    shapes, gap = obstacles_of(static, clearance), gap_of(static)
+    every = contours_of(static, clearance)
+    keep = free_points(every.corners, shapes, static.bounds, gap)
+    kept = Contours(*(frozen(np.ascontiguousarray(values[keep])) for values in every))
+    pairs, lengths = visible_pairs(kept.corners, kept.incoming, kept.outgoing, shapes, gap)
+    tails = np.concatenate([pairs[:, 0], pairs[:, 1]])
+    heads = np.concatenate([pairs[:, 1], pairs[:, 0]])
+    order = np.argsort(tails, kind="stable")
+    starts = np.zeros(len(kept.corners) + 1, dtype=np.int64)
+    np.cumsum(np.bincount(tails, minlength=len(kept.corners)), out=starts[1:])
+    return _Graph(kept, starts, heads[order], np.concatenate([lengths, lengths])[order])
+
+
+@lru_cache(maxsize=32)
+def _ways_out(static: StaticMap, clearance: float) -> FloatArray:
+    """Corners (N, 2) of the free space between two outlines, or an outline and the bounds [m]."""
+    contours = contours_of(static, clearance)
+    edges = contour_edges(contours)
+    found = [segment_crossings(box_edges(static.bounds), edges)]
+    for k in range(int(contours.owner.max()) if len(contours.owner) else 0):
+        found.append(segment_crossings(edges[contours.owner == k], edges[contours.owner > k]))
+    points = np.ascontiguousarray(np.concatenate(found))
+    keep = free_points(points, obstacles_of(static, clearance), static.bounds, gap_of(static))
+    return points[keep]
+
+
+@njit(cache=True, nogil=True)
+def _first_legs(
+    points: FloatArray, regions: Regions, obstacles: Obstacles, box: FloatArray, gap: float
+) -> FloatArray:
+    out = np.empty((points.shape[0], 3))
+    for i in range(points.shape[0]):
+        out[i, 0], out[i, 1], out[i, 2] = goal_leg(
+            points[i, 0], points[i, 1], regions, obstacles, box, gap
+        )
+    return out
+
+
+@dataclass(frozen=True, eq=False)
+class GoalDistances:
+    """Shortest distances from every bend of the map to one goal; what queries are answered from.
+
+    Attributes:
+        static: the map.
+        clearance: distance of paths from obstacles [m].
+        regions: what counts as the goal.
+        obstacles: the obstacles grown by the clearance.
+        nodes: bends, sorted by distance.
+        parents: (V,) the next bend towards the goal, or `GOAL_LEG`.
+        exits: (V, 2) where the leg to the goal ends [m], for nodes whose parent is `GOAL_LEG`.
+    """
+
+    static: StaticMap
+    clearance: float
+    regions: Regions
+    obstacles: Obstacles
+    nodes: Nodes
+    parents: IntArray
+    exits: FloatArray
+
+    @property
+    def gap(self) -> float:
+        """How far paths stay off the grown obstacles [m]."""
+        return gap_of(self.static)
+
+    def path_from(self, start: ArrayLike) -> Path:
+        """The shortest path from a point (2,) [m] to the goal."""
+        origin: FloatArray = array("start", start, (2,))
+        free = leave_inflation(self.static, self.clearance, origin)
+        if free is None:
+            return Path(math.inf)
+        length, points = self._from_free(free)
+        away = float(np.hypot(*(free - origin)))
+        if away > 2.5 * self.gap:
+            points = [origin, *points]
+            length += away
+        elif points:
+            points[0] = origin
+        if not math.isfinite(length):
+            return Path(math.inf)
+        return Path(length, np.array(points))
+
+    def _from_free(self, start: FloatArray) -> tuple[float, list[FloatArray]]:
+        x, y = start.tolist()
+        shapes, gap = self.obstacles, self.gap
+        length, qx, qy = goal_leg(x, y, self.regions, shapes, self.static.bounds, gap)
+        if length == 0.0:
+            return 0.0, [start]
+        over, node = node_leg(x, y, length, -1, False, self.nodes, shapes, gap)
+        if node == NO_LEG:
+            return length, [start, np.array([qx, qy])]
+        points = [start]
+        while node != GOAL_LEG:
+            points.append(self.nodes.points[node])
+            last, node = node, int(self.parents[node])
+        if (self.exits[last] != self.nodes.points[last]).any():
+            points.append(self.exits[last])
+        return over, points
+
+
+@lru_cache(maxsize=128)
+def _distances(
+    static: StaticMap, clearance: float, key: tuple[object, ...], to_center: bool
+) -> GoalDistances:
+    target = key[0] if len(key) == 1 else tuple(_unpack(part) for part in key[1:])
+    regions = regions_of(target, to_center=to_center)  # type: ignore[arg-type]
+    graph, shapes, gap = (
+        _graph_of(static, clearance),
+        obstacles_of(static, clearance),
+        gap_of(static),
+    )
+    # where the goal is partly covered, a path may end at the rim of what covers it
+    rim = np.concatenate([contour_edges(contours_of(static, clearance)), box_edges(static.bounds)])
+    ends = region_crossings(regions, rim)
+    ends = ends[free_points(ends, shapes, static.bounds, gap)]
+    corners = graph.contours
+    count = len(corners.corners)
+    legs = _first_legs(corners.corners, regions, shapes, static.bounds, gap)
+    points = Regions(
+        np.hstack([ends, np.zeros((len(ends), 1))]),
+        np.zeros((0, 4)),
+        np.zeros((0, 2)),
+        np.zeros(1, dtype=np.int64),
+    )
+    rims = _first_legs(corners.corners, Regions(*map(frozen, points)), shapes, static.bounds, gap)
+    legs = np.where((rims[:, 0] < legs[:, 0])[:, None], rims, legs)
+    distances, parents = legs[:, 0].copy(), np.full(count, GOAL_LEG, dtype=np.int64)
+    relax(distances, parents, graph.starts, graph.ends, graph.lengths)
+    zeros = np.zeros((len(ends), 2))
+    distances = np.concatenate([distances, np.zeros(len(ends))])
+    order = np.argsort(distances, kind="stable")
+    order = order[np.isfinite(distances[order])]
+    rank = np.full(len(distances) + 1, GOAL_LEG, dtype=np.int64)  # the last entry serves GOAL_LEG
+    rank[order] = np.arange(len(order))
+    parents = np.concatenate([parents, np.full(len(ends), GOAL_LEG, dtype=np.int64)])
+    columns = (
+        np.concatenate([corners.corners, ends]),
+        np.concatenate([corners.incoming, zeros]),
+        np.concatenate([corners.outgoing, zeros]),
+        distances,
+    )
+    nodes = Nodes(*(frozen(np.ascontiguousarray(values[order])) for values in columns))
+    exits = np.concatenate([legs[:, 1:], ends])[order]
+    return GoalDistances(static, clearance, regions, shapes, nodes, rank[parents[order]], exits)
+
+
+def _pack(target: Target) -> tuple[object, ...]:
+    """A hashable key: a goal itself, or the bytes of a list of polygons."""
+    if isinstance(target, tuple):
+        return ("polygons", *(part.tobytes() for part in target))
+    return (target,)
+
+
+def _unpack(part: object) -> FloatArray:
+    assert isinstance(part, bytes)
+    return frozen(np.frombuffer(part, dtype=np.float64).reshape(-1, 2).copy())
+
+
+def goal_distances(
+    static: StaticMap,
+    goal: Goal | Sequence[ArrayLike],
+    *,
+    clearance: float = 0.0,
+    to_center: bool = False,
+) -> GoalDistances:
+    """Shortest distances to a goal, kept for the maps and goals used last.
+
+    Args:
+        static: obstacles, and bounds that paths may not leave.
+        goal: a disc, a line, a receptacle, or a list of convex polygons (N, 2) and segments
+            (2, 2) [m].
+        clearance: distance that paths keep from obstacles [m].
+        to_center: measure to the centre of a disc instead of to its rim.
+
+    Raises:
+        InvalidInputError: if the goal is none of these, or the clearance is negative.
+    """
+    margin = number("clearance", clearance, low=0.0)
+    return _distances(static, margin, _pack(as_target(goal)), to_center)
+
+
+def leave_inflation(static: StaticMap, clearance: float, point: FloatArray) -> FloatArray | None:
+    """The nearest place (2,) [m] that keeps the clearance; None from inside an obstacle.
+
+    A robot that touches a wall has its centre a little too close to it. The way out is straight
+    and does not cross an obstacle itself.
+    """
+    x, y = point.tolist()
+    gap = gap_of(static)
+    raw, grown = obstacles_of(static), obstacles_of(static, clearance)
+    if obstacle_distance(x, y, raw.vertices, raw.offsets, raw.radii) < -gap:
+        return None
+    if obstacle_distance(x, y, grown.vertices, grown.offsets, grown.radii) >= gap:
+        return point
+    found = [_ways_out(static, clearance), _pushed_out(point, grown, 2.0 * gap)]
+    places = np.ascontiguousarray(np.concatenate(found))
+    places = places[free_points(places, grown, static.bounds, gap)]
+    steps = np.hypot(*(places - point).T)
+    for i in np.argsort(steps, kind="stable").tolist():
+        px, py = places[i].tolist()
+        if line_of_sight(x, y, px, py, raw.vertices, raw.offsets, raw.radii, raw.boxes, -2.0 * gap):
+            place: FloatArray = places[i]
+            return place
+    return None
+
+
+def _pushed_out(point: FloatArray, shapes: Obstacles, extra: float) -> FloatArray:
+    """The point (2,) carried straight to ``extra`` [m] outside each obstacle, as (C, 2)."""
+    found = np.empty((len(shapes.radii), 2))
+    for k, radius in enumerate(shapes.radii.tolist()):
+        core = shapes.vertices[shapes.offsets[k] : shapes.offsets[k + 1]]
+        edges = np.roll(core, -1, axis=0) - core
+        share = ((point - core) * edges).sum(axis=1) / np.maximum((edges**2).sum(axis=1), 1e-300)
+        feet = core + np.clip(share, 0.0, 1.0)[:, None] * edges
+        away = point - feet
+        nearest = int(np.argmin(np.hypot(away[:, 0], away[:, 1])))
+        direction = away[nearest]
+        if not direction.any():  # on the outline of the core: straight out of the edge
+            direction = np.array([edges[nearest, 1], -edges[nearest, 0]])
+        size = float(np.hypot(*direction))
+        unit = direction / size if size > 0.0 else np.array([1.0, 0.0])
+        found[k] = feet[nearest] + (radius + extra) * unit
+    return found
+
+
+class VisibilityGraph:
+    """Shortest paths for a disc-shaped robot among the obstacles of one map.
+
+    Straight walls and polygons are exact; where a path bends around an arc (a thick segment's end,
+    a corner at a clearance), that arc comes out at most 0.07 % too long. Paths stay inside
+    ``static.bounds`` and may touch obstacles; obstacles that touch each other leave no passage.
+    The graph is kept for the maps used last, so making this object again costs nothing.
+
+    Args:
+        static: obstacles and bounds.
+        clearance: distance that paths keep from obstacles [m], such as the robot's radius.
+
+    Raises:
+        InvalidInputError: if the clearance is negative.
+    """
+
+    def __init__(self, static: StaticMap, clearance: float = 0.0) -> None:
+        self.static = static
+        self.clearance = number("clearance", clearance, low=0.0)
+
+    def shortest_path(self, start: ArrayLike, goal: ArrayLike) -> Path:
+        """The shortest path between two points (2,) [m].
+
+        From a start that is too close to an obstacle but not inside, the path first leaves by the
+        shortest way. A goal that is too close to an obstacle cannot be reached.
+        """
+        end: FloatArray = array("goal", goal, (2,))
+        return self.to_goal(start, [np.stack([end, end])])
+
+    def to_goal(self, start: ArrayLike, goal: Goal | Sequence[ArrayLike]) -> Path:
+        """The shortest path from a point (2,) [m] to the nearest point that counts as the goal."""
+        distances = goal_distances(self.static, goal, clearance=self.clearance)
+        return distances.path_from(start)

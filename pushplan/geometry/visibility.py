@@ -1,0 +1,211 @@
+"""Compiled visibility graph around static obstacles, and the distance to a goal along it."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from pushplan.geometry.obstacles import Obstacles, line_of_sight
+from pushplan.geometry.regions import Regions, nearest_in_region
+from pushplan.world.checks import FloatArray, IntArray
+
+NO_LEG = -2
+"""Node index of a place from which nothing can be seen."""
+GOAL_LEG = -1
+"""Node index of a place from which the goal itself is the next stop."""
+
+
+class Nodes(NamedTuple):
+    """Places where a shortest path may bend or end, sorted by their distance to the goal.
+
+    Attributes:
+        points: (V, 2) positions [m].
+        incoming: (V, 2) unit direction of the outline towards the node, 0 where it is no corner.
+        outgoing: (V, 2) unit direction of the outline away from the node.
+        distances: (V,) shortest distance from the node to the goal [m], inf if there is no way.
+    """
+
+    points: FloatArray
+    incoming: FloatArray
+    outgoing: FloatArray
+    distances: FloatArray
+
+
+@njit(cache=True, nogil=True, inline="always")
+def _is_tangent(
+    dx: float, dy: float, ix: float, iy: float, ox: float, oy: float, gap: float
+) -> bool:
+    """Whether a leg that arrives from (dx, dy) beside a corner touches its outline as a tangent.
+
+    A leg that meets a corner head on is never part of a shortest path.
+    """
+    before = ix * dy - iy * dx
+    after = ox * dy - oy * dx
+    return (before >= -gap and after <= gap) or (before <= gap and after >= -gap)
+
+
+@njit(cache=True, nogil=True)
+def _sees(px: float, py: float, qx: float, qy: float, obstacles: Obstacles, gap: float) -> bool:
+    return bool(
+        line_of_sight(
+            px,
+            py,
+            qx,
+            qy,
+            obstacles.vertices,
+            obstacles.offsets,
+            obstacles.radii,
+            obstacles.boxes,
+            gap,
+        )
+    )
+
+
+@njit(cache=True, nogil=True)
+def visible_pairs(
+    points: FloatArray,
+    incoming: FloatArray,
+    outgoing: FloatArray,
+    obstacles: Obstacles,
+    gap: float,
+) -> tuple[IntArray, FloatArray]:
+    """Pairs of corners that see each other along a tangent of both outlines.
+
+    Returns:
+        (E, 2) indices and (E,) lengths [m].
+    """
+    pairs = np.empty((64, 2), dtype=np.int64)
+    lengths = np.empty(64)
+    count = 0
+    for i in range(points.shape[0]):
+        for j in range(i + 1, points.shape[0]):
+            dx, dy = points[j, 0] - points[i, 0], points[j, 1] - points[i, 1]
+            if not _is_tangent(
+                dx, dy, incoming[i, 0], incoming[i, 1], outgoing[i, 0], outgoing[i, 1], gap
+            ) or not _is_tangent(
+                -dx, -dy, incoming[j, 0], incoming[j, 1], outgoing[j, 0], outgoing[j, 1], gap
+            ):
+                continue
+            if not _sees(points[i, 0], points[i, 1], points[j, 0], points[j, 1], obstacles, gap):
+                continue
+            if count == lengths.shape[0]:
+                more_pairs = np.empty((2 * count, 2), dtype=np.int64)
+                more_lengths = np.empty(2 * count)
+                more_pairs[:count] = pairs
+                more_lengths[:count] = lengths
+                pairs, lengths = more_pairs, more_lengths
+            pairs[count, 0] = i
+            pairs[count, 1] = j
+            lengths[count] = math.hypot(dx, dy)
+            count += 1
+    return pairs[:count].copy(), lengths[:count].copy()
+
+
+@njit(cache=True, nogil=True)
+def relax(
+    distances: FloatArray, parents: IntArray, starts: IntArray, ends: IntArray, lengths: FloatArray
+) -> None:
+    """Dijkstra's algorithm from given first distances, in place.
+
+    Args:
+        distances: (V,) first guess [m], inf where there is none.
+        parents: (V,) receives the next node towards the goal where the way leads over one.
+        starts: (V + 1,) where the edges of each node start.
+        ends: (E,) the node at the other end.
+        lengths: (E,) [m].
+    """
+    done = np.zeros(distances.shape[0], dtype=np.bool_)
+    for _ in range(distances.shape[0]):
+        node, best = -1, math.inf
+        for i in range(distances.shape[0]):
+            if not done[i] and distances[i] < best:
+                node, best = i, distances[i]
+        if node < 0:
+            return
+        done[node] = True
+        for e in range(starts[node], starts[node + 1]):
+            other = ends[e]
+            if best + lengths[e] < distances[other]:
+                distances[other] = best + lengths[e]
+                parents[other] = node
+
+
+@njit(cache=True, nogil=True)
+def goal_leg(
+    x: float,
+    y: float,
+    regions: Regions,
+    obstacles: Obstacles,
+    box: FloatArray,
+    gap: float,
+) -> tuple[float, float, float]:
+    """The straight way from x, y to the nearest visible region: length [m] (inf) and its end."""
+    best, bx, by = math.inf, x, y
+    count = regions.discs.shape[0] + regions.lines.shape[0] + regions.offsets.shape[0] - 1
+    for k in range(count):
+        qx, qy = nearest_in_region(k, x, y, regions)
+        length = math.hypot(qx - x, qy - y)
+        if (
+            length < best
+            and box[0] - gap <= qx <= box[2] + gap
+            and box[1] - gap <= qy <= box[3] + gap
+            and _sees(x, y, qx, qy, obstacles, gap)
+        ):
+            best, bx, by = length, qx, qy
+    return best, bx, by
+
+
+@njit(cache=True, nogil=True)
+def node_leg(
+    x: float,
+    y: float,
+    limit: float,
+    hint: int,
+    tangent_only: bool,
+    nodes: Nodes,
+    obstacles: Obstacles,
+    gap: float,
+) -> tuple[float, int]:
+    """The best node to walk to from x, y: distance to the goal over it [m] and its index.
+
+    Args:
+        x, y: position [m].
+        limit: a distance that is already known [m]; only a shorter one counts.
+        hint: node to try first, such as the one of a neighbour; negative for none.
+        tangent_only: skip nodes that a shortest path cannot touch from here. Off for places
+            between an outline and the polygon that is drawn around it.
+        nodes: sorted by distance.
+        obstacles: what blocks the view.
+        gap: distance to keep from obstacles [m].
+    """
+    best, found = limit, NO_LEG
+    count = nodes.points.shape[0]
+    for trial in range(-1, count):
+        i = trial
+        if trial < 0:
+            if hint < 0:
+                continue
+            i = hint
+        elif nodes.distances[i] >= best:
+            break
+        dx, dy = x - nodes.points[i, 0], y - nodes.points[i, 1]
+        room = best - nodes.distances[i]
+        if dx * dx + dy * dy >= room * room or room <= 0.0:
+            continue
+        if tangent_only and not _is_tangent(
+            dx,
+            dy,
+            nodes.incoming[i, 0],
+            nodes.incoming[i, 1],
+            nodes.outgoing[i, 0],
+            nodes.outgoing[i, 1],
+            gap,
+        ):
+            continue
+        length = nodes.distances[i] + math.sqrt(dx * dx + dy * dy)
+        if length < best and _sees(x, y, nodes.points[i, 0], nodes.points[i, 1], obstacles, gap):
+            best, found = length, i
+    return best, found

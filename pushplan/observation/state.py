@@ -1,0 +1,85 @@
+"""`StateObservation`: the scene as a short vector."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pushplan.world import GoalDisc, GoalLine, World
+from pushplan.world.checks import FloatArray, integer, number
+
+_OWN, _EACH = 6, 5
+
+
+@dataclass(frozen=True)
+class StateObservation:
+    """Low-dimensional observation of fixed length.
+
+    Robot x, y [m], cos and sin of its heading; x, y [m] of the goal in the robot's frame; then for
+    each object x, y [m], cos and sin of its heading in the robot's frame, and 1 as a sign that it
+    is there. Rows of absent objects are zero. Of more objects the nearest are kept. A goal disc is
+    given by its centre, a line by its nearest point, an area by its middle.
+
+    Args:
+        max_objects: rows for objects.
+        limit: lengths are clipped to this [m].
+    """
+
+    max_objects: int = 20
+    limit: float = 1000.0
+
+    dtype: ClassVar[np.dtype[np.float32]] = np.dtype(np.float32)
+
+    def __post_init__(self) -> None:
+        integer("max_objects", self.max_objects, low=0)
+        number("limit", self.limit, low=0.0, open_low=True)
+
+    @property
+    def shape(self) -> tuple[int]:
+        """Length of the vector."""
+        return (_OWN + _EACH * self.max_objects,)
+
+    @property
+    def low(self) -> float:
+        """Least value of any entry."""
+        return -self.limit
+
+    @property
+    def high(self) -> float:
+        """Greatest value of any entry."""
+        return self.limit
+
+    def observe(self, world: World) -> NDArray[np.float32]:
+        """The vector."""
+        x, y, theta = world.robot_pose
+        c, s = np.cos(theta), np.sin(theta)
+        to_body = np.array([[c, -s], [s, c]])  # row vectors times this turn into the body frame
+        objects = world.movables.poses
+        relative = (objects[:, :2] - world.robot_pose[:2]) @ to_body
+        if len(objects) > self.max_objects:
+            nearest = np.argsort(np.hypot(relative[:, 0], relative[:, 1]), kind="stable")
+            keep = np.sort(nearest[: self.max_objects])
+            objects, relative = objects[keep], relative[keep]
+        out = np.zeros(self.shape)
+        out[:4] = x, y, c, s
+        out[4:6] = (_goal_point(world) - world.robot_pose[:2]) @ to_body
+        rows = out[_OWN:].reshape(-1, _EACH)[: len(objects)]
+        rows[:, :2] = relative
+        rows[:, 2], rows[:, 3] = np.cos(objects[:, 2] - theta), np.sin(objects[:, 2] - theta)
+        rows[:, 4] = 1.0
+        return np.clip(out, self.low, self.high).astype(np.float32)
+
+
+def _goal_point(world: World) -> FloatArray:
+    goal = world.goal
+    if isinstance(goal, GoalDisc):
+        return goal.center
+    at = world.robot_pose[:2]
+    if isinstance(goal, GoalLine):
+        nearest: FloatArray = at + np.dot(goal.point - at, goal.normal) * goal.normal
+        return nearest
+    middle: FloatArray = goal.polygon.mean(axis=0)
+    return middle

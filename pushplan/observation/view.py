@@ -1,0 +1,127 @@
+"""The window that an image observation looks through."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+
+from pushplan.geometry import fill_convex
+from pushplan.world import World
+from pushplan.world.checks import FloatArray, IntArray
+from pushplan.world.movables import Movables
+
+Image = np.ndarray[tuple[int, int], np.dtype[np.uint8]]
+
+
+@dataclass(frozen=True)
+class View:
+    """A robot-centred, robot-aligned window: row 0 is ahead of the robot, column 0 to its left.
+
+    Args:
+        world: what is looked at.
+        rows: [px]
+        cols: [px]
+        step_ahead: length of a pixel along the robot's heading [m].
+        step_across: length of a pixel across it [m].
+    """
+
+    world: World
+    rows: int
+    cols: int
+    step_ahead: float
+    step_across: float
+
+    @property
+    def numbers(self) -> FloatArray:
+        """(7,) robot x, y, theta, rows, columns, and the two steps, as kernels read them."""
+        return np.array(
+            [*self.world.robot_pose, self.rows, self.cols, self.step_ahead, self.step_across]
+        )
+
+    def fill_movables(self, image: Image, objects: Movables, value: int = 255) -> None:
+        """Fill the outlines of objects."""
+        _fill_bodies(
+            image,
+            self.numbers,
+            objects.poses,
+            objects.vertices,
+            objects.offsets,
+            objects.radii,
+            value,
+        )
+
+    def fill_parts(
+        self, image: Image, vertices: FloatArray, offsets: IntArray, value: int = 255
+    ) -> None:
+        """Fill convex polygons given in the world frame."""
+        _fill_parts(image, self.numbers, vertices, offsets, value)
+
+    def sample(self, image: Image, values: Image, origin: FloatArray, step: float) -> None:
+        """Read a raster in the world frame at every pixel; outside it its border counts."""
+        _sample(image, self.numbers, values, origin[0], origin[1], step)
+
+
+@njit(cache=True, nogil=True)
+def _to_pixels(view: FloatArray, points: FloatArray, out: FloatArray) -> None:
+    """World points (N, 2) [m] to column and row [px]."""
+    c, s = np.cos(view[2]), np.sin(view[2])
+    for i in range(points.shape[0]):
+        dx, dy = points[i, 0] - view[0], points[i, 1] - view[1]
+        out[i, 0] = 0.5 * view[4] - (c * dy - s * dx) / view[6]
+        out[i, 1] = 0.5 * view[3] - (c * dx + s * dy) / view[5]
+
+
+@njit(cache=True, nogil=True)
+def _fill_parts(
+    image: Image, view: FloatArray, vertices: FloatArray, offsets: IntArray, value: int
+) -> None:
+    spots = np.empty_like(vertices)
+    _to_pixels(view, vertices, spots)
+    for k in range(offsets.shape[0] - 1):
+        fill_convex(image, spots[offsets[k] : offsets[k + 1]], value)
+
+
+@njit(cache=True, nogil=True)
+def _fill_bodies(
+    image: Image,
+    view: FloatArray,
+    poses: FloatArray,
+    vertices: FloatArray,
+    offsets: IntArray,
+    radii: FloatArray,
+    value: int,
+) -> None:
+    reach = 0.5 * np.hypot(view[3] * view[5], view[4] * view[6])
+    corners, spots = np.empty_like(vertices), np.empty_like(vertices)
+    for k in range(poses.shape[0]):
+        far = reach + radii[k]
+        if (poses[k, 0] - view[0]) ** 2 + (poses[k, 1] - view[1]) ** 2 > far * far:
+            continue
+        a, b = offsets[k], offsets[k + 1]
+        c, s = np.cos(poses[k, 2]), np.sin(poses[k, 2])
+        for i in range(a, b):
+            corners[i, 0] = poses[k, 0] + c * vertices[i, 0] - s * vertices[i, 1]
+            corners[i, 1] = poses[k, 1] + s * vertices[i, 0] + c * vertices[i, 1]
+        _to_pixels(view, corners[a:b], spots[a:b])
+        fill_convex(image, spots[a:b], value)
+
+
+@njit(cache=True, nogil=True)
+def _sample(
+    image: Image, view: FloatArray, values: Image, ox: float, oy: float, step: float
+) -> None:
+    c, s = np.cos(view[2]), np.sin(view[2])
+    rows, cols = values.shape
+    ahead, across = view[5] / step, view[6] / step
+    # raster coordinates of the first pixel, and how they change along rows and columns
+    front, left = 0.5 * (view[3] - 1.0) * ahead, 0.5 * (view[4] - 1.0) * across
+    u0 = (view[0] - ox) / step + c * front - s * left
+    v0 = (view[1] - oy) / step + s * front + c * left
+    for r in range(image.shape[0]):
+        u, v = u0 - r * ahead * c, v0 - r * ahead * s
+        for q in range(image.shape[1]):
+            j = min(max(int(np.floor(u + q * across * s)), 0), cols - 1)
+            i = min(max(int(np.floor(v - q * across * c)), 0), rows - 1)
+            image[r, q] = values[i, j]

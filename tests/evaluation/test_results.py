@@ -1,0 +1,152 @@
+from __future__ import annotations
+
+import csv
+import html.parser
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pushplan.evaluation import ResultRow, Results, compare
+from pushplan.evaluation.store import RunDirectory
+from pushplan.world import InvalidInputError
+
+
+def rows_of(policy: str, shift: float, seeds: int = 20, setting: str = "maze-5") -> list[ResultRow]:
+    """Scores that differ between policies by ``shift`` in every scenario."""
+    rng = np.random.default_rng(0)
+    return [
+        ResultRow(
+            policy=policy,
+            task="maze",
+            simulator="pymunk",
+            scenario=f"{setting}-{seed}",
+            seed=seed,
+            status="done",
+            reason="goal",
+            success=True,
+            E_nav=float(rng.uniform(0.5, 0.7) + shift),
+            I_nav=float(rng.uniform(0.8, 0.9)),
+            path_length_m=20.0,
+            interaction_work_kg_m=1.0,
+            steps=100,
+            sim_time_s=80.0,
+            wall_time_s=0.5,
+            plan_calls=2,
+            plan_time_median_s=0.01,
+            plan_time_p99_s=0.02,
+            plan_time_max_s=0.02,
+        )
+        for seed in range(seeds)
+    ]
+
+
+@pytest.fixture
+def results(tmp_path: Path) -> Results:
+    with RunDirectory(tmp_path / "run") as store:
+        store.configure({"suite": "maze-2d-5"}, {"plain": "plain", "better": "mine.py:Better"})
+        store.extend("settings", {"maze-5": "maze, 5 boxes", "maze-10": "maze, 10 boxes"})
+        for setting in ("maze-10", "maze-5"):
+            for row in [
+                *rows_of("plain", 0.0, setting=setting),
+                *rows_of("better", 0.1, 19, setting),
+            ]:
+                store.add(row)
+        bad = replace(
+            rows_of("better", 0.0)[-1],
+            status="crashed",
+            reason="ended by <SIGKILL>",
+            success=False,
+            E_nav=0.0,
+            I_nav=None,
+        )
+        store.add(bad, detail="what happened")
+        store.write_csv()
+    return Results.load(tmp_path / "run")
+
+
+def test_policies_keep_their_order_and_settings_are_sorted_by_number(results: Results) -> None:
+    assert results.policies == ["plain", "better"]
+    assert list(results.titles.values()) == ["maze, 5 boxes", "maze, 10 boxes"]
+
+
+def test_a_failed_job_counts_against_its_policy(results: Results) -> None:
+    better = next(s for s in results.summary() if s.policy == "better")
+    assert (better.episodes, better.failed) == (20, 1)
+    assert better.success.share == 0.95
+    assert better.metrics["E_nav"].count == 20
+    assert better.metrics["I_nav"].count == 19
+
+
+def test_differences_are_taken_scenario_by_scenario(results: Results) -> None:
+    pair = next(p for p in compare(results) if p.setting == "maze-10" and p.metric == "E_nav")
+    assert (pair.first, pair.second) == ("plain", "better")
+    # the spread between scenarios is far greater than the difference, and cancels
+    assert pair.difference.mean == pytest.approx(0.1)
+    assert pair.difference.high - pair.difference.low < 1e-9
+    assert (pair.wins, pair.losses, pair.difference.count, pair.clear) == (19, 0, 19, True)
+    same = next(p for p in compare(results) if p.setting == "maze-10" and p.metric == "I_nav")
+    assert (same.wins, same.losses, same.clear) == (0, 0, False)
+
+
+def test_the_table_shows_means_spreads_and_intervals(results: Results) -> None:
+    table = results.table()
+    better = next(s for s in results.summary() if s.policy == "better").metrics["E_nav"]
+    assert f"{better.mean:.3f} ± {better.sd:.3f}" in table
+    assert f"[{better.low:.3f}, {better.high:.3f}]" in table
+    assert "better - plain" in table and "1 failed" in table
+    assert max(map(len, results.table(width=90).splitlines())) <= 90
+
+
+def test_report_files(results: Results) -> None:
+    page = results.report()
+    folder = page.parent
+    with (folder / "summary.csv").open() as file:
+        lines = list(csv.DictReader(file))
+    line = next(x for x in lines if x["policy"] == "plain" and x["metric"] == "E_nav")
+    plain = next(s for s in results.summary() if s.policy == "plain").metrics["E_nav"]
+    assert (float(line["mean"]), float(line["low"])) == (plain.mean, plain.low)
+    assert "| better |" in (folder / "summary.md").read_text()
+    for name in ("tradeoff.png", "scores.png", "planning_time.png"):
+        assert (folder / name).read_bytes().startswith(b"\x89PNG")
+    before = (folder / "differences.csv").read_bytes()
+    results.report()
+    assert (folder / "differences.csv").read_bytes() == before
+
+
+class _Page(html.parser.HTMLParser):
+    def __init__(self) -> None:
+        super().__init__()
+        self.sources: list[str] = []
+        self.links: list[str] = []
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        found = dict(attrs)
+        if tag in ("img", "script", "link", "iframe"):
+            self.sources.append(found.get("src") or found.get("href") or "")
+        if tag == "a":
+            self.links.append(found["href"] or "")
+
+
+def test_the_page_needs_no_network_and_links_to_failures(results: Results) -> None:
+    page = results.report()
+    text = page.read_text()
+    parsed = _Page()
+    parsed.feed(text)
+    assert len(parsed.sources) == 3
+    assert all(source.startswith("data:image/png;base64,") for source in parsed.sources)
+    assert "failures/better--maze-5-19.txt" in parsed.links
+    assert all((page.parent / link).is_file() for link in parsed.links)
+    assert "ended by &lt;SIGKILL&gt;" in text
+
+
+def test_one_policy_and_one_episode_are_enough(tmp_path: Path) -> None:
+    lonely = Results(tuple(rows_of("plain", 0.0, 1)))
+    assert "± 0.000" in lonely.table()
+    assert lonely.report(tmp_path).is_file()
+
+
+def test_no_results_is_an_error(tmp_path: Path) -> None:
+    with pytest.raises(InvalidInputError, match="holds no results"):
+        Results.load(tmp_path)

@@ -1,0 +1,145 @@
+"""The command line as a user meets it."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pushplan.cli import main
+from pushplan.world import Drive, GoalDisc, Movables, RobotModel, StaticMap, World, save_world
+
+COMMANDS = ("run", "plan", "bench", "list", "score", "report", "compile")
+SQUARE = np.array([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]])
+
+
+@pytest.fixture
+def room(tmp_path: Path) -> Path:
+    world = World(
+        robot=RobotModel.from_outline(
+            SQUARE, mass=1.0, drive=Drive.CONSTANT_SPEED, max_speed=1.0, max_turn_rate=1.0
+        ),
+        robot_pose=np.array([2.0, 2.0, 0.0]),
+        static=StaticMap.build(bounds=[0.0, 0.0, 12.0, 12.0]),
+        movables=Movables.from_outlines([SQUARE], [[6.0, 2.0, 0.0]]),
+        goal=GoalDisc(np.array([10.0, 3.0]), 1.0),
+    )
+    path = tmp_path / "room.yaml"
+    save_world(world, path)
+    return path
+
+
+def one_line(capsys: pytest.CaptureFixture[str]) -> str:
+    text = capsys.readouterr().err
+    assert text.startswith("pushplan: ") and text.count("\n") == 1
+    return text
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_help_has_examples(command: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main([command, "--help"]) == 0
+    assert f"examples:\n  pushplan {command}" in capsys.readouterr().out
+
+
+def test_help_is_fast_and_loads_nothing_heavy() -> None:
+    code = (
+        "import sys; from pushplan.cli import main; main(['--help']);"
+        "print([m for m in ('numpy', 'numba', 'scipy', 'rich') if m in sys.modules])"
+    )
+    begin = time.perf_counter()
+    out = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert out.stdout.splitlines()[-1] == "[]"
+    assert time.perf_counter() - begin < 3.0  # alone it is 0.1 s; tests may share a busy machine
+
+
+@pytest.mark.parametrize(
+    ("kind", "name"),
+    [
+        ("planners", "kinodynamic-rrt"),
+        ("policies", "straight"),
+        ("tasks", "maze"),
+        ("suites", "maze-2d-5"),
+        ("metrics", "E_nav"),
+        ("simulators", "pymunk"),
+    ],
+)
+def test_list(kind: str, name: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["list", kind]) == 0
+    assert name in capsys.readouterr().out.splitlines()
+
+
+def test_plan_writes_a_plan(room: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out = room.with_name("plan.json")
+    code = main(
+        [
+            "plan",
+            str(room),
+            "--planner",
+            "kinodynamic-rrt",
+            "--iterations",
+            "2000",
+            "--out",
+            str(out),
+        ]
+    )
+    assert code == 0
+    text = capsys.readouterr().out
+    assert "kinodynamic-rrt: solved" in text and "length" in text
+    data = json.loads(out.read_text())
+    assert data["schema"] == "pushplan-plan/1" and data["status"] == "solved"
+    poses = np.array(data["plan"]["poses"])
+    assert len(poses) == len(data["plan"]["times"])
+    assert poses[0] == pytest.approx([2.0, 2.0, 0.0])
+    assert np.hypot(*(poses[-1, :2] - [10.0, 3.0])) <= 1.0 + 1e-6
+
+
+def test_plan_loads_no_simulator(room: Path) -> None:
+    code = (
+        f"import sys; from pushplan.cli import main; main(['plan', {str(room)!r}, '--planner',"
+        "'straight']); print([m for m in ('pymunk', 'mujoco', 'gymnasium', 'torch', 'matplotlib')"
+        " if m in sys.modules])"
+    )
+    out = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert out.stdout.splitlines()[-1] == "[]"
+
+
+def test_errors_are_one_line_with_a_code(
+    room: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["plan", str(room), "--planner", "kinodynamic-rtt"]) == 2
+    assert "did you mean 'kinodynamic-rrt'" in one_line(capsys)
+    assert main(["plan", str(tmp_path / "none.yaml"), "--planner", "straight"]) == 1
+    assert "cannot read world file" in one_line(capsys)
+    assert main(["report", str(tmp_path)]) == 1
+    assert "holds no results" in one_line(capsys)
+    assert main(["score", str(room)]) == 1
+    assert "not a readable episode" in one_line(capsys)
+    assert main(["bench", "maze-2d-7", "--policies", "straight"]) == 2
+    assert "unknown suite 'maze-2d-7'" in one_line(capsys)
+    assert main(["bench", "smoke", "--policies", "nobody.py:Me"]) == 1
+    assert "no file nobody.py" in one_line(capsys)
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        [],
+        ["list"],
+        ["list", "things"],
+        ["plan", "room.yaml"],
+        ["plan", "room.yaml", "--planner", "straight", "--deadline", "0"],
+        ["plan", "room.yaml", "--planner", "straight", "--deadline", "1", "--iterations", "5"],
+        ["bench", "smoke"],
+        ["bench", "smoke", "--policies", "straight", "--workers", "-1"],
+        ["bench", "smoke", "--policies", "straight", "--timeout", "soon"],
+        ["run", "smoke"],
+    ],
+)
+def test_bad_usage_is_code_2(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(arguments) == 2
+    assert "usage: pushplan" in capsys.readouterr().err
