@@ -69,8 +69,8 @@ def quality(count: int) -> None:
         have = ~np.isnan(costs[:, column])
         above = costs[have, column] / costs[have, -1] - 1.0
         print(
-            f"  {budget:5.2f} s: {have.sum()} of {count} have a plan, mean {costs[have, column].mean():.3f}, "
-            f"above the {budgets[-1]:g} s result by median {100 * np.median(above):.2f} %"
+            f"  {budget:5.2f} s: {have.sum()} of {count} have a plan, "
+            f"mean {costs[have, column].mean():.3f}, above the {budgets[-1]:g} s result by median {100 * np.median(above):.2f} %"
         )
 
 
@@ -83,9 +83,7 @@ def deadlines(calls: int) -> None:
         over = []
         for call in range(calls):
             began = time.perf_counter()
-            planner.plan(
-                scenes[call % 20], stop=Deadline(0.05), rng=np.random.default_rng(call)
-            )
+            planner.plan(scenes[call % 20], stop=Deadline(0.05), rng=np.random.default_rng(call))
             over.append(1e3 * (time.perf_counter() - began - 0.05))
         print(f"  {name:16s} {spread(over)}  p99.9 {np.percentile(over, 99.9):.2f} ms")
 

@@ -65,4 +65,5 @@ def _print(sheets: Sequence[Sheet]) -> None:
         return
     console = Console()
     for sheet in sheets:
-        console.print(rich_table(sheet), end="\n\n")
+        console.print(rich_table(sheet))
+        console.print()

@@ -205,7 +205,8 @@ def text(sheets: Sequence[Sheet], width: int = 160) -> str:
     console = Console(file=io.StringIO(), width=width, force_terminal=False, color_system=None)
     with console.capture() as capture:
         for sheet in sheets:
-            console.print(rich_table(sheet), end="\n\n")
+            console.print(rich_table(sheet))
+            console.print()
     return "\n".join(line.rstrip() for line in capture.get().rstrip().splitlines()) + "\n"
 
 

@@ -32,13 +32,16 @@ class GeometricRRTConfig:
     """Parameters of `GeometricRRT`. Lengths are in units of the robot's circumscribed radius R.
 
     Args:
+        clearance: distance kept between the robot's centre and obstacles [R], as far as there is
+            room; the reference grows its robot by about as much.
         step: longest edge of the tree [R].
         goal_bias: share of samples drawn from the goal.
         resolution: distance between collision checks along an edge [R].
-        pass_iterations: samples in each of the two passes.
+        pass_iterations: samples in each pass.
         spacing: distance between the poses of the plan [R].
     """
 
+    clearance: float = 1.9
     step: float = 1.0
     goal_bias: float = 0.1
     resolution: float = 0.1
@@ -46,7 +49,7 @@ class GeometricRRTConfig:
     spacing: float = 0.15
 
     def __post_init__(self) -> None:
-        for name in ("step", "resolution", "spacing"):
+        for name in ("clearance", "step", "resolution", "spacing"):
             number(name, getattr(self, name), low=0.0, open_low=True)
         number("goal_bias", self.goal_bias, low=0.0, high=1.0)
         integer("pass_iterations", self.pass_iterations, low=1)
@@ -55,6 +58,8 @@ class GeometricRRTConfig:
 @dataclass(frozen=True)
 class GeometricRRT:
     """RRT for a disc (LaValle 1998): first around the objects, then, if that fails, through them.
+
+    Where the second pass fails too, it is repeated with less clearance.
 
     The plan is the raw path of the tree, a zigzag that ignores how the robot turns and what
     pushing costs: the reference that the other planners improve on.
@@ -75,28 +80,29 @@ class GeometricRRT:
         """Plan from ``world``; see `pushplan.world.Planner`. One iteration is one sample."""
         began = time.perf_counter()
         config = self.config
-        stop = MaxIterations(2 * config.pass_iterations) if stop is None else stop
+        stop = MaxIterations(4 * config.pass_iterations) if stop is None else stop
         rng = np.random.default_rng(0) if rng is None else rng
         check = stop.start()
         objects = world.movables
         boxes = [objects.outline_world(k) for k in range(len(objects))]
         iterations, status, plan = 0, PlanStatus.TIMED_OUT, None
         start = np.ascontiguousarray(world.robot_pose[:2])
-        for passed, blocked in enumerate((boxes, [])):
+        size = world.robot.circumscribed_radius
+        wide, narrow = config.clearance * size, world.robot.inscribed_radius
+        passes = [(boxes, wide), ([], wide), ([], min(size, wide)), ([], min(narrow, wide))]
+        for blocked, radius in passes:
             among = obstacles(world.static, blocked)
-            radius = world.robot.circumscribed_radius
             if _near(start, among, radius):
-                # a robot that starts close to something keeps what clearance it has
-                radius = world.robot.inscribed_radius
-                if _near(start, among, radius):
-                    if passed == 1:
-                        status = PlanStatus.START_BLOCKED
-                    continue
+                if radius == passes[-1][1]:
+                    status = PlanStatus.START_BLOCKED
+                continue  # the robot starts closer to something than this pass allows
             points, used = self._grow(world, among, radius, check, iterations, rng)
             iterations += used
             if points is not None:
-                spacing = config.spacing * world.robot.circumscribed_radius
-                plan, status = polyline_plan(world, points, spacing), PlanStatus.SOLVED
+                plan, status = (
+                    polyline_plan(world, points, config.spacing * size),
+                    PlanStatus.SOLVED,
+                )
                 break
             if check(iterations, np.inf):
                 break

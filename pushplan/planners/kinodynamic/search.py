@@ -58,6 +58,7 @@ class Search:
             turn_weight=0.5 * self.size,
         )
         self.bodies, self.settings = interaction.bodies(world), interaction.settings(world)
+        self.guide_share = config.guide_share
         self.walls = obstacles(world.static)
         self.shape = footprint(world.robot)
         self.iterations = self.nodes = self.trees = 0
@@ -118,11 +119,13 @@ class Search:
                 return
 
     def _relax(self, margin: float) -> None:
-        """Allow tighter turns and less clearance [m], for starts in a tight place.
+        """Allow tighter turns and less clearance [m], and look farther from the guide.
 
+        That helps where the robot starts in a tight place or has to turn round first.
         A constant-speed robot may then use its whole turn rate; one that can slow down turns on
         half the radius, to a tenth of its size.
         """
+        self.guide_share *= 0.5  # the way out may be the other way
         radius = self.world.robot.turning_radius
         if self.world.robot.drive is Drive.DIFFERENTIAL:
             radius = max(0.5 * self.pricing.radius, 0.1 * self.size)
@@ -150,10 +153,11 @@ class Search:
             self.iterations += 1
             return self.iterations >= last or self.stopped()
 
+        spread = self.config.guide_spread * self.size
         arcs = grow_tree(
             world.robot_pose,
             self.goal,
-            Targets(guide, self.config, self.size, world.static.bounds, self.rng),
+            Targets(guide, self.guide_share, spread, world.static.bounds, self.rng),
             self.limits,
             self.shape,
             among,

@@ -4,23 +4,30 @@ from __future__ import annotations
 
 import numpy as np
 
-from pushplan.planners.kinodynamic.config import KinodynamicRRTConfig
 from pushplan.world.checks import FloatArray
 
 
 class Targets:
-    """Draws the poses that a tree grows towards."""
+    """Draws the poses that a tree grows towards.
+
+    Args:
+        guide: (N, 2) coarse path to the goal [m].
+        share: share of the targets that are near it; the others are uniform.
+        spread: standard deviation of those about it [m].
+        bounds: (4,) of the workspace.
+        rng: source of chance.
+    """
 
     def __init__(
         self,
         guide: FloatArray,
-        config: KinodynamicRRTConfig,
-        size: float,
+        share: float,
+        spread: float,
         bounds: FloatArray,
         rng: np.random.Generator,
     ) -> None:
-        self.guide, self.config, self.bounds, self.rng = guide, config, bounds, rng
-        self.spread = config.guide_spread * size
+        self.guide, self.share, self.bounds, self.rng = guide, share, bounds, rng
+        self.spread = spread
         index = np.arange(len(guide))
         ahead, behind = (
             guide[np.minimum(index + 3, len(guide) - 1)],
@@ -40,7 +47,7 @@ class Targets:
 
     def _draw(self, count: int) -> FloatArray:
         rng, bounds = self.rng, self.bounds
-        near = rng.random(count) < self.config.guide_share
+        near = rng.random(count) < self.share
         index = rng.integers(len(self.guide), size=count)
         offsets = rng.standard_normal((count, 3)) * [self.spread, self.spread, 0.4]
         guided = np.column_stack([self.guide[index], self.headings[index]]) + offsets

@@ -14,8 +14,8 @@ def turning_radius(robot: RobotModel, turn_share: float) -> float:
     """Least turning radius that plans use at first [m].
 
     A constant-speed robot cannot turn tighter than v / ω. A differential drive can, by slowing
-    down; its own circumscribed radius is easy to follow, and the search halves it where there is no way
-    otherwise.
+    down; its own circumscribed radius is easy to follow, and the search halves it where there is
+    no way otherwise.
     """
     if robot.drive is Drive.DIFFERENTIAL:
         return robot.circumscribed_radius
