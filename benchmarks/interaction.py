@@ -3,7 +3,7 @@
     python benchmarks/interaction.py [SCENES]
 
 Random drives through random scenes of the maze, both models from the same snapshot along
-the same path. Prints the error of displacement and work, beside the error of the null model (nothing
+the same path. Prints the error of displacement and work, beside that of the null model (nothing
 moves), and path steps per second.
 """
 

@@ -68,10 +68,9 @@ def quality(count: int) -> None:
     for column, budget in enumerate(budgets):
         have = ~np.isnan(costs[:, column])
         above = costs[have, column] / costs[have, -1] - 1.0
-        print(
-            f"  {budget:5.2f} s: {have.sum()} of {count} have a plan, "
-            f"mean {costs[have, column].mean():.3f}, above the {budgets[-1]:g} s result by median {100 * np.median(above):.2f} %"
-        )
+        print(f"  {budget:5.2f} s: {have.sum()} of {count} have a plan", end=", ")
+        print(f"mean {costs[have, column].mean():.3f}", end=", ")
+        print(f"above the {budgets[-1]:g} s result by median {100 * np.median(above):.2f} %")
 
 
 def deadlines(calls: int) -> None:
