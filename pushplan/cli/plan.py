@@ -39,11 +39,12 @@ def add(commands: Any) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Plan, say what came of it, write files."""
-    from pushplan.planners import make_planner
+    from pushplan.planners import make_planner, warm_up
     from pushplan.world import load_world, stream
 
     world = load_world(options.world)
     planner = make_planner(options.planner)
+    warm_up(options.planner)  # a deadline is for planning, not for loading kernels
     result = planner.plan(world, stop=_stop(options), rng=stream(options.seed, "policy"))
     _print(options.planner, result)
     if options.out:

@@ -10,7 +10,7 @@ from pushplan.evaluation.loading import load_object
 WARMUPS: dict[str, str] = {
     "policies": "pushplan.evaluation.warmup:policies",
     "observations": "pushplan.evaluation.warmup:observations",
-    "planners": "pushplan.evaluation.warmup:planners",
+    "planners": "pushplan.planners.warming:warm_up",
     "metrics": "pushplan.evaluation.warmup:metrics",
 }
 """What -> "module:function" that is called without arguments."""
@@ -40,21 +40,6 @@ def policies() -> None:
 def observations() -> None:
     """A few steps with image observations."""
     _record("random", "image")
-
-
-def planners() -> None:
-    """A short call of every planner."""
-    from pushplan.envs import make
-    from pushplan.planners import make_planner, planner_names
-    from pushplan.scenarios import suite
-    from pushplan.world import MaxIterations
-
-    for scenario in suite("smoke", episodes=2).scenarios:
-        env = make(scenario, observation="state")
-        env.reset(seed=scenario.seed)
-        for name in planner_names():
-            make_planner(name).plan(env.world, stop=MaxIterations(50))
-        env.close()
 
 
 def metrics() -> None:

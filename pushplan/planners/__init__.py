@@ -20,6 +20,7 @@ __all__ = [
     "planner_names",
     "policy_for",
     "policy_names",
+    "warm_up",
 ]
 
 _LAZY = {
@@ -28,6 +29,7 @@ _LAZY = {
     "PlanFollower": "pushplan.planners.policy",
     "ShortestPath": "pushplan.planners.straight",
     "policy_for": "pushplan.planners.policy",
+    "warm_up": "pushplan.planners.warming",
 }
 
 

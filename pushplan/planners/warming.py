@@ -1,0 +1,41 @@
+"""Load the compiled kernels before the first call that has a deadline."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pushplan.planners.policy import policy_for
+from pushplan.planners.registry import make_planner, planner_names
+from pushplan.world import Drive, GoalDisc, MaxIterations, Movables, RobotModel, StaticMap, World
+
+
+def warm_up(*names: str) -> None:
+    """Plan once in a small room with each planner, so that later calls find compiled kernels.
+
+    Numba compiles a kernel on its first use after an installation (seconds) and loads it from its
+    cache on the first use in a process (a fifth of a second in all). A controller calls this
+    once when it starts.
+
+    Args:
+        names: planners; all by default.
+
+    Raises:
+        UnknownNameError: if there is no such planner.
+    """
+    square = 0.5 * np.array([[1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0], [1.0, -1.0]])
+    world = World(
+        robot=RobotModel.from_outline(
+            square, mass=1.0, drive=Drive.CONSTANT_SPEED, max_speed=1.0, max_turn_rate=1.0
+        ),
+        robot_pose=np.array([2.0, 5.0, 0.0]),
+        static=StaticMap.build(polygons=[square + 8.0], bounds=[0.0, 0.0, 10.0, 10.0]),
+        movables=Movables.from_outlines([square, square], [[4.0, 5.0, 0.0], [5.2, 5.0, 0.0]]),
+        goal=GoalDisc(np.array([8.0, 5.0]), 0.5),
+    )
+    for name in names or planner_names():
+        planner = make_planner(name)
+        planner.plan(world, stop=MaxIterations(600))
+        policy = policy_for(planner)
+        policy.stop = MaxIterations(600)
+        for step in range(3):
+            policy.act(world.moved(time=0.1 * step))
