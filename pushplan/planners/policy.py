@@ -80,6 +80,8 @@ class PlanFollower:
         self.current_plan: Plan | None = None
         self._rng = np.random.default_rng(0)
         self._planned_at = -np.inf
+        self._planned_from = np.full(2, np.nan)
+        self._in_vain = 0
         self._progress: Progress | None = None
 
     def reset(self, world: World, rng: np.random.Generator) -> None:
@@ -88,6 +90,8 @@ class PlanFollower:
         self.current_plan = None
         self._rng = rng
         self._planned_at = -np.inf
+        self._planned_from = np.full(2, np.nan)
+        self._in_vain = 0
         self._progress = Progress(window=2.0 * world.robot.circumscribed_radius)
 
     def act(self, world: World, observation: Any = None) -> Twist:
@@ -97,7 +101,10 @@ class PlanFollower:
         if self._needs_plan(world):
             result = self.planner.plan(world, stop=self.stop, rng=self._rng)
             self.plan_log.append(result)
-            self._planned_at = world.time
+            moved = float(np.hypot(*(world.robot_pose[:2] - self._planned_from)))
+            stuck = moved < 0.05 * world.robot.circumscribed_radius or result.plan is None
+            self._in_vain = self._in_vain + 1 if stuck else 0
+            self._planned_at, self._planned_from = world.time, world.robot_pose[:2]
             if result.plan is not None:
                 self.current_plan = result.plan
         if self.current_plan is None:
@@ -108,7 +115,9 @@ class PlanFollower:
         plan, rule = self.current_plan, self.replanning
         size = world.robot.circumscribed_radius
         waited = world.time - self._planned_at
-        rested = waited >= rule.interval * size / world.robot.max_speed - 1e-9
+        # a robot that stays stuck thinks less and less often, so that the episode ends in time
+        patience = rule.interval * 2 ** min(max(self._in_vain - 20, 0), 6)
+        rested = waited >= patience * size / world.robot.max_speed - 1e-9
         if plan is None:
             return rested
         if rule.never:
@@ -127,7 +136,7 @@ class PlanFollower:
         rest = np.concatenate([world.robot_pose[None], plan.poses[index + 1 :]])
         now = self.interaction.sweep(world, rest)
         if now.jammed_at >= 0:
-            return rested or now.jammed_at <= 3
+            return rested or (now.jammed_at <= 3 and self._in_vain < 20)
         steps = np.diff(plan.object_poses[index:, :, :2], axis=0)
         expected = float(np.hypot(steps[..., 0], steps[..., 1]).sum(axis=0) @ world.movables.masses)
         return rested and now.work - expected > rule.surprise * size * world.robot.mass

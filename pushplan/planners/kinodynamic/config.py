@@ -39,7 +39,7 @@ class KinodynamicRRTConfig:
     guide_share: float = 0.8
     guide_spread: float = 0.5
     avoid_iterations: int = 200
-    tree_iterations: int = 2000
+    tree_iterations: int = 600
     repairs: int = 400
     least_gain: float = 0.001
     batch: int = 20

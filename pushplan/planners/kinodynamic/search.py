@@ -83,7 +83,7 @@ class Search:
         while not self.stopped():
             self._one_round()
             if not self._solved(self.best_cost):
-                margin *= 0.5
+                margin = 0.4 * margin if margin > 0.01 * self.size else 0.0
                 self._relax(margin)
         return PlanStatus.SOLVED if self._solved(self.best_cost) else None
 
