@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import math
 
-from ruckig import ControlInterface, InputParameter, Result, Ruckig, Trajectory
+from ruckig import ControlInterface, InputParameter, Ruckig, RuckigError, Trajectory
 
 from pushplan.world import Drive, RobotModel, Twist
+from pushplan.world.checks import number
 
 
 def clamp_twist(robot: RobotModel, linear: float, angular: float) -> Twist:
@@ -28,48 +29,73 @@ class TwistLimiter:
     """Jerk-limited speed and turn rate, from one command to the next, by Ruckig.
 
     Ruckig (Berscheid and Kröger, "Jerk-limited Real-time Trajectory Generation with Arbitrary
-    Target States", RSS 2021) gives the time-optimal change from the present to the wanted twist;
-    the command is where that change has got to after one period. A robot whose accelerations are
-    unlimited gets its wanted twist at once.
+    Target States", RSS 2021) gives the time-optimal change from the present to the wanted speed;
+    the command is where that change has got to after one period. Speed and turn rate change
+    independently; one whose acceleration is unlimited gets what is wanted at once.
 
     Args:
         robot: gives the limits.
         jerk_time: time in which an acceleration may build up [s]; sets the jerk limit.
+
+    Raises:
+        InvalidInputError: if ``jerk_time`` is not positive.
     """
 
     def __init__(self, robot: RobotModel, jerk_time: float = 0.1) -> None:
+        number("jerk_time", jerk_time, low=0.0, open_low=True)
         self.robot = robot
-        limits = [robot.max_acceleration, robot.max_turn_acceleration]
-        self.limited = any(math.isfinite(limit) for limit in limits)
-        self._input = InputParameter(2)
-        self._input.control_interface = ControlInterface.Velocity
-        self._input.max_acceleration = [min(limit, 1e6) for limit in limits]
-        self._input.max_jerk = [min(limit, 1e6) / jerk_time for limit in limits]
-        self._solver = Ruckig(2)
-        self._velocity, self._acceleration = [0.0, 0.0], [0.0, 0.0]
+        self._speed = _AxisLimiter(robot.max_acceleration, jerk_time)
+        self._turn = _AxisLimiter(robot.max_turn_acceleration, jerk_time)
 
     def reset(self, linear: float = 0.0, angular: float = 0.0) -> None:
-        """Start from a known twist, without acceleration."""
-        self._velocity, self._acceleration = [linear, angular], [0.0, 0.0]
+        """Start from a known twist [m/s, rad/s], without acceleration."""
+        self._speed.reset(linear)
+        self._turn.reset(angular)
 
     def step(self, wanted: Twist, period: float) -> Twist:
         """The twist to command now so that ``wanted`` is reached as soon as the limits allow.
 
         Args:
             wanted: where to get to.
-            period: time until the next call [s].
+            period: time until the next call [s], positive.
         """
+        number("period", period, low=0.0, open_low=True)
         wanted = clamp_twist(self.robot, wanted.linear, wanted.angular)
-        if not self.limited:
+        linear = self._speed.step(wanted.linear, period)
+        return clamp_twist(self.robot, linear, self._turn.step(wanted.angular, period))
+
+
+class _AxisLimiter:
+    """One velocity under a limit of acceleration and jerk."""
+
+    def __init__(self, limit: float, jerk_time: float) -> None:
+        self.limit = limit
+        self.velocity = self.acceleration = 0.0
+        if math.isfinite(limit):
+            self._solver = Ruckig(1)
+            self._input = InputParameter(1)
+            self._input.control_interface = ControlInterface.Velocity
+            self._input.max_acceleration = [limit]
+            self._input.max_jerk = [limit / jerk_time]
+            self._input.target_acceleration = [0.0]
+
+    def reset(self, velocity: float) -> None:
+        self.velocity, self.acceleration = velocity, 0.0
+
+    def step(self, wanted: float, period: float) -> float:
+        if not math.isfinite(self.limit):
+            self.velocity = wanted
             return wanted
-        problem = self._input
-        problem.current_velocity = self._velocity
-        problem.current_acceleration = self._acceleration
-        problem.target_velocity = [wanted.linear, wanted.angular]
-        problem.target_acceleration = [0.0, 0.0]
-        change = Trajectory(2)
-        if self._solver.calculate(problem, change) not in (Result.Working, Result.Finished):
-            return clamp_twist(self.robot, *self._velocity)  # keep going rather than jump
-        _, velocity, acceleration = change.at_time(min(period, change.duration))
-        self._velocity, self._acceleration = list(velocity), list(acceleration)
-        return clamp_twist(self.robot, velocity[0], velocity[1])
+        self._input.current_velocity = [self.velocity]
+        self._input.current_acceleration = [self.acceleration]
+        self._input.target_velocity = [wanted]
+        change = Trajectory(1)
+        try:
+            self._solver.calculate(self._input, change)
+            _, velocity, acceleration = change.at_time(min(period, change.duration))
+            self.velocity, self.acceleration = velocity[0], acceleration[0]
+        except (RuckigError, ValueError):  # limits beyond its numbers: a plain ramp keeps them too
+            reach = self.limit * period
+            self.velocity += min(max(wanted - self.velocity, -reach), reach)
+            self.acceleration = 0.0
+        return self.velocity

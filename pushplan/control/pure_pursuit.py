@@ -26,7 +26,8 @@ class PurePursuit:
 
     def __post_init__(self) -> None:
         number("lookahead", self.lookahead, low=0.0, open_low=True)
-        self._progress: Progress | None = None
+        self._progress = Progress(window=1.0)
+        self._last_time = math.inf
 
     def command(self, world: World, plan: Plan) -> Twist:
         """See `pushplan.world.Controller`.
@@ -36,8 +37,9 @@ class PurePursuit:
         """
         robot = world.robot
         reach = self.lookahead * robot.circumscribed_radius
-        if self._progress is None:
+        if world.time <= self._last_time:  # the clock was set back: another episode
             self._progress = Progress(window=2.0 * reach)
+        self._last_time = world.time
         progress = self._progress
         x, y, theta = (float(value) for value in world.robot_pose)
         along = progress.update(plan, x, y)

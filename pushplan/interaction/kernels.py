@@ -287,6 +287,7 @@ def advance(
     """
     dx, dy = robot_to[0] - robot_from[0], robot_to[1] - robot_from[1]
     turn = robot_to[2] - robot_from[2]
+    turn -= 2.0 * np.pi * np.round(turn / (2.0 * np.pi))  # the short way
     motion = np.sqrt(dx * dx + dy * dy) + abs(turn) * bodies.robot_radius
     mid_x, mid_y = robot_from[0] + 0.5 * dx, robot_from[1] + 0.5 * dy
     reach = bodies.robot_radius + 0.5 * np.sqrt(dx * dx + dy * dy)

@@ -59,7 +59,8 @@ class InteractionModel(Protocol):
         Args:
             world: the snapshot from which the robot starts; it is not changed.
             path: (N, 3) robot poses x, y [m], theta [rad], close enough together that the
-                straight line between two of them is what the robot drives.
+                straight line between two of them is what the robot drives, and the turn from one to
+                the next the shorter one.
 
         Raises:
             InvalidInputError: if the path is not (N, 3), empty, or not finite.

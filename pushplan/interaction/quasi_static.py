@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -31,7 +32,8 @@ class QuasiStatic:
             1. That is exact for a simulator with full damping; 0.94 fits a square box whose weight
             rests evenly on the ground, 1.73 one that stands on its four corners.
         step: longest motion of the robot between two contact resolutions, as a fraction of the
-            smallest object's circumscribed radius.
+            half diagonal of the thinnest body; bodies below a thirtieth of the robot count as
+            that.
         iterations: Gauss-Seidel rounds for each resolution.
 
     Raises:
@@ -55,8 +57,7 @@ class QuasiStatic:
 
     def settings(self, world: World) -> Settings:
         """The numerical settings for the sizes in this world."""
-        radii = world.movables.radii
-        size = float(radii.min()) if len(radii) else world.robot.circumscribed_radius
+        size = _thinnest(world.robot, _Shapes(world.movables))
         return Settings(
             max_step=self.step * size,
             tolerance=1e-3 * size,
@@ -92,6 +93,23 @@ class _Shapes:
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, _Shapes) and self.key == other.key
+
+
+@functools.lru_cache(maxsize=32)
+def _thinnest(robot: RobotModel, shapes: _Shapes) -> float:
+    """Half diagonal of the square that is as wide as the thinnest body [m]."""
+    movables = shapes.movables
+    outlines = [*robot.parts, *(movables.outline(k) for k in range(len(movables)))]
+    floor = robot.circumscribed_radius / 30.0
+    return max(min(_width(outline) for outline in outlines) / math.sqrt(2.0), floor)
+
+
+def _width(outline: FloatArray) -> float:
+    """Least distance between two parallel lines that hold a convex outline (N, 2) [m]."""
+    edges = np.roll(outline, -1, axis=0) - outline
+    normals = np.column_stack([-edges[:, 1], edges[:, 0]]) / np.hypot(*edges.T)[:, None]
+    depths = (outline[None] - outline[:, None]) @ normals[:, :, None]
+    return float(depths[..., 0].max(axis=1).min())
 
 
 @functools.lru_cache(maxsize=32)

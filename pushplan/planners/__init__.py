@@ -1,5 +1,7 @@
 """Planners and the policies made of them. Imports no simulator and no learning library."""
 
+from typing import Any
+
 from pushplan.planners.registry import make_planner, make_policy, planner_names, policy_names
 from pushplan.world import Deadline, MaxIterations, Planner, PlanResult, PlanStatus, Policy, World
 
@@ -33,7 +35,7 @@ _LAZY = {
 }
 
 
-def __getattr__(name: str) -> object:
+def __getattr__(name: str) -> Any:
     """Import a planner when it is first asked for."""
     if name not in _LAZY:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -4,21 +4,33 @@ from __future__ import annotations
 
 import contextlib
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 from ompl import util
 
 _LOCK = threading.Lock()
+_POLL_S = 0.002
 
 
 @contextlib.contextmanager
-def seeded_ompl(seed: int) -> Iterator[None]:
+def seeded_ompl(seed: int, stopped: Callable[[], bool]) -> Iterator[bool]:
     """Seed every generator that OMPL makes inside the block, and keep it from printing.
 
     Args:
         seed: positive.
+        stopped: asked while another thread uses OMPL, so that waiting keeps to a stop rule.
+
+    Yields:
+        Whether OMPL is ours; False if ``stopped()`` came first.
     """
-    with _LOCK:
-        util.setLogLevel(util.LogLevel.LOG_NONE)
-        util.RNG.setSeed(seed)
-        yield
+    ours = _LOCK.acquire(timeout=_POLL_S)
+    while not ours and not stopped():
+        ours = _LOCK.acquire(timeout=_POLL_S)
+    try:
+        if ours:
+            util.setLogLevel(util.LogLevel.LOG_NONE)
+            util.RNG.setSeed(seed)
+        yield ours
+    finally:
+        if ours:
+            _LOCK.release()

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from pushplan.control import PathFollower
+from pushplan.control import PathFollower, clamp_twist
 from pushplan.control.tracking import Progress
 from pushplan.interaction import InteractionModel, QuasiStatic
 from pushplan.world import (
@@ -81,6 +81,7 @@ class PlanFollower:
         self._rng = np.random.default_rng(0)
         self._planned_at = -np.inf
         self._planned_from = np.full(2, np.nan)
+        self._planned_ids = np.zeros(0, dtype=np.int64)
         self._in_vain = 0
         self._progress: Progress | None = None
 
@@ -105,10 +106,11 @@ class PlanFollower:
             stuck = moved < 0.05 * world.robot.circumscribed_radius or result.plan is None
             self._in_vain = self._in_vain + 1 if stuck else 0
             self._planned_at, self._planned_from = world.time, world.robot_pose[:2]
+            self._planned_ids = world.movables.ids
             if result.plan is not None:
                 self.current_plan = result.plan
         if self.current_plan is None:
-            return Twist(world.robot.min_speed, 0.0)
+            return clamp_twist(world.robot, 0.0, 0.0)
         return self.controller.command(world, self.current_plan)
 
     def _needs_plan(self, world: World) -> bool:
@@ -116,12 +118,14 @@ class PlanFollower:
         size = world.robot.circumscribed_radius
         waited = world.time - self._planned_at
         # a robot that stays stuck thinks less and less often, so that the episode ends in time
-        patience = rule.interval * 2 ** min(max(self._in_vain - 20, 0), 6)
+        patience: float = rule.interval * 2 ** min(max(self._in_vain - 20, 0), 6)
         rested = waited >= patience * size / world.robot.max_speed - 1e-9
         if plan is None:
             return rested
         if rule.never:
             return False
+        if not np.array_equal(world.movables.ids, self._planned_ids):
+            return True  # something was delivered, lost or found
         assert self._progress is not None
         x, y = (float(value) for value in world.robot_pose[:2])
         along = self._progress.update(plan, x, y)
@@ -131,13 +135,14 @@ class PlanFollower:
             return True
         if along >= self._progress.total - 1e-9:
             return rested
-        if plan.object_poses is None or len(world.movables) == 0:
+        predicted = plan.object_poses
+        if predicted is None or predicted.shape[1] != len(world.movables) or not predicted.size:
             return False
         rest = np.concatenate([world.robot_pose[None], plan.poses[index + 1 :]])
         now = self.interaction.sweep(world, rest)
         if now.jammed_at >= 0:
             return rested or (now.jammed_at <= 3 and self._in_vain < 20)
-        steps = np.diff(plan.object_poses[index:, :, :2], axis=0)
+        steps = np.diff(predicted[index:, :, :2], axis=0)
         expected = float(np.hypot(steps[..., 0], steps[..., 1]).sum(axis=0) @ world.movables.masses)
         return rested and now.work - expected > rule.surprise * size * world.robot.mass
 

@@ -60,7 +60,7 @@ def make_policy(name: str, **options: Any) -> Policy:
 
 
 def _load(kind: str, name: str, table: dict[str, str]) -> Any:
-    if name not in table:
+    if not isinstance(name, str) or name not in table:
         raise UnknownNameError(kind, name, table)
     module, _, attribute = table[name].partition(":")
     return getattr(importlib.import_module(module), attribute)

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pushplan.geometry import VisibilityGraph
+from pushplan.planners.kinodynamic.timing import start_margin
 from pushplan.planners.polyline import polyline_plan
 from pushplan.world import PlanResult, PlanStats, PlanStatus, Stop, World
 from pushplan.world.checks import number
@@ -49,5 +50,6 @@ class ShortestPath:
                 wall = time.perf_counter() - began
                 stats = PlanStats(wall, first_solution_s=wall, iterations=1)
                 return PlanResult(PlanStatus.SOLVED, plan, stats)
-        stats = PlanStats(time.perf_counter() - began)
-        return PlanResult(PlanStatus.GOAL_UNREACHABLE, None, stats)
+        blocked = start_margin(world, 0.0) is None
+        status = PlanStatus.START_BLOCKED if blocked else PlanStatus.GOAL_UNREACHABLE
+        return PlanResult(status, None, PlanStats(time.perf_counter() - began))

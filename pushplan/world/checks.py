@@ -33,8 +33,11 @@ def number(
         InvalidInputError: if it is not a number, not finite, or out of range.
     """
     if isinstance(value, bool) or not isinstance(value, numbers.Real):
-        raise InvalidInputError(f"{name} must be a number, got {value!r}")
-    result = float(value)
+        raise InvalidInputError(f"{name} must be a number, got {_short(value)}")
+    try:
+        result = float(value)
+    except OverflowError:
+        result = math.inf
     if math.isnan(result) or (finite and math.isinf(result)):
         raise InvalidInputError(f"{name} must be finite, got {result}")
     if result < low or result > high or (open_low and result == low):

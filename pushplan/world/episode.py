@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import zipfile
+import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -11,12 +12,23 @@ from typing import Any
 
 import numpy as np
 
-from pushplan.world.checks import ArrayRecord, BoolArray, FloatArray, array
+from pushplan.world.checks import ArrayRecord, BoolArray, FloatArray, array, known_keys
 from pushplan.world.errors import InvalidInputError, SchemaError
 from pushplan.world.files import world_from_dict, world_to_dict
 from pushplan.world.scene import World
 
 SCHEMA = "pushplan-episode/1"
+_UNREADABLE = (
+    OSError,
+    KeyError,
+    ValueError,
+    TypeError,
+    EOFError,
+    NotImplementedError,
+    RecursionError,
+    zipfile.BadZipFile,
+    zlib.error,
+)
 _ARRAYS = (
     "times",
     "robot_poses",
@@ -75,11 +87,9 @@ class Episode(ArrayRecord):
         if length == 0 or (np.diff(self.times) <= 0.0).any():
             raise InvalidInputError("episode.times must hold at least one instant and increase")
         put(self, "robot_poses", array("episode.robot_poses", self.robot_poses, (length, 3)))
-        poses = (
-            np.asarray(self.object_poses, dtype=np.float64).reshape(length, count, 3)
-            if (count == 0)
-            else self.object_poses
-        )
+        poses = np.asarray(self.object_poses)
+        if count == 0 and poses.size == 0:
+            poses = np.zeros((length, 0, 3))
         put(self, "object_poses", array("episode.object_poses", poses, (length, count, 3)))
         done = np.zeros(count, dtype=bool) if self.completed is None else self.completed
         put(self, "completed", array("episode.completed", done, (count,), dtype=np.bool_))
@@ -120,10 +130,12 @@ class Episode(ArrayRecord):
             with np.load(path, allow_pickle=False) as data:
                 header = json.loads(str(data["header"]))
                 arrays = {key: data[key] for key in _ARRAYS}
-        except (OSError, KeyError, ValueError, EOFError, zipfile.BadZipFile) as error:
+        except _UNREADABLE as error:
             raise SchemaError(f"{path} is not a readable episode file: {error}") from error
         if not isinstance(header, dict) or header.get("schema") != SCHEMA:
             raise SchemaError(f"{path}: this pushplan reads schema {SCHEMA!r}")
+        keys = ("schema", "world", "success", "reason", "about")
+        known_keys(f"the header of {path}", header, keys, keys)
         return cls(
             world=world_from_dict(header["world"]),
             success=header["success"],

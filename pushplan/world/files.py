@@ -11,11 +11,11 @@ from typing import Any
 import numpy as np
 import yaml
 
-from pushplan.world.checks import known_keys, number
+from pushplan.world.checks import array, integer, known_keys, number
 from pushplan.world.errors import InvalidInputError, SchemaError, unknown_name_message
 from pushplan.world.goals import ClearanceArea, Goal, GoalDisc, GoalLine, Receptacle
 from pushplan.world.movables import Movables
-from pushplan.world.outline import signed_area
+from pushplan.world.outline import convex_outline, signed_area
 from pushplan.world.robot import Drive, RobotModel
 from pushplan.world.scene import World
 from pushplan.world.static_map import StaticMap
@@ -127,7 +127,7 @@ def load_world(path: str | Path) -> World:
         raise SchemaError(f"cannot read world file {path}: {error}") from error
     try:
         data = json.loads(text) if path.suffix == ".json" else yaml.safe_load(text)
-    except (json.JSONDecodeError, yaml.YAMLError) as error:
+    except (ValueError, RecursionError, yaml.YAMLError) as error:
         problem = " ".join(str(error).split())
         raise SchemaError(f"{path} is not valid {path.suffix[1:] or 'YAML'}: {problem}") from error
     try:
@@ -175,8 +175,8 @@ def _static(data: object) -> StaticMap:
     for i, segment in enumerate(_list("static.segments", data.get("segments", []))):
         known_keys(f"static.segments[{i}]", segment, ("from", "to", "radius"), ("from", "to"))
         ends = [_list(f"static.segments[{i}].{end}", segment[end]) for end in ("from", "to")]
-        lines.append([*ends[0], *ends[1]])
-        radii.append(segment.get("radius", 0.0))
+        lines.append(array(f"static.segments[{i}]", [*ends[0], *ends[1]], (4,)))
+        radii.append(number(f"static.segments[{i}].radius", segment.get("radius", 0.0), low=0.0))
     return StaticMap.build(
         polygons=_list("static.polygons", data.get("polygons", [])),
         segments=lines,
@@ -199,14 +199,17 @@ def _movables(data: object) -> Movables:
             shape = Movables.from_polygons([item["polygon"]])
             outline, pose = shape.outline(0), shape.poses[0]
         else:
-            outline, pose = np.asarray(item["outline"]), item["pose"]
+            outline = array(f"{name}.outline", item["outline"], (None, 2))
+            pose = array(f"{name}.pose", item["pose"], (3,))
         outlines.append(outline)
         poses.append(pose)
-        twists.append(item.get("twist", [0.0, 0.0, 0.0]))
+        twists.append(array(f"{name}.twist", item.get("twist", [0.0, 0.0, 0.0]), (3,)))
         mass = item.get("mass")
-        masses.append(abs(signed_area(np.asarray(outline, float))) if mass is None else mass)
+        if mass is None:
+            mass = abs(signed_area(convex_outline(f"{name}.outline", outline)))
+        masses.append(number(f"{name}.mass", mass, low=0.0, open_low=True))
         wheeled.append(item.get("wheeled", False))
-        ids.append(item.get("id", i))
+        ids.append(integer(f"{name}.id", item.get("id", i), high=2**63 - 1))
     return Movables.from_outlines(
         outlines,
         np.asarray(poses) if poses else np.zeros((0, 3)),
@@ -218,10 +221,10 @@ def _movables(data: object) -> Movables:
 
 
 def _goal(data: object) -> Goal:
-    if not isinstance(data, Mapping) or data.get("kind") not in _GOALS:
-        kind = data.get("kind") if isinstance(data, Mapping) else data
+    kind = data.get("kind") if isinstance(data, Mapping) else data
+    if not isinstance(data, Mapping) or not isinstance(kind, str) or kind not in _GOALS:
         raise SchemaError(unknown_name_message("goal kind", kind, _GOALS))
-    cls, keys = _GOALS[data["kind"]]
+    cls, keys = _GOALS[kind]
     known_keys("goal", data, ("kind", *keys), keys)
     goal: Goal = cls(**{key: data[key] for key in keys})
     return goal

@@ -136,7 +136,7 @@ class PlanStats:
         wall_time_s: time inside the call [s].
         first_solution_s: time until the first plan that reaches the goal [s], NaN if none.
         iterations: how often the planner's main loop ran.
-        nodes: how many states it kept.
+        nodes: states of its search that are part of the paths it looked at closer.
         detail: further numbers of the algorithm, by name.
     """
 

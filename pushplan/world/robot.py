@@ -35,7 +35,8 @@ class RobotModel(ArrayRecord):
         drive: how it may move.
         max_speed: greatest forward speed [m/s]; the speed itself for a constant-speed drive.
         max_turn_rate: greatest |turn rate| [rad/s].
-        min_speed: least forward speed [m/s], negative if it may reverse.
+        min_speed: least forward speed [m/s], negative if it may reverse, else 0; a constant-speed
+            drive has none other than ``max_speed``.
         max_acceleration: limit of |dv/dt| [m/s²]; infinite where speed can jump.
         max_turn_acceleration: limit of |dω/dt| [rad/s²].
         wheel_separation: distance between the driven wheels [m], 0 if there are none.
@@ -69,10 +70,12 @@ class RobotModel(ArrayRecord):
         put(self, "drive", Drive(choice("drive", self.drive, [d.value for d in Drive])))
         speed = number("robot.max_speed", self.max_speed, low=0.0, open_low=True)
         put(self, "max_speed", speed)
-        low = number("robot.min_speed", self.min_speed, high=speed)
-        put(self, "min_speed", speed if self.drive is Drive.CONSTANT_SPEED else low)
-        for key in ("max_turn_rate",):
-            put(self, key, number(f"robot.{key}", getattr(self, key), low=0.0, open_low=True))
+        if self.drive is Drive.CONSTANT_SPEED:
+            put(self, "min_speed", speed)
+        else:  # it has to be able to stop
+            put(self, "min_speed", number("robot.min_speed", self.min_speed, high=0.0))
+        rate = number("robot.max_turn_rate", self.max_turn_rate, low=0.0, open_low=True)
+        put(self, "max_turn_rate", rate)
         for key in ("max_acceleration", "max_turn_acceleration"):
             value = number(f"robot.{key}", getattr(self, key), low=0.0, open_low=True, finite=False)
             put(self, key, value)

@@ -75,10 +75,10 @@ class StaticMap(ArrayRecord):
             raise InvalidInputError(
                 f"static.radii must be one number or {len(lines)} of them, got {radii!r}"
             ) from error
-        shapes = tuple(np.asarray(p) for p in polygons)
+        shapes = tuple(convex_outline(f"static.polygons[{i}]", p) for i, p in enumerate(polygons))
         if bounds is None:
             corners = [
-                *(convex_outline("static polygon", p) for p in shapes),
+                *shapes,
                 lines[:, :2] - thick[:, None],
                 lines[:, :2] + thick[:, None],
                 lines[:, 2:] - thick[:, None],
@@ -88,18 +88,19 @@ class StaticMap(ArrayRecord):
             if len(every) == 0:
                 raise InvalidInputError("a static map without obstacles needs bounds")
             bounds = np.concatenate([every.min(axis=0), every.max(axis=0)])
-        return cls(shapes, lines, thick, np.asarray(bounds))
+        return cls(shapes, lines, thick, array("static.bounds", bounds, (4,)))
 
     @cached_property
     def convex_parts(self) -> tuple[FloatArray, ...]:
         """Every obstacle as a convex polygon (N, 2) [m].
 
         A thick segment becomes a polygon around its rounded outline, at most
-        1.6 % of the radius too large at the caps and nowhere too small; a segment of radius 0
-        becomes one that is 1 mm thick.
+        1.6 % of the radius too large at the caps and nowhere too small; one of radius 0 becomes
+        a millionth of the map thick.
         """
+        thin = 5e-7 * float((self.bounds[2:] - self.bounds[:2]).max())
         ends = [
-            _capsule(line[:2], line[2:], max(float(radius), 5e-4))
+            _capsule(line[:2], line[2:], max(float(radius), thin))
             for line, radius in zip(self.segments, self.radii, strict=True)
         ]
         return (*self.polygons, *ends)

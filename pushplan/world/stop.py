@@ -25,7 +25,8 @@ class StopCheck(Protocol):
 
         Args:
             iterations: main-loop iterations so far.
-            cost: cost of the best plan so far [kg m], infinite while there is none.
+            cost: what the planner minimises, for its best plan so far, such as travel plus weighted
+                interaction [kg m]; infinite while there is none.
         """
         ...
 

@@ -11,6 +11,7 @@ from ompl import base, geometric
 
 from pushplan.geometry import point_in_polygon
 from pushplan.planners.kinodynamic.collision import Obstacles, obstacles
+from pushplan.planners.kinodynamic.timing import start_margin
 from pushplan.planners.ompl_lock import seeded_ompl
 from pushplan.planners.polyline import polyline_plan
 from pushplan.world import (
@@ -86,6 +87,8 @@ class GeometricRRT:
         objects = world.movables
         boxes = [objects.outline_world(k) for k in range(len(objects))]
         iterations, status, plan = 0, PlanStatus.TIMED_OUT, None
+        if start_margin(world, 0.0) is None:
+            return _result(PlanStatus.START_BLOCKED, None, 0, time.perf_counter() - began)
         start = np.ascontiguousarray(world.robot_pose[:2])
         size = world.robot.circumscribed_radius
         wide, narrow = config.clearance * size, world.robot.inscribed_radius
@@ -93,8 +96,6 @@ class GeometricRRT:
         for blocked, radius in passes:
             among = obstacles(world.static, blocked)
             if _near(start, among, radius):
-                if radius == passes[-1][1]:
-                    status = PlanStatus.START_BLOCKED
                 continue  # the robot starts closer to something than this pass allows
             points, used = self._grow(world, among, radius, check, iterations, rng)
             iterations += used
@@ -128,7 +129,10 @@ class GeometricRRT:
             used += 1
             return used >= config.pass_iterations or check(before + used, np.inf)
 
-        with seeded_ompl(int(rng.integers(1, 2**31))):
+        seed = int(rng.integers(1, 2**31))
+        with seeded_ompl(seed, lambda: check(before + used, np.inf)) as ready:
+            if not ready:
+                return None, used
             space = base.RealVectorStateSpace(2)
             bounds = base.RealVectorBounds(2)
             for axis in range(2):
@@ -140,12 +144,12 @@ class GeometricRRT:
 
             def valid(state: base.State) -> bool:
                 point[0], point[1] = state[0], state[1]
-                return not _near(point, among, radius)
+                return bool(space.satisfiesBounds(state)) and not _near(point, among, radius)
 
             info.setStateValidityChecker(valid)
             size = world.robot.circumscribed_radius
             step = config.resolution * size / space.getMaximumExtent()
-            info.setStateValidityCheckingResolution(min(step, 1.0))
+            info.setStateValidityCheckingResolution(min(step, 0.5))
             info.setup()
             problem = base.ProblemDefinition(info)
             start = space.allocState()
@@ -188,7 +192,7 @@ class _GoalRegion(base.GoalSampleableRegion):
                 point = candidate
                 break
         else:
-            point = getattr(self.goal, "center", point)
+            point = np.clip(getattr(self.goal, "center", point), low, high)
         state[0], state[1] = float(point[0]), float(point[1])
 
     def maxSampleCount(self) -> int:

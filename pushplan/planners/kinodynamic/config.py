@@ -26,8 +26,9 @@ class KinodynamicRRTConfig:
         repairs: repairs tried on a path before its gain is looked at.
         least_gain: share of its cost that a path must lose over ``repairs`` repairs to be worked
             on further; otherwise new trees are grown.
-        batch: repairs between two looks at the stop rule.
-        default_iterations: budget where no stop rule is given.
+        batch: repairs between two looks at the stop rule, fewer among many objects.
+        default_iterations: budget where no stop rule is given; three times as much while there is
+            no plan.
     """
 
     push_weight: float = 3.0
@@ -39,7 +40,7 @@ class KinodynamicRRTConfig:
     guide_share: float = 0.8
     guide_spread: float = 0.5
     avoid_iterations: int = 200
-    tree_iterations: int = 600
+    tree_iterations: int = 1500
     repairs: int = 400
     least_gain: float = 0.001
     batch: int = 20

@@ -12,6 +12,8 @@ from numba import njit
 from pushplan.world.checks import FloatArray
 
 _TWO_PI = 2.0 * np.pi
+MAX_TURN = 0.15
+"""Greatest change of heading between two poses of a path [rad]."""
 
 
 @njit(cache=True, nogil=True)
@@ -104,6 +106,12 @@ def along_arc(pose: FloatArray, length: float, curvature: float, out: FloatArray
 
 
 @njit(cache=True, nogil=True)
+def step_along(curvature: float, spacing: float) -> float:
+    """Distance between poses on an arc [m]: ``spacing``, less where that would turn too far."""
+    return min(spacing, MAX_TURN / max(abs(curvature), 1e-12))
+
+
+@njit(cache=True, nogil=True)
 def sample_pieces(
     start: FloatArray, pieces: FloatArray, spacing: float, out: FloatArray, curvatures: FloatArray
 ) -> int:
@@ -112,7 +120,7 @@ def sample_pieces(
     Args:
         start: (3,) pose at the beginning.
         pieces: (P, 2) length [m] and curvature [1/m] of each arc.
-        spacing: greatest distance between two poses [m].
+        spacing: greatest distance between two poses [m]; less in tight turns.
         out: (M, 3) receives the poses.
         curvatures: (M,) receives the curvature that leads to each pose [1/m].
 
@@ -125,7 +133,7 @@ def sample_pieces(
         length, curvature = pieces[i, 0], pieces[i, 1]
         if length < 1e-9:
             continue
-        steps = int(np.ceil(length / spacing))
+        steps = int(np.ceil(length / step_along(curvature, spacing)))
         if count + steps > out.shape[0]:
             return -1
         for step in range(1, steps + 1):

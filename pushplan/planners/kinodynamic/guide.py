@@ -7,12 +7,14 @@ import heapq
 import numpy as np
 from numba import njit
 
-from pushplan.world import World
+from pushplan.world import GoalDisc, World
 from pushplan.world.checks import BoolArray, FloatArray, IntArray
 from pushplan.world.outline import flatten
 
 _SIDE = 96
-"""Cells along the longer side of the workspace."""
+"""Cells along the longer side of the workspace, if that resolves the robot's own width."""
+_MOST = 400
+"""Cells along the longer side at most."""
 
 
 @njit(cache=True, nogil=True)
@@ -109,6 +111,12 @@ def _search(price: FloatArray, start: int, goal: BoolArray, cell: float) -> Floa
     return path
 
 
+def _cell(world: World) -> float:
+    """Side of a cell [m]: narrower than the robot, as far as the size of the map allows."""
+    extent = float((world.static.bounds[2:] - world.static.bounds[:2]).max())
+    return max(min(extent / _SIDE, world.robot.inscribed_radius or np.inf), extent / _MOST)
+
+
 def guide_path(world: World, push_weight: float) -> FloatArray:
     """A path of the robot's centre from its pose to the goal, coarse and cheap.
 
@@ -120,20 +128,40 @@ def guide_path(world: World, push_weight: float) -> FloatArray:
     Returns:
         (N, 2) points about one cell apart [m]; empty where there is no such path.
     """
-    bounds = world.static.bounds
-    goal = world.navigation_goal
-    cell = float((bounds[2:] - bounds[:2]).max()) / _SIDE
-    cols, rows = (int(np.ceil(side / cell)) for side in bounds[2:] - bounds[:2])
-    inner, outer = world.robot.inscribed_radius, world.robot.circumscribed_radius
-    objects = world.movables
+    robot, objects = world.robot, world.movables
+    inner, outer = robot.inscribed_radius, robot.circumscribed_radius
     walls = list(world.static.convex_parts)
     boxes = [objects.outline_world(k) for k in range(len(objects))]
-    # passing through the middle of a box pushes it for about a robot's width
-    per_metre = push_weight * objects.masses / world.robot.mass
     # walls hold the inscribed disc for certain; the rest of the footprint is a matter of heading
-    shapes = [*walls, *walls, *boxes]
     reach = [inner] * len(walls) + [1.3 * outer] * len(walls) + [outer] * len(boxes)
+    # passing through the middle of a box pushes it for about a robot's width
+    per_metre = push_weight * objects.masses / robot.mass
     weight = [np.inf] * len(walls) + [2.0] * len(walls) + list(per_metre)
+    return _cheapest(world, [*walls, *walls, *boxes], reach, weight)
+
+
+def reachable(world: World) -> bool:
+    """Whether the robot's inscribed disc may get from the start to the goal around the walls.
+
+    False only where it certainly does not.
+    """
+    cell = _cell(world)
+    inner = world.robot.inscribed_radius
+    if cell > inner:
+        return True  # too coarse to tell
+    walls = list(world.static.convex_parts)
+    # a cell less than the disc: a narrow gap is left for the search to find out about
+    reach, weight = [inner - cell] * len(walls), [np.inf] * len(walls)
+    return len(_cheapest(world, walls, reach, weight)) > 0
+
+
+def _cheapest(
+    world: World, shapes: list[FloatArray], reach: list[float], weight: list[float]
+) -> FloatArray:
+    """The cheapest path over the grid where shapes raise the price within their reach."""
+    bounds, goal = world.static.bounds, world.navigation_goal
+    cell = _cell(world)
+    cols, rows = (int(np.ceil(side / cell)) for side in bounds[2:] - bounds[:2])
     vertices, offsets = flatten(shapes)
     price = _prices(
         bounds[:2],
@@ -147,9 +175,17 @@ def guide_path(world: World, push_weight: float) -> FloatArray:
     )
     x = bounds[0] + (np.arange(cols) + 0.5) * cell
     y = bounds[1] + (np.arange(rows) + 0.5) * cell
-    at = world.robot_pose
-    col = int(np.clip((at[0] - bounds[0]) / cell, 0, cols - 1))
-    row = int(np.clip((at[1] - bounds[1]) / cell, 0, rows - 1))
+    row, col = _cell_of(world.robot_pose[:2], bounds, cell, rows, cols)
     reached = goal.contains(np.stack(np.meshgrid(x, y), axis=-1))
+    if isinstance(goal, GoalDisc):  # it may be smaller than a cell
+        reached[_cell_of(goal.center, bounds, cell, rows, cols)] = True
     cells = _search(price, row * cols + col, reached, cell)
     return bounds[:2] + (cells + 0.5) * cell
+
+
+def _cell_of(
+    point: FloatArray, bounds: FloatArray, cell: float, rows: int, cols: int
+) -> tuple[int, int]:
+    """Row and column of the cell nearest to a point (2,)."""
+    col = int(np.clip((point[0] - bounds[0]) / cell, 0, cols - 1))
+    return int(np.clip((point[1] - bounds[1]) / cell, 0, rows - 1)), col

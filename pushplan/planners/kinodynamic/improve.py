@@ -19,9 +19,6 @@ from pushplan.planners.kinodynamic.dubins import dubins, sample_pieces
 from pushplan.world import GoalDisc, NavigationGoal
 from pushplan.world.checks import FloatArray
 
-JAM_COST = 1e6
-"""Added to a path's length at each pose where the robot jams [m], to tell it from any other."""
-
 
 class Pricing(NamedTuple):
     """What a path costs and where it may go."""
@@ -34,6 +31,8 @@ class Pricing(NamedTuple):
     """Least turning radius [m]."""
     spacing: float
     """Greatest distance between two poses of a path [m]."""
+    jam: float
+    """Added to a path's length at each pose where the robot jams [m], to tell it from any other."""
     spread: float
     """Typical sideways displacement that is tried [m]."""
     goal: FloatArray
@@ -127,7 +126,7 @@ def price_from(
             work += moved[k] / bodies.inverse_masses[k]
         path.works[n] = path.works[n - 1] + work
         if not free:
-            path.lengths[n] += JAM_COST
+            path.lengths[n] += pricing.jam
         if m0 * path.lengths[n] + weight * path.works[n] >= limit:
             return np.inf
     cost: float = m0 * path.lengths[count - 1] + weight * path.works[count - 1]
@@ -239,12 +238,21 @@ def _propose(
             return first, 0, 0
         size += added
     new = size - first - 1
+    arrived = trial.poses[size - 1]
+    miss = abs(arrived[0] - target[0]) + abs(arrived[1] - target[1])
+    if miss > 1e-3 * pricing.spacing or (
+        to_end and not in_goal(arrived[0], arrived[1], pricing.goal)
+    ):
+        return first, 0, 0
     rest = count - 1 - last
     if to_end or rest == 0:
         return first, new, size
     if size + rest > trial.poses.shape[0]:
         return first, 0, 0
     trial.poses[size : size + rest] = path.poses[last + 1 : count]
+    # the new piece may end with whole turns more or less than the old one
+    turns = np.round((trial.poses[size - 1, 2] - path.poses[last, 2]) / (2.0 * np.pi))
+    trial.poses[size : size + rest, 2] += 2.0 * np.pi * turns
     trial.curvatures[size : size + rest] = path.curvatures[last + 1 : count]
     return first, new, size + rest
 
@@ -303,7 +311,7 @@ def improve(
         trial.works[first] = path.works[first]
         trial.objects[first] = path.objects[first]
         price = price_from(trial, first, size, cost, pricing, bodies, settings)
-        if price < cost - 1e-9:
+        if price < (1.0 - 1e-9) * cost:
             for n in range(first + 1, size):
                 path.poses[n] = trial.poses[n]
                 path.curvatures[n] = trial.curvatures[n]

@@ -10,7 +10,7 @@ import numpy as np
 from pushplan.interaction import QuasiStatic
 from pushplan.planners.kinodynamic.config import KinodynamicRRTConfig
 from pushplan.planners.kinodynamic.search import Search
-from pushplan.world import MaxIterations, PlanResult, PlanStats, PlanStatus, Stop, World
+from pushplan.world import PlanResult, PlanStats, PlanStatus, Stop, StopCheck, World
 
 
 @dataclass(frozen=True)
@@ -49,7 +49,7 @@ class KinodynamicRRT:
             InvalidInputError: if the world's goal is not one for the robot.
         """
         began = time.perf_counter()
-        stop = MaxIterations(self.config.default_iterations) if stop is None else stop
+        stop = _DefaultBudget(self.config.default_iterations) if stop is None else stop
         rng = np.random.default_rng(0) if rng is None else rng
         search = Search(world, self.config, self.interaction, stop.start(), rng, began)
         status = search.run()
@@ -63,3 +63,14 @@ class KinodynamicRRT:
             detail={"trees": float(search.trees)},
         )
         return PlanResult(status, search.plan() if status.has_plan else None, stats)
+
+
+@dataclass(frozen=True)
+class _DefaultBudget(Stop):
+    """A number of iterations, and three times as many while there is no plan."""
+
+    iterations: int
+
+    def start(self) -> StopCheck:
+        """Arm the rule for one call."""
+        return lambda done, cost: done >= self.iterations * (3 if cost == np.inf else 1)

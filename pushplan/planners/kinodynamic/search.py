@@ -7,12 +7,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from pushplan.geometry import VisibilityGraph
 from pushplan.interaction import QuasiStatic
 from pushplan.planners.kinodynamic.collision import footprint, is_free, obstacles
 from pushplan.planners.kinodynamic.config import KinodynamicRRTConfig
-from pushplan.planners.kinodynamic.guide import guide_path
+from pushplan.planners.kinodynamic.guide import guide_path, reachable
 from pushplan.planners.kinodynamic.improve import (
-    JAM_COST,
     Path,
     Pricing,
     goal_numbers,
@@ -22,9 +22,11 @@ from pushplan.planners.kinodynamic.improve import (
     price_from,
 )
 from pushplan.planners.kinodynamic.targets import Targets
-from pushplan.planners.kinodynamic.timing import reachable, start_margin, timed_plan, turning_radius
+from pushplan.planners.kinodynamic.timing import TIGHTEST, start_margin, timed_plan, turning_radius
 from pushplan.planners.kinodynamic.tree import TreeLimits, grow_tree
+from pushplan.planners.polyline import polyline_plan
 from pushplan.world import Drive, Plan, PlanStatus, StopCheck, World
+from pushplan.world.checks import FloatArray
 
 
 class Search:
@@ -48,6 +50,7 @@ class Search:
             push_weight=float(config.push_weight),
             radius=radius,
             spacing=config.spacing * self.size,
+            jam=self._jam_length(),
             spread=1.5 * self.size,
             goal=goal_numbers(self.goal, config.inset * self.size),
         )
@@ -61,6 +64,10 @@ class Search:
         self.guide_share = config.guide_share
         self.walls = obstacles(world.static)
         self.shape = footprint(world.robot)
+        self.margin = 0.0
+        self.rounds = 0
+        # crowded worlds are slow to sweep: look at the stop rule more often
+        self.batch = max(1, 10 * config.batch // (10 + len(world.movables)))
         self.iterations = self.nodes = self.trees = 0
         self.best: Path | None = None
         self.best_cost = np.inf
@@ -73,6 +80,7 @@ class Search:
             return PlanStatus.START_BLOCKED
         if not reachable(self.world):
             return PlanStatus.GOAL_UNREACHABLE
+        self.margin = margin
         self.shape = footprint(self.world.robot, margin)
         if self.goal.distance(*self.world.robot_pose[:2]) <= 0.0:
             here = make_path(1, len(self.world.movables))
@@ -83,9 +91,15 @@ class Search:
         while not self.stopped():
             self._one_round()
             if not self._solved(self.best_cost):
-                margin = 0.4 * margin if margin > 0.01 * self.size else 0.0
-                self._relax(margin)
+                self._relax()
         return PlanStatus.SOLVED if self._solved(self.best_cost) else None
+
+    def _jam_length(self) -> float:
+        """A length [m] that no path without a jam comes near."""
+        world = self.world
+        extent = float((world.static.bounds[2:] - world.static.bounds[:2]).sum())
+        load = self.config.push_weight * float(world.movables.masses.sum()) / world.robot.mass
+        return 1e4 * (extent + self.size) * (1.0 + load)
 
     def stopped(self) -> bool:
         """Whether the stop rule fires now."""
@@ -94,7 +108,7 @@ class Search:
 
     def _solved(self, cost: float) -> bool:
         """Whether a path of this cost is free of jams."""
-        return cost < JAM_COST * self.pricing.robot_mass
+        return cost < self.pricing.jam * self.pricing.robot_mass
 
     def _one_round(self) -> None:
         """A path around the objects and one among them; the cheaper is worked out further."""
@@ -118,20 +132,25 @@ class Search:
             if cheaper.cost > (1.0 - config.least_gain) * before:
                 return
 
-    def _relax(self, margin: float) -> None:
-        """Allow tighter turns and less clearance [m], and look farther from the guide.
+    def _relax(self) -> None:
+        """Look farther from the guide; from the second time on, with tighter turns and less margin.
 
         That helps where the robot starts in a tight place or has to turn round first.
         A constant-speed robot may then use its whole turn rate; one that can slow down turns on
         half the radius, to a tenth of its size.
         """
         self.guide_share *= 0.5  # the way out may be the other way
+        self.rounds += 1
+        if self.rounds < 2:
+            return
+        self.margin = 0.4 * self.margin if self.margin > 0.01 * self.size else 0.0
         radius = self.world.robot.turning_radius
         if self.world.robot.drive is Drive.DIFFERENTIAL:
-            radius = max(0.5 * self.pricing.radius, 0.1 * self.size)
+            radius = 0.5 * self.pricing.radius
+        radius = max(radius, TIGHTEST * self.size)
         self.pricing = self.pricing._replace(radius=radius)
         self.limits = replace(self.limits, max_curvature=1.0 / radius)
-        self.shape = footprint(self.world.robot, margin)
+        self.shape = footprint(self.world.robot, self.margin)
 
     def _grow(self, push_weight: float, budget: int) -> _Candidate | None:
         """The path of a new tree; an infinite weight treats objects as obstacles."""
@@ -146,7 +165,7 @@ class Search:
                 return None  # the robot touches an object already: only pushing helps
         guide = guide_path(world, push_weight)
         if len(guide) == 0:
-            return None
+            guide = self._exact_guide()
         last = self.iterations + budget
 
         def done() -> bool:
@@ -163,6 +182,7 @@ class Search:
             among,
             int(self.rng.integers(1, 2**31)),
             done,
+            self.stopped,
         )
         if arcs is None:
             return None
@@ -175,17 +195,26 @@ class Search:
         self._keep(path, count, cost)
         return _Candidate(path, make_path(capacity, len(world.movables)), count, cost)
 
+    def _exact_guide(self) -> FloatArray:
+        """A path around the walls alone, where the coarse grid misses a narrow way."""
+        clearance = self.world.robot.inscribed_radius
+        graph = VisibilityGraph(self.world.static, clearance)
+        corners = graph.to_goal(self.world.robot_pose[:2], self.goal).points
+        if len(corners) == 0:
+            return self.world.robot_pose[None, :2]
+        return polyline_plan(self.world, corners, self.size).poses[:, :2]
+
     def _repair(self, candidate: _Candidate, repairs: int) -> None:
         """Try a number of repairs, as long as the stop rule allows."""
-        for _ in range(0, repairs, self.config.batch):
+        for _ in range(0, repairs, self.batch):
             if self.stopped():
                 return
             candidate.count, candidate.cost = improve(
                 candidate.path,
                 candidate.count,
                 candidate.cost,
-                self.rng.random((self.config.batch, 4)),
-                self.rng.standard_normal((self.config.batch, 2)),
+                self.rng.random((self.batch, 4)),
+                self.rng.standard_normal((self.batch, 2)),
                 candidate.trial,
                 self.pricing,
                 self.shape,
@@ -193,7 +222,7 @@ class Search:
                 self.bodies,
                 self.settings,
             )
-            self.iterations += self.config.batch
+            self.iterations += self.batch
             self._keep(candidate.path, candidate.count, candidate.cost)
 
     def _keep(self, path: Path, count: int, cost: float) -> None:

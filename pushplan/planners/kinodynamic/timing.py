@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from pushplan.geometry import geodesic_field
 from pushplan.planners.kinodynamic.collision import footprint, is_free, obstacles
 from pushplan.planners.kinodynamic.improve import Path
 from pushplan.world import Drive, Plan, RobotModel, World
+
+TIGHTEST = 0.1
+"""Least turning radius that plans ever use, in circumscribed radii: nearly on the spot."""
 
 
 def turning_radius(robot: RobotModel, turn_share: float) -> float:
@@ -19,7 +21,7 @@ def turning_radius(robot: RobotModel, turn_share: float) -> float:
     """
     if robot.drive is Drive.DIFFERENTIAL:
         return robot.circumscribed_radius
-    return robot.turning_radius / turn_share
+    return max(robot.turning_radius / turn_share, TIGHTEST * robot.circumscribed_radius)
 
 
 def start_margin(world: World, margin: float) -> float | None:
@@ -33,19 +35,6 @@ def start_margin(world: World, margin: float) -> float | None:
         if is_free(world.robot_pose, shape, walls, np.empty_like(shape.vertices)):
             return share * margin
     return None
-
-
-def reachable(world: World) -> bool:
-    """Whether the robot's inscribed disc can get from the start to the goal around the walls."""
-    extent = world.static.bounds[2:] - world.static.bounds[:2]
-    cell = max(float(extent.max()) / 150.0, 0.05 * world.robot.inscribed_radius)
-    # a cell less than the disc: a narrow gap is left for the search to find out about
-    clearance = max(world.robot.inscribed_radius - cell, 0.0)
-    field = geodesic_field(
-        world.static, world.navigation_goal, resolution=cell, clearance=clearance
-    )
-    x, y = world.robot_pose[:2]
-    return bool(np.isfinite(field.sample(float(x), float(y))))
 
 
 def timed_plan(world: World, path: Path, turn_share: float) -> Plan:

@@ -17,7 +17,7 @@ from numba import njit
 from ompl import base, control
 
 from pushplan.planners.kinodynamic.collision import Footprint, Obstacles, is_free
-from pushplan.planners.kinodynamic.dubins import along_arc
+from pushplan.planners.kinodynamic.dubins import along_arc, step_along
 from pushplan.planners.ompl_lock import seeded_ompl
 from pushplan.world import NavigationGoal
 from pushplan.world.checks import FloatArray
@@ -73,7 +73,6 @@ def steer(
     aimed = 2.0 * side / max(dx * dx + dy * dy, 1e-12)  # the circle through both, tangent here
     best, best_curvature, best_length = np.inf, 0.0, 0.0
     pose = np.empty(3)
-    steps = int(np.ceil(longest / spacing))
     for i in range(7):
         if i == 0:
             curvature = sampled
@@ -81,6 +80,7 @@ def steer(
             curvature = min(max(aimed, -bound), bound)
         else:
             curvature = bound * (0.5 * (i - 2) - 1.0)
+        steps = int(np.ceil(longest / step_along(curvature, spacing)))
         for step in range(1, steps + 1):
             length = longest * step / steps
             along_arc(start, length, curvature, pose)
@@ -104,6 +104,7 @@ def grow_tree(
     among: Obstacles,
     seed: int,
     done: Callable[[], bool],
+    stopped: Callable[[], bool],
 ) -> FloatArray | None:
     """Grow a tree from ``start`` until it reaches ``goal`` or ``done()`` says so.
 
@@ -116,11 +117,14 @@ def grow_tree(
         among: what it must not touch.
         seed: of OMPL's generator, positive.
         done: asked once per iteration.
+        stopped: asked while another thread uses OMPL.
 
     Returns:
         (E, 2) length [m] and curvature [1/m] of the arcs from start to goal, or None.
     """
-    with seeded_ompl(seed):
+    with seeded_ompl(seed, stopped) as ready:
+        if not ready:
+            return None
         return _Growth(start, goal, targets, limits, shape, among).run(done)
 
 
