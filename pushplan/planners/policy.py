@@ -10,6 +10,7 @@ import numpy as np
 from pushplan.control import PathFollower, clamp_twist
 from pushplan.control.tracking import Progress
 from pushplan.interaction import InteractionModel, QuasiStatic
+from pushplan.planners.recovery import back_off
 from pushplan.world import (
     Controller,
     InvalidInputError,
@@ -51,7 +52,8 @@ class PlanFollower:
 
     At every step the rest of the plan is swept again from where everything is now; where that
     costs more than was predicted, or jams, or the robot has left the path, or the plan is used
-    up, a new plan is made. If none is found the old one is kept.
+    up, a new plan is made. If none is found the old one is kept. A differential drive that has no
+    plan, or does not get on with its plans, backs off.
 
     Args:
         planner: makes the plans.
@@ -82,6 +84,7 @@ class PlanFollower:
         self._planned_at = -np.inf
         self._planned_from = np.full(2, np.nan)
         self._planned_ids = np.zeros(0, dtype=np.int64)
+        self._tight = False
         self._in_vain = 0
         self._progress: Progress | None = None
 
@@ -93,6 +96,7 @@ class PlanFollower:
         self._planned_at = -np.inf
         self._planned_from = np.full(2, np.nan)
         self._in_vain = 0
+        self._tight = False
         self._progress = Progress(window=2.0 * world.robot.circumscribed_radius)
 
     def act(self, world: World, observation: Any = None) -> Twist:
@@ -108,7 +112,13 @@ class PlanFollower:
             self._planned_at, self._planned_from = world.time, world.robot_pose[:2]
             self._planned_ids = world.movables.ids
             if result.plan is not None:
+                self._tight = result.stats.detail.get("tight", 0.0) > 0.0
+            if result.plan is not None:
                 self.current_plan = result.plan
+        if self.current_plan is None or self._in_vain > 3:
+            away = back_off(world)
+            if away is not None:
+                return away
         if self.current_plan is None:
             return clamp_twist(world.robot, 0.0, 0.0)
         return self.controller.command(world, self.current_plan)
@@ -135,6 +145,8 @@ class PlanFollower:
             return True
         if along >= self._progress.total - 1e-9:
             return rested
+        if self._tight and waited >= 4.0 * patience * size / world.robot.max_speed:
+            return True  # out of the tight place there may be a plan that keeps its distance
         predicted = plan.object_poses
         if predicted is None or predicted.shape[1] != len(world.movables) or not predicted.size:
             return False

@@ -131,3 +131,31 @@ def test_yaml_files_cannot_run_code(tmp_path):
     with pytest.raises(SchemaError):
         load_world(tmp_path / "w.yaml")
     assert yaml.safe_load("a: 1") == {"a": 1}
+
+
+@pytest.mark.parametrize(
+    ("path", "value"),
+    [
+        ("static.bounds", [[1, 2], [3]]),
+        ("static.bounds", "wide"),
+        ("goal.kind", []),
+        ("robot.mass", 10**400),
+        ("movables.0.outline", [[1, 2], [3]]),
+        ("movables.0.mass", [1]),
+        ("movables.0.id", 2**70),
+        ("movables.0.twist", [[0, 0], [1]]),
+        ("static.segments.0.radius", "thick"),
+        ("robot.parts", [[[0, 0], [1]]]),
+    ],
+)
+def test_malformed_values_are_one_clear_error(path, value):
+    with pytest.raises(InvalidInputError):
+        world_from_dict(change(path, value))
+
+
+def test_nested_and_impossible_files(tmp_path):
+    (tmp_path / "deep.json").write_text("[" * 100_000)
+    (tmp_path / "date.yaml").write_text("time: 2001-99-99")
+    for name in ("deep.json", "date.yaml"):
+        with pytest.raises(SchemaError, match=name):
+            load_world(tmp_path / name)

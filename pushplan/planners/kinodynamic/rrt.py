@@ -60,7 +60,7 @@ class KinodynamicRRT:
             first_solution_s=search.first_solution_s,
             iterations=search.iterations,
             nodes=search.nodes,
-            detail={"trees": float(search.trees)},
+            detail={"trees": float(search.trees), "tight": float(search.tight)},
         )
         return PlanResult(status, search.plan() if status.has_plan else None, stats)
 

@@ -66,6 +66,7 @@ class Search:
         self.shape = footprint(world.robot)
         self.margin = 0.0
         self.rounds = 0
+        self.tight = False
         # crowded worlds are slow to sweep: look at the stop rule more often
         self.batch = max(1, 10 * config.batch // (10 + len(world.movables)))
         self.iterations = self.nodes = self.trees = 0
@@ -231,6 +232,7 @@ class Search:
         if np.isnan(self.first_solution_s) and self._solved(cost):
             self.first_solution_s = time.perf_counter() - self.began
         self.best_cost = cost
+        self.tight = self.rounds > 1
         self.best = Path(*(part[:count].copy() for part in path))
 
     def plan(self) -> Plan:
