@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import functools
 import heapq
 
 import numpy as np
 from numba import njit
 
-from pushplan.world import GoalDisc, World
-from pushplan.world.checks import BoolArray, FloatArray, IntArray
+from pushplan.world import GoalDisc, StaticMap, World
+from pushplan.world.checks import BoolArray, FloatArray, IntArray, frozen
 from pushplan.world.outline import flatten
 
 _SIDE = 96
@@ -130,14 +131,15 @@ def guide_path(world: World, push_weight: float) -> FloatArray:
     """
     robot, objects = world.robot, world.movables
     inner, outer = robot.inscribed_radius, robot.circumscribed_radius
-    walls = list(world.static.convex_parts)
-    boxes = [objects.outline_world(k) for k in range(len(objects))]
+    cell = _cell(world)
     # walls hold the inscribed disc for certain; the rest of the footprint is a matter of heading
-    reach = [inner] * len(walls) + [1.3 * outer] * len(walls) + [outer] * len(boxes)
+    walls = _wall_prices(world.static, cell, ((inner, np.inf), (1.3 * outer, 2.0)))
     # passing through the middle of a box pushes it for about a robot's width
     per_metre = push_weight * objects.masses / robot.mass
-    weight = [np.inf] * len(walls) + [2.0] * len(walls) + list(per_metre)
-    return _cheapest(world, [*walls, *walls, *boxes], reach, weight)
+    boxes = [objects.outline_world(k) for k in range(len(objects))]
+    reach = np.full(len(boxes), outer)
+    price = walls + _grid_prices(world.static.bounds, cell, boxes, reach, per_metre)
+    return _cheapest(world, price, cell)
 
 
 def reachable(world: World) -> bool:
@@ -149,30 +151,36 @@ def reachable(world: World) -> bool:
     inner = world.robot.inscribed_radius
     if cell > inner:
         return True  # too coarse to tell
-    walls = list(world.static.convex_parts)
     # a cell less than the disc: a narrow gap is left for the search to find out about
-    reach, weight = [inner - cell] * len(walls), [np.inf] * len(walls)
-    return len(_cheapest(world, walls, reach, weight)) > 0
+    price = _wall_prices(world.static, cell, ((inner - cell, np.inf),))
+    return len(_cheapest(world, price, cell)) > 0
 
 
-def _cheapest(
-    world: World, shapes: list[FloatArray], reach: list[float], weight: list[float]
+@functools.lru_cache(maxsize=16)
+def _wall_prices(
+    static: StaticMap, cell: float, terms: tuple[tuple[float, float], ...]
 ) -> FloatArray:
-    """The cheapest path over the grid where shapes raise the price within their reach."""
-    bounds, goal = world.static.bounds, world.navigation_goal
-    cell = _cell(world)
+    """Price per metre of each cell from walls alone, one term for each reach and weight."""
+    parts = list(static.convex_parts)
+    count = len(parts)
+    prices = [
+        _grid_prices(static.bounds, cell, parts, np.full(count, reach), np.full(count, weight))
+        for reach, weight in terms
+    ]
+    return frozen(np.sum(prices, axis=0))
+
+
+def _grid_prices(
+    bounds: FloatArray, cell: float, shapes: list[FloatArray], reach: FloatArray, weight: FloatArray
+) -> FloatArray:
     cols, rows = (int(np.ceil(side / cell)) for side in bounds[2:] - bounds[:2])
-    vertices, offsets = flatten(shapes)
-    price = _prices(
-        bounds[:2],
-        cell,
-        rows,
-        cols,
-        vertices,
-        offsets,
-        np.array(reach, dtype=np.float64),
-        np.array(weight, dtype=np.float64),
-    )
+    return _prices(bounds[:2], cell, rows, cols, *flatten(shapes), reach, weight)
+
+
+def _cheapest(world: World, price: FloatArray, cell: float) -> FloatArray:
+    """The cheapest path from the robot to the goal over a grid of prices."""
+    bounds, goal = world.static.bounds, world.navigation_goal
+    rows, cols = price.shape
     x = bounds[0] + (np.arange(cols) + 0.5) * cell
     y = bounds[1] + (np.arange(rows) + 0.5) * cell
     row, col = _cell_of(world.robot_pose[:2], bounds, cell, rows, cols)

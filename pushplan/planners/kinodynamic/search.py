@@ -66,7 +66,7 @@ class Search:
         self.shape = footprint(world.robot)
         self.margin = 0.0
         self.rounds = 0
-        self.tight = False
+        self.tight = self.sealed = False
         # crowded worlds are slow to sweep: look at the stop rule more often
         self.batch = max(1, 10 * config.batch // (10 + len(world.movables)))
         self.iterations = self.nodes = self.trees = 0
@@ -79,8 +79,6 @@ class Search:
         margin = start_margin(self.world, self.config.margin * self.size)
         if margin is None:
             return PlanStatus.START_BLOCKED
-        if not reachable(self.world):
-            return PlanStatus.GOAL_UNREACHABLE
         self.margin = margin
         self.shape = footprint(self.world.robot, margin)
         if self.goal.distance(*self.world.robot_pose[:2]) <= 0.0:
@@ -91,6 +89,8 @@ class Search:
             return PlanStatus.SOLVED
         while not self.stopped():
             self._one_round()
+            if self.sealed:
+                return PlanStatus.GOAL_UNREACHABLE
             if not self._solved(self.best_cost):
                 self._relax()
         return PlanStatus.SOLVED if self._solved(self.best_cost) else None
@@ -166,6 +166,9 @@ class Search:
                 return None  # the robot touches an object already: only pushing helps
         guide = guide_path(world, push_weight)
         if len(guide) == 0:
+            self.sealed = not reachable(world)
+            if self.sealed:
+                return None
             guide = self._exact_guide()
         last = self.iterations + budget
 
