@@ -1,0 +1,60 @@
+"""One policy on the variations of the maze that the suites leave out.
+
+    python benchmarks/maze_variations.py [POLICY] [SEEDS]
+
+Z-shape, crowds, wheeled boxes, random starts, testbed dimensions, wheel-speed actions.
+"""
+
+from __future__ import annotations
+
+import sys
+import time
+
+import numpy as np
+
+from pushplan.envs import make
+from pushplan.evaluation import run_episode
+from pushplan.metrics import navigation_scores
+from pushplan.planners import make_policy
+from pushplan.scenarios import Scenario
+
+CASES: tuple[tuple[str, str, dict[str, object]], ...] = (
+    ("benchmark", "turn_rate", {"shape": "z", "boxes": 10}),
+    ("benchmark", "turn_rate", {"shape": "u", "boxes": 20}),
+    ("benchmark", "turn_rate", {"shape": "u", "boxes": 10, "wheeled": 1.0}),
+    ("benchmark", "turn_rate", {"shape": "u", "boxes": 5, "random_start": True}),
+    ("benchmark", "wheels", {"shape": "u", "boxes": 5}),
+    ("testbed", "turn_rate", {"shape": "u", "boxes": 6}),
+    ("testbed", "turn_rate", {"shape": "z", "boxes": 10}),
+    ("testbed", "wheels", {"shape": "u", "boxes": 6}),
+)
+
+
+def main() -> None:
+    name = sys.argv[1] if len(sys.argv) > 1 else "kinodynamic-rrt"
+    seeds = int(sys.argv[2]) if len(sys.argv) > 2 else 20
+    for preset, action, variations in CASES:
+        rows, failures = [], []
+        began = time.perf_counter()
+        for seed in range(seeds):
+            scenario = Scenario("maze", preset=preset, variations=variations, seed=seed)
+            env = make(scenario, observation="state", action=action)
+            policy = make_policy(name)
+            episode = run_episode(env, policy, scenario)
+            scores = navigation_scores(episode)
+            plans = len(getattr(policy, "plan_log", ()))
+            rows.append((scores.success, scores.efficiency, scores.effort, plans))
+            if not episode.success:
+                failures.append(f"{seed}: {episode.reason}")
+        success, efficiency, effort, plans_mean = np.mean(rows, axis=0)
+        each = (time.perf_counter() - began) / seeds
+        print(
+            f"{preset} {action} {variations}: success {success:.2f}, E_nav {efficiency:.3f}, "
+            f"I_nav {effort:.3f}, {plans_mean:.1f} plans, {each:.2f} s an episode",
+            *failures,
+            sep="\n    failed seed ",
+        )
+
+
+if __name__ == "__main__":
+    main()
