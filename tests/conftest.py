@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import time
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 
@@ -71,6 +74,24 @@ def scattered_boxes(count: int, seed: int) -> np.ndarray:
         if not (wall or crowded or near_ends):
             found.append(np.array([*spot, 0.0]))
     return np.array(found).reshape(-1, 3)
+
+
+@pytest.fixture(scope="session")
+def warm() -> None:
+    """Compiled kernels, for tests that look at the clock."""
+    from pushplan.planners import warm_up
+
+    warm_up()
+
+
+def quickest(call: Callable[[], object], tries: int = 3) -> float:
+    """Least time of some calls [s]: what the machine's other work leaves of it."""
+    times = []
+    for _ in range(tries):
+        began = time.perf_counter()
+        call()
+        times.append(time.perf_counter() - began)
+    return min(times)
 
 
 @pytest.fixture

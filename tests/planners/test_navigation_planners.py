@@ -9,7 +9,7 @@ import time
 
 import numpy as np
 import pytest
-from conftest import make_boxes, make_robot, make_u_maze, scattered_boxes
+from conftest import make_boxes, make_robot, make_u_maze, quickest, scattered_boxes
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from shapely import LineString, Polygon
@@ -34,6 +34,8 @@ from pushplan.world import (
     World,
 )
 from pushplan.world.outline import transform
+
+pytestmark = pytest.mark.usefixtures("warm")
 
 BUDGET = MaxIterations(1200)
 QUICK = Deadline(5.0) | FirstSolution()
@@ -74,10 +76,8 @@ class TestEveryPlanner:
     def test_it_keeps_its_deadline(self, name):
         world = make_u_maze(scattered_boxes(10, 1))
         planner = make_planner(name)
-        planner.plan(world, stop=FirstSolution() | Deadline(5.0))  # compiled by now
-        began = time.perf_counter()
-        planner.plan(world, stop=Deadline(0.05))
-        assert time.perf_counter() - began < 0.05 + 0.06  # 10 ms, and a busy machine
+        took = quickest(lambda: planner.plan(world, stop=Deadline(0.05)))
+        assert took < 0.05 + 0.03  # 10 ms, and a busy machine
 
     def test_the_snapshot_is_left_alone(self, name, u_maze):
         before = hash(u_maze)
@@ -214,7 +214,6 @@ def test_hundreds_of_boxes_do_not_break_the_stop_rule():
     assert len(crowd) > 140
     world = make_u_maze(movables=crowd)
     planner = KinodynamicRRT()
-    planner.plan(world, stop=MaxIterations(50))
     began = time.perf_counter()
     result = planner.plan(world, stop=Deadline(1.0))
     assert time.perf_counter() - began < 1.3
