@@ -3,6 +3,7 @@
 from pushplan.geometry.convex import convex_distance, convex_overlap, convex_penetration
 from pushplan.geometry.distance_field import GeodesicField, geodesic_field, sample_values
 from pushplan.geometry.grid import Grid, clearance_field, occupancy
+from pushplan.geometry.obstacles import core_distance
 from pushplan.geometry.polygon import (
     point_in_polygon,
     polygon_area,
@@ -23,6 +24,7 @@ __all__ = [
     "convex_distance",
     "convex_overlap",
     "convex_penetration",
+    "core_distance",
     "fill_convex",
     "fill_convex_parts",
     "geodesic_field",

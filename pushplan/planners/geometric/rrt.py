@@ -9,7 +9,7 @@ import numpy as np
 from numba import njit
 from ompl import base, geometric
 
-from pushplan.geometry import point_in_polygon
+from pushplan.geometry import core_distance
 from pushplan.planners.kinodynamic.collision import Obstacles, obstacles
 from pushplan.planners.kinodynamic.timing import start_margin
 from pushplan.planners.ompl_lock import seeded_ompl
@@ -210,18 +210,9 @@ def _near(point: FloatArray, among: Obstacles, radius: float) -> bool:
         box = among.boxes[s]
         if x + radius < box[0] or x - radius > box[2] or y + radius < box[1] or y - radius > box[3]:
             continue
-        corners = among.vertices[among.offsets[s] : among.offsets[s + 1]]
-        if point_in_polygon(x, y, corners):
+        first, last = among.offsets[s], among.offsets[s + 1]
+        if core_distance(x, y, among.vertices, first, last) < radius:
             return True
-        count = corners.shape[0]
-        for i in range(count):
-            j = i + 1 if i + 1 < count else 0
-            ex, ey = corners[j, 0] - corners[i, 0], corners[j, 1] - corners[i, 1]
-            px, py = x - corners[i, 0], y - corners[i, 1]
-            t = min(max((px * ex + py * ey) / (ex * ex + ey * ey), 0.0), 1.0)
-            dx, dy = px - t * ex, py - t * ey
-            if dx * dx + dy * dy < radius * radius:
-                return True
     return False
 
 

@@ -8,6 +8,7 @@ import heapq
 import numpy as np
 from numba import njit
 
+from pushplan.geometry import core_distance
 from pushplan.world import GoalDisc, StaticMap, World
 from pushplan.world.checks import BoolArray, FloatArray, IntArray, frozen
 from pushplan.world.outline import flatten
@@ -16,24 +17,6 @@ _SIDE = 96
 """Cells along the longer side of the workspace, if that resolves the robot's own width."""
 _MOST = 400
 """Cells along the longer side at most."""
-
-
-@njit(cache=True, nogil=True)
-def _gap(x: float, y: float, corners: FloatArray) -> float:
-    """Distance [m] from a point to a convex polygon, 0 inside."""
-    inside = True
-    best = np.inf
-    count = corners.shape[0]
-    for i in range(count):
-        j = i + 1 if i + 1 < count else 0
-        ex, ey = corners[j, 0] - corners[i, 0], corners[j, 1] - corners[i, 1]
-        px, py = x - corners[i, 0], y - corners[i, 1]
-        if ex * py - ey * px < 0.0:
-            inside = False
-        t = min(max((px * ex + py * ey) / (ex * ex + ey * ey), 0.0), 1.0)
-        dx, dy = px - t * ex, py - t * ey
-        best = min(best, dx * dx + dy * dy)
-    return 0.0 if inside else np.sqrt(best)
 
 
 @njit(cache=True, nogil=True)
@@ -62,7 +45,7 @@ def _prices(
         for r in range(max(r0, 0), min(r1, rows)):
             for c in range(max(c0, 0), min(c1, cols)):
                 x, y = origin[0] + (c + 0.5) * cell, origin[1] + (r + 0.5) * cell
-                gap = _gap(x, y, corners)
+                gap = max(core_distance(x, y, vertices, offsets[k], offsets[k + 1]), 0.0)
                 if gap < far:
                     price[r, c] += weight[k] * (1.0 - gap / far)
     return price
