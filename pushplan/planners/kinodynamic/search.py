@@ -11,6 +11,7 @@ from pushplan.geometry import VisibilityGraph
 from pushplan.interaction import QuasiStatic
 from pushplan.planners.kinodynamic.collision import footprint, is_free, obstacles
 from pushplan.planners.kinodynamic.config import KinodynamicRRTConfig
+from pushplan.planners.kinodynamic.dubins import step_along
 from pushplan.planners.kinodynamic.guide import guide_path, reachable
 from pushplan.planners.kinodynamic.improve import (
     Path,
@@ -191,9 +192,11 @@ class Search:
         if arcs is None:
             return None
         self.nodes += len(arcs)
-        capacity = 3 * int(arcs[:, 0].sum() / self.pricing.spacing + len(arcs)) + 200
+        steps = [length / step_along(bend, self.pricing.spacing) for length, bend in arcs.tolist()]
+        capacity = 3 * int(sum(steps) + len(arcs)) + 200
         path = make_path(capacity, len(world.movables))
         count = lay_out(world.robot_pose, arcs, path, self.pricing)
+        assert count > 0  # there is room for three times as many poses
         path.objects[0] = world.movables.poses
         cost = price_from(path, 0, count, np.inf, self.pricing, self.bodies, self.settings)
         self._keep(path, count, cost)
