@@ -340,7 +340,7 @@ def robot_held(pose: FloatArray, bodies: Bodies, settings: Settings, scratch: Sc
 @njit(cache=True, nogil=True)
 def sweep_path(
     path: FloatArray, poses: FloatArray, bodies: Bodies, settings: Settings, out: FloatArray
-) -> tuple[float, int]:
+) -> int:
     """Sweep the robot along a path; the compiled heart of `QuasiStatic.sweep`.
 
     Args:
@@ -348,28 +348,20 @@ def sweep_path(
         poses: (K, 3) poses of the objects, changed in place.
         bodies: shapes and masses.
         settings: numerical settings.
-        out: (N, K, 3) receives the poses at each path pose; (0, K, 3) if they are not wanted.
+        out: (N, K, 3) receives the poses at each path pose.
 
     Returns:
-        Work, sum of mass times path length [kg m], and the first pose that is not reached or -1.
+        The first pose that is not reached, or -1.
     """
     scratch = make_scratch(bodies)
     lengths = np.zeros(poses.shape[0])
-    keep = out.shape[0] > 0
     jammed = -1
-    if keep:
-        out[0] = poses
+    out[0] = poses
     for n in range(1, path.shape[0]):
         if jammed < 0 and (
             robot_held(path[n], bodies, settings, scratch)
             or not advance(path[n - 1], path[n], poses, lengths, bodies, settings, scratch)
         ):
             jammed = n
-        if keep:
-            out[n] = poses
-        elif jammed >= 0:
-            break
-    work = 0.0
-    for k in range(lengths.shape[0]):
-        work += lengths[k] / bodies.inverse_masses[k]
-    return work, jammed
+        out[n] = poses
+    return jammed

@@ -73,7 +73,7 @@ class QuasiStatic:
             raise InvalidInputError("path must hold at least one pose, got none")
         poses = world.movables.poses.copy()
         out = np.empty((len(robot_path), len(poses), 3))
-        _, jammed = sweep_path(robot_path, poses, self.bodies(world), self.settings(world), out)
+        jammed = sweep_path(robot_path, poses, self.bodies(world), self.settings(world), out)
         return Interaction(out, world.movables.masses, int(jammed))
 
 

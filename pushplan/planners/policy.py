@@ -77,27 +77,24 @@ class PlanFollower:
         self.replanning = Replanning() if replanning is None else replanning
         self.interaction = QuasiStatic() if interaction is None else interaction
         self.stop = stop
+        self._progress: Progress | None = None
+        self._forget(np.random.default_rng(0))
+
+    def reset(self, world: World, rng: np.random.Generator) -> None:
+        """Forget the last episode."""
+        self._forget(rng)
+        self._progress = Progress(window=2.0 * world.robot.circumscribed_radius)
+
+    def _forget(self, rng: np.random.Generator) -> None:
         self.plan_log: list[PlanResult] = []
         """Every planning call since the last reset."""
         self.current_plan: Plan | None = None
-        self._rng = np.random.default_rng(0)
+        self._rng = rng
         self._planned_at = -np.inf
         self._planned_from = np.full(2, np.nan)
         self._planned_ids = np.zeros(0, dtype=np.int64)
         self._tight = False
         self._in_vain = 0
-        self._progress: Progress | None = None
-
-    def reset(self, world: World, rng: np.random.Generator) -> None:
-        """Forget the last episode."""
-        self.plan_log = []
-        self.current_plan = None
-        self._rng = rng
-        self._planned_at = -np.inf
-        self._planned_from = np.full(2, np.nan)
-        self._in_vain = 0
-        self._tight = False
-        self._progress = Progress(window=2.0 * world.robot.circumscribed_radius)
 
     def act(self, world: World, observation: Any = None) -> Twist:
         """The twist for this step; plans first where that is necessary."""
@@ -112,9 +109,8 @@ class PlanFollower:
             self._planned_at, self._planned_from = world.time, world.robot_pose[:2]
             self._planned_ids = world.movables.ids
             if result.plan is not None:
-                self._tight = result.stats.detail.get("tight", 0.0) > 0.0
-            if result.plan is not None:
                 self.current_plan = result.plan
+                self._tight = result.stats.detail.get("tight", 0.0) > 0.0
         if self.current_plan is None or self._in_vain > 3:
             away = back_off(world)
             if away is not None:
