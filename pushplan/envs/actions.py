@@ -10,27 +10,27 @@ import numpy as np
 from gymnasium.spaces import Box
 from numpy.typing import ArrayLike, NDArray
 
-from pushplan.world import Action, Drive, InvalidInputError, RobotModel, Twist, WheelSpeeds, World
+from pushplan.envs.tasks.base import Task
+from pushplan.world import Action, InvalidInputError, Twist, WheelSpeeds, World
 from pushplan.world.checks import FloatArray
 
-Motion = Callable[[World], Twist | None]
-"""Asked before every control step of one action: the next command, or None when it is done."""
+Motion = Callable[[FloatArray], Twist | None]
+"""Asked before every control step of one action, with the robot's pose (3,): the next command, or
+None when the action is done."""
 
 
 class ActionMode(ABC):
     """One way to command a robot. Actions are arrays in ``[-1, 1]``; others are clipped to it.
 
     Args:
-        robot: the robot that is driven, with its limits.
+        task: whose robot is driven, with its limits.
     """
 
-    drive: ClassVar[Drive]
-    """How a robot driven this way may move."""
     size: ClassVar[int]
     """Number of elements of an action."""
 
-    def __init__(self, robot: RobotModel) -> None:
-        self.robot = robot
+    def __init__(self, task: Task) -> None:
+        self.robot = task.robot
 
     @property
     def space(self) -> Box:
@@ -88,13 +88,12 @@ class ActionMode(ABC):
 def _once(command: Twist) -> Motion:
     """A motion of one control step."""
     commands = iter((command,))
-    return lambda world: next(commands, None)
+    return lambda robot_pose: next(commands, None)
 
 
 class TurnRateAction(ActionMode):
     """Turn rate at constant speed: one element, times ``robot.max_turn_rate``."""
 
-    drive = Drive.CONSTANT_SPEED
     size = 1
 
     def start(self, action: FloatArray, world: World) -> Motion:
@@ -108,7 +107,6 @@ class TurnRateAction(ActionMode):
 class VelocityAction(ActionMode):
     """Forward speed and turn rate of a differential drive, times the robot's limits."""
 
-    drive = Drive.DIFFERENTIAL
     size = 2
 
     def start(self, action: FloatArray, world: World) -> Motion:
@@ -129,7 +127,6 @@ class WheelsAction(ActionMode):
     the mean of the two, the forward speed, is kept.
     """
 
-    drive = Drive.DIFFERENTIAL
     size = 2
 
     def start(self, action: FloatArray, world: World) -> Motion:

@@ -13,22 +13,28 @@ from numpy.typing import ArrayLike, NDArray
 from pushplan.envs.actions import ActionMode
 from pushplan.envs.registry import ACTIONS, SIMULATORS, TASKS, look_up
 from pushplan.envs.simulators.base import Simulator
-from pushplan.envs.tasks.base import ObservationBuilder, Task
+from pushplan.envs.tasks.base import ObservationBuilder, Outcome, Task
 from pushplan.envs.trace import Trace
 from pushplan.envs.window import Window, has_display
 from pushplan.scenarios import Scenario
 from pushplan.world import (
     Action,
+    ClearanceArea,
     InvalidInputError,
     MissingDependencyError,
+    Movables,
     PushplanError,
+    Receptacle,
+    ScenarioError,
     UnknownNameError,
     World,
     stream,
 )
-from pushplan.world.checks import frozen
+from pushplan.world.checks import IntArray, frozen
 
-RENDER_MODES = ("human", "rgb_array")
+RENDER_MODES = ("human", "rgb_array", "camera")
+CAMERA_SIZE = (640, 480)
+"""Width and height of a camera picture [px]."""
 _SEED_LIMIT = 2**31
 
 
@@ -42,20 +48,24 @@ class PushEnv(gymnasium.Env[NDArray[Any], NDArray[Any]]):
     Args:
         task: name of the task.
         simulator: name of the simulator.
-        preset: set of dimensions of the task.
+        preset: set of dimensions of the task; the first that suits the simulator if None.
         variations: what departs from the preset, by name.
-        observation: name of the observation.
+        observation: name of one of the task's observations, or a builder of one's own; the
+            task's first if None.
         action: name of the action mode; the task's first if None.
-        render_mode: ``"rgb_array"``, ``"human"`` (a window) or None.
+        render_mode: ``"rgb_array"`` (a drawing from above), ``"camera"`` (the simulator's own
+            camera), ``"human"`` (a window) or None.
         seed: of the first episode, where `reset` is given none.
 
     ``info`` of each step holds ``success`` (bool), ``reason`` (why the episode has ended, else
-    ``""``), ``work`` (mass times path length of the objects in this step [kg m]) and ``held``
-    (whether something kept the robot from moving as commanded).
+    ``""``), ``work`` (mass times path length of the objects in this step [kg m]), ``held``
+    (whether something kept the robot from moving as commanded) and, where the goal is one for the
+    objects, ``completed`` ((K,) bool, whether the sub-task of each object is done).
 
     Raises:
         UnknownNameError: if a name is unknown; the message lists the valid ones.
-        ScenarioError: if the value of a variation makes no sense.
+        ScenarioError: if the value of a variation makes no sense, or if the simulator needs a
+            third dimension that the preset has not.
         MissingDependencyError: if there is no display for a window.
     """
 
@@ -64,9 +74,9 @@ class PushEnv(gymnasium.Env[NDArray[Any], NDArray[Any]]):
         *,
         task: str,
         simulator: str = "pymunk",
-        preset: str = "benchmark",
+        preset: str | None = None,
         variations: Mapping[str, object] | None = None,
-        observation: str = "image",
+        observation: str | ObservationBuilder | None = None,
         action: str | None = None,
         render_mode: str | None = None,
         seed: int | None = None,
@@ -77,12 +87,21 @@ class PushEnv(gymnasium.Env[NDArray[Any], NDArray[Any]]):
         if action not in task_class.actions:
             raise UnknownNameError(f"action of task {task!r}", action, task_class.actions)
         mode: type[ActionMode] = look_up("action", ACTIONS, action)
-        self.metadata = _metadata()
-        self.render_mode = _checked_render_mode(render_mode)
-        self.task = task_class(preset=preset, variations=variations or {}, drive=mode.drive)
-        self._builder = self.task.observation(observation)
+        if preset is None:
+            preset = (task_class.solid_presets if engine.needs_solids else task_class.presets)[0]
+        self.metadata = _metadata(engine)
+        self.render_mode = _checked_render_mode(render_mode, engine)
+        self.task = task_class(preset=preset, variations=variations or {}, action=action)
+        if engine.needs_solids and self.task.materials.solids is None:
+            raise ScenarioError(
+                f"{task}: simulator {simulator!r} needs a third dimension, which preset "
+                f"{preset!r} has not (valid: {', '.join(task_class.solid_presets)})"
+            )
+        if observation is None or isinstance(observation, str):
+            observation = self.task.observation(observation or task_class.observations[0])
+        self._builder: ObservationBuilder = observation
         self._simulator = engine()
-        self._mode = mode(self.task.robot)
+        self._mode = mode(self.task)
         self._window: Window | None = None
         self._first_seed = seed
         self._world: World | None = None
@@ -137,12 +156,16 @@ class PushEnv(gymnasium.Env[NDArray[Any], NDArray[Any]]):
         world = self.task.start(stream(layout, "layout"))
         self._simulator.build(world, self.task.materials)
         self._world = world
+        self._roster = _Roster(world.movables)
         self._trace = Trace(
             frozen(np.array([world.time])), world.robot_pose[None], world.movables.poses[None]
         )
         self._over = ""
         self._show()
-        return self._builder.observe(world), _info(False, "", 0.0, False)
+        info = _info(Outcome(0.0, False, "", False, False), 0.0, False)
+        if isinstance(world.goal, Receptacle | ClearanceArea):
+            info["completed"] = np.zeros(len(world.movables), dtype=bool)
+        return self._builder.observe(world), info
 
     def step(self, action: ArrayLike) -> tuple[NDArray[Any], float, bool, bool, dict[str, Any]]:
         """Carry out one action.
@@ -156,32 +179,40 @@ class PushEnv(gymnasium.Env[NDArray[Any], NDArray[Any]]):
         """
         if self._over:
             raise EpisodeOverError(f"{self._over}: call reset() before step()")
-        before = self.world
+        before, simulator, roster = self.world, self._simulator, self._roster
         motion = self._mode.start(self._mode.read(action), before)
-        world, traces = before, []
+        traces = []
         touched = held = False
-        while (command := motion(world)) is not None:
-            traces.append(self._simulator.step(command, self.task.control_step))
-            world = self._simulator.world()
-            touched |= self._simulator.touched_static
-            held |= self._simulator.held
-        self._world, self._trace = world, Trace.join(traces)
-        outcome = self.task.score(before, world, self._trace, touched_static=touched)
+        while (command := motion(simulator.robot_pose)) is not None:
+            traces.append(roster.widen(simulator.step(command, self.task.control_step)))
+            touched |= simulator.touched_static
+            held |= simulator.held
+            if self.task.objects_leave:
+                gone = self.task.leaving(roster.present, simulator.object_poses)
+                if len(gone):
+                    simulator.remove(gone.tolist())
+                    roster.drop(gone)
+        after = simulator.world()
+        self._world, self._trace = after, Trace.join(traces)
+        work = roster.work(self._trace)
+        outcome = self.task.score(before, after, work=work, touched_static=touched)
         if outcome.terminated or outcome.truncated:
             self._over = f"the episode has ended ({outcome.reason})"
         self._show()
         return (
-            self._builder.observe(world),
+            self._builder.observe(after),
             outcome.reward,
             outcome.terminated,
             outcome.truncated,
-            _info(outcome.success, outcome.reason, outcome.work, held),
+            _info(outcome, work, held),
         )
 
     def render(self) -> NDArray[np.uint8] | None:
         """The scene now as (H, W, 3) uint8; None in ``"human"`` mode, which draws by itself."""
         if self.render_mode == "rgb_array":
             return _picture(self.world)
+        if self.render_mode == "camera":
+            return self._simulator.photograph(*CAMERA_SIZE)
         self._show()
         return None
 
@@ -198,10 +229,43 @@ class PushEnv(gymnasium.Env[NDArray[Any], NDArray[Any]]):
             self._window.show(_picture(self.world))
 
 
+class _Roster:
+    """The objects of the start, some of which may have left the floor."""
+
+    def __init__(self, movables: Movables) -> None:
+        self.present: IntArray = movables.ids
+        self._poses = np.array(movables.poses)
+        self._before = self._poses
+        self._masses = movables.masses
+        self._rows = np.arange(len(movables))
+        self._ids = movables.ids
+
+    def widen(self, trace: Trace) -> Trace:
+        """The trace of all objects of the start; one that has left keeps its last pose."""
+        if len(self.present) == len(self._ids):
+            self._poses = trace.object_poses[-1]
+            return trace
+        poses = np.repeat(self._poses[None], len(trace.times), axis=0)
+        poses[:, self._rows] = trace.object_poses
+        self._poses = poses[-1]
+        return Trace(trace.times, trace.robot_poses, frozen(poses))
+
+    def drop(self, ids: IntArray) -> None:
+        """Objects have left the floor."""
+        self._rows = self._rows[~np.isin(self.present, ids)]
+        self.present = self._ids[self._rows]
+
+    def work(self, trace: Trace) -> float:
+        """Mass times path length [kg m] since the last call."""
+        lengths = trace.object_lengths(self._before)
+        self._before = self._poses
+        return float(self._masses @ lengths)
+
+
 def make(
     scenario: Scenario,
     *,
-    observation: str = "image",
+    observation: str | ObservationBuilder | None = None,
     action: str | None = None,
     render_mode: str | None = None,
 ) -> PushEnv:
@@ -209,9 +273,9 @@ def make(
 
     Args:
         scenario: what to run.
-        observation: name of the observation.
+        observation: name of one of the task's observations, or a builder; its first if None.
         action: name of the action mode; the task's first if None.
-        render_mode: ``"rgb_array"``, ``"human"`` or None.
+        render_mode: ``"rgb_array"``, ``"camera"``, ``"human"`` or None.
     """
     return PushEnv(
         task=scenario.task,
@@ -229,8 +293,8 @@ def make_env(
     *,
     task: str,
     simulator: str = "pymunk",
-    preset: str = "benchmark",
-    observation: str = "image",
+    preset: str | None = None,
+    observation: str | ObservationBuilder | None = None,
     action: str | None = None,
     render_mode: str | None = None,
     **variations: object,
@@ -265,21 +329,30 @@ def _picture(world: World) -> NDArray[np.uint8]:
     return draw_world(world)
 
 
-def _info(success: bool, reason: str, work: float, held: bool) -> dict[str, Any]:
-    return {"success": success, "reason": reason, "work": work, "held": held}
+def _info(outcome: Outcome, work: float, held: bool) -> dict[str, Any]:
+    info = {"success": outcome.success, "reason": outcome.reason, "work": work, "held": held}
+    return info if outcome.completed is None else {**info, "completed": outcome.completed}
 
 
-def _metadata() -> dict[str, Any]:
-    """Render modes that work here: a window needs a display."""
-    modes = list(RENDER_MODES) if has_display() else ["rgb_array"]
+def _metadata(engine: type[Simulator]) -> dict[str, Any]:
+    """Render modes that work here: a window needs a display, a camera an engine with one."""
+    modes = ["rgb_array"]
+    if has_display():
+        modes.append("human")
+    if engine.has_camera:
+        modes.append("camera")
     return {"render_modes": modes, "render_fps": 10}
 
 
-def _checked_render_mode(render_mode: str | None) -> str | None:
+def _checked_render_mode(render_mode: str | None, engine: type[Simulator]) -> str | None:
     if render_mode is not None and render_mode not in RENDER_MODES:
         raise UnknownNameError("render mode", render_mode, RENDER_MODES)
     if render_mode == "human" and not has_display():
         raise MissingDependencyError(
             "render mode 'human' needs tkinter and a display; 'rgb_array' works without"
+        )
+    if render_mode == "camera" and not engine.has_camera:
+        raise MissingDependencyError(
+            f"simulator {engine.name!r} has no camera; render mode 'rgb_array' draws the scene"
         )
     return render_mode

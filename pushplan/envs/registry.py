@@ -16,6 +16,8 @@ SIMULATORS: Mapping[str, str] = {
 }
 ACTIONS: Mapping[str, str] = {
     "turn_rate": "pushplan.envs.actions:TurnRateAction",
+    "heading": "pushplan.envs.drive_actions:HeadingAction",
+    "waypoint": "pushplan.envs.drive_actions:WaypointAction",
     "velocity": "pushplan.envs.actions:VelocityAction",
     "wheels": "pushplan.envs.actions:WheelsAction",
 }

@@ -1,18 +1,54 @@
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pushplan.envs.actions import TurnRateAction, VelocityAction, WheelsAction
 from pushplan.envs.registry import ACTIONS, look_up
+from pushplan.envs.tasks.base import drive_of
 from pushplan.envs.tasks.maze_presets import PRESETS
-from pushplan.world import InvalidInputError, Twist, UnknownNameError, WheelSpeeds
+from pushplan.world import (
+    GoalDisc,
+    InvalidInputError,
+    Movables,
+    StaticMap,
+    Twist,
+    UnknownNameError,
+    WheelSpeeds,
+    World,
+)
 
 unit = st.floats(-1.0, 1.0, width=32)
 
 
-def mode(cls, preset="testbed"):
-    return cls(PRESETS[preset].robot(cls.drive))
+VELOCITIES = ("turn_rate", "velocity", "wheels")
+ROOM = StaticMap.build(
+    polygons=[[(1.0, -1.0), (1.2, -1.0), (1.2, 0.6), (1.0, 0.6)]], bounds=(-3.0, -3.0, 3.0, 3.0)
+)
+
+
+def mode(name, preset="testbed"):
+    robot = PRESETS[preset].robot(drive_of(name))
+    task = SimpleNamespace(robot=robot, heading_step=0.5, waypoint_window=4.0, control_step=0.15)
+    return look_up("action", ACTIONS, name)(task)
+
+
+def driven(name, action, pose, static=ROOM):
+    """Poses of a robot that does exactly as told."""
+    m = mode(name)
+    world = World(m.robot, np.array(pose), static, Movables.empty(), GoalDisc((2.5, 2.5), 0.1))
+    motion = m.start(m.read(action), world)
+    poses = [np.array(pose, dtype=float)]
+    while (twist := motion(poses[-1])) is not None:
+        poses.append(advanced(poses[-1], twist, 0.15))
+    return np.array(poses)
+
+
+def advanced(pose, twist, h):
+    middle = pose[2] + 0.5 * twist.angular * h
+    step = np.sinc(0.5 * twist.angular * h / np.pi) * twist.linear * h
+    return pose + np.array([step * np.cos(middle), step * np.sin(middle), twist.angular * h])
 
 
 def command(m, values):
@@ -22,10 +58,10 @@ def command(m, values):
     return twist
 
 
-@pytest.mark.parametrize("name", ACTIONS)
+@pytest.mark.parametrize("name", VELOCITIES)
 @given(a=unit, b=unit)
 def test_commands_keep_the_limits_and_come_back(name, a, b):
-    m = mode(look_up("action", ACTIONS, name))
+    m = mode(name)
     values = np.array([a, b][: m.size], dtype=np.float32)
     twist = command(m, values)
     assert abs(twist.linear) <= m.robot.max_speed * (1 + 1e-9)
@@ -36,11 +72,11 @@ def test_commands_keep_the_limits_and_come_back(name, a, b):
 
 
 def test_turn_rate_scales_and_keeps_speed():
-    assert command(mode(TurnRateAction, "benchmark"), [0.5]) == Twist(0.15, 0.0525)
+    assert command(mode("turn_rate", "benchmark"), [0.5]) == Twist(0.15, 0.0525)
 
 
 def test_wheels_are_rim_speeds():
-    m = mode(WheelsAction)
+    m = mode("wheels")
     assert m.encode(WheelSpeeds(0.1, 0.1)) == pytest.approx([0.5, 0.5])
     assert command(m, [0.5, 0.6]).angular == pytest.approx(0.02 / 0.16)
     spin = command(m, [-1.0, 1.0])
@@ -48,7 +84,7 @@ def test_wheels_are_rim_speeds():
 
 
 def test_too_fast_a_curve_keeps_its_radius():
-    m = mode(WheelsAction)
+    m = mode("wheels")
     twist = command(m, m.encode(Twist(0.2, 0.5)))
     assert twist.linear < 0.2
     assert twist.linear / twist.angular == pytest.approx(0.4, rel=1e-5)
@@ -56,7 +92,7 @@ def test_too_fast_a_curve_keeps_its_radius():
 
 @pytest.mark.parametrize("name", ACTIONS)
 def test_bad_actions_are_refused(name):
-    m = mode(look_up("action", ACTIONS, name))
+    m = mode(name)
     for bad in (np.zeros(m.size + 1), 0.0, np.zeros((1, m.size)), ["a"] * m.size, None):
         with pytest.raises(InvalidInputError, match="shape"):
             m.read(bad)
@@ -67,9 +103,43 @@ def test_bad_actions_are_refused(name):
 
 
 def test_velocity_reverses():
-    assert command(mode(VelocityAction), [-1.0, 0.0]).linear == -0.2
+    assert command(mode("velocity"), [-1.0, 0.0]).linear == -0.2
 
 
 def test_unknown_names_list_the_choices():
     with pytest.raises(UnknownNameError, match="did you mean 'wheels'"):
         look_up("action", ACTIONS, "wheel")
+
+
+@pytest.mark.parametrize("turn", [0.0, 0.25, -0.5, 1.0])
+def test_heading_drives_its_distance_relative_to_the_robot(turn):
+    poses = driven("heading", [turn], (-1.0, 0.0, 0.3))
+    heading = 0.3 + turn * np.pi
+    ahead = np.array([-1.0 + 0.5 * np.cos(heading), 0.5 * np.sin(heading)])
+    np.testing.assert_allclose(poses[-1, :2], ahead, atol=0.005)
+    straight = np.hypot(*np.diff(poses[:, :2], axis=0).T).sum()
+    assert straight == pytest.approx(0.5, abs=0.005)
+
+
+def test_waypoint_goes_around_what_is_static():
+    # two metres ahead, behind the column that reaches from y = -1 to 0.6
+    poses = driven("waypoint", [1.0, 0.0], (0.0, 0.0, 0.0))
+    np.testing.assert_allclose(poses[-1, :2], (2.0, 0.0), atol=0.01)
+    over = poses[(poses[:, 0] > 1.0) & (poses[:, 0] < 1.2)]
+    assert len(over) > 0 and (over[:, 1] > 0.6).all()
+
+
+def test_waypoint_that_cannot_be_reached_ends_where_the_robot_is_stopped():
+    m = mode("waypoint")
+    world = World(m.robot, np.zeros(3), ROOM, Movables.empty(), GoalDisc((2.5, 2.5), 0.1))
+    motion = m.start(m.read([0.55, 0.0]), world)  # inside the column
+    calls = 0
+    while motion(np.zeros(3)) is not None:  # something holds the robot
+        calls += 1
+    assert calls < 10
+
+
+@pytest.mark.parametrize("name", ["heading", "waypoint"])
+def test_places_take_no_velocities(name):
+    with pytest.raises(InvalidInputError, match="takes no velocities"):
+        mode(name).encode(Twist(0.1, 0.0))

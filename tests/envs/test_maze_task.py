@@ -5,16 +5,15 @@ import pytest
 import shapely
 
 from pushplan.envs.tasks.maze import MazeTask
-from pushplan.envs.trace import Trace
 from pushplan.geometry.distance_field import geodesic_field
-from pushplan.world import Drive, ScenarioError, UnknownNameError, stream
+from pushplan.world import ScenarioError, UnknownNameError, stream
 
 PRESETS = ("benchmark", "testbed")
 SHAPES = ("u", "z")
 
 
-def task(preset="benchmark", drive=Drive.CONSTANT_SPEED, **variations):
-    return MazeTask(preset=preset, variations=variations, drive=drive)
+def task(preset="benchmark", action="turn_rate", **variations):
+    return MazeTask(preset=preset, variations=variations, action=action)
 
 
 def obstacles(static):
@@ -114,15 +113,11 @@ def test_layout_depends_on_the_seed_alone():
     assert one.movables.wheeled.sum() == 4
 
 
-def still(world, time):
-    return Trace(np.array([time]), world.robot_pose[None], world.movables.poses[None])
-
-
 def test_rewards_by_hand():
     maze = task(boxes=2)
     before = maze.start(stream(0, "layout"))
     after = before.moved(robot_pose=(11.25, 3.87, np.pi / 2), time=0.8)
-    ahead = maze.score(before, after, still(after, 0.8), touched_static=False)
+    ahead = maze.score(before, after, work=0.0, touched_static=False)
     # from (11.25, 3.75) the way leads over the wall's round end at (7.5, 10), radius 0.5: straight
     # up it gets shorter by nearly cos(30 deg) of the way driven
     way = maze.field.exact(11.25, 3.75)
@@ -130,35 +125,26 @@ def test_rewards_by_hand():
     gain = way - maze.field.exact(11.25, 3.87)
     assert 0.1 < gain < 0.12
     assert ahead.reward == pytest.approx(150.0 * gain / farthest, rel=0.02)
-    assert not (ahead.terminated or ahead.truncated or ahead.success) and ahead.work == 0.0
+    assert not (ahead.terminated or ahead.truncated or ahead.success)
 
-    there = before.movables.poses + np.array([[0.3, 0.4, 0.0], [0.0, 0.0, 0.0]])
-    trace = Trace(
-        np.array([0.4, 0.8]),
-        np.stack([before.robot_pose] * 2),
-        np.stack([there, before.movables.poses]),
-    )
-    moved = maze.score(before, before, trace, touched_static=False)
-    assert moved.work == pytest.approx(1.0)  # there and back: length counts
+    moved = maze.score(before, before, work=1.0, touched_static=False)
     assert moved.reward == pytest.approx(-1.5)
 
 
 def test_ends_of_an_episode():
     maze = task(boxes=0)
     before = maze.start(stream(0, "layout"))
-    wall = maze.score(before, before, still(before, 1.0), touched_static=True)
+    wall = maze.score(before, before, work=0.0, touched_static=True)
     assert (wall.reason, wall.success, wall.terminated) == ("wall", False, True)
     assert wall.reward == pytest.approx(-50.0)
     for distance, success in ((1.855, True), (1.865, False)):
         inside = before.moved(robot_pose=(3.75 + distance, 3.75, 0.0))
-        outcome = maze.score(inside, inside, still(inside, 1.0), touched_static=False)
+        outcome = maze.score(inside, inside, work=0.0, touched_static=False)
         assert outcome.success is success and outcome.terminated is success
         assert outcome.reward == pytest.approx(200.0 if success else 0.0)
         assert outcome.reason == ("goal" if success else "")
     maze.start(stream(0, "layout"))
-    outcomes = [
-        maze.score(before, before, still(before, 1.0), touched_static=False) for _ in range(400)
-    ]
+    outcomes = [maze.score(before, before, work=0.0, touched_static=False) for _ in range(400)]
     assert [outcome.truncated for outcome in outcomes] == [False] * 399 + [True]
     assert outcomes[-1].reason == "time_limit" and not outcomes[-1].terminated
 
@@ -181,7 +167,7 @@ def test_bad_variations_are_refused(bad, error, text):
     with pytest.raises(error, match=text):
         task(**bad)
     with pytest.raises(UnknownNameError, match="did you mean 'benchmark'"):
-        MazeTask(preset="benchmrk", variations={}, drive=Drive.CONSTANT_SPEED)
+        MazeTask(preset="benchmrk", variations={}, action="turn_rate")
 
 
 def test_bumper_friction_is_a_parameter():

@@ -238,12 +238,12 @@ def test_follow_reports_poses_and_the_jam():
 
 def test_removed_object_is_gone():
     simulator = built(make_world([(1.5, 0.0, 0.0), (3.5, 0.0, 0.0)]))
-    simulator.remove(0)
+    simulator.remove([0])
     assert simulator.world().movables.ids.tolist() == [1]
     simulator.step(Twist(0.15, 0.0), 4.0)
     assert simulator.world().movables.poses[0, 0] == 3.5
-    with pytest.raises(InvalidInputError, match=r"no object 7 \(valid: \[1\]\)"):
-        simulator.remove(7)
+    with pytest.raises(InvalidInputError, match=r"\[7\], valid ids: \[1\]"):
+        simulator.remove([7])
 
 
 def test_overlaps_in_a_perceived_scene_do_not_hold_the_robot():

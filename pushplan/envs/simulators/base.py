@@ -3,19 +3,47 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, field, fields
+from typing import ClassVar
 
-from numpy.typing import ArrayLike
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
+from pushplan.envs.simulators.water import Water
 from pushplan.envs.trace import Trace
 from pushplan.interaction.model import Interaction
 from pushplan.world import Twist, World
-from pushplan.world.checks import ArrayRecord, FloatArray, number
+from pushplan.world.checks import ArrayRecord, FloatArray, frozen, number
+
+
+@dataclass(frozen=True)
+class Solids:
+    """The third dimension of a scene, for engines that have one.
+
+    Args:
+        object_height: of boxes or floes [m].
+        robot_height: of the robot's body [m].
+        wall_height: of everything static [m].
+        bumper_height: of the footprint parts of the robot other than its first one [m].
+        wheel_radius: of the robot's driven wheels [m].
+    """
+
+    object_height: float
+    robot_height: float
+    wall_height: float
+    bumper_height: float
+    wheel_radius: float
+
+    def __post_init__(self) -> None:
+        for item in fields(self):
+            value = number(item.name, getattr(self, item.name), low=0.0, open_low=True)
+            object.__setattr__(self, item.name, value)
 
 
 @dataclass(frozen=True)
 class Materials:
-    """How bodies grip and roll, in terms that every engine understands.
+    """How bodies grip, roll and float, in terms that every engine understands.
 
     Args:
         robot_object: friction coefficient between the robot's bumper and an object.
@@ -23,15 +51,23 @@ class Materials:
         object_static: friction coefficient between an object and a wall.
         rolling_time: time constant [s] of the exponential decay of a wheeled object's velocity
             once nothing pushes it; it rolls on for speed times this.
+        object_ground: sliding friction coefficient between a plain object and the ground. Planar
+            engines stop plain objects at once instead.
+        water: drag of floating bodies; None on dry ground.
+        solids: the third dimension; None where the scene has none, and three-dimensional engines
+            refuse it.
     """
 
     robot_object: float = 0.0
     object_object: float = 0.0
     object_static: float = 0.0
     rolling_time: float = 1.0
+    object_ground: float = 0.4
+    water: Water | None = None
+    solids: Solids | None = None
 
     def __post_init__(self) -> None:
-        for key in ("robot_object", "object_object", "object_static"):
+        for key in ("robot_object", "object_object", "object_static", "object_ground"):
             value = number(f"friction {key}", getattr(self, key), low=0.0)
             object.__setattr__(self, key, value)
         rolling = number("rolling_time", self.rolling_time, low=0.0, open_low=True)
@@ -48,6 +84,7 @@ class SimulatorState(ArrayRecord):
         robot_twist: (3,) velocity in the world frame [m/s, m/s, rad/s].
         object_poses: (K, 3).
         object_twists: (K, 3).
+        hidden: what else the engine has to remember, in an order of its own.
     """
 
     time: float
@@ -55,15 +92,23 @@ class SimulatorState(ArrayRecord):
     robot_twist: FloatArray
     object_poses: FloatArray
     object_twists: FloatArray
+    hidden: FloatArray = field(default_factory=lambda: frozen(np.zeros(0)))
 
 
 class Simulator(ABC):
     """Holds the bodies of one scene and moves them.
 
-    The contract is *memoryless*: after `build` or `restore` from a snapshot, the same commands
-    give the same bytes, whatever was simulated before. So a rollout from ``env.world`` is what
-    the environment will do.
+    The contract is *memoryless*: after `build` or `restore`, the same commands give the same
+    bytes, whatever was simulated before. A planar engine's whole state is in the `World`, so that
+    a rollout from ``env.world`` is what the environment will do; an engine with a third dimension
+    begins with every body at rest on the ground.
     """
+
+    name: ClassVar[str]
+    """As in the registry of simulators."""
+    needs_solids: ClassVar[bool] = False
+    """Whether the engine has a third dimension, so that `Materials.solids` must be there."""
+    has_camera: ClassVar[bool] = False
 
     @abstractmethod
     def build(self, world: World, materials: Materials) -> None:
@@ -96,9 +141,27 @@ class Simulator(ABC):
     def restore(self, state: SimulatorState) -> None:
         """Go back to a saved state of the same scene."""
 
+    @property
     @abstractmethod
-    def remove(self, object_id: int) -> None:
-        """Take an object off the floor."""
+    def robot_pose(self) -> FloatArray:
+        """(3,) x, y [m], theta [rad] of the robot now; cheap."""
+
+    @property
+    @abstractmethod
+    def object_poses(self) -> FloatArray:
+        """(K, 3) poses of the objects now; cheap."""
+
+    @abstractmethod
+    def remove(self, object_ids: Sequence[int]) -> None:
+        """Take objects off the floor; the others keep their state.
+
+        Raises:
+            InvalidInputError: if one of them is not there.
+        """
+
+    def photograph(self, width: int, height: int) -> NDArray[np.uint8]:
+        """(H, W, 3) picture by the engine's own camera, if `has_camera`."""
+        raise NotImplementedError(f"simulator {self.name!r} has no camera")
 
     @property
     @abstractmethod

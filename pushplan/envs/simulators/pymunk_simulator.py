@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import enum
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -76,6 +77,8 @@ class PymunkSimulator(Simulator):
     or, where that is no better, turns and gives way backwards; if it can do neither it stays where
     it is for the rest of the step.
     """
+
+    name = "pymunk"
 
     def __init__(self, options: PymunkOptions | None = None) -> None:
         self.options = options or PymunkOptions()
@@ -288,13 +291,24 @@ class PymunkSimulator(Simulator):
         self._held = False
         self._bodies.write(np.concatenate([robot[None], objects]))
 
-    def remove(self, object_id: int) -> None:
-        """Take an object off the floor."""
+    @property
+    def robot_pose(self) -> FloatArray:
+        """(3,) pose of the robot now."""
+        robot = self._bodies.robot
+        return np.array([*robot.position, robot.angle])
+
+    @property
+    def object_poses(self) -> FloatArray:
+        """(K, 3) poses of the objects now."""
+        return self._bodies.read()[1:, :3]
+
+    def remove(self, object_ids: Sequence[int]) -> None:
+        """Take objects off the floor."""
         world = self.world()
-        keep = world.movables.ids != object_id
-        if keep.all():
+        keep = ~np.isin(world.movables.ids, object_ids)
+        if len(object_ids) != (~keep).sum():
             raise InvalidInputError(
-                f"there is no object {object_id!r} (valid: {world.movables.ids.tolist()})"
+                f"cannot remove {list(object_ids)}, valid ids: {world.movables.ids.tolist()}"
             )
         self.build(replace(world, movables=world.movables.select(keep)), self._materials)
 

@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pushplan.envs.simulators.base import Materials
-from pushplan.envs.trace import Trace
 from pushplan.world import Drive, RobotModel, World
+from pushplan.world.checks import BoolArray, FloatArray, IntArray
 
 
 class ObservationBuilder(Protocol):
@@ -53,7 +53,8 @@ class Outcome:
         reason: why the episode ends, ``""`` while it goes on.
         terminated: whether the episode is over for the task.
         truncated: whether it was cut off.
-        work: sum over the objects of mass times path length in this step [kg m].
+        completed: (K,) whether the sub-task of each object of the start is done now; None where
+            the goal is one for the robot itself.
     """
 
     reward: float
@@ -61,7 +62,7 @@ class Outcome:
     reason: str
     terminated: bool
     truncated: bool
-    work: float
+    completed: BoolArray | None = None
 
 
 class Task(ABC):
@@ -70,7 +71,7 @@ class Task(ABC):
     Args:
         preset: one of `presets`.
         variations: what departs from the preset, by name.
-        drive: how the action mode drives the robot; it becomes part of the world's robot.
+        action: name of the action mode, one of `actions`; `drive_of` says what the robot becomes.
 
     Raises:
         UnknownNameError: if there is no such preset or variation.
@@ -79,8 +80,13 @@ class Task(ABC):
 
     name: ClassVar[str]
     presets: ClassVar[tuple[str, ...]]
+    """Sets of dimensions; the first is the default."""
+    solid_presets: ClassVar[tuple[str, ...]]
+    """Those with a third dimension; the first is the default of an engine that needs one."""
     actions: ClassVar[tuple[str, ...]]
     """Action modes that make sense; the first is the default."""
+    observations: ClassVar[tuple[str, ...]]
+    """Names of the observations; the first is the default."""
 
     control_step: float
     """Time between two commands to the robot [s]."""
@@ -88,9 +94,13 @@ class Task(ABC):
     robot: RobotModel
     reach: float
     """No coordinate and no distance that is observed exceeds this [m]."""
+    heading_step: float = 0.0
+    """How far a heading action drives [m], where the task has it."""
+    waypoint_window: float = 0.0
+    """Side of the square around the robot that waypoint actions reach [m], where it has them."""
 
     @abstractmethod
-    def __init__(self, *, preset: str, variations: Mapping[str, object], drive: Drive) -> None: ...
+    def __init__(self, *, preset: str, variations: Mapping[str, object], action: str) -> None: ...
 
     @abstractmethod
     def start(self, rng: np.random.Generator) -> World:
@@ -100,14 +110,26 @@ class Task(ABC):
             ScenarioError: if the request cannot be met, such as too many boxes.
         """
 
+    objects_leave: ClassVar[bool] = False
+    """Whether objects can leave the floor, so that `leaving` has to be asked."""
+
+    def leaving(self, ids: IntArray, poses: FloatArray) -> IntArray:
+        """Ids of the objects that leave the floor now; asked after every control step.
+
+        Args:
+            ids: (K,) of the objects on the floor.
+            poses: (K, 3) of them.
+        """
+        raise NotImplementedError(f"nothing ever leaves the floor in task {self.name!r}")
+
     @abstractmethod
-    def score(self, before: World, after: World, trace: Trace, *, touched_static: bool) -> Outcome:
+    def score(self, before: World, after: World, *, work: float, touched_static: bool) -> Outcome:
         """What the step from ``before`` to ``after`` was worth, and whether the episode ends.
 
         Args:
             before: the world when the step began.
-            after: the world when it ended.
-            trace: what moved in between.
+            after: the world when it ended, without the objects that have left the floor.
+            work: sum over the objects of mass times path length in this step [kg m].
             touched_static: whether the robot touched something static.
         """
 
@@ -118,3 +140,8 @@ class Task(ABC):
         Raises:
             UnknownNameError: if the task has no such observation.
         """
+
+
+def drive_of(action: str) -> Drive:
+    """How a robot moves that is commanded by an action mode."""
+    return Drive.CONSTANT_SPEED if action == "turn_rate" else Drive.DIFFERENTIAL

@@ -10,10 +10,9 @@ from typing import Any, ClassVar
 import numpy as np
 import shapely
 
-from pushplan.envs.tasks.base import ObservationBuilder, Outcome, Task
+from pushplan.envs.tasks.base import ObservationBuilder, Outcome, Task, drive_of
 from pushplan.envs.tasks.layout import Floor
 from pushplan.envs.tasks.maze_presets import PRESETS, MazePreset
-from pushplan.envs.trace import Trace
 from pushplan.geometry.distance_field import GeodesicField, geodesic_field
 from pushplan.observation import ImageObservation, StateObservation
 from pushplan.world import (
@@ -106,6 +105,7 @@ class MazeTask(Task):
 
     name = "maze"
     presets = tuple(PRESETS)
+    solid_presets = ("testbed",)
     actions: ClassVar[tuple[str, ...]] = ("turn_rate", "wheels", "velocity")
     observations: ClassVar[tuple[str, ...]] = ("image", "state")
 
@@ -114,13 +114,13 @@ class MazeTask(Task):
         *,
         preset: str = "benchmark",
         variations: Mapping[str, object] | None = None,
-        drive: Drive = Drive.CONSTANT_SPEED,
+        action: str = "turn_rate",
     ) -> None:
         if preset not in PRESETS:
             raise UnknownNameError("preset of the maze", preset, PRESETS)
         self.preset: MazePreset = PRESETS[preset]
         self.variations = MazeVariations.read(variations or {})
-        self.robot = self.preset.robot(drive)
+        self.robot = self.preset.robot(drive_of(action))
         self.control_step = self.preset.control_step
         friction = self.variations.bumper_friction
         self.materials = (
@@ -233,21 +233,19 @@ class MazeTask(Task):
                 return True
         return False
 
-    def score(self, before: World, after: World, trace: Trace, *, touched_static: bool) -> Outcome:
+    def score(self, before: World, after: World, *, work: float, touched_static: bool) -> Outcome:
         """The reward above; a wall is a failure even where the goal is reached at once."""
         self._steps += 1
-        lengths = trace.object_lengths(before.movables.poses)
-        work = float(before.movables.masses @ lengths)
         x0, y0, _ = before.robot_pose.tolist()
         x1, y1, _ = after.robot_pose.tolist()
         progress = (self.field.sample(x0, y0) - self.field.sample(x1, y1)) / self._farthest
         reward = self.preset.progress_reward * progress - self.preset.work_reward * work
         if touched_static:
-            return Outcome(reward + WALL_REWARD, False, "wall", True, False, work)
+            return Outcome(reward + WALL_REWARD, False, "wall", True, False)
         if self.goal.distance(x1, y1) == 0.0:
-            return Outcome(reward + SUCCESS_REWARD, True, "goal", True, False, work)
+            return Outcome(reward + SUCCESS_REWARD, True, "goal", True, False)
         late = self._steps >= self.preset.max_steps
-        return Outcome(reward, False, "time_limit" if late else "", False, late, work)
+        return Outcome(reward, False, "time_limit" if late else "", False, late)
 
     def observation(self, name: str) -> ObservationBuilder:
         """``"image"`` or ``"state"``."""

@@ -1,0 +1,76 @@
+"""Action modes of many control steps: drive along a heading, or to a point."""
+
+from __future__ import annotations
+
+from typing import NoReturn
+
+import numpy as np
+
+from pushplan.control import DriveTo
+from pushplan.envs.actions import ActionMode, Motion
+from pushplan.envs.tasks.base import Task
+from pushplan.geometry import VisibilityGraph
+from pushplan.world import InvalidInputError, Twist, World
+from pushplan.world.checks import FloatArray
+from pushplan.world.outline import transform
+
+
+class HeadingAction(ActionMode):
+    """Turn to a heading and drive a fixed distance along it.
+
+    One element: the heading relative to the robot's in units of pi, 0 straight ahead, positive to
+    the left. The distance is the task's ``heading_step`` [m]. It ends early where the robot is
+    stopped.
+    """
+
+    size = 1
+
+    def __init__(self, task: Task) -> None:
+        super().__init__(task)
+        self._step = task.heading_step
+        self._period = task.control_step
+
+    def start(self, action: FloatArray, world: World) -> Motion:
+        """Drive straight to the point at that heading and distance."""
+        heading = float(action[0]) * np.pi
+        target = self._step * np.array([[np.cos(heading), np.sin(heading)]])
+        driver = DriveTo(self.robot, transform(world.robot_pose, target), self._period)
+        return driver.command
+
+    def _from_twist(self, twist: Twist) -> NoReturn:
+        raise InvalidInputError(f"action mode 'heading' takes no velocities, got {twist!r}")
+
+
+class WaypointAction(ActionMode):
+    """Drive to a point by the shortest way around what is static.
+
+    Two elements: the point in the robot's frame, x ahead and y to the left, in units of half the
+    side of the task's ``waypoint_window`` [m]. The way keeps the robot's circumscribed disc clear
+    of static things where there is such a way, else its inscribed disc; a point that cannot be
+    reached is driven at straight. It ends early where the robot is stopped.
+    """
+
+    size = 2
+
+    def __init__(self, task: Task) -> None:
+        super().__init__(task)
+        self._half = 0.5 * task.waypoint_window
+        self._period = task.control_step
+
+    def start(self, action: FloatArray, world: World) -> Motion:
+        """Drive the shortest way there."""
+        target = transform(world.robot_pose, self._half * action[None, :])[0]
+        low, high = world.static.bounds[:2], world.static.bounds[2:]
+        points = self._way(world, np.clip(target, low, high))
+        return DriveTo(self.robot, points, self._period).command
+
+    def _way(self, world: World, target: FloatArray) -> FloatArray:
+        start = world.robot_pose[:2]
+        for clearance in (self.robot.circumscribed_radius, self.robot.inscribed_radius):
+            path = VisibilityGraph(world.static, clearance=clearance).shortest_path(start, target)
+            if len(path.points) > 1:
+                return path.points[1:]
+        return target[None]
+
+    def _from_twist(self, twist: Twist) -> NoReturn:
+        raise InvalidInputError(f"action mode 'waypoint' takes no velocities, got {twist!r}")
