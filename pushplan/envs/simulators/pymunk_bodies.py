@@ -10,8 +10,9 @@ import pymunk
 import pymunk.batch as batch
 
 from pushplan.envs.simulators.base import Materials
+from pushplan.envs.simulators.momentum import Momentum
 from pushplan.world import World
-from pushplan.world.checks import BoolArray, FloatArray
+from pushplan.world.checks import FloatArray, IntArray
 
 ROBOT, OBJECT, STATIC = 1, 2, 3
 CORRECTION = 0.2
@@ -22,11 +23,13 @@ _POSE_AND_TWIST = (
     | batch.BodyFields.VELOCITY
     | batch.BodyFields.ANGULAR_VELOCITY
 )
+_FORCES = batch.BodyFields.FORCE | batch.BodyFields.TORQUE
 _DEPTHS = batch.ArbiterFields.DISTANCE_1 | batch.ArbiterFields.DISTANCE_2
 # the setters themselves: assignment goes through a check of every attribute's name
 _body_class: Any = pymunk.Body
 _set_velocity = _body_class.velocity.fset
 _set_turn_rate = _body_class.angular_velocity.fset
+_update_position = pymunk.Body.update_position
 
 
 class _Contacts:
@@ -45,37 +48,60 @@ class _Contacts:
 class PymunkBodies:
     """One kinematic robot, K dynamic objects and what is static.
 
+    Only the robot and those objects that `load` names are in the space; nothing happens to the
+    others. Pose-and-twist rows are (1 + A, 6): x, y, theta, vx, vy, omega of the robot, then of
+    each of the A loaded objects, world frame.
+
     Args:
         world: the scene; masses are the ones that the metrics count.
-        materials: friction and rolling.
+        materials: friction, rolling and floating.
         slop: overlap that the contact solver leaves alone [m].
         iterations: sweeps of the contact solver.
-
-    Pose-and-twist rows are (1 + K, 6): x, y, theta, vx, vy, omega of the robot, then of each
-    object, world frame.
     """
 
     def __init__(self, world: World, materials: Materials, *, slop: float, iterations: int) -> None:
         self.space = pymunk.Space()
+        # Every velocity is zeroed in each substep before contacts are solved. What a body carries
+        # on from the substep before comes back as a force: see `_carry_on`.
         self.space.damping = 0.0
         # contacts of the last substep start the next one; 0 would drop contacts unsolved
         self.space.collision_persistence = 1
         self.space.collision_slop = slop
         self.space.iterations = iterations
-        self.rolling: BoolArray = np.concatenate([[False], world.movables.wheeled])
         self._h = 0.0
         self._contacts = _Contacts()
         self._buffer = batch.Buffer()
         self._arbiters = batch.Buffer()
+        self._momentum = Momentum.of(world, materials)
         robot_mu, object_mu, static_mu = _shape_frictions(materials)
         self.robot = pymunk.Body(body_type=pymunk.Body.KINEMATIC)
-        self.objects: list[pymunk.Body] = []
-        self._moving: list[pymunk.Shape] = []
-        self._add_robot(world, robot_mu)
-        self._add_objects(world, object_mu, materials.rolling_time)
+        self._robot_shapes = self._make_robot(world, robot_mu)
+        self._objects = self._make_objects(world, object_mu)
+        self._bodies: list[pymunk.Body] = []
+        self._shapes: list[pymunk.Shape] = []
         self._add_static(world, static_mu)
-        self._rows = self._find_rows()
         self._watch()
+
+    def load(self, active: IntArray, rows: FloatArray) -> None:
+        """Put the robot and some objects into the space, and nothing else that moves.
+
+        Contacts and corrections are forgotten, so that only the rows decide what follows: shapes
+        that are added anew in the same order give the same broad phase, and so the same order in
+        which contacts are solved.
+
+        Args:
+            active: (A,) indices of objects, increasing.
+            rows: (1 + A, 6) where to place them.
+        """
+        self.space.remove(*self._shapes, *self._bodies)
+        chosen = [self._objects[k] for k in active.tolist()]
+        self._bodies = [self.robot, *(body for body, _ in chosen)]
+        self._shapes = [*self._robot_shapes, *(shape for _, shape in chosen)]
+        self.space.add(*self._bodies)
+        self.write(rows)  # first, as the broad phase remembers where a shape was when it came
+        self.space.add(*self._shapes)
+        self._carried = self._momentum.select(active)
+        self._contacts.clear()
 
     def _add_static(self, world: World, friction: float) -> None:
         ground, static = self.space.static_body, world.static
@@ -88,37 +114,27 @@ class PymunkBodies:
             shape.friction, shape.collision_type = friction, STATIC
         self.space.add(*shapes)
 
-    def _add_robot(self, world: World, friction: float) -> None:
-        self.space.add(self.robot)
+    def _make_robot(self, world: World, friction: float) -> list[pymunk.Shape]:
+        shapes: list[pymunk.Shape] = []
         for part in world.robot.parts:
             shape = pymunk.Poly(self.robot, part.tolist())
             shape.friction, shape.collision_type = friction, ROBOT
-            self._moving.append(shape)
-        self.space.add(*self._moving)
+            shapes.append(shape)
+        return shapes
 
-    def _add_objects(self, world: World, friction: float, rolling_time: float) -> None:
+    def _make_objects(
+        self, world: World, friction: float
+    ) -> list[tuple[pymunk.Body, pymunk.Shape]]:
         movables = world.movables
+        made: list[tuple[pymunk.Body, pymunk.Shape]] = []
         for k in range(len(movables)):
             outline = movables.outline(k).tolist()
             mass = float(movables.masses[k])
             body = pymunk.Body(mass, pymunk.moment_for_poly(mass, outline))
-            if movables.wheeled[k]:
-                body.velocity_func = _roll(rolling_time)
             shape = pymunk.Poly(body, outline)
             shape.friction, shape.collision_type = friction, OBJECT
-            self.space.add(body, shape)
-            self.objects.append(body)
-            self._moving.append(shape)
-
-    def _find_rows(self) -> slice:
-        """Where the moving bodies stand in what the batch call returns."""
-        self._buffer.clear()
-        batch.get_space_bodies(self.space, batch.BodyFields.BODY_ID, self._buffer)
-        found = np.frombuffer(self._buffer.int_buf(), dtype=np.uintp).tolist()
-        wanted = [body.id for body in (self.robot, *self.objects)]
-        first = found.index(wanted[0])
-        assert found[first : first + len(wanted)] == wanted
-        return slice(first, first + len(wanted))
+            made.append((body, shape))
+        return made
 
     def _watch(self) -> None:
         contacts = self._contacts
@@ -145,12 +161,9 @@ class PymunkBodies:
             ROBOT, STATIC, begin=begin_robot, pre_solve=measure_robot, separate=end_robot
         )
 
-    def __len__(self) -> int:
-        return 1 + len(self.objects)
-
     @property
     def robot_touched(self) -> bool:
-        """Whether the robot touched something static since `forget_contacts`."""
+        """Whether the robot touched something static since `load`."""
         return self._contacts.robot_touched
 
     @property
@@ -179,33 +192,30 @@ class PymunkBodies:
         return bytes(self._buffer.float_buf())
 
     def unpack(self, packed: bytes) -> FloatArray:
-        """(1 + K, 6) rows of a `snapshot`; writeable."""
-        return np.frombuffer(packed, dtype=np.float64).reshape(-1, 6)[self._rows].copy()
+        """(1 + A, 6) rows of a `snapshot`; writeable."""
+        return np.frombuffer(packed, dtype=np.float64).reshape(-1, 6)[: len(self._bodies)].copy()
 
     def read(self) -> FloatArray:
-        """(1 + K, 6) rows now."""
+        """(1 + A, 6) rows now."""
         return self.unpack(self.snapshot())
 
     def write(self, rows: FloatArray) -> None:
         """Place every body and set its velocity; pending overlap corrections are dropped."""
-        for body, row in zip((self.robot, *self.objects), rows.tolist(), strict=True):
-            pymunk.Body.update_position(body, 0.0)  # empties the hidden correction velocity
-            body.position = row[0], row[1]
-            body.angle = row[2]
-            body.velocity = row[3], row[4]
-            body.angular_velocity = row[5]
+        for body in self._bodies:
+            _update_position(body, 0.0)  # empties the hidden correction velocity
+        self._set(_POSE_AND_TWIST, rows)
 
-    def forget_contacts(self) -> None:
-        """Drop contacts and corrections, so that only poses and velocities decide what follows.
+    def _set(self, fields: batch.BodyFields, values: FloatArray) -> None:
+        """Set something of every body; the ground comes last in the engine and stays at zero."""
+        source = batch.Buffer()
+        source.set_float_buf(np.concatenate([values, np.zeros((1, values.shape[1]))]))
+        batch.set_space_bodies(self.space, fields, source)
 
-        Shapes that are added anew in the same order give the same broad phase, and so the same
-        order in which contacts are solved.
-        """
-        for body in self.objects:
-            pymunk.Body.update_position(body, 0.0)
-        self.space.remove(*self._moving)
-        self.space.add(*self._moving)
-        self._contacts.clear()
+    def slowed(self, rows: FloatArray, h: float) -> FloatArray:
+        """The rows with the velocities that bodies keep when nothing touches them for ``h`` [s]."""
+        kept = rows.copy()
+        kept[:, 3:] = 0.0 if self._carried is None else self._carried.after(rows[:, 3:], h)
+        return kept
 
     def drive(self, vx: float, vy: float, w: float) -> None:
         """Set the robot's velocity [m/s, m/s, rad/s], world frame."""
@@ -218,7 +228,18 @@ class PymunkBodies:
         if h != self._h:  # the engine wants the share of an overlap that is left after a second
             self._h = h
             self.space.collision_bias = max((1.0 - CORRECTION) ** (1.0 / h), 1e-300)
+        if self._carried is not None:
+            self._carry_on(self._carried, h)
         self.space.step(h)
+
+    def _carry_on(self, carried: Momentum, h: float) -> None:
+        """Give each body the force that restores what it keeps of its velocity.
+
+        The engine zeroes velocities after it has moved the bodies and before it solves contacts,
+        and adds force times ``h`` over mass in between.
+        """
+        velocities = self.unpack(self.snapshot())[:, 3:]
+        self._set(_FORCES, carried.forces(carried.after(velocities, h), h))
 
 
 def _shape_frictions(materials: Materials) -> tuple[float, float, float]:
@@ -229,10 +250,3 @@ def _shape_frictions(materials: Materials) -> tuple[float, float, float]:
     if own == 0.0:
         return 0.0, 0.0, 0.0
     return materials.robot_object / own, own, materials.object_static / own
-
-
-def _roll(rolling_time: float) -> Any:
-    def velocity(body: Any, gravity: Any, damping: float, h: float) -> None:
-        pymunk.Body.update_velocity(body, (0.0, 0.0), math.exp(-h / rolling_time), h)
-
-    return velocity

@@ -2,65 +2,28 @@
 
 from __future__ import annotations
 
-import enum
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from pushplan.envs.simulators.base import Materials, Simulator, SimulatorState
+from pushplan.envs.simulators.momentum import Momentum
 from pushplan.envs.simulators.pymunk_bodies import PymunkBodies
+from pushplan.envs.simulators.pymunk_drive import PymunkDriver, PymunkOptions
+from pushplan.envs.simulators.reach import struck, within_reach
 from pushplan.envs.trace import Trace
+from pushplan.geometry.obstacles import obstacle_distance, obstacles_of
 from pushplan.interaction.model import Interaction
 from pushplan.world import InvalidInputError, Twist, World
-from pushplan.world.checks import FloatArray, array, frozen, integer, number
+from pushplan.world.checks import BoolArray, FloatArray, IntArray, array, frozen
 
-
-@dataclass(frozen=True)
-class PymunkOptions:
-    """Numerical settings. Lengths are fractions of the radius of the smallest object.
-
-    Args:
-        travel: how far the fastest point of the robot may move in one substep. At the default
-            (2.8 mm for a 1 m box) boxes end where substeps ten times finer put them to 0.2 % of
-            their size (median) and total work agrees to 0.1 %: docs/simulators.md has the table.
-        slop: overlap that the contact solver leaves alone. It has to be small against an object,
-            because an object rides that far inside its pusher, and not much smaller than
-            ``travel``, because an object that is pushed out of contact in each substep is hit
-            again in the next and chatters.
-        tolerance: overlap at which the robot is held, when something static is involved.
-        iterations: sweeps of the contact solver in each substep.
-        samples: poses recorded in each call of `PymunkSimulator.step`, at even intervals.
-    """
-
-    travel: float = 0.004
-    slop: float = 0.0015
-    tolerance: float = 0.012
-    iterations: int = 20
-    samples: int = 8
-
-    def __post_init__(self) -> None:
-        for key in ("travel", "slop", "tolerance"):
-            value = number(f"pymunk {key}", getattr(self, key), low=0.0, high=0.2, open_low=True)
-            object.__setattr__(self, key, value)
-        for key in ("iterations", "samples"):
-            integer(f"pymunk {key}", getattr(self, key), low=1)
-        if self.tolerance < self.travel + self.slop:
-            raise InvalidInputError(
-                f"pymunk tolerance must be at least travel + slop = "
-                f"{self.travel + self.slop:g}, got {self.tolerance:g}"
-            )
-
-
-class _Moved(enum.Enum):
-    """What came of a substep."""
-
-    ALL = enum.auto()
-    SOME = enum.auto()
-    NOTHING = enum.auto()
-    TOO_FAR = enum.auto()
+_GLIDE_SAMPLES = 4
+"""Poses recorded in a step in which nothing can happen."""
+_REST = 2e-4
+"""Objects that move slower than this share of their size per second stop."""
 
 
 class PymunkSimulator(Simulator):
@@ -70,12 +33,6 @@ class PymunkSimulator(Simulator):
     world is quasi-static; a wheeled object keeps a decaying part of its velocity instead. Contacts
     are solved from scratch at the beginning of each call of `step`: that makes the simulator
     memoryless, as the contract wants.
-
-    Jams: a kinematic robot has no limit of force, and would press an object through a wall. So a
-    substep after which some overlap has grown past the tolerance, while something static is
-    touched, is taken back. Until the next sample the robot then turns on the spot as commanded
-    or, where that is no better, turns and gives way backwards; if it can do neither it stays where
-    it is for the rest of the step.
     """
 
     name = "pymunk"
@@ -83,111 +40,170 @@ class PymunkSimulator(Simulator):
     def __init__(self, options: PymunkOptions | None = None) -> None:
         self.options = options or PymunkOptions()
         self._held = False
-        self._deepest = 0.0
-        self._yielding = 0.0
 
     def build(self, world: World, materials: Materials) -> None:
         """Replace the scene with this one."""
         options, robot = self.options, world.robot
         radii = world.movables.radii
-        self._size = float(radii.min()) if len(radii) else max(robot.inscribed_radius, 1e-3)
+        self._size = max(robot.inscribed_radius, 1e-3)
+        if len(radii):
+            self._size = float(min(np.median(radii), 4.0 * radii.min()))
         self._materials = materials
         self._world = world
-        self._bodies = PymunkBodies(
+        self._obstacles = obstacles_of(world.static)
+        self._momentum = Momentum.of(world, materials)
+        bodies = PymunkBodies(
             world, materials, slop=options.slop * self._size, iterations=options.iterations
         )
-        fastest = max(abs(robot.min_speed), abs(robot.max_speed))
-        self._rim_speed = fastest + robot.max_turn_rate * robot.circumscribed_radius
+        self._driver = PymunkDriver(bodies, robot, options, self._size)
         self._time = world.time
-        self._bodies.write(_rows(world))
-        self._held = False
+        self._rows = _rows(world)
+        self._held = self._touched = False
 
     def step(self, command: Twist, duration: float) -> Trace:
         """Drive at a body-frame velocity for ``duration`` [s]."""
-        samples = self.options.samples
-        wanted = duration * self._rim_speed / (self.options.travel * self._size)
+        radius = self._world.robot.circumscribed_radius
+        speed = abs(command.linear) + abs(command.angular) * radius
+        own = self._own_speeds() * duration
+        loaded = self._in_reach(speed * duration, own)
+        self._held = self._touched = False
+        if not loaded.any() and self._far_from_static(speed * duration):
+            return self._glide(command, duration)
+        wanted = self._substeps(speed, own > 0.0, loaded, duration)
+        samples = min(max(2, math.ceil(wanted)), self.options.samples)
         each = max(1, math.ceil(wanted / samples))
-        h = duration / (samples * each)
-        start = self._bodies.read()
-        rows = self._drive(command, h, each, careful=False)
-        if rows is None:
-            self._bodies.write(start)
-            rows = self._drive(command, h, each, careful=True)
-            assert rows is not None
-        times = self._time + h * each * np.arange(1, samples + 1)
-        self._time += duration
-        times[-1] = self._time
-        poses = rows[..., :3]
-        return Trace(
-            frozen(times),
-            frozen(np.ascontiguousarray(poses[:, 0])),
-            frozen(np.ascontiguousarray(poses[:, 1:])),
-        )
+        while True:
+            active = np.flatnonzero(loaded)
+            start = self._start(active)
+            found = self._driver.run(command, duration, start, active, (samples, each))
+            paths = np.repeat(self._rows[None, 1:, :3], samples, axis=0)
+            paths[:, active] = found[:, 1:, :3]
+            missed = self._struck(loaded, paths)
+            if not missed.any():
+                break
+            loaded |= missed
+        self._keep(active, found[-1])
+        self._held, self._touched = self._driver.held, self._driver.touched
+        return self._traced(duration, found[:, 0, :3], paths)
 
-    def _drive(self, command: Twist, h: float, each: int, *, careful: bool) -> FloatArray | None:
-        """Run the substeps of one step.
+    def _substeps(
+        self, speed: float, rolling: BoolArray, loaded: BoolArray, duration: float
+    ) -> float:
+        """How many substeps a step needs.
 
         Args:
-            command: the velocity in the body frame.
-            h: length of a substep [s].
-            each: substeps between two samples.
-            careful: keep a way back from every substep. Otherwise only where something static
-                is touched already, which is enough nearly always.
-
-        Returns:
-            (samples, 1 + K, 6) rows, or None if a way back was missing: begin again, carefully.
+            speed: of the robot's fastest point [m/s].
+            rolling: (K,) objects that move by themselves.
+            loaded: (K,) objects that are simulated.
+            duration: of the step [s].
         """
-        bodies, w = self._bodies, command.angular
-        half = 0.5 * w * h
-        # the chord of an arc is shorter than the arc by sin(x) / x
-        chord = command.linear * (math.sin(half) / half if half else 1.0)
-        bodies.forget_contacts()
-        self._held = False
-        rows = np.empty((self.options.samples, len(bodies), 6))
-        heading = bodies.heading
-        outcome = _Moved.ALL
-        for i in range(len(rows)):
-            advancing = chord  # a robot that is held tries again after the next sample
-            for j in range(each):
-                middle = heading + half
-                vx, vy = advancing * math.cos(middle), advancing * math.sin(middle)
-                first = i == 0 and j == 0
-                outcome = self._substep(vx, vy, w, h, first=first, careful=careful)
-                if outcome is _Moved.TOO_FAR:
-                    return None
-                if outcome is _Moved.NOTHING:  # nor will it in the rest of the step
-                    rows[i:] = bodies.read()
-                    return rows
-                if outcome is _Moved.SOME:
-                    advancing = self._yielding
-                    heading = bodies.heading
-                else:
-                    heading += w * h
-            rows[i] = bodies.read()
-        return rows
+        # what was pushed at the end of the last step moves on for one substep
+        velocities = self._rows[1:, 3:]
+        speeds = np.hypot(velocities[loaded, 0], velocities[loaded, 1])
+        fastest = max(speed, float(speeds.max(initial=0.0)))
+        wanted = duration * fastest / (self.options.travel * self._size)
+        if rolling.any():
+            decay = self._momentum.fastest_decay(self._rows[:, 3:])
+            wanted = max(wanted, duration * decay / self.options.decay)
+        return wanted
+
+    def _glide(self, command: Twist, duration: float) -> Trace:
+        """A step in which nothing can touch the robot."""
+        shares = np.arange(1, _GLIDE_SAMPLES + 1) / _GLIDE_SAMPLES
+        x, y, theta = self._rows[0, :3]
+        turned = command.angular * duration * shares
+        chord = command.linear * duration * shares * np.sinc(turned / (2.0 * math.pi))
+        middle = theta + 0.5 * turned
+        poses = np.stack([x + chord * np.cos(middle), y + chord * np.sin(middle), theta + turned])
+        self._rows[1:, 3:] = 0.0
+        self._rows[0, :3] = poses[:, -1]
+        last = theta + turned[-1]
+        self._rows[0, 3:] = (
+            command.linear * math.cos(last),
+            command.linear * math.sin(last),
+            command.angular,
+        )
+        paths = np.repeat(self._rows[None, 1:, :3], _GLIDE_SAMPLES, axis=0)
+        return self._traced(duration, poses.T, paths)
+
+    def _traced(self, duration: float, robot: FloatArray, paths: FloatArray) -> Trace:
+        times = self._time + duration * np.arange(1, len(robot) + 1) / len(robot)
+        self._time += duration
+        times[-1] = self._time
+        return Trace(frozen(times), frozen(np.ascontiguousarray(robot)), frozen(paths))
+
+    def _own_speeds(self) -> FloatArray:
+        """(K,) speeds of the points of the objects that move by themselves [m/s].
+
+        What has become slower than can matter has stopped.
+        """
+        if not self._momentum.keeps.any():
+            return np.zeros(len(self._rows) - 1)
+        velocities = self._rows[1:, 3:]
+        turning = np.abs(velocities[:, 2]) * self._world.movables.radii
+        speeds: FloatArray = np.hypot(velocities[:, 0], velocities[:, 1]) + turning
+        speeds[self._momentum.keeps[1:] == 0.0] = 0.0
+        speeds[speeds < _REST * self._size] = 0.0
+        return speeds
+
+    def _in_reach(self, reach: float, own: FloatArray) -> BoolArray:
+        robot, movables = self._world.robot, self._world.movables
+        return within_reach(
+            self._rows[0, :3],
+            reach,
+            robot.vertices,
+            robot.offsets,
+            self._rows[1:, :3],
+            own,
+            movables.vertices,
+            movables.offsets,
+            movables.radii,
+        )
+
+    def _struck(self, loaded: BoolArray, paths: FloatArray) -> BoolArray:
+        movables = self._world.movables
+        if loaded.all():
+            return np.zeros(len(loaded), dtype=bool)
+        return struck(
+            loaded,
+            paths,
+            self._rows[1:, :3],
+            movables.vertices,
+            movables.offsets,
+            movables.radii,
+        )
+
+    def _far_from_static(self, reach: float) -> bool:
+        x, y = self._rows[0, 0], self._rows[0, 1]
+        shapes = self._obstacles
+        gap = obstacle_distance(x, y, shapes.vertices, shapes.offsets, shapes.radii)
+        return bool(gap > self._world.robot.circumscribed_radius + reach)
+
+    def _start(self, active: IntArray) -> FloatArray:
+        """(1 + A, 6) rows of the robot and some objects."""
+        return np.concatenate([self._rows[:1], self._rows[1 + active]])
+
+    def _keep(self, active: IntArray, rows: FloatArray) -> None:
+        """Take over what became of the robot and some objects; the others are at rest."""
+        self._rows[1:, 3:] = 0.0
+        self._rows[0], self._rows[1 + active] = rows[0], rows[1:]
 
     def follow(self, path: ArrayLike) -> Interaction:
         """Sweep the robot straight from pose to pose at its full speed."""
         poses: FloatArray = array("path", path, (None, 3))
         if len(poses) == 0:
             raise InvalidInputError("path must hold at least one pose")
-        bodies = self._bodies
-        start = bodies.read()
-        start[0] = [*poses[0], 0.0, 0.0, 0.0]
-        bodies.write(start)
-        bodies.forget_contacts()
-        found = np.empty((len(poses), len(start) - 1, 3))
-        found[0] = start[1:, :3]
+        self._rows[0] = [*poses[0], 0.0, 0.0, 0.0]
+        found = np.empty((len(poses), len(self._rows) - 1, 3))
+        found[0] = self._rows[1:, :3]
         jammed = -1
         for leg in range(1, len(poses)):
-            if jammed < 0 and not self._sweep(poses[leg - 1], poses[leg], first=leg == 1):
+            if jammed < 0 and not self._sweep(poses[leg - 1], poses[leg]):
                 jammed = leg
-                found[leg:] = bodies.read()[1:, :3]
-            if jammed < 0:
-                found[leg] = bodies.read()[1:, :3]
+            found[leg] = self._rows[1:, :3]
         return Interaction(found, self._world.movables.masses, jammed)
 
-    def _sweep(self, a: FloatArray, b: FloatArray, *, first: bool) -> bool:
+    def _sweep(self, a: FloatArray, b: FloatArray) -> bool:
         """Drive straight between two poses; whether the robot got there."""
         robot = self._world.robot
         dx, dy = float(b[0] - a[0]), float(b[1] - a[1])
@@ -197,73 +213,32 @@ class PymunkSimulator(Simulator):
         if duration == 0.0:
             return True
         reach = length + abs(turn) * robot.circumscribed_radius
+        own = self._own_speeds() * duration
+        loaded = self._in_reach(reach, own)
+        if not loaded.any() and self._far_from_static(reach):
+            self._rows[1:, 3:] = 0.0
+            self._rows[0, :3] = b
+            self._time += duration
+            return True
         count = max(1, math.ceil(reach / (self.options.travel * self._size)))
         h = duration / count
-        for i in range(count):
-            outcome = self._substep(
-                *(dx / duration, dy / duration, turn / duration, h),
-                first=first and i == 0,
-                careful=True,
-            )
-            if outcome is not _Moved.ALL:
-                return False
+        velocity = (dx / duration, dy / duration, turn / duration)
+        while True:
+            active = np.flatnonzero(loaded)
+            through, rows = self._driver.sweep(velocity, h, count, self._start(active), active)
+            paths = self._rows[None, 1:, :3].copy()
+            paths[:, active] = rows[1:, :3]
+            missed = self._struck(loaded, paths)
+            if not missed.any():
+                break
+            loaded |= missed
+        self._keep(active, rows)
         self._time += duration
-        return True
-
-    def _substep(
-        self, vx: float, vy: float, w: float, h: float, *, first: bool, careful: bool
-    ) -> _Moved:
-        """Move everything by ``h`` seconds, the robot at a velocity in the world frame."""
-        bodies = self._bodies
-        limit = self.options.tolerance * self._size
-        # a jam needs something static, so most substeps do without the check
-        if not (first or careful or bodies.static_contacts):
-            return _Moved.ALL if self._try(vx, vy, w, h, limit) else _Moved.TOO_FAR
-        packed = bodies.snapshot()
-        allowed = limit if first else max(limit, self._deepest)
-        if self._try(vx, vy, w, h, allowed):
-            return _Moved.ALL
-        before = bodies.unpack(packed)
-        resting = before.copy()
-        resting[:, 3:] *= bodies.rolling[:, None]
-        if first:  # the scene may have begun with deeper overlaps: no reason to hold the robot
-            still = before.copy()
-            still[:, 3:] = 0.0
-            bodies.write(still)
-            self._try(0.0, 0.0, 0.0, h, math.inf)
-            allowed = max(limit, self._deepest)
-            bodies.write(before)
-            if self._try(vx, vy, w, h, allowed):
-                return _Moved.ALL
-        self._held = True
-        heading = float(before[0, 2])
-        for speed in (0.0, -abs(w) * self._world.robot.circumscribed_radius) if w else ():
-            bodies.write(resting)
-            if self._try(speed * math.cos(heading), speed * math.sin(heading), w, h, allowed):
-                self._yielding = speed
-                return _Moved.SOME
-        bodies.write(resting)
-        if resting[1:, 3:].any() and self._try(0.0, 0.0, 0.0, h, allowed):
-            self._yielding = 0.0
-            return _Moved.SOME
-        resting[:, 3:] = 0.0
-        bodies.write(resting)
-        return _Moved.NOTHING
-
-    def _try(self, vx: float, vy: float, w: float, h: float, allowed: float) -> bool:
-        """Advance by ``h`` [s]; whether no overlap beyond ``allowed`` [m] has come of it."""
-        bodies = self._bodies
-        bodies.drive(vx, vy, w)
-        bodies.advance(h)
-        depth = bodies.depth if bodies.static_contacts else 0.0
-        if depth <= allowed:
-            self._deepest = depth
-            return True
-        return False
+        return through
 
     def world(self) -> World:
         """A snapshot of the scene now."""
-        rows = self._bodies.read()
+        rows = self._rows
         return replace(
             self._world,
             robot_pose=rows[0, :3],
@@ -274,7 +249,7 @@ class PymunkSimulator(Simulator):
 
     def save(self) -> SimulatorState:
         """The state now."""
-        rows = self._bodies.read()
+        rows = self._rows.copy()
         return SimulatorState(
             self._time,
             frozen(rows[0, :3]),
@@ -288,19 +263,18 @@ class PymunkSimulator(Simulator):
         robot = np.concatenate([state.robot_pose, state.robot_twist])
         objects = np.concatenate([state.object_poses, state.object_twists], axis=1)
         self._time = state.time
-        self._held = False
-        self._bodies.write(np.concatenate([robot[None], objects]))
+        self._held = self._touched = False
+        self._rows = np.concatenate([robot[None], objects])
 
     @property
     def robot_pose(self) -> FloatArray:
         """(3,) pose of the robot now."""
-        robot = self._bodies.robot
-        return np.array([*robot.position, robot.angle])
+        return self._rows[0, :3].copy()
 
     @property
     def object_poses(self) -> FloatArray:
         """(K, 3) poses of the objects now."""
-        return self._bodies.read()[1:, :3]
+        return self._rows[1:, :3].copy()
 
     def remove(self, object_ids: Sequence[int]) -> None:
         """Take objects off the floor."""
@@ -315,7 +289,7 @@ class PymunkSimulator(Simulator):
     @property
     def touched_static(self) -> bool:
         """Whether the robot touched something static during the last step."""
-        return self._bodies.robot_touched
+        return self._touched
 
     @property
     def held(self) -> bool:

@@ -1,0 +1,110 @@
+"""What moving bodies keep of their velocity while nothing pushes them, in the plane."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+
+from pushplan.envs.simulators.base import Materials
+from pushplan.geometry import polygon_inertia
+from pushplan.world import World
+from pushplan.world.checks import FloatArray, IntArray
+
+
+@dataclass(frozen=True)
+class Momentum:
+    """Drag on rolling and floating bodies; plain objects on the ground keep nothing.
+
+    A body's law is ``m v' = -(b + c |v|) v``, and likewise about the vertical axis. A wheeled
+    object has ``b = m / rolling_time`` and no c.
+
+    Args:
+        keeps: (N,) whether the body keeps anything; the first is the robot, which never does.
+        inertia: (N, 2) mass [kg] and moment of inertia [kg m²].
+        drag: (N, 4) b and c of the translation and of the rotation, over mass and moment.
+    """
+
+    keeps: FloatArray
+    inertia: FloatArray
+    drag: FloatArray
+
+    @classmethod
+    def of(cls, world: World, materials: Materials) -> Momentum:
+        """For the robot and all objects of a world."""
+        movables = world.movables
+        moments = [
+            mass * polygon_inertia(movables.outline(k)) for k, mass in enumerate(movables.masses)
+        ]
+        inertia = np.ones((1 + len(movables), 2))
+        inertia[1:, 0], inertia[1:, 1] = movables.masses, moments
+        drag = np.zeros((len(inertia), 4))
+        if materials.water is not None:
+            drag = materials.water.coefficients(world) / np.repeat(inertia, 2, axis=1)
+            keeps = np.ones(len(inertia), dtype=bool)
+        else:
+            drag[:, [0, 2]] = 1.0 / materials.rolling_time
+            keeps = np.concatenate([[False], movables.wheeled])
+        keeps[0] = False
+        return cls(keeps.astype(np.float64), inertia, drag)
+
+    def select(self, active: IntArray) -> Momentum | None:
+        """For the robot and some of the objects; None if none of them keeps anything."""
+        rows = np.concatenate([[0], active + 1])
+        if not self.keeps[rows].any():
+            return None
+        return Momentum(self.keeps[rows], self.inertia[rows], self.drag[rows])
+
+    def after(self, velocities: FloatArray, h: float) -> FloatArray:
+        """Velocities (N, 3) after ``h`` [s] without contact; exact for the law above."""
+        return slow_down(velocities, self.keeps, self.drag, h)
+
+    def fastest_decay(self, velocities: FloatArray) -> float:
+        """Greatest rate [1/s] at which a body that moves by itself loses speed."""
+        moving = (self.keeps > 0.0) & velocities.any(axis=1)
+        if not moving.any():
+            return 0.0
+        speeds = np.hypot(velocities[moving, 0], velocities[moving, 1])
+        turning = np.abs(velocities[moving, 2])
+        drag = self.drag[moving]
+        rates = np.maximum(drag[:, 0] + drag[:, 1] * speeds, drag[:, 2] + drag[:, 3] * turning)
+        return float(rates.max())
+
+    def forces(self, velocities: FloatArray, h: float) -> FloatArray:
+        """(N, 3) forces [N, N, N m] that bring bodies at rest to velocities within ``h`` [s]."""
+        out = np.empty_like(velocities)
+        out[:, :2] = velocities[:, :2] * (self.inertia[:, :1] / h)
+        out[:, 2] = velocities[:, 2] * (self.inertia[:, 1] / h)
+        return out
+
+
+@njit(cache=True, nogil=True)
+def slow_down(velocities: FloatArray, keeps: FloatArray, drag: FloatArray, h: float) -> FloatArray:
+    """Solve ``v' = -(b + c |v|) v`` over ``h`` [s] for each body, and for its rotation.
+
+    Args:
+        velocities: (N, 3) vx, vy [m/s], omega [rad/s].
+        keeps: (N,) 0 for a body that stops at once, else 1.
+        drag: (N, 4) b and c of the translation, b and c of the rotation, over the inertia.
+        h: [s].
+    """
+    out = np.zeros((velocities.shape[0], 3))
+    for i in range(velocities.shape[0]):
+        if keeps[i] == 0.0:
+            continue
+        speed = math.hypot(velocities[i, 0], velocities[i, 1])
+        share = _kept(speed, drag[i, 0], drag[i, 1], h)
+        out[i, 0], out[i, 1] = share * velocities[i, 0], share * velocities[i, 1]
+        out[i, 2] = velocities[i, 2] * _kept(abs(velocities[i, 2]), drag[i, 2], drag[i, 3], h)
+    return out
+
+
+@njit(cache=True, nogil=True)
+def _kept(speed: float, b: float, c: float, h: float) -> float:
+    """Share of the speed that is left after ``h``."""
+    decay = math.exp(-b * h)
+    # (1 - exp(-b h)) / b, which tends to h
+    reach = -math.expm1(-b * h) / b if b > 0.0 else h
+    return decay / (1.0 + c * speed * reach)

@@ -1,0 +1,243 @@
+"""Driving a kinematic robot through a Pymunk space, substep by substep, without jamming it."""
+
+from __future__ import annotations
+
+import enum
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from pushplan.envs.simulators.pymunk_bodies import PymunkBodies
+from pushplan.world import InvalidInputError, RobotModel, Twist
+from pushplan.world.checks import FloatArray, IntArray, integer, number
+
+
+@dataclass(frozen=True)
+class PymunkOptions:
+    """Numerical settings. Lengths are fractions of the objects' median radius.
+
+    Where sizes differ much, four times the least radius counts instead, if that is smaller.
+
+    Args:
+        travel: how far the fastest point of the robot may move in one substep. At the default
+            (2.8 mm for a 1 m box) boxes end where substeps ten times finer put them to 0.2 % of
+            their size (median) and total work agrees to 0.1 %: docs/simulators.md has the table.
+        slop: overlap that the contact solver leaves alone. It has to be small against an object,
+            because an object rides that far inside its pusher, and not much smaller than
+            ``travel``, because an object that is pushed out of contact in each substep is hit
+            again in the next and chatters.
+        tolerance: overlap at which the robot is held, when something static is involved.
+        decay: share of its speed that a rolling or floating object may lose in one substep.
+        iterations: sweeps of the contact solver in each substep.
+        samples: poses recorded in each call of `PymunkSimulator.step`, at even intervals.
+    """
+
+    travel: float = 0.008
+    slop: float = 0.002
+    tolerance: float = 0.012
+    decay: float = 0.04
+    iterations: int = 10
+    samples: int = 8
+
+    def __post_init__(self) -> None:
+        for key in ("travel", "slop", "tolerance", "decay"):
+            value = number(f"pymunk {key}", getattr(self, key), low=0.0, high=0.2, open_low=True)
+            object.__setattr__(self, key, value)
+        for key in ("iterations", "samples"):
+            integer(f"pymunk {key}", getattr(self, key), low=1)
+        if self.tolerance < self.travel + self.slop:
+            raise InvalidInputError(
+                f"pymunk tolerance must be at least travel + slop = "
+                f"{self.travel + self.slop:g}, got {self.tolerance:g}"
+            )
+
+
+class _Moved(enum.Enum):
+    """What came of a substep."""
+
+    ALL = enum.auto()
+    SOME = enum.auto()
+    NOTHING = enum.auto()
+    TOO_FAR = enum.auto()
+
+
+class PymunkDriver:
+    """Moves the robot as commanded, or as nearly as it can.
+
+    A kinematic robot has no limit of force, and would press an object through a wall. So a
+    substep after which some overlap has grown past the tolerance, while something static is
+    touched, is taken back. Until the next sample the robot then turns on the spot as commanded
+    or, where that is no better, turns and gives way backwards; if it can do neither it stays where
+    it is for the rest of the step.
+
+    Args:
+        bodies: the scene.
+        robot: its limits.
+        options: numerical settings.
+        size: length [m] of which the options' lengths are shares.
+    """
+
+    def __init__(
+        self, bodies: PymunkBodies, robot: RobotModel, options: PymunkOptions, size: float
+    ) -> None:
+        self.held = False
+        """Whether the robot was kept from moving as commanded in the last run."""
+        self._bodies = bodies
+        self._radius = robot.circumscribed_radius
+        self._limit = options.tolerance * size
+        self._deepest = 0.0
+        self._yielding = 0.0
+
+    @property
+    def touched(self) -> bool:
+        """Whether the robot touched something static in the last run."""
+        return self._bodies.robot_touched
+
+    def run(
+        self,
+        command: Twist,
+        duration: float,
+        start: FloatArray,
+        active: IntArray,
+        counts: tuple[int, int],
+    ) -> FloatArray:
+        """Run the substeps of one step.
+
+        Args:
+            command: the velocity in the body frame.
+            duration: of the step [s].
+            start: (1 + A, 6) rows of the robot and the objects that are simulated.
+            active: (A,) indices of those objects.
+            counts: samples, and substeps between two of them.
+
+        Returns:
+            (samples, 1 + A, 6) rows.
+        """
+        rows = self._run(command, duration, start, active, counts, careful=False)
+        if rows is None:
+            rows = self._run(command, duration, start, active, counts, careful=True)
+            assert rows is not None
+        return rows
+
+    def _run(
+        self,
+        command: Twist,
+        duration: float,
+        start: FloatArray,
+        active: IntArray,
+        counts: tuple[int, int],
+        *,
+        careful: bool,
+    ) -> FloatArray | None:
+        """As `run`; None if a way back was missing: begin again, carefully.
+
+        Without care a way back is kept only where something static is touched already, which is
+        enough nearly always.
+        """
+        bodies, w = self._bodies, command.angular
+        samples, each = counts
+        h = duration / (samples * each)
+        half = 0.5 * w * h
+        # the chord of an arc is shorter than the arc by sin(x) / x
+        chord = command.linear * (math.sin(half) / half if half else 1.0)
+        bodies.load(active, start)
+        self.held = False
+        rows = np.empty((samples, *start.shape))
+        heading = float(start[0, 2])
+        outcome = _Moved.ALL
+        for i in range(samples):
+            advancing = chord  # a robot that is held tries again after the next sample
+            for j in range(each):
+                middle = heading + half
+                vx, vy = advancing * math.cos(middle), advancing * math.sin(middle)
+                first = i == 0 and j == 0
+                outcome = self._substep(vx, vy, w, h, first=first, careful=careful)
+                if outcome is _Moved.TOO_FAR:
+                    return None
+                if outcome is _Moved.NOTHING:  # nor will it in the rest of the step
+                    rows[i:] = bodies.read()
+                    return rows
+                if outcome is _Moved.SOME:
+                    advancing = self._yielding
+                    heading = bodies.heading
+                else:
+                    heading += w * h
+            rows[i] = bodies.read()
+        return rows
+
+    def sweep(
+        self,
+        velocity: tuple[float, float, float],
+        h: float,
+        count: int,
+        start: FloatArray,
+        active: IntArray,
+    ) -> tuple[bool, FloatArray]:
+        """Move at one velocity in the world frame until done or held.
+
+        Args:
+            velocity: x, y [m/s] and turn rate [rad/s].
+            h: length of a substep [s].
+            count: number of substeps.
+            start: as in `run`.
+            active: as in `run`.
+
+        Returns:
+            Whether the robot got there, and the rows at the end.
+        """
+        self._bodies.load(active, start)
+        for i in range(count):
+            if self._substep(*velocity, h, first=i == 0, careful=True) is not _Moved.ALL:
+                return False, self._bodies.read()
+        return True, self._bodies.read()
+
+    def _substep(
+        self, vx: float, vy: float, w: float, h: float, *, first: bool, careful: bool
+    ) -> _Moved:
+        """Move everything by ``h`` seconds, the robot at a velocity in the world frame."""
+        bodies = self._bodies
+        limit = self._limit
+        # a jam needs something static, so most substeps do without the check
+        if not (first or careful or bodies.static_contacts):
+            return _Moved.ALL if self._try(vx, vy, w, h, limit) else _Moved.TOO_FAR
+        packed = bodies.snapshot()
+        allowed = limit if first else max(limit, self._deepest)
+        if self._try(vx, vy, w, h, allowed):
+            return _Moved.ALL
+        before = bodies.unpack(packed)
+        resting = bodies.slowed(before, h)
+        if first:  # the scene may have begun with deeper overlaps: no reason to hold the robot
+            still = before.copy()
+            still[:, 3:] = 0.0
+            bodies.write(still)
+            self._try(0.0, 0.0, 0.0, h, math.inf)
+            allowed = max(limit, self._deepest)
+            bodies.write(before)
+            if self._try(vx, vy, w, h, allowed):
+                return _Moved.ALL
+        self.held = True
+        heading = float(before[0, 2])
+        for speed in (0.0, -abs(w) * self._radius) if w else ():
+            bodies.write(resting)
+            if self._try(speed * math.cos(heading), speed * math.sin(heading), w, h, allowed):
+                self._yielding = speed
+                return _Moved.SOME
+        bodies.write(resting)
+        if resting[1:, 3:].any() and self._try(0.0, 0.0, 0.0, h, allowed):
+            self._yielding = 0.0
+            return _Moved.SOME
+        resting[:, 3:] = 0.0
+        bodies.write(resting)
+        return _Moved.NOTHING
+
+    def _try(self, vx: float, vy: float, w: float, h: float, allowed: float) -> bool:
+        """Advance by ``h`` [s]; whether no overlap beyond ``allowed`` [m] has come of it."""
+        bodies = self._bodies
+        bodies.drive(vx, vy, w)
+        bodies.advance(h)
+        depth = bodies.depth if bodies.static_contacts else 0.0
+        if depth <= allowed:
+            self._deepest = depth
+            return True
+        return False
