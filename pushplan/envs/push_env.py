@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import gymnasium
@@ -52,7 +52,8 @@ class PushEnv(gymnasium.Env[NDArray[Any], NDArray[Any]]):
         variations: what departs from the preset, by name.
         observation: name of one of the task's observations, or a builder of one's own; the
             task's first if None.
-        action: name of the action mode; the task's first if None.
+        action: name of the action mode, or several, of which the first that the task has is
+            taken; the task's first if None.
         render_mode: ``"rgb_array"`` (a drawing from above), ``"camera"`` (the simulator's own
             camera), ``"human"`` (a window) or None.
         seed: of the first episode, where `reset` is given none.
@@ -77,15 +78,13 @@ class PushEnv(gymnasium.Env[NDArray[Any], NDArray[Any]]):
         preset: str | None = None,
         variations: Mapping[str, object] | None = None,
         observation: str | ObservationBuilder | None = None,
-        action: str | None = None,
+        action: str | Sequence[str] | None = None,
         render_mode: str | None = None,
         seed: int | None = None,
     ) -> None:
         task_class: type[Task] = look_up("task", TASKS, task)
         engine: type[Simulator] = look_up("simulator", SIMULATORS, simulator)
-        action = task_class.actions[0] if action is None else action
-        if action not in task_class.actions:
-            raise UnknownNameError(f"action of task {task!r}", action, task_class.actions)
+        action = _chosen_action(task_class, action)
         mode: type[ActionMode] = look_up("action", ACTIONS, action)
         if preset is None:
             preset = (task_class.solid_presets if engine.needs_solids else task_class.presets)[0]
@@ -266,7 +265,7 @@ def make(
     scenario: Scenario,
     *,
     observation: str | ObservationBuilder | None = None,
-    action: str | None = None,
+    action: str | Sequence[str] | None = None,
     render_mode: str | None = None,
 ) -> PushEnv:
     """The environment of a scenario. Its first `reset` uses the scenario's seed.
@@ -274,7 +273,8 @@ def make(
     Args:
         scenario: what to run.
         observation: name of one of the task's observations, or a builder; its first if None.
-        action: name of the action mode; the task's first if None.
+        action: name of the action mode, or several in order of preference; the task's first if
+            None.
         render_mode: ``"rgb_array"``, ``"camera"``, ``"human"`` or None.
     """
     return PushEnv(
@@ -309,6 +309,16 @@ def make_env(
         action=action,
         render_mode=render_mode,
     )
+
+
+def _chosen_action(task: type[Task], wanted: str | Sequence[str] | None) -> str:
+    if wanted is None:
+        return task.actions[0]
+    names = (wanted,) if isinstance(wanted, str) else tuple(wanted)
+    for name in names:
+        if name in task.actions:
+            return name
+    raise UnknownNameError(f"action of task {task.name!r}", ", ".join(map(str, names)), task.actions)
 
 
 def _space(builder: ObservationBuilder, reach: float) -> Box:

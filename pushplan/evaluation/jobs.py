@@ -64,7 +64,8 @@ class JobSettings:
 
     Args:
         make_env: factory of environments, as a callable or as ``"module:function"``; called as
-            ``make_env(scenario, observation=...)``.
+            ``make_env(scenario, observation=...)``, and with ``action=...`` where the policy's
+            attribute ``actions`` names action modes in order of preference.
         observation: kind of observation; ``"auto"`` takes what the policy's attribute
             ``observation`` asks for, else ``"state"``.
         timeout_s: wall-clock limit of one job [s], None for none.
@@ -94,6 +95,9 @@ class JobSettings:
         observation = self.observation
         if observation == "auto":
             observation = getattr(policy, "observation", "state")
+        actions = getattr(policy, "actions", None)
+        if actions is not None:
+            options = {"action": actions, **options}
         make = load_object(self.make_env) if isinstance(self.make_env, str) else self.make_env
         return make(scenario, observation=observation, **options)
 

@@ -63,6 +63,8 @@ class PlanFollower:
         stop: stop rule of each planning call; the planner's own default if None.
     """
 
+    actions = ("turn_rate", "velocity")
+
     def __init__(
         self,
         planner: Planner,
@@ -157,6 +159,8 @@ class PlanFollower:
 
 class RandomTwist:
     """Draws every command uniformly from the robot's limits: the zero of every scale."""
+
+    actions = ("turn_rate", "velocity")
 
     def __init__(self) -> None:
         self._rng = np.random.default_rng(0)
