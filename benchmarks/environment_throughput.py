@@ -1,36 +1,69 @@
-"""How many steps a second the environments take, with the image observation, and where time goes.
+"""How many steps a second the environments take with image observations, and where time goes.
 
 Usage::
 
-    python benchmarks/environment_throughput.py [--steps 600] [--observation image]
+    python benchmarks/environment_throughput.py [--seconds 4] [--only mujoco]
+    python benchmarks/environment_throughput.py --memory
+    python benchmarks/environment_throughput.py --vector
 
-Each row drives one environment with a gentle weave that meets boxes. A new episode starts where
-one ends, after 100 steps, and where the robot has been held for 5 steps; resets are timed apart.
-Shares are measured by wrapping the simulator and the observation builder of the environment in
-timers. The first episode, in which kernels are loaded and distance fields are computed, is not
-counted; what it costs stands in the last columns.
+Each row drives one environment with the same kind of actions: a gentle weave for turn rates and
+velocities, random headings for headings. A new episode starts where one ends, after 100 steps, and
+where the robot has been held for 5 steps; resets are timed apart. Shares are measured by wrapping
+the simulator and the observation builder of the environment in timers. The first episode, in which
+kernels are loaded and distance fields are computed, is not counted; what it costs stands in the
+last columns. Reference and target are those of Bench-Push on a 2-core machine.
 """
 
 from __future__ import annotations
 
 import argparse
-import importlib
+import os
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
-# (preset, boxes, share on wheels)
+
+@dataclass(frozen=True)
+class Row:
+    """One environment, with the reference's and the wanted steps/s."""
+
+    task: str
+    simulator: str
+    action: str
+    variations: Mapping[str, Any] = field(default_factory=dict)
+    reference: float = float("nan")
+    target: float = float("nan")
+    simulated: bool = False  # rates are simulated seconds a second
+
+    @property
+    def name(self) -> str:
+        """In words."""
+        extra = " ".join(f"{key} {value}" for key, value in self.variations.items())
+        return f"{self.task} {self.simulator} {self.action} {extra}"
+
+
 ROWS = (
-    ("benchmark", 3, 0.0),
-    ("benchmark", 5, 0.0),
-    ("benchmark", 10, 0.0),
-    ("benchmark", 10, 0.5),
-    ("testbed", 3, 0.0),
-    ("testbed", 5, 0.0),
-    ("testbed", 10, 0.0),
+    Row("maze", "pymunk", "turn_rate", {"boxes": 5}, 12.2, 1000),
+    Row("maze", "pymunk", "turn_rate", {"boxes": 10}, 11.8, 900),
+    Row("maze", "pymunk", "turn_rate", {"boxes": 10, "wheeled": 0.5}),
+    Row("ship_ice", "pymunk", "turn_rate", {"concentration": 0.1}, 6.4, 450),
+    Row("ship_ice", "pymunk", "turn_rate", {"concentration": 0.3}),
+    Row("ship_ice", "pymunk", "turn_rate", {"concentration": 0.5}, 2.4, 60),
+    Row("box_delivery", "pymunk", "heading", {}, 2.5, 150),
+    Row("box_delivery", "pymunk", "heading", {"layout": "large_columns"}),
+    Row("box_delivery", "pymunk", "velocity", {}),
+    Row("area_clearing", "pymunk", "heading", {}, 17.2, 500),
+    Row("area_clearing", "pymunk", "velocity", {}, 43, 1500),
+    Row("maze", "mujoco", "turn_rate", {"boxes": 3}, 11.7, 500),
+    Row("box_delivery", "mujoco", "heading", {}, 4.5, 120),
+    Row("area_clearing", "mujoco", "heading", {}, 19.5, 200),
+    Row("ship_ice", "mujoco", "turn_rate", {"concentration": 0.1}, 7.1, 40, simulated=True),
+    Row("ship_ice", "mujoco", "turn_rate", {"concentration": 0.5}, 1.3, 10, simulated=True),
 )
+VECTOR = (ROWS[1], ROWS[5], ROWS[9], ROWS[11])
 
 
 class Stopwatch:
@@ -63,28 +96,46 @@ class TimedBuilder:
         return getattr(self._builder, name)
 
 
-def measure(
-    preset: str, boxes: int, wheeled: float, steps: int, observation: str
-) -> dict[str, float]:
-    """Steps/s and shares of one environment."""
-    import gymnasium
+def make(row: Row) -> Any:
+    """The environment of a row, as `gymnasium.make` would make it."""
+    from pushplan.envs.push_env import PushEnv
 
+    return PushEnv(
+        task=row.task,
+        simulator=row.simulator,
+        action=row.action,
+        variations=row.variations,
+        observation="image",
+    )
+
+
+def driver(row: Row) -> Callable[[int], Any]:
+    """Actions by step."""
+    rng = np.random.default_rng(0)
+    if row.action == "turn_rate":
+        return lambda i: np.array([0.6 * np.sin(i / 9.0)], dtype=np.float32)
+    if row.action == "velocity":
+        return lambda i: np.array([1.0, 0.6 * np.sin(i / 35.0)], dtype=np.float32)
+    return lambda i: rng.uniform(-0.5, 0.5, 1).astype(np.float32)
+
+
+def measure(row: Row, seconds: float) -> dict[str, float]:
+    """Steps/s and shares of one environment."""
     begin = time.perf_counter()
-    env = gymnasium.make(
-        "pushplan/Maze-v0", preset=preset, boxes=boxes, wheeled=wheeled, observation=observation
-    ).unwrapped
+    env = make(row)
     made = time.perf_counter() - begin
     begin = time.perf_counter()
     env.reset(seed=0)
     first_reset = time.perf_counter() - begin
-    env.step(np.zeros(1, np.float32))
-
+    act = driver(row)
+    for i in range(3):
+        env.step(act(i))
     physics, seeing = Stopwatch(), Stopwatch()
     env._simulator.step = physics.wrap(env._simulator.step)
     env._builder = TimedBuilder(env._builder, seeing)
-    stepping, resets, held = 0.0, [], 0
-    over, stuck, age = True, 0, 0
-    for i in range(steps):
+    stepping, simulated, resets, held = 0.0, 0.0, [], 0
+    over, stuck, age, i = True, 0, 0, 0
+    while stepping < seconds:
         if over:
             seen = seeing.seconds
             begin = time.perf_counter()
@@ -92,52 +143,108 @@ def measure(
             resets.append(time.perf_counter() - begin)
             seeing.seconds = seen
             stuck, age = 0, 0
-        action = np.array([0.6 * np.sin(i / 9.0)], dtype=np.float32)
+        action, clock = act(i), env.world.time
         begin = time.perf_counter()
         *_, terminated, truncated, info = env.step(action)
         stepping += time.perf_counter() - begin
+        simulated += env.world.time - clock
         held += info["held"]
-        stuck, age = stuck + 1 if info["held"] else 0, age + 1
+        stuck, age, i = stuck + 1 if info["held"] else 0, age + 1, i + 1
         over = terminated or truncated or stuck == 5 or age == 100
     return {
-        "rate": steps / stepping,
-        "simulated": steps * env.task.control_step / stepping,
+        "rate": i / stepping,
+        "simulated": simulated / stepping,
         "physics": physics.seconds / stepping,
         "observation": seeing.seconds / stepping,
-        "held": held / steps,
+        "held": held / i,
         "reset": float(np.median(resets)),
         "first_reset": first_reset,
         "make": made,
     }
 
 
-def main() -> None:
-    """Measure every row and print the table."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--steps", type=int, default=600, help="steps per row")
-    parser.add_argument("--observation", default="image", choices=("image", "state"))
-    options = parser.parse_args()
-
-    begin = time.perf_counter()
-    importlib.import_module("pushplan.envs.push_env")  # registers the ids on the way
-
-    loaded = time.perf_counter() - begin
-    print(f"importing Gymnasium and pushplan.envs: {loaded:.2f} s; observation: ", end="")
-    print(options.observation)
+def throughput(seconds: float, only: str) -> None:
+    """The table of rates."""
     print(
-        f"{'preset':10} {'boxes':>5} {'wheels':>6} {'steps/s':>8} {'sim s/s':>8} "
+        f"{'environment':58} {'steps/s':>8} {'sim s/s':>8} {'ratio':>6} {'target':>7} "
         f"{'physics':>8} {'observ.':>8} {'rest':>6} {'held':>6} {'reset':>9} "
         f"{'1st reset':>9} {'make':>9}"
     )
-    for preset, boxes, wheeled in ROWS:
-        found = measure(preset, boxes, wheeled, options.steps, options.observation)
+    for row in ROWS:
+        if only not in row.name:
+            continue
+        found = measure(row, seconds)
         rest = 1.0 - found["physics"] - found["observation"]
+        ours = found["simulated"] if row.simulated else found["rate"]
         print(
-            f"{preset:10} {boxes:5} {wheeled:6.0%} {found['rate']:8.0f} "
-            f"{found['simulated']:8.0f} {found['physics']:8.0%} {found['observation']:8.0%} "
+            f"{row.name:58} {found['rate']:8.0f} {found['simulated']:8.0f} "
+            f"{ours / row.reference:6.0f} {row.target:7.0f} "
+            f"{found['physics']:8.0%} {found['observation']:8.0%} "
             f"{rest:6.0%} {found['held']:6.0%} {found['reset'] * 1e3:6.1f} ms "
-            f"{found['first_reset'] * 1e3:6.0f} ms {found['make'] * 1e3:6.1f} ms"
+            f"{found['first_reset'] * 1e3:6.0f} ms {found['make'] * 1e3:6.1f} ms",
+            flush=True,
         )
+
+
+def resident() -> float:
+    """Memory of this process [MB]."""
+    with open("/proc/self/statm", encoding="ascii") as file:
+        return int(file.read().split()[1]) * os.sysconf("SC_PAGE_SIZE") / 1e6
+
+
+def memory(only: str, count: int = 20) -> None:
+    """Memory of one more environment of a kind that is in use already."""
+    for row in ROWS:
+        if only not in row.name:
+            continue
+        first = make(row)
+        first.reset(seed=0)
+        first.step(driver(row)(0))
+        before, kept = resident(), []
+        for seed in range(count):
+            env = make(row)
+            env.reset(seed=seed)
+            env.step(driver(row)(0))
+            kept.append(env)
+        print(f"{row.name:58} {(resident() - before) / count:8.2f} MB each")
+
+
+def vector(seconds: float) -> None:
+    """Two environments in two worker processes against two in this one."""
+    from gymnasium.vector import AsyncVectorEnv, AutoresetMode, SyncVectorEnv
+
+    for row in VECTOR:
+        rates = {}
+        for kind in (SyncVectorEnv, AsyncVectorEnv):
+            envs = kind([lambda row=row: make(row)] * 2, autoreset_mode=AutoresetMode.SAME_STEP)
+            envs.reset(seed=1)
+            act = driver(row)
+            for i in range(20):
+                envs.step(np.stack([act(i)] * 2))
+            begin, steps = time.perf_counter(), 0
+            while time.perf_counter() - begin < seconds:
+                envs.step(np.stack([act(steps)] * 2))
+                steps += 1
+            rates[kind.__name__] = 2 * steps / (time.perf_counter() - begin)
+            envs.close()
+        one, two = rates["SyncVectorEnv"], rates["AsyncVectorEnv"]
+        print(f"{row.name:58} sync {one:7.0f}  async {two:7.0f} steps/s  gain {two / one:.2f}")
+
+
+def main() -> None:
+    """Measure what was asked for."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--seconds", type=float, default=4.0, help="of stepping for each row")
+    parser.add_argument("--only", default="", help="rows whose name holds this text")
+    parser.add_argument("--memory", action="store_true", help="memory of an environment instead")
+    parser.add_argument("--vector", action="store_true", help="gain of two processes instead")
+    options = parser.parse_args()
+    if options.memory:
+        memory(options.only)
+    elif options.vector:
+        vector(options.seconds)
+    else:
+        throughput(options.seconds, options.only)
 
 
 if __name__ == "__main__":

@@ -5,7 +5,8 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING, Any
 
-from pushplan.cli.common import add_command, milliseconds, say, whole
+from pushplan.cli.common import add_command, milliseconds, say
+from pushplan.cli.scenario_options import add_scenario_options, scenario_of
 
 if TYPE_CHECKING:
     from pushplan.scenarios import Scenario
@@ -15,6 +16,7 @@ _EXAMPLES = """\
   pushplan run maze-2d-5 --policy kinodynamic-rrt --seed 3 --render episode.gif
   pushplan run --task maze --boxes 8 --shape z --policy straight --out episode.npz
   pushplan run maze-2d-5 --policy my_planner.py:MyPlanner --render path.png
+  pushplan run --task area_clearing --simulator mujoco --policy greedy --render clear.mp4
   pushplan run --task maze --set wheeled=0.5 --set random_start=true --policy straight --live
 """
 
@@ -22,21 +24,7 @@ _EXAMPLES = """\
 def add(commands: Any) -> None:
     """Add the command."""
     parser = add_command(commands, "run", "run one policy on one scenario", _EXAMPLES, run)
-    parser.add_argument("suite", nargs="?", metavar="SUITE", help="take its scenario of --seed")
-    parser.add_argument("--task", metavar="NAME", help="a task instead of a suite, such as maze")
-    parser.add_argument("--simulator", default="pymunk", metavar="NAME", help="default pymunk")
-    parser.add_argument("--preset", default="benchmark", metavar="NAME", help="default benchmark")
-    parser.add_argument("--boxes", type=whole(0), metavar="N", help="number of boxes")
-    parser.add_argument("--shape", metavar="NAME", help="shape of the maze: u or z")
-    parser.add_argument(
-        "--set",
-        action="append",
-        default=[],
-        metavar="NAME=VALUE",
-        dest="variations",
-        help="any other variation of the task; may be repeated",
-    )
-    parser.add_argument("--seed", type=whole(0), default=0, help="of the scenario (default 0)")
+    add_scenario_options(parser)
     parser.add_argument("--policy", required=True, metavar="NAME", help="as in 'pushplan bench'")
     parser.add_argument("--observation", choices=("auto", "image", "state"), default="auto")
     parser.add_argument("--render", metavar="FILE", help="picture or film: .png, .gif or .mp4")
@@ -50,7 +38,7 @@ def run(options: argparse.Namespace) -> int:
     from pushplan.evaluation import Job, JobSettings, parse_policy, run_episode
     from pushplan.evaluation.execute import rehearse
 
-    scenario = _scenario(options)
+    scenario = scenario_of(options)
     camera = Camera(options.render) if options.render else None
     spec = parse_policy(options.policy)
     policy = spec.make()
@@ -70,35 +58,6 @@ def run(options: argparse.Namespace) -> int:
         camera.write(episode)
         say(f"wrote {options.render}")
     return 0
-
-
-def _scenario(options: argparse.Namespace) -> Scenario:
-    from pushplan.scenarios import Scenario, suite
-    from pushplan.world import InvalidInputError
-
-    shown = {"boxes": options.boxes, "shape": options.shape}
-    given: dict[str, Any] = {key: value for key, value in shown.items() if value is not None}
-    given.update(_variation(text) for text in options.variations)
-    if (options.suite is None) == (options.task is None):
-        raise InvalidInputError("give either a SUITE or --task NAME, see 'pushplan run --help'")
-    if options.suite is None:
-        return Scenario(options.task, options.simulator, options.preset, given, options.seed)
-    if given:
-        raise InvalidInputError(
-            f"a suite says what its scenarios are: {', '.join(sorted(given))} needs --task instead"
-        )
-    return suite(options.suite, episodes=1, first_seed=options.seed).scenarios[0]
-
-
-def _variation(text: str) -> tuple[str, Any]:
-    import yaml
-
-    from pushplan.world import InvalidInputError
-
-    name, equals, value = text.partition("=")
-    if not equals or not name:
-        raise InvalidInputError(f"--set takes NAME=VALUE, got {text!r}")
-    return name, yaml.safe_load(value)
 
 
 def _print(label: str, scenario: Scenario, episode: Episode) -> None:

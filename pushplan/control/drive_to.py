@@ -13,7 +13,9 @@ from pushplan.world.checks import FloatArray, array, number
 _ALIGNED = math.radians(2.0)
 _ASTRAY = math.radians(20.0)
 _STALLED = 0.05
-_PATIENCE = 4
+_PATIENCE = 2
+_LONGEST = 5
+"""Periods for which a command may stand."""
 
 
 class DriveTo:
@@ -45,44 +47,53 @@ class DriveTo:
         self._last: tuple[float, float, float] | None = None
         self.arrived = False
         """Whether the last point was reached."""
+        self.periods = 1
+        """For how many periods the last command stays right if the robot follows it exactly."""
 
     def command(self, robot_pose: FloatArray) -> Twist | None:
-        """The velocity until the next call, None when it is there or has given up.
+        """The velocity to drive now, None when it is there or has given up.
 
         Args:
             robot_pose: (3,) x, y [m], theta [rad] now.
         """
         x, y, theta = (float(value) for value in robot_pose)
         if self._budget < 0:
-            self._budget = self._steps_needed(x, y, theta)
+            self._budget = self._periods_needed(x, y, theta)
         if self._blocked(x, y, theta) or self._budget == 0:
             return None
+        bearing, distance = self._aim(x, y, theta)
+        if distance == 0.0:
+            self.arrived = True
+            return None
+        robot, period = self.robot, self._period
+        if abs(bearing) > (_ALIGNED if self._turning else _ASTRAY):
+            self._turning = True
+            periods = _whole(abs(bearing) / (robot.max_turn_rate * period))
+            twist = clamp_twist(robot, 0.0, bearing / period)
+        else:
+            self._turning = False
+            periods = _whole(distance / (robot.max_speed * period))
+            speed = min(robot.max_speed, distance / period)
+            twist = clamp_twist(robot, speed, 2.0 * math.sin(bearing) / distance * speed)
+        self.periods = min(periods, self._budget)
         self._budget -= 1
-        distance = 0.0
+        return twist
+
+    def _aim(self, x: float, y: float, theta: float) -> tuple[float, float]:
+        """Bearing [rad] and distance [m] of the point to drive at, distance 0 if there is none."""
         while self._next < len(self._points):
             dx, dy = self._points[self._next, 0] - x, self._points[self._next, 1] - y
             distance = math.hypot(dx, dy)
-            if distance > self._near:
-                break
+            bearing = math.remainder(math.atan2(dy, dx) - theta, 2.0 * math.pi)
+            missed = not self._turning and abs(bearing) > 0.5 * math.pi
+            if distance > (5.0 if missed else 1.0) * self._near:
+                return bearing, distance
             self._next += 1
             self._turning = True
-        else:
-            self.arrived = True
-            return None
-        bearing = math.remainder(math.atan2(dy, dx) - theta, 2.0 * math.pi)
-        if not self._turning and math.cos(bearing) <= 0.0 and distance < 5.0 * self._near:
-            self._next += 1  # just missed it
-            self._turning = True
-            return self.command(robot_pose)
-        if abs(bearing) > (_ALIGNED if self._turning else _ASTRAY):
-            self._turning = True
-            return clamp_twist(self.robot, 0.0, bearing / self._period)
-        self._turning = False
-        steer = 2.0 * math.sin(bearing) / distance * self.robot.max_speed
-        return clamp_twist(self.robot, min(self.robot.max_speed, distance / self._period), steer)
+        return 0.0, 0.0
 
-    def _steps_needed(self, x: float, y: float, theta: float) -> int:
-        """Twice the control steps that the way takes without disturbance."""
+    def _periods_needed(self, x: float, y: float, theta: float) -> int:
+        """Twice the periods that the way takes without disturbance."""
         seconds = 0.0
         for px, py in self._points.tolist():
             turn = abs(math.remainder(math.atan2(py - y, px - x) - theta, 2.0 * math.pi))
@@ -90,10 +101,10 @@ class DriveTo:
             seconds += turn / self.robot.max_turn_rate
             theta = math.atan2(py - y, px - x)
             x, y = px, py
-        return 2 * math.ceil(seconds / self._period) + 2 * _PATIENCE
+        return 2 * math.ceil(seconds / self._period) + 8
 
     def _blocked(self, x: float, y: float, theta: float) -> bool:
-        """Whether the robot has hardly moved since the last few calls."""
+        """Whether the robot has hardly moved in the periods before the last few calls."""
         if self._last is not None:
             x0, y0, theta0 = self._last
             moved = math.hypot(x - x0, y - y0) / self.robot.max_speed
@@ -102,3 +113,8 @@ class DriveTo:
             self._stalled = self._stalled + 1 if stalled else 0
         self._last = (x, y, theta)
         return self._stalled >= _PATIENCE
+
+
+def _whole(periods: float) -> int:
+    """Full periods, at least one and at most `_LONGEST`."""
+    return min(max(1, int(periods + 1e-9)), _LONGEST)

@@ -14,9 +14,9 @@ from pushplan.envs.tasks.base import Task
 from pushplan.world import Action, InvalidInputError, Twist, WheelSpeeds, World
 from pushplan.world.checks import FloatArray
 
-Motion = Callable[[FloatArray], Twist | None]
-"""Asked before every control step of one action, with the robot's pose (3,): the next command, or
-None when the action is done."""
+Motion = Callable[[FloatArray], tuple[Twist, int] | None]
+"""Asked with the robot's pose (3,) while one action lasts: the next command and the number of
+control steps for which it may stand if the robot follows it exactly; None when it is done."""
 
 
 class ActionMode(ABC):
@@ -87,7 +87,7 @@ class ActionMode(ABC):
 
 def _once(command: Twist) -> Motion:
     """A motion of one control step."""
-    commands = iter((command,))
+    commands = iter(((command, 1),))
     return lambda robot_pose: next(commands, None)
 
 

@@ -15,6 +15,14 @@ from pushplan.world.checks import FloatArray
 from pushplan.world.outline import transform
 
 
+def _motion(driver: DriveTo) -> Motion:
+    def next_command(robot_pose: FloatArray) -> tuple[Twist, int] | None:
+        command = driver.command(robot_pose)
+        return None if command is None else (command, driver.periods)
+
+    return next_command
+
+
 class HeadingAction(ActionMode):
     """Turn to a heading and drive a fixed distance along it.
 
@@ -34,8 +42,7 @@ class HeadingAction(ActionMode):
         """Drive straight to the point at that heading and distance."""
         heading = float(action[0]) * np.pi
         target = self._step * np.array([[np.cos(heading), np.sin(heading)]])
-        driver = DriveTo(self.robot, transform(world.robot_pose, target), self._period)
-        return driver.command
+        return _motion(DriveTo(self.robot, transform(world.robot_pose, target), self._period))
 
     def _from_twist(self, twist: Twist) -> NoReturn:
         raise InvalidInputError(f"action mode 'heading' takes no velocities, got {twist!r}")
@@ -62,7 +69,7 @@ class WaypointAction(ActionMode):
         target = transform(world.robot_pose, self._half * action[None, :])[0]
         low, high = world.static.bounds[:2], world.static.bounds[2:]
         points = self._way(world, np.clip(target, low, high))
-        return DriveTo(self.robot, points, self._period).command
+        return _motion(DriveTo(self.robot, points, self._period))
 
     def _way(self, world: World, target: FloatArray) -> FloatArray:
         start = world.robot_pose[:2]

@@ -11,7 +11,7 @@ from gymnasium.spaces import Box
 from numpy.typing import ArrayLike, NDArray
 
 from pushplan.envs.actions import ActionMode
-from pushplan.envs.registry import ACTIONS, SIMULATORS, TASKS, look_up
+from pushplan.envs.registry import ACTIONS, SIMULATORS, TASKS, default_preset, look_up
 from pushplan.envs.simulators.base import Simulator
 from pushplan.envs.tasks.base import ObservationBuilder, Outcome, Task
 from pushplan.envs.trace import Trace
@@ -86,8 +86,7 @@ class PushEnv(gymnasium.Env[NDArray[Any], NDArray[Any]]):
         engine: type[Simulator] = look_up("simulator", SIMULATORS, simulator)
         action = _chosen_action(task_class, action)
         mode: type[ActionMode] = look_up("action", ACTIONS, action)
-        if preset is None:
-            preset = (task_class.solid_presets if engine.needs_solids else task_class.presets)[0]
+        preset = default_preset(task, simulator) if preset is None else preset
         self.metadata = _metadata(engine)
         self.render_mode = _checked_render_mode(render_mode, engine)
         self.task = task_class(preset=preset, variations=variations or {}, action=action)
@@ -182,8 +181,11 @@ class PushEnv(gymnasium.Env[NDArray[Any], NDArray[Any]]):
         motion = self._mode.start(self._mode.read(action), before)
         traces = []
         touched = held = False
-        while (command := motion(simulator.robot_pose)) is not None:
-            traces.append(roster.widen(simulator.step(command, self.task.control_step)))
+        several = simulator.is_exact and not self.task.objects_leave
+        while (wanted := motion(simulator.robot_pose)) is not None:
+            command, periods = wanted
+            duration = self.task.control_step * (periods if several else 1)
+            traces.append(roster.widen(simulator.step(command, duration)))
             touched |= simulator.touched_static
             held |= simulator.held
             if self.task.objects_leave:
@@ -318,7 +320,9 @@ def _chosen_action(task: type[Task], wanted: str | Sequence[str] | None) -> str:
     for name in names:
         if name in task.actions:
             return name
-    raise UnknownNameError(f"action of task {task.name!r}", ", ".join(map(str, names)), task.actions)
+    raise UnknownNameError(
+        f"action of task {task.name!r}", ", ".join(map(str, names)), task.actions
+    )
 
 
 def _space(builder: ObservationBuilder, reach: float) -> Box:

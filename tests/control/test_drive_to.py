@@ -22,6 +22,7 @@ def run(points, pose=(0.0, 0.0, 0.0), follow=1.0):
     """Poses of a robot whose speeds are ``follow`` times what it is told."""
     driver, poses = DriveTo(ROBOT, points, PERIOD), [np.array(pose, dtype=float)]
     while (twist := driver.command(poses[-1])) is not None:
+        assert driver.periods >= 1
         assert abs(twist.linear) <= ROBOT.max_speed and abs(twist.angular) <= ROBOT.max_turn_rate
         x, y, theta = poses[-1]
         v, w = follow * twist.linear * PERIOD, follow * twist.angular * PERIOD

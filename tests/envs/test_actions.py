@@ -40,8 +40,8 @@ def driven(name, action, pose, static=ROOM):
     world = World(m.robot, np.array(pose), static, Movables.empty(), GoalDisc((2.5, 2.5), 0.1))
     motion = m.start(m.read(action), world)
     poses = [np.array(pose, dtype=float)]
-    while (twist := motion(poses[-1])) is not None:
-        poses.append(advanced(poses[-1], twist, 0.15))
+    while (wanted := motion(poses[-1])) is not None:
+        poses.append(advanced(poses[-1], wanted[0], 0.15 * wanted[1]))
     return np.array(poses)
 
 
@@ -53,7 +53,8 @@ def advanced(pose, twist, h):
 
 def command(m, values):
     motion = m.start(m.read(values), None)
-    twist = motion(None)
+    twist, periods = motion(None)
+    assert periods == 1
     assert motion(None) is None  # these modes last one control step
     return twist
 

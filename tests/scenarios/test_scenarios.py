@@ -100,8 +100,8 @@ def test_seeds_count_up_from_the_first():
     assert [scenario.seed for scenario in found.scenarios] == [100, 101, 102, 103]
     assert {scenario.variations["boxes"] for scenario in found.scenarios} == {5}
     assert suite("maze-2d-5", episodes=2).scenarios == suite("maze-2d-5").scenarios[:2]
-    smoke = suite("smoke", episodes=4, first_seed=7)
-    assert [scenario.seed for scenario in smoke.scenarios] == [7, 7, 8, 8]
+    smoke = suite("smoke", episodes=10, first_seed=7)
+    assert [scenario.seed for scenario in smoke.scenarios] == [7] * 8 + [8] * 2
 
 
 def test_unknown_suite_names_the_nearest():

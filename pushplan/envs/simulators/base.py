@@ -109,6 +109,8 @@ class Simulator(ABC):
     needs_solids: ClassVar[bool] = False
     """Whether the engine has a third dimension, so that `Materials.solids` must be there."""
     has_camera: ClassVar[bool] = False
+    is_exact: ClassVar[bool] = False
+    """Whether the robot follows a command exactly unless it is held."""
 
     @abstractmethod
     def build(self, world: World, materials: Materials) -> None:

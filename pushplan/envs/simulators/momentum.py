@@ -106,5 +106,5 @@ def _kept(speed: float, b: float, c: float, h: float) -> float:
     """Share of the speed that is left after ``h``."""
     decay = math.exp(-b * h)
     # (1 - exp(-b h)) / b, which tends to h
-    reach = -math.expm1(-b * h) / b if b > 0.0 else h
+    reach = -math.expm1(-b * h) / b if b * h > 1e-12 else h
     return decay / (1.0 + c * speed * reach)

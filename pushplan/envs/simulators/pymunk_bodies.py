@@ -77,6 +77,7 @@ class PymunkBodies:
         self.robot = pymunk.Body(body_type=pymunk.Body.KINEMATIC)
         self._robot_shapes = self._make_robot(world, robot_mu)
         self._objects = self._make_objects(world, object_mu)
+        self._active: IntArray = np.zeros(0, dtype=np.int64)
         self._bodies: list[pymunk.Body] = []
         self._shapes: list[pymunk.Shape] = []
         self._add_static(world, static_mu)
@@ -93,14 +94,18 @@ class PymunkBodies:
             active: (A,) indices of objects, increasing.
             rows: (1 + A, 6) where to place them.
         """
-        self.space.remove(*self._shapes, *self._bodies)
-        chosen = [self._objects[k] for k in active.tolist()]
-        self._bodies = [self.robot, *(body for body, _ in chosen)]
-        self._shapes = [*self._robot_shapes, *(shape for _, shape in chosen)]
-        self.space.add(*self._bodies)
+        if self._bodies and np.array_equal(active, self._active):
+            self.space.remove(*self._shapes)
+        else:
+            self.space.remove(*self._shapes, *self._bodies)
+            chosen = [self._objects[k] for k in active.tolist()]
+            self._bodies = [self.robot, *(body for body, _ in chosen)]
+            self._shapes = [*self._robot_shapes, *(shape for _, shape in chosen)]
+            self.space.add(*self._bodies)
+            self._carried = self._momentum.select(active)
+            self._active = active
         self.write(rows)  # first, as the broad phase remembers where a shape was when it came
         self.space.add(*self._shapes)
-        self._carried = self._momentum.select(active)
         self._contacts.clear()
 
     def _add_static(self, world: World, friction: float) -> None:
@@ -203,6 +208,7 @@ class PymunkBodies:
         """Place every body and set its velocity; pending overlap corrections are dropped."""
         for body in self._bodies:
             _update_position(body, 0.0)  # empties the hidden correction velocity
+        self._velocity = (math.nan, math.nan, math.nan)
         self._set(_POSE_AND_TWIST, rows)
 
     def _set(self, fields: batch.BodyFields, values: FloatArray) -> None:
@@ -219,8 +225,10 @@ class PymunkBodies:
 
     def drive(self, vx: float, vy: float, w: float) -> None:
         """Set the robot's velocity [m/s, m/s, rad/s], world frame."""
-        _set_velocity(self.robot, (vx, vy))
-        _set_turn_rate(self.robot, w)
+        if (vx, vy, w) != self._velocity:
+            self._velocity = (vx, vy, w)
+            _set_velocity(self.robot, (vx, vy))
+            _set_turn_rate(self.robot, w)
 
     def advance(self, h: float) -> None:
         """One substep of ``h`` seconds."""

@@ -13,7 +13,7 @@ from pushplan.envs.simulators.base import Materials, Simulator, SimulatorState
 from pushplan.envs.simulators.momentum import Momentum
 from pushplan.envs.simulators.pymunk_bodies import PymunkBodies
 from pushplan.envs.simulators.pymunk_drive import PymunkDriver, PymunkOptions
-from pushplan.envs.simulators.reach import struck, within_reach
+from pushplan.envs.simulators.reach import footprint_gap, struck, within_reach
 from pushplan.envs.trace import Trace
 from pushplan.geometry.obstacles import obstacle_distance, obstacles_of
 from pushplan.interaction.model import Interaction
@@ -21,7 +21,9 @@ from pushplan.world import InvalidInputError, Twist, World
 from pushplan.world.checks import BoolArray, FloatArray, IntArray, array, frozen
 
 _GLIDE_SAMPLES = 4
-"""Poses recorded in a step in which nothing can happen."""
+"""Poses recorded in a step in which nothing can happen; one where the robot drives straight."""
+_SAMPLED = 24.0
+"""Steps of fewer substeps than this are sampled more coarsely."""
 _REST = 2e-4
 """Objects that move slower than this share of their size per second stop."""
 
@@ -36,6 +38,7 @@ class PymunkSimulator(Simulator):
     """
 
     name = "pymunk"
+    is_exact = True
 
     def __init__(self, options: PymunkOptions | None = None) -> None:
         self.options = options or PymunkOptions()
@@ -64,13 +67,13 @@ class PymunkSimulator(Simulator):
         """Drive at a body-frame velocity for ``duration`` [s]."""
         radius = self._world.robot.circumscribed_radius
         speed = abs(command.linear) + abs(command.angular) * radius
-        own = self._own_speeds() * duration
+        own = self._object_speeds() * duration
         loaded = self._in_reach(speed * duration, own)
         self._held = self._touched = False
         if not loaded.any() and self._far_from_static(speed * duration):
             return self._glide(command, duration)
-        wanted = self._substeps(speed, own > 0.0, loaded, duration)
-        samples = min(max(2, math.ceil(wanted)), self.options.samples)
+        wanted = self._substeps(max(speed * duration, own.max(initial=0.0)), duration)
+        samples = max(2, math.ceil(self.options.samples * min(1.0, wanted / _SAMPLED)))
         each = max(1, math.ceil(wanted / samples))
         while True:
             active = np.flatnonzero(loaded)
@@ -86,45 +89,30 @@ class PymunkSimulator(Simulator):
         self._held, self._touched = self._driver.held, self._driver.touched
         return self._traced(duration, found[:, 0, :3], paths)
 
-    def _substeps(
-        self, speed: float, rolling: BoolArray, loaded: BoolArray, duration: float
-    ) -> float:
-        """How many substeps a step needs.
-
-        Args:
-            speed: of the robot's fastest point [m/s].
-            rolling: (K,) objects that move by themselves.
-            loaded: (K,) objects that are simulated.
-            duration: of the step [s].
-        """
-        # what was pushed at the end of the last step moves on for one substep
-        velocities = self._rows[1:, 3:]
-        speeds = np.hypot(velocities[loaded, 0], velocities[loaded, 1])
-        fastest = max(speed, float(speeds.max(initial=0.0)))
-        wanted = duration * fastest / (self.options.travel * self._size)
-        if rolling.any():
-            decay = self._momentum.fastest_decay(self._rows[:, 3:])
-            wanted = max(wanted, duration * decay / self.options.decay)
-        return wanted
+    def _substeps(self, travel: float, duration: float) -> float:
+        """How many substeps a step needs in which some point moves by ``travel`` [m]."""
+        decay = self._momentum.fastest_decay(self._rows[:, 3:])
+        by_travel = travel / (self.options.travel * self._size)
+        return max(by_travel, duration * decay / self.options.decay)
 
     def _glide(self, command: Twist, duration: float) -> Trace:
         """A step in which nothing can touch the robot."""
-        shares = np.arange(1, _GLIDE_SAMPLES + 1) / _GLIDE_SAMPLES
-        x, y, theta = self._rows[0, :3]
-        turned = command.angular * duration * shares
-        chord = command.linear * duration * shares * np.sinc(turned / (2.0 * math.pi))
-        middle = theta + 0.5 * turned
-        poses = np.stack([x + chord * np.cos(middle), y + chord * np.sin(middle), theta + turned])
+        samples = _GLIDE_SAMPLES if command.angular else 1
+        poses = np.empty((samples, 3))
+        x, y, theta = self._rows[0, :3].tolist()
+        turn = command.angular * duration / samples
+        half = 0.5 * turn
+        chord = command.linear * duration / samples * (math.sin(half) / half if half else 1.0)
+        for i in range(samples):
+            x += chord * math.cos(theta + half)
+            y += chord * math.sin(theta + half)
+            theta += turn
+            poses[i] = x, y, theta
+        v = command.linear
         self._rows[1:, 3:] = 0.0
-        self._rows[0, :3] = poses[:, -1]
-        last = theta + turned[-1]
-        self._rows[0, 3:] = (
-            command.linear * math.cos(last),
-            command.linear * math.sin(last),
-            command.angular,
-        )
-        paths = np.repeat(self._rows[None, 1:, :3], _GLIDE_SAMPLES, axis=0)
-        return self._traced(duration, poses.T, paths)
+        self._rows[0] = x, y, theta, v * math.cos(theta), v * math.sin(theta), command.angular
+        paths = np.repeat(self._rows[None, 1:, :3], samples, axis=0)
+        return self._traced(duration, poses, paths)
 
     def _traced(self, duration: float, robot: FloatArray, paths: FloatArray) -> Trace:
         times = self._time + duration * np.arange(1, len(robot) + 1) / len(robot)
@@ -132,17 +120,14 @@ class PymunkSimulator(Simulator):
         times[-1] = self._time
         return Trace(frozen(times), frozen(np.ascontiguousarray(robot)), frozen(paths))
 
-    def _own_speeds(self) -> FloatArray:
-        """(K,) speeds of the points of the objects that move by themselves [m/s].
+    def _object_speeds(self) -> FloatArray:
+        """(K,) speeds of the objects' fastest points, rolling or still being pushed [m/s].
 
         What has become slower than can matter has stopped.
         """
-        if not self._momentum.keeps.any():
-            return np.zeros(len(self._rows) - 1)
         velocities = self._rows[1:, 3:]
         turning = np.abs(velocities[:, 2]) * self._world.movables.radii
         speeds: FloatArray = np.hypot(velocities[:, 0], velocities[:, 1]) + turning
-        speeds[self._momentum.keeps[1:] == 0.0] = 0.0
         speeds[speeds < _REST * self._size] = 0.0
         return speeds
 
@@ -175,9 +160,18 @@ class PymunkSimulator(Simulator):
 
     def _far_from_static(self, reach: float) -> bool:
         x, y = self._rows[0, 0], self._rows[0, 1]
-        shapes = self._obstacles
+        robot, shapes = self._world.robot, self._obstacles
         gap = obstacle_distance(x, y, shapes.vertices, shapes.offsets, shapes.radii)
-        return bool(gap > self._world.robot.circumscribed_radius + reach)
+        if gap > robot.circumscribed_radius + reach:
+            return True
+        return reach < footprint_gap(
+            self._rows[0, :3],
+            robot.vertices,
+            robot.offsets,
+            shapes.vertices,
+            shapes.offsets,
+            shapes.radii,
+        )
 
     def _start(self, active: IntArray) -> FloatArray:
         """(1 + A, 6) rows of the robot and some objects."""
@@ -213,7 +207,7 @@ class PymunkSimulator(Simulator):
         if duration == 0.0:
             return True
         reach = length + abs(turn) * robot.circumscribed_radius
-        own = self._own_speeds() * duration
+        own = self._object_speeds() * duration
         loaded = self._in_reach(reach, own)
         if not loaded.any() and self._far_from_static(reach):
             self._rows[1:, 3:] = 0.0

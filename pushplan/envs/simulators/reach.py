@@ -72,6 +72,36 @@ def within_reach(
 
 
 @njit(cache=True, nogil=True)
+def footprint_gap(
+    robot: FloatArray,
+    parts: FloatArray,
+    part_offsets: IntArray,
+    vertices: FloatArray,
+    offsets: IntArray,
+    radii: FloatArray,
+) -> float:
+    """Distance [m] between the robot's footprint and what is static, 0 or less where they touch.
+
+    Args:
+        robot: (3,) pose of the robot.
+        parts: corners of its footprint, body frame.
+        part_offsets: where each part starts.
+        vertices: corners of the cores of the obstacles, world frame.
+        offsets: where each core starts.
+        radii: how far each obstacle reaches beyond its core [m].
+    """
+    corners = np.empty_like(parts)
+    transform_points(robot[0], robot[1], robot[2], parts, corners)
+    best = math.inf
+    for k in range(radii.shape[0]):
+        core = vertices[offsets[k] : offsets[k + 1]]
+        for p in range(part_offsets.shape[0] - 1):
+            part = corners[part_offsets[p] : part_offsets[p + 1]]
+            best = min(best, convex_distance(part, core) - radii[k])
+    return best
+
+
+@njit(cache=True, nogil=True)
 def struck(
     loaded: BoolArray,
     paths: FloatArray,
