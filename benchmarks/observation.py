@@ -1,47 +1,48 @@
-"""Time of one image observation, whole and by channel.
+"""Time of one image observation at the start of each task, whole and by channel.
 
-Run with ``python benchmarks/observation.py``.
+Run with ``python benchmarks/observation.py``; ``--pictures FOLDER`` also writes the channels of
+each image side by side.
 """
 
 from __future__ import annotations
 
+import argparse
 import time
 from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
 
 import numpy as np
+from PIL import Image
 
-from pushplan.geometry import distance_field
-from pushplan.observation import ImageObservation
-from pushplan.world import Drive, GoalDisc, Movables, RobotModel, StaticMap, World, stream
+from pushplan.envs import make
+from pushplan.geometry import distance_field, shadows
+from pushplan.observation import ImageObservation, channels
+from pushplan.scenarios import Scenario
+from pushplan.world import World
 
-WALLS = [[0, 0, 15, 0], [15, 0, 15, 15], [15, 15, 0, 15], [0, 15, 0, 0], [7.5, 0, 7.5, 10]]
-
-
-def maze(boxes: int = 10) -> World:
-    """A U-shaped maze with boxes anywhere: overlaps do not matter to a picture."""
-    rng = stream(0, "benchmark")
-    x, y = 0.7, 0.6
-    corner = 0.25
-    octagon = np.array(
-        [
-            *((x, -y + corner), (x, y - corner), (x - corner, y), (-x + corner, y)),
-            *((-x, y - corner), (-x, -y + corner), (-x + corner, -y), (x - corner, -y)),
-        ]
-    )
-    square = np.array([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]])
-    poses = rng.uniform([1, 1, -np.pi], [14, 14, np.pi], (boxes, 3))
-    return World(
-        robot=RobotModel.from_outline(
-            octagon, mass=1.0, drive=Drive.CONSTANT_SPEED, max_speed=0.15, max_turn_rate=0.105
-        ),
-        robot_pose=np.array([11.25, 3.75, 1.2]),
-        static=StaticMap.build([], WALLS, 0.5, bounds=[0, 0, 15, 15]),
-        movables=Movables.from_outlines([square] * boxes, poses),
-        goal=GoalDisc(np.array([3.75, 3.75]), 1.86),
-    )
+CASES: dict[str, tuple[str, str, dict[str, Any]]] = {
+    "maze, 10 boxes": ("maze", "image", {"boxes": 10}),
+    "ship_ice, 10 %": ("ship_ice", "image", {"concentration": 0.1}),
+    "ship_ice, 50 %": ("ship_ice", "image", {"concentration": 0.5}),
+    "area_clearing, clear": ("area_clearing", "image", {}),
+    "area_clearing, walled with columns": (
+        "area_clearing",
+        "image",
+        {"layout": "walled_with_columns"},
+    ),
+    "box_delivery, large columns": ("box_delivery", "image", {"layout": "large_columns"}),
+    "box_delivery, large divider": ("box_delivery", "image", {"layout": "large_divider"}),
+    "box_delivery, large columns, spatial": (
+        "box_delivery",
+        "spatial",
+        {"layout": "large_columns"},
+    ),
+}
 
 
-def milliseconds(call: Callable[[], object], repeats: int = 500) -> float:
+def milliseconds(call: Callable[[], object], repeats: int = 300) -> float:
     """Median time of a call [ms]."""
     times = []
     for _ in range(repeats):
@@ -51,22 +52,43 @@ def milliseconds(call: Callable[[], object], repeats: int = 500) -> float:
     return 1e3 * float(np.median(times))
 
 
+def first_time(view: ImageObservation, world: World) -> float:
+    """Median time of an observation of a map that was never seen before [ms]."""
+
+    def call() -> None:
+        for cache in (
+            channels._distance_raster,
+            channels._static_parts,
+            distance_field._field,
+            shadows.bend_distances,
+        ):
+            cache.cache_clear()
+        view.observe(world)
+
+    return milliseconds(call, 9)
+
+
 def main() -> None:
-    world = maze()
-    whole = ImageObservation()
-    whole.observe(world)  # compile
-    title, median = f"whole image {whole.shape}", milliseconds(lambda: whole.observe(world))
-    print(f"{title:32}{median:8.3f} ms")
-    for name in whole.channels:
-        one = ImageObservation(channels=(name,))
-        print(f"{'  ' + name:32}{milliseconds(lambda one=one: one.observe(world)):8.3f} ms")
-
-    def field() -> None:
-        distance_field._field.cache_clear()
-        distance_field.geodesic_field(world.static, world.goal, resolution=0.1)
-
-    field()
-    print(f"{'goal field, 150 x 150, once':32}{milliseconds(field, 20):8.3f} ms")
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--pictures", type=Path, help="folder for the channels of each image")
+    folder = parser.parse_args().pictures
+    for title, (task, name, variations) in CASES.items():
+        env = make(Scenario(task, variations=variations, seed=1), observation=name)
+        env.reset()
+        view = env.task.observation(name)
+        assert isinstance(view, ImageObservation)
+        world = env.world
+        image = view.observe(world)
+        whole = milliseconds(lambda view=view, world=world: view.observe(world))
+        new = first_time(view, world)
+        print(f"{title} {view.shape}: {whole:.3f} ms, {new:.1f} ms for a new map")
+        for channel in view.channels:
+            one = replace(view, channels=(channel,))
+            span = milliseconds(lambda one=one, world=world: one.observe(world))
+            print(f"  {channel:16}{span:8.3f} ms")
+        if folder is not None:
+            tiles = [np.pad(layer, 2, constant_values=90) for layer in image]
+            Image.fromarray(np.hstack(tiles)).save(folder / f"{title.replace(' ', '_')}.png")
 
 
 if __name__ == "__main__":

@@ -8,9 +8,9 @@ import sys
 from collections.abc import Sequence
 
 from pushplan import __version__
-from pushplan.cli import bench, compiling, listing, plan, report, run, score
+from pushplan.cli import bench, compiling, ice, listing, plan, report, run, score, teleop
 
-COMMANDS = (run, plan, bench, listing, score, report, compiling)
+COMMANDS = (run, teleop, plan, bench, listing, score, report, ice, compiling)
 
 _DESCRIPTION = "Plan, push, score and compare: baselines for robots that push things."
 _EXAMPLES = """\

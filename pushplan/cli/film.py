@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from itertools import repeat
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
+from pushplan.cli.scoreboard import Scoreboard, closing_lines
 from pushplan.drawing import draw_world, save_animation, save_image
+from pushplan.drawing.files import Frame
 from pushplan.world import Episode, InvalidInputError, Plan, Policy, World
 
 ENDINGS = (".png", ".gif", ".mp4")
@@ -39,20 +42,27 @@ class Camera:
         self._steps.append((world, getattr(policy, "current_plan", None)))
 
     def write(self, episode: Episode) -> None:
-        """Draw what was seen."""
+        """Draw what was seen, with the scores so far."""
+        count = len(self._steps)
         if self.path.suffix.lower() == ".png":
-            save_image(self.path, self._frame(len(self._steps) - 1, episode))
+            *_, last = self._frames(episode, [count - 1])
+            save_image(self.path, last)
             return
-        stride = -(-len(self._steps) // FRAMES)
-        chosen = [*range(0, len(self._steps) - 1, stride), len(self._steps) - 1]
-        frames = [self._frame(i, episode) for i in chosen]
-        frames += [frames[-1]] * FPS  # a second to look at the end
-        save_animation(self.path, frames, FPS)
+        stride = -(-count // FRAMES)
+        chosen = [*range(0, count - 1, stride), count - 1]
+        save_animation(self.path, self._frames(episode, chosen), FPS)
 
-    def _frame(self, index: int, episode: Episode) -> Any:
-        world, plan = self._steps[index]
-        so_far = episode.times <= world.time + 1e-9
-        trail = np.ascontiguousarray(episode.robot_poses[so_far])
-        last = index == len(self._steps) - 1
-        text = f"{world.time:.1f} s" + (f"  {episode.reason}" if last else "")
-        return draw_world(world, plan=plan, trail=trail, text=text)
+    def _frames(self, episode: Episode, chosen: list[int]) -> Iterator[Frame]:
+        board, seen = Scoreboard(episode.world), 1
+        for index in chosen:
+            world, plan = self._steps[index]
+            now = int(np.searchsorted(episode.times, world.time + 1e-9))
+            board.advance(world, episode.robot_poses[seen:now], episode.object_poses[seen:now])
+            seen, trail = now, episode.robot_poses[:now]
+            text = board.lines()
+            if index == chosen[-1]:
+                text = [text[0], *closing_lines(episode)]
+            frame = draw_world(world, plan=plan, trail=trail, text=text)
+            yield frame
+        if len(chosen) > 1:  # a second to look at the end
+            yield from repeat(frame, FPS)

@@ -11,6 +11,8 @@ from pushplan.world.checks import FloatArray
 
 SMOOTHING = 2
 """Everything is drawn this many times larger and then averaged."""
+THIN = 3
+"""Edges up to this width [px, before smoothing] need no round joints."""
 
 Color = tuple[int, int, int]
 
@@ -34,6 +36,7 @@ class Canvas:
     ) -> None:
         width, height = (float(side) for side in bounds[2:] - bounds[:2])
         self.scale = SMOOTHING * size_px / max(width, height)
+        self.bounds = bounds
         self.corner = np.array([bounds[0], bounds[3]])
         if image is None:
             # even sides, as video codecs want them
@@ -45,6 +48,11 @@ class Canvas:
         self.image = image
         self.draw = ImageDraw.Draw(image)
 
+    @property
+    def pixels_per_metre(self) -> float:
+        """Scale of the finished picture [px/m]."""
+        return self.scale / SMOOTHING
+
     def pixels(self, points: FloatArray) -> list[tuple[float, float]]:
         """World points (N, 2) [m] as pixel coordinates."""
         moved = (points - self.corner) * np.array([self.scale, -self.scale])
@@ -55,12 +63,14 @@ class Canvas:
     ) -> None:
         """A closed polygon with corners (N, 2) [m]."""
         spots = self.pixels(corners)
+        width = self._width(width_px)
+        if fill is not None and width <= THIN:
+            self.draw.polygon(spots, fill=fill, outline=edge if width else None, width=width)
+            return
         if fill is not None:
             self.draw.polygon(spots, fill=fill)
-        if width_px > 0.0:
-            self.draw.line(
-                [*spots, spots[0], spots[1]], fill=edge, width=self._width(width_px), joint="curve"
-            )
+        if width:
+            self.draw.line([*spots, spots[0], spots[1]], fill=edge, width=width, joint="curve")
 
     def line(self, points: FloatArray, color: Color, width_px: float, dash_m: float = 0.0) -> None:
         """An open line through (N, 2) points [m], dashed if ``dash_m`` is positive."""

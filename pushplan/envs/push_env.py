@@ -226,7 +226,7 @@ class PushEnv(gymnasium.Env[NDArray[Any], NDArray[Any]]):
     def _show(self) -> None:
         if self.render_mode == "human":
             if self._window is None:
-                self._window = Window("pushplan")
+                self._window = Window("pushplan", fps=self.metadata["render_fps"])
             self._window.show(_picture(self.world))
 
 

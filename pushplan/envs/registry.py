@@ -10,8 +10,12 @@ from pushplan.world import UnknownNameError
 
 TASKS: Mapping[str, str] = {
     "maze": "pushplan.envs.tasks.maze:MazeTask",
+    "box_delivery": "pushplan.envs.tasks.box_delivery:BoxDeliveryTask",
+    "area_clearing": "pushplan.envs.tasks.area_clearing:AreaClearingTask",
+    "ship_ice": "pushplan.envs.tasks.ship_ice:ShipIceTask",
 }
 SIMULATORS: Mapping[str, str] = {
+    "mujoco": "pushplan.envs.simulators.mujoco_simulator:MujocoSimulator",
     "pymunk": "pushplan.envs.simulators.pymunk_simulator:PymunkSimulator",
 }
 ACTIONS: Mapping[str, str] = {
@@ -23,6 +27,9 @@ ACTIONS: Mapping[str, str] = {
 }
 GYM_IDS: Mapping[str, str] = {
     "pushplan/Maze-v0": "maze",
+    "pushplan/BoxDelivery-v0": "box_delivery",
+    "pushplan/AreaClearing-v0": "area_clearing",
+    "pushplan/ShipIce-v0": "ship_ice",
 }
 
 
@@ -36,3 +43,14 @@ def look_up(kind: str, table: Mapping[str, str], name: object) -> Any:
         raise UnknownNameError(kind, name, table)
     module, _, attribute = table[name].partition(":")
     return getattr(import_module(module), attribute)
+
+
+def default_preset(task: str, simulator: str) -> str:
+    """The first preset of a task that suits a simulator.
+
+    Raises:
+        UnknownNameError: if there is no such task or simulator.
+    """
+    kind, engine = look_up("task", TASKS, task), look_up("simulator", SIMULATORS, simulator)
+    presets: tuple[str, ...] = kind.solid_presets if engine.needs_solids else kind.presets
+    return presets[0]

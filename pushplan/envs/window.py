@@ -5,12 +5,16 @@ from __future__ import annotations
 import importlib.util
 import os
 import sys
-from typing import Any
+import time
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pushplan.world import MissingDependencyError
+
+TICK = 0.02
+"""How often a waiting window looks at what the person does [s]."""
 
 
 def has_display() -> bool:
@@ -22,33 +26,69 @@ def has_display() -> bool:
     return True
 
 
+class Keys(Protocol):
+    """Is told of every key of a window that goes down or up, by its name in tkinter."""
+
+    def press(self, key: str) -> None:
+        """A key went down."""
+
+    def release(self, key: str, now: float) -> None:
+        """A key went up at a time of `time.perf_counter` [s]."""
+
+    def clear(self) -> None:
+        """The window has lost the keyboard, and will not hear of releases."""
+
+
 class Window:
     """One window. A person may close it; frames shown after that are dropped.
 
     Args:
         title: text in the title bar.
+        keyboard: is told of keys.
+        fps: frames are shown no faster than this, so that a person can follow; as fast as they
+            come if None.
 
     Raises:
         MissingDependencyError: if no window can be opened.
     """
 
-    def __init__(self, title: str) -> None:
+    def __init__(
+        self, title: str, *, keyboard: Keys | None = None, fps: float | None = None
+    ) -> None:
         try:
             import tkinter
         except ImportError as error:
             raise MissingDependencyError(
-                "a window needs tkinter; render mode 'rgb_array' works without"
+                "a window needs tkinter, which this Python lacks"
             ) from error
         try:
             self._root: Any = tkinter.Tk()
         except tkinter.TclError as error:
             raise MissingDependencyError(
-                f"no window can be opened here ({error}); render mode 'rgb_array' works without"
+                f"no window can be opened here: it needs a display ({error})"
             ) from error
         self._root.title(title)
         self._root.protocol("WM_DELETE_WINDOW", self.close)
-        self._label: Any = tkinter.Label(self._root)
+        self._label: Any = tkinter.Label(self._root, borderwidth=0)
         self._label.pack()
+        self._photo: Any = None
+        self._pause = 1.0 / fps if fps else 0.0
+        self._next = 0.0
+        if keyboard is not None:
+            self._listen(keyboard)
+
+    def _listen(self, keyboard: Keys) -> None:
+        self._root.bind("<KeyPress>", lambda event: keyboard.press(event.keysym))
+        self._root.bind(
+            "<KeyRelease>", lambda event: keyboard.release(event.keysym, time.perf_counter())
+        )
+        self._root.bind("<FocusOut>", lambda event: keyboard.clear())
+        self._root.focus_force()
+
+    @property
+    def closed(self) -> bool:
+        """Whether the window is gone."""
+        return self._root is None
 
     def show(self, frame: NDArray[np.uint8]) -> None:
         """Show a frame (H, W, 3)."""
@@ -56,14 +96,27 @@ class Window:
             return
         from PIL import Image, ImageTk
 
-        photo = ImageTk.PhotoImage(Image.fromarray(frame), master=self._root)
-        self._label.configure(image=photo)
-        self._label.image = photo  # tkinter keeps no reference of its own
-        self._root.update_idletasks()
-        self._root.update()
+        while (left := self._next - time.perf_counter()) > 0.0 and not self.closed:
+            time.sleep(min(left, TICK))
+            self.update()
+        if self.closed:
+            return
+        self._next = time.perf_counter() + self._pause
+        image = Image.fromarray(frame)
+        if self._photo is None or (self._photo.width(), self._photo.height()) != image.size:
+            self._photo = ImageTk.PhotoImage(image, master=self._root)
+            self._label.configure(image=self._photo)
+        else:
+            self._photo.paste(image)
+        self.update()
+
+    def update(self) -> None:
+        """Redraw, and take in what the person does; a person may close the window here."""
+        if self._root is not None:
+            self._root.update()
 
     def close(self) -> None:
         """Close the window; may be called again."""
         if self._root is not None:
-            self._root.destroy()
-            self._root = None
+            root, self._root, self._photo = self._root, None, None
+            root.destroy()

@@ -45,10 +45,10 @@ class ResultRow:
         status: a value of `Status`.
         reason: why the episode ended; for a failed job what went wrong.
         success: whether the task's goal was reached.
-        E_nav: efficiency of navigation; 0 for a navigation job that failed.
+        E_nav: efficiency of navigation; 0 for a job that failed.
         I_nav: effort of navigation.
-        S_manip: success of manipulation.
-        E_manip: efficiency of manipulation.
+        S_manip: success of manipulation; 0 for a job that failed.
+        E_manip: efficiency of manipulation; 0 for a job that failed.
         I_manip: effort of manipulation.
         path_length_m: length of the robot's path [m].
         interaction_work_kg_m: sum of object mass times path length [kg m].
@@ -103,7 +103,13 @@ SCORES = ("E_nav", "I_nav", "S_manip", "E_manip", "I_manip")
 _SCORED = (*SCORES, "path_length_m", "interaction_work_kg_m", "steps", "sim_time_s")
 _SCORED_NAMES = tuple(name for name in _SCORED if name in metric_names())
 _COUNTED = ("steps", "sim_time_s")
-_NAVIGATION_TASKS = ("maze", "ship_ice", "ship-ice")
+_ZEROED = {
+    "maze": ("E_nav",),
+    "ship_ice": ("E_nav",),
+    "box_delivery": ("S_manip", "E_manip"),
+    "area_clearing": ("S_manip", "E_manip"),
+}
+"""Scores that are 0, and not missing, for a job that failed; else failures would raise the mean."""
 
 
 def setting_of(scenario: str, seed: int) -> str:
@@ -113,6 +119,7 @@ def setting_of(scenario: str, seed: int) -> str:
 
 def blank_row(policy: str, scenario: Any, status: Status, reason: str) -> ResultRow:
     """The row of a job of which nothing was recorded."""
+    zeroed: dict[str, Any] = dict.fromkeys(_ZEROED.get(str(scenario.task), ()), 0.0)
     return ResultRow(
         policy=policy,
         task=str(scenario.task),
@@ -122,7 +129,7 @@ def blank_row(policy: str, scenario: Any, status: Status, reason: str) -> Result
         status=str(status),
         reason=reason,
         success=False,
-        E_nav=0.0 if scenario.task in _NAVIGATION_TASKS else None,
+        **zeroed,
     )
 
 

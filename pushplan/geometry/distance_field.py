@@ -15,7 +15,7 @@ from scipy import ndimage
 from pushplan.geometry.contours import standoff_of
 from pushplan.geometry.grid import Grid, clearance_field
 from pushplan.geometry.obstacles import Obstacles, obstacle_distance
-from pushplan.geometry.regions import Regions
+from pushplan.geometry.regions import Regions, outside_area
 from pushplan.geometry.shortest_path import GoalDistances, goal_distances
 from pushplan.geometry.visibility import NO_LEG, Nodes, goal_leg, node_leg
 from pushplan.world import Goal, StaticMap
@@ -152,6 +152,7 @@ def _field(source: GoalDistances, resolution: float) -> GeodesicField:
         source.gap,
         standoff_of(source.static, source.clearance),
     )
+    values[outside_area(source.target, np.stack(np.meshgrid(grid.x, grid.y), axis=-1))] = 0.0
     return GeodesicField(frozen(values), grid, source)
 
 
@@ -174,7 +175,8 @@ def geodesic_field(
     Args:
         static: obstacles, and bounds that paths may not leave.
         goal: a disc, a line, a receptacle, or a list of convex polygons (N, 2) and segments
-            (2, 2) [m].
+            (2, 2) [m]. For a clearance area values are the distances to the nearest open edge,
+            and 0 outside the area.
         resolution: side of a cell [m].
         clearance: distance that paths keep from obstacles [m].
         bounds: (4,) x_min, y_min, x_max, y_max [m] in place of the map's own.

@@ -11,11 +11,18 @@ from numba import njit
 from numpy.typing import ArrayLike
 
 from pushplan.geometry.contours import segment_crossings
-from pushplan.world import Goal, GoalDisc, GoalLine, InvalidInputError, Receptacle
-from pushplan.world.checks import FloatArray, IntArray, array, frozen
+from pushplan.world import (
+    ClearanceArea,
+    Goal,
+    GoalDisc,
+    GoalLine,
+    InvalidInputError,
+    Receptacle,
+)
+from pushplan.world.checks import BoolArray, FloatArray, IntArray, array, frozen
 from pushplan.world.outline import convex_outline, flatten
 
-Target = GoalDisc | GoalLine | Receptacle | tuple[FloatArray, ...]
+Target = GoalDisc | GoalLine | Receptacle | ClearanceArea | tuple[FloatArray, ...]
 
 
 class Regions(NamedTuple):
@@ -43,12 +50,12 @@ def as_target(goal: Goal | Sequence[ArrayLike]) -> Target:
     Raises:
         InvalidInputError: if it is neither, or there is nothing in the list.
     """
-    if isinstance(goal, GoalDisc | GoalLine | Receptacle):
+    if isinstance(goal, GoalDisc | GoalLine | Receptacle | ClearanceArea):
         return goal
     if isinstance(goal, str | np.ndarray) or not isinstance(goal, Sequence) or not len(goal):
         raise InvalidInputError(
-            "distances are measured to a GoalDisc, GoalLine, Receptacle, or to a list of convex "
-            f"polygons and segments, got {type(goal).__name__}"
+            "distances are measured to a GoalDisc, GoalLine, Receptacle, ClearanceArea, or to a "
+            f"list of convex polygons and segments, got {type(goal).__name__}"
         )
     parts = []
     for i, part in enumerate(goal):
@@ -58,7 +65,10 @@ def as_target(goal: Goal | Sequence[ArrayLike]) -> Target:
 
 
 def regions_of(target: Target, *, to_center: bool = False) -> Regions:
-    """The regions of a checked target; ``to_center`` shrinks a disc to its centre."""
+    """The regions of a checked target; ``to_center`` shrinks a disc to its centre.
+
+    Those of a clearance area are its open edges, see `outside_area`.
+    """
     discs, lines = np.zeros((0, 3)), np.zeros((0, 4))
     parts: tuple[FloatArray, ...] = ()
     if isinstance(target, GoalDisc):
@@ -67,10 +77,28 @@ def regions_of(target: Target, *, to_center: bool = False) -> Regions:
         lines = np.array([[*target.point, *target.normal]])
     elif isinstance(target, Receptacle):
         parts = (target.polygon,)
+    elif isinstance(target, ClearanceArea):
+        edges = np.stack([target.polygon, np.roll(target.polygon, -1, axis=0)], axis=1)
+        parts = tuple(edges[target.open_edges])
     else:
         parts = target
     corners, offsets = flatten(parts)
     return Regions(frozen(discs), frozen(lines), corners, offsets)
+
+
+def outside_area(target: Target, points: FloatArray) -> BoolArray:
+    """Which of the points (..., 2) [m] lie outside a clearance area; none for other targets.
+
+    They are at the goal already. A way through the outside is no way for a point inside: only the
+    open edges count for it.
+    """
+    outside = np.zeros(points.shape[:-1], dtype=np.bool_)
+    if isinstance(target, ClearanceArea):
+        along = np.roll(target.polygon, -1, axis=0) - target.polygon
+        for corner, edge in zip(target.polygon, along, strict=True):
+            offset = points - corner
+            outside |= edge[0] * offset[..., 1] - edge[1] * offset[..., 0] < 0.0
+    return outside
 
 
 @njit(cache=True, nogil=True)

@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit
@@ -22,7 +22,14 @@ from pushplan.geometry.contours import (
     segment_crossings,
 )
 from pushplan.geometry.obstacles import Obstacles, line_of_sight, obstacle_distance, obstacles_of
-from pushplan.geometry.regions import Regions, Target, as_target, region_crossings, regions_of
+from pushplan.geometry.regions import (
+    Regions,
+    Target,
+    as_target,
+    outside_area,
+    region_crossings,
+    regions_of,
+)
 from pushplan.geometry.visibility import (
     GOAL_LEG,
     NO_LEG,
@@ -76,6 +83,18 @@ def _graph_of(static: StaticMap, clearance: float) -> _Graph:
     return _Graph(kept, starts, heads[order], np.concatenate([lengths, lengths])[order])
 
 
+def bends_of(static: StaticMap, clearance: float = 0.0) -> tuple[Contours, FloatArray]:
+    """Where shortest paths may bend, and the (B, B) shortest distances between the bends [m]."""
+    graph = _graph_of(static, clearance)
+    count = len(graph.contours.corners)
+    between = np.full((count, count), np.inf)
+    for k in range(count):
+        between[k, k] = 0.0
+        unused = np.full(count, GOAL_LEG, dtype=np.int64)
+        relax(between[k], unused, graph.starts, graph.ends, graph.lengths)
+    return graph.contours, frozen(between)
+
+
 @lru_cache(maxsize=32)
 def _ways_out(static: StaticMap, clearance: float) -> FloatArray:
     """Corners (N, 2) of the free space between two outlines, or an outline and the bounds [m]."""
@@ -108,7 +127,8 @@ class GoalDistances:
     Attributes:
         static: the map.
         clearance: distance of paths from obstacles [m].
-        regions: what counts as the goal.
+        target: the goal.
+        regions: where paths to it end.
         obstacles: the obstacles grown by the clearance.
         nodes: bends, sorted by distance.
         parents: (V,) the next bend towards the goal, or `GOAL_LEG`.
@@ -117,6 +137,7 @@ class GoalDistances:
 
     static: StaticMap
     clearance: float
+    target: Target
     regions: Regions
     obstacles: Obstacles
     nodes: Nodes
@@ -131,6 +152,8 @@ class GoalDistances:
     def path_from(self, start: ArrayLike) -> Path:
         """The shortest path from a point (2,) [m] to the goal."""
         origin: FloatArray = array("start", start, (2,))
+        if outside_area(self.target, origin):
+            return Path(0.0, origin[None])
         free = leave_inflation(self.static, self.clearance, origin)
         if free is None:
             return Path(math.inf)
@@ -167,8 +190,8 @@ class GoalDistances:
 def _distances(
     static: StaticMap, clearance: float, key: tuple[object, ...], to_center: bool
 ) -> GoalDistances:
-    target = key[0] if len(key) == 1 else tuple(_unpack(part) for part in key[1:])
-    regions = regions_of(target, to_center=to_center)  # type: ignore[arg-type]
+    target: Any = key[0] if len(key) == 1 else tuple(_unpack(part) for part in key[1:])
+    regions = regions_of(target, to_center=to_center)
     graph, shapes, gap = (
         _graph_of(static, clearance),
         obstacles_of(static, clearance),
@@ -206,7 +229,8 @@ def _distances(
     )
     nodes = Nodes(*(frozen(np.ascontiguousarray(values[order])) for values in columns))
     exits = np.concatenate([legs[:, 1:], ends])[order]
-    return GoalDistances(static, clearance, regions, shapes, nodes, rank[parents[order]], exits)
+    ways = rank[parents[order]]
+    return GoalDistances(static, clearance, target, regions, shapes, nodes, ways, exits)
 
 
 def _pack(target: Target) -> tuple[object, ...]:
@@ -233,7 +257,8 @@ def goal_distances(
     Args:
         static: obstacles, and bounds that paths may not leave.
         goal: a disc, a line, a receptacle, or a list of convex polygons (N, 2) and segments
-            (2, 2) [m].
+            (2, 2) [m]. For a clearance area distances are those to the nearest open edge, and 0
+            for what lies outside the area.
         clearance: distance that paths keep from obstacles [m].
         to_center: measure to the centre of a disc instead of to its rim.
 

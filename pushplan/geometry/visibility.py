@@ -35,7 +35,7 @@ class Nodes(NamedTuple):
 
 
 @njit(cache=True, nogil=True, inline="always")
-def _is_tangent(
+def is_tangent(
     dx: float, dy: float, ix: float, iy: float, ox: float, oy: float, gap: float
 ) -> bool:
     """Whether a leg that arrives from (dx, dy) beside a corner touches its outline as a tangent.
@@ -83,9 +83,9 @@ def visible_pairs(
     for i in range(points.shape[0]):
         for j in range(i + 1, points.shape[0]):
             dx, dy = points[j, 0] - points[i, 0], points[j, 1] - points[i, 1]
-            if not _is_tangent(
+            if not is_tangent(
                 dx, dy, incoming[i, 0], incoming[i, 1], outgoing[i, 0], outgoing[i, 1], gap
-            ) or not _is_tangent(
+            ) or not is_tangent(
                 -dx, -dy, incoming[j, 0], incoming[j, 1], outgoing[j, 0], outgoing[j, 1], gap
             ):
                 continue
@@ -195,7 +195,7 @@ def node_leg(
         room = best - nodes.distances[i]
         if dx * dx + dy * dy >= room * room or room <= 0.0:
             continue
-        if tangent_only and not _is_tangent(
+        if tangent_only and not is_tangent(
             dx,
             dy,
             nodes.incoming[i, 0],

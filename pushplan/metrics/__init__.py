@@ -1,14 +1,17 @@
 """Scores of a recorded episode. A metric is a function of an `Episode` and of nothing else."""
 
 from pushplan.metrics.lengths import interaction_work, object_path_lengths, path_length
+from pushplan.metrics.manipulation import ManipulationScores, manipulation_scores
 from pushplan.metrics.navigation import NavigationScores, navigation_scores
 from pushplan.metrics.registry import METRICS, compute, metric_names
 
 __all__ = [
     "METRICS",
+    "ManipulationScores",
     "NavigationScores",
     "compute",
     "interaction_work",
+    "manipulation_scores",
     "metric_names",
     "navigation_scores",
     "object_path_lengths",

@@ -1,9 +1,11 @@
-"""`ImageObservation`: what is around the robot, as images that turn with it."""
+"""`ImageObservation`: what is around the robot, as images."""
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,53 +18,77 @@ from pushplan.world.checks import integer, number
 
 @dataclass(frozen=True)
 class ImageObservation:
-    """Egocentric image channels (Bench-Push, Table II).
+    """Image channels around the robot (Bench-Push, Table II).
 
-    The robot is in the middle and faces up: row 0 is ahead of it, column 0 to its left.
+    By default the robot is in the middle and faces up: row 0 is ahead of it, column 0 to its left.
 
     Args:
         channels: names from `pushplan.observation.CHANNELS`, in the order of the result.
-        window: length ahead to behind, and left to right [m].
+        window: height and width of what is seen [m].
         pixels: rows and columns.
+        north_up: whether the image keeps the world's axes, with +y up and +x to the right,
+            instead of turning with the robot.
+        shift: how far the middle of the window lies up the image from the robot [m]; a positive
+            shift shows more of what is ahead.
 
     Raises:
         UnknownNameError: if there is no such channel.
-        InvalidInputError: if a size is not positive.
+        InvalidInputError: if a size is not positive or the shift is not finite.
     """
 
     channels: tuple[str, ...] = ("footprint", "movable", "static", "goal_distance")
     window: tuple[float, float] = (12.0, 12.0)
     pixels: tuple[int, int] = (192, 192)
+    north_up: bool = False
+    shift: float = 0.0
 
     low: ClassVar[int] = 0
     high: ClassVar[int] = 255
     dtype: ClassVar[np.dtype[np.uint8]] = np.dtype(np.uint8)
 
     def __post_init__(self) -> None:
-        if isinstance(self.channels, str) or len(self.channels) == 0:
+        put = object.__setattr__
+        if isinstance(self.channels, str) or not isinstance(self.channels, Sequence):
             raise InvalidInputError(f"channels must be a list of names, got {self.channels!r}")
+        put(self, "channels", tuple(self.channels))
+        if len(self.channels) == 0:
+            raise InvalidInputError("channels must name at least one channel")
         for name in self.channels:
             if name not in CHANNELS:
                 raise UnknownNameError("channel", name, CHANNELS)
-        if len(self.window) != 2 or len(self.pixels) != 2:
-            raise InvalidInputError(
-                f"window and pixels need two sides each, got {self.window!r} and {self.pixels!r}"
-            )
+        put(self, "window", self._pair("window", self.window))
+        put(self, "pixels", self._pair("pixels", self.pixels))
         for side in self.window:
             number("window", side, low=0.0, open_low=True)
         for count in self.pixels:
             integer("pixels", count, low=1, high=4096)
+        if not isinstance(self.north_up, bool):
+            raise InvalidInputError(f"north_up must be true or false, got {self.north_up!r}")
+        put(self, "shift", number("shift", self.shift))
+
+    @staticmethod
+    def _pair(name: str, sides: object) -> tuple[Any, Any]:
+        if isinstance(sides, str) or not isinstance(sides, Sequence) or len(sides) != 2:
+            raise InvalidInputError(f"{name} needs two sides, height and width, got {sides!r}")
+        return sides[0], sides[1]
 
     @property
     def shape(self) -> tuple[int, int, int]:
         """Channels, rows, columns."""
         return len(self.channels), *self.pixels
 
+    def view(self, world: World) -> View:
+        """Where the pixels of the image of a world are."""
+        x, y, heading = world.robot_pose.tolist()
+        up = 0.5 * math.pi if self.north_up else heading
+        pose = np.array([x + self.shift * math.cos(up), y + self.shift * math.sin(up), up])
+        (rows, cols), (height, width) = self.pixels, self.window
+        return View(world, pose, rows, cols, height / rows, width / cols, self.shift)
+
     def observe(self, world: World) -> NDArray[np.uint8]:
         """The channels (C, H, W), 0 to 255."""
         image = np.zeros(self.shape, np.uint8)
-        rows, cols = self.pixels
-        view = View(world, rows, cols, self.window[0] / rows, self.window[1] / cols)
+        view = self.view(world)
         for i, name in enumerate(self.channels):
             CHANNELS[name](image[i], view)
         return image

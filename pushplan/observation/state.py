@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from pushplan.world import GoalDisc, GoalLine, World
 from pushplan.world.checks import FloatArray, integer, number
+from pushplan.world.outline import centroid
 
 _OWN, _EACH = 6, 5
 
@@ -20,8 +21,10 @@ class StateObservation:
 
     Robot x, y [m], cos and sin of its heading; x, y [m] of the goal in the robot's frame; then for
     each object x, y [m], cos and sin of its heading in the robot's frame, and 1 as a sign that it
-    is there. Rows of absent objects are zero. Of more objects the nearest are kept. A goal disc is
-    given by its centre, a line by its nearest point, an area by its middle.
+    is there. The rows are in the order of the ids: an object has the row of its id, so that it
+    keeps it while others leave the floor, unless an id is no row; then the objects follow each
+    other, and of too many the nearest are kept. Rows of absent objects are zero. A goal disc is
+    given by its centre, a line by its nearest point, a receptacle or clearance area by its middle.
 
     Args:
         max_objects: rows for objects.
@@ -59,17 +62,18 @@ class StateObservation:
         to_body = np.array([[c, -s], [s, c]])  # row vectors times this turn into the body frame
         objects = world.movables.poses
         relative = (objects[:, :2] - world.robot_pose[:2]) @ to_body
-        if len(objects) > self.max_objects:
+        rows = world.movables.ids
+        if len(rows) and not 0 <= rows.min() <= rows.max() < self.max_objects:
             nearest = np.argsort(np.hypot(relative[:, 0], relative[:, 1]), kind="stable")
             keep = np.sort(nearest[: self.max_objects])
-            objects, relative = objects[keep], relative[keep]
+            objects, relative, rows = objects[keep], relative[keep], np.arange(len(keep))
         out = np.zeros(self.shape)
         out[:4] = x, y, c, s
         out[4:6] = (_goal_point(world) - world.robot_pose[:2]) @ to_body
-        rows = out[_OWN:].reshape(-1, _EACH)[: len(objects)]
-        rows[:, :2] = relative
-        rows[:, 2], rows[:, 3] = np.cos(objects[:, 2] - theta), np.sin(objects[:, 2] - theta)
-        rows[:, 4] = 1.0
+        turn = objects[:, 2] - theta
+        out[_OWN:].reshape(-1, _EACH)[rows] = np.column_stack(
+            [relative, np.cos(turn), np.sin(turn), np.ones(len(objects))]
+        )
         return np.clip(out, self.low, self.high).astype(np.float32)
 
 
@@ -81,5 +85,4 @@ def _goal_point(world: World) -> FloatArray:
     if isinstance(goal, GoalLine):
         nearest: FloatArray = at + np.dot(goal.point - at, goal.normal) * goal.normal
         return nearest
-    middle: FloatArray = goal.polygon.mean(axis=0)
-    return middle
+    return centroid(goal.polygon)

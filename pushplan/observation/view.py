@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numba import njit
@@ -17,28 +18,42 @@ Image = np.ndarray[tuple[int, int], np.dtype[np.uint8]]
 
 @dataclass(frozen=True)
 class View:
-    """A robot-centred, robot-aligned window: row 0 is ahead of the robot, column 0 to its left.
+    """A window on the world: where its pixels are.
 
     Args:
         world: what is looked at.
+        pose: (3,) middle of the window [m], and the direction [rad] that is up in the image; left
+            in the image is a quarter turn counter-clockwise from it.
         rows: [px]
         cols: [px]
-        step_ahead: length of a pixel along the robot's heading [m].
+        step_up: length of a pixel up the image [m].
         step_across: length of a pixel across it [m].
+        shift: how far the middle lies up the image from the robot [m].
     """
 
     world: World
+    pose: FloatArray
     rows: int
     cols: int
-    step_ahead: float
+    step_up: float
     step_across: float
+    shift: float
+
+    @cached_property
+    def numbers(self) -> FloatArray:
+        """(7,) pose of the window, rows, columns, and the two steps, as kernels read them."""
+        return np.array([*self.pose, self.rows, self.cols, self.step_up, self.step_across])
 
     @property
-    def numbers(self) -> FloatArray:
-        """(7,) robot x, y, theta, rows, columns, and the two steps, as kernels read them."""
-        return np.array(
-            [*self.world.robot_pose, self.rows, self.cols, self.step_ahead, self.step_across]
-        )
+    def finest(self) -> float:
+        """The shorter side of a pixel [m]."""
+        return min(self.step_up, self.step_across)
+
+    def pixels(self, points: FloatArray) -> FloatArray:
+        """World points (N, 2) [m] as column and row [px]."""
+        spots = np.empty_like(points)
+        to_pixels(self.numbers, points, spots)
+        return spots
 
     def fill_movables(self, image: Image, objects: Movables, value: int = 255) -> None:
         """Fill the outlines of objects."""
@@ -64,7 +79,7 @@ class View:
 
 
 @njit(cache=True, nogil=True)
-def _to_pixels(view: FloatArray, points: FloatArray, out: FloatArray) -> None:
+def to_pixels(view: FloatArray, points: FloatArray, out: FloatArray) -> None:
     """World points (N, 2) [m] to column and row [px]."""
     c, s = np.cos(view[2]), np.sin(view[2])
     for i in range(points.shape[0]):
@@ -78,7 +93,7 @@ def _fill_parts(
     image: Image, view: FloatArray, vertices: FloatArray, offsets: IntArray, value: int
 ) -> None:
     spots = np.empty_like(vertices)
-    _to_pixels(view, vertices, spots)
+    to_pixels(view, vertices, spots)
     for k in range(offsets.shape[0] - 1):
         fill_convex(image, spots[offsets[k] : offsets[k + 1]], value)
 
@@ -104,7 +119,7 @@ def _fill_bodies(
         for i in range(a, b):
             corners[i, 0] = poses[k, 0] + c * vertices[i, 0] - s * vertices[i, 1]
             corners[i, 1] = poses[k, 1] + s * vertices[i, 0] + c * vertices[i, 1]
-        _to_pixels(view, corners[a:b], spots[a:b])
+        to_pixels(view, corners[a:b], spots[a:b])
         fill_convex(image, spots[a:b], value)
 
 
@@ -114,13 +129,13 @@ def _sample(
 ) -> None:
     c, s = np.cos(view[2]), np.sin(view[2])
     rows, cols = values.shape
-    ahead, across = view[5] / step, view[6] / step
+    up, across = view[5] / step, view[6] / step
     # raster coordinates of the first pixel, and how they change along rows and columns
-    front, left = 0.5 * (view[3] - 1.0) * ahead, 0.5 * (view[4] - 1.0) * across
+    front, left = 0.5 * (view[3] - 1.0) * up, 0.5 * (view[4] - 1.0) * across
     u0 = (view[0] - ox) / step + c * front - s * left
     v0 = (view[1] - oy) / step + s * front + c * left
     for r in range(image.shape[0]):
-        u, v = u0 - r * ahead * c, v0 - r * ahead * s
+        u, v = u0 - r * up * c, v0 - r * up * s
         for q in range(image.shape[1]):
             j = min(max(int(np.floor(u + q * across * s)), 0), cols - 1)
             i = min(max(int(np.floor(v - q * across * c)), 0), rows - 1)

@@ -19,6 +19,7 @@ POLICIES: dict[str, str] = {
     "geometric-rrt": "pushplan.planners.policies:geometric_rrt",
     "kinodynamic-rrt": "pushplan.planners.policies:kinodynamic_rrt",
     "random": "pushplan.planners.policy:RandomTwist",
+    "greedy": "pushplan.planners.greedy:GreedyPusher",
 }
 """Name -> "module:callable" that makes a policy."""
 

@@ -24,6 +24,14 @@ from pushplan.world.movables import Movables
 from pushplan.world.plan import Plan, PlanResult, PlanStats, PlanStatus, SubTask
 from pushplan.world.protocols import Controller, Planner, Policy
 from pushplan.world.robot import Drive, RobotModel
+from pushplan.world.robots import (
+    BUMPERS,
+    area_clearing_robot,
+    box_delivery_robot,
+    jackal,
+    maze_robot,
+    turtlebot3_burger,
+)
 from pushplan.world.scene import World
 from pushplan.world.seeds import stream
 from pushplan.world.static_map import StaticMap
@@ -38,6 +46,7 @@ from pushplan.world.stop import (
 )
 
 __all__ = [
+    "BUMPERS",
     "Action",
     "AnyOf",
     "Cancellation",
@@ -75,9 +84,14 @@ __all__ = [
     "UnknownNameError",
     "WheelSpeeds",
     "World",
+    "area_clearing_robot",
+    "box_delivery_robot",
+    "jackal",
     "load_world",
+    "maze_robot",
     "save_world",
     "stream",
+    "turtlebot3_burger",
     "world_from_dict",
     "world_to_dict",
 ]

@@ -19,7 +19,14 @@ from pushplan.world.checks import (
     number,
 )
 from pushplan.world.errors import InvalidInputError
-from pushplan.world.outline import centroid, convex_outline, flatten, signed_area, transform
+from pushplan.world.outline import (
+    areas_and_centroids,
+    convex_outline,
+    convex_outlines,
+    flatten,
+    transform,
+    well_formed,
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,18 +73,21 @@ class Movables(ArrayRecord):
             raise InvalidInputError(f"movables.masses must be positive, got {self.masses.min()}")
         if self.offsets[0] != 0 or self.offsets[-1] != len(self.vertices):
             raise InvalidInputError("movables.offsets must run from 0 to the number of vertices")
-        for k in range(count):
+        self._check_outlines()
+
+    def _check_outlines(self) -> None:
+        good = well_formed(self.vertices, self.offsets)
+        if not good.all():
+            k = int(np.argmin(good))
             name = f"outline of movable {self.ids[k]}"
-            outline = self.vertices[self.offsets[k] : self.offsets[k + 1]]
-            clean = convex_outline(name, outline)
-            if signed_area(outline) < 0.0:
-                raise InvalidInputError(f"{name} must be counter-clockwise")
-            off = centroid(clean)
-            if np.abs(off).max() > 1e-6 * np.ptp(clean, axis=0).max():
-                raise InvalidInputError(
-                    f"{name} must have its centroid at the body origin, it is at "
-                    f"({off[0]:g}, {off[1]:g}); Movables.from_polygons shifts it"
-                )
+            convex_outline(name, self.vertices[self.offsets[k] : self.offsets[k + 1]])
+            raise InvalidInputError(f"{name} must be counter-clockwise")
+        _, centres = areas_and_centroids(self.vertices, self.offsets)
+        for k in np.flatnonzero(np.abs(centres).max(axis=1) > 1e-6 * self.radii).tolist():
+            raise InvalidInputError(
+                f"outline of movable {self.ids[k]} must have its centroid at the body origin, it "
+                f"is at ({centres[k, 0]:g}, {centres[k, 1]:g}); Movables.from_polygons shifts it"
+            )
 
     def __len__(self) -> int:
         return len(self.ids)
@@ -110,12 +120,12 @@ class Movables(ArrayRecord):
             twists: (K, 3), by default zero.
             ids: (K,), by default 0 to K - 1.
         """
-        clean = [convex_outline(f"outline {i}", outline) for i, outline in enumerate(outlines)]
+        clean = convex_outlines("outline", outlines)
         vertices, offsets = flatten(clean)
         count = len(clean)
         if masses is None:
             density = number("density", density, low=0.0, open_low=True)
-            masses = np.array([signed_area(c) for c in clean]) * density
+            masses = areas_and_centroids(vertices, offsets)[0] * density
         return cls(
             ids=np.asarray(np.arange(count) if ids is None else ids),
             poses=np.asarray(poses),
@@ -140,9 +150,9 @@ class Movables(ArrayRecord):
 
         Each gets a pose at its centroid with theta = 0. Arguments as in `from_outlines`.
         """
-        clean = [convex_outline(f"polygon {i}", polygon) for i, polygon in enumerate(polygons)]
-        centres = [centroid(c) for c in clean]
-        poses = np.array([[c[0], c[1], 0.0] for c in centres]).reshape(-1, 3)
+        clean = convex_outlines("polygon", polygons)
+        _, centres = areas_and_centroids(*flatten(clean))
+        poses = np.column_stack([centres, np.zeros(len(clean))])
         outlines = [c - centre for c, centre in zip(clean, centres, strict=True)]
         return cls.from_outlines(
             outlines, poses, masses=masses, density=density, wheeled=wheeled, ids=ids
@@ -189,8 +199,7 @@ class Movables(ArrayRecord):
     @cached_property
     def radii(self) -> FloatArray:
         """(K,) radius [m] of the disc about each origin that holds the object."""
+        if len(self) == 0:
+            return frozen(np.zeros(0))
         reach = np.hypot(self.vertices[:, 0], self.vertices[:, 1])
-        ends = self.offsets
-        return frozen(
-            np.array([reach[ends[k] : ends[k + 1]].max() for k in range(len(self))], dtype=float)
-        )
+        return frozen(np.maximum.reduceat(reach, self.offsets[:-1]))

@@ -8,7 +8,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pushplan.world.checks import FloatArray, IntArray, array, frozen
+from pushplan.world.checks import BoolArray, FloatArray, IntArray, array, frozen
 from pushplan.world.errors import InvalidInputError
 
 
@@ -59,6 +59,74 @@ def convex_outline(name: str, corners: ArrayLike) -> FloatArray:
             f"{name} must be convex: split it into convex parts first, got {points.tolist()}"
         )
     return points
+
+
+def convex_outlines(name: str, outlines: Sequence[ArrayLike]) -> list[FloatArray]:
+    """`convex_outline` of each of many outlines, called ``name`` and its index; much quicker."""
+    points: list[FloatArray] = [
+        array(f"{name} {i}", outline, (None, 2)) for i, outline in enumerate(outlines)
+    ]
+    good = well_formed(*flatten(points))
+    return [
+        corners if good[i] else convex_outline(f"{name} {i}", corners)
+        for i, corners in enumerate(points)
+    ]
+
+
+def well_formed(vertices: FloatArray, offsets: IntArray) -> BoolArray:
+    """Which of some flattened outlines are convex, counter-clockwise and have an area.
+
+    The rules of `convex_outline`, for all of them at once.
+
+    Args:
+        vertices: (V, 2) corners [m].
+        offsets: (K + 1,) where each outline starts.
+
+    Returns:
+        (K,) flags.
+    """
+    counts = np.diff(offsets)
+    good: BoolArray = counts >= 3
+    if not good.all():
+        outlines = unflatten(vertices, offsets)
+        good[good] = well_formed(*flatten([outlines[k] for k in np.flatnonzero(good)]))
+    if not good.all() or len(good) == 0:
+        return good
+    starts = offsets[:-1]
+    after = _next_corner(offsets)
+    size = np.maximum.reduceat(vertices, starts) - np.minimum.reduceat(vertices, starts)
+    least = 1e-9 * size.max(axis=1)
+    least_area = least * size.max(axis=1)
+    edges = vertices[after] - vertices
+    following = edges[after]
+    cross = edges[:, 0] * following[:, 1] - edges[:, 1] * following[:, 0]
+    turns = np.arctan2(cross, (edges * following).sum(axis=1))
+    shifted = vertices - np.repeat(vertices[starts], counts, axis=0)
+    twice = shifted[:, 0] * shifted[after, 1] - shifted[after, 0] * shifted[:, 1]
+    good &= 0.5 * np.add.reduceat(twice, starts) > least_area
+    good &= np.minimum.reduceat(np.hypot(edges[:, 0], edges[:, 1]), starts) > least
+    good &= np.minimum.reduceat(cross, starts) >= -least_area
+    good &= np.abs(np.add.reduceat(turns, starts) - 2.0 * np.pi) <= 1e-6
+    return good
+
+
+def areas_and_centroids(vertices: FloatArray, offsets: IntArray) -> tuple[FloatArray, FloatArray]:
+    """`signed_area` (K,) [m²] and `centroid` (K, 2) [m] of flattened outlines with an area."""
+    if len(offsets) < 2:
+        return np.zeros(0), np.zeros((0, 2))
+    starts, after = offsets[:-1], _next_corner(offsets)
+    shifted = vertices - np.repeat(vertices[starts], np.diff(offsets), axis=0)
+    cross = shifted[:, 0] * shifted[after, 1] - shifted[after, 0] * shifted[:, 1]
+    twice = np.add.reduceat(cross, starts)
+    sums = np.add.reduceat((shifted + shifted[after]) * cross[:, None], starts)
+    return 0.5 * twice, vertices[starts] + sums / (3.0 * twice[:, None])
+
+
+def _next_corner(offsets: IntArray) -> IntArray:
+    """(V,) index of the corner that follows each corner of flattened outlines."""
+    after = np.arange(1, offsets[-1] + 1)
+    after[offsets[1:] - 1] = offsets[:-1]
+    return after
 
 
 def flatten(outlines: Sequence[FloatArray]) -> tuple[FloatArray, IntArray]:

@@ -6,6 +6,7 @@ from pathlib import Path
 import imageio_ffmpeg
 import numpy as np
 import pytest
+from conftest import quickest
 from PIL import Image
 
 from pushplan.drawing import draw_world, save_animation, save_image
@@ -117,8 +118,101 @@ def test_same_world_same_bytes_and_no_leftovers_of_another() -> None:
 
 def test_long_maps_keep_their_shape_with_even_sides() -> None:
     assert draw_world(scene(height=3.33), size_px=301).shape[0] % 2 == 0
-    height, width, _ = draw_world(scene(height=40.0), size_px=SIZE).shape
+    height, width, _ = draw_world(scene(height=40.0), size_px=SIZE, view=40.0).shape
     assert (height, width) == (SIZE, SIZE // 4)
+
+
+def test_long_maps_are_shown_around_the_robot() -> None:
+    world = scene(height=400.0)
+    shapes = set()
+    for y in (2.0, 50.0, 321.4, 399.0):
+        there = world.moved(robot_pose=[5.0, y, 0.3])
+        picture = draw_world(there, size_px=SIZE)
+        shapes.add(picture.shape)
+        rows, _ = np.nonzero(picture[..., 2].astype(int) - picture[..., 0] > 90)  # the robot's blue
+        middle = picture.shape[0] / 2
+        if y == 2.0:
+            assert rows.mean() > 1.5 * middle
+        elif y == 399.0:
+            assert rows.mean() < 0.5 * middle
+        else:
+            assert rows.mean() == pytest.approx(middle, abs=3)
+    assert shapes == {(SIZE, SIZE * 10 // 16, 3)}
+
+
+def test_still_things_do_not_shimmer_while_the_picture_follows() -> None:
+    world = scene(height=400.0)
+    posts = [[2, y, 3, y + 1] for y in range(0, 400, 4)]
+    world = World(
+        world.robot,
+        world.robot_pose,
+        StaticMap.build([], posts, 0.4, bounds=[0, 0, 10, 400]),
+        Movables.empty(),
+        GoalDisc(np.array([9.0, 399.0]), 0.5),
+    )
+    pictures = [
+        draw_world(world.moved(robot_pose=[8.0, 100.0 + dy, 0.0]), size_px=SIZE)[:, :120]
+        for dy in (0.0, 0.0131, 0.0263)
+    ]
+    for picture in pictures[1:]:
+        assert any(
+            np.array_equal(picture[5:-5], np.roll(pictures[0], k, axis=0)[5:-5]) for k in range(3)
+        )
+
+
+@pytest.mark.parametrize("view", [0.0, -1.0, float("nan"), "all"])
+def test_senseless_views_are_refused(view: object) -> None:
+    with pytest.raises(InvalidInputError):
+        draw_world(scene(), view=view)  # type: ignore[arg-type]
+
+
+def test_a_channel_of_water_has_floes_of_ice() -> None:
+    line = GoalLine(np.array([0.0, 9.0]), np.array([0.0, 1.0]))
+    world = scene(line)
+    open_water = World(
+        world.robot, world.robot_pose, StaticMap.build(bounds=[0, 0, 10, 10]), world.movables, line
+    )
+    picture = draw_world(open_water, size_px=SIZE)
+    water, floe = colour(picture, 9.5, 0.5), colour(picture, 2.0, 5.0)
+    assert water[2] > water[0] + 30 and floe.min() > 230
+    assert colour(draw_world(world, size_px=SIZE), 9.5, 0.5).min() > 230
+
+
+def test_the_bumper_is_told_from_the_chassis() -> None:
+    world = scene()
+    plow = np.array([[0.7, -1.2], [1.1, -1.2], [1.1, 1.2], [0.7, 1.2]])
+    robot = RobotModel(
+        (SQUARE * 1.4, plow), 1.0, Drive.DIFFERENTIAL, max_speed=1.0, max_turn_rate=1.0
+    )
+    world = World(robot, [5.0, 2.0, 0.0], world.static, world.movables, world.goal)
+    picture = draw_world(world, size_px=SIZE)
+    chassis, bumper = colour(picture, 4.5, 2.5), colour(picture, 5.9, 2.9)
+    assert bumper.sum() < chassis.sum() - 100
+
+
+def test_open_edges_are_told_from_closed_ones() -> None:
+    area = ClearanceArea(np.array([[1.0, 7], [3, 7], [3, 9], [1, 9]]), [True, True, True, False])
+    picture = draw_world(scene(area), size_px=SIZE)
+    beyond_open = picture[SIZE - (8 * 40) - 40 : SIZE - 8 * 40 + 40, 3 * 40 : 3 * 40 + 10]
+    beyond_closed = picture[SIZE - (8 * 40) - 40 : SIZE - 8 * 40 + 40, 30:38]
+    green = [(p[..., 1].astype(int) - p[..., 0] > 90).sum() for p in (beyond_open, beyond_closed)]
+    assert green[0] > 50 and green[1] == 0
+
+
+def test_a_picture_of_many_floes_is_drawn_in_time(warm: None) -> None:
+    rng = np.random.default_rng(0)
+    angles = np.arange(7) * 2 * np.pi / 7
+    floe = 0.3 * np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    poses = rng.uniform([0, 2, -3], [12, 40, 3], (640, 3))
+    world = World(
+        scene().robot,
+        [6.0, 20.0, 1.5],
+        StaticMap.build(bounds=[0, 0, 12, 40]),
+        Movables.from_outlines([floe] * 640, poses),
+        GoalLine(np.array([0.0, 39.0]), np.array([0.0, 1.0])),
+    )
+    draw_world(world)
+    assert quickest(lambda: draw_world(world, text="E 0.9"), 5) < 0.08  # some 15 ms if undisturbed
 
 
 def test_empty_worlds_and_trails_can_be_drawn() -> None:
@@ -190,3 +284,18 @@ def test_what_cannot_be_written_is_refused(tmp_path: Path, name: str) -> None:
 def test_a_film_needs_a_frame(tmp_path: Path) -> None:
     with pytest.raises(InvalidInputError):
         save_animation(tmp_path / "a.gif", [], fps=10)
+
+
+def test_walls_around_the_bounds_are_in_the_picture() -> None:
+    room = [[[-3, -3], [13, -3], [13, 0], [-3, 0]], [[-3, 0], [0, 0], [0, 10], [-3, 10]]]
+    world = World(
+        scene().robot,
+        [5.0, 5.0, 0.0],
+        StaticMap.build(room, bounds=[0, 0, 10, 10]),
+        Movables.empty(),
+        GoalDisc(np.array([8.0, 8.0]), 0.5),
+    )
+    picture = draw_world(world, size_px=SIZE)
+    assert (picture[-4:] < 110).all() and (picture[:, :4] < 110).all()
+    assert picture[4, -4].min() > 230  # nothing is there on this side
+    assert (picture[:, 20:-20][:-20] > 110).any(axis=2).all()  # most of it is the room

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from shapely.ops import nearest_points
 
 from pushplan.geometry import Grid, VisibilityGraph, clearance_field, geodesic_field
-from pushplan.world import ClearanceArea, GoalDisc, GoalLine, InvalidInputError, StaticMap
+from pushplan.world import GoalDisc, GoalLine, InvalidInputError, StaticMap
 
 U_WALLS = [
     [0, 0, 15, 0],
@@ -286,7 +286,6 @@ def test_targets_may_be_segments_and_unions() -> None:
         (),
         "goal",
         3.0,
-        ClearanceArea(np.array([[0.0, 0], [1, 0], [1, 1]]), np.ones(3, dtype=bool)),
         [np.zeros((1, 2))],
     ],
 )

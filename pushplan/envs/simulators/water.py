@@ -1,65 +1,154 @@
-"""Drag on floating bodies that move in the plane of the water."""
+"""Drag on floating bodies that move in the plane of the water; docs/tasks.md has its sources."""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, fields
 
 import numpy as np
+from numba import njit
 
-from pushplan.geometry import polygon_area
+from pushplan.geometry import polygon_area, polygon_centroid, polygon_inertia
 from pushplan.world import World
-from pushplan.world.checks import FloatArray, frozen, number
+from pushplan.world.checks import FloatArray, IntArray, frozen, number
 
 
 @dataclass(frozen=True)
 class Water:
     """How water brakes bodies: ``F = -(b + c |v|) v``, and likewise about the vertical axis.
 
+    Objects are flat floes. Water resists them at their edges (form drag) and underneath (skin
+    drag), both quadratic. It is never quite still itself: against an ambient motion u0, the drag
+    on a body that is slower than that is linear, which ``b = c u0`` stands for. So a floe comes to
+    rest exponentially, where a quadratic law alone would let it creep for ever.
+
+    The robot is a hull whose low-speed model is linear: its speed decays with a time constant.
+
     Args:
         density: of the water [kg/m³].
-        robot_draught: how deep the robot reaches [m].
         object_draught: how deep an object reaches [m].
-        robot_drag: quadratic drag coefficient C_d of the robot.
-        object_drag: of an object.
-        robot_yaw_drag: quadratic drag coefficient of the robot's rotation.
-        object_yaw_drag: of an object's rotation.
-        robot_linear: linear coefficient b of the robot [N s/m], and [N m s] for its rotation.
-        object_linear: of an object.
+        object_form_drag: C_d of an edge, on mean width times draught.
+        object_skin_drag: C_w of the underside, ``F = density C_w area v²``.
+        ambient_speed: u0 [m/s].
+        robot_draught: how deep the robot reaches [m].
+        robot_surge_time: time constant of the robot's speed when nothing drives it [s].
+        robot_yaw_time: of its turn rate [s].
     """
 
     density: float = 1025.0
+    object_draught: float = 1.05
+    object_form_drag: float = 1.1
+    object_skin_drag: float = 0.0055
+    ambient_speed: float = 0.05
     robot_draught: float = 5.0
-    object_draught: float = 1.0
-    robot_drag: float = 0.5
-    object_drag: float = 1.1
-    robot_yaw_drag: float = 10.0
-    object_yaw_drag: float = 2.0
-    robot_linear: float = 1.0
-    object_linear: float = 1.5
+    robot_surge_time: float = 88.0
+    robot_yaw_time: float = 11.6
 
     def __post_init__(self) -> None:
         for field in fields(self):
-            value = number(f"water {field.name}", getattr(self, field.name), low=0.0)
+            positive = field.name.endswith("_time") or field.name == "density"
+            value = number(
+                f"water {field.name}", getattr(self, field.name), low=0.0, open_low=positive
+            )
             object.__setattr__(self, field.name, value)
 
     def coefficients(self, world: World) -> FloatArray:
         """Drag of the robot, then of each object.
 
         Returns:
-            (1 + K, 4): linear [N s/m] and quadratic [N s²/m²] coefficient of the translation,
-            linear [N m s] and quadratic [N m s²] of the rotation. The area that a body turns
-            against the flow is its equivalent diameter times its draught; the lever of the
-            rotation is its equivalent radius.
+            (1 + K, 4): linear b [N s/m] and quadratic c [N s²/m²] coefficient of the translation,
+            linear [N m s] and quadratic [N m s²] of the rotation.
         """
-        areas = np.array(
-            [sum(polygon_area(part) for part in world.robot.parts)]
-            + [polygon_area(world.movables.outline(k)) for k in range(len(world.movables))]
-        )
-        radii = np.sqrt(areas / np.pi)
-        first = np.arange(len(areas)) == 0
-        draught = np.where(first, self.robot_draught, self.object_draught)
-        linear = np.where(first, self.robot_linear, self.object_linear)
-        form = np.where(first, self.robot_drag, self.object_drag)
-        yaw = np.where(first, self.robot_yaw_drag, self.object_yaw_drag)
-        front = 0.5 * self.density * 2.0 * radii * draught
-        return frozen(np.stack([linear, form * front, linear, yaw * front * radii**3], axis=1))
+        movables = world.movables
+        out = np.zeros((1 + len(movables), 4))
+        out[0, 0] = world.robot.mass / self.robot_surge_time
+        out[0, 2] = world.robot.mass * _hull_inertia(world) / self.robot_yaw_time
+        shape = flow_shapes(movables.vertices, movables.offsets)
+        form = 0.5 * self.density * self.object_form_drag * self.object_draught
+        skin = self.density * self.object_skin_drag
+        out[1:, 1] = form * shape[:, 0] + skin * shape[:, 1]
+        out[1:, 3] = form * shape[:, 2] + skin * shape[:, 3]
+        out[1:, 0] = self.ambient_speed * out[1:, 1]
+        out[1:, 2] = self.ambient_speed / np.sqrt(shape[:, 1] / np.pi) * out[1:, 3]
+        return frozen(out)
+
+
+def coasting(
+    linear: float, quadratic: float, mass: float, start: float, end: float
+) -> tuple[float, float]:
+    """Time [s] and way [m] in which a free body slows down from one speed to another [m/s].
+
+    The exact solution of ``mass dv/dt = -(linear + quadratic v) v``. Also holds about the vertical
+    axis, with the moment of inertia for the mass and angles for ways.
+
+    Raises:
+        InvalidInputError: if a value is negative, or the speeds do not fall.
+    """
+    b = number("linear", linear, low=0.0)
+    c = number("quadratic", quadratic, low=0.0)
+    m = number("mass", mass, low=0.0, open_low=True)
+    v1 = number("end speed", end, low=0.0, open_low=True)
+    v0 = number("start speed", start, low=v1)
+    if b == 0.0 and c == 0.0:
+        return (0.0, 0.0) if v0 == v1 else (math.inf, math.inf)
+    if c == 0.0:
+        return m / b * math.log(v0 / v1), m / b * (v0 - v1)
+    if b == 0.0:
+        return m / c * (1.0 / v1 - 1.0 / v0), m / c * math.log(v0 / v1)
+    slower = math.log((b + c * v0) / (b + c * v1))
+    return m / b * (math.log(v0 / v1) - slower), m / c * slower
+
+
+def _hull_inertia(world: World) -> float:
+    """Polar second moment of the robot's footprint about its origin, per unit mass [m²]."""
+    total = moment = 0.0
+    for part in world.robot.parts:
+        area = polygon_area(part)
+        x, y = polygon_centroid(part)
+        total += area
+        moment += area * (polygon_inertia(part) + x * x + y * y)
+    return moment / total
+
+
+@njit(cache=True, nogil=True)
+def flow_shapes(vertices: FloatArray, offsets: IntArray) -> FloatArray:
+    """What the flow meets of flat convex bodies.
+
+    Args:
+        vertices: (V, 2) corners about the centroids [m], counter-clockwise.
+        offsets: (K + 1,) where each body starts.
+
+    Returns:
+        (K, 4): mean width [m], which of a convex outline is its circumference over pi (Cauchy);
+        area [m²]; sum over both halves of each edge of half the integral of |t|³ dt [m⁴], t along
+        the edge from the foot of the perpendicular, whose speed of rotation meets the water head
+        on (a plate of half length a that turns about its middle has a⁴ / 2); integral of |r|³ dA
+        [m⁵], by two-point products over the triangles of the outline.
+    """
+    count = offsets.shape[0] - 1
+    out = np.zeros((count, 4))
+    for k in range(count):
+        first, last = offsets[k], offsets[k + 1]
+        for i in range(first, last):
+            j = i + 1 if i + 1 < last else first
+            ax, ay, bx, by = vertices[i, 0], vertices[i, 1], vertices[j, 0], vertices[j, 1]
+            ex, ey = bx - ax, by - ay
+            long = math.hypot(ex, ey)
+            s, t = (ax * ex + ay * ey) / long, (bx * ex + by * ey) / long
+            cross = ax * by - ay * bx
+            out[k, 0] += long / math.pi
+            out[k, 1] += 0.5 * cross
+            out[k, 2] += 0.125 * abs(t * abs(t) ** 3 - s * abs(s) ** 3)
+            out[k, 3] += cross * _cubed_distance(ax, ay, bx, by)
+    return out
+
+
+@njit(cache=True, nogil=True)
+def _cubed_distance(ax: float, ay: float, bx: float, by: float) -> float:
+    """Mean of |p|³ over the edge a-b, over 5: times the cross product, the triangle's integral."""
+    total = 0.0
+    # Gauss-Legendre with three points; |r|³ scales with the third power along rays
+    for place, weight in ((-0.7745966692414834, 5.0), (0.0, 8.0), (0.7745966692414834, 5.0)):
+        u = 0.5 + 0.5 * place
+        total += weight / 18.0 * math.hypot(ax + u * (bx - ax), ay + u * (by - ay)) ** 3
+    return total / 5.0

@@ -1,16 +1,16 @@
-"""Where a scene starts: square objects on free floor, without overlaps."""
+"""Where a scene starts: walls, and square objects on free floor without overlaps."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 import shapely
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from pushplan.world import ScenarioError, StaticMap
 from pushplan.world.checks import BoolArray, FloatArray
@@ -58,10 +58,13 @@ class Floor:
         keep_off: Sequence[tuple[Any, float]] = (),
         gap: float = 0.0,
         random_yaw: bool = False,
+        spacing: float = 0.0,
+        within: ArrayLike | None = None,
+        allowed: Callable[[FloatArray], BoolArray] | None = None,
     ) -> FloatArray:
         """Poses of squares that overlap nothing: (count, 3) x, y [m], theta [rad].
 
-        Centres are drawn uniformly over the bounds of the map and rejected where they do not fit.
+        Centres are drawn uniformly over the given box and rejected where they do not fit.
         When that fails too often, squares go to random cells of a shifted lattice, which packs
         nearly as many as fit at all.
 
@@ -73,18 +76,29 @@ class Floor:
                 around it.
             gap: least distance to anything [m].
             random_yaw: any heading instead of 0; on the lattice, multiples of a right angle.
+            spacing: least distance between two centres [m].
+            within: (4,) x_min, y_min, x_max, y_max of the centres [m]; the map's bounds if None.
+            allowed: which centres (N, 2) [m] may be used, beyond all that.
 
         Raises:
             ScenarioError: if there is no room for them.
         """
         if count == 0:
             return np.zeros((0, 3))
-        low, high = self.static.bounds[:2], self.static.bounds[2:]
-        if count * size * size < float(np.prod(high - low)):
-            placed = self._throw(rng, count, size, keep_off, gap, random_yaw)
+        box = np.asarray(self.static.bounds if within is None else within, dtype=np.float64)
+        low, high = box[:2], box[2:]
+
+        def fits(poses: FloatArray) -> BoolArray:
+            found = self._fits(poses, size, keep_off, gap)
+            if allowed is not None and found.any():
+                found[found] = allowed(poses[found, :2])
+            return found
+
+        if (high >= low).all() and count * size * size < float(np.prod(high - low + size)):
+            placed = _throw(rng, count, box, fits, size + gap, spacing, random_yaw)
             if len(placed) == count:
                 return placed
-            cells = self._lattice(rng, count, size, keep_off, gap)
+            cells = _lattice(rng, count, box, fits, max(size + gap, spacing))
             if len(cells) >= count:
                 poses = np.zeros((count, 3))
                 poses[:, :2] = rng.permutation(cells)[:count]
@@ -93,7 +107,7 @@ class Floor:
                 return poses
             room = f"room for {len(cells)} was found"
         else:
-            room = f"the floor is {high[0] - low[0]:g} x {high[1] - low[1]:g} m"
+            room = "the floor has {:g} x {:g} m for their centres".format(*(high - low))
         raise ScenarioError(
             f"{count} boxes of {size:g} m do not fit: {room}; ask for fewer or smaller boxes"
         )
@@ -107,57 +121,77 @@ class Floor:
             fits &= shapely.distance(shapes, shape) > reach + gap
         return fits
 
-    def _throw(
-        self,
-        rng: np.random.Generator,
-        count: int,
-        size: float,
-        keep_off: Sequence[tuple[Any, float]],
-        gap: float,
-        random_yaw: bool,
-    ) -> FloatArray:
-        """Random sequential placement within a budget; fewer than ``count`` if it runs out."""
-        low, high = self.static.bounds[:2], self.static.bounds[2:]
-        placed = np.zeros((count, 3))
-        done = 0
-        for _ in range(max(8, math.ceil(8 * count / _BATCH))):
-            poses = np.zeros((_BATCH, 3))
-            poses[:, :2] = rng.uniform(low, high, (_BATCH, 2))
-            if random_yaw:
-                poses[:, 2] = rng.uniform(-np.pi, np.pi, _BATCH)
-            for pose in poses[self._fits(poses, size, keep_off, gap)]:
-                if not squares_overlap(pose, placed[:done], size + gap).any():
-                    placed[done] = pose
-                    done += 1
-                    if done == count:
-                        return placed
-        return placed[:done]
 
-    def _lattice(
-        self,
-        rng: np.random.Generator,
-        count: int,
-        size: float,
-        keep_off: Sequence[tuple[Any, float]],
-        gap: float,
-    ) -> FloatArray:
-        """(N, 2) free centres of the best of some shifted square lattices."""
-        low, high = self.static.bounds[:2], self.static.bounds[2:]
-        area = float(np.prod(high - low))
-        pitch = max((size + gap) * (1.0 + 1e-9), math.sqrt(area / _LATTICE_CELLS))
-        best = np.zeros((0, 2))
-        for shift in rng.uniform(0.0, pitch, (_LATTICE_SHIFTS, 2)):
-            x = np.arange(low[0] + shift[0], high[0], pitch)
-            y = np.arange(low[1] + shift[1], high[1], pitch)
-            poses = np.stack(
-                [np.repeat(x, len(y)), np.tile(y, len(x)), np.zeros(len(x) * len(y))], axis=1
-            )
-            cells = poses[self._fits(poses, size, keep_off, gap)][:, :2]
-            if len(cells) > len(best):
-                best = cells
-            if len(best) >= count:
-                break
-        return best
+def _throw(
+    rng: np.random.Generator,
+    count: int,
+    box: FloatArray,
+    fits: Callable[[FloatArray], BoolArray],
+    size: float,
+    spacing: float,
+    random_yaw: bool,
+) -> FloatArray:
+    """Random sequential placement within a budget; fewer than ``count`` if it runs out."""
+    placed = np.zeros((count, 3))
+    done = 0
+    for _ in range(max(8, math.ceil(8 * count / _BATCH))):
+        poses = np.zeros((_BATCH, 3))
+        poses[:, :2] = rng.uniform(box[:2], box[2:], (_BATCH, 2))
+        if random_yaw:
+            poses[:, 2] = rng.uniform(-np.pi, np.pi, _BATCH)
+        for pose in poses[fits(poses)]:
+            others = placed[:done]
+            near = np.hypot(*(others[:, :2] - pose[:2]).T) < spacing
+            if not (near.any() or squares_overlap(pose, others, size).any()):
+                placed[done] = pose
+                done += 1
+                if done == count:
+                    return placed
+    return placed[:done]
+
+
+def _lattice(
+    rng: np.random.Generator,
+    count: int,
+    box: FloatArray,
+    fits: Callable[[FloatArray], BoolArray],
+    pitch: float,
+) -> FloatArray:
+    """(N, 2) free centres of the best of some shifted square lattices."""
+    low, high = box[:2], box[2:]
+    pitch = max(pitch * (1.0 + 1e-9), math.sqrt(float(np.prod(high - low)) / _LATTICE_CELLS))
+    best = np.zeros((0, 2))
+    for shift in rng.uniform(0.0, pitch, (_LATTICE_SHIFTS, 2)):
+        x = np.arange(low[0] + shift[0], high[0], pitch)
+        y = np.arange(low[1] + shift[1], high[1], pitch)
+        poses = np.stack(
+            [np.repeat(x, len(y)), np.tile(y, len(x)), np.zeros(len(x) * len(y))], axis=1
+        )
+        cells = poses[fits(poses)][:, :2]
+        if len(cells) > len(best):
+            best = cells
+        if len(best) >= count:
+            break
+    return best
+
+
+def rectangle(x0: float, y0: float, x1: float, y1: float) -> FloatArray:
+    """(4, 2) corners [m] of an upright rectangle, counter-clockwise."""
+    return np.array([(x0, y0), (x1, y0), (x1, y1), (x0, y1)])
+
+
+def walls_around(
+    bounds: tuple[float, float, float, float], thickness: float
+) -> tuple[FloatArray, ...]:
+    """Four walls, each (4, 2) corners [m], around a room x_min, y_min, x_max, y_max [m]."""
+    x0, y0, x1, y1 = bounds
+    t = thickness
+    return (
+        rectangle(x0 - t, y0 - t, x1 + t, y0),
+        rectangle(x0 - t, y1, x1 + t, y1 + t),
+        rectangle(x0 - t, y0, x0, y1),
+        rectangle(x1, y0, x1 + t, y1),
+    )
 
 
 def squares(poses: FloatArray, size: float) -> FloatArray:

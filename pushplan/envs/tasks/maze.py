@@ -48,6 +48,7 @@ class MazeVariations:
         box_yaw: headings of the boxes at the start, ``"aligned"`` with the walls or ``"random"``.
         wheeled: share of the boxes that stand on casters, 0 to 1.
         random_start: whether the robot starts anywhere instead of at the preset's start.
+        bumper: what the testbed's robot carries in front, one of `pushplan.world.BUMPERS`.
         bumper_friction: friction coefficient between robot and boxes.
     """
 
@@ -57,6 +58,7 @@ class MazeVariations:
     box_yaw: str = "aligned"
     wheeled: float = 0.0
     random_start: bool | None = None
+    bumper: str | None = None
     bumper_friction: float | None = None
 
     def __post_init__(self) -> None:
@@ -120,7 +122,10 @@ class MazeTask(Task):
             raise UnknownNameError("preset of the maze", preset, PRESETS)
         self.preset: MazePreset = PRESETS[preset]
         self.variations = MazeVariations.read(variations or {})
-        self.robot = self.preset.robot(drive_of(action))
+        try:
+            self.robot = self.preset.robot(drive_of(action), self.variations.bumper)
+        except InvalidInputError as error:
+            raise ScenarioError(f"maze, preset {preset!r}: {error}") from error
         self.control_step = self.preset.control_step
         friction = self.variations.bumper_friction
         self.materials = (

@@ -8,8 +8,18 @@ from dataclasses import dataclass
 import numpy as np
 
 from pushplan.envs.simulators.base import Materials
-from pushplan.world import Drive, RobotModel, StaticMap
-from pushplan.world.checks import FloatArray
+from pushplan.envs.tasks.layout import rectangle, walls_around
+from pushplan.envs.tasks.testbed import SOLIDS
+from pushplan.world import (
+    BUMPERS,
+    Drive,
+    InvalidInputError,
+    RobotModel,
+    StaticMap,
+    maze_robot,
+    turtlebot3_burger,
+)
+from pushplan.world.checks import choice
 
 
 @dataclass(frozen=True)
@@ -26,11 +36,8 @@ class MazePreset:
         goal_radius: of the goal itself [m].
         robot_radius: added to it, as the robot's centre is what has to get there [m].
         random_start: whether the start is random unless said otherwise.
-        footprint: (N, 2) corners of the robot [m].
-        robot_mass: [kg].
         max_speed: [m/s].
         max_turn_rate: [rad/s].
-        wheel_separation: [m].
         box_size: side of the boxes [m].
         box_mass: [kg], or None for 1 kg/m² of their area.
         materials: friction and rolling.
@@ -50,11 +57,8 @@ class MazePreset:
     goal_radius: float
     robot_radius: float
     random_start: bool
-    footprint: tuple[tuple[float, float], ...]
-    robot_mass: float
     max_speed: float
     max_turn_rate: float
-    wheel_separation: float
     box_size: float
     box_mass: float | None
     materials: Materials
@@ -65,18 +69,24 @@ class MazePreset:
     window: float
     field_resolution: float
 
-    def robot(self, drive: Drive) -> RobotModel:
-        """The robot; a differential drive may also reverse at full speed."""
-        return RobotModel.from_outline(
-            self.footprint,
-            mass=self.robot_mass,
-            drive=drive,
-            max_speed=self.max_speed,
-            min_speed=-self.max_speed if drive is Drive.DIFFERENTIAL else 0.0,
-            max_turn_rate=self.max_turn_rate,
-            wheel_separation=self.wheel_separation,
-            name="maze robot" if self.thick_lines else "turtlebot3",
-        )
+    def robot(self, drive: Drive, bumper: str | None = None) -> RobotModel:
+        """The robot; a differential drive may also reverse at full speed.
+
+        Args:
+            drive: how it may move.
+            bumper: one of `pushplan.world.BUMPERS`; the preset's own robot if None.
+
+        Raises:
+            InvalidInputError: if there is no such bumper, or the robot cannot carry one.
+        """
+        limits = {"max_speed": self.max_speed, "max_turn_rate": self.max_turn_rate}
+        if not self.thick_lines:
+            return turtlebot3_burger("none" if bumper is None else bumper, drive, **limits)
+        if choice("bumper", "none" if bumper is None else bumper, BUMPERS) != "none":
+            raise InvalidInputError(
+                f"bumper {bumper!r} does not fit the robot of this preset (valid: none)"
+            )
+        return maze_robot(drive, **limits)
 
     def static(self, shape: str) -> StaticMap:
         """The walls of the room and inside it."""
@@ -92,16 +102,10 @@ class MazePreset:
             return StaticMap.build(
                 segments=[*around, *inner], radii=self.wall, bounds=(0.0, 0.0, width, length)
             )
-        t = 2.0 * self.wall
-        boxes = [
-            (-t, -t, width + t, 0.0),
-            (-t, length, width + t, length + t),
-            (-t, 0.0, 0.0, length),
-            (width, 0.0, width + t, length),
-            *((x - self.wall, low, x + self.wall, high) for x, low, _, high in inner),
-        ]
+        bounds = (0.0, 0.0, width, length)
+        inside = [rectangle(x - self.wall, low, x + self.wall, high) for x, low, _, high in inner]
         return StaticMap.build(
-            polygons=[_rectangle(*box) for box in boxes], bounds=(0.0, 0.0, width, length)
+            polygons=[*walls_around(bounds, 2.0 * self.wall), *inside], bounds=bounds
         )
 
 
@@ -115,10 +119,6 @@ def inner_walls(shape: str, width: float, length: float) -> list[tuple[float, fl
     ]
 
 
-def _rectangle(x0: float, y0: float, x1: float, y1: float) -> FloatArray:
-    return np.array([(x0, y0), (x1, y0), (x1, y1), (x0, y1)])
-
-
 _UP, _DOWN = np.pi / 2.0, -np.pi / 2.0
 
 BENCHMARK = MazePreset(
@@ -130,14 +130,8 @@ BENCHMARK = MazePreset(
     goal_radius=1.0,
     robot_radius=0.86,
     random_start=False,
-    footprint=(
-        *((0.7, -0.5), (0.7, 0.5), (0.6, 0.6), (-0.6, 0.6)),
-        *((-0.7, 0.5), (-0.7, -0.5), (-0.6, -0.6), (0.6, -0.6)),
-    ),
-    robot_mass=1.0,
     max_speed=0.15,
     max_turn_rate=0.105,
-    wheel_separation=1.0,
     box_size=1.0,
     box_mass=None,
     # those of the 2D benchmark: boxes 1.0, walls 0.5, and no grip at the bumper
@@ -159,14 +153,17 @@ TESTBED = MazePreset(
     goal_radius=0.15,
     robot_radius=0.15,
     random_start=True,
-    footprint=((0.069, -0.0915), (0.069, 0.0915), (-0.069, 0.0915), (-0.069, -0.0915)),
-    robot_mass=1.07,
     max_speed=0.2,
     max_turn_rate=0.785,
-    wheel_separation=0.16,
     box_size=0.08,
     box_mass=0.1,
-    materials=Materials(robot_object=0.4, object_object=0.4, object_static=0.4, rolling_time=0.5),
+    materials=Materials(
+        robot_object=0.4,
+        object_object=0.4,
+        object_static=0.4,
+        rolling_time=0.5,
+        solids=SOLIDS["turtlebot3"],
+    ),
     control_step=0.15,
     max_steps=2000,
     progress_reward=300.0,

@@ -1,0 +1,44 @@
+"""How far ship and floes coast in open water at full scale: the table in docs/tasks.md."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pushplan.envs.simulators.water import coasting
+from pushplan.envs.tasks.ship_presets import FULL_SCALE
+from pushplan.world import GoalLine, Movables, StaticMap, World
+
+RADII = (6.0, 10.0, 25.0)
+ENDS = (1.0, 0.5, 0.1)
+
+
+def main() -> None:
+    angles = np.arange(8) * np.pi / 4.0
+    octagon = np.stack([np.cos(angles), np.sin(angles)], axis=1) / np.sqrt(8.0**0.5 / np.pi)
+    floes = [radius * octagon for radius in RADII]
+    world = World(
+        robot=FULL_SCALE.robot(),
+        robot_pose=np.zeros(3),
+        static=StaticMap.build(bounds=FULL_SCALE.bounds),
+        movables=Movables.from_outlines(
+            floes, np.zeros((len(floes), 3)), density=FULL_SCALE.floe_density
+        ),
+        goal=GoalLine(np.zeros(2), np.array([0.0, 1.0])),
+    )
+    water = FULL_SCALE.materials.water
+    assert water is not None
+    rows = zip(
+        ("ship", *(f"floe of {radius:g} m radius" for radius in RADII)),
+        (world.robot.mass, *world.movables.masses.tolist()),
+        water.coefficients(world).tolist(),
+        strict=True,
+    )
+    print("| body | mass | b | c | " + " | ".join(f"2 to {v:g} m/s" for v in ENDS) + " |")
+    print("|---" * (4 + len(ENDS)) + "|")
+    for name, mass, (b, c, _, _) in rows:
+        cells = [f"{t:.0f} s, {x:.0f} m" for t, x in (coasting(b, c, mass, 2.0, v) for v in ENDS)]
+        print(f"| {name} | {mass / 1e3:.0f} t | {b:.3g} | {c:.3g} | " + " | ".join(cells) + " |")
+
+
+if __name__ == "__main__":
+    main()

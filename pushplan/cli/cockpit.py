@@ -1,0 +1,223 @@
+"""Driving an environment by hand in real time, and recording the episode."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pushplan.cli.keyboard import HELP, Keyboard, twist_of
+from pushplan.cli.scoreboard import Scoreboard, closing_lines
+from pushplan.drawing import draw_world
+from pushplan.envs.trace import Trace
+from pushplan.evaluation.episode import Recording
+from pushplan.world import Episode, Policy, Twist, World
+from pushplan.world.checks import FloatArray, IntArray
+
+FRAME_TIME = 1.0 / 30.0
+"""Frames follow each other no faster than this [s]."""
+TICK = 0.01
+"""How often keys are looked at while waiting [s]."""
+LATE = 0.25
+"""A machine that falls behind by more than this gives up the delay instead of racing [s]."""
+
+
+class Display(Protocol):
+    """Where a person looks and types."""
+
+    keyboard: Keyboard
+
+    @property
+    def closed(self) -> bool:
+        """Whether the person has closed it."""
+
+    def show(self, frame: NDArray[np.uint8]) -> None:
+        """Show a frame (H, W, 3)."""
+
+    def update(self) -> None:
+        """Take in what was typed."""
+
+
+class Clock:
+    """Wall-clock time; tests put another one in its place."""
+
+    def now(self) -> float:
+        """[s]."""
+        return time.perf_counter()
+
+    def sleep(self, seconds: float) -> None:
+        """Wait."""
+        time.sleep(seconds)
+
+
+class _Left(Exception):
+    """The person ended the episode."""
+
+    def __init__(self, *, restart: bool) -> None:
+        super().__init__()
+        self.restart = restart
+
+
+class Pilot:
+    """The policy of a person with a keyboard."""
+
+    def __init__(self, keyboard: Keyboard, now: Callable[[], float]) -> None:
+        self._keyboard = keyboard
+        self._now = now
+
+    def reset(self, world: World, rng: np.random.Generator) -> None:
+        """Nothing to prepare."""
+
+    def act(self, world: World, observation: Any) -> Twist:
+        """What the keys ask for."""
+        return twist_of(self._keyboard.held(self._now()), world.robot)
+
+
+class Cockpit:
+    """Shows each step as it happens, in time with the clock; an observer of `Recording.run`.
+
+    A step is simulated at once and then shown over the time that it takes, so that the picture
+    is in real time and a key acts on the next step.
+
+    Args:
+        env: the environment.
+        display: where to show it.
+        speed: simulated seconds per second.
+        clock: wall-clock time.
+    """
+
+    def __init__(self, env: Any, display: Display, speed: float, clock: Clock) -> None:
+        self._env = env
+        self._display = display
+        self._speed = speed
+        self._clock = clock
+        self._due = self._time = 0.0
+        self._ids: IntArray = np.zeros(0, dtype=np.int64)
+        self._trail: list[FloatArray] = []
+        self._last = (np.zeros(3), np.zeros((0, 3)))
+
+    def __call__(self, step: int, world: World, policy: Policy) -> None:
+        """Show what happened in this step.
+
+        Raises:
+            _Left: if the person wants to end or to start again.
+        """
+        if step == 0:
+            self._begin(world)
+            return
+        trace = self._env.trace
+        self._board.advance(world, trace.robot_poses, trace.object_poses)
+        lines, begin = self._board.lines(), self._due
+        seconds = (world.time - self._time) / self._speed
+        rows = np.flatnonzero(np.isin(self._ids, world.movables.ids))
+        count = max(1, int(seconds / FRAME_TIME))
+        for share in (np.arange(count) + 1.0) / count:
+            robot, objects = self._between(trace, self._time + share * seconds * self._speed)
+            scene = world
+            if share < 1.0:
+                scene = world.moved(robot_pose=robot, movable_poses=objects[rows])
+            self._show(scene, lines, robot[None, :2])
+            self._wait(begin + share * seconds)
+        self._trail.append(trace.robot_poses[:, :2])
+        self._last = (trace.robot_poses[-1], trace.object_poses[-1])
+        self._time = world.time
+        self._due = max(begin + seconds, self._clock.now() - LATE)
+
+    def _between(self, trace: Trace, at: float) -> tuple[FloatArray, FloatArray]:
+        """Poses of the robot (3,) and of the objects (K, 3) at a time [s] within the last step.
+
+        A simulator records no more poses than the metrics need, so they are interpolated.
+        """
+        i = min(int(np.searchsorted(trace.times, at)), len(trace.times) - 1)
+        robot, objects = self._last
+        before = self._time
+        if i > 0:
+            robot, objects = trace.robot_poses[i - 1], trace.object_poses[i - 1]
+            before = float(trace.times[i - 1])
+        share = min(1.0, (at - before) / (float(trace.times[i]) - before))
+        return _mix(robot, trace.robot_poses[i], share), _mix(objects, trace.object_poses[i], share)
+
+    def farewell(self, episode: Episode) -> bool:
+        """Show the final scores until the person has had enough.
+
+        Returns:
+            Whether to start again.
+        """
+        self._display.keyboard.clear()
+        self._show(self._env.world, [*closing_lines(episode), "r starts again   q ends"])
+        while True:
+            self._display.update()
+            if self._display.closed or self._display.keyboard.take("quit"):
+                return False
+            if self._display.keyboard.take("restart"):
+                return True
+            self._clock.sleep(TICK)
+
+    def _begin(self, world: World) -> None:
+        """Wait for the first key: nobody is ready in the first instant."""
+        self._board, self._time = Scoreboard(world), world.time
+        self._ids = world.movables.ids
+        self._last = (world.robot_pose, world.movables.poses)
+        self._trail = [world.robot_pose[None, :2]]
+        self._display.keyboard.clear()
+        self._show(world, [HELP, "press a key to start"])
+        while not self._display.keyboard.touched:
+            self._look()
+            self._clock.sleep(TICK)
+        self._due = self._clock.now()
+
+    def _show(self, world: World, text: list[str], *newest: FloatArray) -> None:
+        trail = np.concatenate([*self._trail, *newest])
+        self._display.show(draw_world(world, trail=trail, text=text))
+
+    def _wait(self, due: float) -> None:
+        self._look()
+        while (left := due - self._clock.now()) > 0.0:
+            self._clock.sleep(min(left, TICK))
+            self._look()
+
+    def _look(self) -> None:
+        self._display.update()
+        if self._display.closed or self._display.keyboard.take("quit"):
+            raise _Left(restart=False)
+        if self._display.keyboard.take("restart"):
+            raise _Left(restart=True)
+
+
+def _mix(a: FloatArray, b: FloatArray, share: float) -> FloatArray:
+    """Poses between a and b (..., 3); headings turn the short way."""
+    step = b - a
+    step[..., 2] = np.remainder(step[..., 2] + np.pi, 2.0 * np.pi) - np.pi
+    return a + share * step
+
+
+def drive(
+    env: Any, scenario: Any, display: Display, *, speed: float = 1.0, clock: Clock | None = None
+) -> Episode:
+    """Let a person drive until they have had enough; the last episode is returned.
+
+    One that the person ended has the reason ``"stopped"``.
+
+    Args:
+        env: a `pushplan.envs.PushEnv` whose actions understand a `Twist`.
+        scenario: what ``env`` was made for.
+        display: where the person looks and types.
+        speed: simulated seconds per second.
+        clock: wall-clock time.
+    """
+    clock = clock or Clock()
+    while True:
+        recording = Recording(Pilot(display.keyboard, clock.now), scenario, "teleop")
+        cockpit = Cockpit(env, display, speed, clock)
+        try:
+            recording.run(env, cockpit)
+        except _Left as left:
+            if left.restart:
+                continue
+            return recording.episode("stopped")
+        episode = recording.episode()
+        if not cockpit.farewell(episode):
+            return episode

@@ -1,0 +1,66 @@
+"""Options by which a command is told what to run."""
+
+from __future__ import annotations
+
+import argparse
+from typing import TYPE_CHECKING, Any
+
+from pushplan.cli.common import whole
+
+if TYPE_CHECKING:
+    from pushplan.scenarios import Scenario
+
+
+def add_scenario_options(parser: argparse.ArgumentParser) -> None:
+    """Add what `scenario_of` reads."""
+    parser.add_argument("suite", nargs="?", metavar="SUITE", help="take its scenario of --seed")
+    parser.add_argument("--task", metavar="NAME", help="a task instead of a suite, such as maze")
+    parser.add_argument("--simulator", default="pymunk", metavar="NAME", help="default pymunk")
+    parser.add_argument("--preset", metavar="NAME", help="default: the first for the simulator")
+    parser.add_argument("--boxes", type=whole(0), metavar="N", help="number of boxes")
+    parser.add_argument("--shape", metavar="NAME", help="shape of the maze: u or z")
+    parser.add_argument(
+        "--set",
+        action="append",
+        default=[],
+        metavar="NAME=VALUE",
+        dest="variations",
+        help="any other variation of the task; may be repeated",
+    )
+    parser.add_argument("--seed", type=whole(0), default=0, help="of the scenario (default 0)")
+
+
+def scenario_of(options: argparse.Namespace) -> Scenario:
+    """The scenario that was asked for.
+
+    Raises:
+        InvalidInputError: if options contradict each other.
+    """
+    from pushplan.envs.registry import default_preset
+    from pushplan.scenarios import Scenario, suite
+    from pushplan.world import InvalidInputError
+
+    shown = {"boxes": options.boxes, "shape": options.shape}
+    given: dict[str, Any] = {key: value for key, value in shown.items() if value is not None}
+    given.update(_variation(text) for text in options.variations)
+    if (options.suite is None) == (options.task is None):
+        raise InvalidInputError("give either a SUITE or --task NAME, see --help")
+    if options.suite is None:
+        preset = options.preset or default_preset(options.task, options.simulator)
+        return Scenario(options.task, options.simulator, preset, given, options.seed)
+    if given:
+        raise InvalidInputError(
+            f"a suite says what its scenarios are: {', '.join(sorted(given))} needs --task instead"
+        )
+    return suite(options.suite, episodes=1, first_seed=options.seed).scenarios[0]
+
+
+def _variation(text: str) -> tuple[str, Any]:
+    import yaml
+
+    from pushplan.world import InvalidInputError
+
+    name, equals, value = text.partition("=")
+    if not equals or not name:
+        raise InvalidInputError(f"--set takes NAME=VALUE, got {text!r}")
+    return name, yaml.safe_load(value)

@@ -1,0 +1,114 @@
+"""``pushplan teleop``: a person drives with the keyboard."""
+
+from __future__ import annotations
+
+import argparse
+from typing import TYPE_CHECKING, Any
+
+from pushplan.cli.common import add_command, positive, say
+from pushplan.cli.scenario_options import add_scenario_options, scenario_of
+
+if TYPE_CHECKING:
+    from pushplan.scenarios import Scenario
+
+_EXAMPLES = """\
+  pushplan teleop maze-2d-5 --seed 3 --out episode.npz
+  pushplan teleop --task area_clearing --speed 3
+  pushplan score episode.npz
+
+keys:
+  up, W      forward              left, A    turn left
+  down, S    back                 right, D   turn right
+  space      stop                 r          start again
+  q, Esc     end; closing the window does the same
+  A robot with one constant speed only steers.
+"""
+ACTIONS = ("turn_rate", "velocity")
+"""Action modes that a person with keys can use."""
+
+
+def add(commands: Any) -> None:
+    """Add the command."""
+    parser = add_command(
+        commands, "teleop", "drive with the keyboard and record the episode", _EXAMPLES, run
+    )
+    add_scenario_options(parser)
+    parser.add_argument(
+        "--action", choices=ACTIONS, help="how the robot is driven (default: as the task has it)"
+    )
+    parser.add_argument(
+        "--speed",
+        type=positive,
+        default=1.0,
+        metavar="X",
+        help="simulated seconds per second (default 1)",
+    )
+    parser.add_argument("--out", metavar="episode.npz", help="write the recorded episode")
+
+
+def run(options: argparse.Namespace) -> int:
+    """Open a window, drive, print the scores, write the episode."""
+    scenario = scenario_of(options)
+    _check_folder(options.out)
+    env = _environment(scenario, options.action)
+    from pushplan.cli.cockpit import drive
+    from pushplan.cli.keyboard import Keyboard
+    from pushplan.envs.window import Window
+
+    keyboard = Keyboard()
+    window = Window(f"pushplan {scenario.task}, seed {scenario.seed}", keyboard=keyboard)
+    try:
+        episode = drive(env, scenario, _WindowDisplay(window, keyboard), speed=options.speed)
+    finally:
+        window.close()
+        env.close()
+    if options.out:
+        episode.save(options.out)
+    from pushplan.metrics import compute
+
+    say(f"{'success' if episode.success else 'no success'} ({episode.reason})")
+    for name, value in compute(episode).items():
+        say(f"  {name:24s}{value:.6g}")
+    if options.out:
+        say(f"wrote {options.out}")
+    return 0
+
+
+class _WindowDisplay:
+    """A window as the place where a person looks and types."""
+
+    def __init__(self, window: Any, keyboard: Any) -> None:
+        self.keyboard = keyboard
+        self._window = window
+        self.show = window.show
+        self.update = window.update
+
+    @property
+    def closed(self) -> bool:
+        closed: bool = self._window.closed
+        return closed
+
+
+def _environment(scenario: Scenario, action: str | None) -> Any:
+    from pushplan.envs import make
+    from pushplan.envs.registry import TASKS, look_up
+    from pushplan.world import InvalidInputError
+
+    known = look_up("task", TASKS, scenario.task).actions
+    usable = [name for name in known if name in ACTIONS]
+    if not usable:
+        raise InvalidInputError(
+            f"task {scenario.task!r} cannot be driven with keys: it has none of the actions "
+            f"{', '.join(ACTIONS)} (it has: {', '.join(known)})"
+        )
+    return make(scenario, observation="state", action=action or usable[0])
+
+
+def _check_folder(out: str | None) -> None:
+    """Better now than after half an hour of driving."""
+    from pathlib import Path
+
+    from pushplan.world import InvalidInputError
+
+    if out is not None and not Path(out).absolute().parent.is_dir():
+        raise InvalidInputError(f"there is no folder {Path(out).parent} for {out!r}")

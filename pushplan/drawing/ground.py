@@ -1,0 +1,90 @@
+"""The floor with goal and walls: what stays the same from frame to frame."""
+
+from __future__ import annotations
+
+import functools
+
+import numpy as np
+from PIL import Image
+
+from pushplan.drawing.canvas import Canvas
+from pushplan.drawing.palette import Palette
+from pushplan.world import ClearanceArea, Goal, GoalDisc, GoalLine, StaticMap
+from pushplan.world.checks import FloatArray
+
+Bounds = tuple[float, float, float, float]
+
+
+@functools.lru_cache(maxsize=8)
+def draw_ground(
+    static: StaticMap, goal: Goal, palette: Palette, shown: Bounds, size_px: int
+) -> Image.Image:
+    """Draw it; the picture is kept, so copy it before drawing on it.
+
+    Args:
+        static: walls.
+        goal: where something has to go.
+        palette: colours.
+        shown: x_min, y_min, x_max, y_max of the picture [m].
+        size_px: longer side of the picture [px].
+    """
+    canvas = Canvas(np.array(shown), size_px, palette.floor)
+    unit = size_px / 600.0
+    fill, edge = palette.goal
+    if isinstance(goal, GoalDisc):
+        canvas.disc(goal.center, goal.radius, fill, edge, 1.5 * unit)
+    elif isinstance(goal, GoalLine):
+        _goal_line(canvas, static, goal, palette, unit)
+    elif isinstance(goal, ClearanceArea):
+        _clearance_area(canvas, goal, palette, unit)
+    else:
+        canvas.polygon(goal.polygon, fill, edge, 3.0 * unit)
+    for polygon in static.polygons:
+        canvas.polygon(polygon, palette.wall, palette.wall, 0.0)
+    for line, radius in zip(static.segments, static.radii, strict=True):
+        canvas.thick_segment(
+            line, max(float(radius), 1.5 * unit / canvas.pixels_per_metre), palette.wall
+        )
+    return canvas.image
+
+
+def _goal_line(
+    canvas: Canvas, static: StaticMap, goal: GoalLine, palette: Palette, unit: float
+) -> None:
+    fill, edge = palette.goal
+    reach = 2.0 * float(np.hypot(*(static.bounds[2:] - static.bounds[:2])))
+    along = reach * np.array([-goal.normal[1], goal.normal[0]])
+    a, b = goal.point - along, goal.point + along
+    beyond = reach * goal.normal
+    canvas.polygon(np.array([a, b, b + beyond, a + beyond]), fill, fill, 0.0)
+    canvas.line(np.stack([a, b]), edge, 2.5 * unit)
+
+
+def _clearance_area(canvas: Canvas, goal: ClearanceArea, palette: Palette, unit: float) -> None:
+    """Open edges are thick and have arrows that point out; closed ones are thin and dashed."""
+    fill, edge = palette.goal
+    canvas.polygon(goal.polygon, fill, fill, 0.0)
+    ends = np.roll(goal.polygon, -1, axis=0)
+    spacing = 40.0 * unit / canvas.pixels_per_metre
+    for a, b, is_open in zip(goal.polygon, ends, goal.open_edges, strict=True):
+        if not is_open:
+            canvas.line(np.stack([a, b]), palette.wall, 1.5 * unit, dash_m=0.2 * spacing)
+            continue
+        canvas.line(np.stack([a, b]), edge, 3.5 * unit)
+        length = float(np.hypot(*(b - a)))
+        along: FloatArray = (b - a) / length
+        out = np.array([along[1], -along[0]])
+        for share in np.arange(0.5, n := max(1, round(length / spacing))) / n:
+            _arrow(canvas, a + share * (b - a), 0.13 * spacing * along, 0.22 * spacing * out, edge)
+
+
+def _arrow(
+    canvas: Canvas,
+    tip_line: FloatArray,
+    half_width: FloatArray,
+    height: FloatArray,
+    color: tuple[int, int, int],
+) -> None:
+    base = tip_line + 0.2 * height
+    corners = np.array([base - half_width, base + half_width, base + height])
+    canvas.polygon(corners, color, color, 0.0)

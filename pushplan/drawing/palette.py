@@ -1,0 +1,64 @@
+"""Colours of pictures: Okabe and Ito's, which colour-blind readers can tell apart."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from pushplan.drawing.canvas import Color
+from pushplan.world import GoalLine, World
+
+
+@dataclass(frozen=True)
+class Palette:
+    """Colours of what is drawn; pairs are a fill and an edge.
+
+    Attributes:
+        floor: the ground.
+        wall: what is static.
+        robot: the chassis.
+        robot_edge: outline of the robot.
+        bumper: its other parts.
+        box: objects.
+        wheeled: objects on casters.
+        box_edge_px: width of their edges at 600 px.
+        ghost: where objects were or will be.
+        goal: where something has to go.
+        plan: the planned path.
+        trail: the path so far.
+        text: letters.
+    """
+
+    floor: Color = (250, 249, 246)
+    wall: Color = (84, 84, 88)
+    robot: Color = (0, 114, 178)
+    robot_edge: Color = (0, 66, 110)
+    bumper: Color = (38, 50, 66)
+    box: tuple[Color, Color] = ((146, 94, 52), (92, 56, 28))
+    wheeled: tuple[Color, Color] = ((226, 192, 140), (150, 112, 62))
+    box_edge_px: float = 1.5
+    ghost: Color = (214, 160, 116)
+    goal: tuple[Color, Color] = ((206, 236, 222), (0, 158, 115))
+    plan: Color = (213, 94, 0)
+    trail: Color = (86, 180, 233)
+    text: Color = (40, 40, 44)
+
+
+FLOOR_PALETTE = Palette()
+WATER_PALETTE = Palette(
+    floor=(176, 206, 226),
+    robot=(64, 60, 72),
+    robot_edge=(24, 24, 30),
+    box=((246, 250, 252), (128, 158, 180)),
+    wheeled=((246, 250, 252), (128, 158, 180)),
+    box_edge_px=1.0,
+    ghost=(120, 150, 180),
+    goal=((186, 222, 216), (0, 130, 95)),
+    trail=(0, 96, 160),
+)
+
+
+def palette_of(world: World) -> Palette:
+    """Water where the goal is a line and nothing is static, else a floor."""
+    static = world.static
+    is_open = not len(static.polygons) and not len(static.segments)
+    return WATER_PALETTE if is_open and isinstance(world.goal, GoalLine) else FLOOR_PALETTE

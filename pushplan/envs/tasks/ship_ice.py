@@ -1,0 +1,254 @@
+"""Ship-Ice: take a ship through broken ice to a line ahead, moving little of the ice."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from typing import Any, ClassVar
+
+import numpy as np
+import shapely
+
+from pushplan.envs.tasks.base import ObservationBuilder, Outcome, Task
+from pushplan.envs.tasks.ship_presets import PRESETS, ShipPreset
+from pushplan.observation import ImageObservation, StateObservation
+from pushplan.scenarios.ice import IceField, generate_ice, load_ice
+from pushplan.world import (
+    GoalLine,
+    InvalidInputError,
+    Movables,
+    ScenarioError,
+    StaticMap,
+    UnknownNameError,
+    World,
+)
+from pushplan.world.checks import FloatArray, number
+from pushplan.world.outline import transform
+
+OUTSIDE_REWARD = -50.0
+SUCCESS_REWARD = 200.0
+CONCENTRATION = 0.1
+"""Where none is asked for, and there is no file."""
+STATE_OBJECTS = 20
+"""Floes that the state observation shows: the nearest."""
+_IMAGE_CHANNELS = ("footprint", "movable", "goal_distance", "heading_line")
+_PIXELS = 150
+_START_TRIES = 500
+_UP = 0.5 * math.pi
+
+
+@dataclass(frozen=True)
+class ShipIceVariations:
+    """What may depart from a preset; None leaves the preset's value.
+
+    Args:
+        concentration: area of the floes as a share of that of the ice field, 0 to 0.5.
+        clumping: 0 for ice that is equally likely everywhere, 1 for patches and open water.
+        goal_distance: how far the goal line lies ahead of the start line [m].
+        start_x: where on the start line the ship starts [m]; anywhere if None.
+        start_heading: [rad], straight ahead by default.
+        ice_file: ice from a file, as `pushplan.scenarios.load_ice` reads it, instead of random
+            ice.
+    """
+
+    concentration: float | None = None
+    clumping: float = 0.6
+    goal_distance: float | None = None
+    start_x: float | None = None
+    start_heading: float = _UP
+    ice_file: str | None = None
+
+    def __post_init__(self) -> None:
+        put = object.__setattr__
+        if self.ice_file is not None and not isinstance(self.ice_file, str):
+            raise InvalidInputError(f"ice_file must be a path as text, got {self.ice_file!r}")
+        if self.concentration is not None:
+            share = number("concentration", self.concentration, low=0.0, high=0.5)
+            put(self, "concentration", share)
+            if self.ice_file is not None:
+                raise InvalidInputError("concentration and ice_file exclude each other")
+        put(self, "clumping", number("clumping", self.clumping, low=0.0, high=1.0))
+        if self.goal_distance is not None:
+            away = number("goal_distance", self.goal_distance, low=0.0, open_low=True)
+            put(self, "goal_distance", away)
+        if self.start_x is not None:
+            put(self, "start_x", number("start_x", self.start_x))
+        heading = number("start_heading", self.start_heading)
+        put(self, "start_heading", heading)
+
+    @classmethod
+    def read(cls, values: Mapping[str, Any]) -> ShipIceVariations:
+        """Variations from a mapping.
+
+        Raises:
+            UnknownNameError: if a name is none of the fields.
+            ScenarioError: if a value makes no sense.
+        """
+        valid = [field.name for field in fields(cls)]
+        for name in values:
+            if name not in valid:
+                raise UnknownNameError("variation of ship_ice", name, valid)
+        try:
+            return cls(**values)
+        except InvalidInputError as error:
+            raise ScenarioError(f"ship_ice: {error}") from error
+
+
+class ShipIceTask(Task):
+    """A ship in a channel of broken ice, as in the Bench-Push paper.
+
+    Reward of a step: the cosine of the angle between the ship's heading and the normal of the
+    goal line, minus ``work_reward`` times the work on the floes; -50 when the ship's origin leaves
+    the channel to a side or behind, +200 at the goal line. The channel has no walls: ice drifts
+    out of it freely.
+    """
+
+    name = "ship_ice"
+    presets = tuple(PRESETS)
+    solid_presets = ("full_scale",)
+    actions: ClassVar[tuple[str, ...]] = ("turn_rate",)
+    observations: ClassVar[tuple[str, ...]] = ("image", "state")
+
+    def __init__(
+        self,
+        *,
+        preset: str = "benchmark",
+        variations: Mapping[str, object] | None = None,
+        action: str = "turn_rate",
+    ) -> None:
+        if preset not in PRESETS:
+            raise UnknownNameError("preset of ship_ice", preset, PRESETS)
+        if action not in self.actions:
+            raise UnknownNameError("action of ship_ice", action, self.actions)
+        self.preset: ShipPreset = PRESETS[preset]
+        self.variations = ShipIceVariations.read(variations or {})
+        self.robot = self.preset.robot()
+        self.control_step = self.preset.control_step
+        self.materials = self.preset.materials
+        bounds = self.preset.bounds
+        self.static = StaticMap.build(bounds=bounds)
+        self.goal = GoalLine(np.array([0.5 * bounds[2], self._goal_y()]), np.array([0.0, 1.0]))
+        self.reach = 2.0 * float(np.hypot(*self.preset.channel))
+        self._file_ice = self._read_ice()
+        self._check_start_x()
+        self._steps = 0
+
+    def _goal_y(self) -> float:
+        start, away = self.preset.start_y, self.variations.goal_distance
+        if away is None:
+            return self.preset.goal_y
+        room = self.preset.channel[1] - start
+        if away > room:
+            raise ScenarioError(
+                f"ship_ice: goal_distance must be at most {room:g} m, which is the end of the "
+                f"channel, got {away:g}"
+            )
+        return start + away
+
+    def _check_start_x(self) -> None:
+        x, width = self.variations.start_x, self.preset.channel[0]
+        if x is not None and not 0.0 <= x <= width:
+            raise ScenarioError(
+                f"ship_ice: start_x must lie in the channel, [0, {width:g}] m, got {x:g}"
+            )
+
+    def _read_ice(self) -> IceField | None:
+        """The floes of the file, which must lie in the channel."""
+        path = self.variations.ice_file
+        if path is None:
+            return None
+        try:
+            field = load_ice(path)
+        except InvalidInputError as error:
+            raise ScenarioError(f"ship_ice: {error}") from error
+        low, high = self.preset.bounds[:2], self.preset.bounds[2:]
+        for i, corners in enumerate(field.polygons):
+            if (corners < low - 1e-9).any() or (corners > high + 1e-9).any():
+                raise ScenarioError(
+                    f"ship_ice: {path}: polygon {i} must lie in the channel, x in [0, {high[0]:g}] "
+                    f"and y in [0, {high[1]:g}] m"
+                )
+        return field
+
+    def start(self, rng: np.random.Generator) -> World:
+        """A new start: the ship on the start line, then ice that leaves it some room."""
+        self._steps = 0
+        if self._file_ice is None:
+            pose = self._start_pose(rng)
+            field = self._random_ice(rng, pose)
+        else:
+            field = self._file_ice
+            pose = self._free_pose(rng, field)
+        return World(
+            robot=self.robot,
+            robot_pose=pose,
+            static=self.static,
+            movables=Movables.from_polygons(field.polygons, density=self.preset.floe_density),
+            goal=self.goal,
+        )
+
+    def _start_pose(self, rng: np.random.Generator) -> FloatArray:
+        margin = self.preset.side_margin
+        anywhere = rng.uniform(margin, self.preset.channel[0] - margin)
+        x = self.variations.start_x
+        return np.array(
+            [anywhere if x is None else x, self.preset.start_y, self.variations.start_heading]
+        )
+
+    def _random_ice(self, rng: np.random.Generator, pose: FloatArray) -> IceField:
+        share = self.variations.concentration
+        around = np.asarray(self._berth(pose).exterior.coords)[:-1]
+        return generate_ice(
+            rng,
+            bounds=self.preset.ice_bounds,
+            concentration=CONCENTRATION if share is None else share,
+            sizes=self.preset.sizes,
+            keep_off=[around],
+            clumping=self.variations.clumping,
+        )
+
+    def _free_pose(self, rng: np.random.Generator, field: IceField) -> FloatArray:
+        """A start that is free of given ice."""
+        tree = shapely.STRtree([shapely.Polygon(corners) for corners in field.polygons])
+        for _ in range(_START_TRIES if self.variations.start_x is None else 1):
+            pose = self._start_pose(rng)
+            if len(tree.query(self._berth(pose), predicate="intersects")) == 0:
+                return pose
+        raise ScenarioError(
+            f"ship_ice: the ice of {self.variations.ice_file} leaves no room for the ship on the "
+            f"start line, y = {self.preset.start_y:g} m"
+        )
+
+    def _berth(self, pose: FloatArray) -> shapely.Polygon:
+        """The water that is free at the start: the hull and some room around it."""
+        hull = shapely.Polygon(transform(pose, self.preset.footprint))
+        return hull.buffer(self.preset.clearance, join_style="mitre").convex_hull
+
+    def score(self, before: World, after: World, *, work: float, touched_static: bool) -> Outcome:
+        """The reward above; to leave the channel is a failure even beyond the goal line."""
+        self._steps += 1
+        x, y, heading = after.robot_pose.tolist()
+        ahead = math.cos(heading) * self.goal.normal[0] + math.sin(heading) * self.goal.normal[1]
+        reward = float(ahead) - self.preset.work_reward * work
+        if x < 0.0 or x > self.preset.channel[0] or y < 0.0:
+            return Outcome(reward + OUTSIDE_REWARD, False, "left_channel", True, False)
+        if self.goal.distance(x, y) == 0.0:
+            return Outcome(reward + SUCCESS_REWARD, True, "goal", True, False)
+        late = self._steps >= self.preset.max_steps
+        return Outcome(reward, False, "time_limit" if late else "", False, late)
+
+    def observation(self, name: str) -> ObservationBuilder:
+        """``"image"`` or ``"state"``."""
+        if name == "image":
+            side = self.preset.window
+            return ImageObservation(
+                channels=_IMAGE_CHANNELS,
+                window=(side, side),
+                pixels=(_PIXELS, _PIXELS),
+                north_up=True,
+                shift=self.preset.shift,
+            )
+        if name == "state":
+            return StateObservation(max_objects=STATE_OBJECTS)
+        raise UnknownNameError("observation of ship_ice", name, self.observations)

@@ -1,0 +1,237 @@
+"""Success, efficiency and effort of manipulation: the Bench-Push paper, equations 3 to 5."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from pushplan.geometry import VisibilityGraph, convex_overlap, goal_distances, point_in_polygon
+from pushplan.metrics.lengths import interaction_work, object_path_lengths, robot_path_length
+from pushplan.world import (
+    ClearanceArea,
+    Episode,
+    InvalidInputError,
+    ManipulationGoal,
+    Receptacle,
+    StaticMap,
+    World,
+)
+from pushplan.world.checks import BoolArray, FloatArray
+
+
+@dataclass(frozen=True)
+class ManipulationScores:
+    """How well a robot brought objects to where they belong.
+
+    Args:
+        success: S_manip in [0, 1]: the share of the objects whose sub-task was completed.
+        efficiency: E_manip: L*(O') over driven length. The tree is no strict lower bound, so it
+            can pass 1; 0 if nothing was completed.
+        effort: I_manip in [0, 1]: the least work for what was completed over all work.
+        completed: K', number of completed sub-tasks.
+        path_length_m: l_0, length of the robot's path [m].
+        interaction_work_kg_m: sum of object mass times object path length [kg m].
+        tree_length_m: L*(O'), length of the minimum spanning tree [m].
+    """
+
+    success: float
+    efficiency: float
+    effort: float
+    completed: int
+    path_length_m: float
+    interaction_work_kg_m: float
+    tree_length_m: float
+
+
+def manipulation_scores(episode: Episode, *, straight: bool = False) -> ManipulationScores:
+    """Score one episode that has a goal for the objects.
+
+    ``episode.completed`` says which sub-tasks were done. Lengths are those of a point: neither
+    the robot nor an object is widened.
+
+    - An object whose sub-task was done at the start needs no path and no work: it counts in
+      S_manip, and its l_i* is 0, but it is no vertex of the tree.
+    - Without any objects there is nothing to do: S_manip is 1.
+    - A robot that never moved has E_manip = 1 if what was completed was so at the start and there
+      is nothing else, else 0.
+    - No work at all gives I_manip = 1.
+
+    Args:
+        episode: the recorded run.
+        straight: measure straight lines instead of shortest paths around static things, as the
+            reference implementation does.
+
+    Raises:
+        InvalidInputError: if the goal is one for the robot.
+    """
+    _goal(episode.world)
+    done = _completed(episode)
+    share = float(done.mean()) if len(done) else 1.0
+    needed = done & ~completed_objects(episode.world)
+    shortest = shortest_lengths(episode.world, needed, straight=straight)
+    tree = tree_length(episode.world, needed, straight=straight)
+    driven, work = robot_path_length(episode), interaction_work(episode)
+    return ManipulationScores(
+        success=share,
+        efficiency=efficiency(tree, driven, everything=share == 1.0),
+        effort=effort(episode.world, shortest, object_path_lengths(episode), driven),
+        completed=int(done.sum()),
+        path_length_m=driven,
+        interaction_work_kg_m=work,
+        tree_length_m=tree,
+    )
+
+
+def completed_objects(world: World) -> BoolArray:
+    """(K,) whether each object is delivered, or off the area, in a scene."""
+    goal, movables = _goal(world), world.movables
+    outlines = [movables.outline_world(k) for k in range(len(movables))]
+    if isinstance(goal, Receptacle):
+        inside = [all(point_in_polygon(x, y, goal.polygon) for x, y in o) for o in outlines]
+        return np.array(inside, dtype=bool)
+    return np.array([not convex_overlap(o, goal.polygon) for o in outlines], dtype=bool)
+
+
+def shortest_lengths(start: World, chosen: BoolArray, *, straight: bool = False) -> FloatArray:
+    """(K,) l_i* [m] of the chosen objects, 0 for the others; inf where no way leads to the goal.
+
+    Args:
+        start: the scene at the start.
+        chosen: (K,) flags.
+        straight: as in `manipulation_scores`.
+    """
+    distances = goal_distances(_floor(start, straight), _goal(start))
+    lengths = np.zeros(len(chosen))
+    for k in np.flatnonzero(chosen):
+        lengths[k] = distances.path_from(start.movables.poses[k, :2]).length
+    return lengths
+
+
+def tree_length(start: World, chosen: BoolArray, *, straight: bool = False) -> float:
+    """L*(O') [m] of the chosen objects, 0 if there are none; inf where no way leads.
+
+    The nearest goal points hang on their own objects alone, so their edges are in every spanning
+    tree and only the robot and the objects have to be spanned.
+    """
+    if not chosen.any():
+        return 0.0
+    points = [start.robot_pose[:2], *start.movables.poses[chosen, :2]]
+    tree = spanning_tree_length(_floor(start, straight), points)
+    return tree + float(shortest_lengths(start, chosen, straight=straight).sum())
+
+
+def spanning_tree_length(static: StaticMap, points: list[FloatArray]) -> float:
+    """Length [m] of the minimum spanning tree over points (2,) [m], inf if one is cut off.
+
+    Edges are shortest paths of a point around what is static. Prim's algorithm.
+    """
+    reached = np.full(len(points), np.inf)
+    open_points, newest, total = set(range(1, len(points))), 0, 0.0
+    graph = VisibilityGraph(static)
+    is_free = not len(static.polygons) and not len(static.segments)
+    while open_points:
+        for k in open_points:
+            length = math.dist(points[k], points[newest])
+            if length < reached[k]:  # a path around obstacles is no shorter
+                if not is_free:
+                    length = graph.shortest_path(points[k], points[newest]).length
+                reached[k] = min(reached[k], length)
+        newest = min(open_points, key=lambda k: (reached[k], k))
+        open_points.remove(newest)
+        total += float(reached[newest])
+    return total
+
+
+def efficiency(tree_m: float, driven_m: float, *, everything: bool) -> float:
+    """E_manip, equation 4.
+
+    NaN if something was completed although no path leads there.
+
+    Args:
+        tree_m: L*(O') [m].
+        driven_m: l_0 [m].
+        everything: whether all sub-tasks were completed.
+    """
+    if math.isinf(tree_m):
+        return math.nan
+    if driven_m > 0.0:
+        return tree_m / driven_m
+    return 1.0 if everything and tree_m == 0.0 else 0.0
+
+
+def effort(world: World, shortest: FloatArray, lengths: FloatArray, driven_m: float) -> float:
+    """I_manip, equation 5.
+
+    An object that got to its goal on a path shorter than l_i* counts with that path. That happens
+    where a part of it was in the goal from the start, or where it was pushed over an edge that is
+    said to be closed; so I_manip stays in [0, 1].
+
+    Args:
+        world: the masses.
+        shortest: (K,) l_i* of the completed objects [m], 0 for the others.
+        lengths: (K,) l_i [m].
+        driven_m: l_0 [m].
+    """
+    masses = world.movables.masses
+    work = float(masses @ lengths)
+    if work == 0.0:
+        return 1.0
+    own = world.robot.mass * driven_m
+    return min(1.0, (own + float(masses @ np.minimum(shortest, lengths))) / (own + work))
+
+
+def _completed(episode: Episode) -> BoolArray:
+    assert episode.completed is not None  # the episode has filled it in
+    return episode.completed
+
+
+def _goal(world: World) -> ManipulationGoal:
+    if not isinstance(world.goal, Receptacle | ClearanceArea):
+        raise InvalidInputError(
+            "manipulation scores need a goal for the objects (Receptacle or ClearanceArea), "
+            f"got {type(world.goal).__name__}"
+        )
+    return world.goal
+
+
+def _floor(start: World, straight: bool) -> StaticMap:
+    """The map, or one without obstacles that holds everything."""
+    if not straight:
+        return start.static
+    box, corners = start.static.bounds.reshape(2, 2), _goal(start).polygon
+    everything = [box, corners, start.robot_pose[None, :2], start.movables.poses[:, :2]]
+    points = np.concatenate(everything)
+    return StaticMap.build(bounds=[*(points.min(axis=0) - 1.0), *(points.max(axis=0) + 1.0)])
+
+
+def _applies(episode: Episode) -> bool:
+    return isinstance(episode.world.goal, Receptacle | ClearanceArea)
+
+
+def s_manip(episode: Episode) -> float | None:
+    """S_manip; None where the goal is one for the robot."""
+    if not _applies(episode):
+        return None
+    done = _completed(episode)
+    return float(done.mean()) if len(done) else 1.0
+
+
+def e_manip(episode: Episode) -> float | None:
+    """E_manip; None where the goal is one for the robot."""
+    return manipulation_scores(episode).efficiency if _applies(episode) else None
+
+
+def e_manip_straight(episode: Episode) -> float | None:
+    """E_manip with straight lines, to be set beside the reference implementation's."""
+    return manipulation_scores(episode, straight=True).efficiency if _applies(episode) else None
+
+
+def i_manip(episode: Episode) -> float | None:
+    """I_manip; None where the goal is one for the robot."""
+    if not _applies(episode):
+        return None
+    needed = _completed(episode) & ~completed_objects(episode.world)
+    shortest = shortest_lengths(episode.world, needed)
+    return effort(episode.world, shortest, object_path_lengths(episode), robot_path_length(episode))

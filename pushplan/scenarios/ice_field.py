@@ -1,0 +1,81 @@
+"""`IceField`: the floes of a broken ice cover."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+
+from pushplan.world import InvalidInputError
+from pushplan.world.checks import ArrayRecord, FloatArray, array, frozen
+from pushplan.world.outline import areas_and_centroids, convex_outlines, flatten
+
+
+@dataclass(frozen=True, eq=False)
+class IceField(ArrayRecord):
+    """Convex floes on a rectangle of water.
+
+    Args:
+        polygons: K convex outlines, each (N, 2) corners [m], world frame.
+        bounds: (4,) x_min, y_min, x_max, y_max of the ice-covered water [m].
+
+    Raises:
+        InvalidInputError: if an outline is not convex or has no area, or the bounds are empty.
+            Whether floes overlap is not looked at here: `load_ice` does, and `generate_ice` makes
+            none.
+    """
+
+    polygons: tuple[FloatArray, ...]
+    bounds: FloatArray
+
+    def __post_init__(self) -> None:
+        put = object.__setattr__
+        put(self, "bounds", checked_bounds(self.bounds))
+        if isinstance(self.polygons, str) or not isinstance(self.polygons, Sequence | np.ndarray):
+            raise InvalidInputError(f"floes must be a list of outlines, got {self.polygons!r:.60}")
+        put(self, "polygons", tuple(convex_outlines("floe", self.polygons)))
+
+    def __len__(self) -> int:
+        return len(self.polygons)
+
+    @cached_property
+    def areas(self) -> FloatArray:
+        """(K,) areas of the floes [m²]."""
+        return frozen(areas_and_centroids(*flatten(self.polygons))[0])
+
+    @property
+    def radii(self) -> FloatArray:
+        """(K,) radii of the discs with the areas of the floes [m]."""
+        return frozen(np.sqrt(self.areas / np.pi))
+
+    @property
+    def concentration(self) -> float:
+        """Area of the floes as a share of the area within the bounds."""
+        return float(self.areas.sum() / np.prod(self.bounds[2:] - self.bounds[:2]))
+
+    def save(self, path: str | Path) -> None:
+        """Write the field to a ``.json`` or ``.npz`` file; `load_ice` gives it back equal.
+
+        Raises:
+            InvalidInputError: if the ending is another one, or the file cannot be written.
+        """
+        from pushplan.scenarios.ice_files import save_ice
+
+        save_ice(self, path)
+
+
+def checked_bounds(bounds: object) -> FloatArray:
+    """Check a rectangle (4,) x_min, y_min, x_max, y_max [m].
+
+    Raises:
+        InvalidInputError: if it has another shape or no area.
+    """
+    box: FloatArray = array("ice bounds", bounds, (4,))  # type: ignore[arg-type]
+    if (box[:2] >= box[2:]).any():
+        raise InvalidInputError(
+            f"ice bounds must be x_min, y_min, x_max, y_max with min < max, got {box.tolist()}"
+        )
+    return box

@@ -1,0 +1,209 @@
+"""Ice fields in files: JSON, and plain NumPy arrays. Pickles are never read."""
+
+from __future__ import annotations
+
+import json
+import zipfile
+import zlib
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import shapely
+
+from pushplan.scenarios.ice_field import IceField, checked_bounds
+from pushplan.world import InvalidInputError, SchemaError
+from pushplan.world.checks import FloatArray, array, known_keys
+from pushplan.world.outline import flatten, signed_area, unflatten, well_formed
+
+SCHEMA = "pushplan-ice/1"
+"""Name and version of the JSON form; files of another version are refused."""
+ENDINGS = (".json", ".npz", ".npy")
+_OVERLAP = 1e-6
+"""Floes may overlap by this share of the smaller one: rounding, where they touch."""
+_READ_ERRORS = (
+    *(OSError, ValueError, EOFError, KeyError, MemoryError, RecursionError, RuntimeError),
+    *(zipfile.BadZipFile, zlib.error),
+)
+
+
+def load_ice(path: str | Path, *, hull: bool = False) -> IceField:
+    """Read an ice field.
+
+    - ``.json``: a list of polygons, each a list of [x, y] corners [m]; or a mapping with
+      ``polygons``, and ``bounds`` and ``schema`` if you like.
+    - ``.npz``: arrays ``vertices`` (V, 2) [m] and ``offsets`` (K + 1,), where each floe starts in
+      them and the last ends, and ``bounds`` if you like.
+    - ``.npy``: an array (K, N, 2) of K floes with N corners each.
+
+    Corners may go round either way, and the first may be repeated at the end. Without bounds, the
+    rectangle around all floes counts.
+
+    Args:
+        path: the file.
+        hull: take the convex hull of a floe that is not convex, instead of refusing it.
+
+    Raises:
+        SchemaError: if the file cannot be read or has another form.
+        InvalidInputError: if a floe is not convex, has no area or leaves the bounds, or if two
+            floes overlap. Messages name the file, the polygon, counted from 0, and the rule.
+    """
+    path = _path(path)
+    if path.suffix.lower() not in ENDINGS:
+        raise InvalidInputError(
+            f"an ice field is read from {', '.join(ENDINGS)} files (never from pickles), "
+            f"got {str(path)!r}"
+        )
+    try:
+        polygons, bounds = _READERS[path.suffix.lower()](path)
+    except InvalidInputError as error:
+        raise SchemaError(f"{path}: {error}") from error
+    except _READ_ERRORS as error:
+        problem = " ".join(str(error).split()) or type(error).__name__
+        raise SchemaError(f"cannot read ice field {path}: {problem}") from error
+    try:
+        floes = _clean(polygons, hull)
+        field = IceField(floes, _bounds(floes, bounds))
+        _check_inside(field)
+        _check_apart(field)
+    except InvalidInputError as error:
+        raise InvalidInputError(f"{path}: {error}") from error
+    return field
+
+
+def save_ice(field: IceField, path: str | Path) -> None:
+    """Write a field to a ``.json`` or ``.npz`` file; `load_ice` gives it back equal.
+
+    Raises:
+        InvalidInputError: if the ending is another one, or the file cannot be written.
+    """
+    path = _path(path)
+    ending = path.suffix.lower()
+    try:
+        if ending == ".json":
+            data = {
+                "schema": SCHEMA,
+                "bounds": field.bounds.tolist(),
+                "polygons": [corners.tolist() for corners in field.polygons],
+            }
+            path.write_text(json.dumps(data) + "\n", encoding="utf-8")
+        elif ending == ".npz":
+            vertices, offsets = flatten(field.polygons)
+            with path.open("wb") as file:
+                np.savez_compressed(file, vertices=vertices, offsets=offsets, bounds=field.bounds)
+        else:
+            raise InvalidInputError(
+                f"an ice field is written to a .json or .npz file, got {str(path)!r}"
+            )
+    except OSError as error:
+        raise InvalidInputError(f"cannot write {path}: {error}") from error
+
+
+def _path(path: object) -> Path:
+    if not isinstance(path, str | Path):
+        raise InvalidInputError(f"the path of an ice field must be a text, got {path!r:.60}")
+    return Path(path)
+
+
+def _read_json(path: Path) -> tuple[Sequence[Any], object]:
+    data = json.loads(path.read_text(encoding="utf-8"))
+    bounds: object = None
+    if isinstance(data, Mapping):
+        known_keys("ice field", data, ("schema", "bounds", "polygons"), ("polygons",))
+        if data.get("schema", SCHEMA) != SCHEMA:
+            raise SchemaError(f"this pushplan reads schema {SCHEMA!r}, got {data['schema']!r}")
+        data, bounds = data["polygons"], data.get("bounds")
+    if not isinstance(data, list):
+        raise SchemaError(f"polygons must be a list of lists of corners, got {data!r:.60}")
+    return data, bounds
+
+
+def _read_npz(path: Path) -> tuple[Sequence[Any], object]:
+    with np.load(path, allow_pickle=False) as archive:
+        if not isinstance(archive, np.lib.npyio.NpzFile):
+            raise SchemaError("this is no .npz archive")
+        known_keys("ice field", archive, ("vertices", "offsets", "bounds"), ("vertices", "offsets"))
+        vertices = array("vertices", archive["vertices"], (None, 2))
+        offsets = array("offsets", archive["offsets"], (None,), dtype=np.int64)
+        bounds = archive["bounds"] if "bounds" in archive else None
+    if (
+        len(offsets) == 0
+        or offsets[0] != 0
+        or offsets[-1] != len(vertices)
+        or (np.diff(offsets) < 0).any()
+    ):
+        raise SchemaError(
+            f"offsets must rise from 0 to the number of vertices, {len(vertices)}, "
+            f"got {offsets.tolist()!s:.60}"
+        )
+    return unflatten(vertices, offsets), bounds
+
+
+def _read_npy(path: Path) -> tuple[Sequence[Any], object]:
+    data = np.load(path, allow_pickle=False)
+    if not isinstance(data, np.ndarray):
+        raise SchemaError("this is no .npy array")
+    polygons: FloatArray = array("the array of polygons", data, (None, None, 2))
+    return list(polygons), None
+
+
+_READERS = {".json": _read_json, ".npz": _read_npz, ".npy": _read_npy}
+
+
+def _clean(polygons: Sequence[Any], hull: bool) -> tuple[FloatArray, ...]:
+    """Counter-clockwise outlines without a repeated last corner; of hulls where asked for."""
+    floes: list[FloatArray] = []
+    for i, corners in enumerate(polygons):
+        points: FloatArray = array(f"polygon {i}", corners, (None, 2))
+        if len(points) > 1 and (points[0] == points[-1]).all():
+            points = points[:-1]
+        if len(points) < 3:
+            raise InvalidInputError(f"polygon {i} must have at least 3 corners, got {len(points)}")
+        floes.append(points if signed_area(points) > 0.0 else points[::-1])
+    for i in np.flatnonzero(~well_formed(*flatten(floes))).tolist():
+        shape = shapely.MultiPoint(floes[i]).convex_hull
+        if not isinstance(shape, shapely.Polygon):
+            raise InvalidInputError(f"polygon {i} must have an area, got {floes[i].tolist()!s:.80}")
+        if not hull:
+            raise InvalidInputError(
+                f"polygon {i} must be convex and must not repeat a corner, "
+                f"got {floes[i].tolist()!s:.80}; load_ice(..., hull=True) takes its convex hull"
+            )
+        around = np.asarray(shape.exterior.coords)[:-1]
+        floes[i] = around if signed_area(around) > 0.0 else around[::-1]
+    return tuple(floes)
+
+
+def _bounds(floes: Sequence[FloatArray], bounds: object) -> FloatArray:
+    if bounds is not None:
+        return checked_bounds(bounds)
+    if not floes:
+        raise InvalidInputError("an ice field without floes must state its bounds")
+    corners = np.concatenate(floes)
+    return checked_bounds([*corners.min(axis=0), *corners.max(axis=0)])
+
+
+def _check_inside(field: IceField) -> None:
+    slack = 1e-9 * float((field.bounds[2:] - field.bounds[:2]).max())
+    for i, corners in enumerate(field.polygons):
+        if (corners < field.bounds[:2] - slack).any() or (corners > field.bounds[2:] + slack).any():
+            raise InvalidInputError(
+                f"polygon {i} must lie within the bounds {field.bounds.tolist()}, "
+                f"got {corners.tolist()!s:.80}"
+            )
+
+
+def _check_apart(field: IceField) -> None:
+    """Refuse floes that overlap; touching is fine."""
+    shapes = np.array([shapely.Polygon(corners) for corners in field.polygons], dtype=object)
+    first, second = shapely.STRtree(shapes).query(shapes, predicate="intersects")
+    first, second = first[first < second], second[first < second]
+    shared = shapely.area(shapely.intersection(shapes[first], shapes[second]))
+    bad = shared > _OVERLAP * np.minimum(field.areas[first], field.areas[second])
+    if bad.any():
+        worst = int(np.argmax(np.where(bad, shared, 0.0)))
+        raise InvalidInputError(
+            f"floes must not overlap: polygons {first[worst]} and {second[worst]} share "
+            f"{shared[worst]:.3g} m², and {int(bad.sum())} pairs overlap in all"
+        )

@@ -1,0 +1,293 @@
+"""Broken ice of a stated concentration: random convex floes that overlap nowhere."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.spatial import cKDTree
+
+from pushplan.geometry import polygon_area
+from pushplan.scenarios.ice_field import IceField, checked_bounds
+from pushplan.scenarios.ice_kernels import cut_cells, fit_floes, throw_discs
+from pushplan.world import InvalidInputError, ScenarioError
+from pushplan.world.checks import FloatArray, IntArray, number
+from pushplan.world.outline import convex_outline, flatten, unflatten
+
+MOST_FLOES = 20_000
+"""More than this is refused: a typing error rather than a wish."""
+_THROWS = 200
+_CORES = (0.85, 0.7, 0.55, 0.4)
+_CORNERS = (5, 10)
+_SLENDER = 1.7
+_WAVES = 48
+_ROUNDS = 12
+_MARGIN = 0.003
+"""Floes are grown this much too large [share of the area], and in the end shrunk to measure."""
+
+
+@dataclass(frozen=True)
+class FloeSizes:
+    """Log-normal floe sizes. The radius of a floe is that of the disc with its area.
+
+    Args:
+        mean_radius: mean of the log-normal distribution before it is cut off [m].
+        spread: standard deviation of the logarithm of the radius.
+        least: floes are no smaller [m].
+        greatest: nor larger [m].
+
+    Raises:
+        InvalidInputError: if they make no sense together.
+    """
+
+    mean_radius: float = 0.33
+    spread: float = 0.28
+    least: float = 0.2
+    greatest: float = 0.6
+
+    def __post_init__(self) -> None:
+        put = object.__setattr__
+        for key in ("mean_radius", "least", "greatest"):
+            put(self, key, number(f"ice {key}", getattr(self, key), low=0.0, open_low=True))
+        put(self, "spread", number("ice spread", self.spread, low=0.0, high=2.0))
+        if not self.least <= self.mean_radius <= self.greatest or self.least == self.greatest:
+            raise InvalidInputError(
+                "ice radii must have least <= mean_radius <= greatest and least < greatest, got "
+                f"{self.least:g}, {self.mean_radius:g}, {self.greatest:g} m"
+            )
+
+    def draw(self, rng: np.random.Generator, total_area: float) -> FloatArray:
+        """Areas [m²], largest first, whose sum is ``total_area`` [m²] where that is possible.
+
+        It is not where the sum is less than one floe, or the range of sizes is narrow and the
+        floes are few.
+        """
+        high = np.pi * self.greatest**2 / (1.0 + _MARGIN)
+        low = min(high, np.pi * self.least**2 * (1.0 + 2.0 * _MARGIN))
+        typical = np.pi * self.mean_radius**2
+        count = int(1.5 * total_area / typical) + 32
+        middle = np.log(self.mean_radius) - 0.5 * self.spread**2
+        radii = np.exp(middle + self.spread * rng.standard_normal(4 * count))
+        inside = radii[(radii >= self.least) & (radii <= self.greatest)]
+        if len(inside) < count:
+            inside = np.clip(radii, self.least, self.greatest)
+        sums = np.cumsum(np.pi * inside**2)
+        number_of = int(np.argmin(np.abs(sums - total_area))) + 1
+        areas = np.pi * inside[:number_of] ** 2
+        for _ in range(50):  # the last few per mille, within the range of sizes
+            areas = np.clip(areas * (total_area / areas.sum()), low, high)
+        return np.sort(areas)[::-1].copy()
+
+
+def generate_ice(
+    rng: np.random.Generator,
+    *,
+    bounds: ArrayLike,
+    concentration: float,
+    sizes: FloeSizes | None = None,
+    keep_off: Sequence[ArrayLike] = (),
+    gap: float | None = None,
+    clumping: float = 0.6,
+) -> IceField:
+    """A random field of convex floes.
+
+    Sizes are drawn until their areas add up to the wanted share. Discs of most of those sizes
+    are thrown at random places, more often where a smooth random field is high, until none
+    touches another. The power diagram (Laguerre tessellation) of the discs gives each floe a cell
+    of its own; a random convex shape grows within it to the floe's area. In open water a floe has
+    a shape of its own, in a crowd its edges run along those of its neighbours, as in ice that
+    has broken. The concentration is exact to rounding.
+
+    Args:
+        rng: the only source of randomness.
+        bounds: x_min, y_min, x_max, y_max of the water [m]; floes stay inside.
+        concentration: wanted area of the floes as a share of the area of the bounds.
+        sizes: of the floes; those of the 2D benchmark by default.
+        keep_off: convex outlines, each (N, 2) [m], that must stay free.
+        gap: least distance between floes, and from floes to ``keep_off`` [m]; by default 3 % of
+            the mean radius.
+        clumping: 0 for floes that are as likely everywhere, 1 for dense patches and open water.
+            The denser the ice, the less room there is for it.
+
+    Raises:
+        InvalidInputError: if a value is out of range.
+        ScenarioError: if the concentration cannot be reached.
+    """
+    sizes = FloeSizes() if sizes is None else sizes
+    if not isinstance(sizes, FloeSizes):
+        raise InvalidInputError(f"ice sizes must be a FloeSizes, got {type(sizes).__name__}")
+    box = checked_bounds(bounds)
+    share = number("ice concentration", concentration, low=0.0, high=1.0)
+    clumping = number("ice clumping", clumping, low=0.0, high=1.0)
+    gap = 0.03 * sizes.mean_radius if gap is None else gap
+    gap = number("ice gap", gap, low=0.0, high=sizes.least, open_low=True)
+    if isinstance(keep_off, str) or not isinstance(keep_off, Sequence):
+        raise InvalidInputError(f"keep_off must be a list of outlines, got {keep_off!r:.60}")
+    blocks = flatten([convex_outline(f"keep_off[{i}]", b) for i, b in enumerate(keep_off)])
+    wanted = share * float(np.prod(box[2:] - box[:2]))
+    if wanted == 0.0:
+        return IceField((), box)
+    _check_possible(wanted, share, sizes, box)
+    return _pack(rng, wanted, share, sizes, box, blocks, gap, clumping)
+
+
+def _pack(
+    rng: np.random.Generator,
+    wanted: float,
+    share: float,
+    sizes: FloeSizes,
+    box: FloatArray,
+    blocks: tuple[FloatArray, IntArray],
+    gap: float,
+    clumping: float,
+) -> IceField:
+    """Floes of a total area [m²]: with large discs first, then with smaller ones."""
+    areas = sizes.draw(rng, wanted)
+    if abs(areas.sum() - wanted) > 0.01 * wanted:
+        raise ScenarioError(
+            f"a concentration of {share:.4g} is {wanted:.3g} m² of ice, which floes of "
+            f"{sizes.least:g} to {sizes.greatest:g} m radius cannot add up to"
+        )
+    favour = _favour(rng, box, sizes.mean_radius, clumping)
+    best = 0.0
+    for core in _CORES:
+        throws = rng.random((len(areas), _THROWS, 3))
+        radii = core * np.sqrt(areas / np.pi)
+        centres = throw_discs(radii, throws, box, favour, *blocks, gap)
+        if len(centres) < len(areas):
+            continue
+        shapes = _random_shapes(rng, len(areas))
+        floes = _grow(areas, wanted, sizes, shapes, centres, radii, box, blocks, gap)
+        reached = sum(polygon_area(floe) for floe in floes)
+        if reached >= wanted:
+            return IceField(_shrunk(floes, wanted / reached), box)
+        best = max(best, reached)
+    raise ScenarioError(
+        f"a concentration of {share:.3g} cannot be packed with floes of {sizes.least:g} to "
+        f"{sizes.greatest:g} m radius and gaps of {gap:g} m"
+        + (f": {share * best / wanted:.3g} was reached" if best else "")
+        + "; ask for less ice, smaller gaps or a wider range of sizes"
+    )
+
+
+def _check_possible(wanted: float, share: float, sizes: FloeSizes, box: FloatArray) -> None:
+    """Refuse what needs no trying."""
+    smallest = np.pi * sizes.least**2
+    side = float((box[2:] - box[:2]).min())
+    if wanted < 0.99 * smallest:
+        raise ScenarioError(
+            f"a concentration of {share:.3g} is {wanted:.3g} m² of ice, less than the smallest "
+            f"floe of {smallest:.3g} m²"
+        )
+    if 2.0 * sizes.greatest > side:
+        raise ScenarioError(
+            f"floes of up to {sizes.greatest:g} m radius do not fit on water that is {side:g} m "
+            "wide"
+        )
+    if wanted > MOST_FLOES * np.pi * sizes.mean_radius**2:
+        raise ScenarioError(
+            f"this would be more than {MOST_FLOES} floes: ask for larger floes or less water"
+        )
+
+
+def _favour(
+    rng: np.random.Generator, box: FloatArray, mean_radius: float, clumping: float
+) -> FloatArray:
+    """(R, C) how much each place is liked: the ranks of a smooth Gaussian random field."""
+    width, height = (float(side) for side in box[2:] - box[:2])
+    step = max(mean_radius, max(width, height) / 1024.0)
+    shape = max(2, round(height / step)), max(2, round(width / step))
+    y, x = (np.linspace(0.0, side, n) for side, n in zip((height, width), shape, strict=True))
+    # a sum of plane waves whose lengths are around a dozen floes
+    waves = rng.standard_normal((_WAVES, 2)) / (5.0 * mean_radius)
+    phases = rng.uniform(0.0, 2.0 * np.pi, _WAVES)
+    along_x = np.exp(1j * np.outer(waves[:, 0], x))  # (W, C)
+    along_y = np.exp(1j * (np.outer(waves[:, 1], y) + phases[:, None]))  # (W, R)
+    field = np.einsum("wr,wc->rc", along_y, along_x).real  # in one fixed order, unlike BLAS
+    ranks = np.argsort(np.argsort(field, axis=None, kind="stable"), kind="stable")
+    level = ranks.reshape(field.shape) / max(1, field.size - 1)
+    return np.ascontiguousarray(1.0 - clumping + clumping * level**3)
+
+
+def _random_shapes(rng: np.random.Generator, count: int) -> tuple[FloatArray, IntArray]:
+    """Convex outlines of area 1 about their centroids: (K, N, 2), and (K,) corner counts.
+
+    Corners lie on an ellipse at uneven angles, so that they are always in convex position.
+    """
+    numbers = rng.integers(*_CORNERS, count)
+    most = _CORNERS[1] - 1
+    jitter = rng.uniform(-0.4, 0.4, (count, most))
+    slender = rng.uniform(1.0, _SLENDER, count)
+    turns = rng.uniform(0.0, 2.0 * np.pi, (count, 2))
+    # surplus corners repeat the last one; they have no part in area and centroid
+    place = np.minimum(np.arange(most), numbers[:, None] - 1)
+    jitter = np.take_along_axis(jitter, place, axis=1)
+    angles = 2.0 * np.pi * (place + jitter) / numbers[:, None] + turns[:, :1]
+    points = np.stack([slender[:, None] * np.cos(angles), np.sin(angles)], axis=2)
+    c, s = np.cos(turns[:, 1]), np.sin(turns[:, 1])
+    rotation = np.stack([np.stack([c, s], axis=1), np.stack([-s, c], axis=1)], axis=1)
+    points = points @ rotation
+    after = np.roll(points, -1, axis=1)
+    cross = points[..., 0] * after[..., 1] - after[..., 0] * points[..., 1]  # (K, N)
+    area = 0.5 * cross.sum(axis=1)
+    middle = ((points + after) * cross[..., None]).sum(axis=1) / (6.0 * area[:, None])
+    points = (points - middle[:, None]) / np.sqrt(area)[:, None, None]
+    return np.ascontiguousarray(points), numbers.astype(np.int64)
+
+
+def _grow(
+    areas: FloatArray,
+    wanted: float,
+    sizes: FloeSizes,
+    shapes: tuple[FloatArray, IntArray],
+    centres: FloatArray,
+    radii: FloatArray,
+    box: FloatArray,
+    blocks: tuple[FloatArray, IntArray],
+    gap: float,
+) -> list[FloatArray]:
+    """Floes in their cells, together of at least the wanted area if there is room for it."""
+    stretch = 1.8
+    furthest = np.hypot(shapes[0][..., 0], shapes[0][..., 1]).max(axis=1)
+    reaches = 1.15 * stretch * furthest * np.sqrt(areas)
+    cells = cut_cells(centres, radii, reaches, *_neighbours(centres, reaches), box, *blocks, gap)
+    targets = (1.0 + _MARGIN) * areas
+    least = np.pi * sizes.least**2 * (1.0 + _MARGIN)
+    greatest = np.pi * sizes.greatest**2
+    for _ in range(_ROUNDS):
+        corners, counts = fit_floes(*shapes, centres, *cells, targets, stretch)
+        grown = [corners[k, :n] for k, n in enumerate(counts.tolist()) if n]
+        found = [polygon_area(floe) for floe in grown]
+        floes = [floe for floe, area in zip(grown, found, strict=True) if area >= least]
+        reached = sum(area for area in found if area >= least)
+        if reached >= wanted:
+            break
+        # what the crowded ones lack falls to those that have room
+        targets = np.minimum(
+            targets * min(1.3, (1.0 + _MARGIN) * wanted / max(reached, 0.1 * wanted)), greatest
+        )
+    return floes
+
+
+def _neighbours(centres: FloatArray, reaches: FloatArray) -> tuple[IntArray, IntArray]:
+    """Floes whose squares may meet: their numbers, one floe after the other, and the offsets."""
+    found = cKDTree(centres).query_pairs(
+        2.0 * np.sqrt(2.0) * float(reaches.max()), output_type="ndarray"
+    )
+    apart = np.abs(centres[found[:, 0]] - centres[found[:, 1]]).max(axis=1)
+    found = found[apart <= reaches[found[:, 0]] + reaches[found[:, 1]]]
+    both = np.concatenate([found, found[:, ::-1]])
+    both = both[np.lexsort((both[:, 1], both[:, 0]))]
+    offsets = np.searchsorted(both[:, 0], np.arange(len(centres) + 1))
+    return np.ascontiguousarray(both[:, 1]).astype(np.int64), offsets.astype(np.int64)
+
+
+def _shrunk(floes: list[FloatArray], share: float) -> tuple[FloatArray, ...]:
+    """Floes drawn in about a point inside, so that this share of their area is left."""
+    vertices, offsets = flatten(floes)
+    counts = np.diff(offsets)
+    middles = np.add.reduceat(vertices, offsets[:-1]) / counts[:, None]
+    middles = np.repeat(middles, counts, axis=0)
+    return unflatten(middles + np.sqrt(share) * (vertices - middles), offsets)

@@ -1,0 +1,184 @@
+"""Fields of broken ice in files, and files that mean no good."""
+
+import io
+import json
+import os
+import pickle
+import zipfile
+
+import numpy as np
+import pytest
+
+from pushplan.scenarios import IceField, generate_ice, load_ice
+from pushplan.world import InvalidInputError, PushplanError, SchemaError, stream
+
+BASIN = (0.0, 0.0, 12.0, 40.0)
+SQUARE = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]
+ARROW = [[0.0, 0.0], [2.0, 0.0], [1.0, 0.2], [1.0, 2.0]]
+
+
+def ice(concentration):
+    return generate_ice(stream(0, "ice"), bounds=BASIN, concentration=concentration)
+
+
+def test_files_give_the_field_back(tmp_path):
+    for field in (ice(0.3), ice(0.0)):
+        for name in ("field.json", "field.npz"):
+            field.save(tmp_path / name)
+            assert load_ice(tmp_path / name) == field
+    ice(0.3).save(tmp_path / "again.npz")
+    first = (tmp_path / "again.npz").read_bytes()
+    ice(0.3).save(tmp_path / "again.npz")
+    assert (tmp_path / "again.npz").read_bytes() == first
+    with pytest.raises(InvalidInputError, match=r"written to a \.json or \.npz"):
+        ice(0.3).save(tmp_path / "field.pkl")
+    with pytest.raises(InvalidInputError, match="cannot write"):
+        ice(0.3).save(tmp_path / "no" / "folder.json")
+
+
+def test_plain_lists_and_arrays(tmp_path):
+    path = tmp_path / "ice.json"
+    clockwise_and_closed = [[5.0, 5.0], [5.0, 6.0], [6.0, 6.0], [5.0, 5.0]]
+    path.write_text(json.dumps([SQUARE, clockwise_and_closed]))
+    field = load_ice(path)
+    assert len(field) == 2 and field.bounds.tolist() == [0.0, 0.0, 6.0, 6.0]
+    assert field.areas.tolist() == [1.0, 0.5]
+    path.write_text(json.dumps({"polygons": [SQUARE], "bounds": [0, 0, 2, 2]}))
+    assert load_ice(path).concentration == 0.25
+    squares = np.array([SQUARE, np.add(SQUARE, 3.0)])
+    np.save(tmp_path / "ice.npy", squares)
+    assert load_ice(tmp_path / "ice.npy") == IceField(tuple(squares), (0.0, 0.0, 4.0, 4.0))
+
+
+def test_hulls_only_when_asked_for(tmp_path):
+    path = tmp_path / "ice.json"
+    path.write_text(json.dumps([np.add(SQUARE, 5.0).tolist(), ARROW]))
+    with pytest.raises(InvalidInputError, match=r"ice\.json: polygon 1 must be convex.*hull=True"):
+        load_ice(path)
+    assert load_ice(path, hull=True).areas.tolist() == [1.0, 2.0]
+
+
+def test_overlapping_floes_are_refused_and_touching_ones_are_not(tmp_path):
+    path = tmp_path / "ice.json"
+    polygons = [SQUARE, np.add(SQUARE, (1.0, 0.0)).tolist(), np.add(SQUARE, (0.5, 0.5)).tolist()]
+    path.write_text(json.dumps(polygons))
+    with pytest.raises(InvalidInputError, match=r"polygons \d and 2 share 0\.25 m², and 2 pairs"):
+        load_ice(path)
+    path.write_text(json.dumps(polygons[:2]))
+    assert len(load_ice(path)) == 2
+
+
+@pytest.mark.parametrize(
+    ("text", "problem"),
+    [
+        ("", "cannot read"),
+        ("{", "cannot read"),
+        ("[" * 100_000, "cannot read"),
+        ("3", "polygons must be a list"),
+        ("{}", "lacks the required key 'polygons'"),
+        ('{"polygons": [], "bound": [0, 0, 1, 1]}', "did you mean 'bounds'"),
+        ('{"polygons": [], "schema": "pushplan-ice/9"}', "reads schema"),
+        ("[]", "must state its bounds"),
+        ('{"polygons": [], "bounds": [0, 0, 1]}', "bounds"),
+        ('[[[0, 0], [1, 0], ["x", 1]]]', "polygon 0 must be an array"),
+        ("[[[0, 0], [1, 0], [NaN, 1]]]", "polygon 0 must be finite"),
+        ("[[[0, 0], [1, 0], [1e999, 1]]]", "polygon 0 must be finite"),
+        ("[[[0, 0], [1, 0, 3], [1, 1]]]", "polygon 0 must be an array"),
+        ("[[[0, 0], [1, 0]]]", "polygon 0 must have at least 3 corners"),
+        ("[[]]", "polygon 0 must have at least 3 corners"),
+        ("[[[0, 0], [1, 0], [2, 0]]]", "polygon 0 must have an area"),
+        ("[[[0, 0], [2, 0], [0, 2], [2, 2]]]", "polygon 0 must be convex"),
+        (
+            '{"polygons": [[[0, 0], [1, 0], [1, 1]]], "bounds": [0, 0, 0.5, 2]}',
+            "polygon 0 must lie",
+        ),
+    ],
+)
+def test_hostile_json(tmp_path, text, problem):
+    path = tmp_path / "ice.json"
+    path.write_text(text)
+    with pytest.raises(InvalidInputError, match=problem) as caught:
+        load_ice(path)
+    assert str(path) in str(caught.value) and len(str(caught.value)) < 400
+
+
+class Trap:
+    """Leaves a mark when somebody unpickles it."""
+
+    def __init__(self, mark):
+        self.mark = mark
+
+    def __reduce__(self):
+        return os.mkdir, (str(self.mark),)
+
+
+def test_pickles_are_never_run(tmp_path):
+    mark = tmp_path / "mark"
+    trap = Trap(mark)
+    hostile = pickle.dumps(trap)
+    objects = np.empty(1, dtype=object)
+    objects[0] = trap
+    packed = io.BytesIO()
+    np.savez(packed, vertices=objects, offsets=np.array([0, 1]))
+    single = io.BytesIO()
+    np.save(single, objects, allow_pickle=True)
+    for name, content in (
+        *((f"ice.{ending}", hostile) for ending in ("json", "npz", "npy", "pkl", "pk", "pickle")),
+        ("objects.npz", packed.getvalue()),
+        ("objects.npy", single.getvalue()),
+        ("swapped.npz", single.getvalue()),
+        ("swapped.npy", packed.getvalue()),
+    ):
+        path = tmp_path / name
+        path.write_bytes(content)
+        with pytest.raises(PushplanError):
+            load_ice(path)
+        assert not mark.exists()
+    pickle.loads(hostile)
+    assert mark.exists()  # the trap works
+
+
+def test_hostile_archives(tmp_path):
+    path = tmp_path / "ice.npz"
+    good = {"vertices": np.array(SQUARE), "offsets": np.array([0, 4])}
+
+    def refused(error=SchemaError, **changes):
+        np.savez(path, **{**good, **changes})
+        with pytest.raises(error):
+            load_ice(path)
+
+    refused(offsets=np.array([0, 5]))
+    refused(offsets=np.array([1, 4]))
+    refused(offsets=np.array([0, 3, 1, 4]))
+    refused(offsets=np.array([], dtype=int))
+    refused(offsets=np.array([0.0, 4.0]))
+    refused(InvalidInputError, offsets=np.array([0, 0, 4]))
+    refused(vertices=np.array(SQUARE)[:, :1])
+    refused(vertices=np.full((4, 2), np.nan))
+    refused(vertices=np.array(SQUARE).astype(str))
+    refused(InvalidInputError, bounds=np.array([0.0, 0.0, 0.5, 1.0]))
+    refused(stowaway=np.zeros(3))
+    np.savez(path, vertices=np.array(SQUARE))
+    with pytest.raises(SchemaError, match="lacks the required key 'offsets'"):
+        load_ice(path)
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr("vertices.npy", b"\x93NUMPY\x01\x00not a header")
+        archive.writestr("offsets.npy", b"")
+    with pytest.raises(SchemaError):
+        load_ice(path)
+    path.write_bytes(path.read_bytes()[:40])
+    with pytest.raises(SchemaError, match="cannot read"):
+        load_ice(path)
+    with pytest.raises(SchemaError, match="cannot read"):
+        load_ice(tmp_path / "missing.npz")
+    for nothing in (None, 3, b"ice.json"):
+        with pytest.raises(InvalidInputError, match="must be a text"):
+            load_ice(nothing)
+    with pytest.raises(InvalidInputError, match="floes must be a list"):
+        IceField(3, BASIN)
+    with pytest.raises(SchemaError, match="cannot read"):
+        (tmp_path / "folder.json").mkdir()
+        load_ice(tmp_path / "folder.json")
+    np.save(tmp_path / "flat.npy", np.zeros(7))
+    with pytest.raises(SchemaError, match=r"flat\.npy: the array of polygons must have shape"):
+        load_ice(tmp_path / "flat.npy")

@@ -1,0 +1,65 @@
+"""``pushplan ice`` as a user meets it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from PIL import Image
+
+from pushplan.cli import main
+from pushplan.scenarios import load_ice
+
+
+def test_a_field_is_made_checked_and_drawn(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out, again = tmp_path / "field.json", tmp_path / "field.npz"
+    picture = tmp_path / "field.png"
+    arguments = ["ice", "--concentration", "0.3", "--seed", "1", "--size", "12x20"]
+    arguments += ["--keep-off", "0,0,12,2"]
+    assert main([*arguments, "--out", str(out), "--picture", str(picture)]) == 0
+    said = capsys.readouterr().out
+    field = load_ice(out)
+    assert said.startswith(f"{len(field)} floes, concentration 30.00 %\n")
+    assert f"wrote {out}\n" in said
+    assert field.bounds.tolist() == [0.0, 0.0, 12.0, 20.0]
+    assert min(corners[:, 1].min() for corners in field.polygons) > 2.0
+    assert Image.open(picture).size == (600, 1000)
+    assert main(["ice", "--check", str(out), "--out", str(again)]) == 0
+    assert load_ice(again) == field
+    assert main([*arguments, "--out", str(again)]) == 0
+    assert load_ice(again) == field
+
+
+@pytest.mark.parametrize(
+    ("arguments", "text"),
+    [
+        ([], "needs --concentration, or --check"),
+        (["--concentration", "30"], "ice concentration must lie in [0, 1], got 30"),
+        (["--concentration", "0.99"], "cannot be packed"),
+        (["--concentration", "0.3", "--radii", "0.6,0.2"], "ice radii must have"),
+        (["--concentration", "0.3", "--out", "field.pkl"], "written to a .json or .npz file"),
+        (["--concentration", "0.3", "--picture", "field.bmp"], "a picture file ends in .png"),
+        (["--check", "missing.json"], "cannot read ice field missing.json"),
+        (["--check", "field.pkl"], "never from pickles"),
+        (["--check", "field.json", "--concentration", "0.3"], "leave out --concentration"),
+    ],
+)
+def test_one_line_says_what_is_wrong(
+    arguments: list[str], text: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["ice", *arguments]) == 1
+    said = capsys.readouterr().err
+    assert said.startswith("pushplan: ") and said.count("\n") == 1 and text in said
+
+
+@pytest.mark.parametrize("size", ["12", "12xtwo", "1x2x3"])
+def test_bad_sizes_are_bad_usage(size: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["ice", "--concentration", "0.3", "--size", size]) == 2
+    assert "must be 2 numbers like 1x2" in capsys.readouterr().err
+
+
+def test_help_has_examples(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["ice", "--help"]) == 0
+    assert "examples:\n  pushplan ice" in capsys.readouterr().out
