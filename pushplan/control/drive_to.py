@@ -50,16 +50,18 @@ class DriveTo:
         self.periods = 1
         """For how many periods the last command stays right if the robot follows it exactly."""
 
-    def command(self, robot_pose: FloatArray) -> Twist | None:
+    def command(self, robot_pose: FloatArray, *, held: bool = False) -> Twist | None:
         """The velocity to drive now, None when it is there or has given up.
 
         Args:
             robot_pose: (3,) x, y [m], theta [rad] now.
+            held: whether something is known to have stopped the robot since the last call; it
+                then does not drive on.
         """
         x, y, theta = (float(value) for value in robot_pose)
         if self._budget < 0:
             self._budget = self._periods_needed(x, y, theta)
-        if self._blocked(x, y, theta) or self._budget == 0:
+        if self._blocked(x, y, theta) or self._budget == 0 or (held and not self._turning):
             return None
         bearing, distance = self._aim(x, y, theta)
         if distance == 0.0:

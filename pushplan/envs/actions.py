@@ -14,9 +14,10 @@ from pushplan.envs.tasks.base import Task
 from pushplan.world import Action, InvalidInputError, Twist, WheelSpeeds, World
 from pushplan.world.checks import FloatArray
 
-Motion = Callable[[FloatArray], tuple[Twist, int] | None]
-"""Asked with the robot's pose (3,) while one action lasts: the next command and the number of
-control steps for which it may stand if the robot follows it exactly; None when it is done."""
+Motion = Callable[[FloatArray, bool], tuple[Twist, int] | None]
+"""Asked while one action lasts, with the robot's pose (3,) and whether it has just been held: the
+next command and the number of control steps for which it may stand if the robot follows it exactly;
+None when the action is done."""
 
 
 class ActionMode(ABC):
@@ -88,7 +89,7 @@ class ActionMode(ABC):
 def _once(command: Twist) -> Motion:
     """A motion of one control step."""
     commands = iter(((command, 1),))
-    return lambda robot_pose: next(commands, None)
+    return lambda robot_pose, held: next(commands, None)
 
 
 class TurnRateAction(ActionMode):

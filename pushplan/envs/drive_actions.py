@@ -16,8 +16,8 @@ from pushplan.world.outline import transform
 
 
 def _motion(driver: DriveTo) -> Motion:
-    def next_command(robot_pose: FloatArray) -> tuple[Twist, int] | None:
-        command = driver.command(robot_pose)
+    def next_command(robot_pose: FloatArray, held: bool) -> tuple[Twist, int] | None:
+        command = driver.command(robot_pose, held=held)
         return None if command is None else (command, driver.periods)
 
     return next_command

@@ -180,14 +180,15 @@ class PushEnv(gymnasium.Env[NDArray[Any], NDArray[Any]]):
         before, simulator, roster = self.world, self._simulator, self._roster
         motion = self._mode.start(self._mode.read(action), before)
         traces = []
-        touched = held = False
+        touched = held = now_held = False
         several = simulator.is_exact and not self.task.objects_leave
-        while (wanted := motion(simulator.robot_pose)) is not None:
+        while (wanted := motion(simulator.robot_pose, now_held)) is not None:
             command, periods = wanted
             duration = self.task.control_step * (periods if several else 1)
             traces.append(roster.widen(simulator.step(command, duration)))
             touched |= simulator.touched_static
-            held |= simulator.held
+            now_held = simulator.held
+            held |= now_held
             if self.task.objects_leave:
                 gone = self.task.leaving(roster.present, simulator.object_poses)
                 if len(gone):

@@ -40,7 +40,7 @@ def driven(name, action, pose, static=ROOM):
     world = World(m.robot, np.array(pose), static, Movables.empty(), GoalDisc((2.5, 2.5), 0.1))
     motion = m.start(m.read(action), world)
     poses = [np.array(pose, dtype=float)]
-    while (wanted := motion(poses[-1])) is not None:
+    while (wanted := motion(poses[-1], False)) is not None:
         poses.append(advanced(poses[-1], wanted[0], 0.15 * wanted[1]))
     return np.array(poses)
 
@@ -53,9 +53,9 @@ def advanced(pose, twist, h):
 
 def command(m, values):
     motion = m.start(m.read(values), None)
-    twist, periods = motion(None)
+    twist, periods = motion(None, False)
     assert periods == 1
-    assert motion(None) is None  # these modes last one control step
+    assert motion(None, False) is None  # these modes last one control step
     return twist
 
 
@@ -135,7 +135,7 @@ def test_waypoint_that_cannot_be_reached_ends_where_the_robot_is_stopped():
     world = World(m.robot, np.zeros(3), ROOM, Movables.empty(), GoalDisc((2.5, 2.5), 0.1))
     motion = m.start(m.read([0.55, 0.0]), world)  # inside the column
     calls = 0
-    while motion(np.zeros(3)) is not None:  # something holds the robot
+    while motion(np.zeros(3), False) is not None:  # something holds the robot
         calls += 1
     assert calls < 10
 
