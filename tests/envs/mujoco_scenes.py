@@ -77,7 +77,9 @@ def jackal():
     )
 
 
-def room(boxes=(), *, pose=(0.0, 0.0, 0.0), half=1.5, wheeled=(), robot=None, twists=None, walls=()):
+def room(
+    boxes=(), *, pose=(0.0, 0.0, 0.0), half=1.5, wheeled=(), robot=None, twists=None, walls=()
+):
     """A walled room around the origin with cubes of 8 cm."""
     boxes = np.asarray(boxes, dtype=float).reshape(-1, 3)
     h, t = half, 0.05

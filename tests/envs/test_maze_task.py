@@ -174,3 +174,16 @@ def test_bumper_friction_is_a_parameter():
     assert task().materials.robot_object == 0.0
     assert task(bumper_friction=0.7).materials.robot_object == 0.7
     assert task("testbed").materials.robot_object == 0.4
+
+
+def test_the_testbed_robot_can_carry_a_bumper():
+    plain, armed = task("testbed"), task("testbed", bumper="collector")
+    assert len(plain.robot.parts) == 1 < len(armed.robot.parts)
+    assert armed.robot.max_speed == plain.robot.max_speed == 0.2
+    assert armed.materials.solids.object_height == 0.08
+    armed.start(stream(0, "layout"))
+    assert task(bumper="none").robot == task().robot and task().materials.solids is None
+    with pytest.raises(ScenarioError, match="does not fit the robot of this preset"):
+        task(bumper="pusher")
+    with pytest.raises(ScenarioError, match="valid: collector"):
+        task("testbed", bumper="shovel")

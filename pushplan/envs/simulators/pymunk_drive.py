@@ -87,6 +87,7 @@ class PymunkDriver:
         self._radius = robot.circumscribed_radius
         self._limit = options.tolerance * size
         self._deepest = 0.0
+        self._measured = False
         self._yielding = 0.0
 
     @property
@@ -202,17 +203,19 @@ class PymunkDriver:
         if not (first or careful or bodies.static_contacts):
             return _Moved.ALL if self._try(vx, vy, w, h, limit) else _Moved.TOO_FAR
         packed = bodies.snapshot()
-        allowed = limit if first else max(limit, self._deepest)
+        unknown = first or not self._measured  # how deep the overlaps are that were there before
+        allowed = limit if unknown else max(limit, self._deepest)
         if self._try(vx, vy, w, h, allowed):
             return _Moved.ALL
         before = bodies.unpack(packed)
         resting = bodies.slowed(before, h)
-        if first:  # the scene may have begun with deeper overlaps: no reason to hold the robot
+        if unknown:  # overlaps that were deeper before are no reason to hold the robot
             still = before.copy()
             still[:, 3:] = 0.0
             bodies.write(still)
-            self._try(0.0, 0.0, 0.0, h, math.inf)
-            allowed = max(limit, self._deepest)
+            bodies.drive(0.0, 0.0, 0.0)
+            bodies.advance(h)
+            allowed = max(limit, bodies.depth)
             bodies.write(before)
             if self._try(vx, vy, w, h, allowed):
                 return _Moved.ALL
@@ -236,8 +239,9 @@ class PymunkDriver:
         bodies = self._bodies
         bodies.drive(vx, vy, w)
         bodies.advance(h)
-        depth = bodies.depth if bodies.static_contacts else 0.0
+        measured = bodies.static_contacts > 0
+        depth = bodies.depth if measured else 0.0
         if depth <= allowed:
-            self._deepest = depth
+            self._deepest, self._measured = depth, measured
             return True
         return False

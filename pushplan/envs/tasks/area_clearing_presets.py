@@ -1,0 +1,120 @@
+"""Dimensions of Area-Clearing: the 2D benchmark's and the TurtleBot3 testbed's."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import partial
+
+from pushplan.envs.simulators.base import Materials
+from pushplan.envs.tasks.manipulation import ManipulationPreset
+from pushplan.envs.tasks.testbed import SOLIDS
+from pushplan.world import area_clearing_robot, turtlebot3_burger
+
+
+@dataclass(frozen=True)
+class ClearingLayout:
+    """One room, with its middle and that of the clearance area at the origin.
+
+    Args:
+        outer: half the width and half the length of the room [m].
+        area: half the width and half the length of the clearance area [m].
+        walls: distance of the walls beside the area from the middle [m]; 0 for none.
+        columns: (x, y) of the middles of columns [m].
+    """
+
+    outer: tuple[float, float]
+    area: tuple[float, float]
+    walls: float = 0.0
+    columns: tuple[tuple[float, float], ...] = ()
+
+    def scaled(self, scale: float) -> ClearingLayout:
+        """The same layout with every length multiplied by ``scale``."""
+        return ClearingLayout(
+            (self.outer[0] * scale, self.outer[1] * scale),
+            (self.area[0] * scale, self.area[1] * scale),
+            self.walls * scale,
+            tuple((x * scale, y * scale) for x, y in self.columns),
+        )
+
+
+@dataclass(frozen=True, kw_only=True)
+class AreaClearingPreset(ManipulationPreset):
+    """One set of dimensions.
+
+    Args:
+        layouts: by name.
+        column: side of the square columns [m].
+        inner_wall: thickness of the walls beside the area [m].
+        box_margin: least distance of a box's centre from the edge of the area at the start [m].
+        start_margin: distance of the robot's start from the lower edge of the area [m].
+    """
+
+    layouts: Mapping[str, ClearingLayout]
+    column: float
+    inner_wall: float
+    box_margin: float
+    start_margin: float
+
+
+_LAYOUTS: Mapping[str, ClearingLayout] = {
+    "clear": ClearingLayout((8.0, 8.0), (5.0, 5.0)),
+    "clear_small": ClearingLayout((6.0, 6.0), (4.0, 4.0)),
+    "walled": ClearingLayout((8.0, 8.0), (5.0, 5.0), walls=6.0),
+    "walled_with_columns": ClearingLayout(
+        (12.0, 12.0), (7.5, 8.0), walls=8.0, columns=((0.0, -5.0), (0.0, 0.0), (0.0, 5.0))
+    ),
+}
+LAYOUTS = tuple(_LAYOUTS)
+_WINDOWS = {"clear": 24.0, "clear_small": 12.0, "walled": 24.0, "walled_with_columns": 24.0}
+
+BENCHMARK = AreaClearingPreset(
+    robots={"benchmark": area_clearing_robot},
+    bumper=None,
+    boxes=dict.fromkeys(LAYOUTS, 10),
+    box_size=1.0,
+    box_mass=None,
+    box_spacing=1.5,
+    wall=18.0,  # as far as observations reach
+    # those of the 2D benchmark: boxes 1.0, walls 0.5, and no grip at the bumper
+    materials=Materials(robot_object=0.0, object_object=1.0, object_static=0.5, rolling_time=2.0),
+    control_step=0.2,
+    heading_step=1.5,
+    windows=_WINDOWS,
+    field_resolution=0.1,
+    layouts=_LAYOUTS,
+    column=2.0,
+    inner_wall=0.2,
+    box_margin=1.0,
+    start_margin=1.0,
+)
+
+SCALE = 0.08
+"""Length in the testbed of a metre in the benchmark, whose 1 m boxes become 8 cm cubes."""
+
+TESTBED = replace(
+    BENCHMARK,
+    robots={"turtlebot3": partial(turtlebot3_burger, max_speed=0.2, max_turn_rate=0.785)},
+    bumper="pusher",
+    box_size=SCALE,
+    box_mass=0.075,
+    box_spacing=1.5 * SCALE,
+    wall=18.0 * SCALE,
+    materials=Materials(
+        robot_object=0.4,
+        object_object=0.4,
+        object_static=0.4,
+        rolling_time=0.5,
+        solids=SOLIDS["turtlebot3"],
+    ),
+    heading_step=1.5 * SCALE,
+    windows={name: side * SCALE for name, side in _WINDOWS.items()},
+    field_resolution=0.01,
+    layouts={name: layout.scaled(SCALE) for name, layout in _LAYOUTS.items()},
+    column=2.0 * SCALE,
+    inner_wall=0.2 * SCALE,
+    box_margin=SCALE,
+    start_margin=SCALE,
+)
+
+PRESETS: Mapping[str, AreaClearingPreset] = {"benchmark": BENCHMARK, "testbed": TESTBED}

@@ -1,0 +1,205 @@
+"""Box-Delivery: push every box into the receptacle in a corner of the room."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+import shapely
+
+from pushplan.envs.tasks.base import Outcome
+from pushplan.envs.tasks.box_delivery_presets import LAYOUTS, PRESETS, BoxDeliveryPreset
+from pushplan.envs.tasks.box_kernels import all_corners_inside
+from pushplan.envs.tasks.layout import rectangle, walls_around
+from pushplan.envs.tasks.manipulation import (
+    START_TRIES,
+    ManipulationTask,
+    ManipulationVariations,
+)
+from pushplan.world import InvalidInputError, Receptacle, StaticMap, UnknownNameError, World
+from pushplan.world.checks import FloatArray, IntArray
+
+PROGRESS_REWARD = 0.2
+TOWARDS = 3.0
+"""How much more a metre towards the receptacle counts than one away from it."""
+DELIVERY_REWARD = 10.0
+WAYPOINT_DELIVERY_REWARD = 1.0
+STATIC_REWARD = -0.25
+STILL_REWARD = -0.25
+_STILL_TURN = 0.02
+_COLUMN_TRIES = 20
+
+
+@dataclass(frozen=True, kw_only=True)
+class BoxDeliveryVariations(ManipulationVariations):
+    """Variations of Box-Delivery; the robot starts anywhere unless ``random_start`` is false."""
+
+    layout: str = "small_empty"
+    box_yaw: str = "random"
+    random_start: bool = True
+
+    task = "box_delivery"
+    layouts = LAYOUTS
+
+
+class BoxDeliveryTask(ManipulationTask):
+    """Box-Delivery, as in the Bench-Push paper (there after Spatial Action Maps, Wu et al. 2020).
+
+    Reward of an action: 0.2 for each metre by which the shortest way of a box's centre to the
+    receptacle gets longer or shorter, three times as much where it gets shorter; +10 for each
+    delivered box (+1 with waypoint actions); -0.25 if the robot touches something static; with
+    waypoint actions -0.25 if it does not move.
+    """
+
+    name = "box_delivery"
+    presets = tuple(PRESETS)
+    solid_presets = ("testbed",)
+    objects_leave = True
+    idle_limits: ClassVar[Mapping[str, int]] = {"heading": 200, "waypoint": 100}
+
+    def __init__(
+        self,
+        *,
+        preset: str = "benchmark",
+        variations: Mapping[str, object] | None = None,
+        action: str = "heading",
+    ) -> None:
+        if preset not in PRESETS:
+            raise UnknownNameError("preset of box_delivery", preset, PRESETS)
+        self.preset: BoxDeliveryPreset = PRESETS[preset]
+        super().__init__(self.preset, BoxDeliveryVariations.read(variations or {}), action)
+        length, width = self.preset.rooms[self.variations.layout]
+        self.bounds = (-0.5 * length, -0.5 * width, 0.5 * length, 0.5 * width)
+        side = self.preset.receptacle
+        x, y = self.bounds[2:]
+        self.goal: Receptacle = Receptacle(rectangle(x - side, y - side, x, y))
+        # a box that leans on the wall overlaps it a little: the sides at the walls do not count
+        reach = x + 0.5 * self.preset.wall, y + 0.5 * self.preset.wall
+        self._mouth = rectangle(x - side, y - side, *reach)
+        self.reach = 2.0 * float(np.hypot(length, width))
+        self._walls = [*walls_around(self.bounds, self.preset.wall), *self._corners()]
+        self._empty = StaticMap.build(polygons=self._walls, bounds=self.bounds)
+
+    def _corners(self) -> list[FloatArray]:
+        """Triangles that keep boxes from getting stuck in the corners without receptacle."""
+        x, y = self.bounds[2:]
+        leg = self.preset.corner
+        return [
+            _triangle(np.array([sx * x, sy * y]), np.array([-sx * leg, 0.0]), -sy * leg)
+            for sx, sy in ((-1.0, -1.0), (1.0, -1.0), (-1.0, 1.0))
+        ]
+
+    def _layout(self, rng: np.random.Generator) -> tuple[StaticMap, bool]:
+        layout = self.variations.layout
+        if layout in self.preset.columns:
+            parts = self._columns(rng)
+        elif layout == "large_divider":
+            parts = self._divider(rng)
+        else:
+            return self._empty, False
+        return StaticMap.build(polygons=[*self._walls, *parts], bounds=self.bounds), True
+
+    def _columns(self, rng: np.random.Generator) -> list[FloatArray]:
+        """Between 1 and as many columns as the layout may have; fewer where they do not fit."""
+        preset = self.preset
+        wanted = int(rng.integers(1, preset.columns[self.variations.layout] + 1))
+        margin = preset.column_margin + 0.5 * preset.column
+        low, high = np.array(self.bounds[:2]) + margin, np.array(self.bounds[2:]) - margin
+        best: list[FloatArray] = []
+        for _ in range(_COLUMN_TRIES):
+            placed: list[FloatArray] = []
+            for spot in rng.uniform(low, high, (4 * wanted, 2)):
+                if all(np.hypot(*(spot - other)) >= preset.column_spacing for other in placed):
+                    placed.append(spot)
+            if len(placed) > len(best):
+                best = placed[:wanted]
+            if len(best) == wanted:
+                break
+        half = 0.5 * preset.column
+        return [rectangle(x - half, y - half, x + half, y + half) for x, y in best]
+
+    def _divider(self, rng: np.random.Generator) -> list[FloatArray]:
+        """A wall from +x that leaves a gap at -x, with triangles where it meets the wall."""
+        share, thickness = self.preset.divider
+        x0, y0, x1, y1 = self.bounds
+        margin, half, leg = self.preset.divider_margin, 0.5 * thickness, self.preset.corner
+        y = float(rng.uniform(y0 + margin, y1 - margin))
+        along = np.array([-leg, 0.0])
+        return [
+            rectangle(x1 - share * (x1 - x0), y - half, x1, y + half),
+            _triangle(np.array([x1, y + half]), along, leg),
+            _triangle(np.array([x1, y - half]), along, -leg),
+        ]
+
+    def _robot_poses(self, rng: np.random.Generator, static: StaticMap) -> FloatArray:
+        low, high = self.bounds[:2], self.bounds[2:]
+        if self.variations.random_start:
+            poses: FloatArray = rng.uniform((*low, -np.pi), (*high, np.pi), (START_TRIES, 3))
+            return poses
+        margin = max(self.preset.start_margin, 1.2 * self.robot.circumscribed_radius)
+        sides = np.linspace(0.0, 0.5 * (high[1] - low[1]) - margin, 12)
+        y = np.stack([sides, -sides], axis=1).ravel()
+        return np.column_stack([np.full_like(y, low[0] + margin), y, np.zeros_like(y)])
+
+    def _box_region(self) -> tuple[FloatArray, list[Any]]:
+        return np.array(self.bounds), [shapely.Polygon(self.goal.polygon)]
+
+    def start(self, rng: np.random.Generator) -> World:
+        """A new start: what is static, the robot, then boxes that it can get to."""
+        world = super().start(rng)
+        self._start = world.movables
+        self._seen = (world, self.goal_distances(world.movables.poses))
+        return world
+
+    def leaving(self, ids: IntArray, poses: FloatArray) -> IntArray:
+        """Boxes with all corners inside the receptacle."""
+        start = self._start
+        if not len(ids):
+            return ids
+        if len(ids) == len(start):
+            vertices, offsets = start.vertices, start.offsets
+        else:  # boxes are alike
+            vertices, offsets = start.vertices[: 4 * len(ids)], start.offsets[: len(ids) + 1]
+        poses = np.ascontiguousarray(poses)
+        gone: IntArray = ids[all_corners_inside(poses, vertices, offsets, self._mouth)]
+        return gone
+
+    def _distances(self, world: World) -> FloatArray:
+        """(K,) goal distance of each box of the start, 0 where it has been delivered."""
+        if self._seen[0] is not world:
+            distances = np.zeros(self.box_count)
+            distances[world.movables.ids] = self.goal_distances(world.movables.poses)
+            self._seen = (world, distances)
+        return self._seen[1]
+
+    def score(self, before: World, after: World, *, work: float, touched_static: bool) -> Outcome:
+        """The reward above; over when every box has left the floor."""
+        if self._field is None:
+            raise InvalidInputError("box_delivery: start() has to be called before score()")
+        closer = self._distances(before) - self._distances(after)
+        delivered = len(before.movables) - len(after.movables)
+        each = WAYPOINT_DELIVERY_REWARD if self.action == "waypoint" else DELIVERY_REWARD
+        reward = PROGRESS_REWARD * float((closer * np.where(closer > 0.0, TOWARDS, 1.0)).sum())
+        reward += each * delivered
+        if touched_static:
+            reward += STATIC_REWARD
+        if self.action == "waypoint" and self._is_still(before, after):
+            reward += STILL_REWARD
+        completed = np.ones(self.box_count, dtype=bool)
+        completed[after.movables.ids] = False
+        idle = self._idle(after, delivered > 0)
+        if completed.all():
+            return Outcome(reward, True, "delivered", True, False, completed)
+        return Outcome(reward, False, "no_progress" if idle else "", False, idle, completed)
+
+    def _is_still(self, before: World, after: World) -> bool:
+        dx, dy, turn = (after.robot_pose - before.robot_pose).tolist()
+        turned = abs(np.remainder(turn + np.pi, 2.0 * np.pi) - np.pi)
+        return bool(np.hypot(dx, dy) < self.preset.still and turned < _STILL_TURN)
+
+
+def _triangle(corner: FloatArray, along: FloatArray, up: float) -> FloatArray:
+    """A right-angled corner piece: its corner, one leg (2,) and the other, along y [m]."""
+    return np.array([corner, corner + along, corner + np.array([0.0, up])])

@@ -1,0 +1,120 @@
+"""Dimensions of Box-Delivery: the 2D benchmark's and the TurtleBot3 testbed's."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import partial
+
+from pushplan.envs.simulators.base import Materials
+from pushplan.envs.tasks.manipulation import ManipulationPreset
+from pushplan.envs.tasks.testbed import SOLIDS
+from pushplan.world import box_delivery_robot, jackal, turtlebot3_burger
+
+LAYOUTS = ("small_empty", "small_columns", "large_columns", "large_divider")
+
+
+@dataclass(frozen=True, kw_only=True)
+class BoxDeliveryPreset(ManipulationPreset):
+    """One set of dimensions. Rooms have their middle at the origin.
+
+    Args:
+        rooms: length along x and width along y of the room by layout [m].
+        receptacle: side of the square receptacle in the corner at +x, +y [m].
+        corner: legs of the triangles that fill the other corners [m].
+        columns: greatest number of columns by layout.
+        column: side of the square columns [m].
+        column_spacing: least distance between the centres of two columns [m].
+        column_margin: least way between a column and the walls [m].
+        divider: length, as a share of the room's, and thickness of the divider [m].
+        divider_margin: least distance of its centre line from the walls along it [m].
+        start_margin: distance of a fixed start from the wall at -x [m].
+        still: a robot that moves less than this in an action has not moved [m].
+    """
+
+    rooms: Mapping[str, tuple[float, float]]
+    receptacle: float
+    corner: float
+    columns: Mapping[str, int]
+    column: float
+    column_spacing: float
+    column_margin: float
+    divider: tuple[float, float]
+    divider_margin: float
+    start_margin: float
+    still: float
+
+
+BENCHMARK = BoxDeliveryPreset(
+    robots={"benchmark": box_delivery_robot},
+    bumper=None,
+    boxes={"small_empty": 10, "small_columns": 10, "large_columns": 20, "large_divider": 20},
+    box_size=0.44,
+    box_mass=None,
+    box_spacing=0.62,
+    wall=7.5,  # as far as observations reach
+    # those of the 2D benchmark: boxes 1.0, walls 0.5, and no grip at the bumper
+    materials=Materials(robot_object=0.0, object_object=1.0, object_static=0.5, rolling_time=2.0),
+    control_step=0.2,
+    heading_step=1.75,
+    windows=dict.fromkeys(LAYOUTS, 10.0),
+    field_resolution=0.1,
+    rooms={
+        "small_empty": (10.0, 5.0),
+        "small_columns": (10.0, 5.0),
+        "large_columns": (10.0, 10.0),
+        "large_divider": (10.0, 10.0),
+    },
+    receptacle=1.5,
+    corner=0.6,
+    columns={"small_columns": 3, "large_columns": 8},
+    column=1.0,
+    column_spacing=2.0,
+    column_margin=1.6,
+    divider=(0.8, 0.5),
+    divider_margin=3.5,
+    start_margin=0.8,
+    still=0.05,
+)
+
+_BURGER = partial(turtlebot3_burger, max_speed=0.2, max_turn_rate=0.785)
+_JACKAL = partial(jackal, max_speed=0.5, max_turn_rate=0.785)  # as slow as the room asks for
+
+TESTBED = BoxDeliveryPreset(
+    robots={"turtlebot3": _BURGER, "jackal": _JACKAL},
+    bumper="pusher",
+    boxes={"small_empty": 5, "small_columns": 5, "large_columns": 10, "large_divider": 10},
+    box_size=0.08,
+    box_mass=0.075,
+    box_spacing=0.62 / 0.44 * 0.08,
+    wall=2.1,
+    materials=Materials(
+        robot_object=0.4,
+        object_object=0.4,
+        object_static=0.4,
+        rolling_time=0.5,
+        solids=SOLIDS["turtlebot3"],
+    ),
+    control_step=0.2,
+    heading_step=0.4,
+    windows=dict.fromkeys(LAYOUTS, 2.845),
+    field_resolution=0.025,
+    rooms={
+        "small_empty": (1.505, 1.55),
+        "small_columns": (1.505, 1.55),
+        "large_columns": (2.845, 2.845),
+        "large_divider": (2.845, 2.845),
+    },
+    receptacle=0.3,
+    corner=0.11,
+    columns={"small_columns": 3, "large_columns": 8},
+    column=0.2845,
+    column_spacing=0.569,
+    column_margin=0.33,
+    divider=(0.8, 0.1),
+    divider_margin=3.5 * 0.2845,
+    start_margin=0.2,
+    still=0.01,
+)
+
+PRESETS: Mapping[str, BoxDeliveryPreset] = {"benchmark": BENCHMARK, "testbed": TESTBED}

@@ -1,0 +1,321 @@
+"""What Box-Delivery and Area-Clearing have in common: a room, a robot, and boxes to push."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, fields, replace
+from typing import Any, ClassVar
+
+import numpy as np
+import shapely
+
+from pushplan.envs.simulators.base import Materials
+from pushplan.envs.tasks.base import ObservationBuilder, Task, drive_of
+from pushplan.envs.tasks.box_kernels import sample_at
+from pushplan.envs.tasks.layout import Floor
+from pushplan.envs.tasks.reach import Reach
+from pushplan.envs.tasks.testbed import SOLIDS
+from pushplan.geometry import GeodesicField, geodesic_field
+from pushplan.observation import ImageObservation, StateObservation
+from pushplan.world import (
+    BUMPERS,
+    InvalidInputError,
+    ManipulationGoal,
+    Movables,
+    RobotModel,
+    ScenarioError,
+    StaticMap,
+    UnknownNameError,
+    World,
+)
+from pushplan.world.checks import FloatArray, choice, integer, number
+from pushplan.world.outline import transform
+
+GAP = 0.01
+"""Least distance between bodies at the start, as a share of the box size."""
+STATE_OBJECTS = 20
+"""Boxes that the state observation has room for; more if there are more."""
+_CHANNELS = ("occupancy", "footprint", "robot_distance", "goal_distance")
+_PIXELS = {"image": 224, "spatial": 96}
+_LAYOUT_TRIES = 8
+START_TRIES = 2000
+
+
+@dataclass(frozen=True, kw_only=True)
+class ManipulationPreset:
+    """Dimensions that both tasks have.
+
+    Args:
+        robots: makers of the robots by name, called with ``drive`` and, where the preset has
+            one, ``bumper``; the first is the default.
+        bumper: the bumper unless said otherwise; None where robots have one of their own.
+        boxes: number of boxes by layout.
+        box_size: side of the boxes [m].
+        box_mass: [kg]; the area in m² if None, as the 2D benchmark's metric takes it.
+        box_spacing: least distance between the centres of two boxes at the start [m].
+        wall: thickness of the walls [m].
+        materials: friction; solids are filled in by robot where there are any.
+        control_step: time between two commands [s].
+        heading_step: how far a heading action drives [m].
+        windows: side of the observed square by layout [m].
+        field_resolution: side of a cell of the distance field [m].
+    """
+
+    robots: Mapping[str, Callable[..., RobotModel]]
+    bumper: str | None
+    boxes: Mapping[str, int]
+    box_size: float
+    box_mass: float | None
+    box_spacing: float
+    wall: float
+    materials: Materials
+    control_step: float
+    heading_step: float
+    windows: Mapping[str, float]
+    field_resolution: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class ManipulationVariations:
+    """What may depart from a preset; None leaves the preset's value.
+
+    Args:
+        layout: name of the layout.
+        boxes: number of boxes, at least 1.
+        box_size: side of the boxes [m]; their least spacing grows with it.
+        box_yaw: headings of the boxes at the start, ``"aligned"`` or ``"random"``.
+        wheeled: share of the boxes that stand on casters, 0 to 1.
+        robot: one of the preset's robots.
+        bumper: one of `pushplan.world.BUMPERS`, where the robot's can be changed.
+        bumper_friction: friction coefficient between robot and boxes.
+        random_start: whether the robot's start is random.
+    """
+
+    layout: str
+    boxes: int | None = None
+    box_size: float | None = None
+    box_yaw: str
+    wheeled: float = 0.0
+    robot: str | None = None
+    bumper: str | None = None
+    bumper_friction: float | None = None
+    random_start: bool
+
+    task: ClassVar[str]
+    layouts: ClassVar[tuple[str, ...]]
+
+    def __post_init__(self) -> None:
+        put = object.__setattr__
+        choice("layout", self.layout, self.layouts)
+        choice("box_yaw", self.box_yaw, ("aligned", "random"))
+        put(self, "wheeled", number("wheeled", self.wheeled, low=0.0, high=1.0))
+        if self.boxes is not None:
+            put(self, "boxes", integer("boxes", self.boxes, low=1))
+        if self.box_size is not None:
+            put(self, "box_size", number("box_size", self.box_size, low=0.0, open_low=True))
+        if self.bumper is not None:
+            choice("bumper", self.bumper, BUMPERS)
+        if self.bumper_friction is not None:
+            friction = number("bumper_friction", self.bumper_friction, low=0.0)
+            put(self, "bumper_friction", friction)
+        if not isinstance(self.random_start, bool | np.bool_):
+            raise InvalidInputError(
+                f"random_start must be true or false, got {self.random_start!r}"
+            )
+
+    @classmethod
+    def read(cls, values: Mapping[str, Any]) -> Any:
+        """Variations from a mapping.
+
+        Raises:
+            UnknownNameError: if a name is none of the fields.
+            ScenarioError: if a value makes no sense.
+        """
+        valid = [field.name for field in fields(cls)]
+        for name in values:
+            if name not in valid:
+                raise UnknownNameError(f"variation of {cls.task}", name, valid)
+        try:
+            return cls(**values)
+        except InvalidInputError as error:
+            raise ScenarioError(f"{cls.task}: {error}") from error
+
+
+class ManipulationTask(Task):
+    """Boxes that have to go somewhere. Subclasses say where, and what that is worth."""
+
+    actions: ClassVar[tuple[str, ...]] = ("heading", "waypoint", "velocity", "wheels")
+    observations: ClassVar[tuple[str, ...]] = ("image", "spatial", "state")
+    idle_limits: ClassVar[Mapping[str, int]]
+    """Actions without progress after which an episode is cut off, by action mode. The others
+    are cut off after as much simulated time as that many heading actions take to drive."""
+
+    goal: ManipulationGoal
+
+    def __init__(
+        self, preset: ManipulationPreset, variations: ManipulationVariations, action: str
+    ) -> None:
+        if action not in self.actions:
+            raise UnknownNameError(f"action of task {self.name!r}", action, self.actions)
+        self.variations = variations
+        self.action = action
+        self._dimensions = preset
+        self.robot = self._make_robot()
+        self.materials = self._make_materials()
+        self.control_step = preset.control_step
+        self.heading_step = preset.heading_step
+        self.waypoint_window = preset.windows[variations.layout]
+        self.idle_time = self.idle_limits["heading"] * self.heading_step / self.robot.max_speed
+        self.box_size = variations.box_size or preset.box_size
+        self.box_count = variations.boxes or preset.boxes[variations.layout]
+        self._field: GeodesicField | None = None
+        self._idle_actions, self._idle_since = 0, 0.0
+
+    def _make_robot(self) -> RobotModel:
+        preset, wanted = self._dimensions, self.variations
+        first = next(iter(preset.robots))
+        self.robot_name = first if wanted.robot is None else wanted.robot
+        try:
+            choice("robot", self.robot_name, tuple(preset.robots))
+            if preset.bumper is None and wanted.bumper is not None:
+                raise InvalidInputError(
+                    f"bumper {wanted.bumper!r}: the robot of this preset has one of its own"
+                )
+        except InvalidInputError as error:
+            raise ScenarioError(f"{self.name}: {error}") from error
+        bumper = wanted.bumper or preset.bumper
+        options = {} if bumper is None else {"bumper": bumper}
+        return preset.robots[self.robot_name](drive=drive_of(self.action), **options)
+
+    def _make_materials(self) -> Materials:
+        materials = self._dimensions.materials
+        if self.variations.bumper_friction is not None:
+            materials = replace(materials, robot_object=self.variations.bumper_friction)
+        if materials.solids is not None:
+            materials = replace(materials, solids=SOLIDS[self.robot_name])
+        return materials
+
+    @property
+    def field(self) -> GeodesicField:
+        """Distance of a point to the goal around what is static [m], in this episode."""
+        if self._field is None:
+            raise InvalidInputError(f"{self.name}: start() has to be called first")
+        return self._field
+
+    def start(self, rng: np.random.Generator) -> World:
+        """A new start: what is static, the robot, then boxes that it can get to."""
+        for left in reversed(range(_LAYOUT_TRIES)):
+            static, random = self._layout(rng)
+            try:
+                world = self._furnish(rng, static)
+                break
+            except ScenarioError:  # another draw of what is static may leave more room
+                if not random or not left:
+                    raise
+        resolution = self._dimensions.field_resolution
+        field = geodesic_field(static, self.goal, resolution=resolution)
+        self._field = field
+        self._farthest = float(field.values[np.isfinite(field.values)].max())
+        self._idle_actions, self._idle_since = 0, world.time
+        return world
+
+    @abstractmethod
+    def _layout(self, rng: np.random.Generator) -> tuple[StaticMap, bool]:
+        """What is static, and whether another call may give something else."""
+
+    @abstractmethod
+    def _robot_poses(self, rng: np.random.Generator, static: StaticMap) -> FloatArray:
+        """(N, 3) candidates for the robot's start, best first."""
+
+    @abstractmethod
+    def _box_region(self) -> tuple[FloatArray, list[Any]]:
+        """(4,) where centres of boxes may be [m], and Shapely geometries that they stay off."""
+
+    def _furnish(self, rng: np.random.Generator, static: StaticMap) -> World:
+        """Robot and boxes among static obstacles; every box within the robot's reach."""
+        size, wanted = self.box_size, self.variations
+        floor = Floor(static)
+        radius = self.robot.circumscribed_radius
+        resolution = self._dimensions.field_resolution
+        middle = self.goal.polygon.mean(axis=0)
+        reach = Reach.around(static, middle, radius=radius, resolution=resolution)
+        extent = 0.5 * float(np.ptp(self.goal.polygon, axis=0).max())
+        candidates = self._robot_poses(rng, static)
+        if not reach.within(middle[None], radius + extent).all():
+            candidates = candidates[:0]
+        pose = self._free_pose(candidates, floor, reach)
+        footprint = [shapely.Polygon(transform(pose, part)) for part in self.robot.parts]
+        region, keep_off = self._box_region()
+        preset = self._dimensions
+        poses = floor.place_squares(
+            rng,
+            self.box_count,
+            size,
+            keep_off=[(shape, 0.0) for shape in (*footprint, *keep_off)],
+            gap=GAP * size,
+            random_yaw=wanted.box_yaw == "random",
+            spacing=preset.box_spacing / preset.box_size * size,
+            within=region,
+            allowed=lambda centres: reach.within(centres, radius + 0.5 * size),
+        )
+        return World(
+            robot=self.robot,
+            robot_pose=pose,
+            static=static,
+            movables=self._boxes(rng, poses),
+            goal=self.goal,
+        )
+
+    def _free_pose(self, candidates: FloatArray, floor: Floor, reach: Reach) -> FloatArray:
+        """The first pose that overlaps nothing and from which the robot gets around."""
+        near = reach.within(candidates[:, :2], self.robot.circumscribed_radius)
+        for candidate in candidates[near]:
+            pose: FloatArray = candidate
+            parts = [shapely.Polygon(transform(pose, part)) for part in self.robot.parts]
+            if floor.is_free(np.array(parts), GAP * self.box_size).all():
+                return pose
+        raise ScenarioError(
+            f"{self.name}: there is no free start for robot {self.robot.name!r} in layout "
+            f"{self.variations.layout!r} from which it can get to the goal"
+        )
+
+    def _boxes(self, rng: np.random.Generator, poses: FloatArray) -> Movables:
+        count, half = len(poses), 0.5 * self.box_size
+        wheeled = np.zeros(count, dtype=bool)
+        wheeled[rng.permutation(count)[: round(self.variations.wheeled * count)]] = True
+        outline = np.array([(-half, -half), (half, -half), (half, half), (-half, half)])
+        mass = self._dimensions.box_mass
+        return Movables.from_outlines(
+            [outline] * count,
+            poses,
+            masses=None if mass is None else np.full(count, mass),
+            wheeled=wheeled,
+        )
+
+    def goal_distances(self, poses: FloatArray) -> FloatArray:
+        """(K,) shortest way of each box centre to the goal [m], from poses (K, 3)."""
+        grid = self.field.grid
+        ox, oy = grid.origin
+        return sample_at(self.field.filled, ox, oy, grid.resolution, self._farthest, poses)
+
+    def _idle(self, world: World, progress: bool) -> bool:
+        """Whether nothing has been achieved for too long, after a step that ended in ``world``."""
+        self._idle_actions += 1
+        if progress:
+            self._idle_actions, self._idle_since = 0, world.time
+        if self.action in self.idle_limits:
+            return self._idle_actions >= self.idle_limits[self.action]
+        return world.time - self._idle_since >= self.idle_time * (1.0 - 1e-9)
+
+    def observation(self, name: str) -> ObservationBuilder:
+        """``"image"``, ``"spatial"`` (the same at fewer pixels) or ``"state"``."""
+        if name in _PIXELS:
+            window = self._dimensions.windows[self.variations.layout]
+            pixels = _PIXELS[name]
+            return ImageObservation(
+                channels=_CHANNELS, window=(window, window), pixels=(pixels, pixels)
+            )
+        if name == "state":
+            return StateObservation(max_objects=max(STATE_OBJECTS, self.box_count))
+        raise UnknownNameError(f"observation of task {self.name!r}", name, self.observations)
