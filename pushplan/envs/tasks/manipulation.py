@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
 import numpy as np
@@ -16,6 +16,7 @@ from pushplan.envs.tasks.box_kernels import sample_at
 from pushplan.envs.tasks.layout import Floor
 from pushplan.envs.tasks.reach import Reach
 from pushplan.envs.tasks.testbed import SOLIDS
+from pushplan.envs.tasks.variations import Variations
 from pushplan.geometry import GeodesicField, geodesic_field
 from pushplan.observation import ImageObservation, StateObservation
 from pushplan.world import (
@@ -77,7 +78,7 @@ class ManipulationPreset:
 
 
 @dataclass(frozen=True, kw_only=True)
-class ManipulationVariations:
+class ManipulationVariations(Variations):
     """What may depart from a preset; None leaves the preset's value.
 
     Args:
@@ -102,7 +103,6 @@ class ManipulationVariations:
     bumper_friction: float | None = None
     random_start: bool
 
-    task: ClassVar[str]
     layouts: ClassVar[tuple[str, ...]]
 
     def __post_init__(self) -> None:
@@ -123,23 +123,6 @@ class ManipulationVariations:
             raise InvalidInputError(
                 f"random_start must be true or false, got {self.random_start!r}"
             )
-
-    @classmethod
-    def read(cls, values: Mapping[str, Any]) -> Any:
-        """Variations from a mapping.
-
-        Raises:
-            UnknownNameError: if a name is none of the fields.
-            ScenarioError: if a value makes no sense.
-        """
-        valid = [field.name for field in fields(cls)]
-        for name in values:
-            if name not in valid:
-                raise UnknownNameError(f"variation of {cls.task}", name, valid)
-        try:
-            return cls(**values)
-        except InvalidInputError as error:
-            raise ScenarioError(f"{cls.task}: {error}") from error
 
 
 class ManipulationTask(Task):

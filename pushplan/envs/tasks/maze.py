@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 import shapely
@@ -13,6 +13,7 @@ import shapely
 from pushplan.envs.tasks.base import ObservationBuilder, Outcome, Task, drive_of
 from pushplan.envs.tasks.layout import Floor
 from pushplan.envs.tasks.maze_presets import PRESETS, MazePreset
+from pushplan.envs.tasks.variations import Variations
 from pushplan.geometry.distance_field import GeodesicField, geodesic_field
 from pushplan.observation import ImageObservation, StateObservation
 from pushplan.world import (
@@ -38,7 +39,7 @@ _START_TRIES = 2000
 
 
 @dataclass(frozen=True)
-class MazeVariations:
+class MazeVariations(Variations):
     """What may depart from a preset; None leaves the preset's value.
 
     Args:
@@ -51,6 +52,8 @@ class MazeVariations:
         bumper: what the testbed's robot carries in front, one of `pushplan.world.BUMPERS`.
         bumper_friction: friction coefficient between robot and boxes.
     """
+
+    task = "maze"
 
     shape: str = "u"
     boxes: int = 5
@@ -77,23 +80,6 @@ class MazeVariations:
         if self.bumper_friction is not None:
             friction = number("bumper_friction", self.bumper_friction, low=0.0)
             put(self, "bumper_friction", friction)
-
-    @classmethod
-    def read(cls, values: Mapping[str, Any]) -> MazeVariations:
-        """Variations from a mapping.
-
-        Raises:
-            UnknownNameError: if a name is none of the fields.
-            ScenarioError: if a value makes no sense.
-        """
-        valid = [field.name for field in fields(cls)]
-        for name in values:
-            if name not in valid:
-                raise UnknownNameError("variation of the maze", name, valid)
-        try:
-            return cls(**values)
-        except InvalidInputError as error:
-            raise ScenarioError(f"maze: {error}") from error
 
 
 class MazeTask(Task):

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
-from typing import Any, ClassVar
+from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 import shapely
 
 from pushplan.envs.tasks.base import ObservationBuilder, Outcome, Task
 from pushplan.envs.tasks.ship_presets import PRESETS, ShipPreset
+from pushplan.envs.tasks.variations import Variations
 from pushplan.observation import ImageObservation, StateObservation
 from pushplan.scenarios.ice import IceField, generate_ice, load_ice
 from pushplan.world import (
@@ -39,7 +40,7 @@ _UP = 0.5 * math.pi
 
 
 @dataclass(frozen=True)
-class ShipIceVariations:
+class ShipIceVariations(Variations):
     """What may depart from a preset; None leaves the preset's value.
 
     Args:
@@ -51,6 +52,8 @@ class ShipIceVariations:
         ice_file: ice from a file, as `pushplan.scenarios.load_ice` reads it, instead of random
             ice.
     """
+
+    task = "ship_ice"
 
     concentration: float | None = None
     clumping: float = 0.6
@@ -76,23 +79,6 @@ class ShipIceVariations:
             put(self, "start_x", number("start_x", self.start_x))
         heading = number("start_heading", self.start_heading)
         put(self, "start_heading", heading)
-
-    @classmethod
-    def read(cls, values: Mapping[str, Any]) -> ShipIceVariations:
-        """Variations from a mapping.
-
-        Raises:
-            UnknownNameError: if a name is none of the fields.
-            ScenarioError: if a value makes no sense.
-        """
-        valid = [field.name for field in fields(cls)]
-        for name in values:
-            if name not in valid:
-                raise UnknownNameError("variation of ship_ice", name, valid)
-        try:
-            return cls(**values)
-        except InvalidInputError as error:
-            raise ScenarioError(f"ship_ice: {error}") from error
 
 
 class ShipIceTask(Task):
