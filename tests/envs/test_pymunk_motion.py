@@ -97,7 +97,7 @@ def test_a_floating_object_coasts_as_drag_says():
 @given(
     offset=st.floats(-0.9, 0.9),
     turn=st.floats(-1.0, 1.0),
-    speed=st.floats(0.2, 2.0),
+    speed=st.floats(0.4, 2.0),
     mass=st.floats(0.2, 5.0),
     grip=st.floats(0.0, 1.0),
 )
