@@ -84,7 +84,9 @@ def test_all_four_tasks_run_on_both_simulators():
     assert len(PAIRS) == 8
 
 
-@pytest.mark.parametrize(("task", "simulator", "preset", "action", "observation"), list(combinations()))
+@pytest.mark.parametrize(
+    ("task", "simulator", "preset", "action", "observation"), list(combinations())
+)
 def test_gymnasium_finds_no_fault(task, simulator, preset, action, observation):
     options = {"action": action, "observation": observation}
     with warnings.catch_warnings():

@@ -101,7 +101,7 @@ class Simulator(ABC):
     The contract is *memoryless*: after `build` or `restore`, the same commands give the same
     bytes, whatever was simulated before. A planar engine's whole state is in the `World`, so that
     a rollout from ``env.world`` is what the environment will do; an engine with a third dimension
-    begins with every body at rest on the ground.
+    begins with every body upright on the ground, and at the twists of the `World`.
     """
 
     name: ClassVar[str]

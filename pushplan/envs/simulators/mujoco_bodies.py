@@ -1,0 +1,326 @@
+"""The state of a MuJoCo scene as planar rows, and back, so that nothing else is remembered."""
+
+from __future__ import annotations
+
+import logging
+import math
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from pushplan.envs.simulators.base import Materials
+from pushplan.envs.simulators.mujoco_kernels import drag_damping, planar_rows, sleep_lists
+from pushplan.envs.simulators.mujoco_model import SceneKey, scene_model
+from pushplan.envs.simulators.mujoco_options import MujocoOptions
+from pushplan.envs.simulators.mujoco_rest import (
+    quiet_objects,
+    rest_cycles,
+    rest_gap,
+)
+from pushplan.world import PushplanError, World
+from pushplan.world.checks import BoolArray, FloatArray, IntArray
+
+_LOG = logging.getLogger(__name__)
+_FASTEST = 1e8
+"""No velocity of a sane simulation exceeds this [m/s] or [rad/s]."""
+_AWAKE = -1 - 10
+"""What MuJoCo writes for a tree that has just been woken: -(1 + mjMINAWAKE)."""
+
+
+def log_warnings() -> None:
+    """Send MuJoCo's warnings to `logging`; it would write them to a file and to the console.
+
+    Whoever has installed a handler of their own keeps it.
+    """
+    if mujoco.get_mju_user_warning() is None:
+        mujoco.set_mju_user_warning(lambda text: _LOG.debug("MuJoCo: %s", text))
+
+
+class DivergedError(PushplanError, RuntimeError):
+    """The engine's state is no longer finite."""
+
+
+class MujocoBodies:
+    """A model and its data, with a robot and K objects that are read and written as rows.
+
+    Bodies on the ground have six degrees of freedom and the robot's wheels one each; floating
+    bodies have three. Positions are ordered robot first, then objects.
+
+    Args:
+        world: the scene; its poses are where everything begins.
+        materials: friction, rolling, water and the third dimension.
+        options: numerical settings.
+    """
+
+    def __init__(self, world: World, materials: Materials, options: MujocoOptions) -> None:
+        log_warnings()
+        self.key = SceneKey.of(world, materials, options)
+        self.model = scene_model(self.key, world.movables)
+        self.data = mujoco.MjData(self.model)
+        self.afloat = materials.water is not None
+        self.count = len(world.movables)
+        solids = materials.solids
+        assert solids is not None
+        self._rest_height = 0.5 * solids.object_height
+        self._wheel_radius = solids.wheel_radius
+        self._track = world.robot.wheel_separation
+        movables = world.movables
+        self._outlines = movables.vertices, movables.offsets, movables.radii
+        self._options = options
+        self._gap = rest_gap(movables.radii)
+        self._quiet = np.empty(self.count, dtype=np.bool_)
+        self.accelerations = self._accelerations(options)
+        self._find_layout()
+
+    def _accelerations(self, options: MujocoOptions) -> tuple[float, float]:
+        """What the robot's motors can do on free ground: [m/s²] and [rad/s²]."""
+        if not self.afloat:
+            return math.inf, math.inf  # up to speed well within a step
+        limits = self.model.actuator_forcerange[:, 1]
+        inertia = self.model.body("robot").inertia.max()
+        return options.thrust, float(limits[2] / inertia)
+
+    def _find_layout(self) -> None:
+        model, data = self.model, self.data
+        self._qpos, self._qvel = data.qpos, data.qvel
+        self.ctrl, self._damping = data.ctrl, model.dof_damping
+        self._asleep, self._touch = data.tree_asleep, data.sensordata
+        # copied: compiled loops want arrays of one kind, and those of the model are read-only
+        self._tree = (
+            np.array(model.body_treeid),
+            np.array(model.body_parentid),
+            np.array(model.dof_treeid),
+        )
+        self._lists = (
+            data.tree_awake,
+            data.body_awake,
+            data.body_awake_ind,
+            data.parent_awake_ind,
+            data.dof_awake_ind,
+        )
+        self._all_awake = np.full(model.ntree, _AWAKE, dtype=np.int32)
+        first = 3 if self.afloat else 9
+        self._first_q, self._first_v = first, 3 if self.afloat else 8
+        size_q, size_v = (3, 3) if self.afloat else (7, 6)
+        self._objects_q = self._qpos[first:].reshape(-1, size_q)
+        self._objects_v = self._qvel[self._first_v :].reshape(-1, size_v)
+        self.hidden_size = model.nq + model.nv + model.ntree
+
+    # ---------------------------------------------------------------- rows of planar states
+
+    def place(self, world: World) -> None:
+        """Put every body where the world says, upright on the ground, with its velocity.
+
+        Objects at rest are asleep until something touches them.
+        """
+        assert world.robot_twist is not None
+        model, water = self.model, self.key.materials.water
+        self._drag = None if water is None else water.coefficients(world)
+        qpos, qvel = np.array(model.qpos0), np.zeros(model.nv)
+        poses, twists = world.movables.poses, world.movables.twists
+        if self.afloat:
+            qpos[:3], qvel[:3] = world.robot_pose, world.robot_twist
+            qpos[3:], qvel[3:] = poses.ravel(), twists.ravel()
+        else:
+            self._put_robot(qpos, qvel, world.robot_pose, world.robot_twist)
+            rows, rates = qpos[9:].reshape(-1, 7), qvel[8:].reshape(-1, 6)
+            rows[:, :2], rows[:, 2] = poses[:, :2], self._rest_height
+            rows[:, 3], rows[:, 6] = np.cos(0.5 * poses[:, 2]), np.sin(0.5 * poses[:, 2])
+            rows[:, 4:6] = 0.0
+            rates[:, :2], rates[:, 5] = twists[:, :2], twists[:, 2]
+        quiet: BoolArray = np.logical_not(twists.any(axis=1))
+        asleep = self._all_awake.copy()
+        rest_cycles(poses, *self._outlines, quiet, self._gap, asleep)
+        self._load(world.time, qpos, qvel, asleep)
+
+    def _put_robot(
+        self, qpos: FloatArray, qvel: FloatArray, pose: FloatArray, twist: FloatArray
+    ) -> None:
+        """A robot whose wheels turn as fast as it moves."""
+        x, y, theta = (float(value) for value in pose)
+        qpos[:3] = x, y, self._wheel_radius
+        qpos[3:7] = math.cos(0.5 * theta), 0.0, 0.0, math.sin(0.5 * theta)
+        qvel[:2], qvel[5] = twist[:2], twist[2]
+        speed = float(twist[0]) * math.cos(theta) + float(twist[1]) * math.sin(theta)
+        qvel[6:8] = self.wheel_speeds(speed, float(twist[2]))
+
+    def wheel_speeds(self, linear: float, angular: float) -> tuple[float, float]:
+        """Rates of the left and the right wheel [rad/s] of a motion without slip."""
+        half = 0.5 * angular * self._track
+        return (linear - half) / self._wheel_radius, (linear + half) / self._wheel_radius
+
+    def planar(self, qpos: FloatArray) -> FloatArray:
+        """(N, 1 + K, 3) poses of N stored positions (N, nq): robot, then objects."""
+        rows: FloatArray = np.empty((len(qpos), 1 + self.count, 3))
+        if self.afloat:
+            rows[:] = qpos.reshape(rows.shape)
+        else:
+            planar_rows(qpos, self._first_q, rows)
+        return rows
+
+    def poses(self) -> FloatArray:
+        """(1 + K, 3) poses now."""
+        rows: FloatArray = self.planar(self._qpos[None])[0]
+        return rows
+
+    def robot_pose(self) -> FloatArray:
+        """(3,) pose of the robot now."""
+        q = self._qpos
+        if self.afloat:
+            return np.array(q[:3])
+        w, x, y, z = (float(value) for value in q[3:7])
+        heading = math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
+        return np.array([q[0], q[1], heading])
+
+    def twists(self) -> FloatArray:
+        """(1 + K, 3) velocities now, world frame."""
+        if self.afloat:
+            return np.array(self._qvel).reshape(-1, 3)
+        rows = np.empty((1 + self.count, 6))
+        rows[0], rows[1:] = self._qvel[:6], self._qvel[8:].reshape(-1, 6)
+        return np.ascontiguousarray(rows[:, [0, 1, 5]])
+
+    @property
+    def qpos(self) -> FloatArray:
+        """All positions, the engine's own array."""
+        positions: FloatArray = self._qpos
+        return positions
+
+    @property
+    def qvel(self) -> FloatArray:
+        """All velocities, the engine's own array."""
+        velocities: FloatArray = self._qvel
+        return velocities
+
+    # ---------------------------------------------------------------- state
+
+    def hidden(self) -> FloatArray:
+        """Positions, velocities and who sleeps, in one array."""
+        return np.concatenate([self._qpos, self._qvel, self._asleep])
+
+    def hidden_without(self, gone: IntArray) -> FloatArray:
+        """What `hidden` would return without some of the objects, given by index."""
+        kept = np.delete(np.arange(self.count), gone)
+        positions, velocities = self._objects_q[kept], self._objects_v[kept]
+        asleep = np.full(len(kept), _AWAKE)  # who rests is found out anew
+        return np.concatenate(
+            [
+                self._qpos[: self._first_q],
+                positions.ravel(),
+                self._qvel[: self._first_v],
+                velocities.ravel(),
+                self._asleep[:1],
+                asleep,
+            ]
+        )
+
+    def load_hidden(self, time: float, hidden: FloatArray) -> None:
+        """Go back to what `hidden` returned at some time [s]."""
+        model = self.model
+        qpos, qvel, asleep = np.split(hidden, [model.nq, model.nq + model.nv])
+        self._load(time, qpos, qvel, asleep.astype(np.int32))
+
+    def refresh(self) -> FloatArray:
+        """Forget all but the state, as if it had just been loaded; returns that (`hidden`).
+
+        MuJoCo keeps accelerations of the step before as a first guess of its solver, and computed
+        quantities of sleeping bodies. With this at the beginning of each step of the simulator
+        they are functions of the state, and the simulator is memoryless.
+        """
+        state = self.hidden()
+        self.load_hidden(self.data.time, state)
+        return state
+
+    def wake_all(self, time: float, hidden: FloatArray) -> None:
+        """Go back to what `hidden` returned, with every object awake."""
+        awake = hidden.copy()
+        awake[-self.model.ntree :] = _AWAKE
+        self.load_hidden(time, awake)
+
+    def settle(self, before: FloatArray, interval: float) -> None:
+        """Lay objects to rest that have stopped.
+
+        Args:
+            before: (nq,) positions one sample earlier.
+            interval: since then [s].
+        """
+        if self.count == 0:
+            return
+        quiet_objects(
+            self._objects_v,
+            self._objects_q,
+            before[self._first_q :].reshape(self._objects_q.shape),
+            self._outlines[2],
+            self._options.sleep_speed,
+            interval,
+            self._quiet,
+        )
+        quiet = self._quiet
+        if not quiet[self._asleep[1:] < 0].any():
+            return  # nobody new
+        asleep = self._all_awake.copy()
+        poses = self.poses()[1:]
+        rest_cycles(poses, *self._outlines, quiet, self._gap, asleep)
+        self._objects_v[asleep[1:] >= 0] = 0.0
+        self._put_to_sleep(asleep)
+
+    def _load(self, time: float, qpos: FloatArray, qvel: FloatArray, asleep: Any) -> None:
+        model, data = self.model, self.data
+        mujoco.mj_resetData(model, data)
+        data.time = time
+        self._qpos[:] = qpos
+        self._qvel[:] = qvel
+        mujoco.mj_kinematics(model, data)
+        mujoco.mj_comPos(model, data)
+        mujoco.mj_crb(model, data)
+        mujoco.mj_factorM(model, data)
+        self._put_to_sleep(asleep)
+
+    def _put_to_sleep(self, asleep: Any) -> None:
+        """Set which trees sleep, and the lists that MuJoCo derives from that."""
+        data = self.data
+        self._asleep[:] = asleep
+        trees, bodies, parents, dofs = sleep_lists(self._asleep, *self._tree, *self._lists)
+        data.ntree_awake, data.nbody_awake = trees, bodies
+        data.nparent_awake, data.nv_awake = parents, dofs
+
+    # ---------------------------------------------------------------- stepping
+
+    def advance(self, interval: float) -> None:
+        """Let the engine run for ``interval`` [s], in steps that are short enough."""
+        model, data = self.model, self.data
+        steps = self._steps(interval)
+        model.opt.timestep = interval / steps
+        if self._drag is None:
+            mujoco.mj_step(model, data, steps)
+            return
+        most = max(1, int(self._options.drag_interval / model.opt.timestep))
+        velocities, damping = self._qvel.reshape(-1, 3), self._damping.reshape(-1, 3)
+        while steps > 0:
+            drag_damping(velocities, self._drag, damping)
+            mujoco.mj_step(model, data, min(most, steps))
+            steps -= most
+
+    def _steps(self, interval: float) -> int:
+        """How many steps of the engine make up an interval [s]."""
+        options = self._options
+        longest = options.water_time_step if self.afloat else options.time_step
+        return max(1, math.ceil(interval / longest - 1e-9))
+
+    @property
+    def touches(self) -> tuple[bool, bool]:
+        """Whether the hull touched something static in the engine's last step, and anything."""
+        return bool(self._touch[0] > 0.0), bool(self._touch[1] > 0.0)
+
+    def check(self) -> None:
+        """Raise where the state is not finite.
+
+        Raises:
+            DivergedError: then.
+        """
+        if not np.abs(self._qvel).max() < _FASTEST:  # false for NaN, too
+            raise DivergedError(
+                "the MuJoCo simulation has diverged: bodies may overlap deeply at the start, or "
+                "the time step be too long for the masses and forces of this scene"
+            )

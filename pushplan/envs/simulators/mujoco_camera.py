@@ -1,0 +1,184 @@
+"""Pictures of a MuJoCo scene without a display."""
+
+from __future__ import annotations
+
+import math
+import os
+import sys
+import weakref
+from typing import Any
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from pushplan.drawing.palette import FLOOR_PALETTE
+from pushplan.envs.simulators.mujoco_shapes import color_of
+from pushplan.world import ClearanceArea, GoalDisc, GoalLine, MissingDependencyError, World
+from pushplan.world.checks import FloatArray, integer
+
+_ELEVATION = -58.0
+_FIELD_OF_VIEW = 40.0
+_LONGEST = 2.0  # depth over width of what is shown
+_BEHIND = 0.2  # share of that which lies behind the robot
+_MOST_GEOMS = 20_000
+
+
+class MujocoCamera:
+    """A fixed camera that shows the whole scene from the south, with its own OpenGL context.
+
+    The backend is what the environment variable ``MUJOCO_GL`` says, or EGL, which needs no display.
+    What it holds is freed with the object.
+
+    Args:
+        model: MjModel of the scene.
+        width: of the pictures [px].
+        height: of the pictures [px].
+
+    Raises:
+        MissingDependencyError: if there is no OpenGL that draws into memory.
+    """
+
+    def __init__(self, model: Any, width: int, height: int) -> None:
+        width = integer("photograph width", width, low=16, high=4096)
+        height = integer("photograph height", height, low=16, high=4096)
+        self.size = width, height
+        self._model = model
+        model.vis.global_.offwidth, model.vis.global_.offheight = width, height
+        model.vis.global_.fovy = _FIELD_OF_VIEW
+        self._context, self._renderer = _open(model, width, height)
+        self._scene = mujoco.MjvScene(model, maxgeom=_MOST_GEOMS)
+        self._options = mujoco.MjvOption()
+        self._camera = mujoco.MjvCamera()
+        self._camera.type = mujoco.mjtCamera.mjCAMERA_FREE
+        self._view = mujoco.MjrRect(0, 0, width, height)
+        self._data = mujoco.MjData(model)
+        self._finalizer = weakref.finalize(self, _close, self._context, self._renderer)
+        self._finalizer.atexit = False  # the display is gone by then, and all is freed anyway
+
+    def take(self, qpos: FloatArray, world: World) -> NDArray[np.uint8]:
+        """(H, W, 3) picture of the bodies, and of the goal.
+
+        Args:
+            qpos: (nq,) positions of the bodies.
+            world: for its bounds, its goal and where the robot is.
+        """
+        model, data = self._model, self._data
+        data.qpos[:] = qpos
+        self._aim(world)
+        mujoco.mj_kinematics(model, data)
+        mujoco.mj_camlight(model, data)
+        mujoco.mjv_updateScene(
+            model,
+            data,
+            self._options,
+            None,
+            self._camera,
+            mujoco.mjtCatBit.mjCAT_ALL.value,
+            self._scene,
+        )
+        self._draw_goal(world)
+        self._context.make_current()
+        mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN.value, self._renderer)
+        mujoco.mjr_render(self._view, self._scene, self._renderer)
+        width, height = self.size
+        picture = np.empty((height, width, 3), dtype=np.uint8)
+        mujoco.mjr_readPixels(picture, None, self._view, self._renderer)
+        return np.ascontiguousarray(picture[::-1])
+
+    def _aim(self, world: World) -> None:
+        """Far enough away for the bounds to fit into the picture both ways.
+
+        Of bounds that are much longer than wide, only a stretch that begins at the robot is shown.
+        """
+        low, high = world.static.bounds[:2].copy(), world.static.bounds[2:].copy()
+        width, depth = (float(side) for side in high - low)
+        if depth > _LONGEST * width:
+            depth = _LONGEST * width
+            y = float(world.robot_pose[1]) - _BEHIND * depth
+            low[1] = min(max(y, float(low[1])), float(high[1]) - depth)
+            high[1] = low[1] + depth
+        aspect = self.size[0] / self.size[1]
+        half_view = math.tan(math.radians(0.5 * _FIELD_OF_VIEW))
+        tilt = math.radians(-_ELEVATION)
+        # the near edge is closer to the camera than the middle by half the depth's share along it
+        nearer = 0.5 * depth * math.cos(tilt)
+        across = 0.5 * width / (half_view * aspect)
+        along = 0.5 * depth * math.sin(tilt) / half_view
+        self._camera.lookat[:] = [*(0.5 * (low + high)), 0.0]
+        self._camera.distance = 1.06 * (max(across, along) + nearer)
+        self._camera.azimuth, self._camera.elevation = 90.0, _ELEVATION
+
+    def _draw_goal(self, world: World) -> None:
+        goal, bounds = world.goal, world.static.bounds
+        thin = 1e-3 * float((bounds[2:] - bounds[:2]).max())
+        if isinstance(goal, GoalDisc):
+            self._mark_disc(goal.center, goal.radius, thin)
+            return
+        if isinstance(goal, GoalLine):
+            along = np.array([-goal.normal[1], goal.normal[0]])
+            reach = 0.5 * float(abs(along) @ (bounds[2:] - bounds[:2]))
+            middle = 0.5 * (bounds[:2] + bounds[2:])
+            foot = middle + ((goal.point - middle) @ goal.normal) * goal.normal
+            edges = [(foot - reach * along, foot + reach * along)]
+        else:
+            corners = goal.polygon
+            edges = list(zip(corners, np.roll(corners, -1, axis=0), strict=True))
+            if isinstance(goal, ClearanceArea):
+                edges = [e for e, is_open in zip(edges, goal.open_edges, strict=True) if is_open]
+        for a, b in edges:
+            self._mark_edge(a, b, thin)
+
+    def _mark_disc(self, center: FloatArray, radius: float, thin: float) -> None:
+        kind, color = mujoco.mjtGeom.mjGEOM_CYLINDER, color_of(FLOOR_PALETTE.goal[0])
+        self._mark(kind, [radius, thin, 0.0], [*center, 0.0], np.eye(3), color)
+
+    def _mark_edge(self, a: FloatArray, b: FloatArray, thin: float) -> None:
+        along = b - a
+        length = float(np.hypot(*along))
+        c, s = along / length
+        turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+        size = [0.5 * length, 4.0 * thin, 2.0 * thin]
+        middle = [*(0.5 * (a + b)), 0.0]
+        self._mark(mujoco.mjtGeom.mjGEOM_BOX, size, middle, turn, color_of(FLOOR_PALETTE.goal[1]))
+
+    def _mark(self, kind: Any, size: Any, pos: Any, turn: Any, rgb: Any) -> None:
+        scene = self._scene
+        if scene.ngeom >= scene.maxgeom:
+            return
+        geom = scene.geoms[scene.ngeom]
+        mujoco.mjv_initGeom(
+            geom,
+            kind.value,
+            np.array(size, dtype=np.float64),
+            np.array(pos, dtype=np.float64),
+            np.asarray(turn, dtype=np.float64).ravel(),
+            np.array([*rgb, 1.0], dtype=np.float32),
+        )
+        scene.ngeom += 1
+
+
+def _open(model: Any, width: int, height: int) -> tuple[Any, Any]:
+    """An OpenGL context that draws into memory, and MuJoCo's renderer in it."""
+    try:
+        if os.environ.get("MUJOCO_GL") or not sys.platform.startswith("linux"):
+            context: Any = mujoco.GLContext(width, height)
+        else:
+            from mujoco.egl import GLContext
+
+            context = GLContext(width, height)
+        context.make_current()
+        renderer = mujoco.MjrContext(model, mujoco.mjtFontScale.mjFONTSCALE_100.value)
+    except Exception as error:  # PyOpenGL and the drivers raise whatever they like
+        raise MissingDependencyError(
+            f"MuJoCo's camera found no OpenGL that draws without a display ({error}). Install EGL "
+            "(Debian: apt-get install libegl1 libgl1-mesa-dri), or OSMesa (libosmesa6) and set "
+            "the environment variable MUJOCO_GL=osmesa; render mode 'rgb_array' works without"
+        ) from error
+    return context, renderer
+
+
+def _close(context: Any, renderer: Any) -> None:
+    context.make_current()
+    renderer.free()
+    context.free()

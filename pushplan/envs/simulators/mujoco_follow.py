@@ -1,0 +1,123 @@
+"""Driving a robot with inertia through given poses, as nearly as its motors allow."""
+
+from __future__ import annotations
+
+import math
+from typing import Protocol
+
+import numpy as np
+
+from pushplan.envs.trace import Trace
+from pushplan.world import RobotModel, Twist
+from pushplan.world.checks import FloatArray
+
+_PERIODS_PER_RADIUS = 10.0
+_PATIENCE = 1.0
+_LATE = 0.5
+
+
+class _Drivable(Protocol):
+    """What the tracking loop needs of a simulator."""
+
+    def step(self, command: Twist, duration: float) -> Trace: ...
+
+    @property
+    def robot_pose(self) -> FloatArray: ...
+
+    @property
+    def object_poses(self) -> FloatArray: ...
+
+    @property
+    def held(self) -> bool: ...
+
+
+def follow_path(
+    simulator: _Drivable, robot: RobotModel, poses: FloatArray
+) -> tuple[FloatArray, int]:
+    """Sweep the robot through poses; it stands at the first.
+
+    A reference moves straight from pose to pose at the robot's full speed and waits where the robot
+    falls behind by more than half its radius. The command is the reference's own motion plus
+    feedback on the error in the robot's frame (Kanayama et al. 1990):
+    v = v_r cos e_θ + k_x e_x, ω = ω_r + v_r k_y e_y + k_θ sin e_θ.
+
+    Args:
+        simulator: that is stepped.
+        robot: its limits.
+        poses: (N, 3) x, y [m], theta [rad].
+
+    Returns:
+        (N, K, 3) object poses when the reference was at each pose, and the index of the first pose
+        that could not be reached, -1 if all were: the robot was held for one second, or for as
+        long as it takes to drive its own radius if that is longer.
+    """
+    radius = robot.circumscribed_radius
+    period = radius / robot.max_speed / _PERIODS_PER_RADIUS
+    patience = max(_PATIENCE, radius / robot.max_speed)
+    start = simulator.object_poses
+    found = np.repeat(start[None], len(poses), axis=0)
+    for leg in range(1, len(poses)):
+        if not _drive_leg(simulator, robot, poses[leg - 1], poses[leg], period, patience):
+            found[leg:] = simulator.object_poses
+            return found, leg
+        found[leg] = simulator.object_poses
+    return found, -1
+
+
+def _drive_leg(
+    simulator: _Drivable,
+    robot: RobotModel,
+    a: FloatArray,
+    b: FloatArray,
+    period: float,
+    patience: float,
+) -> bool:
+    """Move the reference from ``a`` to ``b``; False if the robot was held on the way."""
+    dx, dy = float(b[0] - a[0]), float(b[1] - a[1])
+    turn = math.remainder(float(b[2] - a[2]), 2.0 * math.pi)
+    length = math.hypot(dx, dy)
+    duration = max(length / robot.max_speed, abs(turn) / robot.max_turn_rate)
+    if duration == 0.0:
+        return True
+    middle = float(a[2]) + 0.5 * turn
+    speed = (dx * math.cos(middle) + dy * math.sin(middle)) / duration
+    rate = turn / duration
+    done, waited = 0.0, 0.0
+    while done < duration:
+        share = done / duration
+        reference = float(a[0]) + share * dx, float(a[1]) + share * dy, float(a[2]) + share * turn
+        error = _error(simulator.robot_pose, reference)
+        late = math.hypot(error[0], error[1]) > _LATE * robot.circumscribed_radius
+        late |= abs(error[2]) > _LATE
+        part = period if late else min(period, duration - done)
+        simulator.step(_command(robot, error, speed, rate), part)
+        if late:
+            waited += part
+            if waited > patience:
+                return False
+        else:
+            done += part
+            waited = 0.0
+    return True
+
+
+def _error(pose: FloatArray, reference: tuple[float, float, float]) -> tuple[float, float, float]:
+    """Where the reference is in the robot's frame: ahead, left [m], turned [rad]."""
+    x, y, theta = (float(value) for value in pose)
+    dx, dy = reference[0] - x, reference[1] - y
+    c, s = math.cos(theta), math.sin(theta)
+    return c * dx + s * dy, c * dy - s * dx, math.remainder(reference[2] - theta, 2.0 * math.pi)
+
+
+def _command(
+    robot: RobotModel, error: tuple[float, float, float], speed: float, rate: float
+) -> Twist:
+    """Kanayama's law with gains in units of the robot's radius, within its limits."""
+    ahead, left, turned = error
+    radius = robot.circumscribed_radius
+    pace = robot.max_speed / radius
+    v = speed * math.cos(turned) + 2.0 * pace * ahead
+    w = rate + 4.0 * speed / radius**2 * left + 4.0 * pace * math.sin(turned)
+    top, turn = 1.2 * robot.max_speed, 1.2 * robot.max_turn_rate
+    low = min(1.2 * robot.min_speed, 0.0)
+    return Twist(min(max(v, low), top), min(max(w, -turn), turn))

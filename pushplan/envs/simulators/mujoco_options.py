@@ -1,0 +1,65 @@
+"""Numerical and mechanical settings of the MuJoCo simulator."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, fields
+
+from pushplan.world.checks import integer, number
+
+
+@dataclass(frozen=True)
+class MujocoOptions:
+    """Settings; docs/simulators-mujoco.md has the studies behind the defaults.
+
+    Args:
+        time_step: longest step of the engine on the ground [s]; a whole number of steps fits
+            between two samples.
+        water_time_step: longest step where bodies float [s].
+        drag_interval: longest time for which the drag coefficient of a floating body is kept [s].
+        samples: poses recorded in each call of `MujocoSimulator.step`, at even intervals.
+        iterations: most iterations of the contact solver (Newton) in a step.
+        tolerance: of the contact solver.
+        contact_time: time constant with which an overlap of two bodies decays [s]; MuJoCo needs
+            at least two steps.
+        impedance: how much of a contact's relative motion the solver takes away in a step, in
+            (0, 1); bodies sink into each other by a share of ``1 - impedance``.
+        sleep_speed: objects that end a step slower than this rest until something touches them
+            [m/s].
+        motor_time: time constant of the motors' speed control on free ground [s].
+        motor_force: push of all motors together, in units of the robot's weight.
+        rotor_inertia: inertia of each motor's rotor as its wheel feels it through the gear, in
+            units of the robot's mass times the wheel radius squared.
+        wheel_friction: sliding friction coefficient of tyres on the ground.
+        thrust: greatest acceleration of a ship by its thrusters, ahead and sideways [m/s²].
+        thruster_lever: lever of the thrust that turns a ship, in units of its half length.
+        thrust_droop: loss of speed at full thrust, in units of the greatest speed.
+    """
+
+    time_step: float = 0.0125
+    water_time_step: float = 0.02
+    drag_interval: float = 0.1
+    samples: int = 8
+    iterations: int = 30
+    tolerance: float = 1e-6
+    contact_time: float = 0.025
+    impedance: float = 0.98
+    sleep_speed: float = 1e-3
+    motor_time: float = 0.025
+    motor_force: float = 0.8
+    rotor_inertia: float = 1.0
+    wheel_friction: float = 0.9
+    thrust: float = 0.2
+    thruster_lever: float = 1.0
+    thrust_droop: float = 0.05
+
+    def __post_init__(self) -> None:
+        for item in fields(self):
+            value, name = getattr(self, item.name), f"mujoco {item.name}"
+            if item.name in ("samples", "iterations"):
+                integer(name, value, low=1)
+            else:
+                high = {"impedance": 0.9999}.get(item.name, math.inf)
+                high = 1.0 if item.name.endswith("time_step") else high
+                positive = number(name, value, low=0.0, open_low=True, high=high)
+                object.__setattr__(self, item.name, positive)

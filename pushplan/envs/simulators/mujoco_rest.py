@@ -1,0 +1,130 @@
+"""Which objects rest, so that the engine may leave them out until something touches them."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+
+from pushplan.geometry.convex import convex_penetration
+from pushplan.interaction.separation import place
+from pushplan.world.checks import BoolArray, FloatArray, IntArray
+
+TILT = 1e-4
+"""Square of half the sine of the greatest tilt at which an object may rest."""
+
+
+@njit(cache=True, nogil=True)
+def quiet_objects(
+    velocities: FloatArray,
+    positions: FloatArray,
+    before: FloatArray,
+    radii: FloatArray,
+    speed: float,
+    interval: float,
+    quiet: BoolArray,
+) -> None:
+    """Which objects have hardly moved of late, and do not stand tilted.
+
+    Args:
+        velocities: (K, 3) x, y, yaw of floating bodies, or (K, 6) of free ones, turning last.
+        positions: (K, 3) x, y, theta, or (K, 7) x, y, z and a quaternion w x y z.
+        before: the same, one sample earlier.
+        radii: (K,) of the objects [m]; they turn a rate of rotation into a speed.
+        speed: below which an object counts as quiet [m/s].
+        interval: since the sample before [s].
+        quiet: (K,) receives the answer.
+    """
+    free = velocities.shape[1] == 6
+    linear = 3 if free else 2
+    for k in range(len(velocities)):
+        fastest = 0.0
+        for j in range(velocities.shape[1]):
+            size = 1.0 if j < linear else radii[k]
+            fastest = max(fastest, abs(velocities[k, j]) * size)
+        moved = 0.0
+        for j in range(linear):
+            moved = max(moved, abs(positions[k, j] - before[k, j]))
+        if free:
+            x, y = positions[k, 4], positions[k, 5]
+            upright = x * x + y * y < TILT
+            # half the turn, near enough while it is small
+            for j in range(4, 7):
+                moved = max(moved, 2.0 * abs(positions[k, j] - before[k, j]) * radii[k])
+        else:
+            upright = True
+            moved = max(moved, abs(positions[k, 2] - before[k, 2]) * radii[k])
+        quiet[k] = upright and fastest < speed and moved < speed * interval
+
+
+@njit(cache=True, nogil=True)
+def _root(parent: IntArray, k: int) -> int:
+    while parent[k] != k:
+        parent[k] = parent[parent[k]]
+        k = parent[k]
+    return k
+
+
+@njit(cache=True, nogil=True)
+def rest_cycles(
+    poses: FloatArray,
+    vertices: FloatArray,
+    offsets: IntArray,
+    radii: FloatArray,
+    quiet: BoolArray,
+    gap: float,
+    asleep: IntArray,
+) -> None:
+    """Let quiet objects sleep, together with all that they may touch.
+
+    MuJoCo wakes bodies that sleep together at once, and expects that no two bodies touch that
+    sleep apart. So objects closer than ``gap`` form a group, and a group with one restless
+    member stays awake.
+
+    Args:
+        poses: (K, 3) x, y [m], theta [rad].
+        vertices: (V, 2) outlines in body frames, flattened [m].
+        offsets: (K + 1,) where each begins.
+        radii: (K,) of the discs that hold them [m].
+        quiet: (K,) which may sleep.
+        gap: nearer objects form a group [m].
+        asleep: (1 + K,) trees of the engine, the robot's first: receives, of each object that
+            sleeps, the tree after it in its group; the others stay as they are.
+    """
+    count = len(poses)
+    parent = np.arange(count)
+    corners = np.empty_like(vertices)
+    for k in range(count):
+        place(poses[k], vertices[offsets[k] : offsets[k + 1]], corners[offsets[k] : offsets[k + 1]])
+    for a in range(count):
+        for b in range(a + 1, count):
+            reach = radii[a] + radii[b] + gap
+            dx, dy = poses[a, 0] - poses[b, 0], poses[a, 1] - poses[b, 1]
+            if dx * dx + dy * dy > reach * reach:
+                continue
+            one = corners[offsets[a] : offsets[a + 1]]
+            other = corners[offsets[b] : offsets[b + 1]]
+            if convex_penetration(one, other)[0] > -gap:
+                parent[_root(parent, a)] = _root(parent, b)
+    restless = np.zeros(count, dtype=np.bool_)
+    for k in range(count):
+        if not quiet[k]:
+            restless[_root(parent, k)] = True
+    last = np.full(count, -1)  # of the members found so far of the group with this root
+    first = np.full(count, -1)
+    for k in range(count):
+        root = _root(parent, k)
+        if restless[root]:
+            continue
+        if last[root] < 0:
+            first[root] = k
+        else:
+            asleep[1 + last[root]] = 1 + k
+        asleep[1 + k] = 1 + first[root]
+        last[root] = k
+
+
+def rest_gap(radii: FloatArray) -> float:
+    """Objects closer than this [m] may touch: a hundredth of the smallest one's radius."""
+    return 0.01 * float(radii.min()) if len(radii) else math.inf

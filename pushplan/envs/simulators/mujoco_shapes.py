@@ -1,0 +1,152 @@
+"""Upright prisms for MuJoCo: outlines of the plane, given a height."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from pushplan.world.checks import FloatArray
+from pushplan.world.outline import centroid, signed_area
+
+Color = tuple[float, float, float]
+
+FLOOR_BIT, STATIC_BIT, OBJECT_BIT, ROBOT_BIT, WHEEL_BIT = 1, 2, 4, 8, 16
+"""Kinds of geoms, for MuJoCo's contact filter."""
+
+
+@dataclass(frozen=True)
+class Surface:
+    """What a geom collides with, and how it grips.
+
+    MuJoCo takes the friction of a pair from the geom of the higher priority, and from the greater
+    coefficient where priorities are equal.
+
+    Args:
+        kind: what it is, one of the bits above.
+        meets: the kinds of geoms it collides with.
+        friction: sliding friction coefficient; contacts are frictionless where it is 0.
+        priority: the higher one decides the friction of a pair.
+        color: red, green, blue in [0, 1].
+    """
+
+    kind: int
+    meets: int
+    friction: float
+    priority: int
+    color: Color
+
+    def options(self) -> dict[str, Any]:
+        """Keyword arguments of ``add_geom``; the mass is stated on the body."""
+        return {
+            "contype": self.kind,
+            "conaffinity": self.meets,
+            "condim": 3 if self.friction > 0.0 else 1,
+            "friction": [self.friction, 0.0, 0.0],
+            "priority": self.priority,
+            "rgba": [*self.color, 1.0],
+            "mass": 0.0,
+        }
+
+
+def as_rectangle(outline: FloatArray) -> tuple[FloatArray, FloatArray, float] | None:
+    """Centre (2,), half sides (2,) [m] and heading [rad] of an outline, None if not rectangular."""
+    if len(outline) != 4:
+        return None
+    edges = np.roll(outline, -1, axis=0) - outline
+    lengths = np.hypot(edges[:, 0], edges[:, 1])
+    right_angle = 1e-9 * lengths[0] * lengths[1]
+    if abs(edges[0] @ edges[1]) > right_angle or np.abs(edges[0] + edges[2]).max() > 1e-9:
+        return None
+    heading = math.atan2(edges[0, 1], edges[0, 0])
+    return outline.mean(axis=0), 0.5 * lengths[:2], heading
+
+
+def yaw_quaternion(heading: float) -> FloatArray:
+    """(4,) w, x, y, z of a turn about the vertical axis."""
+    return np.array([math.cos(0.5 * heading), 0.0, 0.0, math.sin(0.5 * heading)])
+
+
+def add_prism(
+    spec: Any, body: Any, name: str, outline: FloatArray, low: float, high: float, surface: Surface
+) -> None:
+    """Give a body an upright prism.
+
+    Args:
+        spec: the model, which gets a mesh where the outline is not a rectangle.
+        body: MjsBody that gets the geom.
+        name: of the geom and the mesh.
+        outline: (N, 2) convex corners in the frame of the body [m].
+        low: lower end in the frame of the body [m].
+        high: upper end [m].
+        surface: contact and colour.
+    """
+    box = as_rectangle(outline)
+    if box is not None:
+        center, half, heading = box
+        body.add_geom(
+            name=name,
+            type=mujoco.mjtGeom.mjGEOM_BOX,
+            pos=[*center, 0.5 * (low + high)],
+            size=[*half, 0.5 * (high - low)],
+            quat=yaw_quaternion(heading),
+            **surface.options(),
+        )
+        return
+    count = len(outline)
+    corners = np.empty((2, count, 3))
+    corners[..., :2] = outline
+    corners[0, :, 2], corners[1, :, 2] = low, high
+    mesh = spec.add_mesh(name=name, uservert=corners.ravel(), userface=_prism_faces(count))
+    mesh.inertia = mujoco.mjtMeshInertia.mjMESH_INERTIA_CONVEX
+    body.add_geom(name=name, type=mujoco.mjtGeom.mjGEOM_MESH, meshname=name, **surface.options())
+
+
+def _prism_faces(count: int) -> FloatArray:
+    """Triangles of a prism whose lower corners are 0 to N - 1 and upper ones N to 2 N - 1."""
+    around = np.arange(count)
+    after = (around + 1) % count
+    sides = np.concatenate(
+        [
+            np.stack([around, after, after + count], axis=1),
+            np.stack([around, after + count, around + count], axis=1),
+        ]
+    )
+    fan = np.arange(1, count - 1)
+    lid = np.stack([np.full(count - 2, count), fan + count, fan + 1 + count], axis=1)
+    base = np.stack([np.zeros(count - 2, dtype=int), fan + 1, fan], axis=1)
+    faces: FloatArray = np.concatenate([sides, lid, base]).ravel()
+    return faces
+
+
+def prism_inertia(outline: FloatArray, height: float, mass: float) -> tuple[FloatArray, FloatArray]:
+    """Centre of mass and inertia of an upright prism of uniform density.
+
+    Args:
+        outline: (N, 2) corners, counter-clockwise [m].
+        height: [m].
+        mass: [kg].
+
+    Returns:
+        Centroid (2,) [m] and (6,) inertia about it: xx, yy, zz, xy, xz, yz [kg m²].
+    """
+    center = centroid(outline)
+    p = outline - center
+    q = np.roll(p, -1, axis=0)
+    cross = p[:, 0] * q[:, 1] - q[:, 0] * p[:, 1]
+    scale = mass / signed_area(outline)
+    # second moments of area of a polygon, as sums over its edges
+    xx = scale / 12.0 * float(cross @ (p[:, 0] ** 2 + p[:, 0] * q[:, 0] + q[:, 0] ** 2))
+    yy = scale / 12.0 * float(cross @ (p[:, 1] ** 2 + p[:, 1] * q[:, 1] + q[:, 1] ** 2))
+    mixed = 2.0 * (p[:, 0] * p[:, 1] + q[:, 0] * q[:, 1]) + p[:, 0] * q[:, 1] + q[:, 0] * p[:, 1]
+    xy = scale / 24.0 * float(cross @ mixed)
+    tall = mass * height * height / 12.0
+    return center, np.array([yy + tall, xx + tall, xx + yy, -xy, 0.0, 0.0])
+
+
+def color_of(rgb: tuple[int, int, int]) -> Color:
+    """A colour of the drawing room in MuJoCo's units."""
+    return rgb[0] / 255.0, rgb[1] / 255.0, rgb[2] / 255.0

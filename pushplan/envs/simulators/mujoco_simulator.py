@@ -1,0 +1,254 @@
+"""The three-dimensional simulator, on MuJoCo. See docs/simulators-mujoco.md for its accuracy."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+
+import mujoco
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from pushplan.envs.simulators.base import Materials, Simulator, SimulatorState
+from pushplan.envs.simulators.mujoco_bodies import MujocoBodies
+from pushplan.envs.simulators.mujoco_camera import MujocoCamera
+from pushplan.envs.simulators.mujoco_follow import follow_path
+from pushplan.envs.simulators.mujoco_model import SceneKey
+from pushplan.envs.simulators.mujoco_options import MujocoOptions
+from pushplan.envs.trace import Trace
+from pushplan.interaction.model import Interaction
+from pushplan.world import InvalidInputError, Twist, World
+from pushplan.world.checks import FloatArray, array, frozen, number
+
+HELD_SHARE = 0.5
+"""A robot in contact that moves with less than this share of its command is held ..."""
+GAIN_SHARE = 0.25
+"""... unless it gains more than this share of the speed that it could gain in the step."""
+_NEGLIGIBLE = 0.05  # commands below this share of the robot's limit hold nobody
+
+
+class MujocoSimulator(Simulator):
+    """A robot on motor-driven wheels among boxes on the ground, or a ship among floes.
+
+    Every call of `step` begins from the state alone (`MujocoBodies.refresh`), so the simulator is
+    memoryless: the same state and commands give the same bytes. A scene built from a `World`
+    starts upright on the ground with the planar velocities that the world states.
+
+    `held`: the hull touched something at one of the step's samples, and in the second half of the
+    step the robot moved along its heading, or turned, with less than half of the commanded rate,
+    and was not speeding up either.
+
+    Args:
+        options: numerical and mechanical settings.
+    """
+
+    name = "mujoco"
+    needs_solids = True
+    has_camera = True
+
+    def __init__(self, options: MujocoOptions | None = None) -> None:
+        self.options = options or MujocoOptions()
+        self._bodies: MujocoBodies | None = None
+        self._camera: MujocoCamera | None = None
+        self._held = self._touched = False
+
+    def build(self, world: World, materials: Materials) -> None:
+        """Replace the scene with this one; a scene of the same shapes keeps its model.
+
+        Raises:
+            InvalidInputError: if ``materials.solids`` is None, or the robot cannot drive.
+        """
+        key = SceneKey.of(world, materials, self.options)
+        if self._bodies is None or self._bodies.key != key:
+            self._camera = None
+            self._bodies = MujocoBodies(world, materials, self.options)
+        self._world, self._materials = world, materials
+        self._held = self._touched = False
+        self._bodies.place(world)
+
+    @property
+    def _scene(self) -> MujocoBodies:
+        if self._bodies is None:
+            raise InvalidInputError("there is no scene yet: call build() first")
+        return self._bodies
+
+    def step(self, command: Twist, duration: float) -> Trace:
+        """Drive at a body-frame velocity for ``duration`` [s]."""
+        duration = number("duration", duration, low=0.0, open_low=True)
+        bodies, samples = self._scene, self.options.samples
+        start, interval = bodies.data.time, duration / samples
+        state = bodies.refresh()
+        try:
+            stored, touched = self._run(command, interval)
+        except mujoco.FatalError:  # the engine is strict about bodies that wake in a chain
+            bodies.wake_all(start, state)
+            stored, touched = self._run(command, interval)
+        bodies.check()
+        bodies.settle(stored[-min(2, samples)], interval)
+        bodies.data.time = start + duration
+        times = start + interval * np.arange(1, samples + 1)
+        times[-1] = bodies.data.time
+        poses = bodies.planar(stored)
+        self._held = touched and self._fell_short(poses[:, 0], command, interval)
+        return Trace(
+            frozen(times),
+            frozen(np.ascontiguousarray(poses[:, 0])),
+            frozen(np.ascontiguousarray(poses[:, 1:])),
+        )
+
+    def _run(self, command: Twist, interval: float) -> tuple[FloatArray, bool]:
+        """Advance by one step.
+
+        Returns:
+            (samples, nq) positions after each interval [s], and whether the hull touched anything.
+        """
+        bodies = self._scene
+        self._command(command)
+        stored = np.empty((self.options.samples, bodies.model.nq))
+        self._touched = touched = False
+        for row in stored:
+            bodies.advance(interval)
+            row[:] = bodies.qpos
+            static, anything = bodies.touches
+            self._touched |= static
+            touched |= anything
+        return stored, touched
+
+    def _fell_short(self, poses: FloatArray, command: Twist, interval: float) -> bool:
+        """Whether the robot's speed or its turn rate is neither what was asked nor rising.
+
+        Args:
+            poses: (N, 3) of the robot, one interval apart; both halves are compared.
+            command: what was asked.
+            interval: [s].
+        """
+        robot, gains = self._world.robot, self._scene.accelerations
+        middle = len(poses) // 2
+        halves = (poses[: middle + 1], poses[middle:])
+        asked = command.linear, command.angular
+        for i, limit in enumerate((robot.max_speed, robot.max_turn_rate)):
+            wanted = abs(asked[i])
+            if wanted < _NEGLIGIBLE * limit or not 0 < middle < len(poses) - 1:
+                continue
+            first, second = (
+                math.copysign(1.0, asked[i]) * _rates(half)[i] / interval for half in halves
+            )
+            possible = min(gains[i] * middle * interval, wanted - first)
+            if second < HELD_SHARE * wanted and second - first <= GAIN_SHARE * possible:
+                return True
+        return False
+
+    def _command(self, command: Twist) -> None:
+        bodies = self._scene
+        if bodies.afloat:
+            bodies.ctrl[:] = command.linear, 0.0, command.angular
+        else:
+            bodies.ctrl[:] = bodies.wheel_speeds(command.linear, command.angular)
+
+    def follow(self, path: ArrayLike) -> Interaction:
+        """Drive the robot through poses at its full speed."""
+        poses: FloatArray = array("path", path, (None, 3))
+        if len(poses) == 0:
+            raise InvalidInputError("path must hold at least one pose")
+        start = self.world().moved(robot_pose=poses[0])
+        if self._scene.afloat and len(poses) > 1:  # a ship is long in getting under way
+            along = poses[1, :2] - poses[0, :2]
+            speed = start.robot.max_speed / max(float(np.hypot(*along)), 1e-9)
+            start = replace(start, robot_twist=np.array([*(speed * along), 0.0]))
+        self.build(start, self._materials)
+        found, jammed = follow_path(self, self._world.robot, poses)
+        return Interaction(found, self._world.movables.masses, jammed)
+
+    def world(self) -> World:
+        """A snapshot of the scene now."""
+        poses, twists = self._scene.poses(), self._scene.twists()
+        return replace(
+            self._world,
+            robot_pose=poses[0],
+            robot_twist=twists[0],
+            movables=self._world.movables.moved_to(poses[1:], twists[1:]),
+            time=self._scene.data.time,
+        )
+
+    def save(self) -> SimulatorState:
+        """The state now."""
+        bodies = self._scene
+        poses, twists = bodies.poses(), bodies.twists()
+        return SimulatorState(
+            bodies.data.time,
+            frozen(poses[0]),
+            frozen(twists[0]),
+            frozen(poses[1:]),
+            frozen(twists[1:]),
+            frozen(bodies.hidden()),
+        )
+
+    def restore(self, state: SimulatorState) -> None:
+        """Go back to a saved state of the same scene.
+
+        Raises:
+            InvalidInputError: if the state is not one of this scene.
+        """
+        bodies = self._scene
+        if state.hidden.shape != (bodies.hidden_size,):
+            raise InvalidInputError(
+                f"the state is of another scene: it has {state.hidden.size} hidden numbers, "
+                f"this scene {bodies.hidden_size}"
+            )
+        self._held = self._touched = False
+        bodies.load_hidden(state.time, state.hidden)
+
+    @property
+    def robot_pose(self) -> FloatArray:
+        """(3,) pose of the robot now."""
+        return self._scene.robot_pose()
+
+    @property
+    def object_poses(self) -> FloatArray:
+        """(K, 3) poses of the objects now."""
+        return self._scene.poses()[1:]
+
+    def remove(self, object_ids: Sequence[int]) -> None:
+        """Take objects off the floor."""
+        world, old = self.world(), self._scene
+        keep = ~np.isin(world.movables.ids, object_ids)
+        if len(object_ids) != (~keep).sum():
+            raise InvalidInputError(
+                f"cannot remove {list(object_ids)}, valid ids: {world.movables.ids.tolist()}"
+            )
+        touched, held = self._touched, self._held
+        hidden = old.hidden_without(np.flatnonzero(~keep))
+        self.build(replace(world, movables=world.movables.select(keep)), self._materials)
+        self._scene.load_hidden(world.time, hidden)
+        self._touched, self._held = touched, held
+
+    def photograph(self, width: int, height: int) -> NDArray[np.uint8]:
+        """(H, W, 3) picture of the whole scene, seen from the south and above.
+
+        Raises:
+            MissingDependencyError: if there is no way to draw without a display.
+        """
+        if self._camera is None or self._camera.size != (width, height):
+            self._camera = MujocoCamera(self._scene.model, width, height)
+        return self._camera.take(self._scene.qpos, self.world())
+
+    @property
+    def touched_static(self) -> bool:
+        """Whether the robot's hull touched something static at one of the last step's samples."""
+        return self._touched
+
+    @property
+    def held(self) -> bool:
+        """Whether the robot was kept from moving as commanded during the last step."""
+        return self._held
+
+
+def _rates(poses: FloatArray) -> tuple[float, float]:
+    """Mean way along the heading [m] and turn [rad] from one of (N, 3) poses to the next."""
+    first, last = poses[0], poses[-1]
+    count = max(len(poses) - 1, 1)
+    turn = math.remainder(float(last[2] - first[2]), 2.0 * math.pi)
+    middle = float(first[2]) + 0.5 * turn
+    way = (last[0] - first[0]) * math.cos(middle) + (last[1] - first[1]) * math.sin(middle)
+    return float(way) / count, turn / count
