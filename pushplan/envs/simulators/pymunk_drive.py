@@ -59,7 +59,6 @@ class _Moved(enum.Enum):
     ALL = enum.auto()
     SOME = enum.auto()
     NOTHING = enum.auto()
-    TOO_FAR = enum.auto()
 
 
 class PymunkDriver:
@@ -153,8 +152,12 @@ class PymunkDriver:
                 middle = heading + half
                 vx, vy = advancing * math.cos(middle), advancing * math.sin(middle)
                 first = i == 0 and j == 0
-                outcome = self._substep(vx, vy, w, h, first=first, careful=careful)
-                if outcome is _Moved.TOO_FAR:
+                # a jam needs something static, so most substeps do without a way back
+                if first or careful or bodies.static_contacts:
+                    outcome = self._substep(vx, vy, w, h, first=first)
+                elif self._try(vx, vy, w, h, self._limit):
+                    outcome = _Moved.ALL
+                else:
                     return None
                 if outcome is _Moved.NOTHING:  # nor will it in the rest of the step
                     rows[i:] = bodies.read()
@@ -189,19 +192,14 @@ class PymunkDriver:
         """
         self._bodies.load(active, start)
         for i in range(count):
-            if self._substep(*velocity, h, first=i == 0, careful=True) is not _Moved.ALL:
+            if self._substep(*velocity, h, first=i == 0) is not _Moved.ALL:
                 return False, self._bodies.read()
         return True, self._bodies.read()
 
-    def _substep(
-        self, vx: float, vy: float, w: float, h: float, *, first: bool, careful: bool
-    ) -> _Moved:
+    def _substep(self, vx: float, vy: float, w: float, h: float, *, first: bool) -> _Moved:
         """Move everything by ``h`` seconds, the robot at a velocity in the world frame."""
         bodies = self._bodies
         limit = self._limit
-        # a jam needs something static, so most substeps do without the check
-        if not (first or careful or bodies.static_contacts):
-            return _Moved.ALL if self._try(vx, vy, w, h, limit) else _Moved.TOO_FAR
         packed = bodies.snapshot()
         unknown = first or not self._measured  # how deep the overlaps are that were there before
         allowed = limit if unknown else max(limit, self._deepest)
