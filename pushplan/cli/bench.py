@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
-from pushplan.cli.common import add_command, positive, say, whole
+from pushplan.cli.common import add_command, add_honest_time, positive, say, whole
 
 if TYPE_CHECKING:
     from pushplan.evaluation import ResultRow
@@ -64,6 +64,7 @@ def add(commands: Any) -> None:
     parser.add_argument(
         "--memory", type=positive, metavar="MB", help="memory of a worker beyond which it fails"
     )
+    add_honest_time(parser)
     parser.add_argument(
         "--retry-failed", action="store_true", help="run jobs again that raised, hung or crashed"
     )
@@ -88,6 +89,7 @@ def run(options: argparse.Namespace) -> int:
                 observation=options.observation,
                 memory_limit_mb=options.memory,
                 retry_failed=options.retry_failed,
+                honest_time=options.honest_time,
                 progress=progress,
             )
         except KeyboardInterrupt:

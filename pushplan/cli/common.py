@@ -23,6 +23,17 @@ def add_command(
     return parser
 
 
+def add_honest_time(parser: argparse.ArgumentParser) -> None:
+    """Add the option that lets time pass while a policy computes."""
+    parser.add_argument(
+        "--honest-time",
+        type=positive,
+        metavar="FACTOR",
+        help="let the world go on while the policy computes, FACTOR seconds for each second "
+        "(default: it stands still)",
+    )
+
+
 def whole(low: int) -> Callable[[str], int]:
     """An option type: a whole number that is at least ``low``."""
 
@@ -47,6 +58,20 @@ def positive(text: str) -> float:
     if not 0.0 < value < float("inf"):
         raise argparse.ArgumentTypeError(f"must be positive and finite, got {text}")
     return value
+
+
+def check_folder(path: str | None) -> None:
+    """Refuse a file in a folder that is not there: better now than after a long run.
+
+    Raises:
+        InvalidInputError: if its folder does not exist.
+    """
+    from pathlib import Path
+
+    from pushplan.world import InvalidInputError
+
+    if path is not None and not Path(path).absolute().parent.is_dir():
+        raise InvalidInputError(f"there is no folder {Path(path).parent} for {path!r}")
 
 
 def say(text: str) -> None:

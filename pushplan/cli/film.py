@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from pushplan.cli.common import check_folder
 from pushplan.cli.scoreboard import Scoreboard, closing_lines
 from pushplan.drawing import draw_world, save_animation, save_image
 from pushplan.drawing.files import Frame
@@ -33,8 +34,7 @@ class Camera:
         self.path = Path(path)
         if self.path.suffix.lower() not in ENDINGS:
             raise InvalidInputError(f"a picture ends in {', '.join(ENDINGS)}, got {path!r}")
-        if not self.path.absolute().parent.is_dir():
-            raise InvalidInputError(f"there is no folder {self.path.parent} for {path!r}")
+        check_folder(path)
         self._steps: list[tuple[World, Plan | None]] = []
 
     def __call__(self, step: int, world: World, policy: Policy) -> None:

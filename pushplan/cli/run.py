@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING, Any
 
-from pushplan.cli.common import add_command, milliseconds, say
+from pushplan.cli.common import add_command, add_honest_time, check_folder, milliseconds, say
 from pushplan.cli.scenario_options import add_scenario_options, scenario_of
 
 if TYPE_CHECKING:
@@ -26,7 +26,13 @@ def add(commands: Any) -> None:
     parser = add_command(commands, "run", "run one policy on one scenario", _EXAMPLES, run)
     add_scenario_options(parser)
     parser.add_argument("--policy", required=True, metavar="NAME", help="as in 'pushplan bench'")
-    parser.add_argument("--observation", choices=("auto", "image", "state"), default="auto")
+    parser.add_argument(
+        "--observation",
+        metavar="NAME",
+        default="auto",
+        help="of the task, such as image or state; by default what the policy asks for",
+    )
+    add_honest_time(parser)
     parser.add_argument("--render", metavar="FILE", help="picture or film: .png, .gif or .mp4")
     parser.add_argument("--live", action="store_true", help="show the episode in a window")
     parser.add_argument("--out", metavar="episode.npz", help="write the recorded episode")
@@ -39,6 +45,7 @@ def run(options: argparse.Namespace) -> int:
     from pushplan.evaluation.execute import rehearse
 
     scenario = scenario_of(options)
+    check_folder(options.out)
     camera = Camera(options.render) if options.render else None
     spec = parse_policy(options.policy)
     policy = spec.make()
@@ -47,7 +54,9 @@ def run(options: argparse.Namespace) -> int:
     env = settings.environment(scenario, policy, render_mode=mode)
     rehearse(Job(spec, scenario), settings)  # so that no timing holds loading and compiling
     try:
-        episode = run_episode(env, policy, scenario, observer=camera)
+        episode = run_episode(
+            env, policy, scenario, observer=camera, honest_time=options.honest_time
+        )
     finally:
         env.close()
     _print(spec.label, scenario, episode)
@@ -79,6 +88,8 @@ def _print(label: str, scenario: Scenario, episode: Episode) -> None:
             f"  planning: {len(times)} calls, median {milliseconds(np.median(times))}, "
             f"max {milliseconds(times.max())}"
         )
+    if (factor := episode.about.get("honest_time")) is not None:
+        say(f"  honest time: a second of computing was {factor:g} s for the robot")
     if len(episode.act_times_s):
         times = episode.act_times_s
         say(

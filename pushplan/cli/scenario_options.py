@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import argparse
+import re
 from typing import TYPE_CHECKING, Any
 
 from pushplan.cli.common import whole
 
 if TYPE_CHECKING:
     from pushplan.scenarios import Scenario
+
+_SCIENTIFIC = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)[eE][-+]?\d+")
+"""Numbers that YAML 1.1 takes for text, such as 1e-3."""
 
 
 def add_scenario_options(parser: argparse.ArgumentParser) -> None:
@@ -42,7 +46,10 @@ def scenario_of(options: argparse.Namespace) -> Scenario:
 
     shown = {"boxes": options.boxes, "shape": options.shape}
     given: dict[str, Any] = {key: value for key, value in shown.items() if value is not None}
-    given.update(_variation(text) for text in options.variations)
+    for name, value in map(_variation, options.variations):
+        if name in given:
+            raise InvalidInputError(f"variation {name!r} is given twice")
+        given[name] = value
     if (options.suite is None) == (options.task is None):
         raise InvalidInputError("give either a SUITE or --task NAME, see --help")
     if options.suite is None:
@@ -63,4 +70,8 @@ def _variation(text: str) -> tuple[str, Any]:
     name, equals, value = text.partition("=")
     if not equals or not name:
         raise InvalidInputError(f"--set takes NAME=VALUE, got {text!r}")
-    return name, yaml.safe_load(value)
+    try:
+        return name, float(value) if _SCIENTIFIC.fullmatch(value) else yaml.safe_load(value)
+    except yaml.YAMLError as error:
+        problem = " ".join(str(error).split())
+        raise InvalidInputError(f"--set {name}: cannot read {value!r}: {problem}") from error

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING, Any
 
-from pushplan.cli.common import add_command, positive, say
+from pushplan.cli.common import add_command, check_folder, positive, say
 from pushplan.cli.scenario_options import add_scenario_options, scenario_of
 
 if TYPE_CHECKING:
@@ -49,7 +49,7 @@ def add(commands: Any) -> None:
 def run(options: argparse.Namespace) -> int:
     """Open a window, drive, print the scores, write the episode."""
     scenario = scenario_of(options)
-    _check_folder(options.out)
+    check_folder(options.out)
     env = _environment(scenario, options.action)
     from pushplan.cli.cockpit import drive
     from pushplan.cli.keyboard import Keyboard
@@ -102,13 +102,3 @@ def _environment(scenario: Scenario, action: str | None) -> Any:
             f"{', '.join(ACTIONS)} (it has: {', '.join(known)})"
         )
     return make(scenario, observation="state", action=action or usable[0])
-
-
-def _check_folder(out: str | None) -> None:
-    """Better now than after half an hour of driving."""
-    from pathlib import Path
-
-    from pushplan.world import InvalidInputError
-
-    if out is not None and not Path(out).absolute().parent.is_dir():
-        raise InvalidInputError(f"there is no folder {Path(out).parent} for {out!r}")

@@ -1,9 +1,34 @@
 """Following a plan within the robot's limits."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
 from pushplan.control.drive_to import DriveTo
 from pushplan.control.limits import TwistLimiter, clamp_twist
 from pushplan.control.path_follower import PathFollower
 from pushplan.control.pure_pursuit import PurePursuit
 from pushplan.control.tracking import Progress
 
-__all__ = ["DriveTo", "PathFollower", "Progress", "PurePursuit", "TwistLimiter", "clamp_twist"]
+if TYPE_CHECKING:
+    from pushplan.control.mpc import MpcConfig, MpcTracker
+
+__all__ = [
+    "DriveTo",
+    "MpcConfig",
+    "MpcTracker",
+    "PathFollower",
+    "Progress",
+    "PurePursuit",
+    "TwistLimiter",
+    "clamp_twist",
+]
+
+
+def __getattr__(name: str) -> Any:
+    """Import the predictive tracker, with its compiled kernels, when it is first asked for."""
+    if name not in ("MpcConfig", "MpcTracker"):
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    import pushplan.control.mpc
+
+    return getattr(pushplan.control.mpc, name)

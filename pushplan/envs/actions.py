@@ -14,10 +14,11 @@ from pushplan.envs.tasks.base import Task
 from pushplan.world import Action, InvalidInputError, Twist, WheelSpeeds, World
 from pushplan.world.checks import FloatArray
 
-Motion = Callable[[FloatArray, bool], tuple[Twist, int] | None]
+Motion = Callable[[FloatArray, bool], tuple[Twist, float] | None]
 """Asked while one action lasts, with the robot's pose (3,) and whether it has just been held: the
-next command and the number of control steps for which it may stand if the robot follows it exactly;
-None when the action is done."""
+next command and the number of control steps for which it may stand if the robot follows it exactly
+(less than one only for a command that has to be replaced before its step is over); None when the
+action is done."""
 
 
 class ActionMode(ABC):
@@ -73,6 +74,10 @@ class ActionMode(ABC):
             action = self._from_twist(self._twist(action))
         return self.read(action).astype(np.float32)
 
+    def afterwards(self, command: Twist) -> Twist:
+        """What the robot does after an action that ended with ``command``, until the next."""
+        return command
+
     @abstractmethod
     def _from_twist(self, twist: Twist) -> FloatArray:
         """The array that asks for a twist, not clipped."""
@@ -90,6 +95,17 @@ def _once(command: Twist) -> Motion:
     """A motion of one control step."""
     commands = iter(((command, 1),))
     return lambda robot_pose, held: next(commands, None)
+
+
+def waiting(command: Twist, periods: float = 1.0, *, then: Motion | None = None) -> Motion:
+    """A command for some time, one control step at most, and then another motion."""
+    first = iter(((command, periods),))
+
+    def motion(robot_pose: FloatArray, held: bool) -> tuple[Twist, float] | None:
+        wanted = next(first, None)
+        return then(robot_pose, held) if wanted is None and then is not None else wanted
+
+    return motion
 
 
 class TurnRateAction(ActionMode):

@@ -6,7 +6,7 @@ from typing import NoReturn
 
 import numpy as np
 
-from pushplan.control import DriveTo
+from pushplan.control import DriveTo, clamp_twist
 from pushplan.envs.actions import ActionMode, Motion
 from pushplan.envs.tasks.base import Task
 from pushplan.geometry import VisibilityGraph
@@ -16,7 +16,7 @@ from pushplan.world.outline import transform
 
 
 def _motion(driver: DriveTo) -> Motion:
-    def next_command(robot_pose: FloatArray, held: bool) -> tuple[Twist, int] | None:
+    def next_command(robot_pose: FloatArray, held: bool) -> tuple[Twist, float] | None:
         command = driver.command(robot_pose, held=held)
         return None if command is None else (command, driver.periods)
 
@@ -43,6 +43,10 @@ class HeadingAction(ActionMode):
         heading = float(action[0]) * np.pi
         target = self._step * np.array([[np.cos(heading), np.sin(heading)]])
         return _motion(DriveTo(self.robot, transform(world.robot_pose, target), self._period))
+
+    def afterwards(self, command: Twist) -> Twist:
+        """It stands."""
+        return clamp_twist(self.robot, 0.0, 0.0)
 
     def _from_twist(self, twist: Twist) -> NoReturn:
         raise InvalidInputError(f"action mode 'heading' takes no velocities, got {twist!r}")
@@ -78,6 +82,10 @@ class WaypointAction(ActionMode):
             if len(path.points) > 1:
                 return path.points[1:]
         return target[None]
+
+    def afterwards(self, command: Twist) -> Twist:
+        """It stands."""
+        return clamp_twist(self.robot, 0.0, 0.0)
 
     def _from_twist(self, twist: Twist) -> NoReturn:
         raise InvalidInputError(f"action mode 'waypoint' takes no velocities, got {twist!r}")

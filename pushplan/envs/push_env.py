@@ -10,8 +10,10 @@ import numpy as np
 from gymnasium.spaces import Box
 from numpy.typing import ArrayLike, NDArray
 
-from pushplan.envs.actions import ActionMode
+from pushplan.control import clamp_twist
+from pushplan.envs.actions import ActionMode, Motion, waiting
 from pushplan.envs.registry import ACTIONS, SIMULATORS, TASKS, default_preset, look_up
+from pushplan.envs.roster import Roster
 from pushplan.envs.simulators.base import Simulator
 from pushplan.envs.tasks.base import ObservationBuilder, Outcome, Task
 from pushplan.envs.trace import Trace
@@ -22,7 +24,6 @@ from pushplan.world import (
     ClearanceArea,
     InvalidInputError,
     MissingDependencyError,
-    Movables,
     PushplanError,
     Receptacle,
     ScenarioError,
@@ -30,7 +31,7 @@ from pushplan.world import (
     World,
     stream,
 )
-from pushplan.world.checks import IntArray, frozen
+from pushplan.world.checks import frozen, integer, number
 
 RENDER_MODES = ("human", "rgb_array", "camera")
 CAMERA_SIZE = (640, 480)
@@ -87,9 +88,12 @@ class PushEnv(gymnasium.Env[NDArray[Any], NDArray[Any]]):
         action = _chosen_action(task_class, action)
         mode: type[ActionMode] = look_up("action", ACTIONS, action)
         preset = default_preset(task, simulator) if preset is None else preset
+        if preset not in task_class.presets:
+            raise UnknownNameError(f"preset of {task}", preset, task_class.presets)
         self.metadata = _metadata(engine)
         self.render_mode = _checked_render_mode(render_mode, engine)
-        self.task = task_class(preset=preset, variations=variations or {}, action=action)
+        variations = {} if variations is None else variations
+        self.task = task_class(preset=preset, variations=variations, action=action)
         if engine.needs_solids and self.task.materials.solids is None:
             raise ScenarioError(
                 f"{task}: simulator {simulator!r} needs a third dimension, which preset "
@@ -97,11 +101,13 @@ class PushEnv(gymnasium.Env[NDArray[Any], NDArray[Any]]):
             )
         if observation is None or isinstance(observation, str):
             observation = self.task.observation(observation or task_class.observations[0])
+        if not hasattr(observation, "observe"):
+            raise UnknownNameError(f"observation of {task}", observation, task_class.observations)
         self._builder: ObservationBuilder = observation
         self._simulator = engine()
         self._mode = mode(self.task)
         self._window: Window | None = None
-        self._first_seed = seed
+        self._first_seed = None if seed is None else integer("seed", seed, low=0)
         self._world: World | None = None
         self._trace: Trace | None = None
         self._over = "reset() has not been called"
@@ -145,16 +151,19 @@ class PushEnv(gymnasium.Env[NDArray[Any], NDArray[Any]]):
             options: none are known.
         """
         if options:
-            raise InvalidInputError(f"reset() knows no options, got {sorted(options)}")
+            raise InvalidInputError(f"reset() knows no options, got {options!r:.80}")
+        if seed is not None:
+            seed = integer("seed", seed, low=0)
         if seed is None and self._first_seed is not None:
             seed = self._first_seed
         self._first_seed = None
         super().reset(seed=seed)
-        layout = int(self.np_random.integers(_SEED_LIMIT)) if seed is None else int(seed)
+        layout = int(self.np_random.integers(_SEED_LIMIT)) if seed is None else seed
         world = self.task.start(stream(layout, "layout"))
         self._simulator.build(world, self.task.materials)
         self._world = world
-        self._roster = _Roster(world.movables)
+        self._meanwhile = clamp_twist(world.robot, 0.0, 0.0)
+        self._roster = Roster(world.movables)
         self._trace = Trace(
             frozen(np.array([world.time])), world.robot_pose[None], world.movables.poses[None]
         )
@@ -175,16 +184,57 @@ class PushEnv(gymnasium.Env[NDArray[Any], NDArray[Any]]):
             EpisodeOverError: if the episode has ended or not begun.
             InvalidInputError: if the action is not finite or has the wrong shape.
         """
+        return self._carry_out(self._started(action))
+
+    def step_late(
+        self, action: ArrayLike, lag: float
+    ) -> tuple[NDArray[Any], float, bool, bool, dict[str, Any]]:
+        """Carry out one action that comes some time after the scene was observed.
+
+        Until then the robot goes on as it was commanded last; a robot that was commanded to go to
+        a point has stopped there. Before the first action a differential drive stands and a
+        constant-speed robot goes straight on. The time is simulated, counts for the task like any
+        other, and is part of this step's reward and trace.
+
+        Args:
+            action: as for `step`.
+            lag: how late it comes [s].
+
+        Raises:
+            EpisodeOverError, InvalidInputError: as `step`.
+        """
+        motion = self._started(action)
+        period = self.task.control_step
+        whole, rest = divmod(number("lag", lag, low=0.0), period)
+        steps = [*(waiting(self._meanwhile) for _ in range(int(whole))), motion]
+        if rest > 1e-9 * period:
+            steps[-1] = waiting(self._meanwhile, rest / period, then=motion)
+        rewards, work, held, traces = 0.0, 0.0, False, []
+        for part in steps:
+            observation, reward, terminated, truncated, info = self._carry_out(part)
+            rewards, work, held = rewards + reward, work + info["work"], held or info["held"]
+            traces.append(self.trace)
+            if terminated or truncated:
+                break
+        self._trace = Trace.join(traces)
+        info = {**info, "work": work, "held": held}
+        return observation, rewards, terminated, truncated, info
+
+    def _started(self, action: ArrayLike) -> Motion:
         if self._over:
             raise EpisodeOverError(f"{self._over}: call reset() before step()")
+        return self._mode.start(self._mode.read(action), self.world)
+
+    def _carry_out(self, motion: Motion) -> tuple[NDArray[Any], float, bool, bool, dict[str, Any]]:
+        """Simulate a motion to its end and score it."""
         before, simulator, roster = self.world, self._simulator, self._roster
-        motion = self._mode.start(self._mode.read(action), before)
         traces = []
         touched = held = now_held = False
         several = simulator.is_exact and not self.task.objects_leave
         while (wanted := motion(simulator.robot_pose, now_held)) is not None:
             command, periods = wanted
-            duration = self.task.control_step * (periods if several else 1)
+            duration = self.task.control_step * (periods if several else min(periods, 1))
+            self._meanwhile = self._mode.afterwards(command)
             traces.append(roster.widen(simulator.step(command, duration)))
             touched |= simulator.touched_static
             now_held = simulator.held
@@ -229,39 +279,6 @@ class PushEnv(gymnasium.Env[NDArray[Any], NDArray[Any]]):
             if self._window is None:
                 self._window = Window("pushplan", fps=self.metadata["render_fps"])
             self._window.show(_picture(self.world))
-
-
-class _Roster:
-    """The objects of the start, some of which may have left the floor."""
-
-    def __init__(self, movables: Movables) -> None:
-        self.present: IntArray = movables.ids
-        self._poses = np.array(movables.poses)
-        self._before = self._poses
-        self._masses = movables.masses
-        self._rows = np.arange(len(movables))
-        self._ids = movables.ids
-
-    def widen(self, trace: Trace) -> Trace:
-        """The trace of all objects of the start; one that has left keeps its last pose."""
-        if len(self.present) == len(self._ids):
-            self._poses = trace.object_poses[-1]
-            return trace
-        poses = np.repeat(self._poses[None], len(trace.times), axis=0)
-        poses[:, self._rows] = trace.object_poses
-        self._poses = poses[-1]
-        return Trace(trace.times, trace.robot_poses, frozen(poses))
-
-    def drop(self, ids: IntArray) -> None:
-        """Objects have left the floor."""
-        self._rows = self._rows[~np.isin(self.present, ids)]
-        self.present = self._ids[self._rows]
-
-    def work(self, trace: Trace) -> float:
-        """Mass times path length [kg m] since the last call."""
-        lengths = trace.object_lengths(self._before)
-        self._before = self._poses
-        return float(self._masses @ lengths)
 
 
 def make(
@@ -317,7 +334,9 @@ def make_env(
 def _chosen_action(task: type[Task], wanted: str | Sequence[str] | None) -> str:
     if wanted is None:
         return task.actions[0]
-    names = (wanted,) if isinstance(wanted, str) else tuple(wanted)
+    names = (
+        tuple(wanted) if isinstance(wanted, Sequence) and not isinstance(wanted, str) else (wanted,)
+    )
     for name in names:
         if name in task.actions:
             return name

@@ -129,6 +129,7 @@ def _configuration(
         "observation": settings.observation,
         "timeout_s": settings.timeout_s,
         "memory_limit_mb": memory_limit_mb,
+        **({} if settings.honest_time is None else {"honest_time": settings.honest_time}),
         **(about or {}),
     }
 

@@ -27,6 +27,7 @@ def bench(
     observation: str = "auto",
     memory_limit_mb: float | None = None,
     retry_failed: bool = False,
+    honest_time: float | None = None,
     progress: Progress | None = None,
 ) -> Results:
     """Run every policy on every scenario of a suite.
@@ -50,6 +51,8 @@ def bench(
         observation: ``"auto"``, ``"image"`` or ``"state"``, see `JobSettings`.
         memory_limit_mb: private memory of a worker at which allocations fail [MB].
         retry_failed: run jobs again whose row says that they failed.
+        honest_time: seconds of the world's clock for each second that a policy computes; None
+            for a world that stands still meanwhile. See `run_episode`.
         progress: told of every row.
 
     Raises:
@@ -62,7 +65,9 @@ def bench(
     jobs = [Job(spec, scenario) for scenario in scenarios for spec in specs]
     options: dict[str, Any] = {
         "workers": workers,
-        "settings": JobSettings(observation=observation, timeout_s=timeout_s),
+        "settings": JobSettings(
+            observation=observation, timeout_s=timeout_s, honest_time=honest_time
+        ),
         "memory_limit_mb": memory_limit_mb,
         "retry_failed": retry_failed,
         "about": {"suite": name, "suite_version": version, "first_seed": seed},

@@ -11,6 +11,7 @@ import numpy as np
 import pushplan
 from pushplan.world import (
     Episode,
+    InvalidInputError,
     Policy,
     PushplanError,
     Twist,
@@ -18,7 +19,10 @@ from pushplan.world import (
     World,
     stream,
 )
-from pushplan.world.checks import FloatArray
+from pushplan.world.checks import FloatArray, number
+
+Clock = Callable[[], float]
+"""Returns seconds, like `time.perf_counter`."""
 
 Observer = Callable[[int, World, Policy], None]
 """Called after the reset with 0 and after step i with i; sees the world and the policy."""
@@ -33,7 +37,13 @@ class InvalidActionError(PolicyError):
 
 
 def run_episode(
-    env: Any, policy: Policy, scenario: Any, *, observer: Observer | None = None
+    env: Any,
+    policy: Policy,
+    scenario: Any,
+    *,
+    observer: Observer | None = None,
+    honest_time: float | None = None,
+    clock: Clock = time.perf_counter,
 ) -> Episode:
     """Run ``policy`` in ``env`` from the start of ``scenario`` to the end of the episode.
 
@@ -46,12 +56,17 @@ def run_episode(
         policy: chooses the actions.
         scenario: what ``env`` was made for; gives the seed.
         observer: sees each step; for pictures and windows.
+        honest_time: seconds of the world's clock for each second that the policy computes; until
+            its action is there, the robot goes on as it was commanded last. None: the world stands
+            still while the policy computes.
+        clock: measures how long the policy takes [s].
 
     Raises:
+        InvalidInputError: if ``honest_time`` is negative, or ``env`` cannot simulate that time.
         PolicyError: if the policy raises.
         InvalidActionError: if it returns an action that is not finite or has the wrong shape.
     """
-    recording = Recording(policy, scenario)
+    recording = Recording(policy, scenario, honest_time=honest_time, clock=clock)
     recording.run(env, observer)
     return recording.episode()
 
@@ -63,10 +78,22 @@ class Recording:
         policy: chooses the actions.
         scenario: what is run.
         label: what results call the policy.
+        honest_time: see `run_episode`.
+        clock: measures how long the policy takes [s].
     """
 
-    def __init__(self, policy: Policy, scenario: Any, label: str = "") -> None:
+    def __init__(
+        self,
+        policy: Policy,
+        scenario: Any,
+        label: str = "",
+        *,
+        honest_time: float | None = None,
+        clock: Clock = time.perf_counter,
+    ) -> None:
         self.policy = policy
+        self.honest_time = checked_honest_time(honest_time)
+        self._clock = clock
         self.scenario = scenario
         self.label = label or type(policy).__name__
         self.started = False
@@ -91,15 +118,20 @@ class Recording:
         self._begin(world)
         rng = stream(self.scenario.seed, "policy")
         self._ask(self.policy.reset, world, rng)
+        self._keep_time(env)
         if observer is not None:
             observer(0, world, self.policy)
         ended = False
         while not ended:
-            begin = time.perf_counter()
+            begin = self._clock()
             action = self._ask(self.policy.act, world, observation)
-            elapsed = time.perf_counter() - begin
+            elapsed = self._clock() - begin
             command = checked_action(env, action)
-            observation, reward, terminated, truncated, info = env.step(command)
+            if self.honest_time is None:
+                observation, reward, terminated, truncated, info = env.step(command)
+            else:
+                lag = self.honest_time * blocking_time(self.policy, elapsed)
+                observation, reward, terminated, truncated, info = env.step_late(command, lag)
             world = env.world
             self._step(env.trace, command, float(reward), elapsed)
             self._completed = info.get("completed", self._completed)
@@ -135,8 +167,22 @@ class Recording:
                 "key": self.scenario.key,
                 "seed": self.scenario.seed,
                 "pushplan": pushplan.__version__,
+                **({} if self.honest_time is None else {"honest_time": self.honest_time}),
             },
         )
+
+    def _keep_time(self, env: Any) -> None:
+        """Tell a policy that plans beside driving how time passes in this episode."""
+        if self.honest_time is None:
+            return
+        if not callable(getattr(env, "step_late", None)):
+            raise InvalidInputError(
+                f"honest time needs an environment with a method step_late(action, lag), "
+                f"{type(env).__name__} has none"
+            )
+        keep_time = getattr(self.policy, "keep_time", None)
+        if callable(keep_time):
+            self._ask(keep_time, self.honest_time, self._clock)
 
     def _begin(self, world: World) -> None:
         self.started = True
@@ -160,6 +206,27 @@ class Recording:
             raise
         except (Exception, SystemExit) as error:
             raise PolicyError(describe(error)) from error
+
+
+def checked_honest_time(factor: float | None) -> float | None:
+    """The factor of honest time, None where the world stands still meanwhile.
+
+    Raises:
+        InvalidInputError: if it is no number, negative or not finite.
+    """
+    return None if factor is None else number("honest_time", factor, low=0.0)
+
+
+def blocking_time(policy: Policy, elapsed_s: float) -> float:
+    """How long the robot waited for an action [s].
+
+    Args:
+        policy: its attribute ``background_s``, if it has one, says how much of the call a robot
+            does beside driving, as `pushplan.planners.PlanFollower` plans.
+        elapsed_s: wall-clock time of the call [s].
+    """
+    beside = float(getattr(policy, "background_s", 0.0))
+    return max(elapsed_s - max(beside, 0.0), 0.0)
 
 
 def checked_action(env: Any, action: object) -> FloatArray:

@@ -69,7 +69,7 @@ def _execute(job: Job, settings: JobSettings) -> Outcome:
         return failed_outcome(
             job, Status.POLICY_ERROR, _short(describe(error)), traceback.format_exc()
         )
-    recording = Recording(policy, job.scenario, job.policy.label)
+    recording = Recording(policy, job.scenario, job.policy.label, honest_time=settings.honest_time)
     begin = time.perf_counter()
     status, reason, detail = Status.DONE, None, ""
     try:

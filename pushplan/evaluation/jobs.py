@@ -8,6 +8,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
+from pushplan.evaluation.episode import checked_honest_time
 from pushplan.evaluation.loading import load_object
 from pushplan.evaluation.policies import PolicySpec
 from pushplan.evaluation.rows import ResultRow, Status, blank_row
@@ -72,6 +73,8 @@ class JobSettings:
         grace_s: how much later a job is ended by force [s].
         rehearse: run the first steps of a policy's first job in each process once without
             recording them, so that loading and compiling are in nobody's planning times.
+        honest_time: seconds of the world's clock for each second that a policy computes; None
+            for a world that stands still meanwhile. See `run_episode`.
     """
 
     make_env: str | Callable[..., Any] = DEFAULT_ENV
@@ -79,11 +82,13 @@ class JobSettings:
     timeout_s: float | None = 300.0
     grace_s: float = 2.0
     rehearse: bool = True
+    honest_time: float | None = None
 
     def __post_init__(self) -> None:
         if self.timeout_s is not None:
             number("timeout_s", self.timeout_s, low=0.0, open_low=True)
         number("grace_s", self.grace_s, low=0.0)
+        checked_honest_time(self.honest_time)
 
     @property
     def force_after_s(self) -> float | None:

@@ -66,7 +66,9 @@ class Results:
     def titles(self) -> dict[str, str]:
         """Words for each setting."""
         known = self.about.get("settings", {})
-        return {setting: known.get(setting, setting) for setting in settings_of(self.rows)}
+        factor = self.about.get("configuration", {}).get("honest_time")
+        mode = "" if factor is None else f", honest time x {factor:g}"
+        return {setting: known.get(setting, setting) + mode for setting in settings_of(self.rows)}
 
     def summary(self) -> list[PolicySummary]:
         """What the rows say about each policy in each setting."""

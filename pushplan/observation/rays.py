@@ -25,18 +25,21 @@ def draw_ray(image: Image, x: float, y: float, dx: float, dy: float, value: int)
     rows, cols = image.shape
     if abs(dx) >= abs(dy):
         step = 1 if dx > 0.0 else -1
-        col = math.floor(x)
+        first = math.floor(x)
+        # from outside it goes on where it meets the image
+        col = max(first, -1) if step > 0 else min(first, cols)
         while 0 <= col < cols or (col < 0 and step > 0) or (col >= cols and step < 0):
-            along = 0.0 if col == math.floor(x) else (col + 0.5 - x) / dx
+            along = 0.0 if col == first else (col + 0.5 - x) / dx
             row = math.floor(y + along * dy)
             if 0 <= row < rows and 0 <= col < cols:
                 image[row, col] = value
             col += step
     else:
         step = 1 if dy > 0.0 else -1
-        row = math.floor(y)
+        first = math.floor(y)
+        row = max(first, -1) if step > 0 else min(first, rows)
         while 0 <= row < rows or (row < 0 and step > 0) or (row >= rows and step < 0):
-            along = 0.0 if row == math.floor(y) else (row + 0.5 - y) / dy
+            along = 0.0 if row == first else (row + 0.5 - y) / dy
             col = math.floor(x + along * dx)
             if 0 <= col < cols and 0 <= row < rows:
                 image[row, col] = value

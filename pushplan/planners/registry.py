@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import inspect
 from typing import Any, cast
 
 from pushplan.world import Planner, Policy, UnknownNameError
@@ -42,9 +43,9 @@ def make_planner(name: str, **options: Any) -> Planner:
         options: keyword arguments of the planner's class.
 
     Raises:
-        UnknownNameError: if there is no such planner.
+        UnknownNameError: if there is no such planner, or it has no such option.
     """
-    return cast(Planner, _load("planner", name, PLANNERS)(**options))
+    return cast(Planner, _made("planner", name, PLANNERS, options))
 
 
 def make_policy(name: str, **options: Any) -> Policy:
@@ -55,9 +56,18 @@ def make_policy(name: str, **options: Any) -> Policy:
         options: keyword arguments of the policy's factory.
 
     Raises:
-        UnknownNameError: if there is no such policy.
+        UnknownNameError: if there is no such policy, or it has no such option.
     """
-    return cast(Policy, _load("policy", name, POLICIES)(**options))
+    return cast(Policy, _made("policy", name, POLICIES, options))
+
+
+def _made(kind: str, name: str, table: dict[str, str], options: dict[str, Any]) -> Any:
+    factory = _load(kind, name, table)
+    signature = inspect.signature(factory)
+    for option in options:
+        if option not in signature.parameters:
+            raise UnknownNameError(f"option of {kind} {name!r}", option, signature.parameters)
+    return factory(**options)
 
 
 def _load(kind: str, name: str, table: dict[str, str]) -> Any:

@@ -22,6 +22,7 @@ SCHEMA = "pushplan-ice/1"
 ENDINGS = (".json", ".npz", ".npy")
 _OVERLAP = 1e-6
 """Floes may overlap by this share of the smaller one: rounding, where they touch."""
+_MAX_BYTES = 10**8
 _READ_ERRORS = (
     *(OSError, ValueError, EOFError, KeyError, MemoryError, RecursionError, RuntimeError),
     *(zipfile.BadZipFile, zlib.error),
@@ -123,6 +124,10 @@ def _read_npz(path: Path) -> tuple[Sequence[Any], object]:
     with np.load(path, allow_pickle=False) as archive:
         if not isinstance(archive, np.lib.npyio.NpzFile):
             raise SchemaError("this is no .npz archive")
+        members = archive.zip.infolist() if archive.zip else []
+        unpacked = sum(item.file_size for item in members)
+        if unpacked > _MAX_BYTES:
+            raise SchemaError(f"an archive may hold {_MAX_BYTES:,} bytes at most, got {unpacked:,}")
         known_keys("ice field", archive, ("vertices", "offsets", "bounds"), ("vertices", "offsets"))
         vertices = array("vertices", archive["vertices"], (None, 2))
         offsets = array("offsets", archive["offsets"], (None,), dtype=np.int64)

@@ -5,6 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from pushplan.envs import PushEnv
 from pushplan.envs.registry import ACTIONS, look_up
 from pushplan.envs.tasks.base import drive_of
 from pushplan.envs.tasks.maze_presets import PRESETS
@@ -144,3 +145,20 @@ def test_waypoint_that_cannot_be_reached_ends_where_the_robot_is_stopped():
 def test_places_take_no_velocities(name):
     with pytest.raises(InvalidInputError, match="takes no velocities"):
         mode(name).encode(Twist(0.1, 0.0))
+
+
+def test_a_robot_at_a_wall_makes_room_for_its_turn():
+    """Random headings drive it into walls and corners; it never stands there for long."""
+    env = PushEnv(task="box_delivery", observation="state", action="heading")
+    env.reset(seed=2)
+    rng = np.random.default_rng(2)
+    still = longest = 0
+    for _ in range(90):
+        before = env.world.robot_pose[:2]
+        *_, terminated, truncated, _ = env.step(rng.uniform(-1.0, 1.0, 1))
+        moved = np.hypot(*(env.world.robot_pose[:2] - before))
+        still = still + 1 if moved < 0.02 * env.task.heading_step else 0
+        longest = max(longest, still)
+        if terminated or truncated:
+            break
+    assert longest <= 5

@@ -24,7 +24,7 @@ from pushplan.evaluation import (
 )
 from pushplan.world import Episode, InvalidInputError
 
-SETTINGS = JobSettings(make_env=f"{HERE}:make_env", timeout_s=1.0, grace_s=0.3)
+SETTINGS = JobSettings(make_env=f"{HERE}:make_env", timeout_s=3.0, grace_s=0.5)
 
 
 def jobs_of(names: str, seeds: range = range(2)) -> list[Job]:

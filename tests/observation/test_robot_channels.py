@@ -199,3 +199,9 @@ def test_images_are_fast_enough_for_every_control_step(warm: None) -> None:
     world = World(world.robot, world.robot_pose, open_floor, world.movables, area)
     view.observe(world)
     assert quickest(lambda: [view.observe(world) for _ in range(10)], 5) / 10 < 1e-3
+
+
+@pytest.mark.parametrize("shift", [1e12, -1e12])
+def test_a_heading_line_from_far_away_takes_no_time(shift: float) -> None:
+    view = ImageObservation(("heading_line",), window=(4.0, 4.0), pixels=(40, 40), shift=shift)
+    assert view.observe(scene(MAPS["columns"], (5.0, 5.0, 1.0))).shape == (1, 40, 40)

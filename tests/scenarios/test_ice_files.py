@@ -182,3 +182,11 @@ def test_hostile_archives(tmp_path):
     np.save(tmp_path / "flat.npy", np.zeros(7))
     with pytest.raises(SchemaError, match=r"flat\.npy: the array of polygons must have shape"):
         load_ice(tmp_path / "flat.npy")
+
+
+def test_archives_that_unpack_to_a_flood_are_refused(tmp_path):
+    path = tmp_path / "flood.npz"
+    np.savez_compressed(path, vertices=np.zeros((7_000_000, 2)), offsets=[0, 7_000_000])
+    assert path.stat().st_size < 10**6
+    with pytest.raises(SchemaError, match=r"an archive may hold 100,000,000 bytes at most"):
+        load_ice(path)

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from pushplan.envs.simulators.water import Water
 from pushplan.envs.trace import Trace
 from pushplan.interaction.model import Interaction
-from pushplan.world import Twist, World
+from pushplan.world import InvalidInputError, Twist, World
 from pushplan.world.checks import ArrayRecord, FloatArray, frozen, number
 
 
@@ -70,6 +70,12 @@ class Materials:
         for key in ("robot_object", "object_object", "object_static", "object_ground"):
             value = number(f"friction {key}", getattr(self, key), low=0.0)
             object.__setattr__(self, key, value)
+        for key, kind in (("water", Water), ("solids", Solids)):
+            part = getattr(self, key)
+            if part is not None and not isinstance(part, kind):
+                raise InvalidInputError(
+                    f"{key} must be a {kind.__name__} or None, got {part!r:.60}"
+                )
         rolling = number("rolling_time", self.rolling_time, low=0.0, open_low=True)
         object.__setattr__(self, "rolling_time", rolling)
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -18,12 +19,14 @@ from pushplan.envs.trace import Trace
 from pushplan.geometry.obstacles import obstacle_distance, obstacles_of
 from pushplan.interaction.model import Interaction
 from pushplan.world import InvalidInputError, Twist, World
-from pushplan.world.checks import BoolArray, FloatArray, IntArray, array, frozen
+from pushplan.world.checks import BoolArray, FloatArray, IntArray, array, frozen, number
 
 _GLIDE_SAMPLES = 4
 """Poses recorded in a step in which nothing can happen; one where the robot drives straight."""
 _SAMPLED = 24.0
 """Steps of fewer substeps than this are sampled more coarsely."""
+_LEAST_SIZE = 0.01
+"""Objects far smaller than this share of the robot or of the others do not refine the steps."""
 _REST = 2e-4
 """Objects that move slower than this share of their size per second stop."""
 
@@ -46,25 +49,43 @@ class PymunkSimulator(Simulator):
 
     def build(self, world: World, materials: Materials) -> None:
         """Replace the scene with this one."""
-        options, robot = self.options, world.robot
+        robot = world.robot
         radii = world.movables.radii
         self._size = max(robot.inscribed_radius, 1e-3)
         if len(radii):
-            self._size = float(min(np.median(radii), 4.0 * radii.min()))
+            least = _LEAST_SIZE * max(self._size, float(np.median(radii)))
+            self._size = max(float(min(np.median(radii), 4.0 * radii.min())), least)
         self._materials = materials
         self._world = world
         self._obstacles = obstacles_of(world.static)
         self._momentum = Momentum.of(world, materials)
-        bodies = PymunkBodies(
-            world, materials, slop=options.slop * self._size, iterations=options.iterations
-        )
-        self._driver = PymunkDriver(bodies, robot, options, self._size)
+        self._driver = self._make_driver()
         self._time = world.time
         self._rows = _rows(world)
         self._held = self._touched = False
 
+    def _make_driver(self) -> PymunkDriver:
+        options = self.options
+        bodies = PymunkBodies(
+            self._world,
+            self._materials,
+            slop=options.slop * self._size,
+            iterations=options.iterations,
+        )
+        return PymunkDriver(bodies, self._world.robot, options, self._size)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Everything but the engine's own objects, which the rest decides."""
+        return {key: value for key, value in self.__dict__.items() if key != "_driver"}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(state)
+        if "_world" in state:
+            self._driver = self._make_driver()
+
     def step(self, command: Twist, duration: float) -> Trace:
         """Drive at a body-frame velocity for ``duration`` [s]."""
+        duration = number("duration", duration, low=0.0, open_low=True)
         radius = self._world.robot.circumscribed_radius
         speed = abs(command.linear) + abs(command.angular) * radius
         own = self._object_speeds() * duration

@@ -71,7 +71,11 @@ class AreaClearingTask(ManipulationTask):
         if preset not in PRESETS:
             raise UnknownNameError("preset of area_clearing", preset, PRESETS)
         self.preset: AreaClearingPreset = PRESETS[preset]
-        super().__init__(self.preset, AreaClearingVariations.read(variations or {}), action)
+        super().__init__(
+            self.preset,
+            AreaClearingVariations.read({} if variations is None else variations),
+            action,
+        )
         self._room = self.preset.layouts[self.variations.layout]
         self.static = self._static()
         half_x, half_y = self._room.area

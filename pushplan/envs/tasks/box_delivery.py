@@ -69,7 +69,11 @@ class BoxDeliveryTask(ManipulationTask):
         if preset not in PRESETS:
             raise UnknownNameError("preset of box_delivery", preset, PRESETS)
         self.preset: BoxDeliveryPreset = PRESETS[preset]
-        super().__init__(self.preset, BoxDeliveryVariations.read(variations or {}), action)
+        super().__init__(
+            self.preset,
+            BoxDeliveryVariations.read({} if variations is None else variations),
+            action,
+        )
         length, width = self.preset.rooms[self.variations.layout]
         self.bounds = (-0.5 * length, -0.5 * width, 0.5 * length, 0.5 * width)
         side = self.preset.receptacle

@@ -33,6 +33,8 @@ from pushplan.world import (
 from pushplan.world.checks import FloatArray, choice, integer, number
 from pushplan.world.outline import transform
 
+LEAST_SIZE = 0.01
+"""Least size of boxes, as a share of the preset's."""
 GAP = 0.01
 """Least distance between bodies at the start, as a share of the box size."""
 STATE_OBJECTS = 20
@@ -84,7 +86,8 @@ class ManipulationVariations(Variations):
     Args:
         layout: name of the layout.
         boxes: number of boxes, at least 1.
-        box_size: side of the boxes [m]; their least spacing grows with it.
+        box_size: side of the boxes [m], at least 1 % of the preset's; their least spacing grows
+            with it.
         box_yaw: headings of the boxes at the start, ``"aligned"`` or ``"random"``.
         wheeled: share of the boxes that stand on casters, 0 to 1.
         robot: one of the preset's robots.
@@ -151,6 +154,12 @@ class ManipulationTask(Task):
         self.waypoint_window = preset.windows[variations.layout]
         self.idle_time = self.idle_limits["heading"] * self.heading_step / self.robot.max_speed
         self.box_size = variations.box_size or preset.box_size
+        least = LEAST_SIZE * preset.box_size
+        if self.box_size < least:
+            raise ScenarioError(
+                f"{self.name}: box_size must be at least {least:g} m in this preset, "
+                f"got {self.box_size:g}"
+            )
         self.box_count = variations.boxes or preset.boxes[variations.layout]
         self._field: GeodesicField | None = None
         self._idle_actions, self._idle_since = 0, 0.0

@@ -107,7 +107,7 @@ class MazeTask(Task):
         if preset not in PRESETS:
             raise UnknownNameError("preset of the maze", preset, PRESETS)
         self.preset: MazePreset = PRESETS[preset]
-        self.variations = MazeVariations.read(variations or {})
+        self.variations = MazeVariations.read({} if variations is None else variations)
         try:
             self.robot = self.preset.robot(drive_of(action), self.variations.bumper)
         except InvalidInputError as error:

@@ -108,7 +108,7 @@ class ShipIceTask(Task):
         if action not in self.actions:
             raise UnknownNameError("action of ship_ice", action, self.actions)
         self.preset: ShipPreset = PRESETS[preset]
-        self.variations = ShipIceVariations.read(variations or {})
+        self.variations = ShipIceVariations.read({} if variations is None else variations)
         self.robot = self.preset.robot()
         self.control_step = self.preset.control_step
         self.materials = self.preset.materials

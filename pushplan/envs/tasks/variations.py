@@ -23,6 +23,8 @@ class Variations:
             UnknownNameError: if a name is none of the fields.
             ScenarioError: if a value makes no sense.
         """
+        if not isinstance(values, Mapping):
+            raise ScenarioError(f"{cls.task}: variations must be a mapping, got {values!r:.60}")
         valid = [field.name for field in fields(cls)]  # type: ignore[arg-type]
         for name in values:
             if name not in valid:

@@ -1,0 +1,310 @@
+"""Compiled assembly of the tracking problem: from a path and a nominal motion to P and q.
+
+The robot's motion under a constant twist is an exact arc, so the prediction has no discretisation
+error. Offset and heading error are linearised about a nominal motion (the last solution, moved on
+in time), which is a Gauss-Newton step of the nonlinear problem: the real-time iteration of Diehl,
+Bock and Schlöder (SIAM J. Control Optim. 43(5), 2005). The states are eliminated, which leaves a
+problem in the inputs alone whose constraints never change and can always be met.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from pushplan.world.checks import FloatArray
+
+
+class Track(NamedTuple):
+    """A path as the kernels read it."""
+
+    poses: FloatArray
+    """(M, 3) x, y [m], theta [rad]."""
+    lengths: FloatArray
+    """(M,) path length from the first pose [m]."""
+    speeds: FloatArray
+    """(M,) forward speed from each pose on [m/s]."""
+
+
+class Tuning(NamedTuple):
+    """Limits and weights, as `MpcConfig` and the robot give them."""
+
+    size: float
+    """R [m]"""
+    max_speed: float
+    max_turn_rate: float
+    max_acceleration: float
+    stops: bool
+    """Whether the robot stops at the end of the path."""
+    optimise_speed: bool
+    heading_weight: float
+    turn_weight: float
+    smoothness: float
+    terminal: float
+    speed_weight: float
+
+
+@njit(cache=True, nogil=True)
+def locate(track: Track, x: float, y: float, low: float, high: float) -> tuple[float, int, float]:
+    """Nearest point of the path between path lengths ``low`` and ``high`` [m].
+
+    Returns:
+        Its path length [m], the index of its segment and the share of the segment before it;
+        past the last pose the path goes on straight.
+    """
+    poses, lengths = track.poses, track.lengths
+    last = poses.shape[0] - 1
+    best, along, index, share = np.inf, lengths[last], last, 0.0
+    i = max(0, int(np.searchsorted(lengths, low, side="right")) - 1)
+    while i < last and lengths[i] <= high:
+        ax, ay = poses[i, 0], poses[i, 1]
+        ex, ey = poses[i + 1, 0] - ax, poses[i + 1, 1] - ay
+        square = ex * ex + ey * ey
+        t = 0.0
+        if square > 1e-18:
+            t = min(max(((x - ax) * ex + (y - ay) * ey) / square, 0.0), 1.0)
+        dx, dy = x - ax - t * ex, y - ay - t * ey
+        gap = dx * dx + dy * dy
+        if gap < best:
+            best, index, share = gap, i, t
+            along = lengths[i] + t * (lengths[i + 1] - lengths[i])
+        i += 1
+    if index >= last - 1 and (index == last or share >= 1.0):
+        cx, sy = np.cos(poses[last, 2]), np.sin(poses[last, 2])
+        over = (x - poses[last, 0]) * cx + (y - poses[last, 1]) * sy
+        along = lengths[last] + max(over, 0.0)
+        index, share = last, 0.0
+    return along, index, share
+
+
+@njit(cache=True, nogil=True)
+def errors(
+    track: Track, x: float, y: float, theta: float, index: int, share: float
+) -> tuple[float, float, float, float]:
+    """Offset [m, left positive], heading error [rad], path heading [rad] and curvature [1/m].
+
+    Between two poses the path is the arc that their headings ask for, not its chord.
+    """
+    poses = track.poses
+    last = poses.shape[0] - 1
+    i = min(index, last)
+    ax, ay, heading = poses[i, 0], poses[i, 1], poses[i, 2]
+    curvature, bulge = 0.0, 0.0
+    nx, ny = -np.sin(heading), np.cos(heading)
+    if i < last:
+        ex, ey = poses[i + 1, 0] - ax, poses[i + 1, 1] - ay
+        length = np.sqrt(ex * ex + ey * ey)
+        turn = poses[i + 1, 2] - heading
+        turn -= 2.0 * np.pi * np.round(turn / (2.0 * np.pi))
+        if length > 1e-9:
+            nx, ny = -ey / length, ex / length
+            slip = np.arctan2(ey, ex) - heading - 0.5 * turn
+            slip -= 2.0 * np.pi * np.round(slip / (2.0 * np.pi))
+            if abs(slip) < 0.1 * abs(turn):  # an arc; else the corner of a polyline
+                curvature = turn / length
+                bulge = -0.5 * turn * length * share * (1.0 - share)
+            ax, ay = ax + share * ex, ay + share * ey
+        heading += share * turn
+    offset = (x - ax) * nx + (y - ay) * ny - bulge
+    error = theta - heading
+    error -= 2.0 * np.pi * np.round(error / (2.0 * np.pi))
+    return offset, error, heading, curvature
+
+
+@njit(cache=True, nogil=True)
+def _speed_at(track: Track, along: float, index: int, tuning: Tuning, dt: float) -> float:
+    """Speed [m/s] that the plan has at a place, and that still allows to stop at its end."""
+    speed: float = min(track.speeds[index], tuning.max_speed)
+    if tuning.stops:
+        left = track.lengths[-1] - along
+        if left <= 1e-9:
+            return 0.0
+        speed = min(speed, left / dt, np.sqrt(2.0 * tuning.max_acceleration * left))
+    return speed
+
+
+@njit(cache=True, nogil=True)
+def arc(x: float, y: float, theta: float, v: float, w: float, dt: float, out: FloatArray) -> None:
+    """Motion under a constant twist: the change of pose, and its derivatives.
+
+    Args:
+        x, y, theta: pose [m, m, rad].
+        v: [m/s].
+        w: [rad/s].
+        dt: [s].
+        out: (9,) receives x, y, theta after it; dx, dy of the motion; d(x, y)/dw; d(x, y)/dv.
+    """
+    half = 0.5 * w * dt
+    if abs(half) > 1e-4:
+        sinc, slope = np.sin(half) / half, (np.cos(half) * half - np.sin(half)) / (half * half)
+    else:
+        sinc, slope = 1.0 - half * half / 6.0, -half / 3.0
+    c, s = np.cos(theta + half), np.sin(theta + half)
+    chord = v * dt * sinc
+    out[3], out[4] = chord * c, chord * s
+    out[0], out[1], out[2] = x + out[3], y + out[4], theta + w * dt
+    rate = v * dt * slope * 0.5 * dt
+    out[5] = rate * c - chord * s * 0.5 * dt
+    out[6] = rate * s + chord * c * 0.5 * dt
+    out[7], out[8] = dt * sinc * c, dt * sinc * s
+
+
+@njit(cache=True, nogil=True)
+def assemble(
+    track: Track,
+    tuning: Tuning,
+    pose: FloatArray,
+    along: float,
+    twist: FloatArray,
+    steps: FloatArray,
+    nominal: FloatArray,
+    hessian: FloatArray,
+    gradient: FloatArray,
+) -> None:
+    """Fill P and q of min 1/2 zᵀPz + qᵀz over z = (w_0 .. w_N-1 [, v_0 .. v_N-1]).
+
+    Turn rates are in units of ``max_turn_rate``, speeds in units of ``max_speed``.
+
+    Args:
+        track: the path.
+        tuning: limits and weights.
+        pose: (3,) where the robot is when the first command takes effect.
+        along: path length of its place on the path [m].
+        twist: (2,) speed [m/s] and turn rate [rad/s] of the command before the first.
+        steps: (N,) how long each command is held [s].
+        nominal: (N, 2) speed [m/s] and turn rate [rad/s] to linearise about; NaN where nothing is
+            known, which is then what the path asks for. Filled in place with what was used.
+        hessian: (n, n) receives P; n = N, or 2 N where the speed is optimised.
+        gradient: (n,) receives q.
+    """
+    count, n = steps.shape[0], gradient.shape[0]
+    hessian[:] = 0.0
+    gradient[:] = 0.0
+    jacobian = np.zeros((3, n))
+    rows = np.zeros((2, n))
+    out = np.empty(9)
+    here, place, speed = pose.copy(), along, twist[0]
+    unit = tuning.size / tuning.max_speed  # T [s]
+    _, index, share = locate(track, here[0], here[1], place, place)
+    bend = errors(track, here[0], here[1], here[2], index, share)[3]
+    for k in range(count):
+        dt = steps[k]
+        tau = dt / unit
+        wanted = _speed_at(track, place, index, tuning, dt)
+        if not (tuning.optimise_speed and np.isfinite(nominal[k, 0])):
+            reach = tuning.max_acceleration * dt
+            nominal[k, 0] = min(max(wanted, speed - reach), speed + reach)
+        speed = nominal[k, 0]
+        turning = min(max(speed * bend, -tuning.max_turn_rate), tuning.max_turn_rate)
+        if not np.isfinite(nominal[k, 1]):
+            nominal[k, 1] = turning
+        arc(here[0], here[1], here[2], speed, nominal[k, 1], dt, out)
+        _differentiate(jacobian, k, count, out, dt, tuning)
+        here[:] = out[:3]
+        place, index, share = locate(track, here[0], here[1], place, place + 2.0 * speed * dt)
+        offset, error, heading, bend = errors(track, here[0], here[1], here[2], index, share)
+        c, s = np.cos(heading), np.sin(heading)
+        away = 1.0 - bend * offset
+        for j in range(n):
+            ahead = c * jacobian[0, j] + s * jacobian[1, j]
+            rows[0, j] = (c * jacobian[1, j] - s * jacobian[0, j]) / tuning.size
+            rows[1, j] = jacobian[2, j] - bend * ahead / max(away, 0.2)
+        factor = tau * (tuning.terminal if k == count - 1 else 1.0)
+        _add(hessian, gradient, rows[0], offset / tuning.size, nominal, tuning, factor)
+        _add(hessian, gradient, rows[1], error, nominal, tuning, factor * tuning.heading_weight)
+        asked = (wanted / tuning.max_speed, turning / tuning.max_turn_rate)
+        before = twist[1] / tuning.max_turn_rate
+        _price_inputs(hessian, gradient, k, count, asked, before, tau, tuning)
+
+
+@njit(cache=True, nogil=True)
+def _differentiate(
+    jacobian: FloatArray, k: int, count: int, motion: FloatArray, dt: float, tuning: Tuning
+) -> None:
+    """Carry d(x, y, theta)/dz over the step ``k``, whose `arc` is ``motion``."""
+    for j in range(jacobian.shape[1]):
+        jacobian[0, j] -= motion[4] * jacobian[2, j]
+        jacobian[1, j] += motion[3] * jacobian[2, j]
+    jacobian[0, k] += motion[5] * tuning.max_turn_rate
+    jacobian[1, k] += motion[6] * tuning.max_turn_rate
+    jacobian[2, k] += dt * tuning.max_turn_rate
+    if tuning.optimise_speed:
+        jacobian[0, count + k] += motion[7] * tuning.max_speed
+        jacobian[1, count + k] += motion[8] * tuning.max_speed
+
+
+@njit(cache=True, nogil=True)
+def _price_inputs(
+    hessian: FloatArray,
+    gradient: FloatArray,
+    k: int,
+    count: int,
+    asked: tuple[float, float],
+    before: float,
+    tau: float,
+    tuning: Tuning,
+) -> None:
+    """Price the inputs of step ``k``: departing from what is asked for, and changing the turn.
+
+    Args:
+        hessian: P.
+        gradient: q.
+        k: the step.
+        count: N.
+        asked: speed and turn rate of the path, in the units of the problem.
+        before: turn rate of the command before the first.
+        tau: length of the step [T].
+        tuning: limits and weights.
+    """
+    scale = (tuning.max_turn_rate * tuning.size / tuning.max_speed) ** 2
+    _diagonal(hessian, gradient, k, asked[1], tau * tuning.turn_weight * scale)
+    if tuning.optimise_speed:
+        _diagonal(hessian, gradient, count + k, asked[0], tau * tuning.speed_weight)
+    calm = tuning.smoothness * scale / tau
+    hessian[k, k] += calm
+    if k == 0:
+        gradient[0] -= calm * before
+    else:
+        hessian[k - 1, k - 1] += calm
+        hessian[k - 1, k] -= calm
+        hessian[k, k - 1] -= calm
+
+
+@njit(cache=True, nogil=True)
+def _add(
+    hessian: FloatArray,
+    gradient: FloatArray,
+    row: FloatArray,
+    value: float,
+    nominal: FloatArray,
+    tuning: Tuning,
+    weight: float,
+) -> None:
+    """Add weight/2 (value + row (z - z_nominal))² to the cost."""
+    count, n = nominal.shape[0], row.shape[0]
+    for j in range(n):  # later inputs have no influence, and may not be known yet
+        if row[j] != 0.0:
+            turns = j < count
+            value -= row[j] * (
+                nominal[j, 1] / tuning.max_turn_rate
+                if turns
+                else nominal[j - count, 0] / tuning.max_speed
+            )
+    for j in range(n):
+        if row[j] == 0.0:
+            continue
+        part = weight * row[j]
+        gradient[j] += part * value
+        for i in range(n):
+            hessian[i, j] += part * row[i]
+
+
+@njit(cache=True, nogil=True)
+def _diagonal(
+    hessian: FloatArray, gradient: FloatArray, k: int, wanted: float, weight: float
+) -> None:
+    """Add weight/2 (z_k - wanted)² to the cost."""
+    hessian[k, k] += weight
+    gradient[k] -= weight * wanted

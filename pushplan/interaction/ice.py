@@ -1,0 +1,90 @@
+"""`IceInteraction`: quasi-static pushing with friction in a crowd, for open water."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from pushplan.interaction.ice_contacts import Crowd, Solver, make_memory, sweep_ice
+from pushplan.interaction.model import Interaction
+from pushplan.interaction.quasi_static import QuasiStatic
+from pushplan.world import World
+from pushplan.world.checks import FloatArray, array, integer, number
+from pushplan.world.errors import InvalidInputError
+
+STILL = 0.03
+"""Share of a step's motion that a body may be moved without a look at its neighbours."""
+
+
+@dataclass(frozen=True)
+class IceInteraction:
+    """Floes that push floes, with friction between all of them; nothing static.
+
+    The same physics as `QuasiStatic`, and friction between the objects as well. Contacts are found
+    once in each step instead of in each round of the solver, which in dense ice is many times
+    as fast. The defaults fit the two-dimensional Ship-Ice, where all friction is 1.
+
+    Args:
+        hull_friction: Coulomb coefficient between robot and objects.
+        friction: Coulomb coefficient between objects.
+        step: longest motion of the robot between two looks for contacts, in units of the median
+            radius of the objects.
+        iterations: Gauss-Seidel rounds in each step.
+
+    Raises:
+        InvalidInputError: if a value is out of range.
+    """
+
+    hull_friction: float = 1.0
+    friction: float = 1.0
+    step: float = 0.5
+    iterations: int = 16
+
+    def __post_init__(self) -> None:
+        number("hull_friction", self.hull_friction, low=0.0)
+        number("friction", self.friction, low=0.0)
+        number("step", self.step, low=0.0, high=1.0, open_low=True)
+        integer("iterations", self.iterations, low=1)
+
+    def crowd(self, world: World) -> Crowd:
+        """The world's shapes and masses as the kernels read them.
+
+        Raises:
+            InvalidInputError: if there is something static in it.
+        """
+        if world.static.convex_parts:
+            raise InvalidInputError(
+                "IceInteraction knows open water only, the world has "
+                f"{len(world.static.convex_parts)} static obstacles: use QuasiStatic"
+            )
+        bodies = QuasiStatic().bodies(world)
+        return Crowd(
+            bodies.robot_vertices,
+            bodies.robot_offsets,
+            bodies.robot_radius,
+            bodies.vertices,
+            bodies.offsets,
+            bodies.radii,
+            world.movables.masses,
+            bodies.inverse_gyration,
+        )
+
+    def solver(self, world: World) -> Solver:
+        """The numerical settings for the sizes in this world."""
+        radii = world.movables.radii
+        size = float(np.median(radii)) if len(radii) else world.robot.circumscribed_radius
+        step = self.step * size
+        return Solver(step, self.iterations, self.hull_friction, self.friction, STILL * step)
+
+    def sweep(self, world: World, path: ArrayLike) -> Interaction:
+        """Predict the motion of every object; see `InteractionModel.sweep`."""
+        robot_path: FloatArray = array("path", path, (None, 3))
+        if len(robot_path) == 0:
+            raise InvalidInputError("path must hold at least one pose, got none")
+        crowd = self.crowd(world)
+        poses = world.movables.poses.copy()
+        out = np.empty((len(robot_path), len(poses), 3))
+        sweep_ice(robot_path, poses, crowd, self.solver(world), make_memory(crowd), out)
+        return Interaction(out, world.movables.masses)

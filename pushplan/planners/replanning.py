@@ -1,0 +1,146 @@
+"""When a plan is replaced, and by what: the replanning rule."""
+
+from __future__ import annotations
+
+import enum
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from pushplan.interaction import Interaction, InteractionModel
+from pushplan.world import GoalDisc, GoalLine, InvalidInputError, Plan, World
+from pushplan.world.checks import FloatArray, number
+
+
+class Reason(enum.Enum):
+    """Why a new plan is wanted; ``urgent`` where the old one cannot be driven on."""
+
+    NO_PLAN = ("no plan", True)
+    OBJECTS = ("objects came or went", False)
+    OFFSET = ("the robot has left the path", True)
+    USED_UP = ("the plan is used up", True)
+    TIGHT = ("out of a tight place", True)
+    JAM = ("the robot would jam", True)
+    SURPRISE = ("the plan costs more than was predicted", False)
+    PERIOD = ("it is time", False)
+
+    def __init__(self, words: str, urgent: bool) -> None:
+        self.words = words
+        self.urgent = urgent
+
+
+@dataclass(frozen=True)
+class Replanning:
+    """When a plan no longer fits the world. Lengths in units of the circumscribed radius R.
+
+    Args:
+        offset: distance from the path that makes a new plan necessary [R].
+        surprise: how much more the rest of the plan may cost than was predicted, in units of
+            driving R further; infinite if that is no reason.
+        look_ahead: how far along the rest of the plan that is looked at [R].
+        interval: least time between two plans for the same reason [s of travel of R at full
+            speed]; a plan on which the robot would jam is replaced at once.
+        never: follow the first plan to its end, as the paper's RRT does.
+        margin: how much cheaper than the rest of the old plan a new one has to be to replace it,
+            in units of driving R; both are swept from the present world, and their travel, w times
+            their interaction, and the straight way from their ends to the goal are compared. A
+            plan that cannot be driven on is replaced anyway. None replaces without comparing.
+        push_weight: w; None takes that of the planner's config, or 1 if it has none.
+        every_seconds: plan again when the plan is this old [s].
+        every_metres: plan again when the robot is this far from where it planned [m].
+        latency: time for which a planning call takes [s]. A plan then starts where the robot will
+            be after it, and is joined to the part of the old plan up to there. None stands for 0
+            where plans are there at once, and for what the last calls took in honest time.
+    """
+
+    offset: float = 0.3
+    surprise: float = 0.1
+    interval: float = 0.5
+    never: bool = False
+    look_ahead: float = math.inf
+    margin: float | None = 0.1
+    push_weight: float | None = None
+    every_seconds: float = math.inf
+    every_metres: float = math.inf
+    latency: float | None = None
+
+    def __post_init__(self) -> None:
+        for name in ("offset", "interval"):
+            number(name, getattr(self, name), low=0.0)
+        number("surprise", self.surprise, low=0.0, finite=False)
+        for name in ("margin", "push_weight", "latency"):
+            if getattr(self, name) is not None:
+                number(name, getattr(self, name), low=0.0)
+        for name in ("every_seconds", "every_metres", "look_ahead"):
+            number(name, getattr(self, name), low=0.0, open_low=True, finite=False)
+        if not isinstance(self.never, bool):
+            raise InvalidInputError(f"never must be True or False, got {self.never!r}")
+
+    def weight(self, planner: object) -> float:
+        """The price w of interaction in comparisons of this planner's plans."""
+        if self.push_weight is not None:
+            return self.push_weight
+        return float(getattr(getattr(planner, "config", None), "push_weight", 1.0))
+
+
+def rest_of(plan: Plan, index: int, predicted: FloatArray | None) -> Plan:
+    """What is left of a plan from its pose ``index`` on.
+
+    Args:
+        plan: the plan.
+        index: of the last pose that the robot has passed.
+        predicted: (N - index, K, 3) where the objects are expected to be from there on; those of
+            the plan if None.
+    """
+    if index == 0 and predicted is None:
+        return plan
+    objects = plan.object_poses
+    if predicted is None and objects is not None:
+        predicted = objects[index:]
+    moves = np.diff(plan.poses[index:, :2], axis=0)
+    length = plan.length
+    left = float(np.hypot(moves[:, 0], moves[:, 1]).sum())
+    mass = plan.travel_cost / length if length > 0.0 else 0.0
+    return Plan(
+        times=plan.times[index:] - plan.times[index],
+        poses=plan.poses[index:],
+        speeds=plan.speeds[index:],
+        turn_rates=plan.turn_rates[index:],
+        travel_cost=mass * left,
+        interaction_cost=plan.interaction_cost if index == 0 else 0.0,
+        object_poses=predicted,
+    )
+
+
+def sweep_rest(
+    world: World, plan: Plan, index: int, interaction: InteractionModel, end: int | None = None
+) -> tuple[Interaction, FloatArray]:
+    """What driving on from the robot's pose to the plan's poses after ``index`` would do.
+
+    Args:
+        world: the world now.
+        plan: the plan.
+        index: of the last pose that the robot has passed.
+        interaction: predicts the objects.
+        end: index after the last pose that is looked at; all by default.
+
+    Returns:
+        The interaction, and the (N, 3) poses that were swept.
+    """
+    path = np.concatenate([world.robot_pose[None], plan.poses[index + 1 : end]])
+    return interaction.sweep(world, path), path
+
+
+def price(world: World, path: FloatArray, swept: Interaction, weight: float) -> float:
+    """Travel, plus ``weight`` times interaction, plus the straight way to the goal [kg m].
+
+    Infinite for a path on which the robot jams.
+    """
+    if swept.jammed_at >= 0:
+        return math.inf
+    moves = np.diff(path[:, :2], axis=0)
+    length = float(np.hypot(moves[:, 0], moves[:, 1]).sum())
+    if isinstance(world.goal, GoalDisc | GoalLine):
+        length += world.goal.distance(float(path[-1, 0]), float(path[-1, 1]))
+    return world.robot.mass * length + weight * swept.work

@@ -1,0 +1,145 @@
+"""Planning from where the robot will be, and joining the new plan to what it drives until then."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+
+from pushplan.control import Progress
+from pushplan.interaction import InteractionModel
+from pushplan.world import Drive, Plan, World
+from pushplan.world.checks import FloatArray
+
+_SPACING = 0.15
+"""Distance between the poses of a stretch without a plan [R]."""
+
+
+def world_ahead(
+    world: World,
+    plan: Plan | None,
+    along: float,
+    latency: float,
+    interaction: InteractionModel,
+) -> tuple[World, Plan | None]:
+    """The world after some more time on the present plan, and the plan of that stretch.
+
+    A robot that has no plan, or comes to its end, waits: a differential drive stands, a
+    constant-speed robot goes straight on.
+
+    Args:
+        world: the world now.
+        plan: what is driven; None for nothing.
+        along: how far along it the robot is [m].
+        latency: how far to look ahead [s].
+        interaction: predicts the objects.
+
+    Returns:
+        The predicted world, and the plan of the stretch; ``world`` itself and None where there is
+        no stretch, or the robot would jam on it.
+    """
+    if latency <= 0.0:
+        return world, None
+    times, poses, twists = _stretch(world, plan, along, latency)
+    swept = interaction.sweep(world, np.concatenate([world.robot_pose[None], poses[1:]]))
+    if swept.jammed_at >= 0:
+        return world, None
+    moves = np.diff(poses[:, :2], axis=0)
+    speed, turn = twists[-1]
+    theta = float(poses[-1, 2])
+    ahead = world.moved(
+        robot_pose=poses[-1], movable_poses=swept.object_poses[-1], time=world.time + latency
+    )
+    ahead = replace(
+        ahead, robot_twist=np.array([speed * math.cos(theta), speed * math.sin(theta), turn])
+    )
+    return ahead, Plan(
+        times=times,
+        poses=poses,
+        speeds=twists[:, 0],
+        turn_rates=twists[:, 1],
+        travel_cost=world.robot.mass * float(np.hypot(moves[:, 0], moves[:, 1]).sum()),
+        interaction_cost=swept.work,
+        object_poses=swept.object_poses,
+    )
+
+
+def joined(stretch: Plan | None, plan: Plan) -> Plan:
+    """One plan of a stretch and the plan that begins at its end."""
+    if stretch is None:
+        return plan
+    objects = None
+    if stretch.object_poses is not None and plan.object_poses is not None:
+        objects = np.concatenate([stretch.object_poses[:-1], plan.object_poses])
+    return Plan(
+        times=np.concatenate([stretch.times[:-1], stretch.times[-1] + plan.times]),
+        poses=np.concatenate([stretch.poses[:-1], plan.poses]),
+        speeds=np.concatenate([stretch.speeds[:-1], plan.speeds]),
+        turn_rates=np.concatenate([stretch.turn_rates[:-1], plan.turn_rates]),
+        travel_cost=stretch.travel_cost + plan.travel_cost,
+        interaction_cost=stretch.interaction_cost + plan.interaction_cost,
+        object_poses=objects,
+        subtasks=tuple(
+            replace(s, first=s.first + len(stretch.times) - 1, last=s.last + len(stretch.times) - 1)
+            for s in plan.subtasks
+        ),
+    )
+
+
+def passed(world: World, plan: Plan, seconds: float) -> int:
+    """Index of the last pose of a plan that a robot has passed which began it a while ago.
+
+    Args:
+        world: where the robot is now.
+        plan: the plan.
+        seconds: for how long it may have driven it [s].
+    """
+    robot = world.robot
+    progress = Progress(window=robot.circumscribed_radius + 1.2 * seconds * robot.max_speed)
+    x, y = (float(value) for value in world.robot_pose[:2])
+    return progress.index(progress.update(plan, x, y))
+
+
+def _stretch(
+    world: World, plan: Plan | None, along: float, latency: float
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Times from now (N,), poses (N, 3) and twists (N, 2) over the next ``latency`` seconds."""
+    if plan is None:
+        times, poses = np.zeros(1), np.array(world.robot_pose)[None]
+        twists = np.array([[world.robot.min_speed, 0.0]])
+    else:
+        times, poses, twists = _on_plan(plan, along, latency)
+    left = latency - float(times[-1])
+    if left <= 1e-9:
+        return times, poses, twists
+    robot, last = world.robot, poses[-1]
+    if robot.drive is Drive.DIFFERENTIAL:  # it stands until then
+        twists = np.concatenate([twists[:-1], np.zeros((2, 2))])
+        return np.append(times, latency), np.concatenate([poses, last[None]]), twists
+    steps = max(1, math.ceil(left * robot.max_speed / (_SPACING * robot.circumscribed_radius)))
+    share = np.arange(1, steps + 1)[:, None] / steps
+    heading = np.array([math.cos(last[2]), math.sin(last[2]), 0.0])
+    straight = last + share * left * robot.max_speed * heading
+    twists = np.concatenate([twists[:-1], np.tile([robot.max_speed, 0.0], (steps + 1, 1))])
+    times = np.concatenate([times, times[-1] + share[:, 0] * left])
+    return times, np.concatenate([poses, straight]), twists
+
+
+def _on_plan(plan: Plan, along: float, latency: float) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """The part of a plan that is driven in the next ``latency`` seconds."""
+    moves = np.diff(plan.poses[:, :2], axis=0)
+    lengths = np.concatenate([[0.0], np.cumsum(np.hypot(moves[:, 0], moves[:, 1]))])
+    now = float(np.interp(along, lengths, plan.times))
+    end = min(now + latency, float(plan.times[-1]))
+    inner = (plan.times > now + 1e-9) & (plan.times < end - 1e-9)
+    times = np.concatenate([[now], plan.times[inner], [end] if end > now else []])
+    headings = np.unwrap(plan.poses[:, 2])
+    poses = np.column_stack(
+        [
+            np.interp(times, plan.times, column)
+            for column in (plan.poses[:, 0], plan.poses[:, 1], headings)
+        ]
+    )
+    index = np.searchsorted(plan.times, times + 1e-9, side="right") - 1
+    return times - now, poses, np.column_stack([plan.speeds[index], plan.turn_rates[index]])

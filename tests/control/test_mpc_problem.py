@@ -1,0 +1,214 @@
+"""The tracking problem against the same problem put up and solved in other ways."""
+
+from __future__ import annotations
+
+import math
+
+import casadi
+import numpy as np
+import pytest
+from conftest import make_robot, make_u_maze
+from scipy.optimize import minimize
+from test_tracking_controllers import FLOOR, arc_plan
+
+from pushplan.control import MpcConfig, MpcTracker
+from pushplan.control.mpc.kernels import Track, Tuning, assemble, errors, locate
+from pushplan.control.mpc.solver import QuadraticProgram
+
+CURVATURE = 0.4
+CENTRE = np.array([0.0, 1.0 / CURVATURE])
+SIZE, SPEED, TURN = 0.8, 0.3, 0.5
+
+
+def circle_track() -> Track:
+    """A left turn of radius 1 / CURVATURE from the origin."""
+    lengths = np.arange(0.0, 12.0, 0.1)
+    angle = lengths * CURVATURE
+    poses = np.column_stack([np.sin(angle) / CURVATURE, (1.0 - np.cos(angle)) / CURVATURE, angle])
+    return Track(poses, lengths, np.full(len(lengths), SPEED))
+
+
+def tuning(**changes: object) -> Tuning:
+    fields: dict[str, object] = {
+        "size": SIZE,
+        "max_speed": SPEED,
+        "max_turn_rate": TURN,
+        "max_acceleration": math.inf,
+        "stops": False,
+        "optimise_speed": False,
+        "heading_weight": 0.5,
+        "turn_weight": 0.03,
+        "smoothness": 0.004,
+        "terminal": 4.0,
+        "speed_weight": 0.2,
+    }
+    return Tuning(**{**fields, **changes})
+
+
+def residuals(z, pose, last, steps, tune):
+    """The square roots of the terms of the cost, on a circle, in plain Python."""
+    count = len(steps)
+    turns = z[:count] * TURN
+    speeds = z[count:] * SPEED if len(z) > count else np.full(count, SPEED)
+    unit = tune.size / tune.max_speed
+    x, y, theta = pose
+    found = []
+    before = last
+    for k, dt in enumerate(steps):
+        for _ in range(50):  # many small steps instead of an exact arc
+            part = dt / 50
+            x += speeds[k] * part * math.cos(theta + 0.5 * turns[k] * part)
+            y += speeds[k] * part * math.sin(theta + 0.5 * turns[k] * part)
+            theta += turns[k] * part
+        away = np.array([x, y]) - CENTRE
+        offset = 1.0 / CURVATURE - np.hypot(*away)
+        heading = math.atan2(away[1], away[0]) + math.pi / 2
+        tau = dt / unit
+        weight = tau * (tune.terminal if k == count - 1 else 1.0)
+        error = math.remainder(theta - heading, 2.0 * math.pi)
+        found.append(math.sqrt(weight) * offset / tune.size)
+        found.append(math.sqrt(weight * tune.heading_weight) * error)
+        wanted = speeds[k] * CURVATURE if len(z) == count else SPEED * CURVATURE
+        found.append(math.sqrt(tau * tune.turn_weight) * unit * (turns[k] - wanted))
+        found.append(math.sqrt(tune.smoothness / tau) * unit * (turns[k] - before))
+        if len(z) > count:
+            found.append(math.sqrt(tau * tune.speed_weight) * (z[count + k] - 1.0))
+        before = turns[k]
+    return np.array(found)
+
+
+@pytest.mark.parametrize("optimise", [False, True])
+@pytest.mark.parametrize("seed", range(4))
+def test_the_assembled_problem_is_the_linearised_one(seed, optimise):
+    rng = np.random.default_rng(seed)
+    tune, count = tuning(optimise_speed=optimise), 8
+    n = 2 * count if optimise else count
+    pose = np.array([0.3, 0.0, 0.1]) + rng.uniform(-0.3, 0.3, 3)
+    steps = np.full(count, 0.4)
+    steps[0] = 0.1
+    nominal = np.column_stack([np.full(count, SPEED), SPEED * CURVATURE * np.ones(count)])
+    nominal[:, 1] += rng.uniform(-0.1, 0.1, count)
+    if optimise:  # the price of turning is taken about the nominal speed: keep it where that is v
+        nominal[:, 0] = SPEED
+    z = nominal[:, 1] / TURN
+    z = np.concatenate([z, nominal[:, 0] / SPEED]) if optimise else z
+    hessian, gradient = np.empty((n, n)), np.empty(n)
+    last = rng.uniform(-0.2, 0.2)
+    twist = np.array([SPEED, last])
+    assemble(circle_track(), tune, pose, 0.3, twist, steps, nominal.copy(), hessian, gradient)
+    small = 1e-6
+    columns = [
+        (
+            residuals(z + small * unit, pose, last, steps, tune)
+            - residuals(z - small * unit, pose, last, steps, tune)
+        )
+        / (2 * small)
+        for unit in np.eye(n)
+    ]
+    jacobian = np.array(columns).T
+    expected = jacobian.T @ jacobian
+    slope = jacobian.T @ residuals(z, pose, last, steps, tune)
+    assert hessian == pytest.approx(expected, abs=2e-3 * np.abs(expected).max())
+    assert hessian @ z + gradient == pytest.approx(slope, abs=2e-3 * np.abs(slope).max())
+
+
+def test_repeated_it_solves_the_nonlinear_problem():
+    robot = make_robot(max_speed=SPEED, max_turn_rate=TURN)
+    world = make_u_maze(static=FLOOR, robot=robot, robot_pose=[0, 0, 0])
+    plan = arc_plan(world, [(11.0, CURVATURE)])
+    world = world.moved(robot_pose=[0.2, 0.35, -0.3])
+    config = MpcConfig(horizon=10, first_iterations=30, period=0.4)
+    tracker = MpcTracker(config)
+    twist = tracker.command(world, plan)
+    size = robot.circumscribed_radius
+    tune = tuning(
+        size=size,
+        heading_weight=config.heading_weight,
+        turn_weight=config.turn_weight,
+        smoothness=config.smoothness,
+        terminal=config.terminal,
+    )
+    steps = np.full(10, config.reach * size / SPEED / 10)
+    steps[0] = 0.4
+
+    def cost(z):
+        return float((residuals(z, world.robot_pose, 0.0, steps, tune) ** 2).sum())
+
+    best = minimize(
+        cost,
+        np.zeros(10),
+        bounds=[(-1, 1)] * 10,
+        method="L-BFGS-B",
+        options={"maxiter": 2000, "ftol": 1e-13, "gtol": 1e-9},
+    )
+    assert twist.angular / TURN == pytest.approx(best.x[0], abs=5e-3)
+
+
+def random_problem(rng, blocks: int, horizon: int):
+    """P of full rank, q, and bounds that hold some of the inputs and changes."""
+    n = blocks * horizon
+    factor = rng.normal(size=(n + 4, n)) * np.exp(rng.uniform(-2, 1, n))
+    hessian = factor.T @ factor / n + 0.01 * np.eye(n)
+    gradient = 3.0 * rng.normal(size=n)
+    low, high = -np.ones(2 * n), np.ones(2 * n)
+    low[n:], high[n:] = -rng.uniform(0.1, 0.5), rng.uniform(0.1, 0.5)
+    return hessian, gradient, low, high
+
+
+@pytest.mark.parametrize("blocks", [1, 2])
+def test_the_solver_agrees_with_an_active_set_method(blocks):
+    rng = np.random.default_rng(blocks)
+    horizon = 12
+    n = blocks * horizon
+    program = QuadraticProgram(blocks, horizon, (True,) * blocks, tolerance=1e-7)
+    change = np.kron(np.eye(blocks), np.eye(horizon) - np.eye(horizon, k=-1))
+    reference = casadi.conic(
+        "reference",
+        "daqp",
+        {"h": casadi.Sparsity.dense(n, n), "a": casadi.Sparsity.dense(n, n)},
+    )
+    held = 0
+    for _ in range(30):
+        hessian, gradient, low, high = random_problem(rng, blocks, horizon)
+        found = program.solve(hessian, gradient, low, high, np.zeros(n))
+        answer = reference(
+            h=hessian, g=gradient, a=change, lbx=low[:n], ubx=high[:n], lba=low[n:], uba=high[n:]
+        )
+        expected = np.array(answer["x"]).ravel()
+        assert found == pytest.approx(expected, abs=2e-4)
+        held += int((np.abs(np.abs(change @ expected) - np.abs(high[n:])) < 1e-6).sum())
+    assert held > 20  # limits mattered
+
+
+def test_what_cannot_be_met_has_no_solution():
+    program = QuadraticProgram(1, 4, (True,))
+    low, high = -np.ones(8), np.ones(8)
+    free = program.solve(np.eye(4), np.ones(4), low, high, np.zeros(4))
+    assert free == pytest.approx(-np.ones(4), abs=1e-5)
+    low[4], high[4] = 2.0, 3.0  # the first input would have to jump beyond its bound
+    assert program.solve(np.eye(4), np.ones(4), low, high, np.zeros(4)) is None
+    low[4], high[4] = -1.0, 1.0
+    again = program.solve(np.eye(4), np.ones(4), low, high, np.zeros(4))
+    assert again == pytest.approx(free, abs=1e-5)
+
+
+@pytest.mark.parametrize("along", [0.0, 0.37, 5.0, 11.8])
+@pytest.mark.parametrize("offset", [-0.5, 0.0, 0.3])
+def test_places_and_errors_on_a_circle(along, offset):
+    track = circle_track()
+    angle = CURVATURE * along
+    x, y = CENTRE + (1.0 / CURVATURE - offset) * np.array([math.sin(angle), -math.cos(angle)])
+    place, index, share = locate(track, x, y, max(along - 1.0, 0.0), along + 1.0)
+    found = errors(track, x, y, angle + 0.2, index, share)
+    assert place == pytest.approx(along, abs=0.02)  # the foot is on a chord, not on the arc
+    assert found[0] == pytest.approx(offset, abs=2e-3)
+    assert found[1:] == pytest.approx((0.2, angle, CURVATURE), abs=0.01)
+
+
+def test_past_the_end_the_path_goes_on_straight():
+    track = circle_track()
+    x, y, theta = track.poses[-1]
+    over = [x + 2.0 * math.cos(theta), y + 2.0 * math.sin(theta)]
+    place, index, share = locate(track, *over, 11.0, 20.0)
+    assert place == pytest.approx(track.lengths[-1] + 2.0)
+    assert errors(track, *over, theta, index, share)[:3] == pytest.approx((0.0, 0.0, theta))
