@@ -5,7 +5,8 @@ from __future__ import annotations
 from pushplan.control import PathFollower, PurePursuit
 from pushplan.planners.geometric import GeometricRRT
 from pushplan.planners.kinodynamic import KinodynamicRRT
-from pushplan.planners.policy import PlanFollower, Replanning
+from pushplan.planners.policy import PlanFollower
+from pushplan.planners.replanning import Replanning
 from pushplan.planners.straight import ShortestPath
 from pushplan.world import Planner, Stop
 
