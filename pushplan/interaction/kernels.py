@@ -59,6 +59,8 @@ class Settings(NamedTuple):
     """Gauss-Seidel rounds in one step."""
     friction: float
     """Coulomb coefficient between robot and objects."""
+    static_friction: float = 0.0
+    """Coulomb coefficient between objects and walls."""
 
 
 @njit(cache=True, nogil=True)
@@ -158,7 +160,9 @@ def _against_robot(
 
 
 @njit(cache=True, nogil=True)
-def _against_static(k: int, poses: FloatArray, bodies: Bodies, scratch: Scratch) -> float:
+def _against_static(
+    k: int, poses: FloatArray, bodies: Bodies, settings: Settings, scratch: Scratch
+) -> float:
     """Move object ``k`` out of the walls; returns the deepest overlap found."""
     deepest = 0.0
     points = scratch.points
@@ -174,7 +178,13 @@ def _against_static(k: int, poses: FloatArray, bodies: Bodies, scratch: Scratch)
             deepest = max(deepest, points[i, 4])
         if found > 0:
             inv = bodies.inverse_gyration[k]
-            separate(points, found, scratch.fixed, 0.0, 0.0, poses[k], 1.0, inv)
+            pushed = separate(points, found, scratch.fixed, 0.0, 0.0, poses[k], 1.0, inv)
+            if settings.static_friction > 0.0:
+                if found == 2:
+                    points[0, :2] = 0.5 * (points[0, :2] + points[1, :2])
+                limit = settings.static_friction * pushed
+                still, before = scratch.fixed, scratch.before[k]
+                drag_along(points[0], limit, still, still, before, poses[k], inv)
     return deepest
 
 
@@ -254,7 +264,7 @@ def _resolve(
             if moved:
                 depth, count = _against_objects(i, count, poses, bodies, settings, scratch)
                 left = max(left, depth)
-                left = max(left, _against_static(k, poses, bodies, scratch))
+                left = max(left, _against_static(k, poses, bodies, settings, scratch))
             i += 1
         if left <= settings.tolerance:
             break

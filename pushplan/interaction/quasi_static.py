@@ -35,6 +35,8 @@ class QuasiStatic:
             half diagonal of the thinnest body; bodies below a thirtieth of the robot count as
             that.
         iterations: Gauss-Seidel rounds for each resolution.
+        static_friction: Coulomb coefficient between objects and walls. With it an object that is
+            squeezed against a wall within the friction cone jams instead of sliding along.
 
     Raises:
         InvalidInputError: if a value is out of range.
@@ -44,12 +46,14 @@ class QuasiStatic:
     gyration_scale: float = 1.0
     step: float = 0.1
     iterations: int = 12
+    static_friction: float = 0.0
 
     def __post_init__(self) -> None:
         number("friction", self.friction, low=0.0)
         number("gyration_scale", self.gyration_scale, low=0.0, open_low=True)
         number("step", self.step, low=0.0, high=1.0, open_low=True)
         integer("iterations", self.iterations, low=1)
+        number("static_friction", self.static_friction, low=0.0)
 
     def bodies(self, world: World) -> Bodies:
         """The world's shapes as the compiled kernels read them; cached."""
@@ -64,6 +68,7 @@ class QuasiStatic:
             jam_depth=0.25 * self.step * size,
             iterations=self.iterations,
             friction=float(self.friction),
+            static_friction=float(self.static_friction),
         )
 
     def sweep(self, world: World, path: ArrayLike) -> Interaction:

@@ -12,22 +12,45 @@ PLANNERS: dict[str, str] = {
     "straight": "pushplan.planners.straight:ShortestPath",
     "geometric-rrt": "pushplan.planners.geometric:GeometricRRT",
     "kinodynamic-rrt": "pushplan.planners.kinodynamic:KinodynamicRRT",
+    "push-aware": "pushplan.planners.push_aware:PushAware",
+    "skeleton": "pushplan.planners.skeleton:Skeleton",
+    "ship-lattice": "pushplan.planners.lattice.ship:ShipLattice",
+    "ship-lattice-published": "pushplan.planners.lattice.ship:published",
+    "ship-predictive": "pushplan.planners.predictive:PredictiveShip",
+    "ship-predictive-network": "pushplan.planners.predictive:PredictiveShipNetwork",
 }
 """Name -> "module:Class"; each is constructed without arguments by default."""
+
+OPEN_WATER = ("ship-predictive", "ship-predictive-network")
+"""Planners that go to a goal line through water without obstacles, and nowhere else."""
 
 POLICIES: dict[str, str] = {
     "straight": "pushplan.planners.policies:straight",
     "geometric-rrt": "pushplan.planners.policies:geometric_rrt",
     "kinodynamic-rrt": "pushplan.planners.policies:kinodynamic_rrt",
+    "push-aware": "pushplan.planners.policies:push_aware",
+    "push-aware-stopping": "pushplan.planners.policies:push_aware_stopping",
+    "skeleton": "pushplan.planners.skeleton:skeleton",
+    "ship-lattice": "pushplan.planners.lattice.policy:ship_lattice",
+    "ship-lattice-published": "pushplan.planners.lattice.policy:ship_lattice_published",
+    "ship-predictive": "pushplan.planners.policies:ship_predictive",
+    "ship-predictive-network": "pushplan.planners.policies:ship_predictive_network",
     "random": "pushplan.planners.policy:RandomTwist",
     "greedy": "pushplan.planners.greedy:GreedyPusher",
 }
 """Name -> "module:callable" that makes a policy."""
 
 
-def planner_names() -> tuple[str, ...]:
-    """The names that `make_planner` knows."""
-    return tuple(PLANNERS)
+def planner_names(*, open_water: bool | None = None) -> tuple[str, ...]:
+    """The names that `make_planner` knows.
+
+    Args:
+        open_water: only those that need open water and a goal line, or only the others; all
+            if None.
+    """
+    if open_water is None:
+        return tuple(PLANNERS)
+    return tuple(name for name in PLANNERS if (name in OPEN_WATER) == open_water)
 
 
 def policy_names() -> tuple[str, ...]:

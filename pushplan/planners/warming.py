@@ -2,11 +2,22 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from pushplan.planners.policy import policy_for
-from pushplan.planners.registry import make_planner, planner_names
-from pushplan.world import Drive, GoalDisc, MaxIterations, Movables, RobotModel, StaticMap, World
+from pushplan.planners.registry import OPEN_WATER, make_planner, planner_names
+from pushplan.world import (
+    Drive,
+    GoalDisc,
+    GoalLine,
+    MaxIterations,
+    Movables,
+    RobotModel,
+    StaticMap,
+    World,
+)
 
 
 def warm_up(*names: str) -> None:
@@ -23,7 +34,7 @@ def warm_up(*names: str) -> None:
         UnknownNameError: if there is no such planner.
     """
     square = 0.5 * np.array([[1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0], [1.0, -1.0]])
-    world = World(
+    room = World(
         robot=RobotModel.from_outline(
             square, mass=1.0, drive=Drive.CONSTANT_SPEED, max_speed=1.0, max_turn_rate=1.0
         ),
@@ -32,7 +43,13 @@ def warm_up(*names: str) -> None:
         movables=Movables.from_outlines([square, square], [[4.0, 5.0, 0.0], [5.2, 5.0, 0.0]]),
         goal=GoalDisc(np.array([8.0, 5.0]), 0.5),
     )
+    water = replace(
+        room,
+        static=StaticMap.build(bounds=[0.0, 0.0, 10.0, 10.0]),
+        goal=GoalLine(np.array([8.0, 5.0]), np.array([1.0, 0.0])),
+    )
     for name in names or planner_names():
+        world = water if name in OPEN_WATER else room
         planner = make_planner(name)
         planner.plan(world, stop=MaxIterations(600))
         policy = policy_for(planner)

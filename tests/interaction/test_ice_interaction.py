@@ -46,6 +46,17 @@ def test_single_floes_move_as_in_the_other_model(friction):
         assert ours.work == pytest.approx(other.work, rel=0.12)
 
 
+def test_work_agrees_with_the_simulator_in_a_crowd():
+    from pushplan.training.ice_passages import PassageConfig, voyage_passages
+
+    config = PassageConfig(passages=12, least_concentration=0.3, greatest_concentration=0.3)
+    batch, truth = voyage_passages(5, "held-out", config)
+    model = IceInteraction()
+    found = np.array([model.sweep(p.world, p.path).work for p in batch.passages])
+    assert found.sum() == pytest.approx(truth.work.sum(), rel=0.15)
+    assert np.corrcoef(found, truth.work)[0, 1] > 0.95
+
+
 def test_it_beats_the_model_without_friction_between_floes():
     rng = np.random.default_rng(3)
     floes = [

@@ -57,7 +57,7 @@ def hall(side: float, robot: RobotModel, start, goal, radius: float, walls=(), b
     )
 
 
-@pytest.mark.parametrize("name", planner_names())
+@pytest.mark.parametrize("name", planner_names(open_water=False))
 @pytest.mark.parametrize("side", [20, 50, 100])
 def test_a_small_goal_in_a_large_hall(name, side):
     world = hall(
@@ -219,7 +219,7 @@ def test_a_plan_that_is_solved_ends_in_the_goal():
             assert world.goal.distance(*result.plan.poses[-1, :2]) <= 1e-6
 
 
-@pytest.mark.parametrize("name", planner_names())
+@pytest.mark.parametrize("name", planner_names(open_water=False))
 def test_a_start_in_a_wall_or_out_of_bounds_is_blocked(name):
     inside = make_u_maze(robot_pose=[7.5, 3.0, 0.0])
     assert make_planner(name).plan(inside, stop=MaxIterations(100)).status is (

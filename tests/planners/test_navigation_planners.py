@@ -45,7 +45,7 @@ def generator(seed: int) -> np.random.Generator:
     return np.random.default_rng(seed)
 
 
-@pytest.mark.parametrize("name", planner_names())
+@pytest.mark.parametrize("name", planner_names(open_water=False))
 class TestEveryPlanner:
     def test_it_is_a_planner(self, name):
         assert isinstance(make_planner(name), Planner)

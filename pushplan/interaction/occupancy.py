@@ -1,0 +1,211 @@
+"""What passing through ice leaves behind, on a grid: the contract of occupancy predictors.
+
+After Zhong et al., "Autonomous Navigation in Ice-Covered Waters with Learned Predictions on
+Ship-Ice Interactions" (2025, arXiv 2409.11326): a patch of 40 x 40 cells about the ship with the
+channels occupancy, footprint and swath goes in, the occupancy after passing comes out. Here cells
+hold the covered share, not a bit, and a forecast also holds the work on the ice.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol, runtime_checkable
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from pushplan.interaction.occupancy_kernels import Patch, cover_objects, cover_sweep
+from pushplan.world import World
+from pushplan.world.checks import ArrayRecord, FloatArray, array, number
+from pushplan.world.errors import InvalidInputError
+
+PATCH_CELLS = 40
+"""Cells along each side of a patch."""
+CELLS_PER_LENGTH = 10
+"""Cells along the hull: 0.2 m for the 2 m ship of the benchmark."""
+CHANNELS = ("occupancy", "footprint", "swath")
+
+
+@dataclass(frozen=True, eq=False)
+class Passage(ArrayRecord):
+    """One way through the objects: a scene, and the poses that the robot sweeps through.
+
+    Args:
+        world: the snapshot; of the robot only the footprint is used.
+        path: (N, 3) robot poses x, y [m], theta [rad], N at least 2.
+    """
+
+    world: World
+    path: FloatArray
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.world, World):
+            raise InvalidInputError(
+                f"passage.world must be a World, got {type(self.world).__name__}"
+            )
+        object.__setattr__(self, "path", array("passage.path", self.path, (None, 3)))
+        if len(self.path) < 2:
+            raise InvalidInputError(f"passage.path needs at least 2 poses, got {len(self.path)}")
+
+
+@dataclass(frozen=True, eq=False)
+class PassageBatch:
+    """Passages as a predictor reads them.
+
+    Args:
+        patches: (B, 3, 40, 40) covered share of each cell: occupancy, footprint at the start,
+            swath. Rows count up ahead (towards the goal), columns to the right.
+        cell: side of a cell [m].
+        density: mass over area of the objects [kg/m²].
+        frames: (B, 3) where each patch lies, as in `occupancy_kernels.cover_objects`; None where
+            the patches come from a map and predictors that need none are asked.
+        passages: the scenes, for predictors that follow single objects; () where there are none.
+
+    Raises:
+        InvalidInputError: if a shape is wrong or a value is not a share.
+    """
+
+    patches: Patch
+    cell: float
+    density: float = 1.0
+    frames: FloatArray | None = None
+    passages: tuple[Passage, ...] = ()
+
+    def __post_init__(self) -> None:
+        put = object.__setattr__
+        shape = (None, len(CHANNELS), PATCH_CELLS, PATCH_CELLS)
+        patches = array("batch.patches", self.patches, shape, dtype=np.float32)
+        put(self, "patches", patches)
+        if patches.size and (patches.min() < 0.0 or patches.max() > 1.0):
+            raise InvalidInputError("batch.patches must hold shares of cells, from 0 to 1")
+        put(self, "cell", number("batch.cell", self.cell, low=0.0, open_low=True))
+        put(self, "density", number("batch.density", self.density, low=0.0, open_low=True))
+        if self.frames is not None:
+            put(self, "frames", array("batch.frames", self.frames, (len(patches), 3)))
+        if self.passages and (len(self.passages) != len(patches) or self.frames is None):
+            raise InvalidInputError(
+                f"a batch of {len(patches)} patches needs as many passages, and frames; got "
+                f"{len(self.passages)} passages"
+            )
+
+    def __len__(self) -> int:
+        return len(self.patches)
+
+
+@dataclass(frozen=True, eq=False)
+class OccupancyForecast:
+    """What a predictor expects of each passage of a batch.
+
+    Args:
+        after: (B, 40, 40) covered share of each cell once the robot has passed.
+        work: (B,) sum of mass times path length over the objects [kg m].
+    """
+
+    after: Patch
+    work: FloatArray
+
+    def __post_init__(self) -> None:
+        put = object.__setattr__
+        shape = (None, PATCH_CELLS, PATCH_CELLS)
+        put(self, "after", array("forecast.after", self.after, shape, dtype=np.float32))
+        put(self, "work", array("forecast.work", self.work, (len(self.after),)))
+
+
+@runtime_checkable
+class OccupancyPredictor(Protocol):
+    """Predicts the occupancy that the robot leaves behind."""
+
+    def predict(self, batch: PassageBatch) -> OccupancyForecast:
+        """The occupancy after each passage, and the work done on the way.
+
+        Raises:
+            InvalidInputError: if the batch lacks what this predictor needs.
+        """
+        ...
+
+
+class NoMotion:
+    """The null model: nothing moves. What every predictor has to beat."""
+
+    def predict(self, batch: PassageBatch) -> OccupancyForecast:
+        """The occupancy before, and no work."""
+        return OccupancyForecast(batch.patches[:, 0], np.zeros(len(batch)))
+
+
+def cell_size(world: World) -> float:
+    """Side of the cells for this robot [m]: a tenth of its length."""
+    return float(np.ptp(world.robot.vertices[:, 0])) / CELLS_PER_LENGTH
+
+
+def ice_density(world: World) -> float:
+    """Mass over area of all objects [kg/m²]; 1 where there are none."""
+    movables = world.movables
+    if len(movables) == 0:
+        return 1.0
+    x, y = movables.vertices.T
+    following = np.arange(1, len(x) + 1)
+    following[movables.offsets[1:] - 1] = movables.offsets[:-1]
+    area = 0.5 * float((x * y[following] - x[following] * y).sum())
+    return float(movables.masses.sum()) / area
+
+
+def patch_frame(path: FloatArray, ahead: float, cell: float) -> FloatArray:
+    """The frame of the patch around a passage, about the middle between its two ends.
+
+    Args:
+        path: (N, 3) robot poses.
+        ahead: direction in which rows count up [rad].
+        cell: side of a cell [m].
+
+    Returns:
+        (3,) as `occupancy_kernels.cover_objects` wants it. The corner lies on a grid of cells
+        about the world's origin, so that patches of one scene share their cells.
+    """
+    right = ahead - 0.5 * math.pi
+    c, s = math.cos(right), math.sin(right)
+    x, y = 0.5 * (path[0, :2] + path[-1, :2]) / cell
+    column = round(c * x + s * y) - PATCH_CELLS // 2
+    row = round(c * y - s * x) - PATCH_CELLS // 2
+    return np.array([cell * (c * column - s * row), cell * (s * column + c * row), right])
+
+
+def make_batch(passages: Sequence[Passage], *, ahead: float = 0.5 * math.pi) -> PassageBatch:
+    """Patches of passages that all have one robot.
+
+    Args:
+        passages: at least one.
+        ahead: direction in which the rows of the patches count up [rad].
+
+    Raises:
+        InvalidInputError: if there are none, or their robots differ.
+    """
+    if not passages:
+        raise InvalidInputError("a batch needs at least one passage")
+    first = passages[0].world
+    if any(passage.world.robot != first.robot for passage in passages):
+        raise InvalidInputError("the passages of a batch must share one robot")
+    cell = cell_size(first)
+    patches = np.empty((len(passages), len(CHANNELS), PATCH_CELLS, PATCH_CELLS), np.float32)
+    frames = np.empty((len(passages), 3))
+    for i, passage in enumerate(passages):
+        frames[i] = patch_frame(passage.path, ahead, cell)
+        movables, robot = passage.world.movables, passage.world.robot
+        shapes = (movables.vertices, movables.offsets)
+        cover_objects(movables.poses, *shapes, frames[i], cell, patches[i, 0])
+        hull = (robot.vertices, robot.offsets)
+        cover_sweep(passage.path[:1], *hull, frames[i], cell, patches[i, 1])
+        cover_sweep(passage.path, *hull, frames[i], cell, patches[i, 2])
+    return PassageBatch(patches, cell, ice_density(first), frames, tuple(passages))
+
+
+def patch_after(batch: PassageBatch, index: int, poses: ArrayLike) -> Patch:
+    """(40, 40) occupancy of one passage's window with its objects at other poses (K, 3)."""
+    if batch.frames is None or not batch.passages:
+        raise InvalidInputError("this batch holds patches only: make it with `make_batch`")
+    movables = batch.passages[index].world.movables
+    at: FloatArray = array("poses", poses, (len(movables), 3))
+    out = np.empty((PATCH_CELLS, PATCH_CELLS), np.float32)
+    cover_objects(at, movables.vertices, movables.offsets, batch.frames[index], batch.cell, out)
+    return out

@@ -1,0 +1,118 @@
+"""Compiled rasters of floes and hulls: how much of each cell is covered."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from pushplan.geometry.raster import fill_convex
+from pushplan.interaction.separation import place
+from pushplan.world.checks import FloatArray, IntArray
+
+Patch = NDArray[np.float32]
+
+SUBCELLS = 4
+"""Samples along each side of a cell: coverage comes in steps of 1/16."""
+
+
+@njit(cache=True, nogil=True)
+def _to_pixels(points: FloatArray, frame: FloatArray, scale: float, out: FloatArray) -> None:
+    """Carry (N, 2) world points [m] into samples of a raster; see `cover_objects` for the frame."""
+    c, s = math.cos(frame[2]), math.sin(frame[2])
+    for i in range(points.shape[0]):
+        dx, dy = points[i, 0] - frame[0], points[i, 1] - frame[1]
+        out[i, 0] = scale * (c * dx + s * dy)
+        out[i, 1] = scale * (c * dy - s * dx)
+
+
+@njit(cache=True, nogil=True)
+def _average(fine: NDArray[np.uint8], out: Patch) -> None:
+    for r in range(out.shape[0]):
+        for col in range(out.shape[1]):
+            total = 0
+            for i in range(SUBCELLS):
+                for j in range(SUBCELLS):
+                    total += fine[SUBCELLS * r + i, SUBCELLS * col + j]
+            out[r, col] = total / (SUBCELLS * SUBCELLS)
+
+
+@njit(cache=True, nogil=True)
+def cover_objects(
+    poses: FloatArray,
+    vertices: FloatArray,
+    offsets: IntArray,
+    frame: FloatArray,
+    cell: float,
+    out: Patch,
+) -> None:
+    """Share of each cell that lies under an object.
+
+    Args:
+        poses: (K, 3) poses of the objects, world frame.
+        vertices: (V, 2) outlines in body frames [m].
+        offsets: (K + 1,) where each outline starts.
+        frame: (3,) world position [m] of the outer corner of cell (0, 0) and heading [rad] of the
+            direction in which columns count up; rows count up to the left of it.
+        cell: side of a cell [m].
+        out: (H, W) receives values from 0 to 1.
+    """
+    height, width = out.shape
+    fine = np.zeros((SUBCELLS * height, SUBCELLS * width), np.uint8)
+    scale = SUBCELLS / cell
+    corners = np.empty_like(vertices)
+    for k in range(poses.shape[0]):
+        a, b = offsets[k], offsets[k + 1]
+        place(poses[k], vertices[a:b], corners[a:b])
+        _to_pixels(corners[a:b], frame, scale, corners[a:b])
+        fill_convex(fine, corners[a:b], 1)
+    _average(fine, out)
+
+
+@njit(cache=True, nogil=True)
+def cover_sweep(
+    path: FloatArray,
+    vertices: FloatArray,
+    offsets: IntArray,
+    frame: FloatArray,
+    cell: float,
+    out: Patch,
+) -> None:
+    """Share of each cell that a robot passes over on a path; of one pose, its footprint.
+
+    Args:
+        path: (N, 3) poses of the robot; between two of them it goes straight.
+        vertices: (V, 2) convex parts of the robot in its body frame [m].
+        offsets: (P + 1,) where each part starts.
+        frame: as in `cover_objects`.
+        cell: side of a cell [m].
+        out: (H, W) receives values from 0 to 1.
+    """
+    height, width = out.shape
+    fine = np.zeros((SUBCELLS * height, SUBCELLS * width), np.uint8)
+    scale = SUBCELLS / cell
+    corners = np.empty_like(vertices)
+    reach = 0.0
+    for i in range(vertices.shape[0]):
+        reach = max(reach, math.hypot(vertices[i, 0], vertices[i, 1]))
+    for n in range(path.shape[0]):
+        steps = 1
+        turn = 0.0
+        if n > 0:
+            turn = path[n, 2] - path[n - 1, 2]
+            turn -= 2.0 * math.pi * np.round(turn / (2.0 * math.pi))
+            way = math.hypot(path[n, 0] - path[n - 1, 0], path[n, 1] - path[n - 1, 1])
+            steps = max(1, math.ceil((way + abs(turn) * reach) / (0.5 * cell)))
+        for step in range(steps):
+            back = step / steps
+            pose = path[n].copy()
+            if n > 0:
+                pose[:2] -= back * (path[n, :2] - path[n - 1, :2])
+                pose[2] -= back * turn
+            place(pose, vertices, corners)
+            _to_pixels(corners, frame, scale, corners)
+            for part in range(offsets.shape[0] - 1):
+                fill_convex(fine, corners[offsets[part] : offsets[part + 1]], 1)
+    _average(fine, out)

@@ -1,0 +1,197 @@
+"""A map of what it costs to cover each cell, and how outlines are put on it. Compiled."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from pushplan.planners.lattice.swaths import row_span
+from pushplan.world.checks import FloatArray, IntArray
+
+
+@njit(cache=True, nogil=True)
+def add_floes(
+    outlines: FloatArray,
+    offsets: IntArray,
+    centres: FloatArray,
+    radii: FloatArray,
+    prices: FloatArray,
+    exponent: float,
+    soft: float,
+    grid: FloatArray,
+) -> None:
+    """Spread the price of each floe over the cells whose centres it covers.
+
+    The price is spread in proportion to (1 + ``soft`` - q²)^exponent, where q is the distance from
+    the centre over the radius of the disc of the same area, at most 1. An exponent of -1/2 makes
+    every strip of a disc, of whatever direction, cost the same; 1 weighs the middle most.
+
+    Args:
+        outlines: (V, 2) corners of the floes [cells], row and column; flattened.
+        offsets: (K + 1,) where each floe starts.
+        centres: (K, 2) [cells].
+        radii: (K,) radius of the disc of the same area [cells].
+        prices: (K,) what it costs to cover the whole floe.
+        exponent: see above.
+        soft: see above; positive where the exponent is negative.
+        grid: (rows, columns) added to in place.
+    """
+    rows, columns = grid.shape
+    for k in range(radii.shape[0]):
+        outline = outlines[offsets[k] : offsets[k + 1]]
+        top, bottom = outline[:, 0].min(), outline[:, 0].max()
+        if prices[k] == 0.0 or bottom < 0.0 or top > rows - 1:
+            continue
+        first_row, last_row = int(np.ceil(top)), int(np.floor(bottom))
+        total = 0.0
+        square = 1.0 / max(radii[k] * radii[k], 1e-12)
+        for fill in range(2):  # weigh all cells of the floe, then fill those on the map
+            share = prices[k] / total if fill == 1 else 0.0
+            for row in range(first_row, last_row + 1):
+                if fill == 1 and (row < 0 or row >= rows):
+                    continue
+                low, high = row_span(outline, float(row))
+                dr = (row - centres[k, 0]) ** 2
+                for column in range(int(np.ceil(low)), int(np.floor(high)) + 1):
+                    q = min((dr + (column - centres[k, 1]) ** 2) * square, 1.0)
+                    base = 1.0 + soft - q
+                    weight = (
+                        base if exponent == 1.0 else (1.0 if exponent == 0.0 else base**exponent)
+                    )
+                    if fill == 0:
+                        total += weight
+                    elif 0 <= column < columns:
+                        grid[row, column] += share * weight
+            if total == 0.0:  # a sliver between the centres of cells
+                row, column = int(np.round(centres[k, 0])), int(np.round(centres[k, 1]))
+                if 0 <= row < rows and 0 <= column < columns:
+                    grid[row, column] += prices[k]
+                break
+
+
+@njit(cache=True, nogil=True)
+def _box_mean(line: FloatArray, half: int, out: FloatArray) -> None:
+    """Mean of each entry and ``half`` to both sides; beyond its ends a line is zero."""
+    count = line.shape[0]
+    total = 0.0
+    for i in range(min(half, count)):
+        total += line[i]
+    for i in range(count):
+        if i + half < count:
+            total += line[i + half]
+        if i - half - 1 >= 0:
+            total -= line[i - half - 1]
+        out[i] = max(total, 0.0) / (2 * half + 1)
+
+
+@njit(cache=True, nogil=True)
+def add_crowding(
+    areas: FloatArray, block_size: int, spread: float, factor: float, grid: FloatArray
+) -> None:
+    """Add ``factor`` times the cube of the ice concentration around each cell.
+
+    The concentration is a mean over a neighbourhood, by box filters passed three times, which is
+    nearly a Gaussian.
+
+    Args:
+        areas: (rows, columns) share of each cell that is covered by ice.
+        block_size: cells, along each axis, that share one value.
+        spread: standard deviation of the neighbourhood [cells].
+        factor: price of a cell at a concentration of 1.
+        grid: (rows, columns) added to in place.
+    """
+    rows, columns = areas.shape
+    coarse_rows = (rows + block_size - 1) // block_size
+    coarse_columns = (columns + block_size - 1) // block_size
+    coarse = np.zeros((coarse_rows, coarse_columns))
+    for row in range(rows):
+        for column in range(columns):
+            coarse[row // block_size, column // block_size] += areas[row, column]
+    coarse /= block_size * block_size
+    # three boxes of width b have the variance (b² - 1) / 4
+    half = int(np.round(0.5 * (np.sqrt(4.0 * (spread / block_size) ** 2 + 1.0) - 1.0)))
+    line = np.empty(max(coarse_rows, coarse_columns))
+    for _ in range(3):
+        for i in range(coarse_rows):
+            _box_mean(coarse[i], half, line)
+            coarse[i] = line[:coarse_columns]
+        for j in range(coarse_columns):
+            _box_mean(coarse[:, j].copy(), half, line)
+            coarse[:, j] = line[:coarse_rows]
+    for row in range(rows):
+        for column in range(columns):
+            share = coarse[row // block_size, column // block_size]
+            grid[row, column] += factor * share * share * share
+
+
+@njit(cache=True, nogil=True)
+def block(outlines: FloatArray, offsets: IntArray, margin: float, grid: FloatArray) -> None:
+    """Set to 1 every cell within ``margin`` [cells] of one of some convex outlines.
+
+    Args:
+        outlines: (V, 2) corners [cells], flattened, in order around each outline.
+        offsets: (S + 1,) where each outline starts.
+        margin: at least half the diagonal of a cell, so that no overlap is missed.
+        grid: (rows, columns) changed in place.
+    """
+    rows, columns = grid.shape
+    for s in range(offsets.shape[0] - 1):
+        outline = outlines[offsets[s] : offsets[s + 1]]
+        count = outline.shape[0]
+        first = max(int(np.floor(outline[:, 0].min() - margin)), 0)
+        last = min(int(np.ceil(outline[:, 0].max() + margin)), rows - 1)
+        left = max(int(np.floor(outline[:, 1].min() - margin)), 0)
+        right = min(int(np.ceil(outline[:, 1].max() + margin)), columns - 1)
+        for row in range(first, last + 1):
+            for column in range(left, right + 1):
+                inside, near = True, np.inf
+                for i in range(count):
+                    j = i + 1 if i + 1 < count else 0
+                    ex, ey = outline[j, 0] - outline[i, 0], outline[j, 1] - outline[i, 1]
+                    px, py = row - outline[i, 0], column - outline[i, 1]
+                    if ex * py - ey * px < 0.0:
+                        inside = False
+                    t = min(max((px * ex + py * ey) / (ex * ex + ey * ey), 0.0), 1.0)
+                    near = min(near, (px - t * ex) ** 2 + (py - t * ey) ** 2)
+                if inside or near <= margin * margin:
+                    grid[row, column] = 1.0
+
+
+@njit(cache=True, nogil=True)
+def prefix_sums(grid: FloatArray) -> FloatArray:
+    """(columns, rows + 1) sums of each column of a (rows, columns) grid before each row."""
+    rows, columns = grid.shape
+    sums = np.empty((columns, rows + 1))
+    for column in range(columns):
+        total = 0.0
+        sums[column, 0] = 0.0
+        for row in range(rows):
+            total += grid[row, column]
+            sums[column, row + 1] = total
+    return sums
+
+
+@njit(cache=True, nogil=True)
+def window_minima(grid: FloatArray, width: int, first: int, last: int) -> FloatArray:
+    """(rows,) least sum of ``width`` neighbours in a row, with middles in ``first`` to ``last``.
+
+    A window hangs over the edge of the grid where its middle is near it.
+    """
+    rows, columns = grid.shape
+    least = np.zeros(rows)
+    half = width // 2
+    for row in range(rows):
+        best = np.inf
+        total = 0.0
+        for column in range(max(first - half, 0), min(first - half + width, columns)):
+            total += grid[row, column]
+        for middle in range(first, last + 1):
+            best = min(best, total)
+            leaving, entering = middle - half, middle - half + width
+            if 0 <= leaving < columns:
+                total -= grid[row, leaving]
+            if 0 <= entering < columns:
+                total += grid[row, entering]
+        # sliding sums lose digits, a bound must not
+        least[row] = max(best - 1e-9 * abs(best) - 1e-12, 0.0) if width > 0 else 0.0
+    return least

@@ -1,0 +1,66 @@
+"""`ShipLattice`: A* over motion primitives among floes, then made better against the prediction."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from pushplan.interaction import InteractionModel
+from pushplan.planners.lattice.call import ShipCall
+from pushplan.planners.lattice.config import ShipLatticeConfig
+from pushplan.world import PlanResult, PlanStats, PlanStatus, Stop, World
+
+
+@dataclass(frozen=True)
+class ShipLattice:
+    """State lattice for a vehicle of bounded turn rate in a field of things that it may push.
+
+    After de Schaetzen et al., "Real-time navigation for autonomous surface vehicles in ice-covered
+    waters" (2023), and AUTO-IceNav (arXiv 2411.17155). Use it on the way to a goal line through
+    many small objects; a goal disc and walls are understood too. The robot's origin stays within
+    the bounds. One iteration is a batch of expanded nodes or one repair.
+
+    Args:
+        config: parameters.
+        interaction: predicts what a path does to the objects; by default `IceInteraction` in open
+            water, and `QuasiStatic` where there are walls.
+    """
+
+    config: ShipLatticeConfig = field(default_factory=ShipLatticeConfig)
+    interaction: InteractionModel | None = None
+
+    def plan(
+        self,
+        world: World,
+        *,
+        stop: Stop | None = None,
+        rng: np.random.Generator | None = None,
+    ) -> PlanResult:
+        """Plan from ``world``; see `pushplan.world.Planner`.
+
+        Raises:
+            InvalidInputError: if the world's goal is not one for the robot.
+        """
+        began = time.perf_counter()
+        check = None if stop is None else stop.start()
+        rng = np.random.default_rng(0) if rng is None else rng
+        call = ShipCall(world, self.config, self.interaction, check, rng, began)
+        status = call.run()
+        if status is None:
+            cancelled = stop is not None and stop.cancelled
+            status = PlanStatus.CANCELLED if cancelled else PlanStatus.TIMED_OUT
+        stats = PlanStats(
+            wall_time_s=time.perf_counter() - began,
+            first_solution_s=call.first_solution_s,
+            iterations=call.iterations,
+            nodes=call.expanded,
+            detail={"lattice_cost": call.lattice_cost, "repairs": float(call.repairs)},
+        )
+        return PlanResult(status, call.plan() if status.has_plan else None, stats)
+
+
+def published() -> ShipLattice:
+    """The planner as published, see `ShipLatticeConfig.published`; the reference."""
+    return ShipLattice(ShipLatticeConfig.published())

@@ -1,0 +1,55 @@
+"""Parameters of the push-aware planner."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from pushplan.planners.kinodynamic import KinodynamicRRTConfig
+from pushplan.world.checks import integer, number
+
+
+@dataclass(frozen=True)
+class PushAwareConfig(KinodynamicRRTConfig):
+    """Parameters of `PushAware`: those of its first plan and its repairs, and of the search.
+
+    Lengths are in units of the robot's circumscribed radius R. Those that are not listed are
+    described in `KinodynamicRRTConfig`.
+
+    Args:
+        push_weight: w, the price of a unit of interaction work against a unit of travel work: the
+            user's trade between E_nav and I_nav.
+        greed: factor on the length that is still to go, in the order of the first search.
+        trust: factor on that length where a path is given up because it will cost too much: the
+            table is up to 3 % too long.
+        edge: longest edge of the first random tree [R].
+        arc: length of an edge of the search [cells of the table].
+        curvatures: how many curvatures an edge may have, spread evenly between the sharpest turns.
+        nodes: nodes of one search at most.
+        memory: of the objects' poses in one search at most [MiB].
+        expansions: arcs driven between two looks at the stop rule, fewer among many objects.
+        slack: how much more than the best plan so far a path of the search may cost before it is
+            repaired, as a share.
+    """
+
+    push_weight: float = 1.75
+    turn_share: float = 0.98
+    margin: float = 0.04
+    default_iterations: int = 20_000
+    greed: float = 1.05
+    trust: float = 0.95
+    arc: float = 2.0
+    curvatures: int = 5
+    nodes: int = 100_000
+    memory: float = 48.0
+    expansions: int = 30
+    slack: float = 0.05
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        for name in ("greed", "trust", "slack"):
+            number(name, getattr(self, name), low=0.0)
+        for name in ("arc", "memory"):
+            number(name, getattr(self, name), low=0.0, open_low=True)
+        integer("curvatures", self.curvatures, low=3)
+        integer("nodes", self.nodes, low=2)
+        integer("expansions", self.expansions, low=1)

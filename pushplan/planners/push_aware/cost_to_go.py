@@ -1,0 +1,195 @@
+"""Least driven length to the goal from every pose, around walls and under the turn limit.
+
+The value function of a forward car of bounded curvature on a grid of (x, y, heading), solved by
+semi-Lagrangian Gauss-Seidel sweeps: from each cell centre short arcs are driven, and the value
+where they end is interpolated (Falcone and Ferretti, "Semi-Lagrangian Approximation Schemes for
+Linear and Hamilton-Jacobi Equations", 2013; for cars: Takei, Tsai, Shen and Landa, "A practical
+path-planning algorithm for a simple car", 2010). Objects are not in it, so one table serves every
+call on a map.
+"""
+
+from __future__ import annotations
+
+import heapq
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from pushplan.planners.kinodynamic.collision import Footprint, Obstacles, is_free
+from pushplan.planners.kinodynamic.improve import in_goal
+from pushplan.world.checks import BoolArray, FloatArray, IntArray
+
+
+class CostToGo(NamedTuple):
+    """A table of lengths to the goal."""
+
+    values: FloatArray
+    """(rows, columns, headings) [m]; inf where the robot overlaps a wall or has no way"""
+    floor: FloatArray
+    """(rows, columns) [m] least length for the robot's inscribed disc, on the grid"""
+    origin: FloatArray
+    """(2,) least x, y of the grid [m]"""
+    cell: float
+    """Side of a cell [m]."""
+
+
+@njit(cache=True, nogil=True)
+def mark_free(
+    origin: FloatArray,
+    cell: float,
+    free: BoolArray,
+    first: int,
+    last: int,
+    shape: Footprint,
+    among: Obstacles,
+) -> None:
+    """Mark which of the cells from ``first`` to ``last`` (exclusive) hold the footprint.
+
+    Args:
+        origin: (2,) least x, y of the grid [m].
+        cell: side of a cell [m].
+        free: (rows, columns, headings), changed in place.
+        first: index of a cell, counted row by row.
+        last: likewise.
+        shape: the footprint.
+        among: the walls.
+    """
+    scratch = np.empty_like(shape.vertices)
+    pose = np.empty(3)
+    cols, headings = free.shape[1], free.shape[2]
+    for at in range(first, last):
+        r, c = at // cols, at % cols
+        pose[0], pose[1] = origin[0] + (c + 0.5) * cell, origin[1] + (r + 0.5) * cell
+        for k in range(headings):
+            pose[2] = 2.0 * np.pi * k / headings
+            free[r, c, k] = is_free(pose, shape, among, scratch)
+
+
+@njit(cache=True, nogil=True)
+def flood(
+    origin: FloatArray, cell: float, open_cells: BoolArray, goal: FloatArray, center: IntArray
+) -> tuple[FloatArray, IntArray]:
+    """Dijkstra over 8 neighbours from the goal: lengths (rows, columns), and cells by length."""
+    rows, cols = open_cells.shape
+    far = np.full((rows, cols), np.inf)
+    order = np.empty(rows * cols, np.int64)
+    queue = [(0.0, np.int64(-1))]
+    for r in range(rows):
+        for c in range(cols):
+            x, y = origin[0] + (c + 0.5) * cell, origin[1] + (r + 0.5) * cell
+            if open_cells[r, c] and in_goal(x, y, goal):
+                far[r, c] = 0.0
+                heapq.heappush(queue, (0.0, np.int64(r * cols + c)))
+    if center[0] >= 0 and far[center[0], center[1]] > 0.0:  # a disc may be smaller than a cell
+        far[center[0], center[1]] = 0.0
+        heapq.heappush(queue, (0.0, np.int64(center[0] * cols + center[1])))
+    count = 0
+    while len(queue) > 0:
+        length, at = heapq.heappop(queue)
+        if at < 0:
+            continue
+        r, c = at // cols, at % cols
+        if length > far[r, c]:
+            continue
+        order[count] = at
+        count += 1
+        for dr in range(-1, 2):
+            for dc in range(-1, 2):
+                nr, nc = r + dr, c + dc
+                if nr < 0 or nc < 0 or nr >= rows or nc >= cols or not open_cells[nr, nc]:
+                    continue
+                there = length + cell * np.sqrt(float(dr * dr + dc * dc))
+                if there < far[nr, nc]:
+                    far[nr, nc] = there
+                    heapq.heappush(queue, (there, nr * cols + nc))
+    return far, order[:count]
+
+
+@njit(cache=True, nogil=True)
+def _between(
+    values: FloatArray, ox: float, oy: float, cell: float, x: float, y: float, theta: float
+) -> float:
+    """Interpolated value at a pose; cells without a value do not count, inf if none has one."""
+    rows, cols, headings = values.shape
+    u, v = (x - ox) / cell - 0.5, (y - oy) / cell - 0.5
+    t = (theta / (2.0 * np.pi) * headings) % headings
+    j, i, k = int(np.floor(u)), int(np.floor(v)), int(t)
+    fu, fv, ft = u - j, v - i, t - k
+    k = k % headings
+    total, weight = 0.0, 0.0
+    for di in range(2):
+        r = i + di
+        if r < 0 or r >= rows:
+            continue
+        wi = fv if di == 1 else 1.0 - fv
+        for dj in range(2):
+            c = j + dj
+            if c < 0 or c >= cols:
+                continue
+            wj = wi * (fu if dj == 1 else 1.0 - fu)
+            for dk in range(2):
+                w = wj * (ft if dk == 1 else 1.0 - ft)
+                value = values[r, c, (k + dk) % headings]
+                if w > 1e-9 and value < np.inf:
+                    total += w * value
+                    weight += w
+    return total / weight if weight > 0.25 else np.inf
+
+
+@njit(cache=True, nogil=True)
+def sweep(
+    values: FloatArray,
+    free: BoolArray,
+    order: IntArray,
+    origin: FloatArray,
+    cell: float,
+    ends: FloatArray,
+    length: float,
+    floor: FloatArray,
+) -> float:
+    """One Gauss-Seidel sweep over the cells; returns the greatest change [m].
+
+    Args:
+        values: (rows, columns, headings), changed in place.
+        free: (rows, columns, headings).
+        order: (N,) cells by their distance from the goal.
+        origin: of the grid.
+        cell: of the grid [m].
+        ends: (headings, arcs, 3) displacement at the end of each arc.
+        length: of the arcs [m].
+        floor: (rows, columns) 0 in the goal.
+    """
+    cols, headings = values.shape[1], values.shape[2]
+    change = 0.0
+    ox, oy = origin[0], origin[1]
+    for n in range(order.shape[0]):
+        r, c = order[n] // cols, order[n] % cols
+        x, y = ox + (c + 0.5) * cell, oy + (r + 0.5) * cell
+        if floor[r, c] == 0.0:
+            continue
+        for k in range(headings):
+            if not free[r, c, k]:
+                continue
+            best = values[r, c, k]
+            for a in range(ends.shape[1]):
+                nx, ny, nt = x + ends[k, a, 0], y + ends[k, a, 1], ends[k, a, 2]
+                value = length + _between(values, ox, oy, cell, nx, ny, nt)
+                if value < best:
+                    best = value
+            if best < values[r, c, k]:
+                change = max(change, min(values[r, c, k], 1e9) - best)
+                values[r, c, k] = best
+    return change
+
+
+@njit(cache=True, nogil=True)
+def length_to_go(table: CostToGo, x: float, y: float, theta: float) -> float:
+    """Length to the goal [m] from a pose: the table's, or its floor where it has none."""
+    value = _between(table.values, table.origin[0], table.origin[1], table.cell, x, y, theta)
+    rows, cols = table.floor.shape
+    r = min(max(int((y - table.origin[1]) / table.cell), 0), rows - 1)
+    c = min(max(int((x - table.origin[0]) / table.cell), 0), cols - 1)
+    if value == np.inf:
+        value = table.floor[r, c]
+    return value

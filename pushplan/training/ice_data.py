@@ -1,0 +1,167 @@
+"""``python -m pushplan.training.ice_data``: pairs of ice before and after a ship, in shards.
+
+A shard is a ``.npz`` file with the passages of a few voyages. Shards that are there already are
+kept, so an interrupted run goes on where it stopped; the bytes depend on the seeds alone.
+"""
+
+from __future__ import annotations
+
+import argparse
+import logging
+import multiprocessing
+import os
+from collections.abc import Sequence
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pushplan.training.ice_passages import SPLITS, voyage_passages
+from pushplan.world import InvalidInputError
+from pushplan.world.checks import choice, integer
+
+log = logging.getLogger(__name__)
+
+LEVELS = 16
+"""Coverage is stored in steps of 1 / 16, which is what it is drawn in."""
+VOYAGES_PER_SHARD = 10
+
+
+@dataclass(frozen=True, eq=False)
+class IcePairs:
+    """Patches before and after, as the network learns them.
+
+    Args:
+        patches: (N, 3, 40, 40) uint8 in sixteenths: occupancy, footprint, swath.
+        after: (N, 40, 40) uint8 in sixteenths.
+        work: (N,) area of each object times its path length, summed, in cells³.
+    """
+
+    patches: NDArray[np.uint8]
+    after: NDArray[np.uint8]
+    work: NDArray[np.float32]
+
+    def __len__(self) -> int:
+        return len(self.work)
+
+
+def voyage_pairs(seed: int, split: str) -> IcePairs:
+    """The pairs of one voyage."""
+    batch, truth = voyage_passages(seed, split)
+    return IcePairs(
+        np.rint(LEVELS * batch.patches).astype(np.uint8),
+        np.rint(LEVELS * truth.after).astype(np.uint8),
+        (truth.work / (batch.density * batch.cell**3)).astype(np.float32),
+    )
+
+
+def write_shard(folder: str | Path, split: str, index: int) -> Path:
+    """Simulate the voyages of one shard and write it, unless it is there."""
+    path = Path(folder) / f"{split}-{index:05d}.npz"
+    if path.exists():
+        return path
+    seeds = range(index * VOYAGES_PER_SHARD, (index + 1) * VOYAGES_PER_SHARD)
+    pairs = [voyage_pairs(seed, split) for seed in seeds]
+    partial = path.with_suffix(f".{os.getpid()}.partial")
+    with partial.open("wb") as file:
+        np.savez_compressed(
+            file,
+            patches=np.concatenate([p.patches for p in pairs]),
+            after=np.concatenate([p.after for p in pairs]),
+            work=np.concatenate([p.work for p in pairs]),
+        )
+    partial.replace(path)
+    return path
+
+
+def write_shards(folder: str | Path, *, split: str, shards: int, workers: int = 1) -> list[Path]:
+    """Write the first shards of a split, in several processes.
+
+    Args:
+        folder: made if it is not there.
+        split: ``"train"`` or ``"held-out"``.
+        shards: how many; each holds 480 pairs.
+        workers: processes.
+    """
+    choice("split", split, SPLITS)
+    integer("shards", shards, low=1)
+    integer("workers", workers, low=1)
+    Path(folder).mkdir(parents=True, exist_ok=True)
+    if workers == 1:
+        return [_reported(folder, split, i, shards) for i in range(shards)]
+    context = multiprocessing.get_context("spawn")
+    with ProcessPoolExecutor(workers, mp_context=context) as pool:
+        work = [pool.submit(write_shard, folder, split, i) for i in range(shards)]
+        paths = []
+        for i, future in enumerate(work):
+            paths.append(future.result())
+            log.info("%s: shard %d of %d", split, i + 1, shards)
+        return paths
+
+
+def _reported(folder: str | Path, split: str, index: int, shards: int) -> Path:
+    path = write_shard(folder, split, index)
+    log.info("%s: shard %d of %d", split, index + 1, shards)
+    return path
+
+
+def read_shards(folder: str | Path, split: str, limit: int | None = None) -> IcePairs:
+    """All pairs of a split, in the order of their shards.
+
+    Args:
+        folder: where `write_shards` put them.
+        split: ``"train"`` or ``"held-out"``.
+        limit: how many shards at most.
+
+    Raises:
+        InvalidInputError: if there are none, or a file is not a shard.
+    """
+    choice("split", split, SPLITS)
+    paths = sorted(Path(folder).glob(f"{split}-*.npz"))[:limit]
+    if not paths:
+        raise InvalidInputError(
+            f"no shards {split}-*.npz in {folder}: make them with "
+            f"'python -m pushplan.training.ice_data --out {folder} --split {split}'"
+        )
+    pairs = [_read(path) for path in paths]
+    return IcePairs(
+        np.concatenate([p.patches for p in pairs]),
+        np.concatenate([p.after for p in pairs]),
+        np.concatenate([p.work for p in pairs]),
+    )
+
+
+def _read(path: Path) -> IcePairs:
+    try:
+        with np.load(path, allow_pickle=False) as data:
+            pairs = IcePairs(data["patches"], data["after"], data["work"])
+    except Exception as error:  # a zip file can be broken in many ways
+        raise InvalidInputError(f"{path} is not a shard of ice passages: {error}") from error
+    count = len(pairs.work)
+    if pairs.patches.shape[:2] != (count, 3) or pairs.after.shape[0] != count:
+        raise InvalidInputError(f"{path} is not a shard of ice passages: shapes disagree")
+    return pairs
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Write shards of both splits, or of one."""
+    parser = argparse.ArgumentParser(
+        prog="python -m pushplan.training.ice_data", description=__doc__
+    )
+    parser.add_argument("--out", required=True, metavar="DIR", help="folder of the shards")
+    parser.add_argument("--split", choices=SPLITS, help="only this one (default: both)")
+    parser.add_argument("--shards", type=int, default=60, help="of the training split (default 60)")
+    parser.add_argument("--held-out", type=int, default=6, help="held-out shards (default 6)")
+    parser.add_argument("--workers", type=int, default=1, help="processes (default 1)")
+    options = parser.parse_args(arguments)
+    logging.basicConfig(level=logging.INFO, format="%(message)s")
+    counts = {"train": options.shards, "held-out": options.held_out}
+    for split in SPLITS if options.split is None else (options.split,):
+        write_shards(options.out, split=split, shards=counts[split], workers=options.workers)
+    return 0
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

@@ -1,0 +1,172 @@
+"""``python -m pushplan.training.ice_evaluation``: predictors against held-out rollouts.
+
+Every predictor sees the same passages; what the simulator made of them is the truth. Writes a
+table in Markdown.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.ndimage import binary_dilation
+
+from pushplan.interaction import QuasiStatic
+from pushplan.interaction.ice import IceInteraction
+from pushplan.interaction.network import IceNetwork
+from pushplan.interaction.occupancy import (
+    NoMotion,
+    OccupancyForecast,
+    OccupancyPredictor,
+    PassageBatch,
+)
+from pushplan.interaction.occupancy_models import ICE_FRICTION, InteractionOccupancy
+from pushplan.training.ice_passages import PassageConfig, voyage_passages
+from pushplan.world.checks import BoolArray, FloatArray, integer
+
+AROUND = 5
+"""Cells about the swath that belong to its window: half a hull length."""
+
+
+@dataclass(frozen=True)
+class PredictionScores:
+    """Errors of one predictor over some passages.
+
+    Args:
+        passages: how many.
+        patch_mse: mean squared error of the covered share over the whole patch.
+        swath_mse: over the cells within half a hull length of the swath.
+        work_bias: mean predicted over mean true work; NaN where no work was done.
+        work_error: mean absolute error of the work over its mean.
+        work_correlation: Pearson's, NaN where one of them is constant.
+        milliseconds: median time for a passage.
+    """
+
+    passages: int
+    patch_mse: float
+    swath_mse: float
+    work_bias: float
+    work_error: float
+    work_correlation: float
+    milliseconds: float
+
+
+def swath_windows(batch: PassageBatch) -> BoolArray:
+    """(B, 40, 40) cells near the swath of each passage."""
+    near = np.ones((1, 2 * AROUND + 1, 2 * AROUND + 1), dtype=bool)
+    window: BoolArray = binary_dilation(batch.patches[:, 2] > 0.0, near)
+    return window
+
+
+def score(
+    batches: Sequence[tuple[PassageBatch, OccupancyForecast]], predictor: OccupancyPredictor
+) -> PredictionScores:
+    """Score a predictor on batches with their truth."""
+    predictor.predict(batches[0][0])  # loads and compiles
+    patch, swath, works, truths, times = [], [], [], [], []
+    for batch, truth in batches:
+        began = time.perf_counter()
+        found = predictor.predict(batch)
+        times.append((time.perf_counter() - began) / len(batch))
+        error = (found.after - truth.after).astype(np.float64) ** 2
+        window = swath_windows(batch)
+        patch.append(error.mean(axis=(1, 2)))
+        swath.append((error * window).sum(axis=(1, 2)) / window.sum(axis=(1, 2)))
+        works.append(found.work)
+        truths.append(truth.work)
+    work, true = np.concatenate(works), np.concatenate(truths)
+    mean = float(true.mean())
+    return PredictionScores(
+        passages=len(true),
+        patch_mse=float(np.concatenate(patch).mean()),
+        swath_mse=float(np.concatenate(swath).mean()),
+        work_bias=float(work.mean()) / mean if mean > 0.0 else float("nan"),
+        work_error=float(np.abs(work - true).mean()) / mean if mean > 0.0 else float("nan"),
+        work_correlation=_correlation(work, true),
+        milliseconds=1e3 * float(np.median(times)),
+    )
+
+
+def _correlation(a: FloatArray, b: FloatArray) -> float:
+    if a.std() == 0.0 or b.std() == 0.0:
+        return float("nan")
+    return float(np.corrcoef(a, b)[0, 1])
+
+
+def held_out(
+    concentration: float, voyages: int, config: PassageConfig | None = None
+) -> list[tuple[PassageBatch, OccupancyForecast]]:
+    """Passages through ice of one concentration that no network was trained on.
+
+    Args:
+        concentration: of the ice.
+        voyages: how many fields of ice.
+        config: of the passages; its concentrations are replaced.
+    """
+    integer("voyages", voyages, low=1)
+    given = config or PassageConfig()
+    fixed = PassageConfig(
+        greatest_concentration=concentration,
+        least_concentration=concentration,
+        passages=given.passages,
+        shortest=given.shortest,
+        longest=given.longest,
+        steepest=given.steepest,
+    )
+    first = round(1e4 * concentration)
+    return [voyage_passages(first + i, "held-out", fixed) for i in range(voyages)]
+
+
+def predictors(network: str | None = None) -> dict[str, OccupancyPredictor]:
+    """The predictors that are compared, by what the table calls them."""
+    return {
+        "no motion": NoMotion(),
+        "quasi-static": InteractionOccupancy(QuasiStatic(friction=ICE_FRICTION)),
+        "ice contacts": InteractionOccupancy(IceInteraction()),
+        "network": IceNetwork(network),
+    }
+
+
+def table(rows: Mapping[tuple[float, str], PredictionScores]) -> str:
+    """Markdown, one row for each concentration and predictor."""
+    lines = [
+        "| ice | predictor | MSE patch | MSE swath | work / true | work error | correlation "
+        "| ms a passage |",
+        "|---|---|---|---|---|---|---|---|",
+    ]
+    for (share, name), s in rows.items():
+        lines.append(
+            f"| {100 * share:.0f} % | {name} | {_in(1e3 * s.patch_mse)} | {_in(1e3 * s.swath_mse)} "
+            f"| {s.work_bias:.2f} | {100 * s.work_error:.0f} % | {_in(s.work_correlation)} "
+            f"| {s.milliseconds:.2g} |"
+        )
+    return "\n".join(lines) + "\n\nMSE in thousandths.\n"
+
+
+def _in(value: float) -> str:
+    return "-" if np.isnan(value) else f"{value:.2f}"
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Write the table."""
+    parser = argparse.ArgumentParser(
+        prog="python -m pushplan.training.ice_evaluation", description=__doc__
+    )
+    parser.add_argument("--network", metavar="FILE.onnx", help="instead of the shipped one")
+    parser.add_argument("--voyages", type=int, default=6, help="for each concentration (default 6)")
+    options = parser.parse_args(arguments)
+    rows = {}
+    for share in (0.1, 0.2, 0.3, 0.4, 0.5):
+        batches = held_out(share, options.voyages)
+        for name, predictor in predictors(options.network).items():
+            rows[share, name] = score(batches, predictor)
+    sys.stdout.write(table(rows))
+    return 0
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

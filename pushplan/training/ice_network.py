@@ -1,0 +1,189 @@
+"""``python -m pushplan.training.ice_network``: train the ice network and export it to ONNX.
+
+Needs the extra ``learn`` (PyTorch). The same shards, seed, thread count and version of PyTorch
+give the same weights.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import logging
+import time
+import warnings
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from pushplan.interaction.occupancy import CELLS_PER_LENGTH, CHANNELS, PATCH_CELLS
+from pushplan.training.ice_data import LEVELS, IcePairs, read_shards
+from pushplan.world import MissingDependencyError
+from pushplan.world.checks import integer, number
+
+if TYPE_CHECKING:
+    from pushplan.training.ice_unet import IceUNet
+
+log = logging.getLogger(__name__)
+
+OPSET = 17
+
+
+@dataclass(frozen=True)
+class TrainingConfig:
+    """Parameters of the training.
+
+    Args:
+        epochs: passes over the pairs.
+        batch: pairs in a step.
+        rate: greatest learning rate of AdamW; it rises over the first tenth of the steps and
+            falls to nothing along a cosine (one-cycle schedule).
+        decay: of the weights.
+        map_weight: of the mean squared error of the occupancy, against the Poisson deviance of the
+            work, which is unbiased in the mean and allows more error where the work is more.
+        seed: of initial weights, order and mirroring.
+        threads: of PyTorch; the result depends on it in the last digits.
+    """
+
+    epochs: int = 12
+    batch: int = 64
+    rate: float = 4e-3
+    decay: float = 1e-4
+    map_weight: float = 20.0
+    seed: int = 0
+    threads: int = 1
+
+    def __post_init__(self) -> None:
+        for name in ("epochs", "batch", "threads"):
+            integer(name, getattr(self, name), low=1)
+        integer("seed", self.seed, low=0)
+        for name in ("rate", "map_weight"):
+            number(name, getattr(self, name), low=0.0, open_low=True)
+        number("decay", self.decay, low=0.0)
+
+
+def train(pairs: IcePairs, config: TrainingConfig | None = None) -> tuple[IceUNet, list[float]]:
+    """Train a network from scratch.
+
+    Returns:
+        The network, and the mean loss of each epoch.
+
+    Raises:
+        MissingDependencyError: without PyTorch.
+    """
+    torch = _torch()
+    from pushplan.training.ice_unet import IceUNet, parameter_count, seeded
+
+    config = config or TrainingConfig()
+    torch.set_num_threads(config.threads)
+    generator = seeded(config.seed)
+    network: Any = IceUNet()
+    network = network.to(memory_format=torch.channels_last)
+    log.info("%d parameters, %d pairs", parameter_count(network), len(pairs))
+    optimizer = torch.optim.AdamW(network.parameters(), lr=config.rate, weight_decay=config.decay)
+    steps = max(1, len(pairs) // config.batch)
+    schedule = torch.optim.lr_scheduler.OneCycleLR(
+        optimizer, max_lr=config.rate, total_steps=config.epochs * steps + 1, pct_start=0.1
+    )
+    data = tuple(torch.from_numpy(x) for x in (pairs.patches, pairs.after, pairs.work))
+    losses = []
+    network.train()
+    for epoch in range(config.epochs):
+        began, total = time.perf_counter(), 0.0
+        order = torch.randperm(len(pairs), generator=generator)
+        for step in range(steps):
+            chosen = order[step * config.batch : (step + 1) * config.batch]
+            mirrored = bool(torch.rand((), generator=generator) < 0.5)
+            loss = _loss(network, [x[chosen] for x in data], mirrored, config.map_weight)
+            optimizer.zero_grad(set_to_none=True)
+            loss.backward()
+            torch.nn.utils.clip_grad_norm_(network.parameters(), 1.0)
+            optimizer.step()
+            schedule.step()
+            total += float(loss.detach())
+        losses.append(total / steps)
+        seconds = time.perf_counter() - began
+        log.info("epoch %d of %d: loss %.4f, %.0f s", epoch + 1, config.epochs, losses[-1], seconds)
+    return network, losses
+
+
+def _loss(network: IceUNet, chosen: list[Any], mirrored: bool, map_weight: float) -> Any:
+    """Error of a step: occupancy and work, of patches seen in a mirror or not."""
+    patches, after = chosen[0].float() / LEVELS, chosen[1].float() / LEVELS
+    work = chosen[2] / CELLS_PER_LENGTH**3
+    if mirrored:
+        patches, after = patches.flip(-1), after.flip(-1)
+    found, effort = network(patches)
+    occupancy = ((found - after) ** 2).mean()
+    return map_weight * occupancy + (effort - work * (effort + 1e-6).log()).mean()
+
+
+def export(network: IceUNet, path: str | Path) -> None:
+    """Write a network as ONNX for any batch size; PyTorch is not needed to run it."""
+    torch = _torch()
+    from pushplan.training.ice_unet import ExportedIceUNet
+
+    example = torch.zeros(2, len(CHANNELS), PATCH_CELLS, PATCH_CELLS)
+    Path(path).parent.mkdir(parents=True, exist_ok=True)
+    with warnings.catch_warnings():
+        # the exporter that needs no further package; it is marked as old
+        warnings.simplefilter("ignore", DeprecationWarning)
+        _write(torch, ExportedIceUNet(network), example, path)
+
+
+def _write(torch: Any, network: Any, example: Any, path: str | Path) -> None:
+    torch.onnx.export(
+        network,
+        (example,),
+        str(path),
+        input_names=["patches"],
+        output_names=["after", "work"],
+        dynamic_axes={"patches": {0: "batch"}, "after": {0: "batch"}, "work": {0: "batch"}},
+        opset_version=OPSET,
+        dynamo=False,
+    )
+
+
+def _torch() -> Any:
+    try:
+        import torch
+    except ImportError as error:
+        raise MissingDependencyError(
+            "training needs PyTorch: pip install 'pushplan[learn]'"
+        ) from error
+    return torch
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Train on a folder of shards and write the network and a record of the training."""
+    parser = argparse.ArgumentParser(
+        prog="python -m pushplan.training.ice_network", description=__doc__
+    )
+    default = TrainingConfig()
+    parser.add_argument("--data", required=True, metavar="DIR", help="shards of ice_data")
+    parser.add_argument("--out", required=True, metavar="FILE.onnx", help="the network")
+    parser.add_argument("--epochs", type=int, default=default.epochs)
+    parser.add_argument("--seed", type=int, default=default.seed)
+    parser.add_argument("--threads", type=int, default=default.threads)
+    parser.add_argument("--shards", type=int, default=None, help="use only so many")
+    options = parser.parse_args(arguments)
+    logging.basicConfig(level=logging.INFO, format="%(message)s")
+    config = TrainingConfig(epochs=options.epochs, seed=options.seed, threads=options.threads)
+    pairs = read_shards(options.data, "train", options.shards)
+    began = time.perf_counter()
+    network, losses = train(pairs, config)
+    seconds = time.perf_counter() - began
+    export(network, options.out)
+    record = {
+        "pairs": len(pairs),
+        "seconds": round(seconds),
+        "losses": [round(loss, 5) for loss in losses],
+        "config": asdict(config),
+    }
+    Path(options.out).with_suffix(".json").write_text(json.dumps(record, indent=2) + "\n")
+    log.info("wrote %s after %.0f s", options.out, seconds)
+    return 0
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

@@ -1,0 +1,157 @@
+"""Passages through random ice, with what the simulator says happens: the truth to learn."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from pushplan.envs.simulators.pymunk_simulator import PymunkSimulator
+from pushplan.envs.tasks.ship_ice import ShipIceTask
+from pushplan.interaction.model import Interaction
+from pushplan.interaction.occupancy import (
+    OccupancyForecast,
+    Passage,
+    PassageBatch,
+    make_batch,
+    patch_after,
+)
+from pushplan.world import World, stream
+from pushplan.world.checks import FloatArray, integer, number
+
+SPLITS = ("train", "held-out")
+
+
+@dataclass(frozen=True)
+class PassageConfig:
+    """What passages are drawn. Lengths in hull lengths.
+
+    Args:
+        greatest_concentration: of the ice, drawn from ``least_concentration`` to this.
+        least_concentration: share of ice.
+        passages: drawn from each voyage along the channel.
+        shortest: least length of a passage.
+        longest: greatest length.
+        arcs: least and greatest length of the arcs that a voyage is made of.
+        spacing: between the poses of a voyage.
+        steepest: greatest angle between the ship and the channel [rad].
+    """
+
+    greatest_concentration: float = 0.5
+    least_concentration: float = 0.01
+    passages: int = 48
+    shortest: float = 0.2
+    longest: float = 1.2
+    arcs: tuple[float, float] = (0.15, 1.0)
+    spacing: float = 0.05
+    steepest: float = math.radians(75.0)
+
+    def __post_init__(self) -> None:
+        share = number("greatest_concentration", self.greatest_concentration, low=0.0, high=0.5)
+        number("least_concentration", self.least_concentration, low=0.0, high=share)
+        integer("passages", self.passages, low=1)
+        number("spacing", self.spacing, low=0.0, high=0.2, open_low=True)
+        number("shortest", self.shortest, low=self.spacing)
+        number("longest", self.longest, low=self.shortest, high=1.5)
+        number("arcs", self.arcs[0], low=self.spacing, high=self.arcs[1])
+        number("steepest", self.steepest, low=0.1, high=0.5 * math.pi)
+
+
+def random_voyage(world: World, config: PassageConfig, rng: np.random.Generator) -> FloatArray:
+    """A way along the channel in arcs of random length and curvature.
+
+    Args:
+        world: the ship at its start, heading up the channel.
+        config: what arcs.
+        rng: the only source of randomness.
+
+    Returns:
+        (N, 3) poses, the hull's ``spacing`` apart, that keep clear of the channel's ends. They may
+        pass its sides by up to a hull length.
+    """
+    length = float(np.ptp(world.robot.vertices[:, 0]))
+    tightest = 1.0 / world.robot.turning_radius
+    step = config.spacing * length
+    x_low, _, x_high, y_high = world.static.bounds.tolist()
+    x, y, theta = world.robot_pose.tolist()
+    poses = [(x, y, theta)]
+    while y < y_high - 1.5 * length and len(poses) < 4000:
+        straight = rng.random() < 0.25
+        bend = 0.0 if straight else rng.choice([-1.0, 1.0]) * tightest * rng.uniform(0.1, 1.0)
+        off = theta - 0.5 * math.pi
+        if abs(off) > config.steepest or x < x_low + length or x > x_high - length:
+            wanted = math.copysign(1.0, 0.5 * (x_low + x_high) - x) if abs(off) < 0.3 else off
+            bend = -math.copysign(tightest, wanted)
+        for _ in range(max(1, round(rng.uniform(*config.arcs) * length / step))):
+            middle = theta + 0.5 * bend * step
+            x += step * math.cos(middle)
+            y += step * math.sin(middle)
+            theta += bend * step
+            poses.append((x, y, theta))
+            if abs(theta - 0.5 * math.pi) > config.steepest and bend * (theta - 1.57) > 0.0:
+                break
+    return np.array(poses)
+
+
+def voyage_passages(
+    seed: int, split: str = "train", config: PassageConfig | None = None
+) -> tuple[PassageBatch, OccupancyForecast]:
+    """Passages of one simulated voyage through fresh ice, and what the simulator made of them.
+
+    Later passages meet ice that the ship has moved before, and its own open wake.
+
+    Args:
+        seed: of the ice, the voyage and the choice of passages.
+        split: ``"train"`` or ``"held-out"``; the same seed gives other ice in the other.
+        config: what is drawn.
+    """
+    config = PassageConfig() if config is None else config
+    rng = stream(seed, f"ice passages {split}")
+    share = rng.uniform(config.least_concentration, config.greatest_concentration)
+    task = ShipIceTask(
+        variations={
+            "concentration": float(share),
+            "clumping": float(rng.uniform()),
+            "goal_distance": 39.0,
+        }
+    )
+    world = task.start(rng)
+    voyage = random_voyage(world, config, rng)
+    simulator = PymunkSimulator()
+    simulator.build(world, task.materials)
+    moved = simulator.follow(voyage)
+    passages, ends = _choose(world, voyage, moved, config, rng)
+    batch = make_batch(passages)
+    after = np.stack(
+        [patch_after(batch, i, moved.object_poses[b]) for i, (_, b) in enumerate(ends)]
+    )
+    work = [Interaction(moved.object_poses[a : b + 1], moved.masses).work for a, b in ends]
+    return batch, OccupancyForecast(after, np.array(work))
+
+
+def _choose(
+    world: World,
+    voyage: FloatArray,
+    moved: Interaction,
+    config: PassageConfig,
+    rng: np.random.Generator,
+) -> tuple[list[Passage], list[tuple[int, int]]]:
+    """Pieces of a voyage, from the poses with the first number to those with the second."""
+    last = len(voyage) - 1 if moved.jammed_at < 0 else moved.jammed_at - 1
+    shortest, longest = (
+        max(1, round(share / config.spacing)) for share in (config.shortest, config.longest)
+    )
+    passages, ends = [], []
+    for _ in range(config.passages):
+        count = int(rng.integers(shortest, longest + 1))
+        first = int(rng.integers(0, max(1, last - count + 1)))
+        scene = replace(
+            world,
+            robot_pose=voyage[first],
+            movables=world.movables.moved_to(moved.object_poses[first]),
+        )
+        end = min(first + count, last)
+        passages.append(Passage(scene, voyage[first : end + 1]))
+        ends.append((first, end))
+    return passages, ends
