@@ -32,6 +32,8 @@ def number(
     Raises:
         InvalidInputError: if it is not a number, not finite, or out of range.
     """
+    if type(value) is float and low < value < high and -math.inf < value < math.inf:
+        return value  # most often; the rest sorts out what is wrong
     if isinstance(value, bool) or not isinstance(value, numbers.Real):
         raise InvalidInputError(f"{name} must be a number, got {_short(value)}")
     try:

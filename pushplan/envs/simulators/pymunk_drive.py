@@ -145,20 +145,21 @@ class PymunkDriver:
         self.held = False
         rows = np.empty((samples, *start.shape))
         heading = float(start[0, 2])
-        outcome = _Moved.ALL
         for i in range(samples):
             advancing = chord  # a robot that is held tries again after the next sample
-            for j in range(each):
-                middle = heading + half
-                vx, vy = advancing * math.cos(middle), advancing * math.sin(middle)
+            j = 0
+            while j < each:
                 first = i == 0 and j == 0
                 # a jam needs something static, so most substeps do without a way back
-                if first or careful or bodies.static_contacts:
-                    outcome = self._substep(vx, vy, w, h, first=first)
-                elif self._try(vx, vy, w, h, self._limit):
-                    outcome = _Moved.ALL
-                else:
-                    return None
+                if not (first or careful or bodies.static_contacts):
+                    done, heading = bodies.march(advancing, heading, w, h, each - j)
+                    j += done
+                    if not self._sound(self._limit):
+                        return None
+                    continue
+                middle = heading + half
+                vx, vy = advancing * math.cos(middle), advancing * math.sin(middle)
+                outcome = self._substep(vx, vy, w, h, first=first)
                 if outcome is _Moved.NOTHING:  # nor will it in the rest of the step
                     rows[i:] = bodies.read()
                     return rows
@@ -167,6 +168,7 @@ class PymunkDriver:
                     heading = bodies.heading
                 else:
                     heading += w * h
+                j += 1
             rows[i] = bodies.read()
         return rows
 
@@ -234,9 +236,13 @@ class PymunkDriver:
 
     def _try(self, vx: float, vy: float, w: float, h: float, allowed: float) -> bool:
         """Advance by ``h`` [s]; whether no overlap beyond ``allowed`` [m] has come of it."""
+        self._bodies.drive(vx, vy, w)
+        self._bodies.advance(h)
+        return self._sound(allowed)
+
+    def _sound(self, allowed: float) -> bool:
+        """Whether no overlap beyond ``allowed`` [m] has come of the last substep."""
         bodies = self._bodies
-        bodies.drive(vx, vy, w)
-        bodies.advance(h)
         measured = bodies.static_contacts > 0
         depth = bodies.depth if measured else 0.0
         if depth <= allowed:
