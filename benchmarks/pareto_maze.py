@@ -1,14 +1,19 @@
 """The front of (E_nav, I_nav) in the maze, drawn by sweeping the price of pushing.
 
-    python benchmarks/pareto_maze.py [SEEDS] [BOXES] [PICTURE]
+Usage::
 
-Closed-loop episodes of the 2D benchmark preset, U-shape, from seed 1000 on: `push-aware` and
-`kinodynamic-rrt` with the same prices w.
+    python benchmarks/pareto_maze.py [--episodes 50] [--boxes 10] [--weights 0.5,1,2.5,5,10]
+
+Closed-loop episodes of the 2D benchmark preset, U-shape, with the turn rate at constant speed:
+`push-aware-constant-speed` and `kinodynamic-rrt` with the same prices w. Prints a table in
+Markdown and writes a picture.
 """
 
 from __future__ import annotations
 
+import argparse
 import sys
+from pathlib import Path
 
 import matplotlib
 import numpy as np
@@ -17,61 +22,68 @@ matplotlib.use("Agg")
 
 from matplotlib import pyplot as plt
 
-from pushplan.control import PathFollower
-from pushplan.envs import make
-from pushplan.evaluation import run_episode
-from pushplan.metrics import navigation_scores
+from pushplan.evaluation import PolicySpec, bench, bootstrap_interval
 from pushplan.planners.kinodynamic import KinodynamicRRT, KinodynamicRRTConfig
-from pushplan.planners.policies import push_aware
+from pushplan.planners.policies import push_aware_constant_speed
 from pushplan.planners.policy import PlanFollower
 from pushplan.planners.push_aware import PushAware, PushAwareConfig, cautious_model
-from pushplan.scenarios import Scenario
 
-WEIGHTS = (0.5, 1.0, 2.0, 5.0)
-FIRST_SEED = 1000
+NAMES = {"push-aware-constant-speed": "o-", "kinodynamic-rrt": "s--"}
 
 
 def policy(name: str, weight: float) -> PlanFollower:
     """A policy with this price of pushing."""
-    if name == "push-aware":
-        return push_aware(PushAware(PushAwareConfig(push_weight=weight), cautious_model()))
-    return PlanFollower(KinodynamicRRT(KinodynamicRRTConfig(push_weight=weight)), PathFollower())
+    if name == "kinodynamic-rrt":
+        return PlanFollower(KinodynamicRRT(KinodynamicRRTConfig(push_weight=weight)))
+    return push_aware_constant_speed(
+        PushAware(PushAwareConfig(push_weight=weight), cautious_model())
+    )
 
 
-def point(name: str, weight: float, boxes: int, seeds: int) -> tuple[float, float, float]:
-    """Mean success, E_nav and I_nav."""
-    rows = []
-    for seed in range(FIRST_SEED, FIRST_SEED + seeds):
-        scenario = Scenario("maze", variations={"shape": "u", "boxes": boxes}, seed=seed)
-        env = make(scenario, observation="state")
-        scores = navigation_scores(run_episode(env, policy(name, weight), scenario))
-        rows.append((float(scores.success), scores.efficiency, scores.effort))
-    success, efficiency, effort = np.mean(rows, axis=0)
-    return float(success), float(efficiency), float(effort)
+def spec(name: str, weight: float) -> PolicySpec:
+    """The same for the worker processes."""
+    source = f"{Path(__file__).resolve()}:policy"
+    return PolicySpec(f"{name}-{weight:g}", source, {"name": name, "weight": weight})
 
 
 def main() -> None:
-    seeds = int(sys.argv[1]) if len(sys.argv) > 1 else 12
-    boxes = int(sys.argv[2]) if len(sys.argv) > 2 else 10
-    picture = sys.argv[3] if len(sys.argv) > 3 else "pareto-maze.png"
-    figure, axes = plt.subplots(figsize=(4.2, 3.2), dpi=90, layout="constrained")
-    for name, style in (("push-aware", "o-"), ("kinodynamic-rrt", "s--")):
+    """Run the sweep, print the table and draw the picture."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--episodes", type=int, default=50)
+    parser.add_argument("--boxes", type=int, default=10, choices=(3, 5, 6, 10))
+    parser.add_argument("--weights", default="0.5,1,2.5,5,10")
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--workers", type=int, default=2)
+    parser.add_argument("--picture", default="docs/images/pareto-maze.png")
+    options = parser.parse_args()
+    weights = [float(text) for text in options.weights.split(",")]
+    specs = [spec(name, weight) for name in NAMES for weight in weights]
+    suite = f"maze-2d-{options.boxes}"
+    rows = bench(
+        suite, specs, episodes=options.episodes, seed=options.seed, workers=options.workers
+    ).rows
+    figure, axes = plt.subplots(figsize=(4.6, 3.4), dpi=90, layout="constrained")
+    sys.stdout.write("| policy | w | success | E_nav | I_nav |\n|---|---|---|---|---|\n")
+    for name, style in NAMES.items():
         front = []
-        for weight in WEIGHTS:
-            success, efficiency, effort = point(name, weight, boxes, seeds)
-            front.append((efficiency, effort))
-            print(
-                f"{name:16s} w {weight:4.1f}: success {success:.2f}, "
-                f"E_nav {efficiency:.3f}, I_nav {effort:.3f}",
-                flush=True,
-            )
+        for weight in weights:
+            mine = [row for row in rows if row.policy == spec(name, weight).label]
+            efficiency = [float(row.E_nav or 0.0) for row in mine]
+            effort = [1.0 if row.I_nav is None else float(row.I_nav) for row in mine]
+            front.append((np.mean(efficiency), np.mean(effort)))
+            cells = [
+                "{:.3f} [{:.3f}, {:.3f}]".format(np.mean(values), *bootstrap_interval(values))
+                for values in (efficiency, effort)
+            ]
+            success = np.mean([row.success for row in mine])
+            sys.stdout.write(f"| `{name}` | {weight:g} | {success:.2f} | {' | '.join(cells)} |\n")
         axes.plot(*np.array(front).T, style, label=name, markersize=4)
-        for weight, at in zip(WEIGHTS, front, strict=True):
+        for weight, at in zip(weights, front, strict=True):
             axes.annotate(f"{weight:g}", at, fontsize=7, textcoords="offset points", xytext=(3, 3))
-    axes.set(xlabel="E_nav", ylabel="I_nav", title=f"maze, U, {boxes} boxes, {seeds} seeds; by w")
+    axes.set(xlabel="E_nav", ylabel="I_nav", title=f"{suite}, {options.episodes} episodes, by w")
     axes.legend(fontsize=8)
     axes.grid(alpha=0.3)
-    figure.savefig(picture)
+    figure.savefig(options.picture)
 
 
 if __name__ == "__main__":

@@ -79,7 +79,7 @@ class IceNetwork:
             return np.empty((0, PATCH_CELLS, PATCH_CELLS), np.float32), np.empty(0)
         after: Patch = np.concatenate([part[0] for part in parts])
         work = np.concatenate([part[1] for part in parts]).astype(np.float64)
-        if not np.isfinite(work).all():
+        if not (np.isfinite(work).all() and np.isfinite(after).all()):
             raise InvalidInputError(f"{self.path} gives values that are not finite: train it again")
         return after, work * float(CELLS_PER_LENGTH**3)
 

@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 from pushplan.control import PathFollower, PurePursuit
-from pushplan.interaction.ice import IceInteraction
 from pushplan.planners.geometric import GeometricRRT
 from pushplan.planners.kinodynamic import KinodynamicRRT
 from pushplan.planners.policy import PlanFollower
-from pushplan.planners.predictive import PredictiveShip, PredictiveShipNetwork
+from pushplan.planners.predictive import (
+    PredictivePublished,
+    PredictiveShip,
+    PredictiveShipNetwork,
+)
+from pushplan.planners.predictive.policy import RenewingFollower
 from pushplan.planners.push_aware import PushAware, cautious_model
 from pushplan.planners.replanning import Replanning
 from pushplan.planners.straight import ShortestPath
@@ -32,43 +36,44 @@ def kinodynamic_rrt(planner: Planner | None = None, stop: Stop | None = None) ->
 
 
 def push_aware(
-    planner: Planner | None = None, stop: Stop | None = None, friction: float = 0.0
+    planner: Planner | None = None, stop: Stop | None = None, friction: float = 0.1
 ) -> PlanFollower:
-    """Push-aware search with replanning when the world departs from the prediction.
+    """Push-aware search; drives with speed and turn rate where the task lets it.
 
     Args:
         planner: the push-aware planner by default.
         stop: stop rule of each planning call.
         friction: Coulomb coefficient between robot and objects, for the prediction.
     """
+    follower = push_aware_constant_speed(planner, stop, friction)
+    follower.actions = ("velocity", "turn_rate")
+    return follower
+
+
+def push_aware_constant_speed(
+    planner: Planner | None = None, stop: Stop | None = None, friction: float = 0.1
+) -> PlanFollower:
+    """`push_aware` with the turn rate alone, as the paper's policies drive; see there."""
     model = cautious_model(friction)
     return PlanFollower(
         planner or PushAware(interaction=model), PathFollower(), interaction=model, stop=stop
     )
 
 
-def push_aware_stopping(
-    planner: Planner | None = None, stop: Stop | None = None, friction: float = 0.0
-) -> PlanFollower:
-    """`push_aware` that drives with speed and turn rate, where the task lets it, and may stop."""
-    follower = push_aware(planner, stop, friction)
-    follower.actions = ("velocity", "turn_rate")
-    return follower
-
-
 def ship_predictive(planner: Planner | None = None, stop: Stop | None = None) -> PlanFollower:
-    """Predicts the floes along each path, and looks again every 4 s for a better one."""
-    return PlanFollower(
-        planner or PredictiveShip(),
-        PathFollower(),
-        replanning=Replanning(every_seconds=4.0, margin=0.01),
-        interaction=IceInteraction(),
-        stop=stop,
-    )
+    """Predicts the floes along each path, and looks for a better one about every half hull."""
+    return RenewingFollower(planner or PredictiveShip(), stop=stop)
 
 
 def ship_predictive_network(
     planner: Planner | None = None, stop: Stop | None = None
 ) -> PlanFollower:
-    """Predicts the occupancy with a network, and looks again every 4 s for a better path."""
-    return ship_predictive(planner or PredictiveShipNetwork(), stop)
+    """Predicts the occupancy with a network, and looks for a better path as often."""
+    return RenewingFollower(planner or PredictiveShipNetwork(), stop=stop)
+
+
+def ship_predictive_published(
+    planner: Planner | None = None, stop: Stop | None = None
+) -> PlanFollower:
+    """The published search by a network: a new plan every 5 m with a ship of 2 m, and taken."""
+    return RenewingFollower(planner or PredictivePublished(), renewal=5.0, margin=None, stop=stop)

@@ -166,7 +166,7 @@ def test_failed_jobs_are_run_again_on_request(tmp_path: Path) -> None:
 def test_another_configuration_is_refused(tmp_path: Path) -> None:
     run_batch(jobs_of("Ahead"), out=tmp_path, workers=0, settings=SETTINGS)
     other = JobSettings(make_env=SETTINGS.make_env, timeout_s=9.0)
-    with pytest.raises(InvalidInputError, match=r"timeout_s was 1\.0, is now 9\.0"):
+    with pytest.raises(InvalidInputError, match=r"timeout_s was 3\.0, is now 9\.0"):
         run_batch(jobs_of("Ahead"), out=tmp_path, workers=0, settings=other)
     changed = [Job(parse_policies(f"Ahead={HERE}:Logs")[0], LineScenario(0))]
     with pytest.raises(InvalidInputError, match="policy 'Ahead' was"):

@@ -120,7 +120,7 @@ def test_config_is_checked() -> None:
         PrimitiveConfig(radius=float("nan"))
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=80, deadline=None)
 @given(
     heading=st.floats(-3.1, 3.1),
     distance=st.floats(0.01, 20.0),

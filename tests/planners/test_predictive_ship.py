@@ -10,11 +10,10 @@ from ice_scenes import channel, straight_path
 
 from pushplan.envs.tasks.ship_ice import ShipIceTask
 from pushplan.interaction.ice import IceInteraction
-from pushplan.planners import make_planner, make_policy, planner_names, warm_up
+from pushplan.planners import make_planner, make_policy, warm_up
 from pushplan.planners.predictive import PredictiveConfig, PredictiveShip, PredictiveShipNetwork
 from pushplan.world import (
     Cancellation,
-    Deadline,
     GoalDisc,
     GoalLine,
     InvalidInputError,
@@ -23,12 +22,24 @@ from pushplan.world import (
     Planner,
     PlanStatus,
     StaticMap,
+    Stop,
     World,
     stream,
 )
 
-NAMES = planner_names(open_water=True)
+NAMES = ("ship-predictive", "ship-predictive-network")
 SQUARE = 0.5 * np.array([[1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0], [1.0, -1.0]])
+
+
+class BusyTime(Stop):
+    """A deadline on the CPU time of this thread, which others' work on the machine is not in."""
+
+    def __init__(self, budget_s):
+        self.budget_s = budget_s
+
+    def start(self):
+        end = time.thread_time() + self.budget_s
+        return lambda iterations, cost: time.thread_time() >= end
 
 
 def ice(concentration: float, seed: int = 1000) -> World:
@@ -129,15 +140,10 @@ class TestEveryPredictivePlanner:
         token.cancel()
         assert make_planner(name).plan(world, stop=token).status is PlanStatus.CANCELLED
         assert make_planner(name).plan(world, stop=MaxIterations(0)).plan is None
-        over = []
-        for _ in range(3):
-            began, busy = time.perf_counter(), time.process_time()
-            result = make_planner(name).plan(world, stop=Deadline(0.1))
-            wall = time.perf_counter() - began
-            share = min(1.0, (time.process_time() - busy) / wall)  # of the machine that we had
-            over.append(share * (wall - 0.1))
-            assert result.plan is not None
-        assert min(over) < 0.015
+        busy = time.thread_time()
+        result = make_planner(name).plan(world, stop=BusyTime(0.2))
+        assert result.plan is not None
+        assert time.thread_time() - busy < 0.23
 
     def test_more_iterations_are_never_worse(self, name):
         world = ice(0.3, 1005)
@@ -146,6 +152,19 @@ class TestEveryPredictivePlanner:
             for limit in (20, 120, 500)
         ]
         assert costs[0] >= costs[1] >= costs[2]
+
+
+def turn_fits(world, side):
+    """Whether the tightest turn to one side gets the ship of `channel` to look along y."""
+    x, y, theta = world.robot_pose
+    radius = world.robot.turning_radius / 0.999
+    turn = (side * (0.5 * np.pi - theta)) % (2.0 * np.pi)
+    at = theta + side * np.linspace(0.0, turn, 200)
+    xs = x + side * radius * (np.sin(at) - np.sin(theta))
+    ys = y - side * radius * (np.cos(at) - np.cos(theta))
+    arrived = np.flatnonzero(ys >= 9.0)
+    end = arrived[0] + 1 if len(arrived) else None
+    return bool((np.abs(xs[:end]) < 6.0).all() and (ys[:end] > -1.0).all())
 
 
 @settings(max_examples=60, deadline=None)
@@ -163,7 +182,12 @@ def test_plans_from_anywhere_can_be_driven(seed):
     world = channel(floes, pose=[rng.uniform(-7, 7), rng.uniform(-2, 10), rng.uniform(-7, 7)])
     result = PredictiveShip(PredictiveConfig(width=2)).plan(world)
     if result.plan is None:
-        assert result.status in (PlanStatus.START_BLOCKED, PlanStatus.GOAL_UNREACHABLE)
+        outside = np.abs(world.robot_pose[0]) > 6.0 or world.robot_pose[1] < -1.0
+        if outside:
+            assert result.status is PlanStatus.START_BLOCKED
+        else:
+            assert result.status is PlanStatus.GOAL_UNREACHABLE
+            assert not any(turn_fits(world, side) for side in (1.0, -1.0))
         return
     plan = result.plan
     assert np.isfinite(plan.object_poses).all()
@@ -189,6 +213,53 @@ def test_the_frame_does_not_matter():
     turned = PredictiveShip().plan(flat).plan
     assert turned.poses[:, 0] == pytest.approx(plan.poses[:, 1], abs=1e-6)
     assert turned.poses[:, 1] == pytest.approx(-plan.poses[:, 0], abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    "pose",
+    [
+        [3.61, 2.79, -0.47],  # room for a turn to the left only if the margin is given up
+        [-5.94, 8.31, 1.79],  # nearly at the side, and drifting towards it
+        [5.79, -0.6, -2.37],  # needs the whole turn rate
+        [-2.99, 8.47, -1.95],  # has to go back first
+    ],
+)
+@pytest.mark.parametrize("name", NAMES)
+def test_ways_out_of_tight_places(name, pose):
+    world = channel([(0.5 * SQUARE, [0.0, 5.0, 0.0])], pose=pose)
+    result = make_planner(name).plan(world)
+    assert result.status is PlanStatus.SOLVED
+    assert (curvatures(result.plan.poses) <= 1.0 / world.robot.turning_radius + 1e-6).all()
+    assert (np.abs(result.plan.poses[:, 0]) <= 6.0).all()
+    assert (result.plan.poses[:, 1] >= -1.0).all()
+
+
+@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize(
+    ("bounds", "goal", "status"),
+    [
+        ([-6.0, -30.0, 6.0, 3000.0], 2000.0, PlanStatus.APPROXIMATE),
+        ([-3000.0, -3000.0, 3000.0, 3000.0], 2000.0, PlanStatus.APPROXIMATE),
+        ([-3000.0, -3000.0, 3000.0, 3000.0], 9.0, PlanStatus.SOLVED),
+        ([-1e-6, -1.0, 1e-6, 39.0], 9.0, PlanStatus.SOLVED),
+    ],
+)
+def test_waters_of_any_size(name, bounds, goal, status):
+    floes = [(0.6 * SQUARE, [x, 4.0, 0.3]) for x in (-2.0, 0.0, 2.0)]
+    world = channel(floes, static=StaticMap.build(bounds=bounds), goal=goal)
+    result = make_planner(name).plan(world, stop=MaxIterations(150))
+    assert result.status is status
+    assert result.plan.length == pytest.approx(min(goal, 80.0), rel=0.1)
+
+
+def test_every_stop_leaves_a_whole_plan_or_none():
+    world = ice(0.3)
+    for limit in range(4, 24):
+        plan = PredictiveShipNetwork().plan(world, stop=MaxIterations(limit)).plan
+        if plan is not None:  # the floes along it may not have been worked out in time
+            assert world.goal.distance(*plan.poses[-1, :2]) <= 1e-9
+            objects = plan.object_poses
+            assert objects is None or objects.shape == (len(plan.poses), len(world.movables), 3)
 
 
 def test_a_ship_that_heads_back_turns_round():

@@ -43,7 +43,7 @@ class KinodynamicRRTConfig:
     tree_iterations: int = 1500
     repairs: int = 400
     least_gain: float = 0.001
-    batch: int = 20
+    batch: int = 10
     default_iterations: int = 4000
 
     def __post_init__(self) -> None:

@@ -73,6 +73,7 @@ class Search:
         self.iterations = self.nodes = self.trees = 0
         self.best: Path | None = None
         self.best_cost = np.inf
+        self._exact: FloatArray | None = None
         self.first_solution_s = float("nan")
 
     def run(self) -> PlanStatus | None:
@@ -166,11 +167,15 @@ class Search:
             if not is_free(world.robot_pose, self.shape, among, np.empty_like(self.shape.vertices)):
                 return None  # the robot touches an object already: only pushing helps
         guide = guide_path(world, push_weight)
+        if self.stopped():
+            return None
         if len(guide) == 0:
-            self.sealed = not reachable(world)
-            if self.sealed:
-                return None
-            guide = self._exact_guide()
+            if self._exact is None:
+                self.sealed = not reachable(world)
+                if self.sealed or self.stopped():
+                    return None
+                self._exact = self._exact_guide()
+            guide = self._exact
         last = self.iterations + budget
 
         def done() -> bool:

@@ -82,10 +82,15 @@ def register(kind: type, successors: Any, bound: Any, reached: Any) -> None:
 
 
 class SearchState(NamedTuple):
-    """Everything that a search has found out so far, so that it can be taken up again."""
+    """Everything that a search has found out so far, so that it can be taken up again.
 
+    Entries of nodes that are not ``known`` hold nothing: a large lattice costs what is looked at.
+    """
+
+    known: BoolArray
+    """(N,) nodes to which a way has been found."""
     costs: FloatArray
-    """(N,) least cost known to each node, infinite where there is none."""
+    """(N,) least cost known to each node."""
     parents: IntArray
     """(N,) node before each node, -1 at a start."""
     edges: IntArray
@@ -105,13 +110,14 @@ class SearchState(NamedTuple):
 def new_state(size: int) -> SearchState:
     """An empty search over nodes 0 to ``size`` - 1."""
     return SearchState(
-        costs=np.full(size, np.inf),
-        parents=np.full(size, -1, dtype=np.int64),
-        edges=np.full(size, -1, dtype=np.int64),
-        closed=np.zeros(size, dtype=np.bool_),
+        known=np.zeros(size, dtype=np.bool_),
+        costs=np.empty(size),
+        parents=np.empty(size, dtype=np.int64),
+        edges=np.empty(size, dtype=np.int64),
+        closed=np.empty(size, dtype=np.bool_),
         keys=np.empty(size),
         heap=np.empty(size, dtype=np.int64),
-        places=np.full(size, -1, dtype=np.int64),
+        places=np.empty(size, dtype=np.int64),
         counters=np.array([0, 0, 0, -1], dtype=np.int64),
     )
 
@@ -128,8 +134,11 @@ def offer(state: SearchState, node: int, cost: float, bound: float, parent: int,
         parent: node before it, -1 for a start.
         edge: label of the last edge.
     """
-    if not cost < state.costs[node] or bound == np.inf:
+    if not cost + bound < np.inf or (state.known[node] and cost >= state.costs[node]):
         return
+    if not state.known[node]:
+        state.known[node] = True
+        state.places[node] = -1
     state.costs[node] = cost
     state.parents[node] = parent
     state.edges[node] = edge
@@ -170,7 +179,7 @@ def search(
         here = state.costs[node]
         for i in range(count):
             cost = here + costs[i]
-            if cost < state.costs[nodes[i]]:
+            if not state.known[nodes[i]] or cost < state.costs[nodes[i]]:
                 bound = estimate(lattice, nodes[i])
                 offer(state, nodes[i], cost, bound, node, edges[i])
     return PAUSED

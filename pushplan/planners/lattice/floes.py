@@ -22,8 +22,6 @@ class FloePrices(NamedTuple):
     """(K,) [m²]"""
     soft: float
     """Softening of the profile, see `cost_map.add_floes`."""
-    crowding: float
-    """Price of covering an area where there is nothing but ice [m/m²]."""
 
 
 @njit(cache=True, nogil=True)
@@ -59,9 +57,7 @@ def floe_prices(world: World, config: ShipLatticeConfig, cell: float) -> FloePri
         mean = 1.0 - 0.5 * (cells / (cells + 0.5)) ** 2
         middle = config.collision_weight * energy / (0.5 * ship) * cell / robot.inscribed_radius
         soft = float(np.mean((1.0 + 0.5 / np.maximum(cells, 0.1)) ** 2 - 1.0))
-        return FloePrices(middle * mean * areas / cell**2, areas, soft, 0.0)
+        return FloePrices(middle * mean * areas / cell**2, areas, soft)
     pushed = config.displacement * (robot.inscribed_radius + radii)
     weight = config.push_weight / robot.mass
-    thickness = float(floes.masses.sum() / areas.sum())
-    crowding = weight * config.crowding * thickness * 2.0 * robot.inscribed_radius
-    return FloePrices(weight * floes.masses * pushed, areas, 0.05, crowding)
+    return FloePrices(weight * floes.masses * pushed, areas, 0.05)

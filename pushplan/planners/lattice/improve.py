@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pushplan.planners.lattice.repairs import propose
-from pushplan.planners.lattice.sweeper import Sweeper, portion_works
+from pushplan.planners.lattice.sweeper import Sweeper
 from pushplan.world.checks import FloatArray
 
 _PORTION = 8
@@ -42,7 +42,6 @@ class Improver:
     Args:
         sweeper: carries the objects.
         start: (K, 3) poses of the objects now.
-        masses: (K,) [kg].
         robot_mass: [kg]
         weight: w, price of work.
         numbers: (5,) as in `repairs.propose`.
@@ -56,7 +55,6 @@ class Improver:
         self,
         sweeper: Sweeper,
         start: FloatArray,
-        masses: FloatArray,
         *,
         robot_mass: float,
         weight: float,
@@ -66,7 +64,7 @@ class Improver:
         stopped: Callable[[], bool],
         free: Callable[[FloatArray], bool],
     ) -> None:
-        self.sweeper, self.start, self.masses = sweeper, start, masses
+        self.sweeper, self.start = sweeper, start
         self.robot_mass, self.weight, self.ahead = robot_mass, weight, ahead
         self.numbers, self.goal = numbers, goal
         self.stopped, self.free = stopped, free
@@ -109,10 +107,10 @@ class Improver:
             if self.stopped():
                 return False
             end = min(at + _PORTION, last - 1)
-            portion = objects[at : end + 1]
-            if not self.sweeper.run(poses[at : end + 1], here, portion):
+            added = works[at + 1 : end + 1]
+            if not self.sweeper.run(poses[at : end + 1], here, objects[at : end + 1], added):
                 return False
-            works[at + 1 : end + 1] = works[at] + np.cumsum(portion_works(portion, self.masses))
+            added[:] = works[at] + np.cumsum(added)
             at = end
             if own + self.weight * works[at] >= limit:
                 return False

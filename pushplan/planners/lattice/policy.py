@@ -9,7 +9,7 @@ import numpy as np
 from pushplan.control import PathFollower
 from pushplan.interaction import QuasiStatic
 from pushplan.interaction.ice import IceInteraction
-from pushplan.planners.lattice.ship import ShipLattice, published
+from pushplan.planners.lattice.ship import ShipLattice, published, quick
 from pushplan.planners.policy import PlanFollower
 from pushplan.planners.replanning import Replanning
 from pushplan.world import Planner, Stop, World
@@ -30,6 +30,8 @@ class ShipFollower(PlanFollower):
         if not self.replanning.never:
             every = RENEWAL * world.robot.circumscribed_radius
             self.replanning = replace(self.replanning, every_metres=every)
+        if isinstance(self.planner, ShipLattice):
+            self.planner.prepare(world)
         super().reset(world, rng)
 
 
@@ -42,6 +44,11 @@ def ship_lattice(planner: Planner | None = None, stop: Stop | None = None) -> Pl
         replanning=rule,
         stop=stop,
     )
+
+
+def ship_lattice_quick(planner: Planner | None = None, stop: Stop | None = None) -> PlanFollower:
+    """`ship_lattice` with plans that are there after milliseconds."""
+    return ship_lattice(planner or quick(), stop)
 
 
 def ship_lattice_published(

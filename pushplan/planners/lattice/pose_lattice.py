@@ -50,7 +50,11 @@ class PoseLattice(NamedTuple):
     goal: FloatArray
     """(4,) 0 and the row of the goal line; or 1, row, column and radius of the goal disc."""
     row_bounds: FloatArray
-    """(H, rows) lower bound of the cost from each row at each heading [m]."""
+    """(H, rows) length of the way from each row and heading to the line [m]."""
+    place_costs: FloatArray
+    """(rows, columns) bound or estimate of the cost from each place to the line [m]."""
+    inflation: float
+    """Factor on both."""
 
 
 @njit(cache=True, nogil=True)
@@ -138,16 +142,16 @@ def _successors(
 
 @njit(cache=True, nogil=True)
 def bound_at(lattice: PoseLattice, node: int) -> float:
-    """Lower bound of the cost from a node to the goal [m]."""
+    """Bound or estimate of the cost from a node to the goal [m], times the inflation."""
     v = node % lattice.columns
     rest = node // lattice.columns
     u = rest % lattice.rows
     h = rest // lattice.rows
     if lattice.goal[0] == 0.0:
-        bound: float = lattice.row_bounds[h, u]
-        return bound
+        bound: float = max(lattice.row_bounds[h, u], lattice.place_costs[u, v])
+        return lattice.inflation * bound
     gap = np.sqrt((u - lattice.goal[1]) ** 2 + (v - lattice.goal[2]) ** 2) - lattice.goal[3]
-    away: float = max(0.0, gap) * lattice.step
+    away: float = lattice.inflation * max(0.0, gap) * lattice.step
     return away
 
 

@@ -8,6 +8,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from pushplan.interaction import InteractionModel
+from pushplan.planners.kinodynamic.timing import turning_radius
+from pushplan.planners.lattice.build import LatticeBuilder
 from pushplan.planners.lattice.call import ShipCall
 from pushplan.planners.lattice.config import ShipLatticeConfig
 from pushplan.world import PlanResult, PlanStats, PlanStatus, Stop, World
@@ -60,7 +62,22 @@ class ShipLattice:
         )
         return PlanResult(status, call.plan() if status.has_plan else None, stats)
 
+    def prepare(self, world: World) -> None:
+        """Make what depends on the ship alone, which the first call would do otherwise.
+
+        That is the motion primitives and what the hull covers along them, 20 to 60 ms; it is kept
+        for all planners of this process. `pushplan.planners.lattice.policy.ShipFollower` does it
+        at the start of an episode.
+        """
+        radius = turning_radius(world.robot, self.config.turn_share)
+        LatticeBuilder(world, self.config, radius=radius, side=0.0).build()
+
 
 def published() -> ShipLattice:
     """The planner as published, see `ShipLatticeConfig.published`; the reference."""
     return ShipLattice(ShipLatticeConfig.published())
+
+
+def quick() -> ShipLattice:
+    """One search and nothing after it, see `ShipLatticeConfig.quick`."""
+    return ShipLattice(ShipLatticeConfig.quick())

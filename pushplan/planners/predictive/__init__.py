@@ -2,5 +2,6 @@
 
 from pushplan.planners.predictive.config import PredictiveConfig
 from pushplan.planners.predictive.planner import PredictiveShip, PredictiveShipNetwork
+from pushplan.planners.predictive.published import PredictivePublished
 
-__all__ = ["PredictiveConfig", "PredictiveShip", "PredictiveShipNetwork"]
+__all__ = ["PredictiveConfig", "PredictivePublished", "PredictiveShip", "PredictiveShipNetwork"]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Generic, Protocol, TypeVar
 
@@ -34,8 +34,8 @@ class Carrier(Protocol[Ice]):
         """The ice after each piece (N, 3) of path, and the work on it [kg m]."""
         ...
 
-    def trace(self, node: Partial[Ice]) -> FloatArray:
-        """(N, K, 3) poses of the floes in reach at each pose of a path."""
+    def trace(self, node: Partial[Ice], stopped: Callable[[], bool]) -> FloatArray | None:
+        """(N, K, 3) poses of the floes in reach at each pose of a path; None if stopped before."""
         ...
 
 
@@ -87,13 +87,19 @@ class Beam(Generic[Ice]):
         config: parameters.
         carrier: predicts.
         check: an armed stop rule.
+        iterations: predictions that the call has made before.
     """
 
     def __init__(
-        self, scene: Scene, config: PredictiveConfig, carrier: Carrier[Ice], check: StopCheck
+        self,
+        scene: Scene,
+        config: PredictiveConfig,
+        carrier: Carrier[Ice],
+        check: StopCheck,
+        iterations: int = 0,
     ) -> None:
         self.scene, self.config, self.carrier, self.check = scene, config, carrier, check
-        self.iterations = self.nodes = self.rounds = 0
+        self.iterations, self.nodes = iterations, 0
         self.best_cost = math.inf
         self.stopped = False
 
@@ -101,7 +107,7 @@ class Beam(Generic[Ice]):
         """The path that has not begun."""
         pose = self.scene.start
         way = np.array([[*pose, 0.0]])
-        return Partial(pose, way, 0.0, 0.0, math.inf, self.carrier.start(), None)
+        return Partial(pose, way, 0.0, 0.0, 0.0, self.carrier.start(), None)
 
     def search(self, root: Partial[Ice], width: int, horizon: float) -> Partial[Ice] | None:
         """The most promising path of a beam.
@@ -151,8 +157,8 @@ class Beam(Generic[Ice]):
     def _piece(self, pose: FloatArray, bend: float) -> FloatArray:
         """(N, 4) an arc, cut off at the goal; empty where it leaves the channel."""
         scene = self.scene
+        count = max(1, round(self.config.arc / SPACING))
         step = SPACING * scene.length
-        count = max(1, round(self.config.arc * scene.length / step))
         way: FloatArray = arc_ahead(pose, bend, step, count, scene.goal, scene.low, scene.high)
         return way
 
@@ -220,27 +226,35 @@ class Beam(Generic[Ice]):
         Returns:
             None where that leaves the channel, or the stop rule fired on it.
         """
-        scene, config = self.scene, self.config
+        scene, w = self.scene, self.config.push_weight
         step = SPACING * scene.length
         turning = 2.0 * math.pi * scene.radius
         most = math.ceil((4.0 * max(scene.goal - node.pose[1], 0.0) + turning) / step)
-        out = np.empty((most, 4))
-        w = config.push_weight
         mass = scene.world.robot.mass
-        count = 0
-        if not node.done:
+        if node.pose[1] < scene.goal:
+            out = np.empty((most, 4))
             count = steer_on(scene.guide, node.pose, mass, w, scene.bends, step, out)
             if count == 0 or not scene.inside(out[:count]):
                 return None
-        each = max(1, round(config.arc * scene.length / step))
-        for i in range(0, count, each):
+            followed = self.follow(node, np.concatenate([[[*node.pose, 0.0]], out[:count]]))
+            if followed is None:
+                return None
+            node = followed
+        node.done = True
+        node.total = mass * node.length + w * node.work
+        return node
+
+    def follow(self, node: Partial[Ice], way: FloatArray) -> Partial[Ice] | None:
+        """A path with a long way (N, 4) at its end, predicted; None if the stop rule fires on it.
+
+        The first pose of the way is that where the path ends.
+        """
+        each = max(1, round(self.config.arc / SPACING))
+        for i in range(0, len(way) - 1, each):
             if self.check(self.iterations, self.best_cost):
                 self.stopped = True
                 return None
-            way = np.concatenate([[[*node.pose, 0.0]], out[i : min(i + each, count)]])
-            node = self.extend(node, way)
-        node.done = True
-        node.total = mass * node.length + w * node.work
+            node = self.extend(node, way[i : i + each + 1])
         return node
 
     def extend(self, node: Partial[Ice], way: FloatArray) -> Partial[Ice]:

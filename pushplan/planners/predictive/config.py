@@ -23,6 +23,7 @@ class PredictiveConfig:
         tries: pieces that are predicted exactly for each path kept; the others are left out by
             their estimate.
         horizon: way ahead for which the ice is predicted; from there on the guide counts.
+        farthest: goal lines that are farther away are approached, with a line at this distance.
         margin: least distance of the ship's origin from the sides of the channel, in half beams.
         row: distance between the rows of the guide.
         column: distance between its columns.
@@ -30,7 +31,7 @@ class PredictiveConfig:
         crowding: how much more that is for each typical floe in the way.
     """
 
-    push_weight: float = 2.0
+    push_weight: float = 1.5
     turn_share: float = 0.9
     arc: float = 0.4
     bends: int = 2
@@ -39,6 +40,7 @@ class PredictiveConfig:
     widest: int = 48
     tries: float = 2.5
     horizon: float = 5.0
+    farthest: float = 40.0
     margin: float = 1.0
     row: float = 0.12
     column: float = 0.1
@@ -48,7 +50,7 @@ class PredictiveConfig:
     def __post_init__(self) -> None:
         for name in ("push_weight", "margin", "gain", "crowding"):
             number(name, getattr(self, name), low=0.0)
-        for name in ("arc", "row", "column", "horizon"):
+        for name in ("arc", "row", "column", "horizon", "farthest"):
             number(name, getattr(self, name), low=0.0, open_low=True)
         number("turn_share", self.turn_share, low=0.0, high=1.0, open_low=True)
         number("tries", self.tries, low=1.0)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -49,7 +49,7 @@ class FloeCarrier:
         work = sweep_ice(way, poses, scene.crowd, scene.solver, self._memory, out)
         return out, work
 
-    def trace(self, node: Partial[FloatArray]) -> FloatArray:
-        """(N, K, 3) poses of the floes at each pose of a path."""
+    def trace(self, node: Partial[FloatArray], stopped: Callable[[], bool]) -> FloatArray:
+        """(N, K, 3) poses of the floes at each pose of a path: they are known."""
         first, *others = node.ices()
         return np.concatenate([first, *(ice[1:] for ice in others)])

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -15,6 +15,9 @@ from pushplan.planners.predictive.floes import FloeCarrier
 from pushplan.planners.predictive.scene import Scene
 from pushplan.world.checks import FloatArray
 
+_TRACED = 10
+"""Poses that are swept between two looks at the stop rule."""
+
 
 class MapCarrier:
     """The ice as a map of covered shares (H, W), of which a patch changes with each piece of path.
@@ -24,7 +27,7 @@ class MapCarrier:
         network: predicts the patches.
     """
 
-    batch = 2
+    batch = 8
 
     def __init__(self, scene: Scene, network: IceNetwork) -> None:
         self._scene, self._network = scene, network
@@ -68,9 +71,17 @@ class MapCarrier:
             found.append((changed, float(work[i]) * self._scale))
         return found
 
-    def trace(self, node: Partial[Patch]) -> FloatArray:
+    def trace(self, node: Partial[Patch], stopped: Callable[[], bool]) -> FloatArray | None:
         """(N, K, 3) poses of the floes at each pose of a path, by the contact model."""
-        return FloeCarrier(self._scene).sweep(self._scene.floes, node.path()[:, :3])[0]
+        floes, path = FloeCarrier(self._scene), node.path()[:, :3]
+        out = self._scene.floes[None]
+        parts = [out]
+        for i in range(0, len(path) - 1, _TRACED):
+            if stopped():
+                return None
+            out = floes.sweep(out[-1], path[i : i + _TRACED + 1])[0]
+            parts.append(out[1:])
+        return np.concatenate(parts)
 
     def _place(self, path: FloatArray) -> tuple[int, int]:
         """First row and column of the patch about the middle between a piece's two ends."""

@@ -15,6 +15,9 @@ from pushplan.world import GoalLine, InvalidInputError, World
 from pushplan.world.checks import FloatArray, IntArray
 from pushplan.world.outline import areas_and_centroids
 
+_MOST_PLACES = 20_000
+"""Rows times columns of the guide, about."""
+
 
 @dataclass(frozen=True)
 class Scene:
@@ -24,7 +27,8 @@ class Scene:
         world: the snapshot, in the world frame.
         turn: angle by which the frame is turned against the world's [rad].
         start: (3,) pose of the ship.
-        goal: y of the goal line [m].
+        away: y of the goal line [m].
+        goal: y of the line to which the search goes: the goal line, or one on the way.
         near: numbers of the floes that may be met.
         floes: (K, 3) their poses.
         crowd: their shapes and the hull's.
@@ -40,6 +44,7 @@ class Scene:
     world: World
     turn: float
     start: FloatArray
+    away: float
     goal: float
     near: IntArray
     floes: FloatArray
@@ -73,30 +78,35 @@ def make_scene(world: World, config: PredictiveConfig, model: IceInteraction) ->
     Raises:
         InvalidInputError: if the goal is no line, or something static is in the water.
     """
-    goal = world.goal
-    if not isinstance(goal, GoalLine):
+    line = world.goal
+    if not isinstance(line, GoalLine):
         raise InvalidInputError(
-            f"the predictive ship planners go to a GoalLine, got a {type(goal).__name__}"
+            f"the predictive ship planners go to a GoalLine, got a {type(line).__name__}"
         )
     full = model.crowd(world)
     robot = world.robot
     length = float(np.ptp(robot.vertices[:, 0]))
-    away = float((goal.point - world.robot_pose[:2]) @ goal.normal)
-    turn = math.atan2(goal.normal[1], goal.normal[0]) - 0.5 * math.pi
+    away = float((line.point - world.robot_pose[:2]) @ line.normal)
+    turn = math.atan2(line.normal[1], line.normal[0]) - 0.5 * math.pi
     floes = _from_world(world.movables.poses, world.robot_pose, turn)
     reach = world.movables.radii + length
-    near = np.flatnonzero((floes[:, 1] > -reach) & (floes[:, 1] < away + reach))
-    low, high = _channel(world, turn, config.margin * 0.5 * float(np.ptp(robot.vertices[:, 1])))
-    theta = math.remainder(float(world.robot_pose[2]) - turn - 0.5 * math.pi, 2.0 * math.pi)
+    goal = min(away, config.farthest * length)
+    near = np.flatnonzero((floes[:, 1] > -reach) & (floes[:, 1] < goal + reach))
+    off = math.remainder(float(world.robot_pose[2]) - turn - 0.5 * math.pi, 2.0 * math.pi)
     radius = robot.turning_radius / config.turn_share
+    margin = config.margin * 0.5 * float(np.ptp(robot.vertices[:, 1]))
+    low, high = _channel(world, turn, margin, (1.0 + 1e-6) * radius * (1.0 - math.cos(off)), off)
+    aside = 0.5 * max(goal, 0.0) + 5.0 * length  # no way leads farther from the straight one
+    low[0], high[0] = max(low[0], min(-aside, high[0])), min(high[0], max(aside, low[0]))
     crowd = _only(full, near)
     solver = model.solver(world)
-    guide = _guide(world, config, crowd, floes[near], max(away, 0.0), low, high, length, radius)
+    guide = _guide(world, config, crowd, floes[near], max(goal, 0.0), low, high, length, radius)
     return Scene(
         world=world,
         turn=turn,
-        start=np.array([0.0, 0.0, 0.5 * math.pi + theta]),
-        goal=away,
+        start=np.array([0.0, 0.0, 0.5 * math.pi + off]),
+        away=away,
+        goal=goal,
         near=near,
         floes=np.ascontiguousarray(floes[near]),
         crowd=crowd,
@@ -116,18 +126,22 @@ def _from_world(poses: FloatArray, origin: FloatArray, turn: float) -> FloatArra
     return np.column_stack([c * dx + s * dy, c * dy - s * dx, poses[:, 2] - turn])
 
 
-def _channel(world: World, turn: float, margin: float) -> tuple[FloatArray, FloatArray]:
+def _channel(
+    world: World, turn: float, margin: float, bulge: float, off: float
+) -> tuple[FloatArray, FloatArray]:
     """Box of places for the ship's origin: the bounds, and less a margin at the sides.
 
-    Where the goal line is not parallel to a side of the bounds, the box around them turned.
+    Where the goal line is not parallel to a side of the bounds, the box around them turned. The
+    margin is given up as far as a ship needs the room to turn ahead: ``bulge`` [m] to the side to
+    which it heads (``off`` [rad], positive to the left).
     """
     x0, y0, x1, y1 = world.static.bounds.tolist()
     corners = np.array([(x0, y0, 0.0), (x1, y0, 0.0), (x1, y1, 0.0), (x0, y1, 0.0)])
     box = _from_world(corners, world.robot_pose, turn)[:, :2]
     low, high = box.min(axis=0), box.max(axis=0)
     margin = min(margin, 0.25 * float(high[0] - low[0]))
-    low[0] = min(low[0] + margin, max(low[0], 0.0))  # a ship that starts nearer may be there
-    high[0] = max(high[0] - margin, min(high[0], 0.0))
+    low[0] = min(low[0] + margin, max(low[0], -bulge if off > 0.0 else 0.0))
+    high[0] = max(high[0] - margin, min(high[0], bulge if off < 0.0 else 0.0))
     return low, high
 
 
@@ -156,12 +170,15 @@ def _guide(
     length: float,
     radius: float,
 ) -> Guide:
-    width = float(high[0] - low[0])
-    columns = max(2, math.ceil(width / (config.column * length)) + 1)
-    column = width / (columns - 1)
+    width, ahead = float(high[0] - low[0]), away + length
+    # a table over wide water is coarser, so that it is there in milliseconds
+    places = (width / (config.column * length)) * (ahead / (config.row * length))
+    coarser = length * max(1.0, math.sqrt(places / _MOST_PLACES))
+    columns = max(2, math.ceil(width / (config.column * coarser)) + 1)
+    column = max(width / (columns - 1), 0.1 * config.column * length)
     cell = 0.5 * column
-    rows = max(2, math.ceil((away + length) / (config.row * length)) + 1)
-    row = (away + length) / (rows - 1)  # the table begins a hull length behind the ship
+    rows = max(2, math.ceil(ahead / (config.row * coarser)) + 1)
+    row = ahead / (rows - 1)  # the table begins a hull length behind the ship
     bow = 0.7 * float(world.robot.vertices[:, 0].max())
     field = np.empty((math.ceil((away + 3.0 * length) / cell) + 1, 2 * columns - 1))
     radii = np.sqrt(areas_and_centroids(crowd.vertices, crowd.offsets)[0] / np.pi)

@@ -9,12 +9,13 @@ import numpy as np
 
 from pushplan.interaction import QuasiStatic
 from pushplan.planners.kinodynamic.rrt import _DefaultBudget
+from pushplan.planners.push_aware.bound import lower_bound
 from pushplan.planners.push_aware.config import PushAwareConfig
 from pushplan.planners.push_aware.search import PushAwareSearch
 from pushplan.world import PlanResult, PlanStats, PlanStatus, Stop, World
 
 
-def cautious_model(friction: float = 0.0, static_friction: float = 0.5) -> QuasiStatic:
+def cautious_model(friction: float = 0.1, static_friction: float = 0.5) -> QuasiStatic:
     """A quasi-static model in which walls hold what is squeezed against them.
 
     A constant-speed robot cannot back out of a squeeze, so a path must not lead into one.
@@ -30,14 +31,16 @@ def cautious_model(friction: float = 0.0, static_friction: float = 0.5) -> Quasi
 class PushAware:
     """Minimises m₀ l₀ + w Σ mᵢ lᵢ, with the objects carried along every branch of the search.
 
-    A first plan comes from the kinodynamic random tree, in milliseconds. Then best-first searches
-    run over (x, y, heading), whose nodes hold where the objects are by then, under the cost of the
-    best plan so far (the meta-algorithm of Hauser and Zhou, arXiv 1505.04098) and led by a table of
-    lengths to the goal under the turn limit; their paths are repaired at random with Dubins curves.
-    The cheapest path is returned when the stop rule fires; waiting longer never costs more.
+    The first plan is the taut path around the walls, as Dubins curves, or that of a kinodynamic
+    random tree. Then best-first searches over (x, y, heading), whose nodes hold where the objects
+    are by then, take turns with random trees, each under the cost of the best plan so far, and
+    what they find is repaired at random with Dubins curves. A share of the iterations goes into a
+    random tree over poses and costs (AO-RRT; Hauser and Zhou, arXiv 1505.04098), which makes the
+    whole asymptotically optimal wherever that is. The cheapest path is returned when the stop
+    rule fires; waiting longer never costs more.
 
     Use it where a tenth of a second is worth a better path, and the world is two-dimensional with
-    convex objects. ``stats.detail`` holds ``cost``, ``bound``, which no path can undercut, and
+    convex objects. ``stats.detail`` holds ``cost``, ``bound``, which no plan can undercut, and
     ``gap``, cost / bound - 1. Without a stop rule it returns after a fixed number of iterations,
     so the same seed gives the same plan.
 
@@ -67,6 +70,7 @@ class PushAware:
         stop = _DefaultBudget(self.config.default_iterations) if stop is None else stop
         rng = np.random.default_rng(0) if rng is None else rng
         search = PushAwareSearch(world, self.config, self.interaction, stop.start(), rng, began)
+        bound = lower_bound(world)  # before the search, so that it is within the time given
         status = search.run()
         if status is None:
             status = PlanStatus.CANCELLED if stop.cancelled else PlanStatus.TIMED_OUT
@@ -75,9 +79,9 @@ class PushAware:
             "tight": float(search.tight),
             "searches": float(search.searches),
             "expansions": float(search.expansions),
+            "random_arcs": float(search.random_arcs),
         }
         if status.has_plan:
-            bound = search.lower_bound()
             detail["cost"], detail["bound"] = float(search.best_cost), bound
             detail["gap"] = float(search.best_cost) / bound - 1.0 if bound > 0.0 else 0.0
         stats = PlanStats(

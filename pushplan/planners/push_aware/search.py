@@ -6,18 +6,29 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pushplan.geometry import VisibilityGraph
 from pushplan.interaction import QuasiStatic
-from pushplan.planners.kinodynamic.collision import footprint
+from pushplan.planners.kinodynamic.collision import first_blocked, footprint
+from pushplan.planners.kinodynamic.dubins import step_along
 from pushplan.planners.kinodynamic.improve import lay_out, make_path, price_from
 from pushplan.planners.kinodynamic.search import Search, _Candidate
 from pushplan.planners.kinodynamic.timing import start_margin, turning_radius
-from pushplan.planners.push_aware.best_first import Branching, Nodes, expand, plant, trace
+from pushplan.planners.lattice.astar import EXHAUSTED, FOUND
+from pushplan.planners.push_aware.best_first import Branching, make_search
 from pushplan.planners.push_aware.config import PushAwareConfig
-from pushplan.planners.push_aware.cost_to_go import CostToGo
+from pushplan.planners.push_aware.cost_to_go import CostToGo, length_to_go
+from pushplan.planners.push_aware.nodes import Nodes, make_nodes, plant, trace
+from pushplan.planners.push_aware.random_tree import DRAWS, grow
 from pushplan.planners.push_aware.tables import table_maker
-from pushplan.world import PlanStatus, StopCheck, World
+from pushplan.planners.push_aware.taut import taut_arcs
+from pushplan.world import Drive, GoalDisc, PlanStatus, StopCheck, World
 from pushplan.world.checks import FloatArray
+
+_RANDOM_NODES = 20_000
+"""Nodes of a random tree at most; then another is begun."""
+_SIGNATURES = 4
+"""Ways to have pushed the objects that some searches tell apart in each cell."""
+_LONGEST_ARC = 2.0
+"""Longest arc of the random tree [R]."""
 
 
 @dataclass(frozen=True)
@@ -28,12 +39,13 @@ class _Style:
     curvatures: int
     greed: float
     signatures: int
+    masses: FloatArray
 
 
 class PushAwareSearch(Search):
     """A first plan, then searches over poses and pushed objects, each under the best cost so far.
 
-    Everything that makes and repairs the first plan is that of the kinodynamic planner.
+    Trees and repairs are those of the kinodynamic planner.
     """
 
     config: PushAwareConfig
@@ -48,8 +60,13 @@ class PushAwareSearch(Search):
         began: float,
     ) -> None:
         super().__init__(world, config, interaction, check, rng, began)
-        self.expansions = self.searches = 0
+        radius = self._radius()
+        self.pricing = self.pricing._replace(radius=radius)
+        self.limits = replace(self.limits, max_curvature=1.0 / radius)
+        self.expansions = self.searches = self.random_arcs = 0
+        self._patience = float(config.first_search)
         self._nodes: Nodes | None = None
+        self._tree: Nodes | None = None
 
     def run(self) -> PlanStatus | None:
         """Search until the stop rule fires; None where there is no plan by then."""
@@ -58,21 +75,18 @@ class PushAwareSearch(Search):
             return status
         table = self._table()
         if table is not None:
-            self._search(table, self._first_style())
+            self._search(table, self._first_style(table))
         while not self.stopped():
+            begun = self.iterations
             if table is not None:
-                self._search(table, self._random_style())
-            self._one_round()
+                self._search(table, self._random_style(table))
+            for _ in range(2):
+                self._one_round()
+            self._grow_at_random(self.config.random_share * (self.iterations - begun))
         return PlanStatus.SOLVED if self._solved(self.best_cost) else None
 
-    def lower_bound(self) -> float:
-        """What no plan can cost less than [kg m]: the way of the inscribed disc past the walls."""
-        world = self.world
-        graph = VisibilityGraph(world.static, world.robot.inscribed_radius)
-        return world.robot.mass * float(graph.to_goal(world.robot_pose[:2], self.goal).length)
-
     def _first_plan(self) -> PlanStatus | None:
-        """Grow trees until one reaches the goal, and repair it a little.
+        """Drive along the taut path or, where that fails, grow trees until one gets to the goal.
 
         Returns:
             A status where the call ends here: the start is blocked, the robot is there already,
@@ -89,124 +103,222 @@ class PushAwareSearch(Search):
             here.objects[0] = self.world.movables.poses
             self._keep(here, 1, 0.0)
             return PlanStatus.SOLVED
+        self._shoot()
         while not self.stopped():
             self._one_round()
-            if self.sealed:
-                return PlanStatus.GOAL_UNREACHABLE
             if self._solved(self.best_cost):
                 return None
+            if self.sealed:
+                return PlanStatus.GOAL_UNREACHABLE
             self._relax()
             self._relax()  # where a first tree fails, the start is most often a tight one
+            self._shoot()
             table = self._table()
             if table is not None:
-                self._search(table, replace(self._random_style(), greed=1.3, signatures=1))
+                self._search(table, replace(self._first_style(table), greed=1.3))
         return None
+
+    def _shoot(self) -> None:
+        """Try to drive along the taut path, objects or not."""
+        depth = 1.01 * self.config.inset * self.size
+        if isinstance(self.goal, GoalDisc):
+            depth = self.goal.radius - 0.99 * float(self.pricing.goal[3])
+        radius = self.pricing.radius
+        for clearance in (max(1.25 * self.size, 1.02 * radius), 1.1 * self.size):
+            arcs = taut_arcs(self.world, self.goal, clearance, radius, depth)
+            if arcs is None:
+                continue
+            if self._candidate(arcs, free=False) is not None:
+                return
 
     def _table(self) -> CostToGo | None:
         """Lengths to the goal without objects; the same for every call on this map."""
-        radius = turning_radius(self.world.robot, self.config.turn_share)
+        robot, static = self.world.robot, self.world.static
         inset = self.config.inset * self.size
-        return table_maker(self.world.robot, self.world.static, self.goal, radius, inset).make(
-            self.stopped
-        )
+        maker = table_maker(robot, static, self.goal, self._radius(), inset)
+        return maker.make(self.stopped)
 
-    def _first_style(self) -> _Style:
+    def _radius(self) -> float:
+        """Least turning radius of plans [m], as long as there is a way with it."""
+        if self.world.robot.drive is Drive.DIFFERENTIAL:
+            return self.config.differential_radius * self.size
+        return turning_radius(self.world.robot, self.config.turn_share)
+
+    def _first_style(self, table: CostToGo) -> _Style:
         config = self.config
-        return _Style(config.arc, config.curvatures, config.greed, 1)
+        greed = max(config.greed, 0.5 * (1.0 + self._dearness(table)))
+        return _Style(config.arc, config.curvatures, greed, 1, self.world.movables.masses)
 
-    def _random_style(self) -> _Style:
-        """Other edges and another greed each time: what one search misses another finds."""
+    def _random_style(self, table: CostToGo) -> _Style:
+        """Other edges, another greed and other prices: what one search misses another finds."""
         config, rng = self.config, self.rng
+        masses = self.world.movables.masses
+        most = max(1.03 * config.greed, self._dearness(table))
         return _Style(
             arc=config.arc * float(rng.uniform(0.7, 1.5)),
             curvatures=int(rng.integers(1, 4)) * 2 + 1,
-            greed=config.greed * float(rng.uniform(0.98, 1.03)),
-            signatures=16 if rng.random() < 0.1 else 1,
+            greed=float(rng.uniform(0.98 * config.greed, most)),
+            signatures=_SIGNATURES if rng.random() < 0.1 else 1,
+            masses=masses * np.exp(config.doubt * rng.standard_normal(len(masses))),
         )
+
+    def _dearness(self, table: CostToGo) -> float:
+        """What the best plan costs, over what its way would cost without objects, at most 2.
+
+        Among many objects the way that is left costs so much more than its length, too, and a
+        search that knows wastes no time on what only looks cheap.
+        """
+        x, y, theta = (float(value) for value in self.world.robot_pose)
+        alone = self.world.robot.mass * float(length_to_go(table, x, y, theta))
+        if not self._solved(self.best_cost) or not 0.0 < alone < np.inf:
+            return 1.3
+        return min(max(self.best_cost / alone, 1.0), 2.0)
 
     def _memory(self, table: CostToGo, signatures: int) -> Nodes:
         """Memory for one search; kept for the next where it fits."""
-        cells = (*table.values.shape, signatures)
-        if self._nodes is not None:
-            if self._nodes.best.shape == cells:
-                return self._nodes
-            return self._nodes._replace(best=np.empty(cells))
-        count, objects = self.config.nodes, len(self.world.movables)
-        rows = int(self.config.memory * 2**20 / (24 * max(objects, 1)))
-        self._nodes = Nodes(
-            poses=np.empty((count, 3)),
-            costs=np.empty(count),
-            estimates=np.empty(count),
-            parents=np.empty(count, np.int64),
-            arcs=np.empty((count, 2)),
-            rows=np.empty(count, np.int64),
-            objects=np.empty((max(2, min(rows, count)), objects, 3)),
-            queue=np.empty(count, np.int64),
-            best=np.empty(cells),
-            counts=np.zeros(4, np.int64),
-        )
+        rows, cols, headings = table.values.shape
+        cells = (rows, cols, headings, signatures)
+        if self._nodes is None:
+            config = self.config
+            count = len(self.world.movables)
+            self._nodes = make_nodes(config.nodes, count, config.memory, cells)
+        if self._nodes.best.shape != cells:
+            self._nodes = self._nodes._replace(best=np.empty(cells))
         return self._nodes
 
     def _search(self, table: CostToGo, style: _Style) -> None:
         """One best-first search under the best cost so far, and repairs of what it finds."""
-        config = self.config
         nodes = self._memory(table, style.signatures)
         bends = np.linspace(-1.0, 1.0, style.curvatures) / self.pricing.radius
-        branching = Branching(bends, style.arc * table.cell, style.greed, config.trust)
+        branching = Branching(
+            bends, style.arc * table.cell, style.greed, self.config.trust, style.masses
+        )
         plant(nodes, self.world.robot_pose, self.world.movables.poses, 0.0)
         self.searches += 1
-        batch = max(1, 10 * config.expansions // (10 + len(self.world.movables)))
-        bound = self._bound()
+        star = make_search(
+            nodes,
+            table,
+            branching,
+            self._bound(1.0 + self.config.slack),
+            self.pricing,
+            self.shape,
+            self.walls,
+            self.bodies,
+            self.settings,
+        )
         while not self.stopped():
             before = int(nodes.counts[3])
-            node = expand(
-                nodes,
-                batch,
+            if before >= self._patience:
+                self._patience *= 1.25  # the trees may know better; then this takes longer
+                return
+            outcome = star.run(2 * self._few())
+            driven = int(nodes.counts[3]) - before
+            self.iterations += max(1, driven)
+            self.expansions += driven
+            if outcome == FOUND:
+                candidate = self._candidate(trace(nodes, star.goal // 2))
+                if candidate is not None:
+                    self._finish(candidate)
+                return
+            if outcome == EXHAUSTED or nodes.counts[2]:
+                return
+
+    def _grow_at_random(self, arcs: float) -> None:
+        """Add arcs to the random tree, and repair what gets to the goal with it."""
+        world, few = self.world, self._few()
+        if self._tree is None:
+            config = self.config
+            count = min(config.nodes, _RANDOM_NODES)
+            self._tree = make_nodes(count, len(world.movables), config.memory)
+            plant(self._tree, world.robot_pose, world.movables.poses, 0.0)
+        last = self.iterations + arcs
+        while self.iterations < last and not self.stopped():
+            bound = self._bound(1.0)
+            if not np.isfinite(bound):
+                return
+            node = grow(
+                self._tree,
+                self.rng.random((few, DRAWS)),
                 bound,
-                table,
-                branching,
+                _LONGEST_ARC * self.size,
+                np.array([2.0 * self.size, np.pi, 2.0 * self.size * world.robot.mass]),
                 self.pricing,
                 self.shape,
                 self.walls,
                 self.bodies,
                 self.settings,
             )
-            driven = int(nodes.counts[3]) - before
-            self.iterations += max(1, driven)
-            self.expansions += driven
-            if node == -2:
-                return
+            self.iterations += few
+            self.random_arcs += few
             if node >= 0:
-                candidate = self._candidate(trace(nodes, node))
+                candidate = self._candidate(trace(self._tree, node))
                 if candidate is not None:
                     self._finish(candidate)
-                return
+            if node == -2:
+                plant(self._tree, world.robot_pose, world.movables.poses, 0.0)
 
-    def _bound(self) -> float:
-        """Cost beyond which a path of a search is of no use [kg m]: repairs may still help it."""
-        return (
-            (1.0 + self.config.slack) * self.best_cost if self._solved(self.best_cost) else np.inf
-        )
+    def _few(self) -> int:
+        """Arcs to drive between two looks at the stop rule."""
+        return max(1, 10 * self.config.expansions // (10 + len(self.world.movables)))
 
-    def _candidate(self, arcs: FloatArray) -> _Candidate | None:
-        """The path along some arcs, priced; None if it does not cost what a plan may cost."""
+    def _bound(self, factor: float) -> float:
+        """``factor`` times the best cost so far [kg m], infinite while there is no plan."""
+        return factor * self.best_cost if self._solved(self.best_cost) else np.inf
+
+    def _candidate(self, arcs: FloatArray, *, free: bool = True) -> _Candidate | None:
+        """The path along some arcs, priced; None if it is not one that could be a plan.
+
+        Args:
+            arcs: (E, 2) length [m] and curvature [1/m].
+            free: whether it is known to touch no wall.
+        """
         world = self.world
-        length = float(arcs[:, 0].sum())
-        turns = float(np.abs(arcs[:, 0] * arcs[:, 1]).sum())
-        capacity = 3 * int(length / self.pricing.spacing + turns / 0.15 + len(arcs)) + 200
+        steps = [length / step_along(bend, self.pricing.spacing) for length, bend in arcs.tolist()]
+        capacity = 3 * int(sum(steps) + len(arcs)) + 200
         path = make_path(capacity, len(world.movables))
         count = lay_out(world.robot_pose, arcs, path, self.pricing)
+        if not free:
+            corners = np.empty_like(self.shape.vertices)
+            blocked = first_blocked(path.poses, count, self.shape, self.walls, corners) < count
+            x, y = path.poses[count - 1, :2]
+            if blocked or self.goal.distance(float(x), float(y)) > 0.0:
+                return None
         path.objects[0] = world.movables.poses
-        cost = price_from(path, 0, count, np.inf, self.pricing, self.bodies, self.settings)
-        if not self._solved(cost):
-            return None
+        cost, done, few = 0.0, 0, self._few()
+        while done < count - 1:  # sweeping through a crowd takes its time
+            if self.stopped():
+                return None
+            last = min(done + few, count - 1)
+            cost = price_from(
+                path, done, last + 1, np.inf, self.pricing, self.bodies, self.settings
+            )
+            if not self._solved(cost):
+                return None
+            done = last
         self._keep(path, count, cost)
         return _Candidate(path, make_path(capacity, len(world.movables)), count, cost)
 
+    def _one_round(self) -> None:
+        """Paths of two trees: around the objects, and among them at a price that varies."""
+        config = self.config
+        doubt = float(np.exp(config.doubt * self.rng.standard_normal())) if self.trees else 1.0
+        for weight, budget in (
+            (np.inf, config.avoid_iterations),
+            (config.push_weight * doubt, config.tree_iterations),
+        ):
+            if self.stopped():
+                return
+            candidate = self._grow(weight, budget)
+            if candidate is not None:
+                self._finish(candidate)
+
     def _finish(self, candidate: _Candidate) -> None:
-        """Repair a path for as long as that pays."""
+        """Repair a path for as long as that pays, and it may still become the best."""
+        config = self.config
         while not self.stopped():
             before = candidate.cost
-            self._repair(candidate, self.config.repairs)
-            if candidate.cost > (1.0 - self.config.least_gain) * before:
+            self._repair(candidate, config.repairs)
+            gain = before - candidate.cost
+            behind = candidate.cost - self.best_cost
+            if gain <= config.least_gain * before or behind > 5.0 * gain:
                 return
