@@ -8,9 +8,21 @@ import sys
 from collections.abc import Sequence
 
 from pushplan import __version__
-from pushplan.cli import bench, compiling, ice, listing, plan, report, run, score, teleop
+from pushplan.cli import (
+    bench,
+    compiling,
+    gtsp,
+    ice,
+    listing,
+    plan,
+    report,
+    run,
+    score,
+    teleop,
+    train,
+)
 
-COMMANDS = (run, teleop, plan, bench, listing, score, report, ice, compiling)
+COMMANDS = (run, teleop, plan, bench, listing, score, report, ice, gtsp, train, compiling)
 
 _DESCRIPTION = "Plan, push, score and compare: baselines for robots that push things."
 _EXAMPLES = """\

@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
-from pushplan.cli.common import add_command, add_honest_time, positive, say, whole
+from pushplan.cli.common import add_command, add_honest_time, add_trust, positive, say, whole
 
 if TYPE_CHECKING:
     from pushplan.evaluation import ResultRow
@@ -33,8 +33,8 @@ def add(commands: Any) -> None:
         "--policies",
         required=True,
         metavar="A,B",
-        help="names ('pushplan list policies'), 'file.py:Class' or 'module:Class' of a policy or "
-        "a planner, each with 'label=' in front if wanted",
+        help="names ('pushplan list policies'), 'onnx:FILE', 'sb3:FILE', 'file.py:Class' or "
+        "'module:Class' of a policy or a planner, each with 'label=' in front if wanted",
     )
     parser.add_argument("--episodes", type=whole(1), metavar="N", help="default: the suite's own")
     parser.add_argument(
@@ -65,6 +65,7 @@ def add(commands: Any) -> None:
         "--memory", type=positive, metavar="MB", help="memory of a worker beyond which it fails"
     )
     add_honest_time(parser)
+    add_trust(parser)
     parser.add_argument(
         "--retry-failed", action="store_true", help="run jobs again that raised, hung or crashed"
     )

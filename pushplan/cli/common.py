@@ -34,6 +34,27 @@ def add_honest_time(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def add_trust(parser: argparse.ArgumentParser) -> None:
+    """Add the option that lets policies from files with pickles run."""
+    parser.add_argument(
+        "--trust-pickles",
+        action=_Trust,
+        nargs=0,
+        help="let sb3:FILE load: this runs whatever code the author of the file put there",
+    )
+
+
+class _Trust(argparse.Action):
+    """Says so in the environment, where worker processes see it too."""
+
+    def __call__(self, *arguments: Any, **options: Any) -> None:
+        import os
+
+        from pushplan.learned.sb3_policy import TRUST_VARIABLE
+
+        os.environ[TRUST_VARIABLE] = "1"
+
+
 def whole(low: int) -> Callable[[str], int]:
     """An option type: a whole number that is at least ``low``."""
 

@@ -34,7 +34,7 @@ def _planners() -> Iterable[str]:
 
 
 def _policies() -> Iterable[str]:
-    from pushplan.planners import policy_names
+    from pushplan.evaluation.policies import policy_names
 
     return policy_names()
 

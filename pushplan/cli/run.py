@@ -5,7 +5,14 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING, Any
 
-from pushplan.cli.common import add_command, add_honest_time, check_folder, milliseconds, say
+from pushplan.cli.common import (
+    add_command,
+    add_honest_time,
+    add_trust,
+    check_folder,
+    milliseconds,
+    say,
+)
 from pushplan.cli.scenario_options import add_scenario_options, scenario_of
 
 if TYPE_CHECKING:
@@ -33,6 +40,7 @@ def add(commands: Any) -> None:
         help="of the task, such as image or state; by default what the policy asks for",
     )
     add_honest_time(parser)
+    add_trust(parser)
     parser.add_argument("--render", metavar="FILE", help="picture or film: .png, .gif or .mp4")
     parser.add_argument("--live", action="store_true", help="show the episode in a window")
     parser.add_argument("--out", metavar="episode.npz", help="write the recorded episode")

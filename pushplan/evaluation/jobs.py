@@ -68,7 +68,7 @@ class JobSettings:
             ``make_env(scenario, observation=...)``, and with ``action=...`` where the policy's
             attribute ``actions`` names action modes in order of preference.
         observation: kind of observation; ``"auto"`` takes what the policy's attribute
-            ``observation`` asks for, else ``"state"``.
+            ``observation`` asks for, by name or as a builder, else ``"state"``.
         timeout_s: wall-clock limit of one job [s], None for none.
         grace_s: how much later a job is ended by force [s].
         rehearse: run the first steps of a policy's first job in each process once without
@@ -104,7 +104,11 @@ class JobSettings:
         if actions is not None:
             options = {"action": actions, **options}
         make = load_object(self.make_env) if isinstance(self.make_env, str) else self.make_env
-        return make(scenario, observation=observation, **options)
+        env = make(scenario, observation=observation, **options)
+        check = getattr(policy, "check_environment", None)
+        if callable(check):  # a network is good for what it was trained on
+            check(env, scenario)
+        return env
 
 
 @dataclass(frozen=True)

@@ -22,9 +22,10 @@ class PolicySpec:
 
     Args:
         label: what results call it: letters, digits and ``_ . + @ -``, 64 at most.
-        source: a name of `pushplan.planners.policy_names`, ``"module:Class"``,
-            ``"path/to/file.py:Class"``, or a callable without required arguments. The class or
-            callable gives a policy, or a planner, which is then wrapped in the default policy.
+        source: a name of `policy_names`, ``"onnx:FILE"`` or ``"sb3:FILE"``
+            (`pushplan.learned.load_policy`), ``"module:Class"``, ``"path/to/file.py:Class"``, or a
+            callable without required arguments. The class or callable gives a policy, a planner,
+            which is then wrapped in the default policy, or an object with ``predict``.
         options: keyword arguments for it.
     """
 
@@ -44,6 +45,9 @@ class PolicySpec:
         """A text that tells sources apart when a run is resumed."""
         options = "".join(f" {key}={value!r}" for key, value in sorted(self.options.items()))
         if isinstance(self.source, str):
+            if (file := _network_file(self.source)) is not None:
+                digest = hashlib.sha256(file.read_bytes()).hexdigest()[:12]
+                return f"{file.name} sha256:{digest}{options}"
             where, _, name = self.source.rpartition(":")
             if where.endswith(".py"):  # edited code is another policy, a moved file is not
                 digest = hashlib.sha256(Path(where).read_bytes()).hexdigest()[:12]
@@ -66,6 +70,10 @@ class PolicySpec:
         """
         if not isinstance(self.source, str):
             return as_policy(self.source(**self.options), self.label)
+        if _network_file(self.source) is not None:
+            from pushplan.learned import load_policy
+
+            return load_policy(self.source, self.label, **self.options)
         if ":" in self.source:
             return as_policy(load_object(self.source)(**self.options), self.label)
         from pushplan.planners import make_policy
@@ -74,7 +82,7 @@ class PolicySpec:
 
 
 def as_policy(thing: Any, label: str) -> Policy:
-    """A policy as it is; a planner wrapped in the default policy.
+    """A policy as it is; a planner, or an object with ``predict``, wrapped as one.
 
     Raises:
         InvalidInputError: if it is neither.
@@ -85,10 +93,32 @@ def as_policy(thing: Any, label: str) -> Policy:
         from pushplan.planners.policy import policy_for
 
         return policy_for(thing)
+    if callable(getattr(thing, "predict", None)):
+        from pushplan.learned import ObjectPolicy
+
+        return ObjectPolicy(thing, label)
     raise InvalidInputError(
         f"policy {label!r} is a {type(thing).__name__}, which has neither the methods of a policy "
-        "(reset, act) nor of a planner (plan)"
+        "(reset, act) nor of a planner (plan) nor of a network (predict)"
     )
+
+
+def policy_names() -> tuple[str, ...]:
+    """The names of all policies that come with pushplan: classical, then trained."""
+    from pushplan.learned import learned_names
+    from pushplan.planners import policy_names as classical_names
+
+    return (*classical_names(), *learned_names())
+
+
+def _network_file(source: str) -> Path | None:
+    """The file of a network, if a source names one."""
+    from pushplan.learned.loading import LEARNED_PREFIXES, learned_file
+    from pushplan.learned.shipped import learned_names, weights_of
+
+    if source.startswith(LEARNED_PREFIXES):
+        return learned_file(source)
+    return weights_of(source) if source in learned_names() else None
 
 
 def parse_policy(given: str | Callable[..., Any] | PolicySpec) -> PolicySpec:
@@ -103,9 +133,15 @@ def parse_policy(given: str | Callable[..., Any] | PolicySpec) -> PolicySpec:
     if isinstance(given, PolicySpec):
         return given
     if isinstance(given, str):
+        from pushplan.learned.loading import LEARNED_PREFIXES, learned_file
+
         label, equals, source = given.partition("=")
         if not equals:
             label, source = "", given
+        if source.startswith(LEARNED_PREFIXES):
+            path = learned_file(source)
+            name = re.sub(r"[^A-Za-z0-9_.+@-]", "_", path.stem).lstrip(".+@-")[:64]
+            return PolicySpec(label or name or "policy", f"{source.partition(':')[0]}:{path}")
         if ":" in source:
             where, _, name = source.rpartition(":")
             if where.endswith(".py"):
@@ -114,15 +150,13 @@ def parse_policy(given: str | Callable[..., Any] | PolicySpec) -> PolicySpec:
                     raise InvalidInputError(f"policy {given!r}: there is no file {where}")
                 source = f"{path}:{name}"
             return PolicySpec(label or name, source)
-        from pushplan.planners import policy_names
-
         if source not in policy_names():
             raise UnknownNameError("policy", source, policy_names())
         return PolicySpec(label or source, source)
     if not callable(given):
         raise InvalidInputError(
-            "a policy is given as a name, 'module:Class', 'file.py:Class' or a callable that "
-            f"makes one, got {type(given).__name__}"
+            "a policy is given as a name, 'onnx:FILE', 'sb3:FILE', 'module:Class', "
+            f"'file.py:Class' or a callable that makes one, got {type(given).__name__}"
         )
     name = getattr(given, "__name__", type(given).__name__)
     return PolicySpec(re.sub(r"[^A-Za-z0-9_.-]", "", name) or "policy", given)

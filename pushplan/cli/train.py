@@ -1,0 +1,176 @@
+"""``pushplan train`` and ``pushplan dataset``: learned policies, from nothing to a model card."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import shlex
+import sys
+from typing import TYPE_CHECKING, Any
+
+from pushplan.cli.common import add_command, say, whole
+from pushplan.cli.dataset import add as add_dataset
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from pushplan.training.policies.config import TrainingConfig
+
+_EXAMPLES = """\
+  pushplan train ppo --task maze --out runs/maze-ppo
+  pushplan train sac --task ship_ice --steps 50000 --seed 1 --out runs/ship-sac
+  pushplan train sam --task box_delivery --device cuda --out runs/box-sam
+  pushplan train ppo --config mine.yaml --out runs/mine
+  pushplan train ppo --task maze --out runs/maze-ppo --resume
+  pushplan train bc --task maze --data runs/maze-data --out runs/maze-bc
+
+The folder then holds policy.onnx, its model card, the learning curve and a checkpoint.
+"""
+
+
+def add(commands: Any) -> None:
+    """Add the commands."""
+    parser = add_command(commands, "train", "train a policy", _EXAMPLES, run)
+    parser.add_argument("algorithm", choices=("ppo", "sac", "sam", "bc"))
+    parser.add_argument("--task", metavar="NAME", help="take the configuration that ships for it")
+    parser.add_argument(
+        "--variant", metavar="NAME", help="with --task: another one that ships, such as image"
+    )
+    parser.add_argument("--config", metavar="FILE.yaml", help="a configuration of one's own")
+    parser.add_argument("--steps", type=whole(1), metavar="N", help="decisions to learn from")
+    parser.add_argument("--seed", type=whole(0), metavar="S", help="default: the configuration's")
+    parser.add_argument("--out", required=True, metavar="DIR", help="folder of the training")
+    parser.add_argument("--resume", action="store_true", help="go on with what is in the folder")
+    parser.add_argument("--data", metavar="DIR", help="with bc: a data set, see pushplan dataset")
+    parser.add_argument(
+        "--device", default="auto", metavar="NAME", help="auto (default), cpu or cuda"
+    )
+    parser.add_argument(
+        "--processes", action="store_true", help="ppo, sac: a process for each environment"
+    )
+    parser.add_argument("--threads", type=whole(1), default=1, help="of PyTorch (default 1)")
+    parser.add_argument(
+        "--episodes",
+        type=whole(0),
+        default=100,
+        metavar="N",
+        help="score the result on N scenarios of each suite (default %(default)s, 0: not at all)",
+    )
+    parser.add_argument(
+        "--workers", type=whole(0), default=1, help="processes for the scores (default 1)"
+    )
+    add_dataset(commands)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Train, score, write the card."""
+    import logging
+
+    from pushplan.training.policies.training import train_policy
+
+    config = _config(options)
+    _show_progress(logging.getLogger("pushplan.training"))
+    try:
+        path = train_policy(
+            config,
+            options.out,
+            resume=options.resume,
+            device=options.device,
+            processes=options.processes,
+            threads=options.threads,
+            data=options.data,
+            command=_command(options, config),
+        )
+    except KeyboardInterrupt:
+        sys.stderr.write(f"stopped; with --resume the training in {options.out} goes on\n")
+        raise
+    assert path is not None
+    say(f"wrote {path}")
+    card = _score(config, path, options)
+    say(f"wrote {card}")
+    return 0
+
+
+def _config(options: argparse.Namespace) -> TrainingConfig:
+    from pushplan.training.policies.config import config_named, read_config
+    from pushplan.world import InvalidInputError
+
+    if (options.config is None) == (options.task is None):
+        raise InvalidInputError("give either --task NAME or --config FILE.yaml")
+    if options.config is not None:
+        if options.variant is not None:
+            raise InvalidInputError("--variant belongs to --task")
+        config = read_config(options.config)
+        if config.algorithm != options.algorithm:
+            raise InvalidInputError(
+                f"{options.config} is for {config.algorithm!r}, not {options.algorithm!r}"
+            )
+    else:
+        variant = "" if options.variant is None else f"-{options.variant}"
+        config = config_named(options.task, options.algorithm + variant)
+    return config.changed(steps=options.steps, seed=options.seed)
+
+
+def _command(options: argparse.Namespace, config: TrainingConfig) -> str:
+    """What starts this training again."""
+    words = ["pushplan", "train", options.algorithm]
+    for name in ("task", "variant", "config", "data", "out"):
+        if (value := getattr(options, name)) is not None:
+            words += [f"--{name}", value]
+    words += ["--steps", str(config.steps), "--seed", str(config.seed)]
+    words += ["--threads", str(options.threads)]
+    return shlex.join(words)
+
+
+def _score(config: TrainingConfig, path: Path, options: argparse.Namespace) -> Path:
+    """Run the policy on held-out scenarios, and write the model card."""
+    from pushplan.training.policies.card import write_card
+
+    rows = []
+    for suite in config.suites if options.episodes else ():
+        rows.append(score_on(suite, path, options.episodes, options.workers))
+        row = rows[-1]
+        say(f"  {suite}: success {row['success']:.2f} of {row['episodes']}")
+    scores = path.with_name("scores.json")
+    scores.write_text(json.dumps(rows, indent=1) + "\n", encoding="utf-8")
+    return write_card(options.out, rows, path.with_name("MODEL_CARD.md"))
+
+
+def score_on(suite: str, path: Path, episodes: int, workers: int) -> dict[str, Any]:
+    """A suite's row of the model card."""
+    from collections import Counter
+
+    import numpy as np
+
+    from pushplan.evaluation import bench, wilson
+    from pushplan.evaluation.statistics import estimate
+
+    results = bench(suite, [f"policy=onnx:{path}"], episodes=episodes, workers=workers)
+    rows = results.rows
+    share = wilson(sum(bool(row.success) for row in rows), len(rows))
+    scores = {}
+    for name in ("S_manip", "E_manip", "I_manip", "E_nav", "I_nav"):
+        values = [float(v) for row in rows if (v := getattr(row, name)) is not None]
+        values = [value for value in values if np.isfinite(value)]
+        if values:
+            found = estimate(values)
+            scores[name] = (found.mean, found.low, found.high)
+    return {
+        "suite": suite,
+        "episodes": len(rows),
+        "success": share.share,
+        "success_low": share.low,
+        "success_high": share.high,
+        "scores": scores,
+        "failures": dict(Counter(row.reason for row in rows if not row.success)),
+    }
+
+
+def _show_progress(logger: Any) -> None:
+    """Write what a training says to standard error."""
+    import logging
+
+    handler = logging.StreamHandler(sys.stderr)
+    handler.setFormatter(logging.Formatter("%(message)s"))
+    logger.addHandler(handler)
+    logger.setLevel(logging.INFO)

@@ -1,0 +1,58 @@
+"""Run trained networks as policies. ONNX Runtime is enough; no learning library is imported.
+
+`load_policy("onnx:FILE")` gives a `pushplan.world.Policy`. What a file has to say about itself is a
+`Specification`.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from pushplan.learned.features import FeatureObservation
+    from pushplan.learned.loading import LEARNED_PREFIXES, load_policy
+    from pushplan.learned.network_policy import NetworkPolicy
+    from pushplan.learned.objects import ObjectPolicy
+    from pushplan.learned.onnx_policy import OnnxPolicy
+    from pushplan.learned.outputs import ActionSpec
+    from pushplan.learned.sb3_policy import Sb3Policy
+    from pushplan.learned.shipped import learned_names
+    from pushplan.learned.specification import RobotSpec, Specification
+
+_HOMES = {
+    "features": ("FeatureObservation",),
+    "loading": ("LEARNED_PREFIXES", "load_policy"),
+    "network_policy": ("NetworkPolicy",),
+    "objects": ("ObjectPolicy",),
+    "onnx_policy": ("OnnxPolicy",),
+    "outputs": ("ActionSpec",),
+    "sb3_policy": ("Sb3Policy",),
+    "shipped": ("learned_names",),
+    "specification": ("RobotSpec", "Specification"),
+}
+_LAZY = {name: module for module, names in _HOMES.items() for name in names}
+
+__all__ = [
+    "LEARNED_PREFIXES",
+    "ActionSpec",
+    "FeatureObservation",
+    "NetworkPolicy",
+    "ObjectPolicy",
+    "OnnxPolicy",
+    "RobotSpec",
+    "Sb3Policy",
+    "Specification",
+    "learned_names",
+    "load_policy",
+]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _LAZY:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(import_module(f"pushplan.learned.{_LAZY[name]}"), name)
+
+
+def __dir__() -> list[str]:
+    return __all__

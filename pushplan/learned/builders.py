@@ -1,0 +1,104 @@
+"""Observation builders as plain data, so that they can travel with a network."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict, fields
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pushplan.learned.features import FeatureObservation
+from pushplan.observation import ImageObservation, StateObservation
+from pushplan.world import InvalidInputError, SchemaError, World
+from pushplan.world.checks import choice, known_keys
+
+KINDS: dict[str, type[Any]] = {
+    "image": ImageObservation,
+    "state": StateObservation,
+    "features": FeatureObservation,
+}
+GREATEST_SIZE = 2**24
+"""Elements of an observation that a file may ask for."""
+
+
+class Builder(Protocol):
+    """Turns a snapshot into an array of fixed shape and type."""
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Shape of the array."""
+        ...
+
+    @property
+    def dtype(self) -> np.dtype[Any]:
+        """Element type of the array."""
+        ...
+
+    @property
+    def low(self) -> float:
+        """Least value of an element."""
+        ...
+
+    @property
+    def high(self) -> float:
+        """Greatest value of an element."""
+        ...
+
+    def observe(self, world: World) -> NDArray[Any]:
+        """A new array."""
+        ...
+
+
+def builder_to_dict(builder: Builder) -> dict[str, Any]:
+    """JSON values from which `builder_from_dict` makes the builder again.
+
+    Raises:
+        InvalidInputError: if it is a builder of one's own, which a file cannot describe.
+    """
+    for kind, known in KINDS.items():
+        if type(builder) is known:
+            own = {
+                key: list(value) if isinstance(value, tuple) else value
+                for key, value in asdict(builder).items()  # type: ignore[call-overload]
+            }
+            return {
+                "kind": kind,
+                **own,
+                "shape": list(builder.shape),
+                "dtype": builder.dtype.name,
+            }
+    raise InvalidInputError(
+        f"an observation in a file is one of {', '.join(KINDS)}, got {type(builder).__name__}"
+    )
+
+
+def builder_from_dict(data: Mapping[str, Any]) -> Builder:
+    """The builder of an observation.
+
+    ``shape`` and ``dtype`` may be given, and must then be what the builder has.
+
+    Raises:
+        SchemaError, InvalidInputError: if a key or a value is wrong.
+    """
+    if not isinstance(data, Mapping) or "kind" not in data:
+        raise SchemaError(f"observation must be a mapping with a kind, got {data!r:.80}")
+    builder_class = KINDS[choice("observation kind", data["kind"], tuple(KINDS))]
+    own = [field.name for field in fields(builder_class)]
+    known_keys("observation", data, ("kind", "shape", "dtype", *own), ("kind",))
+    options = {
+        key: tuple(value) if isinstance(value, list) else value
+        for key, value in data.items()
+        if key in own
+    }
+    builder: Builder = builder_class(**options)
+    if float(np.prod([float(n) for n in builder.shape])) > GREATEST_SIZE:
+        raise InvalidInputError(f"an observation of shape {builder.shape} is too large")
+    stated = {"shape": tuple(data.get("shape", builder.shape)), "dtype": data.get("dtype")}
+    if stated["shape"] != builder.shape or stated["dtype"] not in (None, builder.dtype.name):
+        raise SchemaError(
+            f"observation says {stated['dtype']} of shape {stated['shape']}, but {data['kind']} "
+            f"with these options is {builder.dtype.name} of shape {builder.shape}"
+        )
+    return builder

@@ -1,0 +1,174 @@
+"""`FeatureObservation`: distances and directions around the robot, as a short vector."""
+
+from __future__ import annotations
+
+import functools
+import math
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pushplan.geometry import GoalDistances, goal_distances
+from pushplan.learned.ray_kernels import cast_rays, near_outlines
+from pushplan.world import Goal, GoalDisc, GoalLine, StaticMap, World
+from pushplan.world.checks import FloatArray, IntArray, integer, number
+from pushplan.world.outline import centroid, flatten
+
+_GUIDE, _EACH = 10, 9
+
+
+@dataclass(frozen=True)
+class FeatureObservation:
+    """What matters for pushing, in the robot's frame, cheap to compute and to learn from.
+
+    Our own variant beside the images of the Bench-Push paper. All lengths are divided by
+    ``range``. In this order:
+
+    - 10 numbers that guide: cosine and sine of the robot's heading; the next and the second next
+      bend of the shortest way around what is static (x, y each; for goals of objects both are
+      the middle of the goal); the length of that way; the vector to the nearest of the bounds,
+      outwards (x, y); and 1 if the way is one for the robot, else 0. The way keeps the robot's
+      inscribed disc clear of static things where there is such a way.
+    - ``rays`` numbers, from 0 (nothing within the range) to 1 (touching), for rays around the
+      robot's origin, the first straight ahead, then counter-clockwise: what is static or a bound.
+    - ``rays`` numbers for what may be pushed.
+    - 9 numbers for each of the ``objects`` nearest objects, those that still have to be moved
+      first: x, y; cosine and sine of four times its heading, which is the same for a square
+      however it is turned; radius; unit vector along its own shortest way to the goal, and the
+      length of the way (0 where the goal is one for the robot); 1 as a sign that it is there.
+
+    Args:
+        rays: how many rays, 0 for none.
+        objects: how many objects.
+        range: how far it sees, and the unit of lengths [m].
+        limit: values are clipped to it.
+    """
+
+    rays: int = 24
+    objects: int = 5
+    range: float = 6.0
+    limit: float = 5.0
+
+    dtype: ClassVar[np.dtype[np.float32]] = np.dtype(np.float32)
+
+    def __post_init__(self) -> None:
+        integer("rays", self.rays, low=0, high=4096)
+        integer("objects", self.objects, low=0, high=4096)
+        for name in ("range", "limit"):
+            value = number(name, getattr(self, name), low=0.0, open_low=True)
+            object.__setattr__(self, name, value)
+
+    @property
+    def shape(self) -> tuple[int]:
+        """Length of the vector."""
+        return (_GUIDE + 2 * self.rays + _EACH * self.objects,)
+
+    @property
+    def low(self) -> float:
+        """Least value of any entry."""
+        return -self.limit
+
+    @property
+    def high(self) -> float:
+        """Greatest value of any entry."""
+        return self.limit
+
+    def observe(self, world: World) -> NDArray[np.float32]:
+        """The vector."""
+        x, y, theta = world.robot_pose.tolist()
+        c, s = math.cos(theta), math.sin(theta)
+        to_body = np.array([[c, -s], [s, c]]) / self.range  # row vectors times this
+        out = np.zeros(self.shape)
+        out[:2] = c, s
+        self._guide(out[2:_GUIDE], world, to_body)
+        if self.rays:
+            parts = _walls(world.static)
+            out[_GUIDE : _GUIDE + self.rays] = self._cast(x, y, theta, *parts)
+            objects = world.movables
+            near = near_outlines(
+                *(x, y, self.range, objects.poses, objects.radii),
+                *(objects.vertices, objects.offsets),
+            )
+            out[_GUIDE + self.rays : _GUIDE + 2 * self.rays] = self._cast(x, y, theta, *near)
+        if self.objects and len(world.movables):
+            self._nearest(out[_GUIDE + 2 * self.rays :].reshape(-1, _EACH), world, to_body)
+        return np.clip(out, -self.limit, self.limit).astype(np.float32)
+
+    def _cast(
+        self, x: float, y: float, theta: float, vertices: FloatArray, offsets: IntArray
+    ) -> FloatArray:
+        lengths = np.full(self.rays, self.range)
+        cast_rays(lengths, x, y, theta, vertices, offsets)
+        return 1.0 - lengths / self.range
+
+    def _guide(self, out: FloatArray, world: World, to_body: FloatArray) -> None:
+        """The numbers after cosine and sine."""
+        at = world.robot_pose[:2]
+        goal = world.goal
+        if isinstance(goal, GoalDisc | GoalLine):
+            ahead, length = _way(world.static, goal, world.robot.inscribed_radius, at)
+            out[:4] = ((ahead - at) @ to_body).ravel()
+            out[4] = length / self.range
+            out[7] = 1.0
+        else:
+            out[:4] = np.tile((centroid(goal.polygon) - at) @ to_body, 2)
+        x0, y0, x1, y1 = world.static.bounds.tolist()
+        gaps = (at[0] - x0, at[1] - y0, x1 - at[0], y1 - at[1])
+        nearest = int(np.argmin(gaps))
+        outward = ((-1.0, 0.0), (0.0, -1.0), (1.0, 0.0), (0.0, 1.0))[nearest]
+        out[5:7] = (np.array(outward) * gaps[nearest]) @ to_body
+
+    def _nearest(self, rows: FloatArray, world: World, to_body: FloatArray) -> None:
+        poses, radii, goal = world.movables.poses, world.movables.radii, world.goal
+        offset = poses[:, :2] - world.robot_pose[:2]
+        away = np.hypot(offset[:, 0], offset[:, 1])
+        if isinstance(goal, GoalDisc | GoalLine):
+            chosen = np.argsort(away, kind="stable")[: self.objects]
+        else:
+            distances = goal_distances(world.static, goal)
+            ways = [_first_leg(distances, pose[:2]) for pose in poses]
+            waiting = np.array([length > 0.0 for _, length in ways])
+            chosen = np.lexsort((away, ~waiting))[: self.objects]
+            for row, k in enumerate(chosen.tolist()):
+                direction, length = ways[k]
+                rows[row, 5:7] = direction @ to_body * self.range
+                rows[row, 7] = length / self.range
+        rows = rows[: len(chosen)]
+        turn = 4.0 * (poses[chosen, 2] - world.robot_pose[2])
+        rows[:, :2] = offset[chosen] @ to_body
+        rows[:, 2], rows[:, 3] = np.cos(turn), np.sin(turn)
+        rows[:, 4] = radii[chosen] / self.range
+        rows[:, 8] = 1.0
+
+
+@functools.lru_cache(maxsize=16)
+def _walls(static: StaticMap) -> tuple[FloatArray, IntArray]:
+    """Outlines of what is static, and the bounds as one more."""
+    x0, y0, x1, y1 = static.bounds.tolist()
+    frame = np.array([(x0, y0), (x1, y0), (x1, y1), (x0, y1)])
+    return flatten([*static.convex_parts, frame])
+
+
+def _way(
+    static: StaticMap, goal: Goal, clearance: float, at: FloatArray
+) -> tuple[FloatArray, float]:
+    """(2, 2) the next two points of the way to a goal [m], and its length [m]."""
+    for margin in (clearance, 0.0):
+        path = goal_distances(static, goal, clearance=margin).path_from(at)
+        if math.isfinite(path.length) and len(path.points) > 1:
+            return path.points[[1, min(2, len(path.points) - 1)]], path.length
+        if path.length == 0.0:
+            break
+    return np.stack([at, at]), 0.0
+
+
+def _first_leg(distances: GoalDistances, at: FloatArray) -> tuple[FloatArray, float]:
+    """(2,) unit vector along the way from a point, and its length [m]; 0 where there is none."""
+    path = distances.path_from(at)
+    if not math.isfinite(path.length) or len(path.points) < 2:
+        return np.zeros(2), 0.0
+    leg = path.points[1] - path.points[0]
+    size = float(np.hypot(*leg))
+    return (leg / size if size > 0.0 else leg), path.length

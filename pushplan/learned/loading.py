@@ -1,0 +1,64 @@
+"""Policies from files, as they are named on the command line."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from pushplan.learned.shipped import weights_of
+from pushplan.world import InvalidInputError
+
+if TYPE_CHECKING:
+    from pushplan.learned.network_policy import NetworkPolicy
+
+LEARNED_PREFIXES = ("onnx:", "sb3:")
+_ENDINGS = {"onnx": ".onnx", "sb3": ".zip"}
+
+
+def load_policy(source: str, label: str | None = None, **options: Any) -> NetworkPolicy:
+    """A policy from a file, or a shipped one.
+
+    Args:
+        source: ``"onnx:FILE"``, ``"sb3:FILE"`` (the ending may be left out) or the name of a
+            shipped network.
+        label: what errors call it.
+        options: ``trust`` for ``sb3``, see `pushplan.learned.sb3_policy.Sb3Policy`.
+
+    Raises:
+        InvalidInputError: if the file is no such policy, or is not trusted.
+        UnknownNameError: if there is no shipped network of that name.
+        MissingDependencyError: if a library that runs it is not there.
+    """
+    if not source.startswith(LEARNED_PREFIXES):
+        return _onnx(weights_of(source), label or source, options)
+    kind, path = source.partition(":")[0], learned_file(source)
+    if kind == "onnx":
+        return _onnx(path, label, options)
+    from pushplan.learned.sb3_policy import Sb3Policy
+
+    return Sb3Policy(path, label=label, **options)
+
+
+def learned_file(source: str) -> Path:
+    """The file that a text such as ``onnx:FILE`` names.
+
+    Raises:
+        InvalidInputError: if it is not there.
+    """
+    kind, _, name = source.partition(":")
+    if not name:
+        raise InvalidInputError(f"policy {source!r}: the file is missing, as in {kind}:FILE")
+    path = Path(name).expanduser()
+    with_ending = path.with_name(path.name + _ENDINGS[kind]) if path.name else path
+    for candidate in (path, with_ending):
+        if candidate.is_file():
+            return candidate.resolve()
+    raise InvalidInputError(f"policy {source!r}: there is no file {path} or {with_ending}")
+
+
+def _onnx(path: Path, label: str | None, options: dict[str, Any]) -> NetworkPolicy:
+    if options:
+        raise InvalidInputError(f"an ONNX policy has no options, got {', '.join(options)}")
+    from pushplan.learned.onnx_policy import OnnxPolicy
+
+    return OnnxPolicy(path, label)

@@ -1,0 +1,127 @@
+"""How the output of a network becomes an action."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from pushplan.world import InvalidInputError
+from pushplan.world.checks import choice, integer, known_keys, number
+
+MODES = {"turn_rate": 1, "velocity": 2, "wheels": 2, "heading": 1, "waypoint": 2}
+"""Action modes of `pushplan.envs` and the number of elements of an action."""
+
+OUTPUTS = ("continuous", "direction", "pixel_values")
+_KEYS = ("mode", "output", "shape", "repeat", "window", "step")
+
+
+class BadOutputError(InvalidInputError):
+    """A network gave something that is no action."""
+
+
+@dataclass(frozen=True)
+class ActionSpec:
+    """What a network puts out, and what it means.
+
+    Args:
+        mode: the action mode of the environment.
+        output: ``"continuous"``: the action itself, clipped to [-1, 1]. ``"direction"``, with mode
+            ``heading``: a vector (2,) in the robot's frame, x ahead and y to the left, along which
+            the robot goes. ``"pixel_values"``, with mode ``waypoint``: a value for each pixel of
+            a map around the robot, row 0 ahead and column 0 to the left; the robot drives to the
+            middle of the pixel with the greatest, of equals the first.
+        shape: of the output, without the batch axis.
+        repeat: steps of the environment for which a decision stands.
+        window: with ``pixel_values``, the side of the map [m], which has to be the task's
+            ``waypoint_window``; else 0.
+        step: with mode ``heading``, the task's ``heading_step`` [m]; else 0.
+    """
+
+    mode: str
+    output: str
+    shape: tuple[int, ...]
+    repeat: int = 1
+    window: float = 0.0
+    step: float = 0.0
+
+    def __post_init__(self) -> None:
+        choice("action mode", self.mode, tuple(MODES))
+        choice("output", self.output, OUTPUTS)
+        if isinstance(self.shape, str) or not hasattr(self.shape, "__iter__"):
+            raise InvalidInputError(f"action.shape must be a list of numbers, got {self.shape!r}")
+        shape = tuple(integer("action.shape", n, low=1, high=4096) for n in self.shape)
+        object.__setattr__(self, "shape", shape)
+        object.__setattr__(self, "repeat", integer("action.repeat", self.repeat, low=1))
+        for name in ("window", "step"):
+            object.__setattr__(self, name, number(f"action.{name}", getattr(self, name), low=0.0))
+        self._check_together()
+
+    def _check_together(self) -> None:
+        wanted = {"direction": "heading", "pixel_values": "waypoint"}.get(self.output, self.mode)
+        if self.mode != wanted:
+            raise InvalidInputError(
+                f"output {self.output!r} belongs to action mode {wanted!r}, not {self.mode!r}"
+            )
+        if self.output == "pixel_values":
+            fits = len(self.shape) == 2
+        else:
+            fits = self.shape == (2 if self.output == "direction" else MODES[self.mode],)
+        if not fits:
+            raise InvalidInputError(
+                f"output {self.output!r} of action mode {self.mode!r} cannot have shape "
+                f"{self.shape}"
+            )
+        for name, needed in (
+            ("window", self.output == "pixel_values"),
+            ("step", self.mode == "heading"),
+        ):
+            if needed and getattr(self, name) == 0.0:
+                raise InvalidInputError(f"action.{name} must be given for mode {self.mode!r}")
+
+    def read(self, output: ArrayLike) -> NDArray[np.float32]:
+        """The action in [-1, 1] that an output asks for.
+
+        Raises:
+            BadOutputError: if it is not finite or has another shape.
+        """
+        values = np.asarray(output)
+        if values.shape != self.shape or values.dtype.kind not in "fiu":
+            raise BadOutputError(
+                f"the network must give numbers of shape {self.shape}, it gave {values.dtype} of "
+                f"shape {values.shape}"
+            )
+        if not np.isfinite(values).all():
+            raise BadOutputError("the network gave values that are not finite")
+        if self.output == "pixel_values":
+            row, col = divmod(int(np.argmax(values)), self.shape[1])
+            return self.waypoint(row, col)
+        if self.output == "direction":
+            heading = math.atan2(float(values[1]), float(values[0])) / math.pi
+            return np.array([heading], dtype=np.float32)
+        clipped: NDArray[np.float32] = np.clip(values, -1.0, 1.0).astype(np.float32)
+        return clipped
+
+    def waypoint(self, row: int, col: int) -> NDArray[np.float32]:
+        """(2,) the action that drives to the middle of a pixel."""
+        rows, cols = self.shape
+        ahead, left = 1.0 - 2.0 * (row + 0.5) / rows, 1.0 - 2.0 * (col + 0.5) / cols
+        return np.array([ahead, left], dtype=np.float32)
+
+    def to_dict(self) -> dict[str, Any]:
+        """JSON values."""
+        return {**asdict(self), "shape": list(self.shape)}
+
+    @classmethod
+    def from_dict(cls, data: Mapping[str, Any]) -> ActionSpec:
+        """Read what `to_dict` gives.
+
+        Raises:
+            SchemaError, InvalidInputError: if a key or a value is wrong.
+        """
+        known_keys("action", data, _KEYS, ("mode", "output", "shape"))
+        return cls(**data)

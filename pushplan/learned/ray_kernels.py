@@ -1,0 +1,83 @@
+"""Compiled rays against convex outlines."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from pushplan.world.checks import FloatArray, IntArray
+
+
+@njit(cache=True, nogil=True)
+def cast_rays(
+    out: FloatArray,
+    x: float,
+    y: float,
+    heading: float,
+    vertices: FloatArray,
+    offsets: IntArray,
+) -> None:
+    """Shorten rays to where they first cross an outline.
+
+    Args:
+        out: (N,) lengths of the rays [m], the i-th at ``heading + 2 pi i / N``; shortened.
+        x: where they start [m].
+        y: [m].
+        heading: of the first [rad].
+        vertices: (V, 2) corners of closed outlines, world frame [m].
+        offsets: (P + 1,) where each outline starts.
+    """
+    count = out.shape[0]
+    step = 2.0 * np.pi / count
+    for k in range(offsets.shape[0] - 1):
+        first, end = offsets[k], offsets[k + 1]
+        for i in range(first, end):
+            j = i + 1 if i + 1 < end else first
+            ax, ay = vertices[i, 0] - x, vertices[i, 1] - y
+            bx, by = vertices[j, 0] - x, vertices[j, 1] - y
+            # only the rays between the bearings of the two ends can cross the edge
+            turn = np.arctan2(ax * by - ay * bx, ax * bx + ay * by)
+            low = np.arctan2(ay, ax) if turn >= 0.0 else np.arctan2(by, bx)
+            start = int(np.ceil((low - heading) / step - 1e-9))
+            last = int(np.floor((low + abs(turn) - heading) / step + 1e-9))
+            ex, ey = bx - ax, by - ay
+            for n in range(start, last + 1):
+                c, s = np.cos(heading + n * step), np.sin(heading + n * step)
+                across = c * ey - s * ex
+                if abs(across) < 1e-15:
+                    continue
+                away = (ax * ey - ay * ex) / across
+                if 0.0 <= away < out[n % count]:
+                    out[n % count] = away
+
+
+@njit(cache=True, nogil=True)
+def near_outlines(
+    x: float,
+    y: float,
+    reach: float,
+    poses: FloatArray,
+    radii: FloatArray,
+    vertices: FloatArray,
+    offsets: IntArray,
+) -> tuple[FloatArray, IntArray]:
+    """World-frame outlines of the bodies of which a part may lie within ``reach`` [m]."""
+    keep = np.zeros(poses.shape[0], dtype=np.int64)
+    bodies, corners = 0, 0
+    for k in range(poses.shape[0]):
+        far = reach + radii[k]
+        if (poses[k, 0] - x) ** 2 + (poses[k, 1] - y) ** 2 <= far * far:
+            keep[bodies] = k
+            bodies += 1
+            corners += offsets[k + 1] - offsets[k]
+    out, ends = np.empty((corners, 2)), np.zeros(bodies + 1, dtype=np.int64)
+    n = 0
+    for i in range(bodies):
+        k = keep[i]
+        c, s = np.cos(poses[k, 2]), np.sin(poses[k, 2])
+        for v in range(offsets[k], offsets[k + 1]):
+            out[n, 0] = poses[k, 0] + c * vertices[v, 0] - s * vertices[v, 1]
+            out[n, 1] = poses[k, 1] + s * vertices[v, 0] + c * vertices[v, 1]
+            n += 1
+        ends[i + 1] = n
+    return out, ends

@@ -1,0 +1,127 @@
+"""`Sb3Policy`: a Stable-Baselines3 zip. It holds pickles, so it runs only where it is trusted."""
+
+from __future__ import annotations
+
+import importlib
+import json
+import logging
+import os
+import zipfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pushplan.learned.network_policy import NetworkPolicy
+from pushplan.learned.specification import METADATA_KEY, Specification
+from pushplan.world import InvalidInputError, MissingDependencyError
+
+TRUST_VARIABLE = "PUSHPLAN_TRUST_PICKLES"
+"""Set to 1 in the environment of the process, it says that pickles may be loaded."""
+MEMBER = f"{METADATA_KEY}.json"
+"""Member of the zip, or ending of the file beside it, that holds the specification."""
+ALGORITHMS = ("PPO", "SAC", "A2C", "TD3", "DDPG")
+_UNREADABLE = (OSError, zipfile.BadZipFile, KeyError, UnicodeDecodeError, NotImplementedError)
+
+log = logging.getLogger(__name__)
+
+
+class UntrustedError(InvalidInputError):
+    """A file with pickles was to be loaded without being trusted."""
+
+
+class Sb3Policy(NetworkPolicy):
+    """Runs a model that Stable-Baselines3 has saved; needs the extra ``learn``.
+
+    The specification is the member ``pushplan.json`` of the zip, as `pushplan train` writes it, or
+    a file ``FILE.pushplan.json`` beside it.
+
+    Args:
+        path: the ``.zip`` file.
+        trust: whether its pickles may run. Loading a pickle runs whatever its author wrote. By
+            default the environment variable ``PUSHPLAN_TRUST_PICKLES=1`` decides.
+        label: what errors call it; the file's name by default.
+
+    Raises:
+        UntrustedError: if it is not trusted; nothing has been loaded.
+        InvalidInputError: if it is no such file, or has no specification.
+        MissingDependencyError: without Stable-Baselines3.
+    """
+
+    def __init__(
+        self, path: str | Path, *, trust: bool | None = None, label: str | None = None
+    ) -> None:
+        self.path = Path(path)
+        label = self.path.stem if label is None else label
+        specification, algorithm = _look(self.path)
+        if not (trusted() if trust is None else trust):
+            raise UntrustedError(
+                f"{self.path} is a Stable-Baselines3 file: it holds pickles, and loading them runs "
+                "whatever code their author put there. If you trust where it comes from, give "
+                f"--trust-pickles (or trust=True, or {TRUST_VARIABLE}=1); better export it to ONNX"
+            )
+        log.warning("loading pickles from %s: this can run any code", self.path)
+        self._model = _load(self.path, algorithm)
+        super().__init__(self.decide, specification, label)
+
+    def decide(self, seen: NDArray[Any]) -> NDArray[Any]:
+        """The output of the network for one observation."""
+        return np.asarray(self._model.predict(seen, deterministic=True)[0])
+
+
+def trusted() -> bool:
+    """Whether the environment variable says that pickles may be loaded."""
+    return os.environ.get(TRUST_VARIABLE, "") == "1"
+
+
+def _look(path: Path) -> tuple[Specification, str]:
+    """Specification and algorithm, read as text only."""
+    if not path.is_file():
+        raise InvalidInputError(f"there is no file {path}")
+    beside = path.with_suffix(f".{MEMBER}")
+    try:
+        with zipfile.ZipFile(path) as archive:
+            names = archive.namelist()
+            if "data" not in names:
+                raise InvalidInputError(f"{path} is no Stable-Baselines3 file: it has no 'data'")
+            text = None
+            if MEMBER in names and archive.getinfo(MEMBER).file_size < 2**20:
+                text = archive.read(MEMBER).decode()
+    except _UNREADABLE as error:
+        raise InvalidInputError(f"{path} is no readable zip: {error}") from error
+    if text is None and beside.is_file():
+        text = beside.read_text(encoding="utf-8")
+    if text is None:
+        raise InvalidInputError(
+            f"{path} does not say what it observes and how it acts: put a specification beside it "
+            f"as {beside.name}, see docs/learned.md"
+        )
+    specification = Specification.from_json(text)
+    algorithm = str(specification.training.get("algorithm", "")).upper()
+    if algorithm not in ALGORITHMS:
+        raise InvalidInputError(
+            f"{path}: training.algorithm of the specification must be one of "
+            f"{', '.join(ALGORITHMS)}, got {algorithm!r}"
+        )
+    return specification, algorithm
+
+
+def _load(path: Path, algorithm: str) -> Any:
+    try:
+        library = importlib.import_module("stable_baselines3")
+    except ImportError as error:
+        raise MissingDependencyError(
+            "sb3:FILE needs Stable-Baselines3: pip install 'pushplan[learn]'"
+        ) from error
+    try:
+        return getattr(library, algorithm).load(path, device="cpu")
+    except Exception as error:  # whatever unpickling raises
+        reason = " ".join(str(error).split())[:200]
+        raise InvalidInputError(f"{path} cannot be loaded: {reason}") from error
+
+
+def attach(path: str | Path, specification: Specification) -> None:
+    """Put a specification into a Stable-Baselines3 zip, which stays loadable as before."""
+    with zipfile.ZipFile(path, "a") as archive:
+        archive.writestr(MEMBER, json.dumps(json.loads(specification.to_json()), indent=1))

@@ -1,0 +1,194 @@
+"""`Specification`: what a file with a network says about itself."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
+from typing import Any
+
+from pushplan.learned.builders import Builder, builder_from_dict, builder_to_dict
+from pushplan.learned.outputs import ActionSpec
+from pushplan.world import InvalidInputError, RobotModel, SchemaError
+from pushplan.world.checks import known_keys, number
+
+FORMAT = "pushplan-policy/1"
+METADATA_KEY = "pushplan"
+"""Key of the ONNX metadata, and stem of the zip member, that holds the specification as JSON."""
+LONGEST_TEXT = 1_000_000
+_KEYS = ("format", "tasks", "presets", "robot", "control_step", "observation", "action", "training")
+_TOLERANCE = 1e-6
+
+
+@dataclass(frozen=True)
+class RobotSpec:
+    """The robot that a network drives; a policy refuses another one.
+
+    Args:
+        drive: a `pushplan.world.Drive`.
+        max_speed: [m/s].
+        max_turn_rate: [rad/s].
+        radius: circumscribed radius of the footprint [m].
+    """
+
+    drive: str
+    max_speed: float
+    max_turn_rate: float
+    radius: float
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.drive, str):
+            raise InvalidInputError(f"robot.drive must be a text, got {self.drive!r}")
+        for name in ("max_speed", "max_turn_rate", "radius"):
+            value = number(f"robot.{name}", getattr(self, name), low=0.0, open_low=True)
+            object.__setattr__(self, name, value)
+
+    @classmethod
+    def of(cls, robot: RobotModel) -> RobotSpec:
+        """Of a robot."""
+        return cls(
+            robot.drive.value, robot.max_speed, robot.max_turn_rate, robot.circumscribed_radius
+        )
+
+    def difference(self, robot: RobotModel) -> str | None:
+        """What tells a robot from this one, in words; None if nothing does."""
+        other = RobotSpec.of(robot)
+        for name, mine in asdict(self).items():
+            theirs = getattr(other, name)
+            same = mine == theirs if name == "drive" else close(mine, theirs)
+            if not same:
+                return f"{name} {mine!r} where the robot {robot.name!r} has {theirs!r}"
+        return None
+
+
+@dataclass(frozen=True)
+class Specification:
+    """Observation and action of a network, and what it was made for.
+
+    Args:
+        tasks: names of the tasks; empty for any.
+        presets: names of their presets; empty for any.
+        robot: which robot it drives; None for any.
+        control_step: time between two commands to the robot [s]; 0 for any.
+        observation: builder of what it sees.
+        action: what its output means.
+        training: facts for people and model cards; JSON values, never interpreted.
+    """
+
+    tasks: tuple[str, ...]
+    presets: tuple[str, ...]
+    robot: RobotSpec | None
+    control_step: float
+    observation: Builder
+    action: ActionSpec
+    training: Mapping[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        for name in ("tasks", "presets"):
+            given = getattr(self, name)
+            texts = not isinstance(given, str) and all(isinstance(text, str) for text in given)
+            if not texts:
+                raise InvalidInputError(f"{name} must be a list of names, got {given!r:.80}")
+            object.__setattr__(self, name, tuple(given))
+        step = number("control_step", self.control_step, low=0.0)
+        object.__setattr__(self, "control_step", step)
+
+    def to_json(self) -> str:
+        """One line of JSON."""
+        data = {
+            "format": FORMAT,
+            "tasks": list(self.tasks),
+            "presets": list(self.presets),
+            "robot": None if self.robot is None else asdict(self.robot),
+            "control_step": self.control_step,
+            "observation": builder_to_dict(self.observation),
+            "action": self.action.to_dict(),
+            "training": dict(self.training),
+        }
+        return json.dumps(data, allow_nan=False)
+
+    @classmethod
+    def from_json(cls, text: str) -> Specification:
+        """Read what `to_json` gives.
+
+        Raises:
+            SchemaError, InvalidInputError: if it is no such text, or a value is wrong.
+        """
+        if len(text) > LONGEST_TEXT:
+            raise SchemaError(f"the specification is longer than {LONGEST_TEXT} characters")
+        try:
+            data = json.loads(text)
+        except (ValueError, RecursionError) as error:
+            raise SchemaError(f"the specification is not JSON: {error}") from error
+        if not isinstance(data, dict) or data.get("format") != FORMAT:
+            found = data.get("format") if isinstance(data, dict) else data
+            raise SchemaError(
+                f"the specification has format {found!r:.60}, this version reads {FORMAT!r}"
+            )
+        known_keys("the specification", data, _KEYS, tuple(k for k in _KEYS if k != "training"))
+        training = data.get("training", {})
+        if not isinstance(training, dict):
+            raise SchemaError(f"training must be a mapping, got {training!r:.60}")
+        return cls(
+            tasks=data["tasks"],
+            presets=data["presets"],
+            robot=_robot(data["robot"]),
+            control_step=data["control_step"],
+            observation=builder_from_dict(data["observation"]),
+            action=ActionSpec.from_dict(data["action"]),
+            training=training,
+        )
+
+    def check_environment(self, env: Any, label: str, scenario: Any = None) -> None:
+        """Refuse an environment that the network was not made for.
+
+        Only what the environment tells about itself is compared: ``task.name``,
+        ``task.control_step``, ``task.waypoint_window``, ``task.heading_step`` and
+        ``observation_space``; and ``preset`` of the scenario.
+
+        Args:
+            env: a `pushplan.envs.PushEnv` or anything like it.
+            label: what errors call the policy.
+            scenario: what the environment was made for, if known.
+
+        Raises:
+            InvalidInputError: naming what the file says and what the environment has.
+        """
+        task = getattr(env, "task", None)
+        for kind, mine, theirs in (
+            ("task", self.tasks, getattr(task, "name", None)),
+            ("preset", self.presets, getattr(scenario, "preset", None)),
+        ):
+            if mine and isinstance(theirs, str) and theirs not in mine:
+                raise _mismatch(label, kind, ", ".join(mine), theirs)
+        lengths = (
+            ("control_step [s]", self.control_step, getattr(task, "control_step", None)),
+            ("waypoint_window [m]", self.action.window, getattr(task, "waypoint_window", None)),
+            ("heading_step [m]", self.action.step, getattr(task, "heading_step", None)),
+        )
+        for kind, length, has in lengths:
+            if length and has is not None and not close(length, has):
+                raise _mismatch(label, kind, f"{length:g}", f"{has:g}")
+        space = getattr(env, "observation_space", None)
+        if space is not None and space.shape != self.observation.shape:
+            raise _mismatch(label, "observation shape", self.observation.shape, space.shape)
+
+
+def close(a: float, b: float) -> bool:
+    """Whether two lengths, speeds or times mean the same."""
+    return math.isclose(a, b, rel_tol=_TOLERANCE)
+
+
+def _mismatch(label: str, kind: str, mine: object, theirs: object) -> InvalidInputError:
+    return InvalidInputError(
+        f"policy {label!r} was made for {kind} {mine}, the environment has {theirs}"
+    )
+
+
+def _robot(data: Any) -> RobotSpec | None:
+    if data is None:
+        return None
+    keys = ("drive", "max_speed", "max_turn_rate", "radius")
+    known_keys("robot", data, keys, keys)
+    return RobotSpec(**data)

@@ -1,0 +1,214 @@
+"""`TrainingConfig`: everything that decides what a training gives, in one YAML file."""
+
+from __future__ import annotations
+
+import dataclasses
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, field
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from pushplan.envs.registry import SIMULATORS, TASKS, default_preset
+from pushplan.learned.builders import builder_from_dict
+from pushplan.learned.outputs import OUTPUTS
+from pushplan.training.policies.options import OPTIONS, Options
+from pushplan.world import InvalidInputError, SchemaError, UnknownNameError
+from pushplan.world.checks import choice, integer, known_keys, number
+
+ALGORITHMS = tuple(OPTIONS)
+_SCIENTIFIC = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)[eE][-+]?\d+")
+
+
+@dataclass(frozen=True)
+class ActionChoice:
+    """How the network acts.
+
+    Args:
+        mode: action mode of the environment.
+        output: see `pushplan.learned.ActionSpec`.
+        repeat: control steps, or actions, for which a decision stands.
+    """
+
+    mode: str
+    output: str = "continuous"
+    repeat: int = 1
+
+    def __post_init__(self) -> None:
+        choice("output", self.output, OUTPUTS)
+        integer("action.repeat", self.repeat, low=1)
+
+
+@dataclass(frozen=True)
+class TrainingConfig:
+    """What is trained on what. The same configuration, seed and machine give the same policy.
+
+    Args:
+        algorithm: ``"ppo"``, ``"sac"``, ``"sam"`` or ``"bc"``.
+        task: name of the task.
+        scenarios: variations of the task; each episode draws one of them.
+        observation: of the network, as in a specification (``kind`` and its options).
+        action: how it acts.
+        options: of the algorithm.
+        simulator: name of the simulator.
+        preset: of the task; the first for the simulator by default.
+        steps: decisions to learn from.
+        seed: of weights, exploration and starts.
+        envs: environments that run side by side.
+        chunk: decisions between two checkpoints, each with a validation. Every chunk starts with
+            fresh episodes and generators of its own, so that a resumed training continues exactly.
+        reward_scale: factor of the task's reward.
+        limit: decisions after which a training episode is cut off, 0 for the task's own end.
+        validation: episodes of each validation.
+        suites: on which the result is scored, with scenarios that training never draws.
+    """
+
+    algorithm: str
+    task: str
+    scenarios: tuple[Mapping[str, Any], ...]
+    observation: Mapping[str, Any]
+    action: ActionChoice
+    options: Options
+    simulator: str = "pymunk"
+    preset: str | None = None
+    steps: int = 100_000
+    seed: int = 0
+    envs: int = 4
+    chunk: int = 10_000
+    reward_scale: float = 1.0
+    limit: int = 0
+    validation: int = 20
+    suites: tuple[str, ...] = field(default_factory=tuple)
+
+    def __post_init__(self) -> None:
+        put = object.__setattr__
+        choice("algorithm", self.algorithm, ALGORITHMS)
+        choice("task", self.task, tuple(TASKS))
+        choice("simulator", self.simulator, tuple(SIMULATORS))
+        if self.preset is None:
+            put(self, "preset", default_preset(self.task, self.simulator))
+        for name in ("steps", "envs", "chunk"):
+            integer(name, getattr(self, name), low=1)
+        for name in ("seed", "limit", "validation"):
+            integer(name, getattr(self, name), low=0)
+        put(self, "reward_scale", number("reward_scale", self.reward_scale, low=0.0, open_low=True))
+        if not self.scenarios:
+            raise InvalidInputError("scenarios must hold at least one mapping of variations")
+        if not isinstance(self.options, OPTIONS[self.algorithm]):
+            raise InvalidInputError(
+                f"the options of {self.algorithm!r} are {OPTIONS[self.algorithm].__name__}, got "
+                f"{type(self.options).__name__}"
+            )
+        builder_from_dict(self.observation)
+        is_map = self.action.output == "pixel_values"
+        if is_map != (self.algorithm == "sam"):
+            raise InvalidInputError(
+                f"algorithm {self.algorithm!r} cannot train output {self.action.output!r}: "
+                "pixel_values belong to sam"
+            )
+
+    @classmethod
+    def from_dict(cls, data: Mapping[str, Any]) -> TrainingConfig:
+        """Read what `to_dict` gives, or a configuration file holds.
+
+        Raises:
+            SchemaError, InvalidInputError, UnknownNameError: if a key or a value is wrong.
+        """
+        names = [entry.name for entry in dataclasses.fields(cls)]
+        needed = ("algorithm", "task", "scenarios", "observation", "action")
+        known_keys("the training configuration", data, names, needed)
+        values = dict(data)
+        algorithm = choice("algorithm", values["algorithm"], ALGORITHMS)
+        for name in ("scenarios", "suites"):
+            given = values.get(name, ())
+            if isinstance(given, str) or not isinstance(given, Sequence):
+                raise SchemaError(f"{name} must be a list, got {given!r:.60}")
+            values[name] = tuple(given)
+        if not all(isinstance(one, Mapping) for one in values["scenarios"]):
+            raise SchemaError("each of scenarios must be a mapping of variations")
+        values["action"] = _record(ActionChoice, "action", values["action"])
+        options = OPTIONS[algorithm]
+        values["options"] = _record(options, f"options of {algorithm}", values.get("options", {}))
+        return cls(**values)
+
+    def to_dict(self) -> dict[str, Any]:
+        """JSON values."""
+        data = asdict(self)
+        data["scenarios"] = [dict(one) for one in self.scenarios]
+        data["observation"] = {
+            key: list(value) if isinstance(value, tuple) else value
+            for key, value in self.observation.items()
+        }
+        data["suites"] = list(self.suites)
+        data["options"] = {
+            key: list(value) if isinstance(value, tuple) else value
+            for key, value in data["options"].items()
+        }
+        return data
+
+    def changed(self, **changes: Any) -> TrainingConfig:
+        """The same with other values, such as ``steps`` and ``seed``; None changes nothing."""
+        wanted = {key: value for key, value in changes.items() if value is not None}
+        return dataclasses.replace(self, **wanted)
+
+
+def read_config(path: str | Path) -> TrainingConfig:
+    """A configuration from a YAML file.
+
+    Raises:
+        InvalidInputError: if there is no such file, or something in it is wrong.
+    """
+    path = Path(path)
+    if not path.is_file():
+        raise InvalidInputError(f"there is no configuration {path}")
+    try:
+        data = yaml.safe_load(path.read_text(encoding="utf-8"))
+    except (yaml.YAMLError, UnicodeDecodeError) as error:
+        raise SchemaError(f"{path}: {' '.join(str(error).split())}") from error
+    try:
+        return TrainingConfig.from_dict(data)
+    except InvalidInputError as error:
+        raise SchemaError(f"{path}: {error}") from error
+
+
+def shipped_configs() -> dict[str, Path]:
+    """The configurations that come with the package, by name, such as ``maze-ppo``."""
+    folder = Path(str(resources.files("pushplan.training.policies"))) / "configs"
+    return {path.stem: path for path in sorted(folder.glob("*.yaml"))}
+
+
+def config_named(task: str, algorithm: str) -> TrainingConfig:
+    """The shipped configuration of a task and an algorithm.
+
+    Raises:
+        UnknownNameError: if there is none.
+    """
+    known = shipped_configs()
+    name = f"{task.replace('_', '-')}-{algorithm}"
+    if name not in known:
+        raise UnknownNameError("training configuration", name, known)
+    return read_config(known[name])
+
+
+def _record(kind: type[Any], name: str, data: Any) -> Any:
+    if isinstance(data, kind):
+        return data
+    keys = [entry.name for entry in dataclasses.fields(kind)]
+    known_keys(name, data, keys, ())
+    values = {key: _plain(value) for key, value in data.items()}
+    try:
+        return kind(**values)
+    except TypeError as error:  # a required key is missing
+        raise SchemaError(f"{name}: {error}") from error
+
+
+def _plain(value: Any) -> Any:
+    """Lists as tuples; numbers that YAML 1.1 takes for text, such as 1e-3, as numbers."""
+    if isinstance(value, list):
+        return tuple(value)
+    if isinstance(value, str) and _SCIENTIFIC.fullmatch(value):
+        return float(value)
+    return value

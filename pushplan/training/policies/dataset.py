@@ -1,0 +1,262 @@
+"""Episodes of any policy as a data set, in Minari's terms.
+
+A data set is a folder: ``metadata.json``, and ``data/episode_00000.npz`` and so on with the arrays
+``observations`` (T + 1, ...), ``actions``, ``rewards``, ``terminations`` and ``truncations``
+(T, ...) of each episode, as Minari (https://minari.farama.org) names them. No pickles. `to_minari`
+makes a data set of Minari's own.
+"""
+
+from __future__ import annotations
+
+import json
+import warnings
+import zipfile
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pushplan.envs import PushEnv
+from pushplan.learned.builders import Builder, builder_from_dict, builder_to_dict
+from pushplan.learned.specification import RobotSpec
+from pushplan.training.policies.environment import TRAINING_SEEDS
+from pushplan.training.policies.libraries import need
+from pushplan.world import InvalidInputError, SchemaError, stream
+from pushplan.world.checks import integer, known_keys, number
+
+SCHEMA = "pushplan-dataset/1"
+METADATA = "metadata.json"
+ARRAYS = ("observations", "actions", "rewards", "terminations", "truncations")
+_KEYS = (
+    *("format", "task", "simulator", "preset", "scenarios", "policy", "action_mode", "observation"),
+    *("robot", "control_step", "total_episodes", "total_steps", "successes", "first_seed", "noise"),
+)
+_UNREADABLE = (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile)
+
+
+@dataclass(frozen=True)
+class DatasetRequest:
+    """What is recorded.
+
+    Args:
+        task: name of the task.
+        scenarios: variations of it; the episodes take them in turn.
+        observation: what is recorded as observed, as in a specification.
+        episodes: how many.
+        simulator: name of the simulator.
+        preset: of the task.
+        first_seed: of the first layout; by default beyond all that scores are made on.
+        noise: probability for each action that a random one is carried out instead, for a few
+            steps. The one that the policy wanted is recorded all the same, so that a learner sees
+            how to come back.
+        hold: for how many steps a random action stands.
+    """
+
+    task: str
+    scenarios: tuple[Mapping[str, Any], ...]
+    observation: Mapping[str, Any]
+    episodes: int
+    simulator: str = "pymunk"
+    preset: str | None = None
+    first_seed: int = TRAINING_SEEDS
+    noise: float = 0.0
+    hold: int = 4
+
+    def __post_init__(self) -> None:
+        integer("episodes", self.episodes, low=1)
+        integer("first_seed", self.first_seed, low=0)
+        integer("hold", self.hold, low=1)
+        number("noise", self.noise, low=0.0, high=1.0)
+        if not self.scenarios:
+            raise InvalidInputError("scenarios must hold at least one mapping of variations")
+
+
+@dataclass(frozen=True, eq=False)
+class EpisodeData:
+    """The arrays of an episode."""
+
+    observations: NDArray[Any]
+    actions: NDArray[np.float32]
+    rewards: NDArray[np.float32]
+    terminations: NDArray[np.bool_]
+    truncations: NDArray[np.bool_]
+    success: bool = field(default=False)
+
+
+def record(request: DatasetRequest, policy: Any, label: str, folder: str | Path) -> Path:
+    """Run a policy and write what it saw and did.
+
+    Args:
+        request: what is recorded.
+        policy: a `pushplan.world.Policy`.
+        label: what the data set calls it.
+        folder: a new or empty folder.
+
+    Raises:
+        InvalidInputError: if the folder holds something, or the request makes no sense.
+    """
+    folder = Path(folder)
+    if folder.exists() and any(folder.iterdir()):
+        raise InvalidInputError(f"{folder} is not empty")
+    builder = builder_from_dict(request.observation)
+    wanted = getattr(policy, "observation", "state")
+    envs = [_environment(request, dict(v), policy, wanted) for v in request.scenarios]
+    (folder / "data").mkdir(parents=True, exist_ok=True)
+    steps = successes = 0
+    for number_ in range(request.episodes):
+        env = envs[number_ % len(envs)]
+        episode = _run(env, policy, builder, request, request.first_seed + number_)
+        steps, successes = steps + len(episode.actions), successes + episode.success
+        arrays = {name: getattr(episode, name) for name in ARRAYS}
+        np.savez_compressed(folder / "data" / f"episode_{number_:05d}.npz", **arrays)
+    env = envs[0]
+    about = {
+        "format": SCHEMA,
+        "task": request.task,
+        "simulator": request.simulator,
+        "preset": request.preset,
+        "scenarios": [dict(v) for v in request.scenarios],
+        "policy": label,
+        "action_mode": _mode(env),
+        "observation": builder_to_dict(builder),
+        "robot": vars(RobotSpec.of(env.task.robot)),
+        "control_step": env.task.control_step,
+        "total_episodes": request.episodes,
+        "total_steps": steps,
+        "successes": successes,
+        "first_seed": request.first_seed,
+        "noise": request.noise,
+    }
+    (folder / METADATA).write_text(json.dumps(about, indent=2) + "\n", encoding="utf-8")
+    for env in envs:
+        env.close()
+    return folder
+
+
+def _environment(
+    request: DatasetRequest, variations: dict[str, Any], policy: Any, observation: Any
+) -> PushEnv:
+    return PushEnv(
+        task=request.task,
+        simulator=request.simulator,
+        preset=request.preset,
+        variations=variations,
+        observation=observation,
+        action=getattr(policy, "actions", None),
+    )
+
+
+def _mode(env: PushEnv) -> str:
+    from pushplan.envs.registry import ACTIONS, look_up
+
+    kinds = {look_up("action", ACTIONS, name): name for name in ACTIONS}
+    return kinds[type(env._mode)]
+
+
+def _run(
+    env: PushEnv, policy: Any, builder: Builder, request: DatasetRequest, seed: int
+) -> EpisodeData:
+    seen, _ = env.reset(seed=seed)
+    policy.reset(env.world, stream(seed, "policy"))
+    rng = stream(seed, "noise")
+    observed = [builder.observe(env.world)]
+    actions, rewards, terminations, truncations = [], [], [], []
+    held, disturbed, over = 0, np.zeros(0), False
+    while not over:
+        action = env.encode(policy.act(env.world, seen))
+        actions.append(action)
+        if held == 0 and request.noise and rng.random() < request.noise:
+            held, disturbed = request.hold, rng.uniform(-1.0, 1.0, action.shape)
+        carried_out = disturbed if held else action
+        held = max(0, held - 1)
+        seen, reward, terminated, truncated, info = env.step(carried_out)
+        observed.append(builder.observe(env.world))
+        rewards.append(reward)
+        terminations.append(terminated)
+        truncations.append(truncated)
+        over = terminated or truncated
+    return EpisodeData(
+        np.stack(observed),
+        np.stack(actions).astype(np.float32),
+        np.array(rewards, np.float32),
+        np.array(terminations),
+        np.array(truncations),
+        bool(info["success"]),
+    )
+
+
+def read_metadata(folder: str | Path) -> dict[str, Any]:
+    """What a data set says about itself.
+
+    Raises:
+        SchemaError: if the folder holds no data set.
+    """
+    path = Path(folder) / METADATA
+    try:
+        data = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise SchemaError(f"{folder} is no data set: {error}") from error
+    if not isinstance(data, dict) or data.get("format") != SCHEMA:
+        raise SchemaError(f"{folder} is no data set of format {SCHEMA!r}")
+    known_keys("the metadata of a data set", data, _KEYS, _KEYS)
+    return data
+
+
+def episodes(folder: str | Path) -> Iterator[EpisodeData]:
+    """The episodes of a data set, in their order.
+
+    Raises:
+        SchemaError: if one cannot be read, or one is missing.
+    """
+    about = read_metadata(folder)
+    for number_ in range(int(about["total_episodes"])):
+        path = Path(folder) / "data" / f"episode_{number_:05d}.npz"
+        try:
+            with np.load(path, allow_pickle=False) as file:
+                arrays = {name: file[name] for name in ARRAYS}
+        except _UNREADABLE as error:
+            raise SchemaError(f"{path} is no episode: {error}") from error
+        lengths = {len(arrays[name]) for name in ARRAYS[1:]}
+        if lengths != {len(arrays["observations"]) - 1}:
+            raise SchemaError(f"{path}: the arrays have lengths that do not belong together")
+        yield EpisodeData(**arrays)
+
+
+def to_minari(folder: str | Path, name: str) -> Any:
+    """Make a data set of Minari's own, in Minari's folder (``MINARI_DATASETS_PATH``).
+
+    Args:
+        folder: a data set of `record`.
+        name: such as ``"pushplan/maze/push-aware-v0"``.
+
+    Returns:
+        The ``minari.MinariDataset``.
+
+    Raises:
+        MissingDependencyError: without Minari and h5py.
+    """
+    minari = need("minari")
+    need("h5py")
+    from gymnasium.spaces import Box
+
+    about = read_metadata(folder)
+    builder: Any = builder_from_dict(about["observation"])
+    buffers, size = [], 1
+    for i, episode in enumerate(episodes(folder)):
+        size = episode.actions.shape[1]
+        values = {key: getattr(episode, key) for key in ARRAYS}
+        buffers.append(minari.data_collector.EpisodeBuffer(id=i, **values))
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # it misses an author and a link, which its users may add
+        return minari.create_dataset_from_buffers(
+            dataset_id=name,
+            buffer=buffers,
+            algorithm_name=about["policy"],
+            description=f"{about['task']} of pushplan, {about['preset']}, {about['simulator']}",
+            observation_space=Box(builder.low, builder.high, builder.shape, builder.dtype.type),
+            action_space=Box(-1.0, 1.0, (size,), np.float32),
+            data_format="hdf5",
+        )

@@ -1,0 +1,179 @@
+"""`TrainingEnv`: a task as a learner sees it, one decision a step."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import gymnasium
+import numpy as np
+from gymnasium.spaces import Box, Discrete
+from numpy.typing import NDArray
+
+from pushplan.envs import PushEnv
+from pushplan.learned.builders import Builder, builder_from_dict
+from pushplan.learned.outputs import MODES, ActionSpec
+from pushplan.learned.specification import RobotSpec, Specification
+from pushplan.training.policies.config import TrainingConfig
+from pushplan.world import InvalidInputError, World, stream
+
+TRAINING_SEEDS = 2**20
+"""Layouts of training have seeds from here on; those below are for validation and scoring."""
+VALIDATION_SEEDS = 500_000
+PATIENCE = 4
+"""How much longer a validation episode may last than one of training."""
+_SEED_COUNT = 2**30
+
+
+class _Blank:
+    """In place of a builder: steps between two decisions need not be observed."""
+
+    def __init__(self, builder: Builder) -> None:
+        self.shape, self.dtype = builder.shape, builder.dtype
+        self.low, self.high = builder.low, builder.high
+        self._nothing = np.zeros(self.shape, self.dtype)
+
+    def observe(self, world: World) -> NDArray[Any]:
+        """Always the same zeros."""
+        return self._nothing
+
+
+class TrainingEnv(gymnasium.Env[NDArray[Any], Any]):
+    """Draws a scenario for each episode, repeats each decision, scales the reward.
+
+    Observations are those of the configuration; actions are outputs of the network in [-1, 1]
+    (`ActionSpec`), or with spatial action maps the number of a pixel. ``info`` at the end of an
+    episode holds ``is_success`` and ``share``, how many of the sub-tasks are done.
+
+    Args:
+        config: what is trained.
+    """
+
+    def __init__(self, config: TrainingConfig) -> None:
+        self.config = config
+        self._builder = builder_from_dict(config.observation)
+        self._envs = [self._make(dict(variations)) for variations in config.scenarios]
+        self._env = self._envs[0]
+        self.action = action_spec(config, self._env)
+        for env in self._envs[1:]:
+            if (other := action_spec(config, env)) != self.action:
+                raise InvalidInputError(
+                    f"the scenarios of one network must have actions alike, got {self.action} and "
+                    f"{other}"
+                )
+        self.observation_space: Any = self._env.observation_space
+        self.action_space: Any = (
+            Discrete(int(np.prod(self.action.shape)))
+            if self.action.output == "pixel_values"
+            else Box(-1.0, 1.0, self.action.shape, np.float32)
+        )
+        self._rng = stream(config.seed, "starts")
+        self._decisions = 0
+        self._limit = config.limit
+
+    def _make(self, variations: dict[str, Any]) -> PushEnv:
+        config = self.config
+        return PushEnv(
+            task=config.task,
+            simulator=config.simulator,
+            preset=config.preset,
+            variations=variations,
+            observation=_Blank(self._builder),
+            action=config.action.mode,
+        )
+
+    @property
+    def specification(self) -> Specification:
+        """What a network says about itself that has learned here."""
+        task = self._env.task
+        return Specification(
+            tasks=(self.config.task,),
+            presets=(str(self.config.preset),),
+            robot=RobotSpec.of(task.robot),
+            control_step=task.control_step,
+            observation=self._builder,
+            action=self.action,
+            training={"algorithm": self.config.algorithm},
+        )
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[NDArray[Any], dict[str, Any]]:
+        """Start an episode.
+
+        Args:
+            seed: begins another sequence of starts.
+            options: ``{"layout": N}`` asks for the N-th validation start.
+        """
+        super().reset(seed=seed)
+        if seed is not None:
+            self._rng = stream(seed, "starts")
+        if options is not None and "layout" in options:
+            number = int(options["layout"])
+            self._env = self._envs[number % len(self._envs)]
+            layout = VALIDATION_SEEDS + number
+            self._limit = PATIENCE * self.config.limit
+        else:
+            self._env = self._envs[int(self._rng.integers(len(self._envs)))]
+            layout = TRAINING_SEEDS + int(self._rng.integers(_SEED_COUNT))
+            self._limit = self.config.limit
+        self._decisions = 0
+        self._env.reset(seed=layout)
+        return self.observe(), {}
+
+    def step(self, action: Any) -> tuple[NDArray[Any], float, bool, bool, dict[str, Any]]:
+        """Carry out one decision."""
+        command = (
+            self.action.waypoint(*divmod(int(action), self.action.shape[1]))
+            if self.action.output == "pixel_values"
+            else self.action.read(action)
+        )
+        total = 0.0
+        for _ in range(self.action.repeat):
+            _, reward, terminated, truncated, info = self._env.step(command)
+            total += reward
+            if terminated or truncated:
+                break
+        self._decisions += 1
+        if self._limit and self._decisions >= self._limit and not terminated:
+            truncated = True
+        told: dict[str, Any] = {}
+        if terminated or truncated:
+            success = bool(info["success"])
+            done = info.get("completed")
+            told = {
+                "is_success": success,
+                "share": float(success) if done is None else float(np.mean(done)),
+            }
+        return self.observe(), self.config.reward_scale * total, terminated, truncated, told
+
+    def observe(self) -> NDArray[Any]:
+        """What the network sees now."""
+        return self._builder.observe(self._env.world)
+
+    def close(self) -> None:
+        """Close the environments."""
+        for env in self._envs:
+            env.close()
+
+
+def action_spec(config: TrainingConfig, env: PushEnv) -> ActionSpec:
+    """What the output of the network means in an environment."""
+    output, mode = config.action.output, config.action.mode
+    shape: tuple[int, ...] = (2 if output == "direction" else MODES[mode],)
+    if output == "pixel_values":
+        view = builder_from_dict(config.observation)
+        side = env.task.waypoint_window
+        if getattr(view, "window", None) != (side, side) or getattr(view, "north_up", False):
+            raise InvalidInputError(
+                f"a spatial action map needs an image around the robot with a window of "
+                f"{side:g} x {side:g} m, which waypoints reach, got {config.observation}"
+            )
+        shape = view.shape[1:]
+    return ActionSpec(
+        mode=mode,
+        output=output,
+        shape=shape,
+        repeat=config.action.repeat,
+        window=env.task.waypoint_window if output == "pixel_values" else 0.0,
+        step=env.task.heading_step if mode == "heading" else 0.0,
+    )

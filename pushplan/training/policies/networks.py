@@ -1,0 +1,143 @@
+"""The networks, in PyTorch. Import it only where PyTorch is there."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import pairwise
+from typing import Any
+
+import torch
+from torch import Tensor, nn
+from torch.nn import functional as F
+
+IMAGE_SCALE = 255.0
+
+
+class SmallEncoder(nn.Module):
+    """Four strided convolutions and a linear layer, for images of 32 to 96 pixels."""
+
+    def __init__(self, channels: int, pixels: tuple[int, int], outputs: int = 128) -> None:
+        super().__init__()
+        self.layers = nn.Sequential(
+            nn.Conv2d(channels, 16, 5, stride=2, padding=2),
+            nn.ReLU(),
+            nn.Conv2d(16, 32, 3, stride=2, padding=1),
+            nn.ReLU(),
+            nn.Conv2d(32, 32, 3, stride=2, padding=1),
+            nn.ReLU(),
+            nn.Conv2d(32, 32, 3, stride=2, padding=1),
+            nn.ReLU(),
+            nn.Flatten(),
+        )
+        with torch.no_grad():
+            flat = self.layers(torch.zeros(1, channels, *pixels)).shape[1]
+        self.head = nn.Sequential(nn.Linear(flat, outputs), nn.ReLU())
+
+    def forward(self, images: Tensor) -> Tensor:
+        """(B, outputs) from (B, C, H, W) in [0, 1]."""
+        encoded: Tensor = self.head(self.layers(images))
+        return encoded
+
+
+def layers(inputs: int, widths: Sequence[int], outputs: int) -> nn.Sequential:
+    """A perceptron with ReLU between its layers."""
+    sizes = [inputs, *widths]
+    hidden: list[nn.Module] = []
+    for a, b in pairwise(sizes):
+        hidden += [nn.Linear(a, b), nn.ReLU()]
+    return nn.Sequential(*hidden, nn.Linear(sizes[-1], outputs))
+
+
+class DirectPolicy(nn.Module):
+    """Observation to action, for behaviour cloning; images in [0, 255] or vectors."""
+
+    def __init__(self, shape: tuple[int, ...], widths: Sequence[int], outputs: int) -> None:
+        super().__init__()
+        self.is_image = len(shape) == 3
+        self.encoder: nn.Module = nn.Identity()
+        inputs = shape[0]
+        if self.is_image:
+            self.encoder = SmallEncoder(shape[0], (shape[1], shape[2]))
+            inputs = 128
+        self.body = layers(inputs, widths, outputs)
+
+    def forward(self, observations: Tensor) -> Tensor:
+        """(B, outputs) in [-1, 1]."""
+        seen = observations.float()
+        if self.is_image:
+            seen = seen / IMAGE_SCALE
+        return torch.tanh(self.body(self.encoder(seen)))
+
+
+class _Residual(nn.Module):
+    def __init__(self, width: int, dilation: int) -> None:
+        super().__init__()
+        self.first = nn.Conv2d(width, width, 3, padding=dilation, dilation=dilation)
+        self.second = nn.Conv2d(width, width, 3, padding=1)
+
+    def forward(self, x: Tensor) -> Tensor:
+        return F.relu(x + self.second(F.relu(self.first(x))))
+
+
+class SpatialActionNetwork(nn.Module):
+    """A value for each pixel of the map around the robot.
+
+    Fully convolutional, after Wu et al. 2020 (arXiv 2004.09141), small enough for a processor:
+    residual blocks at a quarter of the resolution, of which some are dilated so that each pixel
+    sees the whole map, a skip from half the resolution, and a pixel shuffle to the full one.
+
+    Args:
+        channels: of the map.
+        widths: channels at half and at a quarter of the resolution.
+        blocks: residual blocks.
+    """
+
+    def __init__(self, channels: int, widths: tuple[int, ...] = (16, 32), blocks: int = 4) -> None:
+        super().__init__()
+        half, quarter = widths
+        self.first = nn.Conv2d(channels, half, 5, stride=2, padding=2)
+        self.second = nn.Conv2d(half, quarter, 3, stride=2, padding=1)
+        dilations = [(1, 2, 4)[i % 3] for i in range(blocks)]
+        self.blocks = nn.Sequential(*(_Residual(quarter, d) for d in dilations))
+        self.rise = nn.Conv2d(quarter, 4 * half, 1)
+        self.mix = nn.Conv2d(half, half, 3, padding=1)
+        self.values = nn.Conv2d(half, 4, 1)
+
+    def forward(self, maps: Tensor) -> Tensor:
+        """(B, H, W) values from (B, C, H, W) maps, 0 to 255; H and W divisible by 4."""
+        high = F.relu(self.first(maps.float() / IMAGE_SCALE))
+        low = self.blocks(F.relu(self.second(high)))
+        high = F.relu(high + F.pixel_shuffle(self.rise(low), 2))
+        high = F.relu(high + self.mix(high))
+        return F.pixel_shuffle(self.values(high), 2)[:, 0]
+
+
+class SquashedActor(nn.Module):
+    """The deterministic action of a Stable-Baselines3 policy, for export.
+
+    Args:
+        policy: of a PPO or SAC model.
+        is_image: whether observations are images, 0 to 255.
+    """
+
+    def __init__(self, policy: Any, is_image: bool) -> None:
+        super().__init__()
+        self.is_image = is_image
+        self.squash = hasattr(policy, "actor")
+        actor = policy.actor if self.squash else policy
+        self.features = actor.features_extractor if self.squash else policy.pi_features_extractor
+        self.body = actor.latent_pi if self.squash else policy.mlp_extractor.policy_net
+        self.mean = actor.mu if self.squash else policy.action_net
+
+    def forward(self, observations: Tensor) -> Tensor:
+        """(B, actions) in [-1, 1]."""
+        seen = observations.float()
+        if self.is_image:
+            seen = seen / IMAGE_SCALE
+        mean = self.mean(self.body(self.features(seen)))
+        return torch.tanh(mean) if self.squash else mean.clamp(-1.0, 1.0)
+
+
+def parameter_count(network: nn.Module) -> int:
+    """How many numbers a network has."""
+    return sum(p.numel() for p in network.parameters())

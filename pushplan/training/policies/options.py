@@ -1,0 +1,179 @@
+"""Parameters of the algorithms, one frozen dataclass each."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from pushplan.world import InvalidInputError
+from pushplan.world.checks import integer, number
+
+
+def _check(
+    options: object, *, positive: tuple[str, ...], shares: tuple[str, ...], whole: tuple[str, ...]
+) -> None:
+    for name in positive:
+        number(name, getattr(options, name), low=0.0, open_low=True)
+    for name in shares:
+        number(name, getattr(options, name), low=0.0, high=1.0)
+    for name in whole:
+        integer(name, getattr(options, name), low=1)
+    widths = getattr(options, "widths", (1,))
+    if not isinstance(widths, tuple) or not widths:
+        raise InvalidInputError(f"widths must be a list of whole numbers, got {widths!r}")
+    for width in widths:
+        integer("width", width, low=1)
+
+
+@dataclass(frozen=True)
+class PpoOptions:
+    """Proximal policy optimisation (Schulman et al. 2017, arXiv 1707.06347).
+
+    Args:
+        rate: learning rate at the start; it falls linearly to a tenth at the end.
+        rollout: decisions of each environment between two updates.
+        batch: decisions in a gradient step.
+        epochs: passes over a rollout.
+        discount: of a decision.
+        trace: lambda of the generalised advantage.
+        clip: of the probability ratio.
+        entropy: weight of the entropy.
+        deviation: logarithm of the first standard deviation of actions.
+        widths: of the hidden layers, for actor and critic each.
+    """
+
+    rate: float = 3e-4
+    rollout: int = 512
+    batch: int = 256
+    epochs: int = 8
+    discount: float = 0.99
+    trace: float = 0.95
+    clip: float = 0.2
+    entropy: float = 0.0
+    deviation: float = -0.5
+    widths: tuple[int, ...] = (128, 128)
+
+    def __post_init__(self) -> None:
+        _check(
+            self,
+            positive=("rate", "clip"),
+            shares=("discount", "trace"),
+            whole=("rollout", "batch", "epochs"),
+        )
+        number("entropy", self.entropy, low=0.0)
+        number("deviation", self.deviation)
+
+
+@dataclass(frozen=True)
+class SacOptions:
+    """Soft actor-critic (Haarnoja et al. 2018, arXiv 1801.01290).
+
+    Args:
+        rate: learning rate.
+        buffer: decisions that are remembered.
+        first: random decisions before learning begins.
+        batch: decisions in a gradient step.
+        every: decisions of each environment between two rounds of updates.
+        updates: gradient steps in such a round.
+        discount: of a decision.
+        follow: share by which the target critics follow in each gradient step.
+        widths: of the hidden layers.
+    """
+
+    rate: float = 5e-4
+    buffer: int = 200_000
+    first: int = 2_000
+    batch: int = 256
+    every: int = 8
+    updates: int = 8
+    discount: float = 0.99
+    follow: float = 0.01
+    widths: tuple[int, ...] = (128, 128)
+
+    def __post_init__(self) -> None:
+        _check(
+            self,
+            positive=("rate", "follow"),
+            shares=("discount", "follow"),
+            whole=("buffer", "first", "batch", "every", "updates"),
+        )
+
+
+@dataclass(frozen=True)
+class SamOptions:
+    """Double deep Q-learning on spatial action maps (Wu et al. 2020, arXiv 2004.09141).
+
+    Args:
+        rate: learning rate of Adam at the start; it falls linearly to a tenth.
+        buffer: decisions that are remembered.
+        first: decisions before learning begins.
+        batch: decisions in a gradient step.
+        every: decisions for each gradient step.
+        discount: of a decision.
+        target_every: gradient steps between two copies of the network to the target.
+        explore: share of the decisions over which exploration falls from 1 to ``explore_end``.
+        explore_end: probability of a random pixel then.
+        at_objects: share of the random pixels that are drawn around movable objects.
+        clip: greatest norm of the gradient.
+        mirror: learn from mirrored maps as often as from others; both tasks are symmetric.
+        widths: channels at half and at a quarter of the map's resolution.
+        blocks: residual blocks at a quarter.
+    """
+
+    rate: float = 5e-4
+    buffer: int = 20_000
+    first: int = 1_000
+    batch: int = 32
+    every: int = 1
+    discount: float = 0.85
+    target_every: int = 500
+    explore: float = 0.15
+    explore_end: float = 0.05
+    at_objects: float = 0.5
+    clip: float = 10.0
+    mirror: bool = True
+    widths: tuple[int, ...] = (16, 32)
+    blocks: int = 4
+
+    def __post_init__(self) -> None:
+        _check(
+            self,
+            positive=("rate", "clip"),
+            shares=("discount", "explore", "explore_end", "at_objects"),
+            whole=("buffer", "first", "batch", "every", "target_every", "blocks"),
+        )
+        if len(self.widths) != 2:
+            raise InvalidInputError(f"widths of sam are two numbers, got {self.widths}")
+        if not isinstance(self.mirror, bool):
+            raise InvalidInputError(f"mirror must be true or false, got {self.mirror!r}")
+
+
+@dataclass(frozen=True)
+class BcOptions:
+    """Behaviour cloning: regression of the actions in a data set.
+
+    Args:
+        rate: greatest learning rate of Adam, on a one-cycle schedule.
+        batch: decisions in a gradient step.
+        held_out: share of the episodes that only measure the error.
+        widths: of the hidden layers.
+        decay: of the weights.
+    """
+
+    rate: float = 1e-3
+    batch: int = 256
+    held_out: float = 0.1
+    widths: tuple[int, ...] = (128, 128)
+    decay: float = 1e-5
+
+    def __post_init__(self) -> None:
+        _check(self, positive=("rate",), shares=("held_out",), whole=("batch",))
+        number("decay", self.decay, low=0.0)
+
+
+Options = PpoOptions | SacOptions | SamOptions | BcOptions
+OPTIONS: dict[str, type[Options]] = {
+    "ppo": PpoOptions,
+    "sac": SacOptions,
+    "sam": SamOptions,
+    "bc": BcOptions,
+}

@@ -1,0 +1,238 @@
+"""The folder of a training: configuration, checkpoint, learning curve, result."""
+
+from __future__ import annotations
+
+import csv
+import dataclasses
+import json
+import math
+import os
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import yaml
+
+from pushplan.training.policies.config import TrainingConfig, read_config
+from pushplan.training.policies.environment import TrainingEnv
+from pushplan.training.policies.libraries import need
+from pushplan.world import InvalidInputError
+
+CONFIG, CURVE, PICTURE = "config.yaml", "curve.csv", "curve.png"
+CHECKPOINT, BEST, POLICY, RECORD = "checkpoint.pt", "best.pt", "policy.onnx", "training.json"
+
+
+@dataclass(frozen=True)
+class CurvePoint:
+    """One row of a learning curve.
+
+    Args:
+        steps: decisions so far.
+        seconds: wall-clock time of training so far, without validation [s].
+        episodes: training episodes that ended in this chunk.
+        train_return: mean unscaled reward of them; NaN where none ended.
+        train_success: share of them that reached the goal.
+        valid_return: mean unscaled reward of the validation episodes.
+        valid_success: share of them that reached the goal.
+        valid_share: mean share of their sub-tasks that were done.
+        loss: of the learner, in its own units.
+    """
+
+    steps: int
+    seconds: float
+    episodes: int
+    train_return: float
+    train_success: float
+    valid_return: float
+    valid_success: float
+    valid_share: float
+    loss: float
+
+    @property
+    def rank(self) -> tuple[float, float]:
+        """What makes one policy better than another in validation."""
+        if math.isnan(self.valid_share):  # without validation the last one is taken
+            return (0.0, 0.0)
+        return (round(self.valid_share, 6), self.valid_return)
+
+
+class TrainingRun:
+    """A training in a folder; it can be left off after any chunk and taken up again.
+
+    Args:
+        folder: where everything is kept.
+        config: what is trained. A folder that holds another training is refused.
+        resume: whether to go on with what is in the folder.
+
+    Raises:
+        InvalidInputError: if the folder holds a training and ``resume`` is false, or another one.
+    """
+
+    def __init__(self, folder: str | Path, config: TrainingConfig, *, resume: bool = False) -> None:
+        self.folder = Path(folder)
+        self.config = config
+        self.curve: list[CurvePoint] = []
+        there = self.folder / CONFIG
+        if there.is_file():
+            if not resume:
+                raise InvalidInputError(
+                    f"{self.folder} holds a training: go on with --resume, or take another folder"
+                )
+            _same(read_config(there), config, self.folder)
+        self.folder.mkdir(parents=True, exist_ok=True)
+        _replace(there, yaml.safe_dump(config.to_dict(), sort_keys=False).encode())
+        if resume and self.path(CURVE).is_file():
+            self.curve = _read_curve(self.path(CURVE))
+
+    def path(self, name: str) -> Path:
+        """A file of the run."""
+        return self.folder / name
+
+    @property
+    def chunks(self) -> int:
+        """How many chunks the training has."""
+        return -(-self.config.steps // self.config.chunk)
+
+    @property
+    def done(self) -> int:
+        """How many of them are done."""
+        return len(self.curve)
+
+    @property
+    def seconds(self) -> float:
+        """Wall-clock time of training so far [s]."""
+        return self.curve[-1].seconds if self.curve else 0.0
+
+    def save(self, state: Mapping[str, Any], point: CurvePoint) -> None:
+        """Keep a checkpoint and the row of the curve that belongs to it; both or none count.
+
+        Args:
+            state: what `load` gives back: tensors, numbers, texts, lists and mappings of them.
+            point: the new row.
+        """
+        torch = need("torch")
+        best = point.rank >= max((old.rank for old in self.curve), default=(-np.inf, -np.inf))
+        self.curve.append(point)
+        state = {**state, "chunks": len(self.curve)}
+        self._write_curve()  # rows beyond the checkpoint are dropped when it is loaded
+        partial = self.path(CHECKPOINT + ".part")
+        if best:
+            torch.save({"weights": state["weights"]}, partial)
+            os.replace(partial, self.path(BEST))
+        torch.save(state, partial)
+        os.replace(partial, self.path(CHECKPOINT))
+
+    def load(self) -> Any:
+        """The last checkpoint, None if there is none. Loads numbers only, never pickled code."""
+        if not self.path(CHECKPOINT).is_file():
+            self.curve = []
+            return None
+        state = self._numbers(CHECKPOINT)
+        self.curve = self.curve[: int(state["chunks"])]
+        if len(self.curve) != int(state["chunks"]):
+            raise InvalidInputError(f"{self.path(CURVE)} does not belong to the checkpoint")
+        return state
+
+    def best_weights(self) -> Any:
+        """Weights of the checkpoint that was best in validation."""
+        return self._numbers(BEST)["weights"]
+
+    def _numbers(self, name: str) -> Any:
+        """A file of tensors, numbers and texts; anything else in it is refused."""
+        torch = need("torch")
+        try:
+            return torch.load(self.path(name), map_location="cpu", weights_only=True)
+        except Exception as error:  # damaged, or pickled code
+            reason = str(error).strip().partition("\n")[0][:120]
+            raise InvalidInputError(f"{self.path(name)} is no checkpoint: {reason}") from error
+
+    def record(self, **facts: Any) -> None:
+        """Write what a model card needs."""
+        text = json.dumps({"config": self.config.to_dict(), **facts}, indent=2)
+        _replace(self.path(RECORD), text.encode())
+
+    def _write_curve(self) -> None:
+        names = [entry.name for entry in dataclasses.fields(CurvePoint)]
+        partial = self.path(CURVE + ".part")
+        with partial.open("w", newline="", encoding="utf-8") as file:
+            writer = csv.writer(file)
+            writer.writerow(names)
+            for point in self.curve:
+                writer.writerow([f"{value:.6g}" for value in dataclasses.astuple(point)])
+        os.replace(partial, self.path(CURVE))
+
+
+class Stopwatch:
+    """Adds up the time of training, without that of validation."""
+
+    def __init__(self, before: float) -> None:
+        self._before = before
+        self._began = time.perf_counter()
+
+    @property
+    def seconds(self) -> float:
+        """So far [s]."""
+        return self._before + time.perf_counter() - self._began
+
+    def forget(self, seconds: float) -> None:
+        """Take off what was no training."""
+        self._began += seconds
+
+
+def validate(
+    env: TrainingEnv, decide: Callable[[Any], Any], episodes: int
+) -> tuple[float, float, float]:
+    """Mean unscaled return, share of successes, and mean share of sub-tasks, over fixed starts.
+
+    Args:
+        env: of the training; its episode is lost.
+        decide: from observation to action.
+        episodes: how many; NaN where there is none.
+    """
+    returns, successes, shares = [], [], []
+    for number in range(episodes):
+        seen, _ = env.reset(options={"layout": number})
+        total, over = 0.0, False
+        while not over:
+            seen, reward, terminated, truncated, info = env.step(decide(seen))
+            total += reward / env.config.reward_scale
+            over = terminated or truncated
+        returns.append(total)
+        successes.append(info["is_success"])
+        shares.append(info["share"])
+    if not episodes:
+        return (float("nan"),) * 3
+    return float(np.mean(returns)), float(np.mean(successes)), float(np.mean(shares))
+
+
+def _same(old: TrainingConfig, new: TrainingConfig, folder: Path) -> None:
+    """A training may be made longer, nothing else."""
+    before, after = ({**c.to_dict(), "steps": 0} for c in (old, new))
+    differing = [key for key in after if before[key] != after[key]]
+    if differing:
+        key = differing[0]
+        raise InvalidInputError(
+            f"{folder} holds another training: its {key} is {before[key]!r}, not {after[key]!r}"
+        )
+
+
+def _read_curve(path: Path) -> list[CurvePoint]:
+    with path.open(newline="", encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    whole = ("steps", "episodes")
+    try:
+        return [
+            CurvePoint(**{k: (int if k in whole else float)(v) for k, v in row.items()})  # type: ignore[arg-type]
+            for row in rows
+        ]
+    except (TypeError, ValueError) as error:
+        raise InvalidInputError(f"{path} is no learning curve: {error}") from error
+
+
+def _replace(path: Path, content: bytes) -> None:
+    partial = path.with_name(path.name + ".part")
+    partial.write_bytes(content)
+    os.replace(partial, path)

@@ -1,0 +1,249 @@
+"""Spatial action maps: double deep Q-learning where each pixel is an action.
+
+After Wu et al. 2020, Spatial Action Maps for Mobile Manipulation (arXiv 2004.09141): a fully
+convolutional network gives a value for each pixel of the map around the robot, and the robot drives
+the shortest way to the best one.
+"""
+
+from __future__ import annotations
+
+import copy
+import logging
+import time
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pushplan.observation.channels import MOVABLE
+from pushplan.training.policies.config import TrainingConfig
+from pushplan.training.policies.environment import TrainingEnv
+from pushplan.training.policies.libraries import need
+from pushplan.training.policies.options import SamOptions
+from pushplan.training.policies.replay import ReplayBuffer
+from pushplan.training.policies.run import CurvePoint, Stopwatch, TrainingRun, validate
+from pushplan.training.policies.sb3_training import chunk_seed
+from pushplan.world import InvalidInputError, stream
+
+log = logging.getLogger(__name__)
+
+_LEAST_RATE = 0.1
+_AROUND = 2
+"""Pixels about a movable one that exploration at objects may take."""
+
+
+class SamLearner:
+    """Network, target and memory of a training.
+
+    Args:
+        config: what is trained.
+        shape: of the map, channels first.
+        device: of PyTorch.
+    """
+
+    def __init__(self, config: TrainingConfig, shape: tuple[int, ...], device: str) -> None:
+        from pushplan.training.policies.networks import SpatialActionNetwork
+
+        if shape[1] % 4 or shape[2] % 4:
+            raise InvalidInputError(f"the sides of a map must be divisible by 4, got {shape[1:]}")
+        assert isinstance(config.options, SamOptions)
+        self.torch = need("torch")
+        self.options = config.options
+        self.device = device
+        channels = list(config.observation.get("channels", ()))
+        self.occupancy = channels.index("occupancy") if "occupancy" in channels else None
+        self.torch.manual_seed(chunk_seed(config.seed, 0))
+        options = self.options
+        self.network = SpatialActionNetwork(shape[0], options.widths, options.blocks).to(device)
+        self.target = copy.deepcopy(self.network)
+        self.optimizer = self.torch.optim.Adam(self.network.parameters(), lr=options.rate)
+        self.memory = ReplayBuffer(options.buffer, shape)
+        self.updates = 0
+        self.losses: list[float] = []
+
+    def values(self, seen: NDArray[Any]) -> NDArray[np.float32]:
+        """(H, W) value of each pixel."""
+        with self.torch.no_grad():
+            batch = self.torch.from_numpy(seen[None]).to(self.device)
+            found: NDArray[np.float32] = self.network(batch)[0].cpu().numpy()
+        return found
+
+    def best(self, seen: NDArray[Any]) -> int:
+        """Number of the pixel with the greatest value."""
+        return int(np.argmax(self.values(seen)))
+
+    def update(self, rng: np.random.Generator, rate: float) -> None:
+        """One gradient step on decisions drawn from the memory."""
+        torch, options = self.torch, self.options
+        seen, actions, rewards, following, ends = self.memory.sample(options.batch, rng)
+        cols = seen.shape[-1]
+        if options.mirror and rng.random() < 0.5:  # what is left is right
+            seen, following = seen[..., ::-1], following[..., ::-1]
+            actions = actions - actions % cols + (cols - 1 - actions % cols)
+        seen, following = (
+            torch.from_numpy(np.ascontiguousarray(a)).to(self.device) for a in (seen, following)
+        )
+        chosen, reward, over = (
+            torch.from_numpy(a).to(self.device) for a in (actions, rewards, ends)
+        )
+        with torch.no_grad():
+            choice = self.network(following).flatten(1).argmax(1, keepdim=True)
+            future = self.target(following).flatten(1).gather(1, choice)[:, 0]
+            wanted = reward + options.discount * future * (~over)
+        value = self.network(seen).flatten(1).gather(1, chosen[:, None])[:, 0]
+        loss = torch.nn.functional.smooth_l1_loss(value, wanted)
+        for group in self.optimizer.param_groups:
+            group["lr"] = rate
+        self.optimizer.zero_grad(set_to_none=True)
+        loss.backward()
+        torch.nn.utils.clip_grad_norm_(self.network.parameters(), options.clip)
+        self.optimizer.step()
+        self.losses.append(float(loss.detach()))
+        self.updates += 1
+        if self.updates % options.target_every == 0:
+            self.target.load_state_dict(self.network.state_dict())
+
+    def state(self) -> dict[str, Any]:
+        """For a checkpoint."""
+        memory = {
+            key: self.torch.from_numpy(value) if isinstance(value, np.ndarray) else value
+            for key, value in self.memory.state().items()
+        }
+        return {
+            "weights": self.network.state_dict(),
+            "target": self.target.state_dict(),
+            "optimizer": self.optimizer.state_dict(),
+            "memory": memory,
+            "updates": self.updates,
+        }
+
+    def restore(self, state: Any) -> None:
+        """From a checkpoint."""
+        self.network.load_state_dict(state["weights"])
+        self.target.load_state_dict(state["target"])
+        self.optimizer.load_state_dict(state["optimizer"])
+        self.memory.restore(state["memory"])
+        self.updates = int(state["updates"])
+
+
+def train_sam(
+    run: TrainingRun, *, device: str = "cpu", until: Callable[[int], bool] | None = None
+) -> Any:
+    """Train from the last checkpoint of a run to its end; as `train_sb3`, resumable exactly.
+
+    Args:
+        run: the folder and the configuration.
+        device: of PyTorch.
+        until: asked with the number of chunks that are done; true leaves the training off.
+
+    Returns:
+        The network with the weights of the best chunk.
+    """
+    config = run.config
+    envs = [TrainingEnv(config) for _ in range(config.envs)]
+    learner = SamLearner(config, envs[0].observation_space.shape, device)
+    state = run.load()
+    if state is not None:
+        learner.restore(state)
+    watch = Stopwatch(run.seconds)
+    logger = _Board(run)
+    for chunk in range(run.done, run.chunks):
+        if until is not None and until(chunk):
+            break
+        episodes = _chunk(learner, config, envs, chunk)
+        began = time.perf_counter()
+        scores = validate(envs[0], learner.best, config.validation)
+        watch.forget(time.perf_counter() - began)
+        returns, successes = zip(*episodes, strict=True) if episodes else ((), ())
+        point = CurvePoint(
+            min((chunk + 1) * config.chunk, config.steps),
+            watch.seconds,
+            len(episodes),
+            float(np.mean(returns)) / config.reward_scale if returns else float("nan"),
+            float(np.mean(successes)) if successes else float("nan"),
+            *scores,
+            loss=float(np.mean(learner.losses)) if learner.losses else float("nan"),
+        )
+        learner.losses.clear()
+        run.save(learner.state(), point)
+        logger.write(point)
+        log.info(
+            "%d of %d decisions, %.0f s: share %.2f, success %.2f in validation",
+            *(point.steps, config.steps, point.seconds, point.valid_share, point.valid_success),
+        )
+    logger.close()
+    for env in envs:
+        env.close()
+    if run.done:
+        learner.network.load_state_dict(run.best_weights())
+    return learner.network
+
+
+def _chunk(
+    learner: SamLearner, config: TrainingConfig, envs: list[TrainingEnv], chunk: int
+) -> list[tuple[float, bool]]:
+    """Act and learn for one chunk; returns of the episodes that ended in it, and successes."""
+    options = learner.options
+    seed = chunk_seed(config.seed, chunk)
+    learner.torch.manual_seed(seed)
+    rng = stream(seed, "exploration")
+    seen = [env.reset(seed=seed + i)[0] for i, env in enumerate(envs)]
+    totals = [0.0] * len(envs)
+    ended: list[tuple[float, bool]] = []
+    first = chunk * config.chunk
+    for step in range(first, min(first + config.chunk, config.steps)):
+        i = step % len(envs)
+        action = _explore(learner, seen[i], rng, step / config.steps)
+        following, reward, terminated, truncated, info = envs[i].step(action)
+        learner.memory.add(seen[i], action, reward, following, terminated)
+        totals[i] += reward
+        if terminated or truncated:
+            ended.append((totals[i], bool(info["is_success"])))
+            following, totals[i] = envs[i].reset()[0], 0.0
+        seen[i] = following
+        if len(learner.memory) >= options.first and step % options.every == 0:
+            share = step / config.steps
+            learner.update(rng, options.rate * (1.0 - (1.0 - _LEAST_RATE) * share))
+    return ended
+
+
+def _explore(
+    learner: SamLearner, seen: NDArray[Any], rng: np.random.Generator, share: float
+) -> int:
+    """A pixel: the best, or with the probability of this part of the training a random one."""
+    options = learner.options
+    fallen = 1.0 - (1.0 - options.explore_end) * min(1.0, share / max(options.explore, 1e-9))
+    if rng.random() >= fallen and len(learner.memory) >= options.first:
+        return learner.best(seen)
+    rows, cols = seen.shape[1:]
+    if learner.occupancy is not None and rng.random() < options.at_objects:
+        at = np.argwhere(seen[learner.occupancy] == MOVABLE)
+        if len(at):
+            spot = at[rng.integers(len(at))] + rng.integers(-_AROUND, _AROUND + 1, 2)
+            row, col = np.clip(spot, 0, (rows - 1, cols - 1)).tolist()
+            return int(row * cols + col)
+    return int(rng.integers(rows * cols))
+
+
+class _Board:
+    """Scalars for TensorBoard, where it is installed."""
+
+    def __init__(self, run: TrainingRun) -> None:
+        self._writer: Any = None
+        try:
+            from torch.utils.tensorboard import SummaryWriter
+        except ImportError:
+            return
+        self._writer = SummaryWriter(str(run.path("tb_0")))
+
+    def write(self, point: CurvePoint) -> None:
+        """A row of the curve."""
+        if self._writer is not None:
+            for name in ("train_return", "valid_return", "valid_share", "valid_success", "loss"):
+                self._writer.add_scalar(f"pushplan/{name}", getattr(point, name), point.steps)
+
+    def close(self) -> None:
+        """Write what is left."""
+        if self._writer is not None:
+            self._writer.close()

@@ -1,0 +1,158 @@
+"""The door: train a policy from a configuration, or go on, and export what comes out."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from pushplan.learned.sb3_policy import attach
+from pushplan.training.policies.config import TrainingConfig
+from pushplan.training.policies.environment import TrainingEnv
+from pushplan.training.policies.libraries import chosen_device, hardware, need
+from pushplan.training.policies.run import CURVE, PICTURE, POLICY, TrainingRun
+from pushplan.world import InvalidInputError
+
+
+def train_policy(
+    config: TrainingConfig,
+    folder: str | Path,
+    *,
+    resume: bool = False,
+    device: str = "auto",
+    processes: bool = False,
+    threads: int = 1,
+    data: str | Path | None = None,
+    command: str = "",
+    until: Callable[[int], bool] | None = None,
+) -> Path | None:
+    """Train, and write ``policy.onnx``, ``curve.csv``, ``curve.png`` and ``training.json``.
+
+    Args:
+        config: what is trained.
+        folder: of the training; also holds its checkpoint.
+        resume: go on with what is in the folder.
+        device: ``"auto"``, ``"cpu"`` or ``"cuda"``.
+        processes: with PPO and SAC, a process for each environment.
+        threads: of PyTorch.
+        data: with ``bc``, the folder of a data set.
+        command: what the model card says that the training was started with.
+        until: asked with the number of chunks that are done; true leaves the training off.
+
+    Returns:
+        The network; None if the training was left off before its end.
+
+    Raises:
+        InvalidInputError: if something does not fit.
+        MissingDependencyError: without the extra ``learn``.
+    """
+    if config.algorithm == "bc" and data is None:
+        raise InvalidInputError(
+            "bc needs a data set (--data DIR): make one with 'pushplan dataset export'"
+        )
+    if config.algorithm != "bc" and data is not None:
+        raise InvalidInputError(f"a data set belongs to bc, not to {config.algorithm}")
+    need("torch").set_num_threads(threads)
+    device = chosen_device(device)
+    run = TrainingRun(folder, config, resume=resume)
+    options: dict[str, Any] = {"device": device, "until": until}
+    if config.algorithm == "bc":
+        from pushplan.training.policies.cloning import train_bc
+
+        network = train_bc(run, str(data), **options)
+    elif config.algorithm == "sam":
+        from pushplan.training.policies.sam import train_sam
+
+        network = train_sam(run, **options)
+    else:
+        network = _train_actor(run, processes, options)
+    _draw(run)
+    if run.done < run.chunks:
+        return None
+    return _finish(run, network, device, threads, data, command)
+
+
+def _train_actor(run: TrainingRun, processes: bool, options: dict[str, Any]) -> Any:
+    """Train with Stable-Baselines3; keeps its model too, and gives the actor alone."""
+    from pushplan.training.policies.networks import SquashedActor
+    from pushplan.training.policies.sb3_training import MODEL, train_sb3
+
+    model = train_sb3(run, processes=processes, **options)
+    path = run.path(MODEL)
+    path.unlink(missing_ok=True)
+    model.save(path)
+    attach(path, specification_of(run))
+    return SquashedActor(model.policy, len(model.observation_space.shape) == 3)
+
+
+def specification_of(run: TrainingRun, **facts: Any) -> Any:
+    """What the network of a training says about itself."""
+    env = TrainingEnv(run.config)
+    specification = env.specification
+    env.close()
+    training = {
+        **specification.training,
+        "scenarios": [dict(one) for one in run.config.scenarios],
+        "steps": run.config.steps,
+        "seed": run.config.seed,
+        **facts,
+    }
+    return replace(specification, training=training)
+
+
+def _draw(run: TrainingRun) -> None:
+    from pushplan.training.policies.curves import draw_curve
+
+    if run.curve:
+        title = f"{run.config.task}, {run.config.algorithm}"
+        pairs = run.config.algorithm == "bc"
+        draw_curve(run.curve, run.path(PICTURE), title, pairs=pairs)
+
+
+def _finish(
+    run: TrainingRun,
+    network: Any,
+    device: str,
+    threads: int,
+    data: str | Path | None,
+    command: str,
+) -> Path:
+    from pushplan.training.policies.dataset import read_metadata
+    from pushplan.training.policies.export import decision_time, export, observation_time
+    from pushplan.training.policies.networks import parameter_count
+
+    best = max(run.curve, key=lambda point: (point.rank, point.steps))
+    path = export(network, specification_of(run, best_steps=best.steps), run.path(POLICY))
+    run.record(
+        parameters=parameter_count(network),
+        bytes=path.stat().st_size,
+        decision_ms=1e3 * decision_time(path),
+        observation_ms=1e3 * observation_time(run.config),
+        steps=run.curve[-1].steps,
+        seconds=run.seconds,
+        best_steps=best.steps,
+        valid_success=_finite(best.valid_success),
+        valid_share=_finite(best.valid_share),
+        hardware=f"{hardware(device)}, {threads} thread{'s' * (threads > 1)}",
+        versions=_versions(run.config.algorithm),
+        command=command,
+        data=None if data is None else read_metadata(data),
+        curve=CURVE,
+    )
+    return path
+
+
+def _finite(value: float) -> float | None:
+    return value if math.isfinite(value) else None
+
+
+def _versions(algorithm: str) -> dict[str, str]:
+    import platform
+
+    import pushplan
+
+    names = ["torch"] + (["stable_baselines3"] if algorithm in ("ppo", "sac") else [])
+    found = {name: str(need(name).__version__) for name in names}
+    return {"pushplan": pushplan.__version__, "Python": platform.python_version(), **found}

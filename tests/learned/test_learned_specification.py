@@ -1,0 +1,148 @@
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from policy_files import map_specification, maze_specification
+
+from pushplan.envs import PushEnv
+from pushplan.learned import ActionSpec, FeatureObservation, RobotSpec, Specification
+from pushplan.learned.outputs import BadOutputError
+from pushplan.observation import ImageObservation
+from pushplan.world import InvalidInputError, SchemaError, UnknownNameError
+from pushplan.world.outline import transform
+
+
+def changed(**changes: object) -> str:
+    data = json.loads(maze_specification().to_json())
+    for key, value in changes.items():
+        where, _, inner = key.partition("__")
+        if inner:
+            data[where][inner] = value
+        else:
+            data[where] = value
+    return json.dumps(data)
+
+
+class TestJson:
+    @pytest.mark.parametrize(
+        "specification",
+        [
+            maze_specification(),
+            map_specification(),
+            maze_specification(observation=FeatureObservation(rays=8, objects=2, range=3.0)),
+            maze_specification(tasks=(), presets=(), robot=None, control_step=0.0),
+            maze_specification(action=ActionSpec("heading", "direction", (2,), repeat=3, step=1.5)),
+        ],
+    )
+    def test_round_trip(self, specification):
+        assert Specification.from_json(specification.to_json()) == specification
+
+    @pytest.mark.parametrize(
+        ("text", "message"),
+        [
+            ("", "not JSON"),
+            ("[1, 2]", "format"),
+            ("[" * 5000, "not JSON"),
+            (changed(format="pushplan-policy/99"), "reads 'pushplan-policy/1'"),
+            (changed(extra=1), "unknown key in the specification 'extra'"),
+            (changed(tasks="maze"), "list of names"),
+            (changed(control_step=float("inf")), "control_step"),
+            (changed(robot={"drive": "tank"}), "robot"),
+            (changed(robot__max_speed="fast"), "robot.max_speed"),
+            (changed(training=[1]), "training"),
+            (changed(observation=3), "observation"),
+            (changed(observation__kind="pickle"), "unknown observation kind 'pickle'"),
+            (changed(observation__shape=[7]), r"says float32 of shape \(7,\)"),
+            (changed(observation__dtype="float64"), "says float64"),
+            (changed(observation__max_objects=10**9), "too large"),
+            (changed(action__mode="fly"), "unknown action mode"),
+            (changed(action__output="pixel_values"), "belongs to action mode 'waypoint'"),
+            (changed(action__shape=[3]), "cannot have shape"),
+            (changed(action__shape=[-1]), "at least 1|must be in"),
+            (changed(action__repeat=0), "repeat"),
+            (changed(action__step=None), "action.step"),
+        ],
+    )
+    def test_what_is_wrong_is_said(self, text, message):
+        with pytest.raises((InvalidInputError, UnknownNameError), match=message):
+            Specification.from_json(text)
+
+    def test_a_long_text_is_refused(self):
+        with pytest.raises(SchemaError, match="longer"):
+            Specification.from_json(" " * 2_000_000)
+
+    def test_own_builders_do_not_travel(self):
+        class Mine:
+            shape, dtype = (3,), np.dtype(np.float32)
+
+        with pytest.raises(InvalidInputError, match="one of image, state, features"):
+            maze_specification(observation=Mine()).to_json()
+
+
+class TestEnvironment:
+    def test_the_right_one_passes(self):
+        env = PushEnv(task="maze", observation="state")
+        maze_specification().check_environment(env, "p")
+        assert RobotSpec.of(env.task.robot) == maze_specification().robot
+
+    def test_both_sides_are_named(self):
+        env = PushEnv(task="maze", observation="state")
+        for specification, message in (
+            (maze_specification(tasks=("ship_ice",)), "task ship_ice, the environment has maze"),
+            (maze_specification(control_step=0.5), r"control_step \[s\] 0.5.*has 0.8"),
+            (
+                maze_specification(observation=FeatureObservation(rays=8, objects=1)),
+                r"shape \(35,\), the environment has \(106,\)",
+            ),
+        ):
+            with pytest.raises(InvalidInputError, match=message):
+                specification.check_environment(env, "p")
+
+    def test_maps_have_the_window_that_waypoints_reach(self):
+        spec = map_specification()
+        env = PushEnv(task="box_delivery", action="waypoint", observation=spec.observation)
+        spec.check_environment(env, "p")
+        area = PushEnv(task="area_clearing", action="waypoint", observation=spec.observation)
+        wide = map_specification(tasks=("area_clearing",), control_step=0.0)
+        with pytest.raises(InvalidInputError, match=r"waypoint_window \[m\] 10, .* has 24"):
+            wide.check_environment(area, "p")
+
+
+class TestOutputs:
+    def test_continuous_is_clipped(self):
+        spec = ActionSpec("velocity", "continuous", (2,))
+        assert spec.read(np.array([-3.0, 0.5])).tolist() == [-1.0, 0.5]
+
+    @given(st.floats(-3.1, 3.1), st.floats(0.1, 50.0))
+    def test_a_direction_is_a_heading(self, angle, size):
+        spec = ActionSpec("heading", "direction", (2,), step=1.0)
+        action = spec.read(size * np.array([np.cos(angle), np.sin(angle)]))
+        assert action.shape == (1,)
+        assert float(action[0]) * np.pi == pytest.approx(angle, abs=1e-5)
+
+    @pytest.mark.parametrize(
+        "output", [np.zeros(2), np.zeros((1, 1)), np.array([np.nan]), np.array(["a"])]
+    )
+    def test_what_is_no_action_is_refused(self, output):
+        with pytest.raises(BadOutputError):
+            ActionSpec("turn_rate", "continuous", (1,)).read(output)
+
+    def test_a_pixel_is_the_place_that_it_shows(self):
+        env = PushEnv(task="box_delivery", observation="state", action="waypoint")
+        env.reset(seed=1000)
+        world = env.world
+        view = ImageObservation(("movable",), (10.0, 10.0), (96, 96))
+        spec = ActionSpec("waypoint", "pixel_values", (96, 96), window=10.0)
+        shown = np.argwhere(view.observe(world)[0] == 255)
+        assert len(shown) > 20
+        centres = world.movables.poses[:, :2]
+        for row, col in shown:
+            at = transform(world.robot_pose, 5.0 * spec.waypoint(int(row), int(col))[None])[0]
+            assert np.hypot(*(centres - at).T).min() <= world.movables.radii[0] + 1e-6
+        values = np.zeros((96, 96))
+        values[tuple(shown[7])] = 1.0
+        assert np.array_equal(spec.read(values), spec.waypoint(*map(int, shown[7])))

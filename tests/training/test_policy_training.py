@@ -1,0 +1,482 @@
+"""Tiny trainings: they run, go on where they were left, and come out as files that work."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+
+from pushplan.cli import main
+from pushplan.envs import PushEnv
+from pushplan.learned import FeatureObservation, OnnxPolicy
+from pushplan.training.policies.card import write_card
+from pushplan.training.policies.config import (
+    TrainingConfig,
+    config_named,
+    read_config,
+    shipped_configs,
+)
+from pushplan.training.policies.dataset import (
+    DatasetRequest,
+    episodes,
+    read_metadata,
+    record,
+    to_minari,
+)
+from pushplan.training.policies.environment import TRAINING_SEEDS, TrainingEnv
+from pushplan.training.policies.options import OPTIONS
+from pushplan.training.policies.replay import ReplayBuffer
+from pushplan.training.policies.run import CurvePoint, TrainingRun
+from pushplan.training.policies.training import train_policy
+from pushplan.world import InvalidInputError, SchemaError, UnknownNameError
+
+SMALL = {"kind": "features", "rays": 4, "objects": 1, "range": 6.0}
+IMAGE = {
+    "kind": "image",
+    "channels": ["footprint", "movable", "static", "goal_distance"],
+    "window": [12.0, 12.0],
+    "pixels": [36, 36],
+}
+MAP = {
+    "kind": "image",
+    "channels": ["occupancy", "footprint", "robot_distance", "goal_distance"],
+    "window": [10.0, 10.0],
+    "pixels": [16, 16],
+}
+TINY = {
+    "ppo": {"rollout": 16, "batch": 16, "epochs": 1, "widths": [8]},
+    "sac": {"first": 8, "batch": 8, "every": 4, "updates": 1, "buffer": 64, "widths": [8]},
+    "sam": {"first": 6, "batch": 4, "buffer": 16, "widths": [4, 8], "blocks": 1, "every": 2},
+    "bc": {"batch": 16, "widths": [8]},
+}
+
+
+def tiny(algorithm: str, **changes: object) -> TrainingConfig:
+    """A training of seconds."""
+    data: dict[str, object] = {
+        "algorithm": algorithm,
+        "task": "maze",
+        "scenarios": [{"boxes": 1}],
+        "observation": SMALL,
+        "action": {"mode": "turn_rate", "repeat": 8},
+        "steps": 96,
+        "chunk": 32,
+        "envs": 2,
+        "validation": 1,
+        "limit": 4,
+        "options": TINY[algorithm],
+        "suites": ["maze-2d-3"],
+    }
+    if algorithm == "sam":
+        data |= {
+            "task": "box_delivery",
+            "scenarios": [{"boxes": 1}],
+            "observation": MAP,
+            "action": {"mode": "waypoint", "output": "pixel_values"},
+            "steps": 18,
+            "chunk": 6,
+            "validation": 0,
+            "suites": [],
+        }
+    return TrainingConfig.from_dict({**data, **changes})
+
+
+@pytest.fixture(scope="module")
+def data(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A data set of three short episodes."""
+    from pushplan.planners import make_policy
+
+    folder = tmp_path_factory.mktemp("data") / "maze"
+    request = DatasetRequest("maze", ({"boxes": 1},), SMALL, 3, noise=0.05)
+    return record(request, make_policy("straight"), "straight", folder)
+
+
+def trained(config: TrainingConfig, folder: Path, data: Path, **options: object) -> Path | None:
+    if config.algorithm == "bc":
+        options["data"] = data
+    return train_policy(config, folder, device="cpu", **options)
+
+
+def behaviour(path: Path) -> np.ndarray:
+    """What a network puts out for some observations."""
+    policy = OnnxPolicy(path)
+    rng = np.random.default_rng(0)
+    shape, dtype = policy.observation.shape, policy.observation.dtype
+    seen = rng.integers(0, 255, (5, *shape)) if dtype == np.uint8 else rng.normal(size=(5, *shape))
+    return np.stack([policy.decide(one.astype(dtype)) for one in seen])
+
+
+class TestTraining:
+    @pytest.mark.parametrize("algorithm", ["ppo", "sac", "sam", "bc"])
+    def test_left_off_and_taken_up_it_ends_the_same(self, algorithm, tmp_path, data):
+        pytest.importorskip("stable_baselines3")
+        config = tiny(algorithm)
+        whole = trained(config, tmp_path / "whole", data)
+        assert trained(config, tmp_path / "parts", data, until=lambda done: done == 2) is None
+        with pytest.raises(InvalidInputError, match="--resume"):
+            trained(config, tmp_path / "parts", data)
+        parts = trained(config, tmp_path / "parts", data, resume=True)
+        assert np.array_equal(behaviour(whole), behaviour(parts))
+        drawn = (tmp_path / "whole" / "curve.png").read_bytes()
+        assert drawn[:4] == b"\x89PNG"
+        rows = [
+            [line.split(",") for line in (tmp_path / part / "curve.csv").read_text().splitlines()]
+            for part in ("whole", "parts")
+        ]
+        assert len(rows[0]) == 4
+        assert [row[:1] + row[2:] for row in rows[0]] == [row[:1] + row[2:] for row in rows[1]]
+        again = trained(config, tmp_path / "parts", data, resume=True)  # nothing is left to do
+        assert np.array_equal(behaviour(whole), behaviour(again))
+
+    def test_what_comes_out_runs_without_a_learning_library(self, tmp_path, data):
+        path = trained(tiny("bc"), tmp_path / "run", data)
+        code = f"""
+import sys
+for name in ("torch", "stable_baselines3", "onnx", "minari", "tensorboard"):
+    sys.modules[name] = None
+from pushplan.evaluation import parse_policy, run_episode
+from pushplan.evaluation.jobs import JobSettings
+from pushplan.scenarios import Scenario
+policy = parse_policy("onnx:{path}").make()
+scenario = Scenario("maze", "pymunk", "benchmark", {{"boxes": 1}}, 3)
+episode = run_episode(JobSettings().environment(scenario, policy), policy, scenario)
+print(episode.actions.ravel().tolist())
+"""
+        done = subprocess.run(
+            [sys.executable, "-c", code], capture_output=True, text=True, check=True
+        )
+        actions = json.loads(done.stdout)
+        policy = OnnxPolicy(path)
+        env = PushEnv(task="maze", variations={"boxes": 1}, observation=policy.observation)
+        seen, _ = env.reset(seed=3)
+        policy.reset(env.world, np.random.default_rng(0))
+        for action in actions:
+            decided = policy.act(env.world, seen)
+            assert float(decided[0]) == action
+            seen, *_ = env.step(decided)
+
+    def test_images_and_the_file_of_the_library(self, tmp_path, monkeypatch):
+        pytest.importorskip("stable_baselines3")
+        from pushplan.learned import load_policy
+
+        config = tiny("ppo", observation=IMAGE, steps=32, validation=0)
+        path = train_policy(config, tmp_path / "run", device="cpu")
+        exported = OnnxPolicy(path)
+        assert exported.observation.shape == (4, 36, 36)
+        model = load_policy(f"sb3:{tmp_path / 'run' / 'model.zip'}", trust=True)
+        env = TrainingEnv(config)
+        seen, _ = env.reset(seed=1)
+        assert model.specification.action == exported.specification.action
+        assert model.decide(seen) == pytest.approx(exported.decide(seen), abs=1e-4)
+
+    def test_a_process_for_each_environment_learns_the_same(self, tmp_path):
+        pytest.importorskip("stable_baselines3")
+        config = tiny("ppo", steps=32, validation=0)
+        one = train_policy(config, tmp_path / "one", device="cpu")
+        two = train_policy(config, tmp_path / "two", device="cpu", processes=True)
+        assert np.array_equal(behaviour(one), behaviour(two))
+
+    def test_another_training_in_the_folder(self, tmp_path, data):
+        trained(tiny("bc", validation=0), tmp_path, data, until=lambda done: done == 1)
+        with pytest.raises(InvalidInputError, match="its seed is 0, not 1"):
+            trained(tiny("bc", validation=0, seed=1), tmp_path, data, resume=True)
+        longer = trained(tiny("bc", validation=0, steps=128), tmp_path, data, resume=True)
+        assert longer is not None
+
+    def test_a_data_set_belongs_to_cloning(self, tmp_path, data):
+        with pytest.raises(InvalidInputError, match="bc needs a data set"):
+            train_policy(tiny("bc"), tmp_path)
+        with pytest.raises(InvalidInputError, match="belongs to bc"):
+            train_policy(tiny("ppo"), tmp_path, data=data)
+        other = tiny("bc", observation={**SMALL, "rays": 5})
+        with pytest.raises(InvalidInputError, match=r"the observation is .*rays': 5"):
+            train_policy(other, tmp_path / "a", data=data)
+        with pytest.raises(InvalidInputError, match=r"sees no GPU|must be auto"):
+            train_policy(tiny("ppo"), tmp_path / "b", device="cuda:77" if no_gpu() else "tpu")
+
+    def test_a_checkpoint_that_runs_code_is_refused(self, tmp_path, data):
+        import torch
+
+        trained(tiny("bc", validation=0), tmp_path, data, until=lambda done: done == 1)
+        torch.save({"chunks": Path("x")}, tmp_path / "checkpoint.pt")
+        with pytest.raises(InvalidInputError, match="is no checkpoint"):
+            trained(tiny("bc", validation=0), tmp_path, data, resume=True)
+        (tmp_path / "checkpoint.pt").write_bytes(b"damaged")
+        with pytest.raises(InvalidInputError, match="is no checkpoint"):
+            trained(tiny("bc", validation=0), tmp_path, data, resume=True)
+
+
+def no_gpu() -> bool:
+    import torch
+
+    return not torch.cuda.is_available()
+
+
+class TestEnvironment:
+    def test_starts_are_none_that_are_scored(self):
+        env = TrainingEnv(tiny("ppo"))
+        seeds = []
+        for inner in env._envs:
+            inner.reset = lambda seed, inner=inner: (
+                seeds.append(seed) or PushEnv.reset(inner, seed=seed)
+            )
+        env.reset(seed=0)
+        env.reset()
+        env.reset(options={"layout": 7})
+        assert min(seeds[:2]) >= TRAINING_SEEDS
+        assert seeds[2] == 500_007
+
+    def test_it_passes_the_checker(self):
+        from gymnasium.utils.env_checker import check_env
+
+        check_env(TrainingEnv(tiny("ppo")), skip_render_check=True)
+
+    def test_a_decision_stands_for_several_steps(self):
+        env = TrainingEnv(tiny("ppo", reward_scale=0.5))
+        plain = PushEnv(task="maze", variations={"boxes": 1}, observation=FeatureObservation())
+        env.reset(options={"layout": 3})
+        plain.reset(seed=500_003)
+        _, reward, *_ = env.step(np.array([0.3], np.float32))
+        wanted = sum(plain.step([np.float32(0.3)])[1] for _ in range(8))
+        assert reward == pytest.approx(0.5 * wanted, abs=1e-6)
+        env.reset()
+        for _ in range(4):  # training episodes are cut off
+            _, _, terminated, truncated, info = env.step(np.array([0.0], np.float32))
+        assert truncated and not terminated
+        assert info == {"is_success": False, "share": 0.0}
+
+    def test_a_direction_is_where_the_robot_goes(self):
+        config = tiny(
+            "ppo",
+            task="box_delivery",
+            action={"mode": "heading", "output": "direction"},
+            observation={**SMALL, "range": 5.0},
+        )
+        env = TrainingEnv(config)
+        env.reset(seed=3)
+        before = env._env.world.robot_pose
+        env.step(np.array([0.0, 0.7], np.float32))  # to the left
+        way = env._env.world.robot_pose[:2] - before[:2]
+        turned = np.remainder(np.arctan2(way[1], way[0]) - before[2], 2 * np.pi)
+        assert np.hypot(*way) > 0.3
+        assert turned == pytest.approx(np.pi / 2, abs=0.1)
+
+    def test_a_map_has_to_reach_as_far_as_waypoints(self):
+        with pytest.raises(InvalidInputError, match="10 x 10 m"):
+            TrainingEnv(tiny("sam", observation={**MAP, "window": [8.0, 8.0]}))
+
+
+class TestConfigs:
+    def test_all_that_ship_can_be_read(self):
+        shipped = shipped_configs()
+        for name, path in shipped.items():
+            config = read_config(path)
+            assert name.startswith(f"{config.task.replace('_', '-')}-{config.algorithm}")
+            assert TrainingConfig.from_dict(config.to_dict()) == config
+            assert TrainingConfig.from_dict(yaml.safe_load(yaml.safe_dump(config.to_dict())))
+        for task in ("maze", "ship-ice", "box-delivery", "area-clearing"):
+            assert {f"{task}-ppo", f"{task}-sac"} <= set(shipped)
+        assert {"box-delivery-sam", "area-clearing-sam"} <= set(shipped)
+
+    @pytest.mark.parametrize("name", sorted(shipped_configs()))
+    def test_each_makes_its_environment(self, name):
+        env = TrainingEnv(read_config(shipped_configs()[name]))
+        seen, _ = env.reset(seed=0)
+        assert env.observation_space.contains(seen)
+        assert json.loads(env.specification.to_json())["format"] == "pushplan-policy/1"
+
+    @pytest.mark.parametrize(
+        ("changes", "message"),
+        [
+            ({"sceanrios": []}, "did you mean 'scenarios'"),
+            ({"algorithm": "dqn"}, "unknown algorithm 'dqn'"),
+            ({"scenarios": []}, "at least one"),
+            ({"scenarios": [3]}, "must be a mapping"),
+            ({"suites": "maze"}, "must be a list"),
+            ({"options": {"rate": -1}}, "rate"),
+            ({"options": {"rates": 1}}, "did you mean 'rate'"),
+            ({"options": {"widths": []}}, "widths"),
+            ({"action": {"output": "continuous"}}, "action"),
+            ({"action": {"mode": "turn_rate", "output": "pixel_values"}}, "belong to sam"),
+            ({"observation": {"kind": "sound"}}, "unknown observation kind"),
+            ({"steps": 0}, "steps"),
+            ({"reward_scale": float("nan")}, "reward_scale"),
+        ],
+    )
+    def test_what_is_wrong_is_said(self, changes, message):
+        with pytest.raises((InvalidInputError, UnknownNameError), match=message):
+            TrainingConfig.from_dict({**tiny("ppo").to_dict(), **changes})
+
+    def test_files(self, tmp_path):
+        with pytest.raises(InvalidInputError, match="no configuration"):
+            read_config(tmp_path / "no.yaml")
+        path = tmp_path / "bad.yaml"
+        for text in ("a: [", "[1]", "algorithm: ppo"):
+            path.write_text(text)
+            with pytest.raises(SchemaError, match=r"bad\.yaml"):
+                read_config(path)
+        with pytest.raises(UnknownNameError, match="maze-ppo"):
+            config_named("maze", "dqn")
+        data = tiny("ppo").to_dict()
+        data["options"]["rate"] = "1e-3"  # as YAML 1.1 reads it
+        assert TrainingConfig.from_dict(data).options.rate == 1e-3
+
+    def test_empty_options_are_the_defaults(self):
+        for algorithm, options in OPTIONS.items():
+            assert tiny(algorithm, options={}).options == options()
+
+
+class TestDataset:
+    def test_it_holds_what_happened(self, data):
+        about = read_metadata(data)
+        found = list(episodes(data))
+        assert len(found) == about["total_episodes"] == 3
+        assert sum(len(one.actions) for one in found) == about["total_steps"]
+        assert about["action_mode"] == "turn_rate"
+        for one in found:
+            assert one.observations.shape == (len(one.actions) + 1, 10 + 8 + 9)
+            assert one.terminations[:-1].sum() == 0
+            assert one.terminations[-1] or one.truncations[-1]
+            assert np.abs(one.actions).max() <= 1.0
+
+    def test_the_same_again(self, data, tmp_path):
+        from pushplan.planners import make_policy
+
+        request = DatasetRequest("maze", ({"boxes": 1},), SMALL, 1, noise=0.05)
+        folder = record(request, make_policy("straight"), "straight", tmp_path / "again")
+        first, again = next(episodes(data)), next(episodes(folder))
+        for entry in dataclasses.fields(first):
+            if entry.name != "success":
+                assert np.array_equal(getattr(first, entry.name), getattr(again, entry.name))
+
+    def test_damage_is_said(self, data, tmp_path):
+        with pytest.raises(InvalidInputError, match="not empty"):
+            record(DatasetRequest("maze", ({},), SMALL, 1), None, "x", data)
+        with pytest.raises(SchemaError, match="no data set"):
+            read_metadata(tmp_path)
+        (tmp_path / "data").mkdir()
+        (tmp_path / "metadata.json").write_text((data / "metadata.json").read_text())
+        with pytest.raises(SchemaError, match=r"episode_00000\.npz"):
+            list(episodes(tmp_path))
+        (tmp_path / "data" / "episode_00000.npz").write_bytes(b"PK no")
+        with pytest.raises(SchemaError, match=r"episode_00000\.npz"):
+            list(episodes(tmp_path))
+
+    def test_minari_reads_it(self, data, tmp_path, monkeypatch):
+        pytest.importorskip("minari")
+        pytest.importorskip("h5py")
+        monkeypatch.setenv("MINARI_DATASETS_PATH", str(tmp_path))
+        made = to_minari(data, "pushplan/straight-v0")
+        assert made.total_episodes == 3
+        assert made.total_steps == read_metadata(data)["total_steps"]
+        assert np.array_equal(made[0].actions, next(episodes(data)).actions)
+
+
+class TestReplay:
+    def test_the_oldest_are_forgotten(self):
+        buffer = ReplayBuffer(3, (2,), np.uint8)
+        with pytest.raises(InvalidInputError, match="empty"):
+            buffer.sample(1, np.random.default_rng(0))
+        for i in range(5):
+            buffer.add(np.full(2, i), i, float(i), np.full(2, i + 1), i == 4)
+        assert len(buffer) == 3
+        seen, actions, rewards, following, ends = buffer.sample(50, np.random.default_rng(0))
+        assert set(actions.tolist()) == {2, 3, 4}
+        assert (seen[:, 0] == actions).all() and (following[:, 0] == actions + 1).all()
+        assert (rewards == actions).all() and (ends == (actions == 4)).all()
+        other = ReplayBuffer(3, (2,), np.uint8)
+        other.restore(buffer.state())
+        assert np.array_equal(other.seen, buffer.seen) and other.position == buffer.position
+
+
+class TestSamLearner:
+    def test_it_learns_which_pixel_pays(self):
+        pytest.importorskip("torch")
+        from pushplan.training.policies.sam import SamLearner
+
+        options = {"rate": 0.01, "batch": 16, "buffer": 128, "widths": [8, 8], "blocks": 1}
+        config = tiny("sam", options={**options, "discount": 0.0, "target_every": 20})
+        learner = SamLearner(config, (4, 16, 16), "cpu")
+        rng = np.random.default_rng(0)
+        for _ in range(128):  # the pixel that is lit pays
+            seen = np.zeros((4, 16, 16), np.uint8)
+            lit = int(rng.integers(256))
+            seen[0].flat[lit] = 255
+            action = lit if rng.random() < 0.5 else int(rng.integers(256))
+            learner.memory.add(seen, action, float(action == lit), seen, True)
+        for _ in range(150):
+            learner.update(rng, 0.01)
+        near = 0
+        for lit in range(0, 256, 16):
+            seen = np.zeros((4, 16, 16), np.uint8)
+            seen[0].flat[lit + 5] = 255
+            row, col = divmod(learner.best(seen), 16)
+            near += abs(row - lit // 16) <= 1 and abs(col - 5) <= 1
+        assert near >= 12
+
+
+class TestCard:
+    def test_it_says_what_is_known(self, tmp_path, data):
+        trained(tiny("bc"), tmp_path, data, command="pushplan train bc ...")
+        scores = {
+            "suite": "maze-2d-3",
+            "episodes": 100,
+            "success": 0.93,
+            "success_low": 0.86,
+            "success_high": 0.97,
+            "scores": {"E_nav": (0.8, 0.78, 0.82)},
+            "failures": {"wall": 7},
+        }
+        text = write_card(tmp_path, [scores], tmp_path / "MODEL_CARD.md").read_text()
+        for part in (
+            "| maze-2d-3 | 100 | 0.930 [0.860, 0.970] | 0.800 [0.780, 0.820] |",
+            "wall 7 of 100 episodes",
+            "3 episodes of `straight`",
+            "pushplan train bc ...",
+        ):
+            assert part in text
+        with pytest.raises(SchemaError, match="no finished training"):
+            write_card(tmp_path / "nowhere", [], tmp_path / "x.md")
+
+    def test_the_best_is_the_one_with_the_greatest_share(self, tmp_path):
+        pytest.importorskip("torch")
+        run = TrainingRun(tmp_path, tiny("ppo"))
+        point = CurvePoint(1, 1.0, 0, 0.0, 0.0, 5.0, 0.0, 0.5, 0.0)
+        for i, share in enumerate((0.5, 0.9, 0.2)):
+            run.save({"weights": {"i": i}}, dataclasses.replace(point, valid_share=share))
+        assert run.best_weights() == {"i": 1}
+        assert run.load()["chunks"] == 3
+
+
+class TestCommands:
+    def test_from_nothing_to_a_card(self, tmp_path, capsys):
+        config = tiny("bc", validation=0, steps=32)
+        path = tmp_path / "tiny.yaml"
+        path.write_text(yaml.safe_dump(config.to_dict()))
+        out, found = tmp_path / "run", tmp_path / "data"
+        call = ["--task", "maze", "--config", str(path), "--episodes", "2", "--out", str(found)]
+        assert main(["dataset", "export", "--policy", "straight", *call]) == 0
+        assert "2 episodes" in capsys.readouterr().out
+        call = ["--config", str(path), "--data", str(found), "--out", str(out), "--workers", "0"]
+        assert main(["train", "bc", *call, "--episodes", "1", "--device", "cpu"]) == 0
+        assert "wrote" in capsys.readouterr().out
+        assert "| maze-2d-3 | 1 |" in (out / "MODEL_CARD.md").read_text()
+        assert main(["run", "maze-2d-3", "--policy", f"onnx:{out / 'policy'}"]) == 0
+
+    def test_bad_usage(self, tmp_path, capsys):
+        out = str(tmp_path / "x")
+        for call, message in (
+            (["ppo"], "either --task NAME or --config"),
+            (["sam", "--task", "maze"], "unknown training configuration 'maze-sam'"),
+            (["ppo", "--config", "no.yaml"], "no configuration no.yaml"),
+            (["ppo", "--config", "no.yaml", "--variant", "image"], "--variant belongs to --task"),
+            (["bc", "--task", "maze"], "bc needs one"),
+        ):
+            assert main(["train", *call, "--out", out]) != 0
+            assert message in capsys.readouterr().err
