@@ -1,0 +1,131 @@
+"""Manipulation: scores of policies on the suites that have a goal for the objects.
+
+Usage::
+
+    python benchmarks/manipulation.py [--episodes 50] [--workers 2] [--only area-clearing-2d]
+        [--policies greedy,gtsp,gtsp-mpc] [--seed 0]
+    python benchmarks/manipulation.py --figure docs/images/gtsp-mpc.png
+
+Prints one row of a Markdown table for each suite and policy: means with bootstrap intervals of
+95 %, the share of episodes with everything done, the paired difference to the first policy, and
+the wall time of a step, simulation included. Below the table it names every episode in which
+something was left undone. With ``--figure`` it only draws what
+`gtsp-mpc` plans first in some scenes.
+"""
+
+from __future__ import annotations
+
+import argparse
+import tempfile
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pushplan.drawing import save_image
+from pushplan.drawing.sequence import draw_sequence
+from pushplan.envs import make
+from pushplan.evaluation import ResultRow, bench
+from pushplan.planners.subtasks import GtspMpc
+from pushplan.scenarios import suite, suite_names
+
+SCORES = ("S_manip", "E_manip", "I_manip")
+PICTURED = ("area-clearing-2d-10", "box-delivery-2d-small-columns-10")
+_DRAWS = 2000
+
+
+def main() -> None:
+    """Run the suites and print the table."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--episodes", type=int, default=50)
+    parser.add_argument("--workers", type=int, default=2)
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--only", default="", help="suites whose name holds this text")
+    parser.add_argument("--policies", default="greedy,gtsp,gtsp-mpc")
+    parser.add_argument("--figure", default="", help="draw planned sequences to this file instead")
+    options = parser.parse_args()
+    if options.figure:
+        figure(options.figure, options.seed)
+        return
+    policies = options.policies.split(",")
+    print("| suite | policy | episodes | all done | S | E | I | E - first | I - first | ms/step |")
+    print("|---|---|---|---|---|---|---|---|---|---|", flush=True)
+    failed: list[str] = []
+    for name in suite_names():
+        if name == "smoke" or options.only not in name:
+            continue
+        if suite(name, episodes=1).scenarios[0].task not in ("area_clearing", "box_delivery"):
+            continue
+        with tempfile.TemporaryDirectory() as folder:
+            results = bench(
+                name,
+                policies=policies,
+                episodes=options.episodes,
+                workers=options.workers,
+                seed=options.seed,
+                out=folder,
+            )
+            rows = list(results.rows)
+        first = [row for row in rows if row.policy == policies[0]]
+        for policy in policies:
+            mine = [row for row in rows if row.policy == policy]
+            print(line(name, policy, mine, first), flush=True)
+            failed += [f"{name} {policy} {r.seed}: {r.reason}" for r in mine if not r.success]
+    print("", *failed, sep="\n")
+
+
+def line(name: str, policy: str, mine: Sequence[ResultRow], first: Sequence[ResultRow]) -> str:
+    """One row of the table."""
+    done = sum(row.success for row in mine) / max(1, len(mine))
+    cells = [interval(values(mine, score)) for score in SCORES]
+    for score in SCORES[1:]:
+        other = {row.seed: getattr(row, score) for row in first}
+        pairs = [
+            getattr(row, score) - other[row.seed]
+            for row in mine
+            if getattr(row, score) is not None and other.get(row.seed) is not None
+        ]
+        cells.append("" if policy == first[0].policy else interval(np.array(pairs)))
+    time = np.mean([row.wall_time_s / row.steps for row in mine if row.wall_time_s and row.steps])
+    return (
+        f"| `{name}` | `{policy}` | {len(mine)} | {done:.2f} | {' | '.join(cells)} "
+        f"| {1e3 * time:.1f} |"
+    )
+
+
+def figure(path: str, seed: int) -> None:
+    """Draw what the policy plans first in some scenes, side by side."""
+    pictures = []
+    for name in PICTURED:
+        scenario = suite(name, episodes=1, first_seed=seed).scenarios[0]
+        env = make(scenario, observation="state", action=("velocity",))
+        env.reset(seed=scenario.seed)
+        policy = GtspMpc()
+        policy.act(env.world)
+        picture = draw_sequence(env.world, [push.poses for push in policy.plan], size_px=480)
+        pictures.append(picture)
+        env.close()
+    height = max(len(picture) for picture in pictures)
+    filled = [
+        np.pad(p, ((0, height - len(p)), (0, 12), (0, 0)), constant_values=255) for p in pictures
+    ]
+    save_image(path, np.concatenate(filled, axis=1))
+
+
+def values(rows: Sequence[ResultRow], score: str) -> NDArray[np.float64]:
+    """A score of all episodes that have one."""
+    return np.array([getattr(row, score) for row in rows if getattr(row, score) is not None])
+
+
+def interval(numbers: NDArray[np.float64]) -> str:
+    """Mean and bootstrap interval of 95 %."""
+    if not len(numbers):
+        return ""
+    rng = np.random.default_rng(0)
+    means = rng.choice(numbers, (_DRAWS, len(numbers))).mean(axis=1)
+    low, high = np.quantile(means, [0.025, 0.975])
+    return f"{numbers.mean():.3f} [{low:.3f}, {high:.3f}]"
+
+
+if __name__ == "__main__":
+    main()
