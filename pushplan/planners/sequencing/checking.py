@@ -1,0 +1,111 @@
+"""Input of the solver, checked; each breach is one error that names it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from pushplan.world.checks import IntArray
+from pushplan.world.errors import InvalidInputError
+
+LARGEST = 1e290
+"""Finite costs stay below this, so that no sum of them overflows."""
+LARGEST_WHOLE = 2**53
+"""Whole numbers stay below this as a sum, so that float64 holds them exactly."""
+
+
+def checked_costs(costs: ArrayLike) -> NDArray[np.number]:
+    """The cost matrix, not copied if it is an array already.
+
+    Raises:
+        InvalidInputError: if it is not square, not numeric, NaN, minus infinity or too large.
+    """
+    try:
+        matrix = np.asarray(costs)
+    except (TypeError, ValueError) as error:
+        raise InvalidInputError(f"costs must be an (N, N) array of numbers: {error}") from error
+    if matrix.dtype.kind not in "iuf":
+        raise InvalidInputError(f"costs must be numbers, got an array of {matrix.dtype}")
+    if matrix.ndim != 2 or matrix.shape[0] != matrix.shape[1] or not matrix.size:
+        raise InvalidInputError(f"costs must have shape (N, N) with N >= 1, got {matrix.shape}")
+    low, high = matrix.min(), matrix.max()
+    if np.isnan(low):
+        u, v = np.argwhere(np.isnan(matrix))[0]
+        raise InvalidInputError(f"costs must not be NaN, got NaN from node {u} to node {v}")
+    if low == -np.inf:
+        u, v = np.argwhere(matrix == -np.inf)[0]
+        raise InvalidInputError(
+            f"costs must be above -inf, got -inf from node {u} to node {v}; +inf forbids an arc"
+        )
+    if high == np.inf:
+        high = max((row[row < np.inf].max(initial=low) for row in matrix), default=low)
+        high = low if high == np.inf else high
+    largest = max(abs(float(low)), abs(float(high)))
+    if largest == np.inf:
+        largest = 0.0
+    if matrix.dtype.kind in "iu" and largest * len(matrix) >= LARGEST_WHOLE:
+        raise InvalidInputError(
+            f"whole-number costs must add up to less than 2^53 on a tour, got {largest:g}"
+        )
+    if largest > LARGEST:
+        raise InvalidInputError(
+            f"finite costs must be at most {LARGEST:g} in size, got {largest:g}; inf forbids an arc"
+        )
+    return matrix
+
+
+def checked_clusters(
+    clusters: Sequence[Sequence[int]] | Sequence[IntArray], nodes: int
+) -> tuple[IntArray, ...]:
+    """The clusters as arrays of node numbers.
+
+    Args:
+        clusters: a partition of the nodes.
+        nodes: N.
+
+    Raises:
+        InvalidInputError: if they are no partition of 0 to N - 1; the message names the nodes.
+    """
+    if isinstance(clusters, str | bytes) or not hasattr(clusters, "__iter__"):
+        raise InvalidInputError(f"clusters must be a sequence of node lists, got {clusters!r:.60}")
+    found: list[IntArray] = []
+    owner = np.full(nodes, -1, dtype=np.int64)
+    for index, cluster in enumerate(clusters):
+        try:
+            members = np.asarray(cluster)
+        except (TypeError, ValueError) as error:
+            raise InvalidInputError(f"cluster {index} must be a list of nodes: {error}") from error
+        if members.ndim != 1 or not members.size:
+            raise InvalidInputError(
+                f"cluster {index} must be a list of at least one node, got {cluster!r:.60}"
+            )
+        if members.dtype.kind not in "iu":
+            raise InvalidInputError(
+                f"cluster {index} must hold whole numbers, got an array of {members.dtype}"
+            )
+        outside = members[(members < 0) | (members >= nodes)]
+        if outside.size:
+            raise InvalidInputError(
+                f"cluster {index} has node {outside[0]}, but nodes are 0 to {nodes - 1}"
+            )
+        members = members.astype(np.int64)
+        for node in members:
+            if owner[node] >= 0:
+                where = (
+                    f"clusters {owner[node]} and {index}"
+                    if owner[node] != index
+                    else (f"cluster {index} twice")
+                )
+                raise InvalidInputError(f"clusters must not overlap: node {node} is in {where}")
+            owner[node] = index
+        found.append(members)
+    missing = np.flatnonzero(owner < 0)
+    if missing.size:
+        shown = ", ".join(str(node) for node in missing[:8])
+        raise InvalidInputError(
+            f"every node must be in a cluster, but {missing.size} are in none: {shown}"
+            f"{', ...' if missing.size > 8 else ''}"
+        )
+    return tuple(found)
