@@ -1,0 +1,164 @@
+"""The front of a robot and the face of a box, from their outlines."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+
+from pushplan.planners.pushing.inputs import expect
+from pushplan.planners.pushing.kernels import Contact
+from pushplan.planners.pushing.parameters import PushParameters, pressure_radius
+from pushplan.world import InvalidInputError, RobotModel
+from pushplan.world.checks import FloatArray, number
+from pushplan.world.outline import convex_outline
+
+_SAMPLES = 401
+_STEEP = 0.8
+"""|dx/dy| from which an edge is a flank and no longer part of the front."""
+_FLAT = 0.02
+"""Depth of a front, as a share of its half width, below which it counts as straight."""
+_BENT = 0.7
+"""Greatest bend times depth of a box: a box fits into the bumper's hollow."""
+
+
+@dataclass(frozen=True)
+class Bumper:
+    """The front of a robot: x = front + bend y² / 2 for |y| <= half, body frame [m].
+
+    Args:
+        front: distance of its middle from the axle [m].
+        half: half its width [m].
+        bend: curvature [1/m]: 0 straight, positive where the ends reach ahead and hold a box,
+            negative for a nose. A V-shaped front is replaced by the parabola nearest to it.
+    """
+
+    front: float
+    half: float
+    bend: float
+
+    def __post_init__(self) -> None:
+        for name in ("front", "half"):
+            number(f"bumper {name}", getattr(self, name), low=0.0, open_low=True)
+        number("bumper bend", self.bend)
+
+    @classmethod
+    def of(cls, robot: RobotModel) -> Bumper:
+        """The front of a robot's footprint."""
+        return _bumper(expect("robot", robot, RobotModel))
+
+
+@dataclass(frozen=True)
+class Face:
+    """A side of a box.
+
+    Args:
+        normal: direction of its inward normal in the box's frame [rad].
+        depth: a, its distance from the centroid [m].
+        low: its right end seen along the inward normal, from the centroid [m], negative.
+        high: its left end [m].
+    """
+
+    normal: float
+    depth: float
+    low: float
+    high: float
+
+    def __post_init__(self) -> None:
+        number("face normal", self.normal)
+        number("face depth", self.depth, low=0.0, open_low=True)
+        number("face low", self.low)
+        number("face high", self.high, low=self.low, open_low=True)
+
+
+def face_towards(outline: FloatArray, direction: float) -> Face:
+    """The face of a box that a push along ``direction`` [rad, box frame] meets most squarely.
+
+    Args:
+        outline: (N, 2) convex, counter-clockwise corners, origin at the centroid [m].
+        direction: [rad].
+    """
+    outline, direction = convex_outline("outline", outline), number("direction", direction)
+    edges = np.roll(outline, -1, axis=0) - outline
+    lengths = np.hypot(edges[:, 0], edges[:, 1])
+    inward = np.stack([-edges[:, 1], edges[:, 0]], axis=1) / lengths[:, None]
+    facing = inward @ np.array([math.cos(direction), math.sin(direction)])
+    # of sides that face it nearly alike the longer one
+    k = int(np.argmax(facing + 0.05 * lengths / lengths.max()))
+    normal = inward[k]
+    along = np.array([-normal[1], normal[0]])
+    ends = sorted((float(outline[k] @ along), float((outline[k] + edges[k]) @ along)))
+    depth = -float(outline[k] @ normal)
+    return Face(math.atan2(normal[1], normal[0]), depth, ends[0], ends[1])
+
+
+def contact_of(
+    bumper: Bumper, outline: FloatArray, face: Face, parameters: PushParameters
+) -> Contact:
+    """Bumper, face and friction as the kernels read them.
+
+    Args:
+        bumper: the robot's front.
+        outline: (N, 2) corners of the box [m].
+        face: of the box.
+        parameters: friction.
+    """
+    spread = parameters.spread * _radius(outline.tobytes())
+    bend = min(bumper.bend, _BENT / face.depth)
+    return Contact(
+        bumper.front,
+        bumper.half,
+        bend,
+        face.depth,
+        face.low,
+        face.high,
+        spread,
+        parameters.friction,
+    )
+
+
+@lru_cache(maxsize=256)
+def _radius(outline: bytes) -> float:
+    return pressure_radius(np.frombuffer(outline).reshape(-1, 2))
+
+
+@lru_cache(maxsize=64)
+def _bumper(robot: RobotModel) -> Bumper:
+    wide = float(np.abs(robot.vertices[:, 1]).max())
+    ys = np.linspace(-wide, wide, _SAMPLES) * (1.0 - 1e-9)
+    front = np.full(_SAMPLES, -np.inf)
+    for part in robot.parts:
+        front = np.maximum(front, _foremost(part, ys))
+    middle = _SAMPLES // 2
+    if not math.isfinite(front[middle]) or front[middle] <= 0.0:
+        raise InvalidInputError(f"robot {robot.name!r} has no front ahead of its axle to push with")
+    steps = np.diff(front) / np.diff(ys)
+    steep = ~(np.abs(steps) < _STEEP)
+    left = np.flatnonzero(steep[middle:])
+    right = np.flatnonzero(steep[:middle])
+    last = middle + int(left[0]) if len(left) else _SAMPLES - 1
+    first = int(right[-1]) + 1 if len(right) else 0
+    half = float(min(ys[last], -ys[first]))
+    if half <= 0.0:
+        raise InvalidInputError(f"robot {robot.name!r} has a pointed front, which holds no box")
+    inside = np.abs(ys) <= half
+    square = 0.5 * ys[inside] ** 2
+    bend, ahead = np.polyfit(square, front[inside], 1)
+    if abs(bend) * 0.5 * half * half < _FLAT * half:
+        return Bumper(float(front[inside].max()), half, 0.0)
+    return Bumper(float(ahead), half, float(bend))
+
+
+def _foremost(part: FloatArray, ys: FloatArray) -> FloatArray:
+    """Greatest x of a convex part at each y, -inf beside it."""
+    found = np.full(len(ys), -np.inf)
+    for (ax, ay), (bx, by) in zip(part, np.roll(part, -1, axis=0), strict=True):
+        low, high = min(ay, by), max(ay, by)
+        if high - low < 1e-12:
+            continue
+        at = (ys >= low) & (ys <= high)
+        share = (ys[at] - ay) / (by - ay)
+        found[at] = np.maximum(found[at], ax + share * (bx - ax))
+    return found

@@ -1,0 +1,198 @@
+"""`PushModel`: where a box goes when a robot with a bumper drives against it."""
+
+from __future__ import annotations
+
+import enum
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from pushplan.planners.pushing import kernels
+from pushplan.planners.pushing.bumper import Bumper, Face, contact_of, face_towards
+from pushplan.planners.pushing.inputs import expect
+from pushplan.planners.pushing.kernels import Contact
+from pushplan.planners.pushing.parameters import PushParameters, stable_curvature
+from pushplan.world import InvalidInputError, RobotModel, Twist
+from pushplan.world.checks import ArrayRecord, FloatArray, array, number
+from pushplan.world.outline import centroid, convex_outline
+
+
+class ContactMode(enum.Enum):
+    """How bumper and box touch."""
+
+    FREE = kernels.FREE
+    """Not at all; the box stands."""
+    STICK = kernels.STICK
+    """Along a line, without sliding."""
+    SLIDE = kernels.SLIDE
+    """Along a line, and the box slides along the bumper."""
+    CORNER_STICK = kernels.CORNER_STICK
+    """At one point, about which the box turns."""
+    CORNER_SLIDE = kernels.CORNER_SLIDE
+    """At one point that slides."""
+
+
+@dataclass(frozen=True, eq=False)
+class PushState(ArrayRecord):
+    """Robot and box while the box is in front of the bumper.
+
+    Args:
+        robot_pose: (3,) x, y [m], theta [rad].
+        offset: of the box's centre to the left of the robot's x axis [m].
+        angle: of the pushed face's inward normal against the robot's heading [rad].
+        gap: between bumper and box along the robot's x axis [m].
+    """
+
+    robot_pose: FloatArray
+    offset: float
+    angle: float
+    gap: float = 0.0
+
+    def __post_init__(self) -> None:
+        put = object.__setattr__
+        put(self, "robot_pose", array("push state robot_pose", self.robot_pose, (3,)))
+        for name in ("offset", "angle", "gap"):
+            put(self, name, number(f"push state {name}", getattr(self, name)))
+
+    def row(self) -> FloatArray:
+        """(6,) as the kernels read it."""
+        return np.array([*self.robot_pose, self.offset, self.angle, max(self.gap, 0.0)])
+
+    @classmethod
+    def from_row(cls, row: FloatArray) -> PushState:
+        """The inverse of `row`."""
+        return cls(row[:3], float(row[3]), float(row[4]), float(row[5]))
+
+
+@dataclass(frozen=True)
+class ContactReport:
+    """What a command does to the box now.
+
+    Args:
+        mode: of contact.
+        velocity: forward and leftward speed of the box [m/s] and its turn rate [rad/s], in the
+            frame of the pushed face.
+        pressure: centre of pressure on the face, left of the box's centre [m].
+        shear: tangential over normal force, beyond what the bumper's shape gives.
+        margin: 1 - |turn rate| / (the greatest with which the box sticks): share of the friction
+            cone and of the line of contact that is not used; negative where the box slips.
+    """
+
+    mode: ContactMode
+    velocity: tuple[float, float, float]
+    pressure: float
+    shear: float
+    margin: float
+
+
+class PushModel:
+    """Quasi-static pushing of one convex box by a bumper, under Coulomb friction.
+
+    Args:
+        robot: whose bumper pushes; a `RobotModel`, or its `Bumper`.
+        outline: (N, 2) convex corners of the box, from its centroid [m].
+        parameters: friction.
+        face: which side is pushed; the one that faces -x if None.
+
+    Raises:
+        InvalidInputError: if the outline is not convex or its centroid not at its origin.
+    """
+
+    def __init__(
+        self,
+        robot: RobotModel | Bumper,
+        outline: ArrayLike,
+        parameters: PushParameters | None = None,
+        face: Face | None = None,
+    ) -> None:
+        self.bumper = robot if isinstance(robot, Bumper) else Bumper.of(robot)
+        self.outline = convex_outline("outline", outline)
+        middle = centroid(self.outline)
+        if np.abs(middle).max() > 1e-6 * np.abs(self.outline).max():
+            raise InvalidInputError(
+                f"outline must have its centroid at the origin, got {middle.tolist()}"
+            )
+        self.parameters = PushParameters() if parameters is None else parameters
+        expect("parameters", self.parameters, PushParameters)
+        self.face = face_towards(self.outline, 0.0) if face is None else face
+        expect("face", self.face, Face)
+        self.contact: Contact = contact_of(self.bumper, self.outline, self.face, self.parameters)
+
+    @property
+    def reach(self) -> float:
+        """From the axle to the centre of a box that lies on the middle of the bumper [m]."""
+        return self.bumper.front + self.face.depth
+
+    def stable_curvature(self, offset: float = 0.0) -> float:
+        """`stable_curvature` of a box at an offset [m] on this bumper, as if straight [1/m]."""
+        low, high = kernels.line(self.contact, number("offset", offset))
+        return stable_curvature(
+            self.parameters.friction,
+            reach=self.bumper.front,
+            depth=self.face.depth,
+            half=min(-low, high),
+            c=self.contact.spread,
+        )
+
+    def state(self, robot_pose: ArrayLike, box_pose: ArrayLike) -> PushState:
+        """The state of a robot and a box at poses (3,) x, y [m], theta [rad]."""
+        robot: FloatArray = array("robot_pose", robot_pose, (3,))
+        box: FloatArray = array("box_pose", box_pose, (3,))
+        row = np.empty(6)
+        kernels.observe(self.contact, self.face.normal, robot, box, row)
+        return PushState.from_row(row)
+
+    def box_pose(self, state: PushState) -> FloatArray:
+        """(3,) pose of the box."""
+        return self._box_of(state.row())
+
+    def predict(self, state: PushState, twists: ArrayLike, dt: ArrayLike | float) -> FloatArray:
+        """(N + 1, 6) poses of the robot and of the box under commands.
+
+        Args:
+            state: where it begins.
+            twists: (N, 2) forward speeds [m/s] and turn rates [rad/s].
+            dt: how long each is held [s], one number or (N,).
+        """
+        states = self.rows(state, twists, dt)[0]
+        return np.array([np.concatenate([row[:3], self._box_of(row)]) for row in states])
+
+    def rows(
+        self, state: PushState, twists: ArrayLike, dt: ArrayLike | float
+    ) -> tuple[FloatArray, FloatArray]:
+        """States (N + 1, 6) as `PushState.row`, and (N, 6) details as `contact_velocity` has."""
+        commands = array("twists", twists, (None, 2))
+        count = len(commands)
+        steps = array("dt", dt, (count,)) if np.ndim(dt) else np.full(count, number("dt", dt))
+        if (steps <= 0.0).any():
+            raise InvalidInputError(f"dt must be positive, got {steps.min()}")
+        row = expect("state", state, PushState).row()
+        states, details = np.empty((count + 1, 6)), np.empty((count, 6))
+        kernels.rollout(self.contact, row, commands, steps, states, details)
+        return states, details
+
+    def report(self, state: PushState, twist: Twist) -> ContactReport:
+        """What a command does to the box now, if the box touches the bumper."""
+        expect("state", state, PushState)
+        v, w = expect("twist", twist, Twist).linear, twist.angular
+        out = np.zeros(6)
+        if v > 0.0 or w != 0.0:
+            length = 0.05 * self.reach / max(abs(v), abs(w) * self.reach)
+            kernels.contact_velocity(self.contact, state.offset, state.angle, v, w, length, out)
+        bound = self.stable_curvature(state.offset) * max(v, 0.0)
+        used = abs(w) / bound if bound > 0.0 else (0.0 if w == 0.0 else math.inf)
+        return ContactReport(
+            ContactMode(int(out[4])),
+            (float(out[0]), float(out[1]), float(out[2])),
+            float(out[3]),
+            float(out[5]),
+            max(1.0 - used, -9.0),
+        )
+
+    def _box_of(self, row: FloatArray) -> FloatArray:
+        pose = np.empty(3)
+        kernels.box_pose(self.contact, row, pose)
+        pose[2] -= self.face.normal
+        return pose

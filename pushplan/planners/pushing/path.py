@@ -1,0 +1,166 @@
+"""`PushPath`: the way that a box is to be pushed along."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from pushplan.planners.kinodynamic.dubins import along_arc
+from pushplan.planners.pushing.inputs import expect
+from pushplan.world import InvalidInputError, Plan, RobotModel, SubTask
+from pushplan.world.checks import ArrayRecord, FloatArray, array, integer, number
+
+_PIECES = 24
+"""Least number of poses along a path of one piece."""
+_BEND = 0.05
+"""Greatest turn between two poses [rad]."""
+
+
+@dataclass(frozen=True, eq=False)
+class PushPath(ArrayRecord):
+    """The way of a box's centre.
+
+    Args:
+        poses: (N, 3) x, y [m] and direction of travel [rad], at least two; what way round the box
+            itself is does not matter.
+
+    Raises:
+        InvalidInputError: if there are fewer than two poses, or the path has no length.
+    """
+
+    poses: FloatArray
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "poses", array("push path poses", self.poses, (None, 3)))
+        if len(self.poses) < 2 or self.length <= 0.0:
+            raise InvalidInputError("a push path needs two poses or more, at different places")
+
+    @classmethod
+    def straight(cls, start: ArrayLike, end: ArrayLike) -> PushPath:
+        """From one point (2,) to another [m]."""
+        return cls.through(np.stack([array("start", start, (2,)), array("end", end, (2,))]))
+
+    @classmethod
+    def arcs(cls, start: ArrayLike, pieces: Sequence[tuple[float, float]]) -> PushPath:
+        """Arcs, one after the other.
+
+        Args:
+            start: (3,) x, y [m] and direction [rad].
+            pieces: length [m] and curvature [1/m], left positive, of each.
+        """
+        here = array("start", start, (3,)).copy()
+        poses = [here.copy()]
+        rows = array("pieces", pieces, (None, 2)).tolist()
+        for i, (length, curvature) in enumerate(rows):
+            length = number(f"pieces[{i}] length", length, low=0.0, open_low=True)
+            turn = abs(curvature) * length
+            count = min(max(_PIECES, math.ceil(turn / _BEND)), 2000)
+            for _ in range(count):
+                out = np.empty(3)
+                along_arc(here, length / count, curvature, out)
+                here = out
+                poses.append(out.copy())
+        return cls(np.array(poses))
+
+    @classmethod
+    def through(cls, points: ArrayLike, radius: float = 0.0) -> PushPath:
+        """Straight from point to point.
+
+        Args:
+            points: (N, 2) [m], at least two.
+            radius: of the arcs that round the corners [m]; less where a leg is too short.
+        """
+        corners: FloatArray = array("points", points, (None, 2))
+        radius = number("radius", radius, low=0.0)
+        if len(corners) > 1:
+            steps = np.hypot(*np.diff(corners, axis=0).T)
+            corners = corners[np.concatenate([[True], steps > 1e-9])]
+        if len(corners) < 2:
+            raise InvalidInputError("a push path needs two different points or more")
+        legs = np.diff(corners, axis=0)
+        lengths = np.hypot(legs[:, 0], legs[:, 1])
+        headings = np.arctan2(legs[:, 1], legs[:, 0])
+        cut = np.zeros(len(corners))  # of the legs beside each corner
+        turns = np.array([math.remainder(t, math.tau) for t in np.diff(headings).tolist()])
+        for i, turn in enumerate(turns.tolist(), start=1):
+            if radius > 0.0 and 1e-6 < abs(turn) < math.pi - 1e-6:
+                room = 0.5 * min(lengths[i - 1], lengths[i])
+                cut[i] = min(radius * math.tan(0.5 * abs(turn)), room)
+        poses: list[FloatArray] = []
+        for i, (length, heading) in enumerate(zip(lengths, headings, strict=True)):
+            ahead = np.array([math.cos(heading), math.sin(heading)])
+            run = np.linspace(cut[i], length - cut[i + 1], _PIECES // 2 + 1)
+            poses += [np.array([*(corners[i] + x * ahead), heading]) for x in run]
+            if cut[i + 1] > 0.0:
+                turn = float(turns[i])
+                bend = math.tan(0.5 * abs(turn)) / cut[i + 1]
+                arc = cls.arcs(poses[-1], [(abs(turn) / bend, math.copysign(bend, turn))])
+                poses += list(arc.poses[1:-1])
+        return cls(np.array(poses))
+
+    @property
+    def lengths(self) -> FloatArray:
+        """(N,) length of the path up to each pose [m]."""
+        steps = np.diff(self.poses[:, :2], axis=0)
+        return np.concatenate([[0.0], np.cumsum(np.hypot(steps[:, 0], steps[:, 1]))])
+
+    @property
+    def length(self) -> float:
+        """[m]."""
+        return float(self.lengths[-1])
+
+    def rest_from(self, along: float) -> PushPath | None:
+        """What is left of it after the first ``along`` metres; None if nothing is."""
+        lengths, along = self.lengths, number("along", along)
+        if along >= lengths[-1] - 1e-9:
+            return None
+        if along <= 0.0:
+            return self
+        i = int(np.searchsorted(lengths, along, side="right")) - 1
+        share = (along - lengths[i]) / (lengths[i + 1] - lengths[i])
+        a, b = self.poses[i], self.poses[i + 1]
+        turn = math.remainder(float(b[2] - a[2]), math.tau)
+        first = np.array([*(a[:2] + share * (b[:2] - a[:2])), a[2] + share * turn])
+        return PushPath(np.concatenate([first[None], self.poses[i + 1 :]]))
+
+    def nearest(self, point: ArrayLike) -> tuple[float, float]:
+        """Length [m] up to the point of the path nearest to (2,) a point, and its distance [m]."""
+        at = array("point", point, (2,))
+        a = self.poses[:-1, :2]
+        edges = self.poses[1:, :2] - a
+        square = np.maximum((edges**2).sum(axis=1), 1e-18)
+        share = np.clip(((at - a) * edges).sum(axis=1) / square, 0.0, 1.0)
+        away = np.hypot(*(a + share[:, None] * edges - at).T)
+        i = int(np.argmin(away))
+        return float(self.lengths[i] + share[i] * np.sqrt(square[i])), float(away[i])
+
+    def plan(self, robot: RobotModel, box_id: int, speed: float | None = None) -> Plan:
+        """The path as a `pushplan.world.Plan` for `PushingMpc`.
+
+        Its poses are those of the box, and its one sub-task names the box.
+
+        Args:
+            robot: gives the speed limit.
+            box_id: label of the box.
+            speed: of the robot [m/s]; its greatest if None.
+        """
+        expect("robot", robot, RobotModel)
+        pace = robot.max_speed if speed is None else number("speed", speed, low=0.0, open_low=True)
+        pace = min(pace, robot.max_speed)
+        count = len(self.poses)
+        lengths = self.lengths
+        turns = np.array([math.remainder(t, math.tau) for t in np.diff(self.poses[:, 2]).tolist()])
+        steps = np.maximum(np.diff(lengths), 1e-9)
+        rates = np.clip(pace * turns / steps, -robot.max_turn_rate, robot.max_turn_rate)
+        return Plan(
+            times=lengths / pace,
+            poses=self.poses,
+            speeds=np.full(count, pace),
+            turn_rates=np.concatenate([rates, [0.0]]),
+            travel_cost=robot.mass * float(lengths[-1]),
+            subtasks=(SubTask((integer("box_id", box_id),), 0, count - 1),),
+        )

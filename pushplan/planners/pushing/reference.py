@@ -1,0 +1,316 @@
+"""`NonlinearPushingMpc`: the same problem, solved to the end by CasADi and IPOPT.
+
+For tests and benchmarks: it says how much the quadratic program gives away, and takes a hundred
+times as long.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import casadi
+import numpy as np
+
+from pushplan.control.mpc.kernels import errors, locate
+from pushplan.planners.pushing.cost import SPEED_CALM, Weights
+from pushplan.planners.pushing.kernels import FLUSH, Contact, box_pose
+from pushplan.planners.pushing.mpc import PushingMpc, bounds_of, steps_of
+from pushplan.world import RobotModel
+from pushplan.world.checks import FloatArray, IntArray
+
+_SUBSTEPS = 2
+_ROUNDS = 3
+"""How often the box's places on the path are looked up again."""
+_SETTINGS: dict[str, Any] = {
+    "ipopt.print_level": 0,
+    "ipopt.sb": "yes",
+    "ipopt.max_iter": 150,
+    "ipopt.tol": 1e-6,
+    "ipopt.acceptable_tol": 1e-4,
+    "ipopt.warm_start_init_point": "yes",
+    "ipopt.mu_strategy": "adaptive",
+    "print_time": False,
+    "error_on_fail": False,
+}
+
+
+class NonlinearPushingMpc(PushingMpc):
+    """`PushingMpc` whose problem is solved as it is, by an interior-point method.
+
+    It starts from the solution of the quadratic program and keeps whichever costs less.
+    """
+
+    _solver_of: tuple[Any, ...] | None = None
+    gain: tuple[float, float] = (0.0, 0.0)
+    """Cost of the quadratic program's commands and of those found at the last call."""
+
+    def _solve(self, robot: RobotModel, start: FloatArray) -> FloatArray | None:
+        assert self.model is not None
+        quick = super()._solve(robot, start)
+        if quick is None:
+            quick = np.tile([robot.max_speed, 0.0], (self.config.moves, 1))
+        steps = steps_of(self.config, self.model.reach, robot.max_speed, self._held)
+        best = self._refined(robot, start, steps, quick)
+        self.value = self.gain[1]
+        self._solution_steps = steps
+        return best
+
+    def _refined(
+        self, robot: RobotModel, start: FloatArray, steps: FloatArray, commands: FloatArray
+    ) -> FloatArray:
+        """The best of commands (M, 2) and of what IPOPT makes of them."""
+        config, nominal = self.config, commands
+        value = self._assemble(robot, start, steps, nominal)
+        self.gain = (value, value)
+        units = np.array([robot.max_speed, robot.max_turn_rate])
+        low, high = bounds_of(robot, self._program.rows, config.moves, steps, self._last)
+        solver, changes = self._nonlinear(robot)
+        n, count = 2 * config.moves, 5 * config.horizon
+        best = nominal
+        for _ in range(_ROUNDS):
+            self._assemble(robot, start, steps, nominal)
+            places = self._places(robot, steps, nominal)
+            states = self._memory[4]
+            found = solver(
+                x0=np.concatenate([(nominal / units).T.ravel(), states[1:, :5].ravel()]),
+                p=np.concatenate([states[0, :5], steps, self._last / units, places.ravel()]),
+                lbx=np.concatenate([low[:n], np.full(count, -np.inf)]),
+                ubx=np.concatenate([high[:n], np.full(count, np.inf)]),
+                lbg=np.concatenate([np.zeros(count), low[n : n + changes]]),
+                ubg=np.concatenate([np.zeros(count), high[n : n + changes]]),
+            )
+            z = np.asarray(found["x"]).ravel()[:n]
+            if not np.isfinite(z).all():
+                break
+            z = np.clip(z, low[:n], high[:n])
+            nominal = np.ascontiguousarray(z.reshape(2, -1).T * units)
+            cost = self._assemble(robot, start, steps, nominal)
+            if cost < self.gain[1]:
+                best, self.gain = nominal, (value, cost)
+        return best
+
+    def _nonlinear(self, robot: RobotModel) -> tuple[Any, int]:
+        """The solver, and its number of constraints on changes of commands."""
+        assert self.model is not None
+        key = (self.model.contact, self._weights, robot, self.config)
+        if self._solver_of is None or self._solver_of[0] != key:
+            made = nonlinear_problem(
+                self.model.contact, self._weights, robot, self._groups, self.config.moves
+            )
+            self._solver_of = (key, made, self._program.rows - 2 * self.config.moves)
+        return self._solver_of[1], self._solver_of[2]
+
+    def _places(self, robot: RobotModel, steps: FloatArray, nominal: FloatArray) -> FloatArray:
+        """(N, 6) of each step: path x, y, heading, curvature; wanted speed and turn rate."""
+        assert self.model is not None
+        track, weights, states = self._track, self._weights, self._memory[4]
+        rows, place = [], self.along
+        contact = self.model.contact
+        at = _box_of(contact, states[0])
+        _, index, share = locate(track, at[0], at[1], place, place)
+        bend = errors(track, at[0], at[1], states[0, 2], index, share)[3]
+        for k, dt in enumerate(steps.tolist()):
+            wanted = min(float(track.speeds[index]), weights.max_speed)
+            wanted = min(wanted, max(float(track.lengths[-1]) - place, 0.0) / dt)
+            turn = min(max(wanted * bend, -robot.max_turn_rate), robot.max_turn_rate)
+            v = float(nominal[self._groups[k], 0])
+            at = _box_of(contact, states[k + 1])
+            theta = states[k + 1, 2] + states[k + 1, 4]
+            place, index, share = locate(track, at[0], at[1], place, place + 2.0 * v * dt + 1e-9)
+            lateral, _, heading, bend = errors(track, at[0], at[1], theta, index, share)
+            foot = [at[0] + lateral * np.sin(heading), at[1] - lateral * np.cos(heading)]
+            rows.append([*foot, heading, bend, wanted, turn])
+        return np.array(rows)
+
+
+def _box_of(contact: Contact, state: FloatArray) -> tuple[float, float]:
+    out = np.empty(3)
+    box_pose(contact, state, out)
+    return float(out[0]), float(out[1])
+
+
+def nonlinear_problem(
+    contact: Contact, weights: Weights, robot: RobotModel, groups: IntArray, moves: int
+) -> Any:
+    """The problem of `problem.assemble` with its states as variables, for CasADi's IPOPT."""
+    count = len(groups)
+    z = casadi.SX.sym("z", 2 * moves)
+    x = casadi.SX.sym("x", 5, count)
+    start, steps = casadi.SX.sym("start", 5), casadi.SX.sym("steps", count)
+    last, places = casadi.SX.sym("last", 2), casadi.SX.sym("places", 6, count)
+    units = (robot.max_speed, robot.max_turn_rate)
+    rate = units[1] * weights.length / weights.max_speed
+    cost: Any = 0.0
+    defects = []
+    for k in range(count):
+        g = int(groups[k])
+        v, w = z[g] * units[0], z[moves + g] * units[1]
+        before = start if k == 0 else x[:, k - 1]
+        defects.append(x[:, k] - step(contact, before, v, w, steps[k]))
+        tau = steps[k] * weights.max_speed / weights.length
+        factor = tau * (weights.terminal if k == count - 1 else 1.0)
+        cost += 0.5 * factor * _price(contact, weights, x[:, k], places[:, k], v, w)
+        cost += 0.5 * tau * weights.speed * (z[g] - places[4, k] / units[0]) ** 2
+        turn = places[5, k] / units[1]
+        cost += 0.5 * tau * weights.turn * rate**2 * (z[moves + g] - turn) ** 2
+        if k == 0 or groups[k - 1] != g:
+            old = (last[0], last[1]) if g == 0 else (z[g - 1], z[moves + g - 1])
+            calm = 0.5 * weights.smoothness / casadi.fmax(tau, 0.05)
+            cost += calm * (
+                SPEED_CALM * (z[g] - old[0]) ** 2 + rate**2 * (z[moves + g] - old[1]) ** 2
+            )
+    changes = []
+    for kind, limit in enumerate((robot.max_acceleration, robot.max_turn_acceleration)):
+        if np.isfinite(limit):
+            part = z[kind * moves : (kind + 1) * moves]
+            changes.append(part - casadi.vertcat(0.0, part[:-1]))
+    problem = {
+        "x": casadi.vertcat(z, casadi.vec(x)),
+        "p": casadi.vertcat(start, steps, last, casadi.vec(places)),
+        "f": cost,
+        "g": casadi.vertcat(*defects, *changes),
+    }
+    return casadi.nlpsol("push", "ipopt", problem, _SETTINGS)
+
+
+def _price(contact: Contact, weights: Weights, x: Any, place: Any, v: Any, w: Any) -> Any:
+    """Squares of the residuals of one step, see `problem.residuals`."""
+    ahead = _standoff(contact, x[3], x[4])[0]
+    c, s = casadi.cos(x[2]), casadi.sin(x[2])
+    dx, dy = x[0] + c * ahead - s * x[3] - place[0], x[1] + s * ahead + c * x[3] - place[1]
+    cp, sp = casadi.cos(place[2]), casadi.sin(place[2])
+    along = cp * dx + sp * dy
+    lateral = cp * dy - sp * dx - 0.5 * place[3] * along**2
+    error = x[2] + x[4] - place[2] - place[3] * along
+    turns = casadi.floor((error + np.pi) / (2.0 * np.pi))
+    error = error - 2.0 * np.pi * turns
+    share = x[3] / weights.half
+    beyond = casadi.fmax(casadi.fabs(share) - weights.safe, 0.0)
+    cost = (lateral / weights.length) ** 2 + weights.heading * error**2
+    cost += weights.offset * share**2 + weights.rim * beyond**2
+    cost += weights.angle * (x[4] - _flush(contact, x[3])) ** 2
+    if weights.curvature >= 0.0:
+        over = casadi.fmax(casadi.fabs(w) - weights.curvature * v, 0.0)
+        cost += weights.grip * (over * weights.length / weights.max_speed) ** 2
+    return cost
+
+
+def step(contact: Contact, x: Any, v: Any, w: Any, dt: Any) -> Any:
+    """`kernels.advance` of a box in contact, as an expression: (5,) state after ``dt``."""
+    h = dt / _SUBSTEPS
+    for _ in range(_SUBSTEPS):
+        offset, angle = x[3], x[4]
+        vn, vt, omega = _velocity(contact, offset, angle, v, w, h)
+        ahead = _standoff(contact, offset, angle)[0]
+        c, s = casadi.cos(angle), casadi.sin(angle)
+        half = 0.5 * w * h
+        chord = v * h * (1.0 - half**2 / 6.0 + half**4 / 120.0)
+        slid = offset + h * (vn * s + vt * c - w * ahead)
+        turned = angle + h * (omega - w)
+        if contact.bend >= 0.0:  # lies on the bumper before the step is over
+            flush = _flush(contact, slid)
+            before = angle - _flush(contact, offset)
+            over = casadi.logic_and(casadi.fabs(before) > FLUSH, before * (turned - flush) < 0.0)
+            turned = casadi.if_else(over, flush, turned)
+        x = casadi.vertcat(
+            x[0] + chord * casadi.cos(x[2] + half),
+            x[1] + chord * casadi.sin(x[2] + half),
+            x[2] + w * h,
+            slid,
+            turned,
+        )
+    return x
+
+
+def _line(contact: Contact, offset: Any) -> tuple[Any, Any]:
+    low = casadi.fmax(contact.low, -contact.half - offset)
+    return low, casadi.fmin(contact.high, contact.half - offset)
+
+
+def _flush(contact: Contact, offset: Any) -> Any:
+    if contact.bend <= 0.0:
+        return 0.0
+    low, high = _line(contact, offset)
+    return -contact.bend * (offset + 0.5 * (low + high)) / (1.0 - contact.bend * contact.depth)
+
+
+def _standoff(contact: Contact, offset: Any, angle: Any) -> tuple[Any, Any]:
+    c, s = casadi.cos(angle), casadi.sin(angle)
+    low, high = _line(contact, offset)
+    middle = 0.5 * (low + high)
+    if contact.bend < 0.0:
+        middle = (-s / (c * contact.bend) - offset + contact.depth * s) / c
+        middle = casadi.fmin(casadi.fmax(middle, low), high)
+    best: Any = None
+    at: Any = None
+    for y in (low, middle, high):
+        lateral = offset - contact.depth * s + y * c
+        x = contact.front + 0.5 * contact.bend * lateral**2 + contact.depth * c + y * s
+        if best is None:
+            best, at = x, y
+        else:
+            ahead = x > best + 1e-12
+            best, at = casadi.if_else(ahead, x, best), casadi.if_else(ahead, y, at)
+    return best, at
+
+
+def _corner(contact: Contact, y: Any, tilt: Any, un: Any, ut: Any, w: Any) -> tuple[Any, Any, Any]:
+    px, square = -contact.depth, contact.spread**2
+    cn, ct = un - w * y, ut + w * px
+    total = square + px**2 + y**2
+    vn = ((square + px**2) * cn + px * y * ct) / total
+    vt = (px * y * cn + (square + y**2) * ct) / total
+    nx, ny = casadi.cos(tilt), casadi.sin(tilt)
+    press, shear = vn * nx + vt * ny, vt * nx - vn * ny
+    ratio = contact.friction * casadi.if_else(shear > 0.0, 1.0, -1.0)
+    fx, fy = nx - ratio * ny, ny + ratio * nx
+    arm, lever = px * fy - y * fx, px * ny - y * nx
+    push = (cn * nx + ct * ny) / casadi.fmax(1.0 + arm * lever / square, 0.05)
+    sticks = casadi.logic_and(press > 0.0, casadi.fabs(shear) <= contact.friction * press)
+    pushed = cn * nx + ct * ny > 0.0
+    found = []
+    for stuck, slid in (
+        (vn, push * fx),
+        (vt, push * fy),
+        ((px * vt - y * vn) / square, push * arm / square),
+    ):
+        found.append(casadi.if_else(pushed, casadi.if_else(sticks, stuck, slid), 0.0))
+    return found[0], found[1], found[2]
+
+
+def _velocity(
+    contact: Contact, offset: Any, angle: Any, v: Any, w: Any, dt: Any
+) -> tuple[Any, Any, Any]:
+    """`kernels.contact_velocity` as expressions."""
+    ahead, touch = _standoff(contact, offset, angle)
+    c, s = casadi.cos(angle), casadi.sin(angle)
+    ux, uy = v - w * offset, w * ahead
+    un, ut = c * ux + s * uy, c * uy - s * ux
+    if contact.bend < 0.0:
+        return _corner(contact, touch, 0.0, un, ut, w)
+    low, high = _line(contact, offset)
+    bend, a, square = contact.bend, contact.depth, contact.spread**2
+    slope, grip = -bend / (1.0 - bend * a), 1.0 - bend * a
+    closing = w - (angle - _flush(contact, offset)) / dt
+    normal = un + (closing - w) * touch
+    pressed = casadi.fmax(normal, 0.0)
+    shear = ut * grip - bend * square * closing
+    slips = casadi.fabs(shear) > contact.friction * pressed
+    ratio = contact.friction * casadi.if_else(shear > 0.0, 1.0, -1.0)
+    slid = (ratio * pressed + bend * square * (closing - slope * ut)) / (
+        grip - bend * square * slope
+    )
+    vt = casadi.if_else(slips, slid, ut)
+    omega = casadi.if_else(slips, closing + slope * (slid - ut), closing)
+    moment = -(square * omega + a * vt)  # centre of pressure times normal force
+    above = casadi.if_else(normal > 1e-12, moment > high * normal, omega < 0.0)
+    below = casadi.if_else(normal > 1e-12, moment < low * normal, omega >= 0.0)
+    y = casadi.if_else(above, high, low)
+    end = casadi.if_else(above, contact.high, contact.low)
+    lateral = offset - a * s + y * c
+    tilt = casadi.if_else(casadi.fabs(y - end) < 1e-12, -bend * lateral - angle, 0.0)
+    point = _corner(contact, y, tilt, un, ut, w)
+    off_line = casadi.logic_or(above, below)
+    line = (normal, vt, omega)
+    found = [casadi.if_else(off_line, p, q) for p, q in zip(point, line, strict=True)]
+    return found[0], found[1], found[2]
