@@ -48,6 +48,7 @@ MAZE = ("straight", "geometric-rrt", "kinodynamic-rrt", "push-aware")
 SHIP = (
     "skeleton",
     "ship-lattice",
+    "ship-lattice-quick",
     "ship-lattice-published",
     "ship-predictive",
     "ship-predictive-network",
@@ -236,6 +237,8 @@ def main() -> None:
     parser.add_argument("--growth", action="store_true", help="memory instead of deadlines")
     parser.add_argument("--controllers", action="store_true", help="with --growth: them as well")
     options = parser.parse_args()
+    if options.calls is not None and options.calls < 10:
+        parser.error(f"calls must be at least 10, got {options.calls}")
     if options.growth:
         memory(options.planners, options.calls or 100_000, options.controllers)
     else:

@@ -43,6 +43,8 @@ class IceNetwork:
     def __init__(self, path: str | Path | None = None, *, threads: int = 1) -> None:
         self.path = Path(str(resources.files("pushplan.interaction") / "weights" / SHIPPED))
         if path is not None:
+            if not isinstance(path, (str, Path)):
+                raise InvalidInputError(f"path must be that of a file, got {path!r}")
             self.path = Path(path)
         self.threads = integer("threads", threads, low=1)
 
@@ -51,7 +53,14 @@ class IceNetwork:
 
     def load(self) -> None:
         """Read the weights now; otherwise the first prediction does."""
-        _session(self.path, self.threads)
+        self._session()
+
+    def _session(self) -> Any:
+        try:
+            changed = self.path.stat().st_mtime_ns
+        except OSError:
+            changed = 0  # the message of what reads it says more
+        return _session(self.path, self.threads, changed)
 
     def predict(self, batch: PassageBatch) -> OccupancyForecast:
         """See `OccupancyPredictor.predict`; only the patches of the batch are used."""
@@ -70,7 +79,7 @@ class IceNetwork:
         Raises:
             InvalidInputError: if the network does not give numbers.
         """
-        session = _session(self.path, self.threads)
+        session = self._session()
         parts = [
             session.run(["after", "work"], {"patches": patches[i : i + _GREATEST_BATCH]})
             for i in range(0, len(patches), _GREATEST_BATCH)
@@ -85,8 +94,8 @@ class IceNetwork:
 
 
 @functools.lru_cache(maxsize=4)
-def _session(path: Path, threads: int) -> Any:
-    """An ONNX Runtime session, checked; one per file and process."""
+def _session(path: Path, threads: int, changed: int) -> Any:
+    """An ONNX Runtime session, checked; one for each state of a file in a process."""
     try:
         import onnxruntime
     except ImportError as error:

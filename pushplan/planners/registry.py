@@ -15,13 +15,15 @@ PLANNERS: dict[str, str] = {
     "push-aware": "pushplan.planners.push_aware:PushAware",
     "skeleton": "pushplan.planners.skeleton:Skeleton",
     "ship-lattice": "pushplan.planners.lattice.ship:ShipLattice",
+    "ship-lattice-quick": "pushplan.planners.lattice.ship:quick",
     "ship-lattice-published": "pushplan.planners.lattice.ship:published",
     "ship-predictive": "pushplan.planners.predictive:PredictiveShip",
     "ship-predictive-network": "pushplan.planners.predictive:PredictiveShipNetwork",
+    "ship-predictive-published": "pushplan.planners.predictive:PredictivePublished",
 }
 """Name -> "module:Class"; each is constructed without arguments by default."""
 
-OPEN_WATER = ("ship-predictive", "ship-predictive-network")
+OPEN_WATER = ("ship-predictive", "ship-predictive-network", "ship-predictive-published")
 """Planners that go to a goal line through water without obstacles, and nowhere else."""
 
 POLICIES: dict[str, str] = {
@@ -29,14 +31,18 @@ POLICIES: dict[str, str] = {
     "geometric-rrt": "pushplan.planners.policies:geometric_rrt",
     "kinodynamic-rrt": "pushplan.planners.policies:kinodynamic_rrt",
     "push-aware": "pushplan.planners.policies:push_aware",
-    "push-aware-stopping": "pushplan.planners.policies:push_aware_stopping",
+    "push-aware-constant-speed": "pushplan.planners.policies:push_aware_constant_speed",
     "skeleton": "pushplan.planners.skeleton:skeleton",
     "ship-lattice": "pushplan.planners.lattice.policy:ship_lattice",
+    "ship-lattice-quick": "pushplan.planners.lattice.policy:ship_lattice_quick",
     "ship-lattice-published": "pushplan.planners.lattice.policy:ship_lattice_published",
     "ship-predictive": "pushplan.planners.policies:ship_predictive",
     "ship-predictive-network": "pushplan.planners.policies:ship_predictive_network",
+    "ship-predictive-published": "pushplan.planners.policies:ship_predictive_published",
     "random": "pushplan.planners.policy:RandomTwist",
     "greedy": "pushplan.planners.greedy:GreedyPusher",
+    "gtsp": "pushplan.planners.subtasks:Gtsp",
+    "gtsp-mpc": "pushplan.planners.subtasks:GtspMpc",
 }
 """Name -> "module:callable" that makes a policy."""
 

@@ -8,6 +8,8 @@ import numpy as np
 
 from pushplan.planners.policy import policy_for
 from pushplan.planners.registry import OPEN_WATER, make_planner, planner_names
+from pushplan.planners.sequencing import warm_up_solver
+from pushplan.planners.subtasks.warming import warm_up_subtasks
 from pushplan.world import (
     Drive,
     GoalDisc,
@@ -48,11 +50,14 @@ def warm_up(*names: str) -> None:
         static=StaticMap.build(bounds=[0.0, 0.0, 10.0, 10.0]),
         goal=GoalLine(np.array([8.0, 5.0]), np.array([1.0, 0.0])),
     )
+    if not names:
+        warm_up_solver()
+        warm_up_subtasks()
     for name in names or planner_names():
-        world = water if name in OPEN_WATER else room
+        world, enough = (water, 30) if name in OPEN_WATER else (room, 600)
         planner = make_planner(name)
-        planner.plan(world, stop=MaxIterations(600))
+        planner.plan(world, stop=MaxIterations(enough))
         policy = policy_for(planner)
-        policy.stop = MaxIterations(600)
+        policy.stop = MaxIterations(enough)
         for step in range(3):
             policy.act(world.moved(time=0.1 * step))

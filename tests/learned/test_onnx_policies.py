@@ -23,6 +23,7 @@ from pushplan.evaluation.policies import policy_names
 from pushplan.learned import OnnxPolicy, learned_names, load_policy, onnx_session
 from pushplan.learned.onnx_policy import read_specification
 from pushplan.learned.outputs import ActionSpec, BadOutputError
+from pushplan.learned.shipped import weights_of
 from pushplan.scenarios import Scenario
 from pushplan.world import InvalidInputError, UnknownNameError
 
@@ -110,6 +111,17 @@ class TestGood:
         assert set(learned_names()) <= set(policy_names())
         assert read_specification(path) == maze_specification()
 
+    @pytest.mark.parametrize("name", learned_names())
+    def test_what_ships_is_small_and_says_what_it_is(self, name):
+        path = weights_of(name)
+        assert path.stat().st_size <= 2 * 2**20
+        card = path.with_suffix(".md").read_text(encoding="utf-8")
+        assert "## Scores" in card and "Not scored" not in card
+        policy = load_policy(name)
+        assert policy.specification.tasks and policy.label == name
+        seen = np.zeros(policy.observation.shape, policy.observation.dtype)
+        assert len(policy.specification.action.read(policy.decide(seen)))
+
     def test_bench_compares_it(self, tmp_path):
         path = turning(tmp_path / "turn.onnx", 0.0)
         results = bench("maze-2d-3", [f"onnx:{path}", "straight"], episodes=2, workers=0)
@@ -155,7 +167,7 @@ class TestHostile:
         self.refused(tmp_path / "no.onnx", "no such file")
         with pytest.raises(InvalidInputError, match="there is no file"):
             parse_policy(f"onnx:{tmp_path / 'no'}")
-        with pytest.raises(InvalidInputError, match="there is no file"):
+        with pytest.raises(InvalidInputError, match="the file is missing"):
             load_policy("onnx:")
         with pytest.raises(UnknownNameError):
             load_policy("maze-nothing")

@@ -36,6 +36,7 @@ from pushplan.world import (
     Movables,
     PlanStatus,
     Receptacle,
+    RobotModel,
     StaticMap,
     World,
 )
@@ -169,7 +170,7 @@ def test_the_bound_holds_for_every_plan_of_a_long_run(drive):
 def test_the_turning_bound_is_below_every_dubins_path(x, y, theta, radius, size):
     goal, pose = GoalDisc([x, y], size), np.array([0.0, 0.0, theta])
     bound = turning_length(pose, goal, radius)
-    assert bound >= goal.distance(0.0, 0.0) - 0.02 * radius
+    assert bound >= goal.distance(0.0, 0.0) - 1e-3 * (goal.distance(0.0, 0.0) + size)
     pieces, shortest = np.empty((3, 2)), np.inf
     for around in np.linspace(0.0, 2.0 * np.pi, 13):
         for heading in np.linspace(-np.pi, np.pi, 13):
@@ -177,6 +178,75 @@ def test_the_turning_bound_is_below_every_dubins_path(x, y, theta, radius, size)
             shortest = min(shortest, dubins(pose, np.array(end), radius, pieces))
     if goal.distance(0.0, 0.0) > 0.0:
         assert bound <= shortest + 1e-9
+
+
+def test_the_bound_knows_that_a_robot_must_turn_round():
+    goal, radius = GoalDisc([10.0, 0.0], 1.0), 4.0
+    ahead = turning_length(np.array([0.0, 0.0, 0.0]), goal, radius)
+    away = turning_length(np.array([0.0, 0.0, np.pi]), goal, radius)
+    assert ahead == pytest.approx(9.0, abs=0.01)
+    assert away > ahead + 0.9 * np.pi * radius
+    assert turning_length(np.array([10.0, 0.5, 0.0]), goal, radius) == 0.0
+    line = GoalLine(np.array([3.0, 0.0]), np.array([1.0, 0.0]))
+    assert turning_length(np.array([0.0, 0.0, np.pi]), line, radius) == pytest.approx(
+        np.pi * radius + 3.0
+    )
+
+
+@pytest.mark.parametrize("drive", ["constant_speed", "differential"])
+def test_the_bound_holds_in_a_corridor_of_the_robots_own_width(drive):
+    corners = 0.5 * np.array([[1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0], [1.0, -1.0]])
+    robot = RobotModel.from_outline(
+        corners, mass=1.0, drive=drive, max_speed=0.5, max_turn_rate=0.5
+    )
+    walls = [
+        np.array([[4.0, y], [14.0, y], [14.0, y + 2.0], [4.0, y + 2.0]])
+        for y in (5.5 + 1e-6, 2.5 - 1e-6)
+    ]
+    world = World(
+        robot=robot,
+        robot_pose=[7.0, 5.0, 0.0],
+        static=StaticMap.build(polygons=walls, bounds=[0.0, 0.0, 24.0, 10.0]),
+        movables=Movables.empty(),
+        goal=GoalDisc([19.0, 5.0], 0.3),
+    )
+    result = PushAware().plan(world, stop=MaxIterations(2500))
+    assert result.status is PlanStatus.SOLVED
+    assert result.stats.detail["gap"] >= 0.0
+    assert lower_bound(world) > 11.0
+
+
+def test_thin_posts_are_not_missed_where_the_robot_starts_at_a_wall():
+    diamond = np.array([[0.5, 0.0], [0.0, 0.5], [-0.5, 0.0], [0.0, -0.5]])
+    robot = RobotModel.from_outline(
+        diamond, mass=1.0, drive="constant_speed", max_speed=0.3, max_turn_rate=0.3
+    )
+    behind = np.array([[1.2, 4.0], [1.5 - 1e-6, 4.0], [1.5 - 1e-6, 6.0], [1.2, 6.0]])
+    post = 0.01 * np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
+    solved = 0
+    for seed in range(12):
+        places = generator(seed).uniform(1.0, 9.0, (10, 2))
+        posts = [place + post for place in places if np.hypot(*(place - [2.0, 5.0])) > 1.2]
+        world = World(
+            robot=robot,
+            robot_pose=[2.0, 5.0, 0.0],
+            static=StaticMap.build(polygons=[*posts, behind], bounds=[0.0, 0.0, 10.0, 10.0]),
+            movables=Movables.empty(),
+            goal=GoalDisc([9.0, 5.0], 0.4),
+        )
+        result = PushAware().plan(world, stop=MaxIterations(1500), rng=generator(seed))
+        if result.plan is None:
+            continue
+        solved += 1
+        hit = unary_union([Polygon(one) for one in posts])
+        between, poses, plan = np.empty(3), result.plan.poses, result.plan
+        for n, span in enumerate(np.diff(plan.times)):
+            for share in (0.0, 0.5):
+                length = plan.speeds[n] * span * share
+                along_arc(poses[n], length, plan.turn_rates[n] / plan.speeds[n], between)
+                cut = Polygon(transform(between, diamond)).intersection(hit).area
+                assert cut < 0.2 * 4e-4
+    assert solved > 4
 
 
 def test_the_random_tree_alone_gets_there_under_a_bound():

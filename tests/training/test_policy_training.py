@@ -476,7 +476,7 @@ class TestCommands:
             (["sam", "--task", "maze"], "unknown training configuration 'maze-sam'"),
             (["ppo", "--config", "no.yaml"], "no configuration no.yaml"),
             (["ppo", "--config", "no.yaml", "--variant", "image"], "--variant belongs to --task"),
-            (["bc", "--task", "maze"], "bc needs one"),
+            (["bc", "--task", "maze"], "bc needs a data set"),
         ):
             assert main(["train", *call, "--out", out]) != 0
             assert message in capsys.readouterr().err

@@ -29,6 +29,11 @@ from pushplan.planners.polyline import polyline_plan
 from pushplan.world import Drive, Plan, PlanStatus, StopCheck, World
 from pushplan.world.checks import FloatArray
 
+_THIN_MARGIN = 0.05
+"""Margin below which a post could hide between two poses of the usual spacing [R]."""
+_LEAST_SPACING = 0.02
+"""Least spacing for that reason [R]."""
+
 
 class Search:
     """One planning call: trees, their paths, and the best path so far."""
@@ -81,8 +86,7 @@ class Search:
         margin = start_margin(self.world, self.config.margin * self.size)
         if margin is None:
             return PlanStatus.START_BLOCKED
-        self.margin = margin
-        self.shape = footprint(self.world.robot, margin)
+        self._set_margin(margin)
         if self.goal.distance(*self.world.robot_pose[:2]) <= 0.0:
             here = make_path(1, len(self.world.movables))
             here.poses[0] = self.world.robot_pose
@@ -96,6 +100,16 @@ class Search:
             if not self._solved(self.best_cost):
                 self._relax()
         return PlanStatus.SOLVED if self._solved(self.best_cost) else None
+
+    def _set_margin(self, margin: float) -> None:
+        """Keep ``margin`` [m] from walls; with little of it poses lie closer, for what is thin."""
+        self.margin = margin
+        self.shape = footprint(self.world.robot, margin)
+        spacing = self.config.spacing * self.size
+        if margin < _THIN_MARGIN * self.size:
+            spacing = min(spacing, max(2.0 * margin, _LEAST_SPACING * self.size))
+        self.pricing = self.pricing._replace(spacing=spacing)
+        self.limits = replace(self.limits, spacing=spacing)
 
     def _jam_length(self) -> float:
         """A length [m] that no path without a jam comes near."""
@@ -146,14 +160,13 @@ class Search:
         self.rounds += 1
         if self.rounds < 2:
             return
-        self.margin = 0.4 * self.margin if self.margin > 0.01 * self.size else 0.0
+        self._set_margin(0.4 * self.margin if self.margin > 0.01 * self.size else 0.0)
         radius = self.world.robot.turning_radius
         if self.world.robot.drive is Drive.DIFFERENTIAL:
             radius = 0.5 * self.pricing.radius
         radius = max(radius, TIGHTEST * self.size)
         self.pricing = self.pricing._replace(radius=radius)
         self.limits = replace(self.limits, max_curvature=1.0 / radius)
-        self.shape = footprint(self.world.robot, self.margin)
 
     def _grow(self, push_weight: float, budget: int) -> _Candidate | None:
         """The path of a new tree; an infinite weight treats objects as obstacles."""

@@ -230,11 +230,6 @@ class AStar:
         """Cost of the path to the goal, infinite before it is reached."""
         return float(self.state.costs[self.goal]) if self.goal >= 0 else float("inf")
 
-    def discard_goal(self) -> None:
-        """Close the goal that was reached, so that `run` goes on to the next best one."""
-        take(self.state)
-        self.state.counters[GOAL] = -1
-
     def path(self, node: int | None = None) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
         """Nodes from a start to ``node``, by default the goal, and the labels of the edges.
 

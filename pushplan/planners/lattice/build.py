@@ -136,10 +136,6 @@ class LatticeBuilder:
         far = self.ahead + beyond + behind
         return min(behind, -low[0]), math.ceil(self.ahead) + beyond, far
 
-    def fits(self) -> bool:
-        """Whether the lattice is of a size that can be searched."""
-        return bool(self.rows * self.columns * self.config.headings <= 4 * _MOST_NODES)
-
     def build(self, factor: float = 1.0) -> BuiltLattice:
         """The lattice, with a factor on all prices."""
         if self._common is None:
@@ -149,6 +145,8 @@ class LatticeBuilder:
             sums = factor * sums
         lengths, costs = self._guide(sums, lattice)
         lattice = lattice._replace(price_sums=sums.ravel(), row_bounds=lengths, place_costs=costs)
+        if not sums.any():  # inflated, lane changes would come first where nothing is to avoid
+            lattice = lattice._replace(inflation=1.0)
         start = (*self.start, self.heading)
         return BuiltLattice(lattice, self.frame, self.motions, start, self.arrives)
 

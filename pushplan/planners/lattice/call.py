@@ -9,6 +9,7 @@ import numpy as np
 
 from pushplan.interaction import InteractionModel
 from pushplan.planners.kinodynamic.collision import first_blocked, footprint, is_free, obstacles
+from pushplan.planners.kinodynamic.guide import reachable
 from pushplan.planners.kinodynamic.improve import Path
 from pushplan.planners.kinodynamic.timing import timed_plan, turning_radius
 from pushplan.planners.lattice.astar import FOUND, PAUSED
@@ -81,7 +82,8 @@ class ShipCall:
                     self._improve(builder)
                 assert self.built is not None
                 return PlanStatus.SOLVED if self.built.arrives else PlanStatus.APPROXIMATE
-        return PlanStatus.GOAL_UNREACHABLE
+        # the lattice is coarse: where it leads nowhere there may be a way nevertheless
+        return None if reachable(world) else PlanStatus.GOAL_UNREACHABLE
 
     def _limits(self) -> list[tuple[float, float]]:
         """Shares of the turn rate and distances from the bounds [m] to try, one after the other."""
@@ -158,16 +160,14 @@ class ShipCall:
         )
         self._consider(self.poses, self.curvatures)
         for factor in config.searches[1:]:
-            if self.stopped() or len(world.movables) == 0:
+            if self.stopped():
                 return
             self._search(builder, factor)
         if self.improver.best is None or not isinstance(self.goal, GoalLine):
             return
         if config.refinement and not self.stopped():
             self._refine(builder)
-        while self.repairs < config.repairs and self.improver.best.works[-1] > 0.0:
-            if self.stopped():
-                return
+        while self.repairs < config.repairs and not self.stopped():
             self.improver.repair(self.rng)
             self.repairs += 1
             self.iterations += 1

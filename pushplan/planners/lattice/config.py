@@ -92,8 +92,9 @@ class ShipLatticeConfig:
         number("inflation", self.inflation, low=1.0)
         for name in ("repairs", "refinement"):
             integer(name, getattr(self, name), low=0)
-        if not self.searches:
-            raise InvalidInputError("searches must hold at least one factor, got none")
+        if not isinstance(self.searches, (tuple, list)) or len(self.searches) == 0:
+            raise InvalidInputError(f"searches must be one factor or more, got {self.searches!r}")
+        object.__setattr__(self, "searches", tuple(self.searches))
         for factor in self.searches:
             number("searches", factor, low=0.0)
         PrimitiveConfig(self.headings, 1.0, self.variants, self.shifts)

@@ -45,6 +45,7 @@ def floe_prices(world: World, config: ShipLatticeConfig, cell: float) -> FloePri
         cell: side of a cell of the map [m].
     """
     floes, robot = world.movables, world.robot
+    half = max(robot.inscribed_radius, 0.1 * robot.circumscribed_radius)
     areas = areas_and_centroids(floes.vertices, floes.offsets)[0]
     radii = np.sqrt(areas / np.pi)
     if config.price == "kinetic-energy":
@@ -55,9 +56,9 @@ def floe_prices(world: World, config: ShipLatticeConfig, cell: float) -> FloePri
         # the mean of 1 - d²/(r + 1/2)² over a disc of r cells
         cells = radii / cell
         mean = 1.0 - 0.5 * (cells / (cells + 0.5)) ** 2
-        middle = config.collision_weight * energy / (0.5 * ship) * cell / robot.inscribed_radius
+        middle = config.collision_weight * energy / (0.5 * ship) * cell / half
         soft = float(np.mean((1.0 + 0.5 / np.maximum(cells, 0.1)) ** 2 - 1.0))
         return FloePrices(middle * mean * areas / cell**2, areas, soft)
-    pushed = config.displacement * (robot.inscribed_radius + radii)
+    pushed = config.displacement * (half + radii)
     weight = config.push_weight / robot.mass
     return FloePrices(weight * floes.masses * pushed, areas, 0.05)

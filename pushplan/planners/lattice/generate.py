@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 
 from pushplan.planners.lattice.primitives import PrimitiveConfig, generate
+from pushplan.world.errors import InvalidInputError
 
 SHIPPED = (PrimitiveConfig(8, 6.0, 1, 0), PrimitiveConfig(16, 6.0), PrimitiveConfig(16, 19.0))
 """The sets that ship with pushplan; others are made when they are needed."""
@@ -36,7 +37,10 @@ def main(arguments: list[str] | None = None) -> int:
     options = parser.parse_args(arguments)
     names = ("headings", "radius", "variants", "shifts")
     given = {name: getattr(options, name) for name in names if getattr(options, name) is not None}
-    configs = SHIPPED if options.shipped else (PrimitiveConfig(**given),)
+    try:
+        configs = SHIPPED if options.shipped else (PrimitiveConfig(**given),)
+    except InvalidInputError as error:
+        parser.error(str(error))
     options.out.mkdir(parents=True, exist_ok=True)
     for config in configs:
         sys.stdout.write(f"{write(config, options.out)}\n")

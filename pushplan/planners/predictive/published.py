@@ -46,8 +46,8 @@ class PredictivePublished:
     the patch of occupancy around it, plus its length [m for a ship of 2 m]; the predicted map is
     carried at each node, and all edges from a node are predicted in one call. The heuristic is the
     length of the Dubins path to the line. Networks, weights and data of the paper are not public:
-    the network is ours, the lattice that of `ShipLatticeConfig.published`. Nothing but the cheapest
-    path is ever found, so that a deadline that comes before ends without a plan.
+    the network is ours, the lattice that of `ShipLatticeConfig.published`. A path is
+    there only when the search ends, so that a deadline that comes before ends without a plan.
 
     Args:
         change_weight: factor on the mean squared change.

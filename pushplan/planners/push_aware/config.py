@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from pushplan.planners.kinodynamic import KinodynamicRRTConfig
+from pushplan.planners.kinodynamic.timing import TIGHTEST
 from pushplan.world.checks import integer, number
 
 
@@ -28,7 +29,8 @@ class PushAwareConfig(KinodynamicRRTConfig):
         curvatures: how many curvatures an edge may have, spread evenly between the sharpest turns.
         nodes: nodes of one search at most.
         memory: of the objects' poses in one search at most [MiB].
-        expansions: arcs driven between two looks at the stop rule, fewer among many objects.
+        expansions: half the arcs driven at most between two looks at the stop rule, fewer among
+            many objects.
         first_search: arcs driven in a search at most; a quarter more after each that took them
             all.
         slack: how much more than the best plan so far a path of the search may cost before it is
@@ -60,8 +62,9 @@ class PushAwareConfig(KinodynamicRRTConfig):
         super().__post_init__()
         for name in ("greed", "trust", "slack", "doubt", "random_share"):
             number(name, getattr(self, name), low=0.0)
-        for name in ("arc", "memory", "differential_radius"):
+        for name in ("arc", "memory"):
             number(name, getattr(self, name), low=0.0, open_low=True)
+        number("differential_radius", self.differential_radius, low=TIGHTEST)
         integer("curvatures", self.curvatures, low=3)
         integer("nodes", self.nodes, low=2)
         for name in ("expansions", "first_search"):

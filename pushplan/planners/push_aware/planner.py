@@ -83,7 +83,7 @@ class PushAware:
         }
         if status.has_plan:
             detail["cost"], detail["bound"] = float(search.best_cost), bound
-            detail["gap"] = float(search.best_cost) / bound - 1.0 if bound > 0.0 else 0.0
+            detail["gap"] = _gap(float(search.best_cost), bound)
         stats = PlanStats(
             wall_time_s=time.perf_counter() - began,
             first_solution_s=search.first_solution_s,
@@ -92,3 +92,10 @@ class PushAware:
             detail=detail,
         )
         return PlanResult(status, search.plan() if status.has_plan else None, stats)
+
+
+def _gap(cost: float, bound: float) -> float:
+    """By what share a cost exceeds a bound; infinite where the bound says nothing."""
+    if cost <= bound or bound <= 0.0:
+        return 0.0 if cost <= bound else float("inf")
+    return cost / bound - 1.0

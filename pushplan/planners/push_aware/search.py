@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pushplan.interaction import QuasiStatic
-from pushplan.planners.kinodynamic.collision import first_blocked, footprint
+from pushplan.planners.kinodynamic.collision import first_blocked
 from pushplan.planners.kinodynamic.dubins import step_along
 from pushplan.planners.kinodynamic.improve import lay_out, make_path, price_from
 from pushplan.planners.kinodynamic.search import Search, _Candidate
@@ -95,8 +95,7 @@ class PushAwareSearch(Search):
         margin = start_margin(self.world, self.config.margin * self.size)
         if margin is None:
             return PlanStatus.START_BLOCKED
-        self.margin = margin
-        self.shape = footprint(self.world.robot, margin)
+        self._set_margin(margin)
         if self.goal.distance(*self.world.robot_pose[:2]) <= 0.0:
             here = make_path(1, len(self.world.movables))
             here.poses[0] = self.world.robot_pose

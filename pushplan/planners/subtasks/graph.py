@@ -1,0 +1,209 @@
+"""`SubTaskGraph`: candidate pushes, what they cover, and what lies between them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from pushplan.planners.subtasks import lattice
+from pushplan.planners.subtasks.candidates import (
+    area_pushes,
+    collecting_pushes,
+    guided_pushes,
+)
+from pushplan.planners.subtasks.hard import freeing_pushes, swinging_pushes
+from pushplan.planners.subtasks.push import Push, signature
+from pushplan.planners.subtasks.runner import Runner
+from pushplan.planners.subtasks.scene import Ground, Scene
+from pushplan.world import ClearanceArea
+from pushplan.world.checks import FloatArray, IntArray
+
+_FREED = 2
+"""How many objects, the nearest ones, freeing pushes are looked for at a time."""
+
+
+@dataclass(frozen=True, eq=False)
+class Approach:
+    """Cheapest ways of the robot from where it is to every pose of the lattice.
+
+    Args:
+        costs: (16 * rows * columns,) [m].
+        before: the pose before each, -1 for none.
+    """
+
+    costs: FloatArray
+    before: IntArray
+
+
+@dataclass(frozen=True, eq=False)
+class SubTaskGraph:
+    """The pushes of one scene with their costs.
+
+    Args:
+        pushes: N candidates.
+        costs: (N + 1, N) cost [m] of each push after each other, approach included; the last row
+            from where the robot is. inf where there is no way.
+        approach: from where the robot is.
+        infeasible: why there is no push for an object, by id.
+    """
+
+    pushes: tuple[Push, ...]
+    costs: FloatArray
+    approach: Approach
+    infeasible: dict[int, str]
+
+
+def build_graph(
+    scene: Scene,
+    penalties: dict[tuple[object, ...], float] | None = None,
+    *,
+    freeing: bool = False,
+) -> SubTaskGraph:
+    """Make the candidate pushes of a scene and price them.
+
+    Args:
+        scene: the scene.
+        penalties: what to add to the price of a push, by `signature` [m].
+        freeing: whether pushes that only free an object are wanted too; where there are no others
+            they are in any case.
+    """
+    approach = approach_from(scene)
+    runner = Runner(scene)
+    pushes = candidate_pushes(scene, runner, freeing)
+    looked = [arrival_poses(scene.fine, push.start) for push in pushes]
+    row = _arrivals(scene.fine, approach.costs, looked)
+    extra = np.array([(penalties or {}).get(signature(push), 0.0) for push in pushes])
+    pushes, keep = _best(scene, pushes, row + extra)
+    row = row[keep]
+    prices = np.array([push.price for push in pushes]) + extra[keep]
+    costs = _between(scene, pushes)
+    costs = np.vstack([costs, row[None]]) + prices[None] if len(pushes) else np.zeros((1, 0))
+    covered = {i for n, push in enumerate(pushes) if np.isfinite(row[n]) for i in push.serves}
+    infeasible = {
+        int(i): "no push for it was found that the robot can get to"
+        for i in scene.world.movables.ids[~scene.done].tolist()
+        if i not in covered
+    }
+    return SubTaskGraph(tuple(pushes), costs, approach, infeasible)
+
+
+def candidate_pushes(scene: Scene, runner: Runner, freeing: bool = False) -> list[Push]:
+    """All candidates of a scene; ``freeing`` see `build_graph`."""
+    left = runner.left.tolist()
+    pushes: list[Push] = []
+    if isinstance(scene.world.goal, ClearanceArea):
+        pushes += area_pushes(runner)
+        covered = {i for push in pushes for i in push.covers}
+        ids = scene.world.movables.ids
+        hard = [k for k in left if int(ids[k]) not in covered]
+        pushes += guided_pushes(runner, hard)
+    else:
+        pushes += guided_pushes(runner, left)
+        pushes += collecting_pushes(runner, left)
+    if freeing or not pushes:  # what is hard to get at is often freed by what is done before
+        freed = 0
+        away = np.hypot(*(scene.poses[:, :2] - scene.world.robot_pose[:2]).T)
+        for k in sorted(left, key=lambda k: (float(away[k]), k)):
+            found = freeing_pushes(runner, k) or swinging_pushes(runner, k)
+            pushes += found
+            freed += bool(found)
+            if freed == _FREED:
+                break
+    return pushes
+
+
+def approach_from(scene: Scene, led: int = -1) -> Approach:
+    """Cheapest ways from where the robot is.
+
+    Args:
+        scene: the scene.
+        led: index of an object that is not to be moved on the way; -1 if none.
+    """
+    return _search(scene, scene.fine, scene.world.robot_pose, led=led)
+
+
+def _search(
+    scene: Scene,
+    ground: Ground,
+    pose: FloatArray,
+    share: float = 1.0,
+    without: IntArray | None = None,
+    led: int = -1,
+) -> Approach:
+    for reach in (1.5, 4.0):
+        starts, costs = lattice.near_poses(ground.floor, pose, reach)
+        if len(starts):
+            break
+    best, before = lattice.search_poses(
+        starts,
+        costs,
+        ground.floor,
+        *ground.contacts(share, without, led),
+        lattice.MOVES,
+        lattice.LENGTHS,
+        lattice.TURNS,
+        scene.config.turn_price * scene.size,
+        lattice.ARM * scene.size,
+    )
+    return Approach(best, before)
+
+
+def _arrivals(
+    ground: Ground, costs: FloatArray, looked: Sequence[tuple[IntArray, FloatArray]]
+) -> FloatArray:
+    """(N,) cost of getting to each of some places."""
+    return np.array(
+        [float((costs[nodes] + extra).min()) if len(nodes) else np.inf for nodes, extra in looked]
+    )
+
+
+def arrival_poses(ground: Ground, start: FloatArray) -> tuple[IntArray, FloatArray]:
+    """Lattice poses from which the start of a push is reached, and what the rest costs [m]."""
+    floor = ground.floor
+    u = np.array([np.cos(start[2]), np.sin(start[2]), 0.0])
+    nodes, extra = lattice.near_poses(floor, start - 0.7 * floor.step * u, 1.3)
+    if not len(nodes):
+        nodes, extra = lattice.near_poses(floor, start, 2.0)
+    return nodes, extra
+
+
+def _best(scene: Scene, pushes: Sequence[Push], row: FloatArray) -> tuple[list[Push], list[int]]:
+    """The best few pushes for each object, of those that the robot can get to."""
+    keep: set[int] = set()
+    order = sorted(
+        (n for n in range(len(pushes)) if np.isfinite(row[n])),
+        key=lambda n: (pushes[n].price / max(1, len(pushes[n].covers)), n),
+    )
+    near = sorted(order, key=lambda n: (row[n] + pushes[n].price) / max(1, len(pushes[n].covers)))
+    ids = scene.world.movables.ids[~scene.done].tolist()
+    count = min(scene.config.per_box, max(2, scene.config.most // max(1, len(ids))))
+    for i in ids:
+        mine = [n for n in order if i in pushes[n].serves]
+        keep.update(mine[:count])
+        keep.update([n for n in near if i in pushes[n].serves][: count // 2])
+    index = sorted(keep)
+    return [pushes[n] for n in index], index
+
+
+def _between(scene: Scene, pushes: Sequence[Push]) -> FloatArray:
+    """(N, N) cost of the approach from the end of each push to the start of each other [m]."""
+    ground, ids = scene.coarse, scene.world.movables.ids
+    looked = [arrival_poses(ground, push.start) for push in pushes]
+    out = np.full((len(pushes), len(pushes)), np.inf)
+    known: dict[tuple[object, ...], FloatArray] = {}
+    step = 2.0 * ground.floor.step
+    for n, push in enumerate(pushes):
+        key = (
+            push.covers,
+            *np.round(push.end[:2] / step).tolist(),
+            round(float(push.end[2]) / 0.8),
+        )
+        if key not in known:
+            gone = np.flatnonzero(np.isin(ids, push.covers))
+            found = _search(scene, ground, push.end, scene.config.later, gone)
+            known[key] = _arrivals(ground, found.costs, looked)
+        out[n] = known[key]
+    np.fill_diagonal(out, np.inf)
+    return out

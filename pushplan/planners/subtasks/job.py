@@ -1,0 +1,153 @@
+"""`Job`: one push in hand: drive there, look again, push, and know when it ends."""
+
+from __future__ import annotations
+
+import enum
+import math
+
+import numpy as np
+
+from pushplan.control import clamp_twist
+from pushplan.planners.subtasks.drive import LegDriver
+from pushplan.planners.subtasks.follow import BoxFollower, suits
+from pushplan.planners.subtasks.push import Push
+from pushplan.planners.subtasks.rollout import guide
+from pushplan.planners.subtasks.route import Route
+from pushplan.planners.subtasks.runner import Runner
+from pushplan.planners.subtasks.scene import Scene
+from pushplan.world import Twist, World
+from pushplan.world.checks import FloatArray
+
+_PATIENCE = 4
+"""Commands without motion after which the robot counts as stuck."""
+
+
+class JobEnd(enum.Enum):
+    """How a job ended."""
+
+    DONE = "done"
+    """What it was for is where it belongs, or has been freed."""
+    FAILED = "failed"
+    """The push did not do what it was for."""
+    STUCK = "stuck"
+    """The robot could not move on."""
+    MOOT = "moot"
+    """There is nothing left to push."""
+
+
+class Job:
+    """Carries out one push.
+
+    Args:
+        world: the snapshot in which it begins.
+        push: the push.
+        route: the way to its start.
+        period: time between two commands [s].
+
+    Attributes:
+        push: the push, as predicted last.
+        route: the way to its start.
+        pushing: whether the push itself has begun.
+    """
+
+    def __init__(self, world: World, push: Push, route: Route, period: float) -> None:
+        self.push, self.route, self.pushing = push, route, False
+        self._driver = LegDriver(world.robot, route, period)
+        self._follower: BoxFollower | None = None
+        self._driven = self._reached = self._asked = 0.0
+        self._last: FloatArray | None = None
+        self._still = 0
+
+    def command(self, scene: Scene) -> Twist | JobEnd:
+        """The velocity to drive now, or how the job ended."""
+        world, period = scene.world, scene.config.period
+        if self._is_stuck(world):
+            return JobEnd.STUCK
+        twist: Twist | JobEnd | None = None
+        if not self.pushing:
+            if self._is_moot(scene):
+                return JobEnd.MOOT
+            twist = self._driver.command(world.robot_pose)
+            if twist is None:
+                twist = self._begin(scene)
+        if twist is None:
+            twist = self._push(scene)
+        if isinstance(twist, Twist):
+            radius = world.robot.circumscribed_radius
+            self._asked = period * (abs(twist.linear) + abs(twist.angular) * radius)
+            self._last = world.robot_pose
+        return twist
+
+    def _is_moot(self, scene: Scene) -> bool:
+        """Whether the object to be pushed has gone, or is where it belongs already."""
+        led = np.flatnonzero(scene.world.movables.ids == self.push.led)
+        return not len(led) or bool(scene.done[led[0]])
+
+    def _begin(self, scene: Scene) -> JobEnd | None:
+        """Look again at what the push would do from here."""
+        push, world = self.push, scene.world
+        ends = Runner(scene).again(push, world.robot_pose)
+        good = [end for end in ends if push.frees or set(push.covers) & set(end.covers)]
+        if not good:
+            return JobEnd.FAILED
+        self.push = max(
+            good, key=lambda end: (len(set(end.covers) & set(push.covers)), -end.length)
+        )
+        self.pushing, self._still = True, 0
+        if self.push.turn:
+            self._driver = _turning(world, self.push, scene.config.period)
+        if scene.config.mpc and suits(scene, self.push):
+            self._follower = BoxFollower(scene, self.push)
+        return None
+
+    def _push(self, scene: Scene) -> Twist | JobEnd:
+        push, world, pose = self.push, scene.world, scene.world.robot_pose
+        ids = world.movables.ids
+        left = np.isin(ids, push.covers) & ~scene.done
+        if not push.frees and not left.any():
+            return JobEnd.DONE
+        if push.turn:
+            return self._driver.command(pose) or JobEnd.DONE
+        if self._last is not None:
+            self._driven += math.dist(pose[:2], self._last[:2])
+        longest = push.length if push.frees else 1.1 * push.length + 0.4 * scene.size
+        if self._driven > longest - 1e-6:
+            return JobEnd.DONE if push.frees else JobEnd.FAILED
+        law = scene.law._replace(gain=push.gain)
+        led = np.flatnonzero((ids == push.led) & ~scene.done)
+        step, turn = law.step, 0.0
+        if not push.guided:
+            turn = _along_line(push.start, pose, law.size)
+        elif len(led):
+            step, turn, self._reached, holds = guide(
+                pose, scene.poses[led[0]], push.box_path, self._reached, push.shift, law
+            )
+            if not holds:
+                return JobEnd.FAILED
+            if self._follower is not None:
+                return self._follower.command(world) or JobEnd.FAILED
+        period = scene.config.period
+        return clamp_twist(world.robot, step / period, turn / period)
+
+    def _is_stuck(self, world: World) -> bool:
+        """Whether the robot has hardly moved for some commands."""
+        if self._last is not None and self._asked > 0.0:
+            pose, radius = world.robot_pose, world.robot.circumscribed_radius
+            turned = abs(math.remainder(float(pose[2] - self._last[2]), 2.0 * math.pi))
+            moved = math.dist(pose[:2], self._last[:2]) + turned * radius
+            self._still = self._still + 1 if moved < 0.1 * self._asked else 0
+        return self._still >= _PATIENCE
+
+
+def _turning(world: World, push: Push, period: float) -> LegDriver:
+    """A driver that turns on the spot by what a push turns by."""
+    heading = float(world.robot_pose[2]) + push.turn
+    return LegDriver(world.robot, Route(np.zeros((0, 2)), np.zeros(0), heading, 0.0), period)
+
+
+def _along_line(start: FloatArray, pose: FloatArray, size: float) -> float:
+    """The turn [rad] that keeps the robot on the line of a push."""
+    error = math.remainder(float(start[2] - pose[2]), 2.0 * math.pi)
+    away = pose[:2] - start[:2]
+    left = float(math.cos(start[2]) * away[1] - math.sin(start[2]) * away[0])
+    return 0.5 * error - 0.3 * left / size

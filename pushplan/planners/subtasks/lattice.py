@@ -1,0 +1,280 @@
+"""Where the robot can drive to, and at which price: straight moves and turns on a pose lattice.
+
+Sixteen headings whose straight moves lead from cell to cell; the robot drives ahead or back along
+its heading, or turns to the next heading on the spot. What is static forbids poses; an object
+that the footprint overlaps costs as far as it is carried along, until the overlap gets less again.
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from pushplan.geometry import convex_penetration
+from pushplan.interaction.separation import place
+from pushplan.planners.kinodynamic.collision import (
+    Footprint,
+    Obstacles,
+    footprint,
+    is_free,
+    obstacles,
+)
+from pushplan.planners.lattice.heap import pop_least, push_or_lift
+from pushplan.world import RobotModel, StaticMap
+from pushplan.world.checks import BoolArray, FloatArray, IntArray, frozen
+
+_QUARTER = ((1, 0), (2, 1), (1, 1), (1, 2))
+MOVES: IntArray = np.array(
+    [*_QUARTER]
+    + [(-y, x) for x, y in _QUARTER]
+    + [(-x, -y) for x, y in _QUARTER]
+    + [(y, -x) for x, y in _QUARTER],
+    dtype=np.int64,
+)
+"""(16, 2) cells along x and y that a straight move along each heading covers."""
+HEADINGS: FloatArray = np.arctan2(MOVES[:, 1], MOVES[:, 0])
+"""(16,) the headings [rad]."""
+LENGTHS: FloatArray = np.hypot(MOVES[:, 0], MOVES[:, 1])
+"""(16,) length of the move along each heading [cells]."""
+TURNS: FloatArray = np.abs(
+    np.arctan2(np.sin(np.roll(HEADINGS, -1) - HEADINGS), np.cos(np.roll(HEADINGS, -1) - HEADINGS))
+)
+"""(16,) angle from each heading to the next [rad]."""
+COUNT = len(MOVES)
+Layers = NDArray[np.float32]
+"""(K, 16, rows, columns) depth of the footprint in each object [m]."""
+ARM = 0.8
+"""How far a turn by one radian carries an object along [circumscribed radii]."""
+
+
+class Floor(NamedTuple):
+    """The lattice over one static map; cell (i, j) has its middle at origin + (j, i) * step."""
+
+    x: float
+    y: float
+    step: float
+    blocked: BoolArray
+    """(16, rows, columns) where something static is in the way."""
+
+
+@njit(cache=True, nogil=True)
+def _block(
+    blocked: BoolArray,
+    x: float,
+    y: float,
+    step: float,
+    headings: FloatArray,
+    shape: Footprint,
+    among: Obstacles,
+) -> None:
+    pose, scratch = np.empty(3), np.empty_like(shape.vertices)
+    for t in range(blocked.shape[0]):
+        pose[2] = headings[t]
+        for i in range(blocked.shape[1]):
+            pose[1] = y + i * step
+            for j in range(blocked.shape[2]):
+                pose[0] = x + j * step
+                blocked[t, i, j] = not is_free(pose, shape, among, scratch)
+
+
+@functools.lru_cache(maxsize=8)
+def floor_of(robot: RobotModel, static: StaticMap, step: float, margin: float) -> Floor:
+    """The lattice for a robot among what is static; kept for the maps used last.
+
+    Args:
+        robot: its footprint.
+        static: walls and columns.
+        step: side of a cell [m].
+        margin: distance to keep from what is static [m].
+    """
+    x0, y0, x1, y1 = static.bounds.tolist()
+    cols, rows = int((x1 - x0) / step) + 1, int((y1 - y0) / step) + 1
+    blocked = np.empty((COUNT, rows, cols), dtype=np.bool_)
+    x, y = x0 + 0.5 * ((x1 - x0) - (cols - 1) * step), y0 + 0.5 * ((y1 - y0) - (rows - 1) * step)
+    _block(blocked, x, y, step, HEADINGS, footprint(robot, margin), obstacles(static))
+    return Floor(x, y, step, frozen(blocked))
+
+
+@njit(cache=True, nogil=True)
+def contact_depths(
+    floor: Floor,
+    headings: FloatArray,
+    shape: Footprint,
+    poses: FloatArray,
+    vertices: FloatArray,
+    offsets: IntArray,
+    radii: FloatArray,
+    chosen: BoolArray,
+) -> Layers:
+    """(K, 16, rows, columns) how deep the footprint is in each of the chosen objects [m]."""
+    count, rows, cols = floor.blocked.shape
+    out = np.zeros((poses.shape[0], count, rows, cols), dtype=np.float32)
+    outline, pose = np.empty_like(vertices), np.empty(3)
+    body = np.empty_like(shape.vertices)
+    for k in range(poses.shape[0]):
+        if not chosen[k]:
+            continue
+        a, b = offsets[k], offsets[k + 1]
+        place(poses[k], vertices[a:b], outline[a:b])
+        reach = shape.radius + radii[k]
+        i0 = max(0, int(np.ceil((poses[k, 1] - reach - floor.y) / floor.step)))
+        i1 = min(rows - 1, int(np.floor((poses[k, 1] + reach - floor.y) / floor.step)))
+        j0 = max(0, int(np.ceil((poses[k, 0] - reach - floor.x) / floor.step)))
+        j1 = min(cols - 1, int(np.floor((poses[k, 0] + reach - floor.x) / floor.step)))
+        for t in range(headings.shape[0]):
+            pose[:] = 0.0
+            pose[2] = headings[t]
+            place(pose, shape.vertices, body)
+            for i in range(i0, i1 + 1):
+                y = floor.y + i * floor.step
+                for j in range(j0, j1 + 1):
+                    x = floor.x + j * floor.step
+                    dx, dy = poses[k, 0] - x, poses[k, 1] - y
+                    if dx * dx + dy * dy >= reach * reach or floor.blocked[t, i, j]:
+                        continue
+                    deepest = 0.0
+                    moved = outline[a:b] - np.array([x, y])
+                    for p in range(shape.offsets.shape[0] - 1):
+                        part = body[shape.offsets[p] : shape.offsets[p + 1]]
+                        deepest = max(deepest, convex_penetration(part, moved)[0])
+                    out[k, t, i, j] = deepest
+    return out
+
+
+@njit(cache=True, nogil=True)
+def add_up(layers: Layers, weights: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Depth in all objects together at each pose [m], and the weights of those it is in.
+
+    Args:
+        layers: (K, 16, rows, columns) from `contact_depths`.
+        weights: (K,) 0 for objects that do not count.
+    """
+    count, turns, rows, cols = layers.shape
+    flat = layers.reshape((count, turns * rows * cols))
+    depths, touch = np.zeros(flat.shape[1]), np.zeros(flat.shape[1])
+    for k in range(count):
+        if weights[k] == 0.0:
+            continue
+        for n in range(flat.shape[1]):
+            if flat[k, n] > 0.0:
+                depths[n] += flat[k, n]
+                touch[n] += weights[k]
+    return depths.reshape((turns, rows, cols)), touch.reshape((turns, rows, cols))
+
+
+@njit(cache=True, nogil=True)
+def search_poses(
+    starts: IntArray,
+    costs: FloatArray,
+    floor: Floor,
+    depths: FloatArray,
+    touch: FloatArray,
+    moves: IntArray,
+    lengths: FloatArray,
+    turns: FloatArray,
+    turn_price: float,
+    arm: float,
+) -> tuple[FloatArray, IntArray]:
+    """Cheapest ways from a set of poses to every pose of the lattice (Dijkstra).
+
+    Args:
+        starts: (S,) flat indices of poses.
+        costs: (S,) what it costs to be there [m].
+        floor: the lattice.
+        depths, touch: (16, rows, columns) from `contact_depths`.
+        moves: (16, 2) `MOVES`.
+        lengths: (16,) of the moves, in cells.
+        turns: (16,) angle from each heading to the next [rad].
+        turn_price: price of a turn [m/rad].
+        arm: how far a turn carries an object along [m/rad].
+
+    Returns:
+        (16 * rows * columns,) costs [m] and the pose before each, -1 for none.
+    """
+    count, rows, cols = depths.shape
+    total = count * rows * cols
+    best = np.full(total, np.inf)
+    before = np.full(total, -1, dtype=np.int64)
+    keys, heap = np.empty(total), np.empty(total, dtype=np.int64)
+    places, size = np.full(total, -1, dtype=np.int64), np.zeros(1, dtype=np.int64)
+    flat, shut, near = depths.ravel(), floor.blocked.ravel(), touch.ravel()
+    for s in range(starts.shape[0]):
+        if costs[s] < best[starts[s]]:
+            best[starts[s]] = costs[s]
+            push_or_lift(keys, heap, places, size, starts[s], costs[s])
+    area = rows * cols
+    while size[0] > 0:
+        node = pop_least(keys, heap, places, size)
+        t, rest = node // area, node % area
+        i, j = rest // cols, rest % cols
+        for move in range(4):
+            if move < 2:
+                sign = 1 - 2 * move
+                ni, nj = i + sign * moves[t, 1], j + sign * moves[t, 0]
+                if ni < 0 or nj < 0 or ni >= rows or nj >= cols:
+                    continue
+                other = t * area + ni * cols + nj
+                price = lengths[t] * floor.step
+                motion = price
+            else:
+                other = ((t + (1 if move == 2 else count - 1)) % count) * area + rest
+                turn = turns[t if move == 2 else (t + count - 1) % count]
+                price, motion = turn * turn_price, turn * arm
+            if shut[other]:
+                continue
+            if near[other] > 0.0 and flat[other] >= flat[node]:
+                price += motion * near[other]
+            if best[node] + price < best[other]:
+                best[other] = best[node] + price
+                before[other] = node
+                push_or_lift(keys, heap, places, size, other, best[other])
+    return best, before
+
+
+def nearest_heading(theta: float) -> int:
+    """Index of the heading that is nearest to ``theta`` [rad]."""
+    return int(np.argmax(np.cos(HEADINGS - theta)))
+
+
+def near_poses(floor: Floor, pose: FloatArray, reach: float) -> tuple[IntArray, FloatArray]:
+    """Free poses of the lattice near a pose: flat indices and what it costs to get there [m].
+
+    Args:
+        floor: the lattice.
+        pose: (3,) x, y [m], theta [rad].
+        reach: how many cells away they may be.
+    """
+    _, rows, cols = floor.blocked.shape
+    u, v = (float(pose[0]) - floor.x) / floor.step, (float(pose[1]) - floor.y) / floor.step
+    found, costs = [], []
+    turn = np.abs(np.remainder(HEADINGS - pose[2] + math.pi, 2.0 * math.pi) - math.pi)
+    for t in np.flatnonzero(turn < 0.5).tolist():
+        for i in range(max(0, math.ceil(v - reach)), min(rows - 1, math.floor(v + reach)) + 1):
+            for j in range(max(0, math.ceil(u - reach)), min(cols - 1, math.floor(u + reach)) + 1):
+                away = math.hypot(i - v, j - u)
+                if away <= reach and not floor.blocked[t, i, j]:
+                    found.append((t * rows + i) * cols + j)
+                    costs.append((away + 0.5 * turn[t]) * floor.step)
+    return np.array(found, dtype=np.int64), np.array(costs)
+
+
+def pose_at(floor: Floor, node: int) -> FloatArray:
+    """(3,) the pose of a flat index."""
+    _, rows, cols = floor.blocked.shape
+    t, rest = divmod(node, rows * cols)
+    i, j = divmod(rest, cols)
+    return np.array([floor.x + j * floor.step, floor.y + i * floor.step, HEADINGS[t]])
+
+
+def cell_at(floor: Floor, x: float, y: float) -> int:
+    """Flat index of the cell that is nearest to a point [m]."""
+    _, rows, cols = floor.blocked.shape
+    i = min(max(round((y - floor.y) / floor.step), 0), rows - 1)
+    j = min(max(round((x - floor.x) / floor.step), 0), cols - 1)
+    cell: int = i * cols + j
+    return cell

@@ -1,0 +1,274 @@
+"""What a push would do, compiled: the pushing law run in closed loop against quasi-static contacts.
+
+Two laws. A *line* push drives straight ahead and is followed until it has done what it can. A
+*guided* push leads one object along a path: the robot heads where the object has to go, turned
+towards the side to which the object has slipped on the bumper.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from pushplan.geometry import convex_penetration
+from pushplan.interaction.kernels import Bodies, Settings, advance, make_scratch, robot_held
+from pushplan.interaction.separation import place
+from pushplan.world import ClearanceArea, Goal, Receptacle, StaticMap
+from pushplan.world.checks import BoolArray, FloatArray, frozen
+
+EVENTS = 8
+"""How many stages of one push are kept."""
+GONE = 1e7
+"""Where an object is put that has left the floor [m]."""
+
+
+class Task(NamedTuple):
+    """When an object is done, as kernels read it."""
+
+    polygon: FloatArray
+    """(N, 2) the area that objects have to leave, or get into."""
+    edges: FloatArray
+    """(E, 3) unit normal and offset of the edges within which a delivered object lies."""
+    delivers: bool
+    """Whether objects have to get into the polygon, and leave the floor there."""
+    slack: float
+    """By how much an object has to be clear of the polygon's edge [m]."""
+
+
+def task_of(goal: Goal, static: StaticMap, slack: float) -> Task:
+    """The task for kernels. Sides of a receptacle that lie on the bounds do not count."""
+    assert isinstance(goal, ClearanceArea | Receptacle)
+    polygon = goal.polygon
+    along = np.roll(polygon, -1, axis=0) - polygon
+    normals = np.stack([along[:, 1], -along[:, 0]], axis=1) / np.hypot(*along.T)[:, None]
+    offsets = (normals * polygon).sum(axis=1)
+    low, high = static.bounds[:2], static.bounds[2:]
+    corners = np.array([[low[0], low[1]], [high[0], low[1]], [high[0], high[1]], [low[0], high[1]]])
+    # the sides of a receptacle that stand at the walls
+    inner = (corners @ normals.T).max(axis=0) > offsets + 4.0 * slack
+    edges = np.column_stack([normals, offsets])[inner]
+    return Task(
+        polygon,
+        frozen(np.ascontiguousarray(edges)),
+        isinstance(goal, Receptacle),
+        slack,
+    )
+
+
+@njit(cache=True, nogil=True)
+def is_done(k: int, poses: FloatArray, bodies: Bodies, task: Task) -> bool:
+    """Whether object ``k`` is where it belongs."""
+    if poses[k, 0] >= 0.5 * GONE:
+        return True
+    a, b = bodies.offsets[k], bodies.offsets[k + 1]
+    outline = np.empty((b - a, 2))
+    place(poses[k], bodies.vertices[a:b], outline)
+    if task.delivers:
+        for e in range(task.edges.shape[0]):
+            for i in range(b - a):
+                out = task.edges[e, 0] * outline[i, 0] + task.edges[e, 1] * outline[i, 1]
+                if out > task.edges[e, 2] - task.slack:
+                    return False
+        return True
+    return bool(convex_penetration(outline, task.polygon)[0] < -task.slack)
+
+
+@njit(cache=True, nogil=True)
+def all_done(poses: FloatArray, bodies: Bodies, task: Task) -> BoolArray:
+    """(K,) whether each object is where it belongs."""
+    out = np.empty(poses.shape[0], dtype=np.bool_)
+    for k in range(poses.shape[0]):
+        out[k] = is_done(k, poses, bodies, task)
+    return out
+
+
+@njit(cache=True, nogil=True)
+def along_path(
+    x: float, y: float, path: FloatArray, reached: float, ahead: float
+) -> tuple[float, float, float, float]:
+    """The carrot on a path: a point some way beyond the nearest one.
+
+    Args:
+        x, y: where the object is [m].
+        path: (M, 2) [m].
+        reached: arc length reached before [m]; the nearest point is looked for from there on.
+        ahead: how far beyond the nearest point the carrot is [m].
+
+    Returns:
+        The carrot, the arc length of the nearest point, and the distance from it [m].
+    """
+    best, at, arc = np.inf, reached, 0.0
+    for i in range(path.shape[0] - 1):
+        dx, dy = path[i + 1, 0] - path[i, 0], path[i + 1, 1] - path[i, 1]
+        length = math.sqrt(dx * dx + dy * dy)
+        if length > 0.0 and arc + length >= reached and arc <= reached + 3.0 * ahead:
+            t = ((x - path[i, 0]) * dx + (y - path[i, 1]) * dy) / length
+            t = min(max(t, max(0.0, reached - arc)), length)
+            px, py = path[i, 0] + t / length * dx, path[i, 1] + t / length * dy
+            away = math.sqrt((px - x) ** 2 + (py - y) ** 2)
+            if away < best:
+                best, at = away, arc + t
+        arc += length
+    target, arc = at + ahead, 0.0
+    for i in range(path.shape[0] - 1):
+        dx, dy = path[i + 1, 0] - path[i, 0], path[i + 1, 1] - path[i, 1]
+        length = math.sqrt(dx * dx + dy * dy)
+        if length > 0.0 and (arc + length >= target or i == path.shape[0] - 2):
+            t = (target - arc) / length  # beyond the end the last leg goes on
+            return path[i, 0] + t * dx, path[i, 1] + t * dy, at, best
+        arc += length
+    return path[-1, 0], path[-1, 1], at, best
+
+
+class Law(NamedTuple):
+    """The geometric pushing law."""
+
+    step: float
+    """Distance between two commands [m]."""
+    turn: float
+    """Greatest turn in one step [rad]."""
+    size: float
+    """Circumscribed radius of the robot [m]."""
+    half: float
+    """Half the width of the bumper [m]."""
+    front: float
+    """How far the bumper is ahead of the robot's origin [m]."""
+    ahead: float
+    """How far ahead of the object the path is looked at [m]."""
+    gain: float
+    """Curvature of the robot's path for each radian that it is off its heading, times ``size``."""
+
+
+@njit(cache=True, nogil=True)
+def guide(
+    robot: FloatArray,
+    box: FloatArray,
+    path: FloatArray,
+    reached: float,
+    shift: float,
+    law: Law,
+) -> tuple[float, float, float, bool]:
+    """One command of a guided push.
+
+    Args:
+        robot: (3,) pose.
+        box: (3,) pose of the object that is led.
+        path: (M, 2) for its middle [m].
+        reached: arc length that it has got to [m].
+        shift: how far the robot's middle is meant to be to the left of the object [m].
+        law: parameters.
+
+    Returns:
+        Step [m], turn [rad], arc length now [m], and whether the object is still on the bumper.
+    """
+    cx, cy, at, _ = along_path(box[0], box[1], path, reached, law.ahead)
+    way = math.atan2(cy - box[1], cx - box[0])
+    error = way - robot[2]
+    error -= 2.0 * math.pi * np.round(error / (2.0 * math.pi))
+    gx, gy = box[0] - robot[0], box[1] - robot[1]
+    ux, uy = math.cos(way), math.sin(way)
+    left = gx * uy - gy * ux
+    c, s = math.cos(robot[2]), math.sin(robot[2])
+    side, forward = -s * gx + c * gy, c * gx + s * gy
+    holds = abs(side) < 0.95 * law.half and forward > 0.5 * law.front and abs(error) < 1.75
+    wanted = law.gain * (error - math.atan((left - shift) / law.size)) * law.step / law.size
+    return law.step, min(max(wanted, -law.turn), law.turn), at, holds
+
+
+@njit(cache=True, nogil=True)
+def roll_out(
+    start: FloatArray,
+    first: FloatArray,
+    led: int,
+    path: FloatArray,
+    shift: float,
+    limit: float,
+    wanted: BoolArray,
+    law: Law,
+    bodies: Bodies,
+    settings: Settings,
+    task: Task,
+    track: FloatArray,
+    stage_steps: FloatArray,
+    stage_poses: FloatArray,
+    stage_lengths: FloatArray,
+) -> tuple[int, int, int]:
+    """Run a push until nothing that is wanted can come of it any more.
+
+    Args:
+        start: (3,) pose of the robot.
+        first: (K, 3) poses of the objects.
+        led: index of the object of a guided push, -1 for a line push.
+        path: (M, 2) path of the led object [m].
+        shift: see `guide`.
+        limit: greatest length of the robot's path [m].
+        wanted: (K,) objects that are to be done; the push ends when all are.
+        law: parameters.
+        bodies, settings: of the interaction model.
+        task: when objects are done.
+        track: (T, 3) receives the robot's poses.
+        stage_steps: (EVENTS,) receives how many poses each stage has.
+        stage_poses: (EVENTS, K, 3) receives the objects' poses at the end of each stage.
+        stage_lengths: (EVENTS, K) receives their path lengths [m].
+
+    Returns:
+        How many stages and poses there are, and how it ended: 0 as wanted, 1 at the limit, 2
+        jammed, 3 lost. A stage ends where one more object is done; a last stage that ends
+        otherwise is kept too.
+    """
+    count = first.shape[0]
+    scratch = make_scratch(bodies)
+    poses, lengths = first.copy(), np.zeros(count)
+    done = all_done(poses, bodies, task)
+    here, there = start.copy(), np.empty(3)
+    track[0] = here
+    stages, used, travelled, reached, end = 0, 1, 0.0, 0.0, 1
+    longest = track.shape[0]
+    while used < longest and travelled < limit:
+        ds, turn = law.step, 0.0
+        if led >= 0:
+            ds, turn, reached, holds = guide(here, poses[led], path, reached, shift, law)
+            if not holds and not done[led]:
+                end = 3
+                break
+        there[0] = here[0] + ds * math.cos(here[2] + 0.5 * turn)
+        there[1] = here[1] + ds * math.sin(here[2] + 0.5 * turn)
+        there[2] = here[2] + turn
+        if robot_held(there, bodies, settings, scratch):
+            end = 2
+            break
+        saved = poses.copy()
+        if not advance(here, there, poses, lengths, bodies, settings, scratch):
+            end = 2
+            break
+        here[:] = there
+        track[used] = here
+        used += 1
+        travelled += ds
+        news = False
+        missing = False
+        for k in range(count):
+            if poses[k, 0] != saved[k, 0] or poses[k, 1] != saved[k, 1]:
+                was = done[k]
+                done[k] = is_done(k, poses, bodies, task)
+                news = news or (done[k] and not was)
+                if done[k] and task.delivers:
+                    poses[k, 0] = GONE * (1.0 + k)
+            missing = missing or (wanted[k] and not done[k])
+        if news and stages < EVENTS - 1:
+            stage_steps[stages] = used
+            stage_poses[stages] = poses
+            stage_lengths[stages] = lengths
+            stages += 1
+        if not missing:
+            end = 0
+            break
+    if stages == 0 or stage_steps[stages - 1] != used:
+        stage_steps[stages] = used
+        stage_poses[stages] = poses
+        stage_lengths[stages] = lengths
+        stages += 1
+    return stages, used, end

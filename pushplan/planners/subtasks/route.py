@@ -1,0 +1,289 @@
+"""The way to the start of a push: straight legs ahead or back, and turns on the spot between."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+
+from pushplan.geometry import convex_penetration
+from pushplan.interaction.kernels import Bodies
+from pushplan.interaction.separation import place
+from pushplan.planners.kinodynamic.collision import (
+    Footprint,
+    Obstacles,
+    footprint,
+    is_free,
+    obstacles,
+)
+from pushplan.planners.subtasks import lattice
+from pushplan.planners.subtasks.graph import Approach, arrival_poses
+from pushplan.planners.subtasks.scene import LED, Scene
+from pushplan.world.checks import ArrayRecord, FloatArray
+
+_MOST = 14
+"""Points of the lattice's way that a route may bend at."""
+TIGHT = 25.0
+"""Price of driving on, where the robot begins nearer to something static than it should be."""
+
+
+@dataclass(frozen=True, eq=False)
+class Route(ArrayRecord):
+    """Legs of a drive.
+
+    Args:
+        points: (N, 2) where each leg ends [m].
+        signs: (N,) 1 ahead, -1 back.
+        heading: to turn to at the end [rad].
+        price: length, and what is pushed about on the way [m].
+    """
+
+    points: FloatArray
+    signs: FloatArray
+    heading: float
+    price: float
+
+
+@njit(cache=True, nogil=True)
+def _depth(
+    pose: FloatArray,
+    shape: Footprint,
+    poses: FloatArray,
+    bodies: Bodies,
+    weights: FloatArray,
+    body: FloatArray,
+) -> tuple[float, float]:
+    """How deep the footprint is in the objects [m], and the weights of those it is in."""
+    total, touch, placed = 0.0, 0.0, False
+    for k in range(poses.shape[0]):
+        dx, dy = poses[k, 0] - pose[0], poses[k, 1] - pose[1]
+        reach = shape.radius + bodies.radii[k]
+        if weights[k] == 0.0 or dx * dx + dy * dy >= reach * reach:
+            continue
+        if not placed:
+            place(pose, shape.vertices, body)
+            placed = True
+        a, b = bodies.offsets[k], bodies.offsets[k + 1]
+        outline = np.empty((b - a, 2))
+        place(poses[k], bodies.vertices[a:b], outline)
+        deepest = 0.0
+        for p in range(shape.offsets.shape[0] - 1):
+            part = body[shape.offsets[p] : shape.offsets[p + 1]]
+            deepest = max(deepest, convex_penetration(part, outline)[0])
+        if deepest > 0.0:
+            total += deepest
+            touch += weights[k]
+    return total, touch
+
+
+@njit(cache=True, nogil=True)
+def _motion(
+    here: FloatArray,
+    there: FloatArray,
+    step: float,
+    turn_price: float,
+    shape: Footprint,
+    tight: Footprint,
+    among: Obstacles,
+    poses: FloatArray,
+    bodies: Bodies,
+    weights: FloatArray,
+    arm: float,
+) -> float:
+    """Price of a straight motion between two poses, or of a turn on the spot; inf at a wall."""
+    body = np.empty_like(shape.vertices)
+    scratch = np.empty_like(tight.vertices)
+    length = math.hypot(there[0] - here[0], there[1] - here[1])
+    turn = there[2] - here[2]
+    turn -= 2.0 * math.pi * np.round(turn / (2.0 * math.pi))
+    steps = max(1, math.ceil((length + abs(turn) * shape.radius) / step))
+    pose = here.copy()
+    depth, _ = _depth(pose, shape, poses, bodies, weights, body)
+    was_free = is_free(pose, tight, among, scratch)
+    motion = (length + arm * abs(turn)) / steps
+    price = length + turn_price * abs(turn)
+    for n in range(1, steps + 1):
+        part = n / steps
+        pose[0] = here[0] + part * (there[0] - here[0])
+        pose[1] = here[1] + part * (there[1] - here[1])
+        pose[2] = here[2] + part * turn
+        if is_free(pose, tight, among, scratch):
+            was_free = True
+        elif was_free:
+            return np.inf
+        else:
+            price += TIGHT * (length + shape.radius * abs(turn)) / steps
+        now, touch = _depth(pose, shape, poses, bodies, weights, body)
+        if touch > 0.0 and now >= depth:
+            price += motion * touch
+        depth = now
+    total: float = price
+    return total
+
+
+class Router:
+    """Makes routes in one scene."""
+
+    def __init__(self, scene: Scene) -> None:
+        self.scene = scene
+        margin = scene.config.margin * scene.size
+        robot = scene.world.robot
+        self._shape = footprint(robot, margin)
+        self._tight = footprint(robot, 0.5 * margin)
+        self._among = obstacles(scene.world.static)
+        self._weights = scene.nuisance
+
+    def motion(self, here: FloatArray, there: FloatArray) -> float:
+        """Price of a straight motion or a turn on the spot [m]; inf where a wall is hit."""
+        scene = self.scene
+        return float(
+            _motion(
+                here,
+                there,
+                0.1 * scene.size,
+                scene.config.turn_price * scene.size,
+                self._shape,
+                self._tight,
+                self._among,
+                scene.poses,
+                scene.bodies,
+                self._weights,
+                lattice.ARM * scene.size,
+            )
+        )
+
+    def leg(self, here: FloatArray, point: FloatArray, sign: float) -> tuple[float, float]:
+        """Price of turning to a point (2,) and driving there, and the heading then."""
+        dx, dy = point[0] - here[0], point[1] - here[1]
+        if math.hypot(dx, dy) < 1e-9:
+            return 0.0, float(here[2])
+        heading = math.atan2(sign * dy, sign * dx)
+        turned = np.array([here[0], here[1], heading])
+        price = self.motion(here, turned)
+        if math.isinf(price):
+            return price, heading
+        return price + self.motion(turned, np.array([point[0], point[1], heading])), heading
+
+    def route(self, approach: Approach, start: FloatArray, led: int = -1) -> Route | None:
+        """The way from the robot to the start (3,) of a push; None if there is none.
+
+        Args:
+            approach: from where the robot is.
+            start: (3,) where to get to.
+            led: index of the object that is to be pushed and must not be moved before; -1 if none.
+        """
+        scene = self.scene
+        self._weights = scene.nuisance.copy()
+        if led >= 0:
+            self._weights[led] += LED
+        nodes, extra = arrival_poses(scene.fine, start)
+        if not len(nodes):
+            return None
+        total = approach.costs[nodes] + extra
+        best = int(np.argmin(total))
+        if not math.isfinite(float(total[best])):
+            return None
+        chain = [int(nodes[best])]
+        while approach.before[chain[-1]] >= 0:
+            chain.append(int(approach.before[chain[-1]]))
+        poses = [lattice.pose_at(scene.fine.floor, node) for node in reversed(chain)]
+        points = _bends(poses)
+        here = scene.world.robot_pose
+        return (
+            self._shortened([here[:2], *points, start[:2]], here, float(start[2]))
+            # too near to a wall to turn there: as near as the lattice gets, which has turned before
+            or self._shortened([here[:2], *points], here, float(start[2]))
+            or self._plain(points, float(start[2]))
+        )
+
+    def poses_along(self, route: Route) -> FloatArray:
+        """(N, 3) poses on the way, close enough together for a prediction."""
+        here: FloatArray = self.scene.world.robot_pose
+        found = [here[None]]
+        for point, sign in zip(route.points, route.signs, strict=True):
+            dx, dy = (sign * (point - here[:2])).tolist()
+            if math.hypot(dx, dy) > 1e-9:
+                for there in (
+                    np.array([here[0], here[1], math.atan2(dy, dx)]),
+                    np.array([point[0], point[1], math.atan2(dy, dx)]),
+                ):
+                    found.append(_between(here, there))
+                    here = there
+        found.append(_between(here, np.array([here[0], here[1], route.heading])))
+        return np.concatenate(found)
+
+    def _shortened(self, points: list[FloatArray], here: FloatArray, end: float) -> Route | None:
+        """The cheapest way over some of the points to the last, and a turn to a heading there."""
+        count = len(points)
+        best = [math.inf] * count
+        came: list[tuple[int, float]] = [(-1, 1.0)] * count
+        headings = [float(here[2])] * count
+        best[0] = 0.0
+        for j in range(1, count):
+            for i in range(j):
+                if math.isinf(best[i]):
+                    continue
+                pose = np.array([*points[i], headings[i]])
+                for sign in (1.0, -1.0):
+                    if best[i] + math.dist(points[i], points[j]) >= best[j]:
+                        continue
+                    price, heading = self.leg(pose, points[j], sign)
+                    price += best[i]
+                    if j == count - 1:
+                        there = np.array([*points[j], heading])
+                        price += self.motion(there, np.array([*points[j], end]))
+                    if price < best[j]:
+                        best[j], came[j], headings[j] = price, (i, sign), heading
+        if math.isinf(best[-1]):
+            return None
+        legs, j = [], count - 1
+        while j > 0:
+            legs.append((points[j], came[j][1]))
+            j = came[j][0]
+        legs.reverse()
+        return Route(
+            np.array([point for point, _ in legs]),
+            np.array([sign for _, sign in legs]),
+            end,
+            best[-1],
+        )
+
+    def _plain(self, points: list[FloatArray], end: float) -> Route:
+        """The lattice's own way, ahead or back as the robot stands."""
+        signs, heading, at = [], float(self.scene.world.robot_pose[2]), self.scene.world.robot_pose
+        for point in points:
+            way = math.atan2(point[1] - at[1], point[0] - at[0])
+            ahead = math.cos(way - heading) >= 0.0
+            signs.append(1.0 if ahead else -1.0)
+            heading, at = way if ahead else way + math.pi, point
+        length = float(np.hypot(*np.diff(np.array(points), axis=0).T).sum())
+        return Route(np.array(points), np.array(signs), end, length)
+
+
+def _between(here: FloatArray, there: FloatArray) -> FloatArray:
+    """Poses (N, 3) after ``here`` up to ``there``, turned the shorter way."""
+    turn = math.remainder(float(there[2] - here[2]), 2.0 * math.pi)
+    steps = max(1, math.ceil(abs(turn) / 0.3))
+    part = np.linspace(0.0, 1.0, steps + 1)[1:, None]
+    end = np.array([there[0], there[1], here[2] + turn])
+    poses: FloatArray = here + part * (end - here)
+    return poses
+
+
+def _bends(poses: list[FloatArray]) -> list[FloatArray]:
+    """Where the lattice's way bends, and in the middle of long legs."""
+    points = [poses[0][:2]]
+    for before, here, after in zip(poses, poses[1:], poses[2:], strict=False):
+        one, two = here[:2] - before[:2], after[:2] - here[:2]
+        if not one.any() or not two.any():
+            if np.hypot(*(here[:2] - points[-1])) > 0.0:
+                points.append(here[:2])
+        elif abs(one[0] * two[1] - one[1] * two[0]) > 1e-9 or float(one @ two) < 0.0:
+            points.append(here[:2])
+    if np.hypot(*(poses[-1][:2] - points[-1])) > 0.0:
+        points.append(poses[-1][:2])
+    while len(points) > _MOST:
+        points = points[:1] + points[1:-1:2] + points[-1:]
+    return points

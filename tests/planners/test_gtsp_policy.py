@@ -1,0 +1,182 @@
+"""The policies `gtsp` and `gtsp-mpc`: whole small episodes, and how they end."""
+
+import hashlib
+import subprocess
+import sys
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from conftest import make_boxes, make_robot, make_u_maze
+
+from pushplan.drawing.sequence import draw_sequence
+from pushplan.envs import PushEnv
+from pushplan.planners import make_policy, policy_names
+from pushplan.planners.subtasks import GtspMpc, SubTaskConfig
+from pushplan.world import (
+    InvalidInputError,
+    Receptacle,
+    StaticMap,
+    Twist,
+    UnknownNameError,
+    World,
+    box_delivery_robot,
+)
+
+CORNER = Receptacle([(3.0, 3.0), (5.0, 3.0), (5.0, 5.0), (3.0, 5.0)])
+
+
+def room(boxes, extra=()):
+    return World(
+        robot=box_delivery_robot(),
+        robot_pose=(-3.0, -3.0, 0.0),
+        static=StaticMap.build(polygons=list(extra), bounds=(-5, -5, 5, 5)),
+        movables=make_boxes(boxes),
+        goal=CORNER,
+    )
+
+
+def run(policy, *, task, preset, seed, limit=1500, disturb=None, **options):
+    env = PushEnv(task=task, preset=preset, action="velocity", observation="state", **options)
+    env.reset(seed=seed)
+    policy.reset(env.world, np.random.default_rng(0))
+    rng = np.random.default_rng(5)
+    info = {}
+    for _ in range(limit):
+        world = env.world
+        if disturb is not None:
+            noise = rng.normal(0.0, disturb, world.movables.poses.shape)
+            world = world.moved(movable_poses=world.movables.poses + noise)
+        *_, terminated, truncated, info = env.step(env.encode(policy.act(world)))
+        if terminated or truncated:
+            break
+    return info
+
+
+EPISODES = [
+    ("area_clearing", "benchmark", "pymunk", {"layout": "clear_small", "boxes": 3}),
+    ("area_clearing", "testbed", "mujoco", {"layout": "clear_small", "boxes": 2}),
+    ("box_delivery", "benchmark", "pymunk", {"layout": "small_empty", "boxes": 2}),
+    ("box_delivery", "testbed", "mujoco", {"layout": "small_empty", "boxes": 2}),
+]
+
+
+@pytest.mark.parametrize(("task", "preset", "simulator", "variations"), EPISODES)
+def test_every_box_gets_where_it_belongs(task, preset, simulator, variations):
+    policy = make_policy("gtsp-mpc")
+    options = {"simulator": simulator, "variations": variations}
+    info = run(policy, task=task, preset=preset, seed=1000, **options)
+    assert info["success"]
+    assert policy.given_up == {}
+
+
+def test_noisy_poses_do_not_keep_it_from_clearing():
+    info = run(
+        GtspMpc(),
+        task="area_clearing",
+        preset="benchmark",
+        seed=1003,
+        disturb=0.01,
+        variations={"layout": "clear_small", "boxes": 2},
+    )
+    assert info["success"]
+
+
+def test_the_published_policy_plans_once_and_ends():
+    policy = make_policy("gtsp")
+    world = room([(0.0, 0.0, 0.0), (-1.0, 2.0, 0.0)])
+    first = policy.act(world)
+    assert isinstance(first, Twist) and (first.linear or first.angular)
+    # nothing ever moves: it skips leg after leg, and stands at the end
+    for step in range(1, 60):
+        last = policy.act(world.moved(time=0.2 * step))
+    assert last == Twist(0.0, 0.0)
+
+
+def test_a_box_that_nobody_can_reach_is_given_up_with_a_reason():
+    ring = [
+        [(-1, -1), (1, -1), (1, -0.7), (-1, -0.7)],
+        [(-1, 0.7), (1, 0.7), (1, 1), (-1, 1)],
+        [(-1, -1), (-0.7, -1), (-0.7, 1), (-1, 1)],
+        [(0.7, -1), (1, -1), (1, 1), (0.7, 1)],
+    ]
+    policy, world = GtspMpc(), room([(0.0, 0.0, 0.0)], ring)
+    for step in range(12):
+        command = policy.act(world.moved(time=400.0 * step))
+    assert command == Twist(0.0, 0.0)
+    assert list(policy.given_up) == [0] and "push" in policy.given_up[0]
+    assert policy.plan == ()
+
+
+def test_a_box_delivered_by_accident_is_dropped():
+    policy = GtspMpc()
+    world = room([(0.0, 0.0, 0.0), (-2.0, 2.0, 0.0)])
+    policy.act(world)
+    first = policy.plan[0].led
+    assert {i for push in policy.plan for i in push.covers} == {0, 1}
+    left = replace(world, movables=world.movables.select(world.movables.ids != first), time=0.2)
+    policy.act(left)
+    assert first not in {push.led for push in policy.plan}
+    assert policy.act(replace(left, movables=make_boxes([]), time=0.4)) == Twist(0.0, 0.0)
+    assert policy.plan == () and policy.given_up == {}
+
+
+def commands():
+    """A digest of what the policy drives on a small scene."""
+    policy = GtspMpc()
+    env = PushEnv(
+        task="box_delivery",
+        preset="benchmark",
+        action="velocity",
+        observation="state",
+        variations={"layout": "small_columns", "boxes": 3},
+    )
+    env.reset(seed=1002)
+    policy.reset(env.world, np.random.default_rng(0))
+    digest = hashlib.sha256()
+    for _ in range(60):
+        twist = policy.act(env.world)
+        digest.update(np.array([twist.linear, twist.angular]).tobytes())
+        env.step(env.encode(twist))
+    return digest.hexdigest()
+
+
+def test_two_processes_drive_the_same():
+    code = "import test_gtsp_policy as t; print(t.commands())"
+    path = f"import sys; sys.path[:0] = {[p for p in sys.path if 'tests' in p]!r}; "
+    done = subprocess.run(
+        [sys.executable, "-c", path + code], capture_output=True, text=True, check=True
+    )
+    assert done.stdout.strip() == commands()
+
+
+@pytest.mark.parametrize("name", ["gtsp", "gtsp-mpc"])
+def test_other_tasks_and_robots_are_refused(name):
+    assert name in policy_names()
+    policy = make_policy(name)
+    with pytest.raises(InvalidInputError, match="goal"):
+        policy.act(replace(make_u_maze(), robot=box_delivery_robot()))
+    with pytest.raises(InvalidInputError, match="differential"):
+        policy.act(replace(room([]), robot=make_robot()))
+
+
+def test_settings_of_the_policies_are_checked():
+    with pytest.raises(InvalidInputError):
+        GtspMpc(SubTaskConfig(), price=3.0)
+    with pytest.raises(InvalidInputError):
+        make_policy("gtsp-mpc", config="fast")
+    with pytest.raises(InvalidInputError):
+        make_policy("gtsp-mpc", price=-1.0)
+    with pytest.raises(UnknownNameError):
+        make_policy("gtsp-mpc", prize=1.0)
+
+
+def test_a_sequence_is_drawn():
+    world = room([(0.0, 0.0, 0.0)])
+    policy = GtspMpc()
+    policy.act(world)
+    plain = draw_sequence(world, [], size_px=200)
+    drawn = draw_sequence(world, [push.poses for push in policy.plan], size_px=200)
+    assert plain.shape == drawn.shape and (plain != drawn).any()
+    with pytest.raises(InvalidInputError):
+        draw_sequence(world, [np.zeros((3, 1))])

@@ -1,0 +1,219 @@
+"""Candidate pushes, their graph, and covering as a GTSP."""
+
+import functools
+import itertools
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import shapely
+from conftest import SQUARE, make_boxes
+
+from pushplan.planners.sequencing import solve_gtsp
+from pushplan.planners.subtasks import (
+    Scene,
+    SubTaskConfig,
+    build_graph,
+    tour_of,
+)
+from pushplan.planners.subtasks.completions import completions
+from pushplan.planners.subtasks.hard import swinging_pushes
+from pushplan.planners.subtasks.reduction import parts_of, reduce
+from pushplan.planners.subtasks.rollout import all_done
+from pushplan.planners.subtasks.runner import Runner
+from pushplan.world import (
+    ClearanceArea,
+    InvalidInputError,
+    MaxIterations,
+    Movables,
+    Receptacle,
+    StaticMap,
+    World,
+    box_delivery_robot,
+)
+
+CORNER = Receptacle([(3.0, 3.0), (5.0, 3.0), (5.0, 5.0), (3.0, 5.0)])
+COLUMN = [(-0.5, 0.0), (0.5, 0.0), (0.5, 1.0), (-0.5, 1.0)]
+AREA = [(-3.0, -3.0), (3.0, -3.0), (3.0, 3.0), (-3.0, 3.0)]
+
+
+def scene(boxes, goal=CORNER, extra=(), pose=(-3.0, -3.0, 0.0), **config):
+    world = World(
+        robot=box_delivery_robot(),
+        robot_pose=pose,
+        static=StaticMap.build(polygons=list(extra), bounds=(-5, -5, 5, 5)),
+        movables=make_boxes(boxes),
+        goal=goal,
+    )
+    return Scene(world, SubTaskConfig(**config))
+
+
+@functools.cache
+def example(kind):
+    """A scene and its graph."""
+    if kind == "delivery":
+        here = scene([(-1.5, -1.5, 0.3), (0.5, -2.0, 0.0)], extra=[COLUMN])
+    else:
+        area = ClearanceArea(AREA, [True, True, False, True])
+        here = scene([(2.0, -1.0, 0.0), (1.0, 1.5, 0.5), (-2.0, 2.0, 1.0)], area, [COLUMN])
+    return here, build_graph(here)
+
+
+@pytest.mark.parametrize("kind", ["delivery", "clearing"])
+def test_candidate_pushes_keep_clear_of_what_is_static(kind):
+    here, graph = example(kind)
+    assert {i for push in graph.pushes for i in push.covers} == set(range(len(here.poses)))
+    walls = shapely.Polygon(COLUMN)
+    room = shapely.box(-5, -5, 5, 5)
+    for push in graph.pushes:
+        for x, y, theta in push.poses[::4]:
+            c, s = math.cos(theta), math.sin(theta)
+            for part in here.world.robot.parts:
+                body = shapely.Polygon(part @ np.array([[c, s], [-s, c]]) + [x, y])
+                assert body.intersection(walls).area < 1e-3
+                assert body.difference(room).area < 1e-3
+
+
+@pytest.mark.parametrize("kind", ["delivery", "clearing"])
+def test_costs_are_no_less_than_the_straight_ways(kind):
+    here, graph = example(kind)
+    count = len(graph.pushes)
+    assert graph.costs.shape == (count + 1, count)
+    assert np.isinf(graph.costs[np.arange(count), np.arange(count)]).all()
+    assert np.isfinite(graph.costs[-1]).all()
+    assert not np.isnan(graph.costs).any()
+    slack = 1.5 * here.coarse.floor.step  # where a push begins between the lattice's poses
+    for n, push in enumerate(graph.pushes):
+        assert push.length > 0.0 and push.price >= push.length
+        assert push.work > 0.0
+        ends = [other.end for other in graph.pushes] + [here.world.robot_pose]
+        for m, end in enumerate(ends):
+            if m != n:
+                straight = math.dist(end[:2], push.start[:2])
+                assert graph.costs[m, n] >= straight + push.length - slack
+
+
+@pytest.mark.parametrize("kind", ["delivery", "clearing"])
+def test_what_a_push_covers_is_done_where_it_is_predicted_to_end(kind):
+    here, graph = example(kind)
+    for push in graph.pushes:
+        done = all_done(push.object_poses, here.bodies, here.task)
+        assert done[list(push.covers)].all()
+
+
+def test_a_row_of_boxes_is_swept_by_one_push():
+    goal = ClearanceArea(AREA, [False, True, False, False])
+    here = scene([(1.0, 0.2, 0.0), (2.2, -0.2, 0.0)], goal, price=0.5)
+    graph = build_graph(here)
+    assert any(set(push.covers) == {0, 1} for push in graph.pushes)
+    order, cost = tour_of(graph)
+    assert len(order) == 1 and cost == pytest.approx(graph.costs[-1, order[0]])
+
+
+def brute_force(costs, masks, boxes):
+    """The cheapest sequence of pushes that covers everything, each adding something."""
+    every, best = (1 << boxes) - 1, math.inf
+    for size in range(1, boxes + 1):
+        for order in itertools.permutations(range(len(masks)), size):
+            covered, total, last = 0, 0.0, len(masks)
+            for n in order:
+                if covered | masks[n] == covered:
+                    break
+                covered |= masks[n]
+                total += costs[last, n]
+                last = n
+            else:
+                if covered == every:
+                    best = min(best, total)
+    return best
+
+
+def test_covering_is_solved_as_by_brute_force():
+    rng = np.random.default_rng(3)
+    for _ in range(40):
+        boxes, count = int(rng.integers(1, 5)), int(rng.integers(2, 7))
+        masks = rng.integers(1, 1 << boxes, count)
+        starts, ends = rng.uniform(0.0, 9.0, (count, 2)), rng.uniform(0.0, 9.0, (count + 1, 2))
+        pushes = np.hypot(*(ends[:count] - starts).T) + rng.uniform(0.0, 5.0, count)
+        costs = np.hypot(*np.moveaxis(ends[:, None] - starts[None], 2, 0)) + pushes
+        costs[:, rng.random(count) < 0.15] = np.inf
+        np.fill_diagonal(costs[:-1], np.inf)
+        truth = brute_force(costs, masks.tolist(), boxes)
+        best, _ = completions(costs, masks, boxes)
+        assert best[0, count] == pytest.approx(truth)
+        reduced = reduce(costs, masks.tolist(), boxes)
+        if not all(reduced.clusters):
+            assert math.isinf(truth)
+            continue
+        tour = solve_gtsp(reduced.costs, reduced.clusters, stop=MaxIterations(300))
+        if math.isinf(truth):
+            assert not tour.status.has_tour
+        else:
+            assert tour.cost == pytest.approx(truth)
+            order = reduced.order([int(node) for node in tour.nodes])
+            steps = zip([count, *order[:-1]], order, strict=True)
+            assert sum(costs[a, b] for a, b in steps) == pytest.approx(truth)
+
+
+def test_a_push_stands_for_its_parts():
+    assert parts_of(0b101) == [(0,), (2,), (0, 2)]
+    assert parts_of(0b11111) == [(0, 1, 2, 3, 4), (0,), (1,), (2,), (3,), (4,)]
+
+
+def test_more_objects_than_can_be_solved_exactly():
+    boxes = [(x, y, 0.0) for x in (-2.2, -0.7, 0.8, 2.3) for y in (-2.2, -0.4, 1.4)]
+    graph = build_graph(scene(boxes, ClearanceArea(AREA, [True] * 4), per_box=2))
+    order, cost = tour_of(graph, iterations=30)
+    covered = {i for n in order for i in graph.pushes[n].covers}
+    assert covered == set(range(12)) and math.isfinite(cost)
+    steps = zip([len(graph.pushes), *order[:-1]], order, strict=True)
+    assert sum(graph.costs[a, b] for a, b in steps) == pytest.approx(cost)
+
+
+def test_a_walled_in_box_is_infeasible():
+    ring = [
+        [(-2, -2), (2, -2), (2, -1.5), (-2, -1.5)],
+        [(-2, 1.5), (2, 1.5), (2, 2), (-2, 2)],
+        [(-2, -2), (-1.5, -2), (-1.5, 2), (-2, 2)],
+        [(1.5, -2), (2, -2), (2, 2), (1.5, 2)],
+    ]
+    graph = build_graph(scene([(0.0, 0.0, 0.0), (0.0, -3.5, 0.0)], extra=ring))
+    assert list(graph.infeasible) == [0]
+    assert {i for push in graph.pushes for i in push.covers} == {1}
+
+
+def test_a_box_at_a_wall_is_freed():
+    here = scene([(0.0, -4.49, 0.0)])
+    graph = build_graph(here, freeing=True)
+    assert graph.pushes and not graph.infeasible
+
+
+def test_a_box_in_a_corner_is_turned_out_of_it():
+    room = scene([(0.0, 0.0, 0.0)])
+    small = Movables.from_outlines([0.44 * SQUARE], [(-4.5, -4.5, 0.3)])
+    here = Scene(replace(room.world, movables=small), room.config)
+    found = swinging_pushes(Runner(here), 0)
+    assert found
+    for push in found:
+        assert push.frees and push.turn != 0.0
+        moved = push.object_poses[0, :2] - here.poses[0, :2]
+        assert float(np.hypot(*moved)) > 0.02
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"price": -1.0},
+        {"price": math.nan},
+        {"cell": 0.0},
+        {"slack": 2.0},
+        {"per_box": 0},
+        {"rehearsals": 2.5},
+        {"period": "soon"},
+        {"mpc": 1},
+    ],
+)
+def test_settings_are_checked(changes):
+    with pytest.raises(InvalidInputError):
+        SubTaskConfig(**changes)
