@@ -12,7 +12,7 @@ from pushplan.world.checks import FloatArray, array, number
 
 _ALIGNED = math.radians(2.0)
 _ASTRAY = math.radians(20.0)
-_NEAR, _MISSED = 0.004, 0.1
+_NEAR, _MISSED = 0.02, 0.1
 """A point counts as reached within the first, or behind the robot within the second [circumscribed
 radii]."""
 _STALLED = 0.1

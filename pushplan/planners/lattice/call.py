@@ -167,7 +167,10 @@ class ShipCall:
             return
         if config.refinement and not self.stopped():
             self._refine(builder)
-        while self.repairs < config.repairs and not self.stopped():
+        # a path that touches nothing is not shortened: it would be until it grazes a floe
+        while self.repairs < config.repairs and self.improver.best.works[-1] > 0.0:
+            if self.stopped():
+                return
             self.improver.repair(self.rng)
             self.repairs += 1
             self.iterations += 1
