@@ -15,9 +15,10 @@ from pushplan.envs.actions import ActionMode, Motion, waiting
 from pushplan.envs.registry import ACTIONS, SIMULATORS, TASKS, default_preset, look_up
 from pushplan.envs.roster import Roster
 from pushplan.envs.simulators.base import Simulator
-from pushplan.envs.tasks.base import ObservationBuilder, Outcome, Task
+from pushplan.envs.tasks.base import Outcome, Task
 from pushplan.envs.trace import Trace
 from pushplan.envs.window import Window, has_display
+from pushplan.observation import ObservationBuilder
 from pushplan.scenarios import Scenario
 from pushplan.world import (
     Action,

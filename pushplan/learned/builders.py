@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import asdict, fields
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pushplan.learned.features import FeatureObservation
-from pushplan.observation import ImageObservation, StateObservation
-from pushplan.world import InvalidInputError, SchemaError, World
+from pushplan.observation import ImageObservation, ObservationBuilder, StateObservation
+from pushplan.world import InvalidInputError, SchemaError
 from pushplan.world.checks import choice, known_keys
 
 KINDS: dict[str, type[Any]] = {
@@ -23,35 +22,7 @@ GREATEST_SIZE = 2**24
 """Elements of an observation that a file may ask for."""
 
 
-class Builder(Protocol):
-    """Turns a snapshot into an array of fixed shape and type."""
-
-    @property
-    def shape(self) -> tuple[int, ...]:
-        """Shape of the array."""
-        ...
-
-    @property
-    def dtype(self) -> np.dtype[Any]:
-        """Element type of the array."""
-        ...
-
-    @property
-    def low(self) -> float:
-        """Least value of an element."""
-        ...
-
-    @property
-    def high(self) -> float:
-        """Greatest value of an element."""
-        ...
-
-    def observe(self, world: World) -> NDArray[Any]:
-        """A new array."""
-        ...
-
-
-def builder_to_dict(builder: Builder) -> dict[str, Any]:
+def builder_to_dict(builder: ObservationBuilder) -> dict[str, Any]:
     """JSON values from which `builder_from_dict` makes the builder again.
 
     Raises:
@@ -74,7 +45,7 @@ def builder_to_dict(builder: Builder) -> dict[str, Any]:
     )
 
 
-def builder_from_dict(data: Mapping[str, Any]) -> Builder:
+def builder_from_dict(data: Mapping[str, Any]) -> ObservationBuilder:
     """The builder of an observation.
 
     ``shape`` and ``dtype`` may be given, and must then be what the builder has.
@@ -92,7 +63,7 @@ def builder_from_dict(data: Mapping[str, Any]) -> Builder:
         for key, value in data.items()
         if key in own
     }
-    builder: Builder = builder_class(**options)
+    builder: ObservationBuilder = builder_class(**options)
     if float(np.prod([float(n) for n in builder.shape])) > GREATEST_SIZE:
         raise InvalidInputError(f"an observation of shape {builder.shape} is too large")
     stated = {"shape": tuple(data.get("shape", builder.shape)), "dtype": data.get("dtype")}

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pushplan.learned.builders import Builder
 from pushplan.learned.outputs import BadOutputError
 from pushplan.learned.specification import Specification
+from pushplan.observation import ObservationBuilder
 from pushplan.world import InvalidInputError, World
 from pushplan.world.checks import FloatArray
 
@@ -40,7 +40,7 @@ class NetworkPolicy:
         return f"{type(self).__name__}({self.label!r})"
 
     @property
-    def observation(self) -> Builder:
+    def observation(self) -> ObservationBuilder:
         """What an environment has to observe for it."""
         return self.specification.observation
 

@@ -8,8 +8,9 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
-from pushplan.learned.builders import Builder, builder_from_dict, builder_to_dict
+from pushplan.learned.builders import builder_from_dict, builder_to_dict
 from pushplan.learned.outputs import ActionSpec
+from pushplan.observation import ObservationBuilder
 from pushplan.world import InvalidInputError, RobotModel, SchemaError
 from pushplan.world.checks import known_keys, number
 
@@ -80,7 +81,7 @@ class Specification:
     presets: tuple[str, ...]
     robot: RobotSpec | None
     control_step: float
-    observation: Builder
+    observation: ObservationBuilder
     action: ActionSpec
     training: Mapping[str, Any] = field(default_factory=dict)
 

@@ -1,7 +1,8 @@
 """A `pushplan.world.World` as what a policy observes. No simulator, no Gymnasium."""
 
+from pushplan.observation.builder import ObservationBuilder
 from pushplan.observation.channels import CHANNELS
 from pushplan.observation.image import ImageObservation
 from pushplan.observation.state import StateObservation
 
-__all__ = ["CHANNELS", "ImageObservation", "StateObservation"]
+__all__ = ["CHANNELS", "ImageObservation", "ObservationBuilder", "StateObservation"]

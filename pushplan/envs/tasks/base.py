@@ -5,42 +5,14 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, ClassVar, Protocol
+from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pushplan.envs.simulators.base import Materials
+from pushplan.observation import ObservationBuilder
 from pushplan.world import Drive, RobotModel, World
 from pushplan.world.checks import BoolArray, FloatArray, IntArray
-
-
-class ObservationBuilder(Protocol):
-    """Turns a snapshot into an array of fixed shape and type, within fixed bounds."""
-
-    @property
-    def shape(self) -> tuple[int, ...]:
-        """Shape of the array."""
-        ...
-
-    @property
-    def dtype(self) -> np.dtype[Any]:
-        """Element type of the array."""
-        ...
-
-    @property
-    def low(self) -> float:
-        """Least value of an element."""
-        ...
-
-    @property
-    def high(self) -> float:
-        """Greatest value of an element."""
-        ...
-
-    def observe(self, world: World) -> NDArray[Any]:
-        """A new array for this snapshot."""
-        ...
 
 
 @dataclass(frozen=True)

@@ -11,14 +11,14 @@ import numpy as np
 import shapely
 
 from pushplan.envs.simulators.base import Materials
-from pushplan.envs.tasks.base import ObservationBuilder, Task, drive_of
+from pushplan.envs.tasks.base import Task, drive_of
 from pushplan.envs.tasks.box_kernels import sample_at
 from pushplan.envs.tasks.layout import Floor
 from pushplan.envs.tasks.reach import Reach
 from pushplan.envs.tasks.testbed import SOLIDS
 from pushplan.envs.tasks.variations import Variations
 from pushplan.geometry import GeodesicField, geodesic_field
-from pushplan.observation import ImageObservation, StateObservation
+from pushplan.observation import ImageObservation, ObservationBuilder, StateObservation
 from pushplan.world import (
     BUMPERS,
     InvalidInputError,

@@ -10,12 +10,12 @@ from typing import ClassVar
 import numpy as np
 import shapely
 
-from pushplan.envs.tasks.base import ObservationBuilder, Outcome, Task, drive_of
+from pushplan.envs.tasks.base import Outcome, Task, drive_of
 from pushplan.envs.tasks.layout import Floor
 from pushplan.envs.tasks.maze_presets import PRESETS, MazePreset
 from pushplan.envs.tasks.variations import Variations
 from pushplan.geometry.distance_field import GeodesicField, geodesic_field
-from pushplan.observation import ImageObservation, StateObservation
+from pushplan.observation import ImageObservation, ObservationBuilder, StateObservation
 from pushplan.world import (
     Drive,
     GoalDisc,

@@ -10,10 +10,10 @@ from typing import ClassVar
 import numpy as np
 import shapely
 
-from pushplan.envs.tasks.base import ObservationBuilder, Outcome, Task
+from pushplan.envs.tasks.base import Outcome, Task
 from pushplan.envs.tasks.ship_presets import PRESETS, ShipPreset
 from pushplan.envs.tasks.variations import Variations
-from pushplan.observation import ImageObservation, StateObservation
+from pushplan.observation import ImageObservation, ObservationBuilder, StateObservation
 from pushplan.scenarios.ice import IceField, generate_ice, load_ice
 from pushplan.world import (
     GoalLine,

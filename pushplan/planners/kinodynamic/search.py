@@ -83,6 +83,19 @@ class Search:
 
     def run(self) -> PlanStatus | None:
         """Search until the stop rule fires; None where there is no plan by then."""
+        status = self._begin()
+        if status is not None:
+            return status
+        while not self.stopped():
+            self._one_round()
+            if self.sealed:
+                return PlanStatus.GOAL_UNREACHABLE
+            if not self._solved(self.best_cost):
+                self._relax()
+        return PlanStatus.SOLVED if self._solved(self.best_cost) else None
+
+    def _begin(self) -> PlanStatus | None:
+        """Find the margin that can be kept; a status where the call ends here already."""
         margin = start_margin(self.world, self.config.margin * self.size)
         if margin is None:
             return PlanStatus.START_BLOCKED
@@ -93,13 +106,7 @@ class Search:
             here.objects[0] = self.world.movables.poses
             self._keep(here, 1, 0.0)
             return PlanStatus.SOLVED
-        while not self.stopped():
-            self._one_round()
-            if self.sealed:
-                return PlanStatus.GOAL_UNREACHABLE
-            if not self._solved(self.best_cost):
-                self._relax()
-        return PlanStatus.SOLVED if self._solved(self.best_cost) else None
+        return None
 
     def _set_margin(self, margin: float) -> None:
         """Keep ``margin`` [m] from walls; with little of it poses lie closer, for what is thin."""

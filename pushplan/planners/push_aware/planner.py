@@ -96,6 +96,6 @@ class PushAware:
 
 def _gap(cost: float, bound: float) -> float:
     """By what share a cost exceeds a bound; infinite where the bound says nothing."""
-    if cost <= bound or bound <= 0.0:
-        return 0.0 if cost <= bound else float("inf")
-    return cost / bound - 1.0
+    if cost <= bound:
+        return 0.0
+    return cost / bound - 1.0 if bound > 0.0 else float("inf")

@@ -11,7 +11,7 @@ from pushplan.planners.kinodynamic.collision import first_blocked
 from pushplan.planners.kinodynamic.dubins import step_along
 from pushplan.planners.kinodynamic.improve import lay_out, make_path, price_from
 from pushplan.planners.kinodynamic.search import Search, _Candidate
-from pushplan.planners.kinodynamic.timing import start_margin, turning_radius
+from pushplan.planners.kinodynamic.timing import turning_radius
 from pushplan.planners.lattice.astar import EXHAUSTED, FOUND
 from pushplan.planners.push_aware.best_first import Branching, make_search
 from pushplan.planners.push_aware.config import PushAwareConfig
@@ -92,16 +92,9 @@ class PushAwareSearch(Search):
             A status where the call ends here: the start is blocked, the robot is there already,
             or no way leads to the goal.
         """
-        margin = start_margin(self.world, self.config.margin * self.size)
-        if margin is None:
-            return PlanStatus.START_BLOCKED
-        self._set_margin(margin)
-        if self.goal.distance(*self.world.robot_pose[:2]) <= 0.0:
-            here = make_path(1, len(self.world.movables))
-            here.poses[0] = self.world.robot_pose
-            here.objects[0] = self.world.movables.poses
-            self._keep(here, 1, 0.0)
-            return PlanStatus.SOLVED
+        status = self._begin()
+        if status is not None:
+            return status
         self._shoot()
         while not self.stopped():
             self._one_round()

@@ -20,8 +20,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pushplan.envs import PushEnv
-from pushplan.learned.builders import Builder, builder_from_dict, builder_to_dict
+from pushplan.learned.builders import builder_from_dict, builder_to_dict
 from pushplan.learned.specification import RobotSpec
+from pushplan.observation import ObservationBuilder
 from pushplan.training.policies.environment import TRAINING_SEEDS
 from pushplan.training.policies.libraries import need
 from pushplan.world import InvalidInputError, SchemaError, stream
@@ -157,7 +158,7 @@ def _mode(env: PushEnv) -> str:
 
 
 def _run(
-    env: PushEnv, policy: Any, builder: Builder, request: DatasetRequest, seed: int
+    env: PushEnv, policy: Any, builder: ObservationBuilder, request: DatasetRequest, seed: int
 ) -> EpisodeData:
     seen, _ = env.reset(seed=seed)
     policy.reset(env.world, stream(seed, "policy"))

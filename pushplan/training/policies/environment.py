@@ -10,9 +10,10 @@ from gymnasium.spaces import Box, Discrete
 from numpy.typing import NDArray
 
 from pushplan.envs import PushEnv
-from pushplan.learned.builders import Builder, builder_from_dict
+from pushplan.learned.builders import builder_from_dict
 from pushplan.learned.outputs import MODES, ActionSpec
 from pushplan.learned.specification import RobotSpec, Specification
+from pushplan.observation import ObservationBuilder
 from pushplan.training.policies.config import TrainingConfig
 from pushplan.world import InvalidInputError, World, stream
 
@@ -27,7 +28,7 @@ _SEED_COUNT = 2**30
 class _Blank:
     """In place of a builder: steps between two decisions need not be observed."""
 
-    def __init__(self, builder: Builder) -> None:
+    def __init__(self, builder: ObservationBuilder) -> None:
         self.shape, self.dtype = builder.shape, builder.dtype
         self.low, self.high = builder.low, builder.high
         self._nothing = np.zeros(self.shape, self.dtype)
