@@ -10,14 +10,16 @@ an upper bound of its lateness on a machine of its own. *gc* is the longest time
 garbage collector took within a call.
 
 The second calls every planner CALLS times on a small start with a budget of a few iterations, and
-the controllers as often along a path, and writes how the memory of the process grows after the
-first tenth of the calls; then a hundredth of the calls are repeated under tracemalloc, which sees
-what Python and NumPy allocate.
+the controllers as often along a path, and writes how memory grows after the first tenth of the
+calls: the pages of the process, and what is in use of the heap of the C library, which compiled
+code and libraries allocate from (where that can be asked, as in glibc); then a hundredth of the
+calls are repeated under tracemalloc, which sees what Python and NumPy allocate.
 """
 
 from __future__ import annotations
 
 import argparse
+import ctypes
 import gc
 import os
 import sys
@@ -160,17 +162,42 @@ def resident() -> float:
         return int(file.read().split()[1]) * os.sysconf("SC_PAGE_SIZE") / 1024.0
 
 
+class _Mallinfo2(ctypes.Structure):
+    """What glibc says of its heap, see mallinfo(3) [bytes]."""
+
+    _fields_ = tuple(
+        (name, ctypes.c_size_t)
+        for name in (
+            *("arena", "ordblks", "smblks", "hblks", "hblkhd"),
+            *("usmblks", "fsmblks", "uordblks", "fordblks", "keepcost"),
+        )
+    )
+
+
+def heap_in_use() -> float:
+    """Bytes that the C library has handed out and not got back; NaN where it does not say."""
+    try:
+        ask = ctypes.CDLL(None).mallinfo2
+    except (AttributeError, OSError):
+        return float("nan")
+    ask.restype = _Mallinfo2
+    answer = ask()
+    return float(answer.uordblks + answer.hblkhd)
+
+
 def growth(name: str, call: Callable[[int], object], calls: int) -> None:
     """Write a row: time of a call, memory after a tenth of the calls and at the end, growth."""
-    marks, began = [], time.perf_counter()
+    marks, heap, began = [], [], time.perf_counter()
     for number in range(calls):
         if number in (calls // 10, calls // 2):
             gc.collect()
             marks.append(resident())
+            heap.append(heap_in_use())
         call(number)
     each = 1e3 * (time.perf_counter() - began) / calls
     gc.collect()
     marks.append(resident())
+    heap.append(heap_in_use())
     few = max(calls // 100, 20)
     tracemalloc.start()
     for number in range(few):
@@ -185,7 +212,8 @@ def growth(name: str, call: Callable[[int], object], calls: int) -> None:
     write(
         f"| `{name}` | {each:.2f} | "
         + " | ".join(f"{mark / 1024.0:.1f}" for mark in marks)
-        + f" | {1024.0 * (marks[-1] - marks[0]) / (0.9 * calls):.1f} | {traced:.1f} |"
+        + f" | {1024.0 * (marks[-1] - marks[0]) / (0.9 * calls):.1f}"
+        f" | {(heap[-1] - heap[0]) / (0.9 * calls):.1f} | {traced:.1f} |"
     )
 
 
@@ -193,9 +221,9 @@ def memory(names: list[str], calls: int, controllers: bool) -> None:
     """One row for each planner and controller."""
     write(f"{calls} calls each", "")
     write(
-        "| | ms a call | MB after a tenth | MB after half | MB at the end | bytes a call "
-        "| traced bytes a call |",
-        "|---|---|---|---|---|---|---|",
+        "| | ms a call | MB after a tenth | MB after half | MB at the end "
+        "| bytes a call | of the heap | traced |",
+        "|---|---|---|---|---|---|---|---|",
     )
     stop = MaxIterations(20)
     for name in names:

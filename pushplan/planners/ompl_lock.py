@@ -3,13 +3,24 @@
 from __future__ import annotations
 
 import contextlib
+import functools
 import threading
 from collections.abc import Callable, Iterator
+from typing import Any
 
-from ompl import util
+from ompl import base, util
 
 _LOCK = threading.Lock()
 _POLL_S = 0.002
+
+
+@functools.cache
+def own_state(kind: type[base.StateSpace], *arguments: int) -> Any:
+    """The one state of a kind of space to hand values to OMPL with, which copies it.
+
+    Its Python binding cannot free states (2.0.1), so one for each call would be lost.
+    """
+    return kind(*arguments).allocState()
 
 
 @contextlib.contextmanager

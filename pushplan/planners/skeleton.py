@@ -14,6 +14,7 @@ from scipy.spatial import Delaunay, QhullError, cKDTree
 
 from pushplan.control import PurePursuit
 from pushplan.geometry import VisibilityGraph
+from pushplan.planners.arguments import check_call
 from pushplan.planners.kinodynamic.timing import start_margin
 from pushplan.planners.policy import PlanFollower
 from pushplan.planners.polyline import polyline_plan
@@ -73,6 +74,7 @@ class Skeleton:
             InvalidInputError: if the world's goal is not one for the robot.
         """
         began = time.perf_counter()
+        check_call(world, stop, rng)
         check = None if stop is None else stop.start()
         status, points = self._path(world, check)
         if stop is not None and stop.cancelled:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pushplan.geometry import VisibilityGraph
+from pushplan.planners.arguments import check_call
 from pushplan.planners.kinodynamic.timing import start_margin
 from pushplan.planners.polyline import polyline_plan
 from pushplan.world import PlanResult, PlanStats, PlanStatus, Stop, World
@@ -40,6 +41,7 @@ class ShortestPath:
     ) -> PlanResult:
         """Plan from ``world``; exact and without chance, so ``stop`` and ``rng`` are not needed."""
         began = time.perf_counter()
+        check_call(world, stop, rng)
         robot, goal = world.robot, world.navigation_goal
         start = world.robot_pose[:2]
         for clearance in (robot.circumscribed_radius, robot.inscribed_radius):

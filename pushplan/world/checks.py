@@ -6,7 +6,7 @@ import dataclasses
 import math
 import numbers
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
@@ -16,6 +16,18 @@ from pushplan.world.errors import InvalidInputError, SchemaError, unknown_name_m
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 BoolArray = NDArray[np.bool_]
+_T = TypeVar("_T")
+
+
+def expect(name: str, value: object, kind: type[_T]) -> _T:
+    """Check that ``value`` is of a type and return it.
+
+    Raises:
+        InvalidInputError: naming the value and the type otherwise.
+    """
+    if not isinstance(value, kind):
+        raise InvalidInputError(f"{name} must be a {kind.__name__}, got {_short(value)}")
+    return value
 
 
 def number(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 import time
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -67,6 +68,41 @@ def test_a_small_goal_in_a_large_hall(name, side):
     if name != "geometric-rrt":  # a blind tree may miss it, and then says so
         assert result.status is PlanStatus.SOLVED
     assert result.status in (PlanStatus.SOLVED, PlanStatus.TIMED_OUT)
+
+
+@pytest.mark.parametrize("name", planner_names())
+@pytest.mark.parametrize(
+    ("given", "what"),
+    [
+        (({}, None, None), "world must be a World"),
+        ((make_u_maze(), 0.05, None), "stop must be a Stop"),
+        ((make_u_maze(), None, 7), "rng must be a Generator"),
+    ],
+)
+def test_wrong_arguments_are_named(name, given, what):
+    world, stop, rng = given
+    with pytest.raises(InvalidInputError, match=what):
+        make_planner(name).plan(world, stop=stop, rng=rng)
+
+
+@pytest.mark.parametrize("name", planner_names())
+def test_wrong_settings_are_named(name):
+    planner = make_planner(name)
+    for option in ("config", "interaction", "network"):
+        if hasattr(planner, option):
+            with pytest.raises(InvalidInputError, match=f"{option} must be a"):
+                replace(planner, **{option: {"price": 1}})
+
+
+def test_a_heap_of_boxes_does_not_stop_the_clock():
+    rng = np.random.default_rng(7)
+    heap = np.column_stack([rng.uniform(0, 10, (200, 2)), rng.uniform(-3, 3, 200)])
+    world = hall(10, make_robot(), [1, 1, 0.8], [9, 9], 0.5)
+    boxes = Movables.from_outlines([SQUARE * 10 ** rng.uniform(-3, 0, 2) for _ in heap], heap)
+    world = World(world.robot, world.robot_pose, world.static, boxes, world.goal)
+    for name in ("kinodynamic-rrt", "push-aware"):
+        planner = make_planner(name)
+        assert quickest(lambda planner=planner: planner.plan(world, stop=Deadline(0.05))) < 0.12
 
 
 @pytest.mark.parametrize("door", [0.8, 1.3])

@@ -10,9 +10,10 @@ from numba import njit
 from ompl import base, geometric
 
 from pushplan.geometry import core_distance
+from pushplan.planners.arguments import check_call
 from pushplan.planners.kinodynamic.collision import Obstacles, obstacles
 from pushplan.planners.kinodynamic.timing import start_margin
-from pushplan.planners.ompl_lock import seeded_ompl
+from pushplan.planners.ompl_lock import own_state, seeded_ompl
 from pushplan.planners.polyline import polyline_plan
 from pushplan.world import (
     MaxIterations,
@@ -25,7 +26,7 @@ from pushplan.world import (
     StopCheck,
     World,
 )
-from pushplan.world.checks import FloatArray, integer, number
+from pushplan.world.checks import FloatArray, expect, integer, number
 
 
 @dataclass(frozen=True)
@@ -71,6 +72,9 @@ class GeometricRRT:
 
     config: GeometricRRTConfig = field(default_factory=GeometricRRTConfig)
 
+    def __post_init__(self) -> None:
+        expect("config", self.config, GeometricRRTConfig)
+
     def plan(
         self,
         world: World,
@@ -80,6 +84,7 @@ class GeometricRRT:
     ) -> PlanResult:
         """Plan from ``world``; see `pushplan.world.Planner`. One iteration is one sample."""
         began = time.perf_counter()
+        check_call(world, stop, rng)
         config = self.config
         stop = MaxIterations(4 * config.pass_iterations) if stop is None else stop
         rng = np.random.default_rng(0) if rng is None else rng
@@ -152,7 +157,7 @@ class GeometricRRT:
             info.setStateValidityCheckingResolution(min(step, 0.5))
             info.setup()
             problem = base.ProblemDefinition(info)
-            start = space.allocState()
+            start = own_state(base.RealVectorStateSpace, 2)
             start[0], start[1] = float(world.robot_pose[0]), float(world.robot_pose[1])
             problem.addStartState(start)
             region = _GoalRegion(info, world.navigation_goal, among.bounds, rng)

@@ -19,6 +19,9 @@ from pushplan.planners.kinodynamic.dubins import dubins, sample_pieces
 from pushplan.world import GoalDisc, NavigationGoal
 from pushplan.world.checks import FloatArray
 
+PATIENCE = 4_000
+"""Pairs of objects that may be tested for one repair; that takes some milliseconds."""
+
 
 class Pricing(NamedTuple):
     """What a path costs and where it may go."""
@@ -90,6 +93,7 @@ def price_from(
     first: int,
     count: int,
     limit: float,
+    patience: int,
     pricing: Pricing,
     bodies: Bodies,
     settings: Settings,
@@ -101,12 +105,13 @@ def price_from(
         first: the last pose whose price is known.
         count: poses in use.
         limit: cost at which there is no point in going on [kg m].
+        patience: pairs of objects that are tested at most, where many lie in a heap.
         pricing: masses and weight.
         bodies: shapes for the sweep.
         settings: of the sweep.
 
     Returns:
-        The cost [kg m], infinite where it passes ``limit``.
+        The cost [kg m], infinite where it passes ``limit`` or takes too long to find.
     """
     scratch = make_scratch(bodies)
     objects = bodies.radii.shape[0]
@@ -127,7 +132,8 @@ def price_from(
         path.works[n] = path.works[n - 1] + work
         if not free:
             path.lengths[n] += pricing.jam
-        if m0 * path.lengths[n] + weight * path.works[n] >= limit:
+        too_dear = m0 * path.lengths[n] + weight * path.works[n] >= limit
+        if too_dear or scratch.tests[0] > patience:
             return np.inf
     cost: float = m0 * path.lengths[count - 1] + weight * path.works[count - 1]
     return cost
@@ -310,7 +316,7 @@ def improve(
         trial.lengths[first] = path.lengths[first]
         trial.works[first] = path.works[first]
         trial.objects[first] = path.objects[first]
-        price = price_from(trial, first, size, cost, pricing, bodies, settings)
+        price = price_from(trial, first, size, cost, PATIENCE, pricing, bodies, settings)
         if price < (1.0 - 1e-9) * cost:
             for n in range(first + 1, size):
                 path.poses[n] = trial.poses[n]

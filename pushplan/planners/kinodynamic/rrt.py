@@ -8,9 +8,11 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from pushplan.interaction import QuasiStatic
+from pushplan.planners.arguments import check_call
 from pushplan.planners.kinodynamic.config import KinodynamicRRTConfig
 from pushplan.planners.kinodynamic.search import Search
 from pushplan.world import PlanResult, PlanStats, PlanStatus, Stop, StopCheck, World
+from pushplan.world.checks import expect
 
 
 @dataclass(frozen=True)
@@ -36,6 +38,10 @@ class KinodynamicRRT:
     config: KinodynamicRRTConfig = field(default_factory=KinodynamicRRTConfig)
     interaction: QuasiStatic = field(default_factory=QuasiStatic)
 
+    def __post_init__(self) -> None:
+        expect("config", self.config, KinodynamicRRTConfig)
+        expect("interaction", self.interaction, QuasiStatic)
+
     def plan(
         self,
         world: World,
@@ -49,7 +55,8 @@ class KinodynamicRRT:
             InvalidInputError: if the world's goal is not one for the robot.
         """
         began = time.perf_counter()
-        stop = _DefaultBudget(self.config.default_iterations) if stop is None else stop
+        check_call(world, stop, rng)
+        stop = DefaultBudget(self.config.default_iterations) if stop is None else stop
         rng = np.random.default_rng(0) if rng is None else rng
         search = Search(world, self.config, self.interaction, stop.start(), rng, began)
         status = search.run()
@@ -66,7 +73,7 @@ class KinodynamicRRT:
 
 
 @dataclass(frozen=True)
-class _DefaultBudget(Stop):
+class DefaultBudget(Stop):
     """A number of iterations, and three times as many while there is no plan."""
 
     iterations: int

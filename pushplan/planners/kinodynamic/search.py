@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -22,6 +23,7 @@ from pushplan.planners.kinodynamic.improve import (
     make_path,
     price_from,
 )
+from pushplan.planners.kinodynamic.pace import Pace
 from pushplan.planners.kinodynamic.targets import Targets
 from pushplan.planners.kinodynamic.timing import TIGHTEST, start_margin, timed_plan, turning_radius
 from pushplan.planners.kinodynamic.tree import TreeLimits, grow_tree
@@ -33,6 +35,7 @@ _THIN_MARGIN = 0.05
 """Margin below which a post could hide between two poses of the usual spacing [R]."""
 _LEAST_SPACING = 0.02
 """Least spacing for that reason [R]."""
+_ENDLESS = 2**62
 
 
 class Search:
@@ -76,6 +79,7 @@ class Search:
         # crowded worlds are slow to sweep: look at the stop rule more often
         self.batch = max(1, 10 * config.batch // (10 + len(world.movables)))
         self.iterations = self.nodes = self.trees = 0
+        self._repair_pace, self._pricing_pace = Pace(), Pace()
         self.best: Path | None = None
         self.best_cost = np.inf
         self._exact: FloatArray | None = None
@@ -125,14 +129,22 @@ class Search:
         load = self.config.push_weight * float(world.movables.masses.sum()) / world.robot.mass
         return 1e4 * (extent + self.size) * (1.0 + load)
 
+    @property
+    def _jam_cost(self) -> float:
+        """A cost [kg m] that no path without a jam comes near."""
+        return self.pricing.jam * self.pricing.robot_mass
+
     def stopped(self) -> bool:
         """Whether the stop rule fires now."""
-        solved = self._solved(self.best_cost)
-        return self.check(self.iterations, self.best_cost if solved else np.inf)
+        return self.check(self.iterations, self._best_plan_cost())
+
+    def _best_plan_cost(self) -> float:
+        """The cost of the best plan [kg m], infinite while there is none."""
+        return self.best_cost if self._solved(self.best_cost) else np.inf
 
     def _solved(self, cost: float) -> bool:
         """Whether a path of this cost is free of jams."""
-        return cost < self.pricing.jam * self.pricing.robot_mass
+        return cost < self._jam_cost
 
     def _one_round(self) -> None:
         """A path around the objects and one among them; the cheaper is worked out further."""
@@ -222,10 +234,27 @@ class Search:
         path = make_path(capacity, len(world.movables))
         count = lay_out(world.robot_pose, arcs, path, self.pricing)
         assert count > 0  # there is room for three times as many poses
-        path.objects[0] = world.movables.poses
-        cost = price_from(path, 0, count, np.inf, self.pricing, self.bodies, self.settings)
+        cost = self._price(path, count, np.inf)
+        if cost is None:
+            return None
         self._keep(path, count, cost)
         return _Candidate(path, make_path(capacity, len(world.movables)), count, cost)
+
+    def _price(self, path: Path, count: int, limit: float) -> float | None:
+        """Sweep the objects along a path; its cost [kg m], None where it passes the limit.
+
+        Sweeping through a crowd takes its time: None too where the stop rule fires meanwhile.
+        """
+        path.objects[0] = self.world.movables.poses
+        cost, priced = 0.0, 1
+        for first, last in self._pricing_pace.pieces(count - 1, self.stopped):
+            priced = last + 1
+            cost = price_from(
+                path, first, priced, limit, _ENDLESS, self.pricing, self.bodies, self.settings
+            )
+            if not cost < limit:
+                return None
+        return cost if priced == count else None
 
     def _exact_guide(self) -> FloatArray:
         """A path around the walls alone, where the coarse grid misses a narrow way."""
@@ -241,21 +270,26 @@ class Search:
         for _ in range(0, repairs, self.batch):
             if self.stopped():
                 return
-            candidate.count, candidate.cost = improve(
-                candidate.path,
-                candidate.count,
-                candidate.cost,
-                self.rng.random((self.batch, 4)),
-                self.rng.standard_normal((self.batch, 2)),
-                candidate.trial,
-                self.pricing,
-                self.shape,
-                self.walls,
-                self.bodies,
-                self.settings,
-            )
+            draws = self.rng.random((self.batch, 4))
+            normals = self.rng.standard_normal((self.batch, 2))
+            # between pieces only the clock counts: what else may fire has been looked at
+            late = partial(self.check, self.iterations, self._best_plan_cost())
+            for first, last in self._repair_pace.pieces(self.batch, late):
+                candidate.count, candidate.cost = improve(
+                    candidate.path,
+                    candidate.count,
+                    candidate.cost,
+                    draws[first:last],
+                    normals[first:last],
+                    candidate.trial,
+                    self.pricing,
+                    self.shape,
+                    self.walls,
+                    self.bodies,
+                    self.settings,
+                )
+                self._keep(candidate.path, candidate.count, candidate.cost)
             self.iterations += self.batch
-            self._keep(candidate.path, candidate.count, candidate.cost)
 
     def _keep(self, path: Path, count: int, cost: float) -> None:
         if cost >= self.best_cost:

@@ -18,7 +18,7 @@ from ompl import base, control
 
 from pushplan.planners.kinodynamic.collision import Footprint, Obstacles, is_free
 from pushplan.planners.kinodynamic.dubins import along_arc, step_along
-from pushplan.planners.ompl_lock import seeded_ompl
+from pushplan.planners.ompl_lock import own_state, seeded_ompl
 from pushplan.world import NavigationGoal
 from pushplan.world.checks import FloatArray
 
@@ -178,7 +178,7 @@ class _Growth:
         info.setMinMaxControlDuration(1, 1)
         info.setup()
         problem = base.ProblemDefinition(info)
-        state = space.allocState()
+        state = own_state(base.SE2StateSpace)
         state.setX(float(self.start[0]))
         state.setY(float(self.start[1]))
         state.setYaw(float(self.start[2]))

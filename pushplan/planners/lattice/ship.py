@@ -8,11 +8,13 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from pushplan.interaction import InteractionModel
+from pushplan.planners.arguments import check_call
 from pushplan.planners.kinodynamic.timing import turning_radius
 from pushplan.planners.lattice.build import LatticeBuilder
 from pushplan.planners.lattice.call import ShipCall
 from pushplan.planners.lattice.config import ShipLatticeConfig
 from pushplan.world import PlanResult, PlanStats, PlanStatus, Stop, World
+from pushplan.world.checks import expect
 
 
 @dataclass(frozen=True)
@@ -33,6 +35,11 @@ class ShipLattice:
     config: ShipLatticeConfig = field(default_factory=ShipLatticeConfig)
     interaction: InteractionModel | None = None
 
+    def __post_init__(self) -> None:
+        expect("config", self.config, ShipLatticeConfig)
+        if self.interaction is not None:
+            expect("interaction", self.interaction, InteractionModel)  # type: ignore[type-abstract]
+
     def plan(
         self,
         world: World,
@@ -46,6 +53,7 @@ class ShipLattice:
             InvalidInputError: if the world's goal is not one for the robot.
         """
         began = time.perf_counter()
+        check_call(world, stop, rng)
         check = None if stop is None else stop.start()
         rng = np.random.default_rng(0) if rng is None else rng
         call = ShipCall(world, self.config, self.interaction, check, rng, began)

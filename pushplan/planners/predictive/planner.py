@@ -9,12 +9,14 @@ import numpy as np
 
 from pushplan.interaction.ice import IceInteraction
 from pushplan.interaction.network import IceNetwork
+from pushplan.planners.arguments import check_call
 from pushplan.planners.predictive.call import plan_call
 from pushplan.planners.predictive.config import PredictiveConfig
 from pushplan.planners.predictive.floes import FloeCarrier
 from pushplan.planners.predictive.maps import MapCarrier
 from pushplan.planners.predictive.scene import Scene
 from pushplan.world import PlanResult, Stop, World
+from pushplan.world.checks import expect
 
 
 @dataclass(frozen=True)
@@ -39,6 +41,10 @@ class PredictiveShip:
     config: PredictiveConfig = field(default_factory=PredictiveConfig)
     interaction: IceInteraction = field(default_factory=IceInteraction)
 
+    def __post_init__(self) -> None:
+        expect("config", self.config, PredictiveConfig)
+        expect("interaction", self.interaction, IceInteraction)
+
     def plan(
         self, world: World, *, stop: Stop | None = None, rng: np.random.Generator | None = None
     ) -> PlanResult:
@@ -48,6 +54,7 @@ class PredictiveShip:
             InvalidInputError: if the goal is no line, or something static is in the water.
         """
         began = time.perf_counter()
+        check_call(world, stop, rng)
         return plan_call(world, self.config, self.interaction, FloeCarrier, stop, began)
 
 
@@ -70,6 +77,11 @@ class PredictiveShipNetwork:
     network: IceNetwork = field(default_factory=IceNetwork)
     interaction: IceInteraction = field(default_factory=IceInteraction)
 
+    def __post_init__(self) -> None:
+        expect("config", self.config, PredictiveConfig)
+        expect("network", self.network, IceNetwork)
+        expect("interaction", self.interaction, IceInteraction)
+
     def plan(
         self, world: World, *, stop: Stop | None = None, rng: np.random.Generator | None = None
     ) -> PlanResult:
@@ -80,6 +92,7 @@ class PredictiveShipNetwork:
                 network cannot be read.
         """
         began = time.perf_counter()
+        check_call(world, stop, rng)
         self.network.load()
 
         def carrier(scene: Scene) -> MapCarrier:

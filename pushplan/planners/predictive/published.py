@@ -13,6 +13,7 @@ from pushplan.interaction.ice import IceInteraction
 from pushplan.interaction.network import IceNetwork
 from pushplan.interaction.occupancy import PATCH_CELLS
 from pushplan.interaction.occupancy_kernels import Patch
+from pushplan.planners.arguments import check_call
 from pushplan.planners.kinodynamic.dubins import sample_pieces
 from pushplan.planners.kinodynamic.timing import timed_plan, turning_radius
 from pushplan.planners.lattice.astar import SIZE, AStar, SearchState, expand, offer, take
@@ -26,7 +27,7 @@ from pushplan.planners.predictive.config import PredictiveConfig
 from pushplan.planners.predictive.maps import MapCarrier
 from pushplan.planners.predictive.scene import Scene, make_scene
 from pushplan.world import Movables, Plan, PlanResult, PlanStats, PlanStatus, Stop, World
-from pushplan.world.checks import FloatArray, IntArray, number
+from pushplan.world.checks import FloatArray, IntArray, expect, number
 
 
 @njit(cache=True, nogil=True)
@@ -59,6 +60,7 @@ class PredictivePublished:
 
     def __post_init__(self) -> None:
         number("change_weight", self.change_weight, low=0.0)
+        expect("network", self.network, IceNetwork)
 
     def plan(
         self, world: World, *, stop: Stop | None = None, rng: np.random.Generator | None = None
@@ -70,6 +72,7 @@ class PredictivePublished:
                 network cannot be read.
         """
         began = time.perf_counter()
+        check_call(world, stop, rng)
         self.network.load()
         check = (lambda iterations, cost: False) if stop is None else stop.start()
         scene = make_scene(world, PredictiveConfig(margin=0.0), IceInteraction())

@@ -8,11 +8,13 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from pushplan.interaction import QuasiStatic
-from pushplan.planners.kinodynamic.rrt import _DefaultBudget
+from pushplan.planners.arguments import check_call
+from pushplan.planners.kinodynamic.rrt import DefaultBudget
 from pushplan.planners.push_aware.bound import lower_bound
 from pushplan.planners.push_aware.config import PushAwareConfig
 from pushplan.planners.push_aware.search import PushAwareSearch
 from pushplan.world import PlanResult, PlanStats, PlanStatus, Stop, World
+from pushplan.world.checks import expect
 
 
 def cautious_model(friction: float = 0.1, static_friction: float = 0.5) -> QuasiStatic:
@@ -52,6 +54,10 @@ class PushAware:
     config: PushAwareConfig = field(default_factory=PushAwareConfig)
     interaction: QuasiStatic = field(default_factory=cautious_model)
 
+    def __post_init__(self) -> None:
+        expect("config", self.config, PushAwareConfig)
+        expect("interaction", self.interaction, QuasiStatic)
+
     def plan(
         self,
         world: World,
@@ -67,7 +73,8 @@ class PushAware:
             InvalidInputError: if the world's goal is not one for the robot.
         """
         began = time.perf_counter()
-        stop = _DefaultBudget(self.config.default_iterations) if stop is None else stop
+        check_call(world, stop, rng)
+        stop = DefaultBudget(self.config.default_iterations) if stop is None else stop
         rng = np.random.default_rng(0) if rng is None else rng
         search = PushAwareSearch(world, self.config, self.interaction, stop.start(), rng, began)
         bound = lower_bound(world)  # before the search, so that it is within the time given

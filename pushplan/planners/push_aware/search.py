@@ -9,7 +9,7 @@ import numpy as np
 from pushplan.interaction import QuasiStatic
 from pushplan.planners.kinodynamic.collision import first_blocked
 from pushplan.planners.kinodynamic.dubins import step_along
-from pushplan.planners.kinodynamic.improve import lay_out, make_path, price_from
+from pushplan.planners.kinodynamic.improve import lay_out, make_path
 from pushplan.planners.kinodynamic.search import Search, _Candidate
 from pushplan.planners.kinodynamic.timing import turning_radius
 from pushplan.planners.lattice.astar import EXHAUSTED, FOUND
@@ -255,7 +255,7 @@ class PushAwareSearch(Search):
 
     def _bound(self, factor: float) -> float:
         """``factor`` times the best cost so far [kg m], infinite while there is no plan."""
-        return factor * self.best_cost if self._solved(self.best_cost) else np.inf
+        return factor * self._best_plan_cost()
 
     def _candidate(self, arcs: FloatArray, *, free: bool = True) -> _Candidate | None:
         """The path along some arcs, priced; None if it is not one that could be a plan.
@@ -275,18 +275,9 @@ class PushAwareSearch(Search):
             x, y = path.poses[count - 1, :2]
             if blocked or self.goal.distance(float(x), float(y)) > 0.0:
                 return None
-        path.objects[0] = world.movables.poses
-        cost, done, few = 0.0, 0, self._few()
-        while done < count - 1:  # sweeping through a crowd takes its time
-            if self.stopped():
-                return None
-            last = min(done + few, count - 1)
-            cost = price_from(
-                path, done, last + 1, np.inf, self.pricing, self.bodies, self.settings
-            )
-            if not self._solved(cost):
-                return None
-            done = last
+        cost = self._price(path, count, self._jam_cost)
+        if cost is None:
+            return None
         self._keep(path, count, cost)
         return _Candidate(path, make_path(capacity, len(world.movables)), count, cost)
 

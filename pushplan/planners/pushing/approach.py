@@ -14,13 +14,12 @@ from pushplan.geometry import convex_overlap
 from pushplan.planners.kinodynamic.collision import footprint, is_free, obstacles
 from pushplan.planners.pushing import kernels
 from pushplan.planners.pushing.bumper import face_towards
-from pushplan.planners.pushing.inputs import expect
 from pushplan.planners.pushing.model import PushModel
 from pushplan.planners.pushing.parameters import PushParameters
 from pushplan.planners.pushing.path import PushPath
 from pushplan.planners.pushing.ways import Ways
 from pushplan.world import StaticMap, World
-from pushplan.world.checks import FloatArray, integer, number
+from pushplan.world.checks import FloatArray, expect, integer, number
 from pushplan.world.outline import centroid
 
 _MILD = [(0, 0.0), (0, 0.25), (0, -0.25), (0, 0.45), (0, -0.45)]

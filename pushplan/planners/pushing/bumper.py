@@ -8,11 +8,10 @@ from functools import lru_cache
 
 import numpy as np
 
-from pushplan.planners.pushing.inputs import expect
 from pushplan.planners.pushing.kernels import Contact
 from pushplan.planners.pushing.parameters import PushParameters, pressure_radius
 from pushplan.world import InvalidInputError, RobotModel
-from pushplan.world.checks import FloatArray, number
+from pushplan.world.checks import FloatArray, expect, number
 from pushplan.world.outline import convex_outline
 
 _SAMPLES = 401

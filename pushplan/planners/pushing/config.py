@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from pushplan.planners.pushing.inputs import expect
 from pushplan.planners.pushing.parameters import PushParameters
-from pushplan.world.checks import integer, number
+from pushplan.world.checks import expect, integer, number
 
 
 @dataclass(frozen=True)

@@ -14,12 +14,11 @@ from pushplan.planners.pushing.approach import find_approach
 from pushplan.planners.pushing.clearance import Clearance
 from pushplan.planners.pushing.config import PushingConfig
 from pushplan.planners.pushing.estimate import PoseEstimate
-from pushplan.planners.pushing.inputs import expect
 from pushplan.planners.pushing.mpc import PushingMpc
 from pushplan.planners.pushing.path import PushPath
 from pushplan.planners.pushing.walk import Walk
 from pushplan.world import Drive, InvalidInputError, Plan, StaticMap, Twist, World
-from pushplan.world.checks import FloatArray, integer, number
+from pushplan.world.checks import FloatArray, expect, integer, number
 
 _NOWHERE = kernels.Contact(0.1, 0.1, 0.0, 0.1, -0.1, 0.1, 0.1, 0.0)
 """A box for a robot that pushes none."""

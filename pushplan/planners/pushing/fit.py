@@ -15,12 +15,11 @@ from scipy.optimize import least_squares
 
 from pushplan.planners.pushing import kernels
 from pushplan.planners.pushing.bumper import Bumper, contact_of, face_towards
-from pushplan.planners.pushing.inputs import expect
 from pushplan.planners.pushing.kernels import Contact
 from pushplan.planners.pushing.model import PushModel
 from pushplan.planners.pushing.parameters import PushParameters
 from pushplan.world import Episode, InvalidInputError, PushplanError
-from pushplan.world.checks import FloatArray
+from pushplan.world.checks import FloatArray, expect
 
 _TOUCH = 0.06
 """Greatest gap of a box that is being pushed [depth of the box]."""

@@ -9,12 +9,11 @@ import numpy as np
 
 from pushplan.planners.pushing import kernels
 from pushplan.planners.pushing.bumper import face_towards
-from pushplan.planners.pushing.inputs import expect
 from pushplan.planners.pushing.model import PushModel
 from pushplan.planners.pushing.parameters import PushParameters
 from pushplan.planners.pushing.path import PushPath
 from pushplan.world import Episode, InvalidInputError
-from pushplan.world.checks import ArrayRecord, BoolArray, FloatArray
+from pushplan.world.checks import ArrayRecord, BoolArray, FloatArray, expect
 
 _TOUCH = 0.05
 """Greatest gap of a box that touches the bumper [L]."""

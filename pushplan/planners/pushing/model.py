@@ -11,11 +11,10 @@ from numpy.typing import ArrayLike
 
 from pushplan.planners.pushing import kernels
 from pushplan.planners.pushing.bumper import Bumper, Face, contact_of, face_towards
-from pushplan.planners.pushing.inputs import expect
 from pushplan.planners.pushing.kernels import Contact
 from pushplan.planners.pushing.parameters import PushParameters, stable_curvature
 from pushplan.world import InvalidInputError, RobotModel, Twist
-from pushplan.world.checks import ArrayRecord, FloatArray, array, number
+from pushplan.world.checks import ArrayRecord, FloatArray, array, expect, number
 from pushplan.world.outline import centroid, convex_outline
 
 

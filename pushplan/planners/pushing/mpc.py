@@ -15,12 +15,11 @@ from pushplan.planners.pushing.clearance import Clearance
 from pushplan.planners.pushing.config import PushingConfig
 from pushplan.planners.pushing.cost import ROWS, Weights
 from pushplan.planners.pushing.estimate import Estimate
-from pushplan.planners.pushing.inputs import expect
 from pushplan.planners.pushing.kernels import box_pose, observe
 from pushplan.planners.pushing.model import PushModel, PushState
 from pushplan.planners.pushing.problem import assemble
 from pushplan.world import Drive, InvalidInputError, Plan, RobotModel, StaticMap, Twist, World
-from pushplan.world.checks import FloatArray, IntArray
+from pushplan.world.checks import FloatArray, IntArray, expect
 
 _BACK, _WINDOW = 0.5, 2.0
 """How far the box's place may move back or ahead from one call to the next [L]."""

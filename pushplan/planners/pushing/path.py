@@ -10,9 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pushplan.planners.kinodynamic.dubins import along_arc
-from pushplan.planners.pushing.inputs import expect
 from pushplan.world import InvalidInputError, Plan, RobotModel, SubTask
-from pushplan.world.checks import ArrayRecord, FloatArray, array, integer, number
+from pushplan.world.checks import ArrayRecord, FloatArray, array, expect, integer, number
 
 _PIECES = 24
 """Least number of poses along a path of one piece."""

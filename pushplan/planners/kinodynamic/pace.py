@@ -1,0 +1,35 @@
+"""Work in pieces, so that a clock can be looked at however long a unit takes."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+
+_PIECE_S = 0.002
+"""Time between two looks [s]."""
+
+
+class Pace:
+    """Cuts work into pieces of about two milliseconds.
+
+    What is done must not depend on where the cuts are: they follow the clock.
+    """
+
+    def __init__(self) -> None:
+        self._few = 1.0
+
+    def pieces(self, total: int, stopped: Callable[[], bool]) -> Iterator[tuple[int, int]]:
+        """Yield (first, last + 1) of consecutive pieces of ``total`` units, until stopped.
+
+        Args:
+            total: units to do.
+            stopped: asked between the pieces, not before the first.
+        """
+        done = 0
+        while done < total and not (done and stopped()):
+            upto = min(total, done + max(1, int(self._few)))
+            began = time.perf_counter()
+            yield done, upto
+            took = max(time.perf_counter() - began, 1e-6)
+            self._few = min(2.0 * self._few, (upto - done) * _PIECE_S / took)
+            done = upto
