@@ -24,6 +24,7 @@ from pushplan.world import (
     Drive,
     FirstSolution,
     GoalDisc,
+    GoalLine,
     InvalidInputError,
     MaxIterations,
     Movables,
@@ -92,6 +93,19 @@ def test_wrong_settings_are_named(name):
         if hasattr(planner, option):
             with pytest.raises(InvalidInputError, match=f"{option} must be a"):
                 replace(planner, **{option: {"price": 1}})
+
+
+@pytest.mark.parametrize("name", planner_names())
+def test_ships_that_hardly_turn(name):
+    water = StaticMap.build(bounds=[0, 0, 12, 20])
+    for rate in (1e-3, 1e-9):
+        robot = make_robot(max_turn_rate=rate)
+        world = World(robot, [6, 1, np.pi / 2], water, make_boxes([]), GoalLine([6, 9.0], [0, 1.0]))
+        if rate == 1e-9 and name.startswith("ship"):
+            with pytest.raises(InvalidInputError, match="turning radius"):
+                make_planner(name).plan(world)
+        else:
+            assert make_planner(name).plan(world, stop=SOON).status.has_plan
 
 
 def test_a_heap_of_boxes_does_not_stop_the_clock():

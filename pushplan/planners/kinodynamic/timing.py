@@ -6,10 +6,13 @@ import numpy as np
 
 from pushplan.planners.kinodynamic.collision import footprint, is_free, obstacles
 from pushplan.planners.kinodynamic.improve import Path
-from pushplan.world import Drive, Plan, RobotModel, World
+from pushplan.world import Drive, InvalidInputError, Plan, RobotModel, World
 
 TIGHTEST = 0.1
 """Least turning radius that plans ever use, in circumscribed radii: nearly on the spot."""
+
+_WIDEST = 1e5
+"""Greatest turning radius of vehicles that lattices are made for, in circumscribed radii."""
 
 
 def turning_radius(robot: RobotModel, turn_share: float) -> float:
@@ -22,6 +25,20 @@ def turning_radius(robot: RobotModel, turn_share: float) -> float:
     if robot.drive is Drive.DIFFERENTIAL:
         return robot.circumscribed_radius
     return max(robot.turning_radius / turn_share, TIGHTEST * robot.circumscribed_radius)
+
+
+def check_turns(robot: RobotModel) -> None:
+    """Refuse a vehicle that hardly turns: pieces of its paths would be longer than any scene.
+
+    Raises:
+        InvalidInputError: naming its turning radius.
+    """
+    most = _WIDEST * robot.circumscribed_radius
+    if not robot.turning_radius <= most:
+        raise InvalidInputError(
+            f"a lattice needs a turning radius of at most {most:g} m ({_WIDEST:g} times the size "
+            f"of the robot), got {robot.turning_radius:g} m; push-aware plans with any"
+        )
 
 
 def start_margin(world: World, margin: float) -> float | None:

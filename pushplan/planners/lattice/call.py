@@ -11,7 +11,7 @@ from pushplan.interaction import InteractionModel
 from pushplan.planners.kinodynamic.collision import first_blocked, footprint, is_free, obstacles
 from pushplan.planners.kinodynamic.guide import reachable
 from pushplan.planners.kinodynamic.improve import Path
-from pushplan.planners.kinodynamic.timing import timed_plan, turning_radius
+from pushplan.planners.kinodynamic.timing import check_turns, timed_plan, turning_radius
 from pushplan.planners.lattice.astar import FOUND, PAUSED
 from pushplan.planners.lattice.build import BuiltLattice, LatticeBuilder
 from pushplan.planners.lattice.config import ShipLatticeConfig
@@ -43,6 +43,7 @@ class ShipCall:
         rng: np.random.Generator,
         began: float,
     ) -> None:
+        check_turns(world.robot)
         self.world, self.config, self.interaction = world, config, interaction
         self.check, self.rng, self.began = check, rng, began
         self.goal = world.navigation_goal

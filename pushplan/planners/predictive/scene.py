@@ -9,6 +9,7 @@ import numpy as np
 
 from pushplan.interaction.ice import IceInteraction
 from pushplan.interaction.ice_contacts import Crowd, Solver
+from pushplan.planners.kinodynamic.timing import check_turns
 from pushplan.planners.predictive.config import PredictiveConfig
 from pushplan.planners.predictive.guide import HEADINGS, Guide, fill_table, ice_field
 from pushplan.world import GoalLine, InvalidInputError, World
@@ -76,13 +77,15 @@ def make_scene(world: World, config: PredictiveConfig, model: IceInteraction) ->
     """Look at a world.
 
     Raises:
-        InvalidInputError: if the goal is no line, or something static is in the water.
+        InvalidInputError: if the goal is no line, something static is in the water, or the robot
+            hardly turns.
     """
     line = world.goal
     if not isinstance(line, GoalLine):
         raise InvalidInputError(
             f"the predictive ship planners go to a GoalLine, got a {type(line).__name__}"
         )
+    check_turns(world.robot)
     full = model.crowd(world)
     robot = world.robot
     length = float(np.ptp(robot.vertices[:, 0]))
