@@ -227,6 +227,7 @@ def memory(names: list[str], calls: int, controllers: bool) -> None:
     )
     stop = MaxIterations(20)
     for name in names:
+        warm_up(name)
         planner, worlds = make_planner(name), starts(name, 5, small=True)
 
         def call(number: int, planner: Planner = planner, worlds: list[World] = worlds) -> object:

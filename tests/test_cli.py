@@ -121,7 +121,7 @@ def test_errors_are_one_line_with_a_code(
     assert "not a readable episode" in one_line(capsys)
     assert main(["bench", "maze-2d-7", "--policies", "straight"]) == 2
     assert "unknown suite 'maze-2d-7'" in one_line(capsys)
-    assert main(["bench", "smoke", "--policies", "nobody.py:Me"]) == 1
+    assert main(["bench", "smoke", "--policies", "nobody.py:Me"]) == 2
     assert "no file nobody.py" in one_line(capsys)
 
 

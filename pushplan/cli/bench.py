@@ -10,15 +10,21 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
+from pushplan.cli import paper
 from pushplan.cli.common import add_command, add_honest_time, add_trust, positive, say, whole
 
 if TYPE_CHECKING:
-    from pushplan.evaluation import ResultRow
+    from pushplan.evaluation import ResultRow, Results
+
+    _Progress = Callable[[int, int, ResultRow | None], None]
 
 _EXAMPLES = """\
   pushplan bench maze-2d-5 --policies straight,kinodynamic-rrt --episodes 20 --out runs/first
   pushplan bench maze-2d-5 --policies straight,my_planner.py:MyPlanner --out runs/mine
   pushplan bench maze-2d-10 --policies fast=my_planner.py:fast,slow=my_planner.py:slow
+  pushplan bench paper --only maze,ship_ice --episodes 20
+
+'paper' is every policy on the suites of the Bench-Push paper's tables, its numbers beside ours.
 
 A run that was interrupted or killed continues when the same command is given again.
 """
@@ -28,15 +34,17 @@ _LINE_EVERY_S = 10.0
 def add(commands: Any) -> None:
     """Add the command."""
     parser = add_command(commands, "bench", "compare policies on a suite", _EXAMPLES, run)
-    parser.add_argument("suite", metavar="SUITE", help="see 'pushplan list suites'")
+    parser.add_argument("suite", metavar="SUITE", help="see 'pushplan list suites'; or 'paper'")
     parser.add_argument(
         "--policies",
-        required=True,
         metavar="A,B",
         help="names ('pushplan list policies'), 'onnx:FILE', 'sb3:FILE', 'file.py:Class' or "
-        "'module:Class' of a policy or a planner, each with 'label=' in front if wanted",
+        "'module:Class' of a policy or a planner, each with 'label=' in front if wanted "
+        "(paper: all that come with pushplan by default)",
     )
-    parser.add_argument("--episodes", type=whole(1), metavar="N", help="default: the suite's own")
+    parser.add_argument(
+        "--episodes", type=whole(1), metavar="N", help="default: the suite's own; paper: 100 each"
+    )
     parser.add_argument(
         "--workers",
         type=whole(0),
@@ -69,34 +77,36 @@ def add(commands: Any) -> None:
     parser.add_argument(
         "--retry-failed", action="store_true", help="run jobs again that raised, hung or crashed"
     )
+    paper.add_options(parser)
+    parser.set_defaults(usage=parser.print_usage)
 
 
 def run(options: argparse.Namespace) -> int:
     """Run the batch, print the table, write plots and page."""
     from pushplan.cli.report import show
-    from pushplan.evaluation import bench
+    from pushplan.evaluation import UnusablePolicyError
 
+    if (wrong := paper.check(options)) is not None:
+        options.usage(sys.stderr)
+        return _refuse(wrong)
     out = options.out or os.path.join("runs", options.suite)
+    comparison = None
     with _progress() as progress:
         try:
-            results = bench(
-                options.suite,
-                options.policies,
-                episodes=options.episodes,
-                seed=options.seed,
-                workers=options.workers,
-                out=out,
-                timeout_s=options.timeout,
-                observation=options.observation,
-                memory_limit_mb=options.memory,
-                retry_failed=options.retry_failed,
-                honest_time=options.honest_time,
-                progress=progress,
-            )
+            if options.suite == paper.SUITE:
+                comparison = paper.compare(options, out, progress)
+                results = comparison.results
+            else:
+                results = _results(options, out, progress)
+        except UnusablePolicyError as error:
+            return _refuse(str(error))
         except KeyboardInterrupt:
             sys.stderr.write(f"stopped; the same command continues the run in {out}\n")
             raise
-    show(results)
+    if comparison is None:
+        show(results)
+    else:
+        paper.show(comparison, out, options.markdown)
     failed = sum(row.failed for row in results.rows)
     if failed:
         say(f"{failed} of {len(results.rows)} jobs failed: see the page, or status and reason in ")
@@ -104,8 +114,32 @@ def run(options: argparse.Namespace) -> int:
     return 0
 
 
+def _results(options: argparse.Namespace, out: str, progress: _Progress) -> Results:
+    from pushplan.evaluation import bench
+
+    return bench(
+        options.suite,
+        options.policies,
+        episodes=options.episodes,
+        seed=options.seed,
+        workers=options.workers,
+        out=out,
+        timeout_s=options.timeout,
+        observation=options.observation,
+        memory_limit_mb=options.memory,
+        retry_failed=options.retry_failed,
+        honest_time=options.honest_time,
+        progress=progress,
+    )
+
+
+def _refuse(message: str) -> int:
+    sys.stderr.write(f"pushplan: {' '.join(message.split())}\n")
+    return 2
+
+
 @contextmanager
-def _progress() -> Iterator[Callable[[int, int, ResultRow | None], None]]:
+def _progress() -> Iterator[_Progress]:
     """A bar where there is a terminal, else a line now and then."""
     if not sys.stderr.isatty():
         yield _Lines()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -71,6 +72,9 @@ class PushEnv(gymnasium.Env[NDArray[Any], NDArray[Any]]):
             third dimension that the preset has not.
         MissingDependencyError: if there is no display for a window.
     """
+
+    observation_time_s = 0.0
+    """Wall-clock time that the last observation took to make [s]."""
 
     def __init__(
         self,
@@ -153,10 +157,7 @@ class PushEnv(gymnasium.Env[NDArray[Any], NDArray[Any]]):
         """
         if options:
             raise InvalidInputError(f"reset() knows no options, got {options!r:.80}")
-        if seed is not None:
-            seed = integer("seed", seed, low=0)
-        if seed is None and self._first_seed is not None:
-            seed = self._first_seed
+        seed = self._first_seed if seed is None else integer("seed", seed, low=0)
         self._first_seed = None
         super().reset(seed=seed)
         layout = int(self.np_random.integers(_SEED_LIMIT)) if seed is None else seed
@@ -173,7 +174,7 @@ class PushEnv(gymnasium.Env[NDArray[Any], NDArray[Any]]):
         info = _info(Outcome(0.0, False, "", False, False), 0.0, False)
         if isinstance(world.goal, Receptacle | ClearanceArea):
             info["completed"] = np.zeros(len(world.movables), dtype=bool)
-        return self._builder.observe(world), info
+        return self._observe(world), info
 
     def step(self, action: ArrayLike) -> tuple[NDArray[Any], float, bool, bool, dict[str, Any]]:
         """Carry out one action.
@@ -253,12 +254,18 @@ class PushEnv(gymnasium.Env[NDArray[Any], NDArray[Any]]):
             self._over = f"the episode has ended ({outcome.reason})"
         self._show()
         return (
-            self._builder.observe(after),
+            self._observe(after),
             outcome.reward,
             outcome.terminated,
             outcome.truncated,
             _info(outcome, work, held),
         )
+
+    def _observe(self, world: World) -> NDArray[Any]:
+        began = time.perf_counter()
+        observation = self._builder.observe(world)
+        self.observation_time_s = time.perf_counter() - began
+        return observation
 
     def render(self) -> NDArray[np.uint8] | None:
         """The scene now as (H, W, 3) uint8; None in ``"human"`` mode, which draws by itself."""

@@ -12,7 +12,9 @@ if TYPE_CHECKING:
     from pushplan.evaluation.batch import run_batch
     from pushplan.evaluation.benchmark import bench
     from pushplan.evaluation.episode import InvalidActionError, PolicyError, run_episode
+    from pushplan.evaluation.fitness import UnusablePolicyError
     from pushplan.evaluation.jobs import Job, JobSettings, Outcome
+    from pushplan.evaluation.paper import Comparison, bench_paper
     from pushplan.evaluation.policies import PolicySpec, parse_policies, parse_policy
     from pushplan.evaluation.pool import WorkerPool
     from pushplan.evaluation.results import Results, compare
@@ -24,7 +26,9 @@ _HOMES = {
     "batch": ("run_batch",),
     "benchmark": ("bench",),
     "episode": ("InvalidActionError", "PolicyError", "run_episode"),
+    "fitness": ("UnusablePolicyError",),
     "jobs": ("Job", "JobSettings", "Outcome"),
+    "paper": ("Comparison", "bench_paper"),
     "policies": ("PolicySpec", "parse_policies", "parse_policy"),
     "pool": ("WorkerPool",),
     "results": ("Results", "compare"),
@@ -37,6 +41,7 @@ _LAZY = {name: module for module, names in _HOMES.items() for name in names}
 __all__ = [
     "COLUMNS",
     "TIMING_COLUMNS",
+    "Comparison",
     "Estimate",
     "InvalidActionError",
     "Job",
@@ -50,8 +55,10 @@ __all__ = [
     "ResultRow",
     "Results",
     "Status",
+    "UnusablePolicyError",
     "WorkerPool",
     "bench",
+    "bench_paper",
     "bootstrap_interval",
     "compare",
     "parse_policies",

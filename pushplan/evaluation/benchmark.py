@@ -8,8 +8,9 @@ from pathlib import Path
 from typing import Any
 
 from pushplan.evaluation.batch import Progress, run_batch
+from pushplan.evaluation.fitness import usable_policies
 from pushplan.evaluation.jobs import Job, JobSettings
-from pushplan.evaluation.policies import PolicySpec, parse_policies
+from pushplan.evaluation.policies import PolicySpec
 from pushplan.evaluation.results import Results
 
 Given = str | Callable[..., Any] | PolicySpec
@@ -57,17 +58,17 @@ def bench(
 
     Raises:
         UnknownNameError: if there is no such suite or policy.
+        UnusablePolicyError: if a policy cannot be made, or for none of the scenarios.
         InvalidInputError: as `run_batch`.
     """
-    specs = parse_policies(policies)
+    settings = JobSettings(observation=observation, timeout_s=timeout_s, honest_time=honest_time)
     name, version, scenarios = _scenarios(suite, episodes, seed)
+    specs = usable_policies(policies, scenarios, settings)
     # all policies of a scenario close together: a run that is cut short still compares them
     jobs = [Job(spec, scenario) for scenario in scenarios for spec in specs]
     options: dict[str, Any] = {
         "workers": workers,
-        "settings": JobSettings(
-            observation=observation, timeout_s=timeout_s, honest_time=honest_time
-        ),
+        "settings": settings,
         "memory_limit_mb": memory_limit_mb,
         "retry_failed": retry_failed,
         "about": {"suite": name, "suite_version": version, "first_seed": seed},

@@ -123,6 +123,7 @@ class Recording:
             observer(0, world, self.policy)
         ended = False
         while not ended:
+            seeing = observation_time(env, self.policy, len(self._actions))
             begin = self._clock()
             action = self._ask(self.policy.act, world, observation)
             elapsed = self._clock() - begin
@@ -130,8 +131,9 @@ class Recording:
             if self.honest_time is None:
                 observation, reward, terminated, truncated, info = env.step(command)
             else:
-                lag = self.honest_time * blocking_time(self.policy, elapsed)
+                lag = self.honest_time * (seeing + blocking_time(self.policy, elapsed))
                 observation, reward, terminated, truncated, info = env.step_late(command, lag)
+            elapsed += seeing
             world = env.world
             self._step(env.trace, command, float(reward), elapsed)
             self._completed = info.get("completed", self._completed)
@@ -168,6 +170,7 @@ class Recording:
                 "seed": self.scenario.seed,
                 "pushplan": pushplan.__version__,
                 **({} if self.honest_time is None else {"honest_time": self.honest_time}),
+                **({} if held_for(self.policy) == 1 else {"held_for": held_for(self.policy)}),
             },
         )
 
@@ -227,6 +230,25 @@ def blocking_time(policy: Policy, elapsed_s: float) -> float:
     """
     beside = float(getattr(policy, "background_s", 0.0))
     return max(elapsed_s - max(beside, 0.0), 0.0)
+
+
+def held_for(policy: Policy) -> int:
+    """Steps for which a decision of the policy stands: more than 1 for some networks."""
+    action = getattr(getattr(policy, "specification", None), "action", None)
+    return int(getattr(action, "repeat", 1))
+
+
+def observation_time(env: Any, policy: Policy, step: int) -> float:
+    """How long the observation took that the policy decides on in a step [s].
+
+    Args:
+        env: says it, if it can, as ``observation_time_s``.
+        policy: one without the attribute ``observation`` looks at the world alone.
+        step: number of the step, from 0.
+    """
+    if getattr(policy, "observation", None) is None or step % held_for(policy):
+        return 0.0
+    return float(getattr(env, "observation_time_s", 0.0))
 
 
 def checked_action(env: Any, action: object) -> FloatArray:

@@ -64,7 +64,7 @@ def _tradeoff(results: Results) -> tuple[str, Figure] | None:
             if not points:
                 continue
             xy = np.array(points, dtype=float)
-            style = {"color": COLOURS[i % 8], "marker": MARKERS[i % 8]}
+            style = {"color": COLOURS[i % 8], "marker": MARKERS[(i + i // 8) % 8]}
             axes.scatter(*xy.T, s=16, alpha=0.35, linewidths=0, **style)
             across, up = estimate(xy[:, 0]), estimate(xy[:, 1])
             axes.errorbar(

@@ -61,6 +61,18 @@ class PolicySpec:
         name = getattr(source, "__qualname__", type(source).__qualname__)
         return re.sub(r"0x[0-9a-f]+", "0x", f"{where}:{name}{options}")
 
+    @property
+    def is_ours(self) -> bool:
+        """Whether it runs code of pushplan only: a name, or the file of a network."""
+        if not isinstance(self.source, str):
+            return False
+        return ":" not in self.source or self.network is not None
+
+    @property
+    def network(self) -> Path | None:
+        """The file of the network, if it is one."""
+        return _network_file(self.source) if isinstance(self.source, str) else None
+
     def make(self) -> Policy:
         """A fresh policy.
 

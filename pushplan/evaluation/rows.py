@@ -59,6 +59,11 @@ class ResultRow:
         plan_time_median_s: of the planning calls [s].
         plan_time_p99_s: of the planning calls [s].
         plan_time_max_s: of the planning calls [s].
+        decision_time_median_s: wall-clock time from world to action, without simulation, in the
+            steps in which something was decided [s]: making the observation, if the policy asks
+            for one, and the policy's own call.
+        decision_time_mean_s: the same, over all steps [s].
+        decision_time_max_s: the slowest step [s].
     """
 
     policy: str
@@ -83,6 +88,9 @@ class ResultRow:
     plan_time_median_s: float | None = None
     plan_time_p99_s: float | None = None
     plan_time_max_s: float | None = None
+    decision_time_median_s: float | None = None
+    decision_time_mean_s: float | None = None
+    decision_time_max_s: float | None = None
 
     @property
     def setting(self) -> str:
@@ -96,7 +104,9 @@ class ResultRow:
 
 
 COLUMNS = tuple(field.name for field in fields(ResultRow))
-TIMING_COLUMNS = tuple(name for name in COLUMNS if name.startswith(("wall_time", "plan_time")))
+TIMING_COLUMNS = tuple(
+    name for name in COLUMNS if name.startswith(("wall_time", "plan_time", "decision_time"))
+)
 """Columns that differ from run to run."""
 
 SCORES = ("E_nav", "I_nav", "S_manip", "E_manip", "I_manip")
@@ -147,7 +157,8 @@ def scored_row(row: ResultRow, episode: Episode, plan_calls: int | None) -> Resu
     if "steps" in values:
         values["steps"] = int(values["steps"])
     success = episode.success and not row.failed
-    return replace(row, success=success, **values, **_plan_times(episode, plan_calls))
+    times = {**_plan_times(episode, plan_calls), **_decision_times(episode)}
+    return replace(row, success=success, **values, **times)
 
 
 def _plan_times(episode: Episode, plan_calls: int | None) -> Mapping[str, Any]:
@@ -159,4 +170,15 @@ def _plan_times(episode: Episode, plan_calls: int | None) -> Mapping[str, Any]:
         "plan_time_median_s": float(np.median(times)),
         "plan_time_p99_s": float(np.percentile(times, 99.0)),
         "plan_time_max_s": float(times.max()),
+    }
+
+
+def _decision_times(episode: Episode) -> Mapping[str, float]:
+    times = episode.act_times_s
+    if len(times) == 0:
+        return {}
+    return {
+        "decision_time_median_s": float(np.median(times[:: episode.about.get("held_for", 1)])),
+        "decision_time_mean_s": float(times.mean()),
+        "decision_time_max_s": float(times.max()),
     }

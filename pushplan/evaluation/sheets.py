@@ -24,7 +24,12 @@ HEADINGS = {
     "interaction_work_kg_m": "work [kg m]",
     "path_length_m": "path [m]",
     "plan_time_median_s": "plan [ms]",
+    "decision_time_median_s": "step [ms]",
     "wall_time_s": "wall [s]",
+}
+_TIMES = {
+    "plan_time_median_s": "plan_time_max_s",
+    "decision_time_median_s": "decision_time_max_s",
 }
 
 
@@ -48,7 +53,8 @@ class Sheet:
 SCORE_NOTE = (
     "mean ± standard deviation over episodes, 95 % bootstrap interval of the mean below; success "
     "with its Wilson interval; a failed job counts as no success and E_nav = 0; plan is the "
-    "median over episodes of each episode's median planning call, its slowest call below"
+    "median over episodes of each episode's median planning call, its slowest call below; step "
+    "is the same for the time from world to action, without simulation"
 )
 MEASURED_NOTE = (
     "mean ± standard deviation over the episodes that did not fail, 95 % bootstrap interval of "
@@ -77,8 +83,7 @@ def score_sheets(
         if wide:
             more = ("interaction_work_kg_m", "path_length_m", "wall_time_s")
             metrics += [name for name in more if any(name in s.metrics for s in mine)]
-        if any("plan_time_median_s" in s.metrics for s in mine):
-            metrics.append("plan_time_median_s")
+        metrics += [name for name in _TIMES if any(name in s.metrics for s in mine)]
         headings = ("policy", "runs", "success", *(HEADINGS[name] for name in metrics))
         cells = tuple(_policy_cells(summary, metrics, wide) for summary in mine)
         note = SCORE_NOTE + ("; med is the median" if wide else "")
@@ -222,8 +227,8 @@ def _policy_cells(summary: PolicySummary, metrics: Sequence[str], wide: bool) ->
         value = summary.metrics.get(name)
         if value is None:
             cells.append("")
-        elif name == "plan_time_median_s":
-            worst = summary.metrics["plan_time_max_s"].highest
+        elif name in _TIMES:
+            worst = summary.metrics[_TIMES[name]].highest
             cells.append(f"{_digits(1e3 * value.median)}\nmax {_digits(1e3 * worst)}")
         else:
             cells.append(_estimate(value, wide=wide))

@@ -57,6 +57,9 @@ class RunDirectory:
                 "PRIMARY KEY (policy, scenario, seed)) WITHOUT ROWID"
             )
             self._db.execute("CREATE TABLE IF NOT EXISTS about (key TEXT PRIMARY KEY, value TEXT)")
+            for name in COLUMNS:  # a run that an earlier version began
+                if name not in _columns(self._db):
+                    self._db.execute(f'ALTER TABLE results ADD COLUMN "{name}" REAL')
 
     def __enter__(self) -> RunDirectory:
         return self
@@ -133,9 +136,10 @@ class RunDirectory:
         if detail:
             write_atomic(self.failures / f"{stem}.txt", detail.encode(errors="replace"))
         marks = ", ".join("?" * len(COLUMNS))
+        names = ", ".join(f'"{name}"' for name in COLUMNS)
         values = [getattr(row, name) for name in COLUMNS]
         with self._db:
-            self._db.execute(f"INSERT OR REPLACE INTO results VALUES ({marks})", values)
+            self._db.execute(f"INSERT OR REPLACE INTO results ({names}) VALUES ({marks})", values)
 
     def forget_failures(self) -> None:
         """Remove the rows of jobs that did not end by the rules of their task."""
@@ -179,15 +183,20 @@ def open_results(path: str | Path) -> tuple[list[ResultRow], Mapping[str, Any]]:
 
 
 def read_rows(db: sqlite3.Connection) -> list[ResultRow]:
-    """All rows of a database, sorted."""
-    names = ", ".join(f'"{name}"' for name in COLUMNS)
+    """All rows of a database, sorted; a column that it lacks is empty."""
+    there = [name for name in COLUMNS if name in _columns(db)]
+    names = ", ".join(f'"{name}"' for name in there)
     query = f"SELECT {names} FROM results ORDER BY policy, task, simulator, seed, scenario"
     rows = []
     for values in db.execute(query):
-        data = dict(zip(COLUMNS, values, strict=True))
+        data = dict(zip(there, values, strict=True))
         data["success"] = bool(data["success"])
         rows.append(ResultRow(**data))
     return rows
+
+
+def _columns(db: sqlite3.Connection) -> set[str]:
+    return {row[1] for row in db.execute("PRAGMA table_info(results)")}
 
 
 def read_about(db: sqlite3.Connection) -> dict[str, Any]:

@@ -12,7 +12,14 @@ from pushplan.evaluation.rows import SCORES, ResultRow
 from pushplan.evaluation.statistics import Estimate, Proportion, estimate, wilson
 
 METRICS = (*SCORES, "path_length_m", "interaction_work_kg_m", "sim_time_s")
-TIMINGS = ("plan_time_median_s", "plan_time_max_s", "wall_time_s")
+TIMINGS = (
+    "plan_time_median_s",
+    "plan_time_max_s",
+    "decision_time_median_s",
+    "decision_time_mean_s",
+    "decision_time_max_s",
+    "wall_time_s",
+)
 PAIRED = (*SCORES, "interaction_work_kg_m", "path_length_m")
 
 

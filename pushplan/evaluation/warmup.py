@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import time
+from typing import Any
 
 from pushplan.evaluation.episode import PolicyError, Recording
 from pushplan.evaluation.jobs import JobSettings
 from pushplan.evaluation.loading import load_object
+from pushplan.evaluation.policies import PolicySpec, policy_names
 from pushplan.world import InvalidInputError, UnknownNameError
 
 WARMUPS: dict[str, str] = {
@@ -32,37 +34,44 @@ def warm_up(name: str) -> float:
 
 
 def policies() -> None:
-    """A few steps of every policy in every kind of start of the smoke suite."""
-    from pushplan.planners import policy_names
-
+    """A few steps of every policy, networks too, in every kind of start of the smoke suite."""
     for name in policy_names():
-        _record(name, "state")
+        _record(name)
 
 
 def observations() -> None:
-    """A few steps with image observations."""
-    _record("random", "image")
+    """A few steps with each kind of observation that a network may have been trained on."""
+    from pushplan.learned import FeatureObservation
+
+    for observation in ("image", "spatial", FeatureObservation()):
+        _record("random", observation)
 
 
 def metrics() -> None:
     """Every metric of a short episode."""
     from pushplan.metrics import compute
 
-    for recording in _record("random", "state"):
+    for recording in _record("random"):
         compute(recording.episode())
 
 
-def _record(policy: str, observation: str) -> list[Recording]:
-    """The first steps of a policy in every smoke start that it is made for."""
-    from pushplan.planners import make_policy
+def _record(policy: str, observation: Any = None) -> list[Recording]:
+    """The first steps of a policy in every smoke start that it is made for.
+
+    Args:
+        policy: a name.
+        observation: what the environment observes, where the policy does not say.
+    """
     from pushplan.scenarios import suite
 
     recordings = []
     for scenario in suite("smoke").scenarios:
-        runner = make_policy(policy)
+        runner = PolicySpec(policy, policy).make()
+        if observation is not None:
+            runner.observation = observation  # type: ignore[attr-defined]
         try:
-            env = JobSettings(observation=observation).environment(scenario, runner)
-        except UnknownNameError:  # the task has none of the policy's action modes
+            env = JobSettings().environment(scenario, runner)
+        except (UnknownNameError, InvalidInputError):  # another task's actions or observation
             continue
         recording = Recording(runner, scenario)
         try:

@@ -49,7 +49,8 @@ def test_a_run_directory_holds_rows_and_traces(tmp_path: Path) -> None:
     assert header == (
         "policy,task,simulator,scenario,seed,status,reason,success,E_nav,I_nav,S_manip,E_manip,"
         "I_manip,path_length_m,interaction_work_kg_m,steps,sim_time_s,wall_time_s,plan_calls,"
-        "plan_time_median_s,plan_time_p99_s,plan_time_max_s"
+        "plan_time_median_s,plan_time_p99_s,plan_time_max_s,"
+        "decision_time_median_s,decision_time_mean_s,decision_time_max_s"
     )
     assert header == ",".join(COLUMNS)
     assert [(row.policy, row.seed) for row in rows] == [
@@ -265,19 +266,23 @@ def test_a_killed_run_continues_to_the_same_bytes(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_workers_end_with_their_owner_and_ctrl_c_is_clean(tmp_path: Path) -> None:
-    process = start(tmp_path)
-    wait_for_traces(tmp_path, 2, process)
-    workers = Path(f"/proc/{process.pid}/task")
-    children = [
-        int(pid) for task in workers.iterdir() for pid in (task / "children").read_text().split()
-    ]
-    os.killpg(process.pid, signal.SIGINT)
-    assert process.stderr is not None
-    assert b"KeyboardInterrupt" in process.communicate(timeout=10)[1]
+    for attempt in range(3):  # on a busy machine a run may end before it is interrupted
+        out = tmp_path / str(attempt)
+        process = start(out)
+        wait_for_traces(out, 2, process)
+        workers = Path(f"/proc/{process.pid}/task")
+        children = [
+            int(p) for task in workers.iterdir() for p in (task / "children").read_text().split()
+        ]
+        os.killpg(process.pid, signal.SIGINT)
+        said = process.communicate(timeout=10)[1]
+        if not (out / "results.csv").exists():
+            break
+    assert b"KeyboardInterrupt" in said
     assert children
     assert not any(Path(f"/proc/{pid}").exists() for pid in children)
-    assert start(tmp_path).wait(60) == 0
-    assert len(without_timings(tmp_path)) == 1 + 18
+    assert start(out).wait(60) == 0
+    assert len(without_timings(out)) == 1 + 18
 
 
 def test_two_runs_do_not_write_into_one_directory(tmp_path: Path) -> None:

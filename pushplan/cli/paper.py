@@ -1,0 +1,78 @@
+"""``pushplan bench paper``: every policy beside the numbers of the Bench-Push paper."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import shlex
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from pushplan.cli.common import check_folder, say
+
+if TYPE_CHECKING:
+    from pushplan.evaluation import Comparison
+
+SUITE = "paper"
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Add what only this suite knows."""
+    group = parser.add_argument_group("only for 'bench paper'")
+    group.add_argument(
+        "--only", metavar="A,B", help="some of its tasks and suites (default: all of the paper's)"
+    )
+    group.add_argument(
+        "--markdown", metavar="FILE", help="write the tables there too, as in docs/comparison.md"
+    )
+
+
+def check(options: argparse.Namespace) -> str | None:
+    """What is wrong with the options, if anything."""
+    if options.suite != SUITE:
+        if options.policies is None:
+            return "the following arguments are required: --policies"
+        for name in ("only", "markdown"):
+            if getattr(options, name) is not None:
+                return f"--{name} is for 'bench {SUITE}' only"
+    elif options.markdown is not None and os.path.isdir(options.markdown):
+        return f"--markdown takes a file, {options.markdown!r} is a folder"
+    elif options.honest_time is not None or options.observation != "auto":
+        return f"'bench {SUITE}' takes neither --honest-time nor --observation"
+    return None
+
+
+def compare(options: argparse.Namespace, out: str, progress: Callable[..., None]) -> Comparison:
+    """Run what is missing."""
+    from pushplan.evaluation import bench_paper
+    from pushplan.evaluation.paper import EPISODES
+
+    check_folder(options.markdown)
+    given = {"only": options.only, "policies": options.policies, "episodes": options.episodes}
+    words = [word for key, value in given.items() if value for word in (f"--{key}", str(value))]
+    return bench_paper(
+        only=options.only,
+        policies=options.policies,
+        episodes=options.episodes or EPISODES,
+        seed=options.seed,
+        workers=options.workers,
+        out=out,
+        timeout_s=options.timeout,
+        memory_limit_mb=options.memory,
+        retry_failed=options.retry_failed,
+        progress=progress,
+        command=shlex.join(["pushplan", "bench", SUITE, *words]),
+    )
+
+
+def show(comparison: Comparison, out: str, markdown: str | None) -> None:
+    """Print the tables, write the page of the run, say where everything is."""
+    from pushplan.evaluation.store import write_atomic
+
+    say(comparison.table())
+    say(f"page:     {comparison.results.report()}")
+    say(f"document: {os.path.join(out, 'paper.md')}, with what the columns are and what compares")
+    if markdown is not None:
+        write_atomic(Path(markdown), comparison.markdown().encode())
+        say(f"document: {markdown}")

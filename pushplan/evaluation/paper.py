@@ -1,0 +1,197 @@
+"""Every policy on the suites that mirror the tables of the Bench-Push paper, side by side."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from pushplan.evaluation.batch import Progress, run_batch
+from pushplan.evaluation.benchmark import Given
+from pushplan.evaluation.fitness import UnusablePolicyError, misfit, read_policies
+from pushplan.evaluation.jobs import Job, JobSettings, file_stem
+from pushplan.evaluation.paper_tables import overview, paper_sheet, preface, training_cost
+from pushplan.evaluation.policies import PolicySpec, policy_names
+from pushplan.evaluation.published import PublishedTable, chosen_tables
+from pushplan.evaluation.results import Results
+from pushplan.evaluation.rows import ResultRow, setting_of
+from pushplan.evaluation.sheets import Sheet, markdown, text
+from pushplan.evaluation.store import write_atomic
+from pushplan.metrics import compute
+from pushplan.world import Episode
+
+TO_GOAL_POINT = "E_nav_to_goal_point"
+EPISODES = 100
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Our results beside the paper's.
+
+    Args:
+        results: of all suites.
+        tables: what the paper says, one for each suite.
+        misfits: (suite, policy) -> why it was not run.
+        to_goal_point: (policy, scenario, seed) -> E_nav in the convention of the paper.
+        training: label of a network -> what its training took.
+        command: what gives the same again, if known.
+    """
+
+    results: Results
+    tables: tuple[PublishedTable, ...]
+    misfits: Mapping[tuple[str, str], str]
+    to_goal_point: Mapping[tuple[str, str, int], float]
+    training: Mapping[str, str]
+    command: str = ""
+
+    def sheets(self) -> list[Sheet]:
+        """An overview, then one table a suite: the paper's policies, then ours."""
+        rows = [self._rows(table) for table in self.tables]
+        return [overview(self.tables, rows), *(self._sheet(table) for table in self.tables)]
+
+    def table(self, width: int = 160) -> str:
+        """The tables as text."""
+        return text(self.sheets(), width)
+
+    def markdown(self) -> str:
+        """The tables as a Markdown document."""
+        return f"{preface(self.results, self.command)}\n{markdown(self.sheets())}"
+
+    def _rows(self, table: PublishedTable) -> list[ResultRow]:
+        setting = _setting(table)
+        return [row for row in self.results.rows if row.setting == setting]
+
+    def _sheet(self, table: PublishedTable) -> Sheet:
+        rows = self._rows(table)
+        points = {
+            policy: [
+                value
+                for row in rows
+                if row.policy == policy
+                if (value := self.to_goal_point.get((policy, row.scenario, row.seed))) is not None
+            ]
+            for policy in self.results.policies
+        }
+        unfit = {name: why for (suite, name), why in self.misfits.items() if suite == table.suite}
+        return paper_sheet(table, rows, self.results.policies, points, self.training, unfit)
+
+
+def bench_paper(
+    *,
+    only: str | Sequence[str] | None = None,
+    policies: str | Sequence[Given] | None = None,
+    episodes: int = EPISODES,
+    seed: int = 0,
+    workers: int | None = None,
+    out: str | Path | None = None,
+    timeout_s: float | None = 600.0,
+    memory_limit_mb: float | None = None,
+    retry_failed: bool = False,
+    progress: Progress | None = None,
+    command: str = "",
+) -> Comparison:
+    """Run policies on the suites that mirror the paper's tables, each where it is made for it.
+
+    Args:
+        only: names of suites or tasks; all suites of the paper if None.
+        policies: as for `bench`; every policy that comes with pushplan if None.
+        episodes: scenarios of each suite.
+        seed: seed of the first scenario of each suite.
+        workers, timeout_s, memory_limit_mb, retry_failed, progress: as for `bench`.
+        out: run directory, continued if it holds this run already; suites, policies and episodes
+            may be added to it. With it, ``paper.md`` and the report of `Results` are written.
+        command: what the document says gives the same again.
+
+    Raises:
+        UnknownNameError: if there is no such suite, task or policy.
+        UnusablePolicyError: if a policy cannot be made, or was named and is made for no suite.
+        InvalidInputError: as `run_batch`.
+    """
+    tables = chosen_tables(only)
+    settings = JobSettings(timeout_s=timeout_s)
+    scenarios = {table.suite: _scenarios(table, episodes, seed) for table in tables}
+    specs = read_policies(list(policy_names()) if policies is None else policies)
+    misfits = _misfits(specs, scenarios, settings)
+    for spec in specs if policies is not None else ():
+        reasons = [misfits.get((table.suite, spec.label)) for table in tables]
+        if all(reasons):
+            raise UnusablePolicyError(f"policy {spec.label!r} fits no chosen suite: {reasons[0]}")
+    jobs = [
+        Job(spec, scenario)
+        for suite, starts in scenarios.items()
+        for scenario in starts
+        for spec in specs
+        if (suite, spec.label) not in misfits
+    ]
+    with tempfile.TemporaryDirectory(prefix="pushplan-") as temporary:
+        folder = Path(temporary if out is None else out)
+        run_batch(
+            jobs,
+            out=folder,
+            workers=workers,
+            settings=settings,
+            memory_limit_mb=memory_limit_mb,
+            retry_failed=retry_failed,
+            about={"suite": "paper", "first_seed": seed},
+            progress=progress,
+        )
+        results = _chosen(Results.load(folder), jobs, None if out is None else folder)
+        points = _to_goal_point(results.rows, folder)
+    training = {spec.label: training_cost(spec.network) for spec in specs if spec.network}
+    comparison = Comparison(results, tables, misfits, points, training, command)
+    if out is not None:
+        write_atomic(folder / "paper.md", comparison.markdown().encode())
+    return comparison
+
+
+def _scenarios(table: PublishedTable, episodes: int, seed: int) -> Sequence[Any]:
+    from pushplan.scenarios import suite
+
+    return suite(table.suite, episodes=episodes, first_seed=seed).scenarios
+
+
+def _setting(table: PublishedTable) -> str:
+    first = _scenarios(table, 1, 0)[0]
+    return setting_of(first.key, first.seed)
+
+
+def _misfits(
+    specs: Sequence[PolicySpec], scenarios: Mapping[str, Sequence[Any]], settings: JobSettings
+) -> dict[tuple[str, str], str]:
+    """(suite, label) -> why; suites of one task, preset and simulator differ in nothing here."""
+    known: dict[tuple[str, ...], str | None] = {}
+    found = {}
+    for suite, starts in scenarios.items():
+        first = starts[0]
+        for spec in specs:
+            kind = (spec.label, first.task, first.preset, first.simulator)
+            if kind not in known:
+                known[kind] = misfit(spec, first, settings)
+            reason = known[kind]
+            if reason is not None:
+                found[suite, spec.label] = reason
+    return found
+
+
+def _chosen(results: Results, jobs: Sequence[Job], path: Path | None) -> Results:
+    """Without what an earlier run of more suites, policies or episodes left there."""
+    wanted = {job.id for job in jobs}
+    rows = tuple(r for r in results.rows if (r.policy, r.scenario, r.seed) in wanted)
+    return Results(rows, results.about, path)
+
+
+def _to_goal_point(rows: Sequence[ResultRow], folder: Path) -> dict[tuple[str, str, int], float]:
+    """E_nav in the paper's convention, from the stored episodes; 0 for a job that failed."""
+    values = {}
+    for row in rows:
+        if row.E_nav is None:
+            continue
+        value = 0.0
+        if row.success:
+            stem = file_stem(row.policy, row.scenario, row.seed)
+            episode = Episode.load(folder / "episodes" / f"{stem}.npz")
+            value = compute(episode, [TO_GOAL_POINT])[TO_GOAL_POINT]
+        values[row.policy, row.scenario, row.seed] = value
+    return values

@@ -1,0 +1,139 @@
+"""The numbers of the Bench-Push paper, as data: ``data/bench_push.yaml``."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache
+from importlib import resources
+from typing import Any
+
+import yaml
+
+from pushplan.evaluation.rows import SCORES
+from pushplan.world import InvalidInputError, UnknownNameError
+
+SETTINGS = {"paper": "paper", "robot": "paper, physical robot", "code": "the paper's code"}
+"""Where a row comes from -> words."""
+
+ENOUGH = 0.9
+"""Share of successes, or S_manip, from which on a value of I is held against another."""
+
+
+@dataclass(frozen=True)
+class Score:
+    """A published number.
+
+    Args:
+        value: mean, or median.
+        sd: standard deviation, if it was given.
+    """
+
+    value: float
+    sd: float | None = None
+
+
+@dataclass(frozen=True)
+class PublishedRow:
+    """One policy of the paper.
+
+    Args:
+        policy: as the paper calls it.
+        setting: a key of `SETTINGS`.
+        episodes: how many, if known.
+        scores: ``"success"``, ``"E_nav"``, ... -> number.
+    """
+
+    policy: str
+    setting: str
+    episodes: int | None
+    scores: Mapping[str, Score]
+
+
+@dataclass(frozen=True)
+class PublishedTable:
+    """What the paper says about the scenes of one suite.
+
+    Args:
+        suite: of ours that mirrors it.
+        title: one line.
+        source: table or figure.
+        statistic: ``"mean"`` or ``"median"``.
+        notes: what is comparable and what is not.
+        rows: none where there is no number.
+    """
+
+    suite: str
+    title: str
+    source: str
+    statistic: str
+    notes: tuple[str, ...]
+    rows: tuple[PublishedRow, ...]
+
+    @property
+    def task(self) -> str:
+        """Name of the task."""
+        from pushplan.scenarios import suite
+
+        return suite(self.suite, episodes=1).scenarios[0].task
+
+    def best(self, name: str) -> float | None:
+        """The best published value of a score, without those of the physical robot.
+
+        I counts for who does the task: `ENOUGH`, where the paper says it.
+        """
+        rows = [row for row in self.rows if row.setting != "robot" and name in row.scores]
+        if name.startswith("I_"):
+            rows = [
+                r for r in rows if "S_manip" not in r.scores or r.scores["S_manip"].value >= ENOUGH
+            ]
+        return max((row.scores[name].value for row in rows), default=None)
+
+
+@cache
+def published_tables() -> tuple[PublishedTable, ...]:
+    """All tables, in the order of the paper."""
+    file = resources.files("pushplan.evaluation").joinpath("data/bench_push.yaml")
+    data = yaml.safe_load(file.read_text("utf-8"))
+    return tuple(
+        PublishedTable(
+            **{key: entry[key] for key in ("suite", "title", "source", "statistic")},
+            notes=tuple(entry["notes"]),
+            rows=tuple(_row(row, entry.get("episodes", {})) for row in entry["rows"]),
+        )
+        for entry in data["tables"]
+    )
+
+
+def chosen_tables(only: str | Sequence[str] | None = None) -> tuple[PublishedTable, ...]:
+    """The tables of some suites or tasks.
+
+    Args:
+        only: names of suites or tasks, as a list or with commas; all tables if None.
+
+    Raises:
+        UnknownNameError: if there is no table for a name.
+        InvalidInputError: if there is no name.
+    """
+    tables = published_tables()
+    if only is None:
+        return tables
+    given = only.split(",") if isinstance(only, str) else list(only)
+    names = [str(name).strip() for name in given if str(name).strip()]
+    if not names:
+        raise InvalidInputError("at least one suite or task is needed")
+    for name in names:
+        if all(name not in (t.suite, t.task) for t in tables):
+            valid = [word for table in tables for word in (table.suite, table.task)]
+            raise UnknownNameError("suite or task of the paper", name, dict.fromkeys(valid))
+    return tuple(t for t in tables if t.suite in names or t.task in names)
+
+
+def _row(data: Mapping[str, Any], episodes: Mapping[str, int]) -> PublishedRow:
+    scores = {}
+    for name in ("success", *SCORES):
+        if name in data:
+            given = data[name]
+            scores[name] = Score(*given) if isinstance(given, list) else Score(float(given))
+    setting = data.get("setting", "paper")
+    return PublishedRow(data["policy"], setting, episodes.get(setting), scores)
