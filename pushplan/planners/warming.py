@@ -21,13 +21,16 @@ from pushplan.world import (
     World,
 )
 
+_ENOUGH = {"push-aware": 6000}
+"""Iterations after which all kernels of a planner have been used, where 600 are not enough."""
+
 
 def warm_up(*names: str) -> None:
     """Plan once in a small room with each planner, so that later calls find compiled kernels.
 
     Numba compiles a kernel on its first use after an installation (seconds) and loads it from its
-    cache on the first use in a process (a fifth of a second in all). A controller calls this
-    once when it starts.
+    cache on the first use in a process (a second or so, three for ``push-aware``). A controller
+    calls this once when it starts.
 
     Args:
         names: planners; all by default.
@@ -36,12 +39,13 @@ def warm_up(*names: str) -> None:
         UnknownNameError: if there is no such planner.
     """
     square = 0.5 * np.array([[1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0], [1.0, -1.0]])
+    corner = square + np.array([5.0, 6.3])  # for the straight way to go round
     room = World(
         robot=RobotModel.from_outline(
             square, mass=1.0, drive=Drive.CONSTANT_SPEED, max_speed=1.0, max_turn_rate=1.0
         ),
         robot_pose=np.array([2.0, 5.0, 0.0]),
-        static=StaticMap.build(polygons=[square + 8.0], bounds=[0.0, 0.0, 10.0, 10.0]),
+        static=StaticMap.build(polygons=[square + 8.0, corner], bounds=[0.0, 0.0, 10.0, 10.0]),
         movables=Movables.from_outlines([square, square], [[4.0, 5.0, 0.0], [5.2, 5.0, 0.0]]),
         goal=GoalDisc(np.array([8.0, 5.0]), 0.5),
     )
@@ -56,7 +60,9 @@ def warm_up(*names: str) -> None:
     for name in names or planner_names():
         world, enough = (water, 30) if name in OPEN_WATER else (room, 600)
         planner = make_planner(name)
-        planner.plan(world, stop=MaxIterations(enough))
+        planner.plan(world, stop=MaxIterations(_ENOUGH.get(name, enough)))
+        if world is room:  # some go about it in another way where nothing is static
+            planner.plan(water, stop=MaxIterations(enough))
         policy = policy_for(planner)
         policy.stop = MaxIterations(enough)
         for step in range(3):

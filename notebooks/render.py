@@ -1,0 +1,210 @@
+"""Run the notebooks, and write what they say and show into docs/notebooks.md.
+
+Usage::
+
+    python notebooks/render.py [NAME ...] [--check]
+
+Without a name all notebooks are run, each in a process of its own; with names the parts of the
+others on the page stay as they are. With --check nothing is written.
+
+No Jupyter kernel is needed: what a cell prints, the value of its last line and the figures that it
+leaves open are kept, as Jupyter shows them.
+"""
+
+from __future__ import annotations
+
+import argparse
+import ast
+import contextlib
+import io
+import json
+import os
+import re
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+os.environ.setdefault("MPLBACKEND", "Agg")
+
+from PIL import Image
+
+HERE = Path(__file__).parent
+DOCS = HERE.parent / "docs"
+ORDER = (
+    "first_plan",
+    "your_own_planner",
+    "price_of_pushing",
+    "sequencing_and_pushing",
+    "learned_against_classical",
+    "planner_in_a_control_loop",
+)
+COLOURS = 96
+"""Of a picture: flat drawings look the same with few, and are a third of the size."""
+DPI = 110
+HEAD = """\
+# Notebooks
+
+Six of them, in [`notebooks/`](../notebooks): open one with Jupyter. They are kept without outputs
+and run as tests, each in less than a minute. This page is what they say and show, made by
+`python notebooks/render.py` on a 2-core machine that was busy with other work, which makes every
+time on it longer.
+"""
+
+
+@dataclass(frozen=True)
+class Output:
+    """What a code cell has given.
+
+    Args:
+        text: printed, and the value of the last line.
+        pictures: drawn, as PNG.
+    """
+
+    text: str
+    pictures: tuple[bytes, ...] = ()
+
+
+Cell = tuple[str, str, Output | None]
+"""Kind, source and output; only code has an output."""
+
+
+def notebooks() -> list[Path]:
+    """The notebooks in reading order."""
+    rank = {name: i for i, name in enumerate(ORDER)}
+    return sorted(HERE.glob("*.ipynb"), key=lambda path: (rank.get(path.stem, 99), path.stem))
+
+
+def cells_of(path: Path) -> list[tuple[str, str]]:
+    """Kind and source of each cell."""
+    cells = json.loads(path.read_text("utf-8"))["cells"]
+    return [(cell["cell_type"], "".join(cell["source"])) for cell in cells]
+
+
+def run_notebook(path: Path) -> Iterator[Cell]:
+    """Run a notebook in an empty scope, cell by cell."""
+    scope: dict[str, Any] = {"__name__": "__main__"}
+    for kind, source in cells_of(path):
+        yield kind, source, run_cell(source, scope) if kind == "code" else None
+
+
+def run_cell(source: str, scope: dict[str, Any]) -> Output:
+    """Run one cell as a notebook would."""
+    body = ast.parse(source).body
+    last = body.pop() if body and isinstance(body[-1], ast.Expr) else None
+    printed, value = io.StringIO(), None
+    with contextlib.redirect_stdout(printed):
+        exec(compile(ast.Module(body, []), "<cell>", "exec"), scope)
+        if last is not None:
+            value = eval(compile(ast.Expression(last.value), "<cell>", "eval"), scope)
+    if source.rstrip().endswith(";"):
+        value = None  # as IPython has it
+    text = printed.getvalue()
+    pictures = [png(image) for image in open_figures()]
+    if isinstance(value, Image.Image):
+        pictures.append(png(value))
+    elif hasattr(value, "savefig"):
+        pictures.append(png(picture_of(value)))
+    elif value is not None and not pictures:
+        text += f"{value!r}\n"
+    return Output(text, tuple(pictures))
+
+
+def open_figures() -> list[Image.Image]:
+    """The figures of pyplot, which are closed."""
+    plt = sys.modules.get("matplotlib.pyplot")
+    images = []
+    for number in plt.get_fignums() if plt else ():
+        images.append(picture_of(plt.figure(number)))
+        plt.close(number)
+    return images
+
+
+def picture_of(figure: Any) -> Image.Image:
+    """A figure of matplotlib as a picture."""
+    buffer = io.BytesIO()
+    figure.savefig(buffer, format="png", dpi=DPI)
+    return Image.open(buffer)
+
+
+def png(image: Image.Image) -> bytes:
+    """A small PNG."""
+    flat = image.convert("RGB").quantize(COLOURS, dither=Image.Dither.NONE)
+    buffer = io.BytesIO()
+    flat.save(buffer, format="png", optimize=True)
+    return buffer.getvalue()
+
+
+def markdown(path: Path, cells: list[Cell]) -> str:
+    """The part of the page that shows a notebook; writes its pictures."""
+    for old in (DOCS / "images").glob(f"notebook-{path.stem}-*.png"):
+        old.unlink()
+    blocks, count, heading = [f'<a id="{path.stem}"></a>'], 0, ""
+    for kind, source, output in cells:
+        blocks.append(shown(kind, source))
+        if output is None:
+            heading = (re.findall(r"^#+ (.*)", source, flags=re.MULTILINE) or [heading])[-1]
+            continue
+        if output.text.strip():
+            blocks.append(f"```\n{output.text.rstrip()}\n```")
+        for picture in output.pictures:
+            count += 1
+            name = f"notebook-{path.stem}-{count}.png"
+            (DOCS / "images" / name).write_bytes(picture)
+            blocks.append(f"![{heading}](images/{name})")
+    return "\n\n".join(blocks) + "\n"
+
+
+def shown(kind: str, source: str) -> str:
+    """How the page shows the source of a cell: headings one level down, links from where it is."""
+    if kind == "code":
+        return f"```python\n{source}\n```"
+    return re.sub(r"^#", "##", source, flags=re.MULTILINE).replace("](../docs/", "](")
+
+
+def parts_of(page: str) -> dict[str, str]:
+    """The parts of a page that was written before, by notebook."""
+    pieces = re.split(r"^(?=<a id=)", page, flags=re.MULTILINE)[1:]
+    return {piece.split('"')[1]: piece.rstrip() + "\n" for piece in pieces}
+
+
+def write_page(path: Path, cells: list[Cell]) -> None:
+    """Put a notebook in its place on the page."""
+    page = DOCS / "notebooks.md"
+    parts = parts_of(page.read_text("utf-8")) if page.exists() else {}
+    parts[path.stem] = markdown(path, cells)
+    links = []
+    for other in notebooks():
+        title = cells_of(other)[0][1].splitlines()[0].lstrip("# ")
+        links.append(f"- [{title}](#{other.stem}), [`{other.name}`](../notebooks/{other.name})")
+    known = [parts[other.stem] for other in notebooks() if other.stem in parts]
+    page.write_text("\n".join([HEAD, *links, "", *known]), "utf-8")
+
+
+def main() -> int:
+    """Run what is asked for."""
+    parser = argparse.ArgumentParser(description="run the notebooks and render them into docs/")
+    parser.add_argument("names", nargs="*", metavar="NAME", help="of a notebook; all by default")
+    parser.add_argument("--check", action="store_true", help="run, and write nothing")
+    options = parser.parse_args()
+    found = {path.stem: path for path in notebooks()}
+    names = options.names or list(found)
+    if unknown := sorted(set(names) - set(found)):
+        parser.error(f"no notebook is called {unknown[0]!r} (valid: {', '.join(found)})")
+    if len(names) > 1:
+        flags = ["--check"] if options.check else []
+        command = [sys.executable, __file__, *flags]
+        return max([subprocess.run([*command, name]).returncode for name in names])
+    path, began = found[names[0]], time.perf_counter()
+    cells = list(run_notebook(path))
+    sys.stdout.write(f"{path.stem}: {time.perf_counter() - began:.1f} s\n")
+    if not options.check:
+        write_page(path, cells)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
