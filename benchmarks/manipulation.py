@@ -22,8 +22,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from pushplan.drawing import save_image
-from pushplan.drawing.sequence import draw_sequence
+from pushplan.drawing import draw_sequence, save_image
 from pushplan.envs import make
 from pushplan.evaluation import ResultRow, bench
 from pushplan.planners.subtasks import GtspMpc

@@ -25,7 +25,7 @@ from pushplan.control import PurePursuit
 from pushplan.envs.registry import SIMULATORS, look_up
 from pushplan.envs.simulators.base import Materials, Simulator
 from pushplan.envs.tasks.testbed import SOLIDS
-from pushplan.evaluation.push_plots import push_figure
+from pushplan.evaluation import push_figure
 from pushplan.planners.pushing import (
     NonlinearPushingMpc,
     PushingConfig,

@@ -2,5 +2,6 @@
 
 from pushplan.drawing.files import save_animation, save_image
 from pushplan.drawing.scene import draw_world
+from pushplan.drawing.sequence import draw_sequence
 
-__all__ = ["draw_world", "save_animation", "save_image"]
+__all__ = ["draw_sequence", "draw_world", "save_animation", "save_image"]

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from pushplan.evaluation.paper import Comparison, bench_paper
     from pushplan.evaluation.policies import PolicySpec, parse_policies, parse_policy
     from pushplan.evaluation.pool import WorkerPool
+    from pushplan.evaluation.push_plots import push_figure
     from pushplan.evaluation.results import Results, compare
     from pushplan.evaluation.rows import COLUMNS, TIMING_COLUMNS, ResultRow, Status
     from pushplan.evaluation.statistics import Estimate, Proportion, bootstrap_interval, wilson
@@ -31,6 +32,7 @@ _HOMES = {
     "paper": ("Comparison", "bench_paper"),
     "policies": ("PolicySpec", "parse_policies", "parse_policy"),
     "pool": ("WorkerPool",),
+    "push_plots": ("push_figure",),
     "results": ("Results", "compare"),
     "rows": ("COLUMNS", "TIMING_COLUMNS", "ResultRow", "Status"),
     "statistics": ("Estimate", "Proportion", "bootstrap_interval", "wilson"),
@@ -63,6 +65,7 @@ __all__ = [
     "compare",
     "parse_policies",
     "parse_policy",
+    "push_figure",
     "run_batch",
     "run_episode",
     "wilson",

@@ -207,7 +207,13 @@ def text(sheets: Sequence[Sheet], width: int = 160) -> str:
     """The sheets as plain text."""
     from rich.console import Console
 
-    console = Console(file=io.StringIO(), width=width, force_terminal=False, color_system=None)
+    console = Console(
+        file=io.StringIO(),
+        width=width,
+        force_terminal=False,
+        force_jupyter=False,
+        color_system=None,
+    )
     with console.capture() as capture:
         for sheet in sheets:
             console.print(rich_table(sheet))

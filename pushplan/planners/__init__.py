@@ -8,6 +8,7 @@ from pushplan.world import Deadline, MaxIterations, Planner, PlanResult, PlanSta
 __all__ = [
     "Deadline",
     "GeometricRRT",
+    "GtspMpc",
     "KinodynamicRRT",
     "MaxIterations",
     "PlanFollower",
@@ -15,6 +16,9 @@ __all__ = [
     "PlanStatus",
     "Planner",
     "Policy",
+    "PredictiveShip",
+    "PushAware",
+    "ShipLattice",
     "ShortestPath",
     "World",
     "make_planner",
@@ -27,8 +31,12 @@ __all__ = [
 
 _LAZY = {
     "GeometricRRT": "pushplan.planners.geometric",
+    "GtspMpc": "pushplan.planners.subtasks",
     "KinodynamicRRT": "pushplan.planners.kinodynamic",
     "PlanFollower": "pushplan.planners.policy",
+    "PredictiveShip": "pushplan.planners.predictive",
+    "PushAware": "pushplan.planners.push_aware",
+    "ShipLattice": "pushplan.planners.lattice.ship",
     "ShortestPath": "pushplan.planners.straight",
     "policy_for": "pushplan.planners.policy",
     "warm_up": "pushplan.planners.warming",

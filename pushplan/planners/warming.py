@@ -6,7 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from pushplan.planners.policy import policy_for
+from pushplan.control import MpcTracker
+from pushplan.planners.policy import PlanFollower
 from pushplan.planners.registry import OPEN_WATER, make_planner, planner_names
 from pushplan.planners.sequencing import warm_up_solver
 from pushplan.planners.subtasks.warming import warm_up_subtasks
@@ -24,6 +25,8 @@ from pushplan.world import (
 _ENOUGH = {"push-aware": 6000}
 """Iterations after which all kernels of a planner have been used, where 600 are not enough."""
 
+_PUSHERS = ("greedy", "gtsp", "gtsp-mpc")
+
 
 def warm_up(*names: str) -> None:
     """Plan once in a small room with each planner, so that later calls find compiled kernels.
@@ -33,7 +36,7 @@ def warm_up(*names: str) -> None:
     calls this once when it starts.
 
     Args:
-        names: planners; all by default.
+        names: planners, and policies that push objects to a goal; all by default.
 
     Raises:
         UnknownNameError: if there is no such planner.
@@ -56,14 +59,15 @@ def warm_up(*names: str) -> None:
     )
     if not names:
         warm_up_solver()
+    if not names or set(names) & set(_PUSHERS):
         warm_up_subtasks()
-    for name in names or planner_names():
+    for name in [name for name in names if name not in _PUSHERS] if names else planner_names():
         world, enough = (water, 30) if name in OPEN_WATER else (room, 600)
         planner = make_planner(name)
         planner.plan(world, stop=MaxIterations(_ENOUGH.get(name, enough)))
         if world is room:  # some go about it in another way where nothing is static
             planner.plan(water, stop=MaxIterations(enough))
-        policy = policy_for(planner)
+        policy = PlanFollower(planner, MpcTracker() if name.startswith("ship") else None)
         policy.stop = MaxIterations(enough)
         for step in range(3):
             policy.act(world.moved(time=0.1 * step))

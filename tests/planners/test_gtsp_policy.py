@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from conftest import make_boxes, make_robot, make_u_maze
 
-from pushplan.drawing.sequence import draw_sequence
+from pushplan.drawing import draw_sequence
 from pushplan.envs import PushEnv
 from pushplan.planners import make_policy, policy_names
 from pushplan.planners.subtasks import GtspMpc, SubTaskConfig

@@ -6,7 +6,7 @@ import pytest
 from pushing_scenes import make_simulator, make_world, run
 
 from pushplan.envs import PushEnv
-from pushplan.evaluation.push_plots import push_figure
+from pushplan.evaluation import push_figure
 from pushplan.planners.pushing import (
     ExecutorConfig,
     PushExecutor,
