@@ -3,14 +3,15 @@
 Usage::
 
     python benchmarks/manipulation.py [--episodes 50] [--workers 2] [--only area-clearing-2d]
-        [--policies greedy,gtsp,gtsp-mpc] [--seed 0]
+        [--policies greedy,gtsp,gtsp-mpc] [--seed 0] [--out runs/manipulation]
     python benchmarks/manipulation.py --figure docs/images/gtsp-mpc.png
 
 Prints one row of a Markdown table for each suite and policy: means with bootstrap intervals of
 95 %, the share of episodes with everything done, the paired difference to the first policy, and
 the wall time of a step, simulation included. Below the table it names every episode in which
-something was left undone. With ``--figure`` it only draws what
-`gtsp-mpc` plans first in some scenes.
+something was left undone. With ``--out`` the episodes are kept, a folder for each suite, and a run
+that was interrupted goes on. With ``--figure`` it only draws what `gtsp-mpc` plans first in some
+scenes.
 """
 
 from __future__ import annotations
@@ -42,6 +43,7 @@ def main() -> None:
     parser.add_argument("--only", default="", help="suites whose name holds this text")
     parser.add_argument("--policies", default="greedy,gtsp,gtsp-mpc")
     parser.add_argument("--figure", default="", help="draw planned sequences to this file instead")
+    parser.add_argument("--out", default="", help="keep the episodes in this folder")
     options = parser.parse_args()
     if options.figure:
         figure(options.figure, options.seed)
@@ -62,7 +64,7 @@ def main() -> None:
                 episodes=options.episodes,
                 workers=options.workers,
                 seed=options.seed,
-                out=folder,
+                out=f"{options.out}/{name}" if options.out else folder,
             )
             rows = list(results.rows)
         first = [row for row in rows if row.policy == policies[0]]
