@@ -11,7 +11,7 @@ import numpy as np
 from pushplan.control import DriveTo, clamp_twist
 from pushplan.planners.lining_up import LineUp, bumper_half, is_done, line_up, unit, way_of
 from pushplan.world import ClearanceArea, Drive, InvalidInputError, Receptacle, Twist, World
-from pushplan.world.checks import FloatArray, number
+from pushplan.world.checks import FloatArray, expect, number
 
 _RETREATS = ((-1.0, 0.0), (-0.5, 1.0), (-0.5, -1.0), (1.0, 0.0), (0.5, 1.0), (0.5, -1.0))
 """Speed and turn rate, as shares of the greatest, that are tried in turn to get away."""
@@ -75,7 +75,7 @@ class GreedyPusher:
     actions = ("velocity",)
 
     def __init__(self, config: GreedyConfig | None = None) -> None:
-        self.config = config or GreedyConfig()
+        self.config = expect("config", config or GreedyConfig(), GreedyConfig)
         self._forget(0.0)
 
     def _forget(self, time: float) -> None:

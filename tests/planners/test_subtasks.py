@@ -15,10 +15,14 @@ from pushplan.planners.subtasks import (
     Scene,
     SubTaskConfig,
     build_graph,
+    lattice,
     tour_of,
 )
 from pushplan.planners.subtasks.completions import completions
+from pushplan.planners.subtasks.graph import candidate_pushes
 from pushplan.planners.subtasks.hard import swinging_pushes
+from pushplan.planners.subtasks.push import signature
+from pushplan.planners.subtasks.recall import Recall
 from pushplan.planners.subtasks.reduction import parts_of, reduce
 from pushplan.planners.subtasks.rollout import all_done
 from pushplan.planners.subtasks.runner import Runner
@@ -111,6 +115,13 @@ def test_a_row_of_boxes_is_swept_by_one_push():
     assert len(order) == 1 and cost == pytest.approx(graph.costs[-1, order[0]])
 
 
+def test_a_push_that_is_barred_is_left_out():
+    here, graph = example("delivery")
+    barred = signature(graph.pushes[0])
+    again = build_graph(here, {barred: math.inf})
+    assert again.pushes and barred not in {signature(push) for push in again.pushes}
+
+
 def brute_force(costs, masks, boxes):
     """The cheapest sequence of pushes that covers everything, each adding something."""
     every, best = (1 << boxes) - 1, math.inf
@@ -199,6 +210,59 @@ def test_a_box_in_a_corner_is_turned_out_of_it():
         assert push.frees and push.turn != 0.0
         moved = push.object_poses[0, :2] - here.poses[0, :2]
         assert float(np.hypot(*moved)) > 0.02
+
+
+def test_what_is_remembered_comes_to_the_same():
+    rng, recall = np.random.default_rng(4), Recall()
+    boxes = np.column_stack([rng.uniform(-2.5, 2.5, (6, 2)), rng.uniform(-3.0, 3.0, 6)])
+    first = scene(boxes, ClearanceArea(AREA, [True] * 4))
+    known = 0
+    for _ in range(3):
+        fresh = Scene(first.world.moved(movable_poses=boxes), first.config)
+        kept = replace(fresh, recall=recall)
+        before = len(recall)
+        one, other = (candidate_pushes(here, Runner(here)) for here in (fresh, kept))
+        known += len(one) > len(recall) - before
+        assert len(one) == len(other)
+        for a, b in zip(one, other, strict=True):
+            assert a == b
+        recall.age()
+        boxes = boxes.copy()
+        boxes[rng.integers(6)] += rng.uniform(-0.4, 0.4, 3)
+    assert known
+
+
+def test_the_search_is_that_of_dijkstra():
+    here, _ = example("clearing")
+    ground = here.coarse
+    floor, (depths, touch) = ground.floor, ground.contacts()
+    starts, costs = lattice.near_poses(floor, here.world.robot_pose, 1.5)
+    table = (lattice.MOVES, lattice.LENGTHS, lattice.TURNS, 0.02, 0.5)
+    none = np.zeros(0, dtype=np.int64)
+    best, before = lattice.search_poses(starts, costs, floor, depths, touch, *table, none)
+    assert np.isfinite(best).mean() > 0.3
+    targets = np.argsort(best)[:50]
+    some, _ = lattice.search_poses(starts, costs, floor, depths, touch, *table, targets)
+    assert (some[targets] == best[targets]).all()
+    # every price is that of the pose before it and the step from there, and no step is cheaper
+    count, rows, cols = depths.shape
+    flat, near, shut = depths.ravel(), touch.ravel(), floor.blocked.ravel()
+    for node in np.flatnonzero(np.isfinite(best))[::37].tolist():
+        t, i, j = node // (rows * cols), node // cols % rows, node % cols
+        steps = []
+        for sign in (1, -1):
+            y, x = i + sign * lattice.MOVES[t, 1], j + sign * lattice.MOVES[t, 0]
+            if 0 <= y < rows and 0 <= x < cols:
+                length = lattice.LENGTHS[t] * floor.step
+                steps.append(((t * rows + y) * cols + x, length, length))
+        for to, turn in (((t + 1) % count, lattice.TURNS[t]), (t - 1, lattice.TURNS[t - 1])):
+            steps.append(((to % count * rows + i) * cols + j, 0.02 * turn, 0.5 * turn))
+        for other, price, motion in steps:
+            if not shut[node] and np.isfinite(best[other]):
+                touched = near[node] > 0.0 and flat[node] >= flat[other]
+                cost = best[other] + (price + motion * near[node] if touched else price)
+                assert best[node] <= cost
+                assert before[node] != other or best[node] == pytest.approx(cost)
 
 
 @pytest.mark.parametrize(

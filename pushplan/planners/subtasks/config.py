@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from pushplan.world import InvalidInputError
-from pushplan.world.checks import integer, number
+from pushplan.world.checks import expect, integer, number
 
 
 @dataclass(frozen=True)
@@ -62,16 +61,4 @@ class SubTaskConfig:
         integer("subtask per_box", self.per_box, low=1, high=1000)
         integer("subtask most", self.most, low=1, high=10000)
         integer("subtask rehearsals", self.rehearsals, low=1, high=1000)
-        if not isinstance(self.mpc, bool):
-            raise InvalidInputError(f"subtask mpc must be True or False, got {self.mpc!r}")
-
-
-def checked_config(config: object) -> SubTaskConfig:
-    """The config.
-
-    Raises:
-        InvalidInputError: if it is none.
-    """
-    if not isinstance(config, SubTaskConfig):
-        raise InvalidInputError(f"config must be a SubTaskConfig, got {config!r:.60}")
-    return config
+        expect("subtask mpc", self.mpc, bool)

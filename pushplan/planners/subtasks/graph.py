@@ -23,6 +23,8 @@ from pushplan.world.checks import FloatArray, IntArray
 _FREED = 2
 """How many objects, the nearest ones, freeing pushes are looked for at a time."""
 
+_EVERYWHERE = np.zeros(0, dtype=np.int64)
+
 
 @dataclass(frozen=True, eq=False)
 class Approach:
@@ -72,8 +74,7 @@ def build_graph(
     approach = approach_from(scene)
     runner = Runner(scene)
     pushes = candidate_pushes(scene, runner, freeing)
-    looked = [arrival_poses(scene.fine, push.start) for push in pushes]
-    row = _arrivals(scene.fine, approach.costs, looked)
+    row = lattice.least_costs(approach.costs, _arrivals(scene.fine, pushes))
     extra = np.array([(penalties or {}).get(signature(push), 0.0) for push in pushes])
     pushes, keep = _best(scene, pushes, row + extra)
     row = row[keep]
@@ -131,6 +132,7 @@ def _search(
     share: float = 1.0,
     without: IntArray | None = None,
     led: int = -1,
+    targets: IntArray = _EVERYWHERE,
 ) -> Approach:
     for reach in (1.5, 4.0):
         starts, costs = lattice.near_poses(ground.floor, pose, reach)
@@ -146,16 +148,18 @@ def _search(
         lattice.TURNS,
         scene.config.turn_price * scene.size,
         lattice.ARM * scene.size,
+        targets,
     )
     return Approach(best, before)
 
 
-def _arrivals(
-    ground: Ground, costs: FloatArray, looked: Sequence[tuple[IntArray, FloatArray]]
-) -> FloatArray:
-    """(N,) cost of getting to each of some places."""
-    return np.array(
-        [float((costs[nodes] + extra).min()) if len(nodes) else np.inf for nodes, extra in looked]
+def _arrivals(ground: Ground, pushes: Sequence[Push]) -> lattice.Arrivals:
+    """Where the starts of pushes are reached from."""
+    found = [arrival_poses(ground, push.start) for push in pushes]
+    return lattice.Arrivals(
+        np.concatenate([nodes for nodes, _ in found] or [np.zeros(0, dtype=np.int64)]),
+        np.concatenate([extra for _, extra in found] or [np.zeros(0)]),
+        np.cumsum([len(nodes) for nodes, _ in found], dtype=np.int64),
     )
 
 
@@ -190,7 +194,7 @@ def _best(scene: Scene, pushes: Sequence[Push], row: FloatArray) -> tuple[list[P
 def _between(scene: Scene, pushes: Sequence[Push]) -> FloatArray:
     """(N, N) cost of the approach from the end of each push to the start of each other [m]."""
     ground, ids = scene.coarse, scene.world.movables.ids
-    looked = [arrival_poses(ground, push.start) for push in pushes]
+    arrivals = _arrivals(ground, pushes)
     out = np.full((len(pushes), len(pushes)), np.inf)
     known: dict[tuple[object, ...], FloatArray] = {}
     step = 2.0 * ground.floor.step
@@ -202,8 +206,10 @@ def _between(scene: Scene, pushes: Sequence[Push]) -> FloatArray:
         )
         if key not in known:
             gone = np.flatnonzero(np.isin(ids, push.covers))
-            found = _search(scene, ground, push.end, scene.config.later, gone)
-            known[key] = _arrivals(ground, found.costs, looked)
+            found = _search(
+                scene, ground, push.end, scene.config.later, gone, targets=arrivals.nodes
+            )
+            known[key] = lattice.least_costs(found.costs, arrivals)
         out[n] = known[key]
     np.fill_diagonal(out, np.inf)
     return out

@@ -6,7 +6,9 @@ import math
 from dataclasses import replace
 
 import numpy as np
+from numba import njit
 
+from pushplan.planners.kinodynamic.collision import Footprint, Obstacles, is_free
 from pushplan.planners.subtasks.places import (
     SHIFTS,
     axes_of,
@@ -47,13 +49,15 @@ def partial_pushes(runner: Runner, k: int, path: FloatArray) -> list[Push]:
         if not scene.fits(start):
             continue
         ends = runner.run(start, k, path=path, shift=shift, frees=True)
+        if not ends:
+            continue
         for back in (0.3, 1.2):
             limit = ends[0].length - back * scene.size
             if limit <= 0.4 * scene.size:
                 continue
             for push in runner.run(start, k, path=path, shift=shift, limit=limit, frees=True):
                 if _gain(runner, k, push) > 0.3 * scene.size:
-                    rest = float(scene.remaining(push.object_poses)[k])
+                    rest = float(scene.remaining(push.object_poses[[k]])[0])
                     found.append(replace(push, price=push.price + rest + 2.0 * scene.size))
     return found
 
@@ -87,7 +91,7 @@ def freeing_pushes(runner: Runner, k: int) -> list[Push]:
     way = scene.box_path(k, 0.0)
     if way is None:
         return []
-    towards, lacking = direction_of(way, scene.size), _lacking(scene, k)
+    towards, lacking = direction_of(way, scene.size), _lacking(scene, k, scene.poses[k])
     found: list[Push] = []
     for turn in _TURNS:
         if len(found) >= _ENOUGH:
@@ -114,15 +118,14 @@ def _in_vain(runner: Runner, k: int, push: Push, lacking: float) -> float:
         return 3.0 * scene.size
     if math.dist(push.object_poses[k, :2], scene.poses[k, :2]) < 0.05 * scene.size:
         return math.inf
-    after = Scene(scene.world.moved(movable_poses=_kept(push.object_poses, scene)), scene.config)
-    still = _lacking(after, k)
+    still = _lacking(scene, k, push.object_poses[k])
     return 3.0 * still + scene.size if still < lacking - 0.05 * scene.size else math.inf
 
 
 def swinging_pushes(runner: Runner, k: int) -> list[Push]:
     """Turns on the spot that get an object out of a corner with the end of the bumper."""
     scene = runner.scene
-    box, lacking = scene.poses[k, :2], _lacking(scene, k)
+    box, lacking = scene.poses[k, :2], _lacking(scene, k, scene.poses[k])
     found: list[Push] = []
     for share in (0.9, 1.02, 1.15):
         for n in range(_SIDES):
@@ -139,30 +142,49 @@ def swinging_pushes(runner: Runner, k: int) -> list[Push]:
     return found
 
 
-def _lacking(scene: Scene, k: int) -> float:
+def _lacking(scene: Scene, k: int, pose: FloatArray) -> float:
     """How much farther from the walls an object would have to be for the robot to get behind [m].
 
     Behind means on the side from which it can be pushed towards its goal, or nearly so.
     """
-    way = scene.box_path(k, 0.0)
+    way = scene.box_path(k, 0.0, pose=pose)
     if way is None:
         return math.inf
-    towards, least = direction_of(way, scene.size), 1.5 * scene.size
+    towards, least, step = direction_of(way, scene.size), 1.5 * scene.size, 0.1 * scene.size
     for turn in _NEARLY:
         u, _ = axes_of(towards + turn)
         for shift in SHIFTS:
-            start = behind(scene, k, towards + turn, shift * scene.half)
-            for away in np.arange(0.0, least, 0.1 * scene.size).tolist():
-                if scene.fits(start + away * np.array([*u, 0.0])):
-                    least = away
-                    break
+            start = behind(scene, k, towards + turn, shift * scene.half, pose)
+            away = _first_free(start, u, step, least, *scene.fit)
+            if math.isfinite(away):
+                least = away
     return least
+
+
+@njit(cache=True, nogil=True)
+def _first_free(
+    start: FloatArray,
+    u: FloatArray,
+    step: float,
+    limit: float,
+    shape: Footprint,
+    among: Obstacles,
+    scratch: FloatArray,
+) -> float:
+    """How far along ``u`` a free pose is [m]; inf if there is none nearer than the limit."""
+    pose, n = start.copy(), 0
+    while n * step < limit:
+        pose[0], pose[1] = start[0] + n * step * u[0], start[1] + n * step * u[1]
+        if is_free(pose, shape, among, scratch):
+            return n * step
+        n += 1
+    return np.inf
 
 
 def _gain(runner: Runner, k: int, push: Push) -> float:
     """By how much nearer to its goal an object gets [m]; 0 where no way leads there."""
     scene = runner.scene
-    now, then = scene.remaining_now[k], scene.remaining(push.object_poses)[k]
+    now, then = scene.remaining_now[k], scene.remaining(push.object_poses[[k]])[0]
     return float(now - then) if math.isfinite(now) and math.isfinite(then) else 0.0
 
 
@@ -175,19 +197,11 @@ def _is_free(runner: Runner, k: int, push: Push) -> bool:
     moved = float(np.hypot(*(pose[:2] - scene.poses[k, :2])))
     if moved < 0.15 * scene.size:
         return False
-    after = Scene(scene.world.moved(movable_poses=_kept(push.object_poses, scene)), scene.config)
     for clearance in (1.08 * scene.half, 0.75 * float(scene.world.movables.radii[k])):
-        path = after.box_path(k, clearance)
+        path = scene.box_path(k, clearance, pose=pose)
         if path is None:
             continue
         heading = direction_of(path, 0.5 * scene.size)
-        if any(after.fits(behind(after, k, heading, share * scene.half)) for share in SHIFTS):
+        if any(scene.fits(behind(scene, k, heading, share * scene.half, pose)) for share in SHIFTS):
             return True
     return False
-
-
-def _kept(poses: FloatArray, scene: Scene) -> FloatArray:
-    """Poses with objects that are gone left where they were."""
-    gone = poses[:, 0] >= 0.5 * GONE
-    kept: FloatArray = np.where(gone[:, None], scene.poses, poses)
-    return kept

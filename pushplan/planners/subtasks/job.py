@@ -43,6 +43,7 @@ class Job:
         push: the push.
         route: the way to its start.
         period: time between two commands [s].
+        predictive: whether to push by predictive control where that suits.
 
     Attributes:
         push: the push, as predicted last.
@@ -50,8 +51,11 @@ class Job:
         pushing: whether the push itself has begun.
     """
 
-    def __init__(self, world: World, push: Push, route: Route, period: float) -> None:
+    def __init__(
+        self, world: World, push: Push, route: Route, period: float, *, predictive: bool = True
+    ) -> None:
         self.push, self.route, self.pushing = push, route, False
+        self._predictive = predictive
         self._driver = LegDriver(world.robot, route, period)
         self._follower: BoxFollower | None = None
         self._driven = self._reached = self._asked = 0.0
@@ -96,7 +100,7 @@ class Job:
         self.pushing, self._still = True, 0
         if self.push.turn:
             self._driver = _turning(world, self.push, scene.config.period)
-        if scene.config.mpc and suits(scene, self.push):
+        if self._predictive and suits(scene, self.push):
             self._follower = BoxFollower(scene, self.push)
         return None
 

@@ -24,7 +24,6 @@ from pushplan.planners.kinodynamic.collision import (
     is_free,
     obstacles,
 )
-from pushplan.planners.lattice.heap import pop_least, push_or_lift
 from pushplan.world import RobotModel, StaticMap
 from pushplan.world.checks import BoolArray, FloatArray, IntArray, frozen
 
@@ -42,7 +41,10 @@ HEADINGS: FloatArray = np.arctan2(MOVES[:, 1], MOVES[:, 0])
 LENGTHS: FloatArray = np.hypot(MOVES[:, 0], MOVES[:, 1])
 """(16,) length of the move along each heading [cells]."""
 TURNS: FloatArray = np.abs(
-    np.arctan2(np.sin(np.roll(HEADINGS, -1) - HEADINGS), np.cos(np.roll(HEADINGS, -1) - HEADINGS))
+    np.arctan2(
+        np.sin(np.roll(HEADINGS, -1) - HEADINGS),
+        np.cos(np.roll(HEADINGS, -1) - HEADINGS),
+    )
 )
 """(16,) angle from each heading to the next [rad]."""
 COUNT = len(MOVES)
@@ -50,6 +52,12 @@ Layers = NDArray[np.float32]
 """(K, 16, rows, columns) depth of the footprint in each object [m]."""
 ARM = 0.8
 """How far a turn by one radian carries an object along [circumscribed radii]."""
+
+
+_BUCKETS = 1024
+"""How many buckets of poses a search has in one round."""
+_WIDTH = 0.1
+"""Costs that one bucket spans [cells]."""
 
 
 class Floor(NamedTuple):
@@ -95,7 +103,10 @@ def floor_of(robot: RobotModel, static: StaticMap, step: float, margin: float) -
     x0, y0, x1, y1 = static.bounds.tolist()
     cols, rows = int((x1 - x0) / step) + 1, int((y1 - y0) / step) + 1
     blocked = np.empty((COUNT, rows, cols), dtype=np.bool_)
-    x, y = x0 + 0.5 * ((x1 - x0) - (cols - 1) * step), y0 + 0.5 * ((y1 - y0) - (rows - 1) * step)
+    x, y = (
+        x0 + 0.5 * ((x1 - x0) - (cols - 1) * step),
+        y0 + 0.5 * ((y1 - y0) - (rows - 1) * step),
+    )
     _block(blocked, x, y, step, HEADINGS, footprint(robot, margin), obstacles(static))
     return Floor(x, y, step, frozen(blocked))
 
@@ -167,6 +178,68 @@ def add_up(layers: Layers, weights: FloatArray) -> tuple[FloatArray, FloatArray]
     return depths.reshape((turns, rows, cols)), touch.reshape((turns, rows, cols))
 
 
+@njit(cache=True, nogil=True, inline="always")
+def _unlink(node: int, heads: IntArray, after: IntArray, ahead: IntArray) -> None:
+    """Take a node out of its bucket."""
+    if ahead[node] >= 0:
+        after[ahead[node]] = after[node]
+    else:
+        heads[-2 - ahead[node]] = after[node]
+    if after[node] >= 0:
+        ahead[after[node]] = ahead[node]
+    ahead[node] = -1
+
+
+@njit(cache=True, nogil=True, inline="always")
+def _link(node: int, bucket: int, heads: IntArray, after: IntArray, ahead: IntArray) -> None:
+    """Put a node that is in no bucket into one."""
+    after[node], ahead[node] = heads[bucket], -2 - bucket
+    if heads[bucket] >= 0:
+        ahead[heads[bucket]] = node
+    heads[bucket] = node
+
+
+@njit(cache=True, nogil=True)
+def _deal(
+    best: FloatArray, width: float, heads: IntArray, after: IntArray, ahead: IntArray
+) -> float:
+    """Put the poses that wait in the last bucket where they belong; returns the least cost."""
+    base, node = np.inf, heads[_BUCKETS]
+    while node >= 0:
+        base = min(base, best[node])
+        node = after[node]
+    node, heads[_BUCKETS] = heads[_BUCKETS], -1
+    while node >= 0:
+        following = after[node]
+        _link(node, int(min((best[node] - base) / width, _BUCKETS)), heads, after, ahead)
+        node = following
+    return base
+
+
+@njit(cache=True, nogil=True)
+def _beside(
+    t: int, i: int, j: int, move: int, shape: tuple[int, int, int], moves: IntArray
+) -> tuple[int, int]:
+    """The pose that a move leads to, -1 if none; and the heading that says how far it is.
+
+    Args:
+        t, i, j: heading, row and column of a pose.
+        move: 0 ahead, 1 back, 2 to the next heading, 3 to the one before.
+        shape: how many headings, rows and columns there are.
+        moves: (16, 2) `MOVES`.
+    """
+    count, rows, cols = shape
+    if move < 2:
+        sign = 1 - 2 * move
+        i, j = i + sign * moves[t, 1], j + sign * moves[t, 0]
+        if i < 0 or j < 0 or i >= rows or j >= cols:
+            return -1, t
+        return (t * rows + i) * cols + j, t
+    to = t + 1 if move == 2 else t - 1
+    to = to - count if to == count else (count - 1 if to < 0 else to)
+    return (to * rows + i) * cols + j, t if move == 2 else to
+
+
 @njit(cache=True, nogil=True)
 def search_poses(
     starts: IntArray,
@@ -179,8 +252,12 @@ def search_poses(
     turns: FloatArray,
     turn_price: float,
     arm: float,
+    targets: IntArray,
 ) -> tuple[FloatArray, IntArray]:
-    """Cheapest ways from a set of poses to every pose of the lattice (Dijkstra).
+    """Cheapest ways from a set of poses to every pose of the lattice.
+
+    Poses are expanded bucket by bucket of about equal costs, and again where they get cheaper
+    (Dial 1969; Meyer and Sanders 2003). What lies beyond the last bucket waits for another round.
 
     Args:
         starts: (S,) flat indices of poses.
@@ -192,47 +269,57 @@ def search_poses(
         turns: (16,) angle from each heading to the next [rad].
         turn_price: price of a turn [m/rad].
         arm: how far a turn carries an object along [m/rad].
+        targets: flat indices of poses after which to stop; none to go on to the end.
 
     Returns:
-        (16 * rows * columns,) costs [m] and the pose before each, -1 for none.
+        (16 * rows * columns,) costs [m] and the pose before each, -1 for none. Where the search
+        has stopped before the end, costs above that of the last target are not the least ones.
     """
-    count, rows, cols = depths.shape
-    total = count * rows * cols
+    total, (_, rows, cols) = depths.size, depths.shape
     best = np.full(total, np.inf)
     before = np.full(total, -1, dtype=np.int64)
-    keys, heap = np.empty(total), np.empty(total, dtype=np.int64)
-    places, size = np.full(total, -1, dtype=np.int64), np.zeros(1, dtype=np.int64)
     flat, shut, near = depths.ravel(), floor.blocked.ravel(), touch.ravel()
+    # doubly linked lists; the first of bucket b has -2 - b ahead of it, -1 is in no bucket
+    after, ahead = np.empty(total, dtype=np.int64), np.full(total, -1, dtype=np.int64)
+    heads = np.full(_BUCKETS + 1, -1, dtype=np.int64)
+    width, met = _WIDTH * floor.step, 0
     for s in range(starts.shape[0]):
-        if costs[s] < best[starts[s]]:
-            best[starts[s]] = costs[s]
-            push_or_lift(keys, heap, places, size, starts[s], costs[s])
-    area = rows * cols
-    while size[0] > 0:
-        node = pop_least(keys, heap, places, size)
-        t, rest = node // area, node % area
-        i, j = rest // cols, rest % cols
-        for move in range(4):
-            if move < 2:
-                sign = 1 - 2 * move
-                ni, nj = i + sign * moves[t, 1], j + sign * moves[t, 0]
-                if ni < 0 or nj < 0 or ni >= rows or nj >= cols:
-                    continue
-                other = t * area + ni * cols + nj
-                price = lengths[t] * floor.step
-                motion = price
-            else:
-                other = ((t + (1 if move == 2 else count - 1)) % count) * area + rest
-                turn = turns[t if move == 2 else (t + count - 1) % count]
-                price, motion = turn * turn_price, turn * arm
-            if shut[other]:
-                continue
-            if near[other] > 0.0 and flat[other] >= flat[node]:
-                price += motion * near[other]
-            if best[node] + price < best[other]:
-                best[other] = best[node] + price
-                before[other] = node
-                push_or_lift(keys, heap, places, size, other, best[other])
+        node = starts[s]
+        if costs[s] < best[node]:
+            if ahead[node] == -1:
+                _link(node, _BUCKETS, heads, after, ahead)
+            best[node] = costs[s]
+    while heads[_BUCKETS] >= 0:
+        base = _deal(best, width, heads, after, ahead)
+        for at in range(_BUCKETS):
+            while met < targets.shape[0] and best[targets[met]] < base + at * width:
+                met += 1
+            if 0 < targets.shape[0] == met:
+                return best, before
+            while heads[at] >= 0:
+                node = heads[at]
+                _unlink(node, heads, after, ahead)
+                row = node // cols
+                t = row // rows
+                i, j = row - t * rows, node - row * cols
+                for move in range(4):
+                    other, way = _beside(t, i, j, move, depths.shape, moves)
+                    if other < 0 or shut[other]:
+                        continue
+                    if move < 2:
+                        price = motion = lengths[way] * floor.step
+                    else:
+                        price, motion = turns[way] * turn_price, turns[way] * arm
+                    if near[other] > 0.0 and flat[other] >= flat[node]:
+                        price += motion * near[other]
+                    cost = best[node] + price
+                    if cost < best[other]:
+                        if ahead[other] != -1:
+                            _unlink(other, heads, after, ahead)
+                        best[other] = cost
+                        before[other] = node
+                        bucket = int(min((cost - base) / width, _BUCKETS))
+                        _link(other, bucket, heads, after, ahead)
     return best, before
 
 
@@ -241,6 +328,7 @@ def nearest_heading(theta: float) -> int:
     return int(np.argmax(np.cos(HEADINGS - theta)))
 
 
+@njit(cache=True, nogil=True)
 def near_poses(floor: Floor, pose: FloatArray, reach: float) -> tuple[IntArray, FloatArray]:
     """Free poses of the lattice near a pose: flat indices and what it costs to get there [m].
 
@@ -249,18 +337,46 @@ def near_poses(floor: Floor, pose: FloatArray, reach: float) -> tuple[IntArray, 
         pose: (3,) x, y [m], theta [rad].
         reach: how many cells away they may be.
     """
-    _, rows, cols = floor.blocked.shape
-    u, v = (float(pose[0]) - floor.x) / floor.step, (float(pose[1]) - floor.y) / floor.step
-    found, costs = [], []
-    turn = np.abs(np.remainder(HEADINGS - pose[2] + math.pi, 2.0 * math.pi) - math.pi)
-    for t in np.flatnonzero(turn < 0.5).tolist():
-        for i in range(max(0, math.ceil(v - reach)), min(rows - 1, math.floor(v + reach)) + 1):
-            for j in range(max(0, math.ceil(u - reach)), min(cols - 1, math.floor(u + reach)) + 1):
+    count, rows, cols = floor.blocked.shape
+    u, v = (pose[0] - floor.x) / floor.step, (pose[1] - floor.y) / floor.step
+    i0, i1 = max(0, math.ceil(v - reach)), min(rows - 1, math.floor(v + reach))
+    j0, j1 = max(0, math.ceil(u - reach)), min(cols - 1, math.floor(u + reach))
+    most = count * max(0, i1 - i0 + 1) * max(0, j1 - j0 + 1)
+    found, costs, n = np.empty(most, dtype=np.int64), np.empty(most), 0
+    for t in range(count):
+        turn = abs((HEADINGS[t] - pose[2] + math.pi) % (2.0 * math.pi) - math.pi)
+        if turn >= 0.5:
+            continue
+        for i in range(i0, i1 + 1):
+            for j in range(j0, j1 + 1):
                 away = math.hypot(i - v, j - u)
                 if away <= reach and not floor.blocked[t, i, j]:
-                    found.append((t * rows + i) * cols + j)
-                    costs.append((away + 0.5 * turn[t]) * floor.step)
-    return np.array(found, dtype=np.int64), np.array(costs)
+                    found[n] = (t * rows + i) * cols + j
+                    costs[n] = (away + 0.5 * turn) * floor.step
+                    n += 1
+    return found[:n], costs[:n]
+
+
+class Arrivals(NamedTuple):
+    """Poses of the lattice from which some places are reached, one place after the other."""
+
+    nodes: IntArray
+    extra: FloatArray
+    """What the rest of the way costs [m]."""
+    ends: IntArray
+    """(N,) where the poses of each place end."""
+
+
+@njit(cache=True, nogil=True)
+def least_costs(costs: FloatArray, arrivals: Arrivals) -> FloatArray:
+    """(N,) cost of getting to each of some places [m], from what `search_poses` returns."""
+    out = np.full(arrivals.ends.shape[0], np.inf)
+    at = 0
+    for n in range(arrivals.ends.shape[0]):
+        while at < arrivals.ends[n]:
+            out[n] = min(out[n], costs[arrivals.nodes[at]] + arrivals.extra[at])
+            at += 1
+    return out
 
 
 def pose_at(floor: Floor, node: int) -> FloatArray:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numba import njit
 
 from pushplan.planners.subtasks.rollout import along_path
 from pushplan.planners.subtasks.scene import Scene
@@ -20,13 +21,35 @@ def axes_of(heading: float) -> tuple[FloatArray, FloatArray]:
     return np.array([c, s]), np.array([-s, c])
 
 
-def behind(scene: Scene, k: int, heading: float, shift: float) -> FloatArray:
-    """(3,) a pose behind object ``k`` from which to push it along a heading."""
-    u, v = axes_of(heading)
-    outline = scene.world.movables.outline_world(k)
-    middle = scene.poses[k, :2]
-    depth = float(((middle - outline) @ u).max()) + scene.front + scene.config.slack * scene.size
-    return np.array([*(middle - depth * u + shift * v), heading])
+def behind(
+    scene: Scene, k: int, heading: float, shift: float, pose: FloatArray | None = None
+) -> FloatArray:
+    """(3,) a pose behind object ``k`` from which to push it along a heading.
+
+    Args:
+        scene: the scene.
+        k: index of the object.
+        heading: [rad].
+        shift: how far the robot's middle is to the left of the object [m].
+        pose: (3,) of the object, if it is not where it is now.
+    """
+    outline = scene.world.movables.outline(k)
+    room = scene.front + scene.config.slack * scene.size
+    return _behind(scene.poses[k] if pose is None else pose, outline, heading, shift, room)
+
+
+@njit(cache=True, nogil=True)
+def _behind(
+    pose: FloatArray, outline: FloatArray, heading: float, shift: float, room: float
+) -> FloatArray:
+    c, s = math.cos(heading), math.sin(heading)
+    cos, sin = math.cos(pose[2]), math.sin(pose[2])
+    depth = -np.inf
+    for i in range(outline.shape[0]):
+        x, y = outline[i, 0], outline[i, 1]
+        depth = max(depth, -((cos * x - sin * y) * c + (sin * x + cos * y) * s))
+    depth += room
+    return np.array([pose[0] - depth * c - shift * s, pose[1] - depth * s + shift * c, heading])
 
 
 def direction_of(path: FloatArray, ahead: float) -> float:

@@ -10,12 +10,14 @@ import numpy as np
 from pushplan.control import clamp_twist
 from pushplan.planners.greedy import GreedyPusher
 from pushplan.planners.subtasks.choose import choose
-from pushplan.planners.subtasks.config import SubTaskConfig, checked_config
+from pushplan.planners.subtasks.config import SubTaskConfig
 from pushplan.planners.subtasks.graph import SubTaskGraph
 from pushplan.planners.subtasks.job import Job, JobEnd
 from pushplan.planners.subtasks.push import Push, signature
+from pushplan.planners.subtasks.recall import Recall
 from pushplan.planners.subtasks.scene import Scene, check_world
 from pushplan.world import InvalidInputError, Twist, World
+from pushplan.world.checks import expect
 
 _SIMPLE = 60.0
 """How long the simple pusher works where nothing is found [circumscribed radii at full speed]."""
@@ -23,6 +25,8 @@ _TRIES = 6
 """How often it does so in vain before what is left is given up."""
 _DEAREST = 3.0
 """What is added to the price of a push that has failed [circumscribed radii]."""
+_ENOUGH = 3
+"""After so many failures a push is not made again before something else has been done."""
 
 
 class GtspMpc:
@@ -49,12 +53,14 @@ class GtspMpc:
             raise InvalidInputError("give either a config or a price, not both")
         if config is None:
             config = SubTaskConfig() if price is None else SubTaskConfig(price=price)
-        self.config = checked_config(config)
+        self.config = expect("config", config, SubTaskConfig)
         self._forget()
 
     def _forget(self) -> None:
         self._job: Job | None = None
+        self._recall = Recall()
         self._penalties: dict[tuple[object, ...], float] = {}
+        self._barred: set[tuple[object, ...]] = set()
         self._failures = 0
         self._escape: list[tuple[float, float]] = []
         self._last_time = math.inf
@@ -79,11 +85,12 @@ class GtspMpc:
         if world.time <= self._last_time != math.inf:
             self._forget()
         self._last_time = world.time
-        scene = Scene(world, self.config)
+        scene = Scene(world, self.config, self._recall)
         left = int((~scene.done).sum())
         if left != self._simple_left:  # something was done, or has come back
             self._simple_left, self._in_vain, self._simple_until = left, 0, -math.inf
             self._stopped_at = None
+            self._barred.clear()
         if not left:
             self._job, self.given_up, self.plan = None, {}, ()
             return Twist(0.0, 0.0)
@@ -103,12 +110,21 @@ class GtspMpc:
             if self._job is None:
                 if chosen is not None:  # one search a step is enough
                     break
-                chosen = choose(scene, self._penalties)
+                self._recall.age()
+                barred = dict.fromkeys(self._barred, math.inf)
+                chosen = choose(scene, self._penalties | barred)
                 self.graph, self.plan = chosen.graph, chosen.plan
                 self.given_up = dict(chosen.graph.infeasible)
                 if chosen.first is None:
                     return None
-                self._job = Job(world, chosen.first.push, chosen.first.route, self.config.period)
+                push = chosen.first.push
+                self._job = Job(
+                    world,
+                    push,
+                    chosen.first.route,
+                    self.config.period,
+                    predictive=self.config.mpc and signature(push) not in self._penalties,
+                )
             command = self._job.command(scene)
             if isinstance(command, Twist):
                 return command
@@ -123,7 +139,9 @@ class GtspMpc:
             return
         if end is not JobEnd.MOOT:  # also what was freed: if that was in vain, another way
             key = signature(job.push)
-            self._penalties[key] = self._penalties.get(key, 0.0) + _DEAREST * scene.size
+            dearer = self._penalties[key] = self._penalties.get(key, 0.0) + _DEAREST * scene.size
+            if dearer > (_ENOUGH - 0.5) * _DEAREST * scene.size:
+                self._barred.add(key)
         if end is JobEnd.STUCK:
             self._failures += 1
             self._escape = _back(scene, self._failures)
@@ -138,6 +156,7 @@ class GtspMpc:
             return Twist(0.0, 0.0)
         if self._in_vain == 0:
             self._penalties.clear()
+            self._barred.clear()
         self._in_vain += 1
         self._simple_until = world.time + _SIMPLE * scene.size / world.robot.max_speed
         return self._simple.act(world)

@@ -10,13 +10,13 @@ import numpy as np
 from pushplan.control import clamp_twist
 from pushplan.geometry import VisibilityGraph
 from pushplan.planners.sequencing import solve_gtsp
-from pushplan.planners.subtasks.config import SubTaskConfig, checked_config
+from pushplan.planners.subtasks.config import SubTaskConfig
 from pushplan.planners.subtasks.drive import LegDriver
 from pushplan.planners.subtasks.places import behind
 from pushplan.planners.subtasks.route import Route
 from pushplan.planners.subtasks.scene import Scene, check_world
 from pushplan.world import ClearanceArea, MaxIterations, Receptacle, Twist, World
-from pushplan.world.checks import FloatArray
+from pushplan.world.checks import FloatArray, expect
 
 _PATIENCE = 5
 """Commands without motion after which the rest of a leg is left out."""
@@ -37,7 +37,7 @@ class Gtsp:
     actions = ("velocity",)
 
     def __init__(self, config: SubTaskConfig | None = None) -> None:
-        self.config = checked_config(config or SubTaskConfig())
+        self.config = expect("config", config or SubTaskConfig(), SubTaskConfig)
         self._forget()
 
     def _forget(self) -> None:

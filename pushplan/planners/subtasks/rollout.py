@@ -59,10 +59,30 @@ def task_of(goal: Goal, static: StaticMap, slack: float) -> Task:
 
 
 @njit(cache=True, nogil=True)
+def _may_be_done(x: float, y: float, task: Task) -> bool:
+    """Whether an object with its middle at (x, y) could be where it belongs."""
+    if task.delivers:
+        for e in range(task.edges.shape[0]):
+            if task.edges[e, 0] * x + task.edges[e, 1] * y > task.edges[e, 2]:
+                return False
+        return True
+    count = task.polygon.shape[0]
+    for i in range(count):
+        j = i + 1 if i + 1 < count else 0
+        ax, ay = task.polygon[i, 0], task.polygon[i, 1]
+        ex, ey = task.polygon[j, 0] - ax, task.polygon[j, 1] - ay
+        if ex * (y - ay) - ey * (x - ax) < 0.0:
+            return True
+    return False
+
+
+@njit(cache=True, nogil=True)
 def is_done(k: int, poses: FloatArray, bodies: Bodies, task: Task) -> bool:
     """Whether object ``k`` is where it belongs."""
     if poses[k, 0] >= 0.5 * GONE:
         return True
+    if not _may_be_done(poses[k, 0], poses[k, 1], task):
+        return False
     a, b = bodies.offsets[k], bodies.offsets[k + 1]
     outline = np.empty((b - a, 2))
     place(poses[k], bodies.vertices[a:b], outline)
@@ -178,6 +198,60 @@ def guide(
     return law.step, min(max(wanted, -law.turn), law.turn), at, holds
 
 
+class Log(NamedTuple):
+    """What a run of a push is written into."""
+
+    track: FloatArray
+    """(T, 3) the robot's poses."""
+    steps: FloatArray
+    """(EVENTS,) how many poses each stage has."""
+    poses: FloatArray
+    """(EVENTS, K, 3) the objects' poses at the end of each stage."""
+    lengths: FloatArray
+    """(EVENTS, K) their path lengths [m]."""
+    box: FloatArray
+    """(4,) x_min, y_min, x_max, y_max of all that moved, and of its surroundings [m]."""
+
+
+@njit(cache=True, nogil=True)
+def _enclose(box: FloatArray, pose: FloatArray, reach: float) -> None:
+    """Make a box big enough for a disc."""
+    box[0], box[1] = min(box[0], pose[0] - reach), min(box[1], pose[1] - reach)
+    box[2], box[3] = max(box[2], pose[0] + reach), max(box[3], pose[1] + reach)
+
+
+@njit(cache=True, nogil=True)
+def _write(log: Log, stages: int, used: int, poses: FloatArray, lengths: FloatArray) -> int:
+    """Write a stage down; returns how many there are then."""
+    log.steps[stages] = used
+    log.poses[stages] = poses
+    log.lengths[stages] = lengths
+    return stages + 1
+
+
+@njit(cache=True, nogil=True)
+def _take_stock(
+    poses: FloatArray,
+    saved: FloatArray,
+    done: BoolArray,
+    bodies: Bodies,
+    task: Task,
+    box: FloatArray,
+    room: float,
+) -> bool:
+    """After a step: take away what is delivered; returns whether one more object is done."""
+    news = False
+    for k in range(poses.shape[0]):
+        if poses[k, 0] != saved[k, 0] or poses[k, 1] != saved[k, 1]:
+            _enclose(box, poses[k], bodies.radii[k] + room)
+            was = done[k]
+            done[k] = is_done(k, poses, bodies, task)
+            news = news or (done[k] and not was)
+            if done[k] and task.delivers:
+                poses[k, 0] = GONE * (1.0 + k)
+    return news
+
+
 @njit(cache=True, nogil=True)
 def roll_out(
     start: FloatArray,
@@ -191,10 +265,7 @@ def roll_out(
     bodies: Bodies,
     settings: Settings,
     task: Task,
-    track: FloatArray,
-    stage_steps: FloatArray,
-    stage_poses: FloatArray,
-    stage_lengths: FloatArray,
+    log: Log,
 ) -> tuple[int, int, int]:
     """Run a push until nothing that is wanted can come of it any more.
 
@@ -209,25 +280,24 @@ def roll_out(
         law: parameters.
         bodies, settings: of the interaction model.
         task: when objects are done.
-        track: (T, 3) receives the robot's poses.
-        stage_steps: (EVENTS,) receives how many poses each stage has.
-        stage_poses: (EVENTS, K, 3) receives the objects' poses at the end of each stage.
-        stage_lengths: (EVENTS, K) receives their path lengths [m].
+        log: receives what happens.
 
     Returns:
         How many stages and poses there are, and how it ended: 0 as wanted, 1 at the limit, 2
         jammed, 3 lost. A stage ends where one more object is done; a last stage that ends
         otherwise is kept too.
     """
-    count = first.shape[0]
     scratch = make_scratch(bodies)
-    poses, lengths = first.copy(), np.zeros(count)
+    poses, lengths = first.copy(), np.zeros(first.shape[0])
+    saved = np.empty_like(poses)
     done = all_done(poses, bodies, task)
     here, there = start.copy(), np.empty(3)
-    track[0] = here
+    log.track[0] = here
+    room = 2.0 * law.step
+    log.box[0], log.box[1], log.box[2], log.box[3] = np.inf, np.inf, -np.inf, -np.inf
+    _enclose(log.box, here, bodies.robot_radius + room)
     stages, used, travelled, reached, end = 0, 1, 0.0, 0.0, 1
-    longest = track.shape[0]
-    while used < longest and travelled < limit:
+    while used < log.track.shape[0] and travelled < limit:
         ds, turn = law.step, 0.0
         if led >= 0:
             ds, turn, reached, holds = guide(here, poses[led], path, reached, shift, law)
@@ -237,38 +307,23 @@ def roll_out(
         there[0] = here[0] + ds * math.cos(here[2] + 0.5 * turn)
         there[1] = here[1] + ds * math.sin(here[2] + 0.5 * turn)
         there[2] = here[2] + turn
-        if robot_held(there, bodies, settings, scratch):
-            end = 2
-            break
-        saved = poses.copy()
-        if not advance(here, there, poses, lengths, bodies, settings, scratch):
+        saved[:] = poses
+        if robot_held(there, bodies, settings, scratch) or not advance(
+            here, there, poses, lengths, bodies, settings, scratch
+        ):
             end = 2
             break
         here[:] = there
-        track[used] = here
+        log.track[used] = here
         used += 1
         travelled += ds
-        news = False
-        missing = False
-        for k in range(count):
-            if poses[k, 0] != saved[k, 0] or poses[k, 1] != saved[k, 1]:
-                was = done[k]
-                done[k] = is_done(k, poses, bodies, task)
-                news = news or (done[k] and not was)
-                if done[k] and task.delivers:
-                    poses[k, 0] = GONE * (1.0 + k)
-            missing = missing or (wanted[k] and not done[k])
+        _enclose(log.box, here, bodies.robot_radius + room)
+        news = _take_stock(poses, saved, done, bodies, task, log.box, room)
         if news and stages < EVENTS - 1:
-            stage_steps[stages] = used
-            stage_poses[stages] = poses
-            stage_lengths[stages] = lengths
-            stages += 1
-        if not missing:
+            stages = _write(log, stages, used, poses, lengths)
+        if not (wanted & ~done).any():
             end = 0
             break
-    if stages == 0 or stage_steps[stages - 1] != used:
-        stage_steps[stages] = used
-        stage_poses[stages] = poses
-        stage_lengths[stages] = lengths
-        stages += 1
+    if stages == 0 or log.steps[stages - 1] != used:
+        stages = _write(log, stages, used, poses, lengths)
     return stages, used, end

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
@@ -21,7 +22,7 @@ from pushplan.planners.kinodynamic.collision import (
 from pushplan.planners.subtasks import lattice
 from pushplan.planners.subtasks.graph import Approach, arrival_poses
 from pushplan.planners.subtasks.scene import LED, Scene
-from pushplan.world.checks import ArrayRecord, FloatArray
+from pushplan.world.checks import ArrayRecord, FloatArray, IntArray
 
 _MOST = 14
 """Points of the lattice's way that a route may bend at."""
@@ -78,49 +79,104 @@ def _depth(
     return total, touch
 
 
+class _Driving(NamedTuple):
+    """What motions are priced from."""
+
+    step: float
+    """Distance of the poses that are looked at [m]."""
+    turn_price: float
+    arm: float
+    shape: Footprint
+    tight: Footprint
+    among: Obstacles
+    poses: FloatArray
+    bodies: Bodies
+    weights: FloatArray
+
+
 @njit(cache=True, nogil=True)
-def _motion(
-    here: FloatArray,
-    there: FloatArray,
-    step: float,
-    turn_price: float,
-    shape: Footprint,
-    tight: Footprint,
-    among: Obstacles,
-    poses: FloatArray,
-    bodies: Bodies,
-    weights: FloatArray,
-    arm: float,
-) -> float:
+def _motion(here: FloatArray, there: FloatArray, by: _Driving) -> float:
     """Price of a straight motion between two poses, or of a turn on the spot; inf at a wall."""
-    body = np.empty_like(shape.vertices)
-    scratch = np.empty_like(tight.vertices)
+    body = np.empty_like(by.shape.vertices)
+    scratch = np.empty_like(by.tight.vertices)
     length = math.hypot(there[0] - here[0], there[1] - here[1])
     turn = there[2] - here[2]
     turn -= 2.0 * math.pi * np.round(turn / (2.0 * math.pi))
-    steps = max(1, math.ceil((length + abs(turn) * shape.radius) / step))
+    steps = max(1, math.ceil((length + abs(turn) * by.shape.radius) / by.step))
     pose = here.copy()
-    depth, _ = _depth(pose, shape, poses, bodies, weights, body)
-    was_free = is_free(pose, tight, among, scratch)
-    motion = (length + arm * abs(turn)) / steps
-    price = length + turn_price * abs(turn)
+    depth, _ = _depth(pose, by.shape, by.poses, by.bodies, by.weights, body)
+    was_free = is_free(pose, by.tight, by.among, scratch)
+    motion = (length + by.arm * abs(turn)) / steps
+    price = length + by.turn_price * abs(turn)
     for n in range(1, steps + 1):
         part = n / steps
         pose[0] = here[0] + part * (there[0] - here[0])
         pose[1] = here[1] + part * (there[1] - here[1])
         pose[2] = here[2] + part * turn
-        if is_free(pose, tight, among, scratch):
+        if is_free(pose, by.tight, by.among, scratch):
             was_free = True
         elif was_free:
             return np.inf
         else:
-            price += TIGHT * (length + shape.radius * abs(turn)) / steps
-        now, touch = _depth(pose, shape, poses, bodies, weights, body)
+            price += TIGHT * (length + by.shape.radius * abs(turn)) / steps
+        now, touch = _depth(pose, by.shape, by.poses, by.bodies, by.weights, body)
         if touch > 0.0 and now >= depth:
             price += motion * touch
         depth = now
     total: float = price
     return total
+
+
+@njit(cache=True, nogil=True)
+def _leg(
+    x: float, y: float, heading: float, point: FloatArray, sign: float, by: _Driving
+) -> tuple[float, float]:
+    """Price of turning to a point (2,) and driving there, and the heading then."""
+    dx, dy = point[0] - x, point[1] - y
+    if math.hypot(dx, dy) < 1e-9:
+        return 0.0, heading
+    way = math.atan2(sign * dy, sign * dx)
+    turned = np.array([x, y, way])
+    price = _motion(np.array([x, y, heading]), turned, by)
+    if price < np.inf:
+        price += _motion(turned, np.array([point[0], point[1], way]), by)
+    return price, way
+
+
+@njit(cache=True, nogil=True)
+def _cheapest(
+    points: FloatArray, heading: float, end: float, by: _Driving
+) -> tuple[float, IntArray, FloatArray]:
+    """The cheapest way over some points to the last one, and a turn to a heading there.
+
+    Args:
+        points: (N, 2), the first is where the robot is.
+        heading: of the robot there [rad].
+        end: heading to turn to at the last [rad].
+        by: what motions are priced from.
+
+    Returns:
+        The price, and for each point the one before it, and whether it is got to ahead (1) or
+        back (-1).
+    """
+    count = points.shape[0]
+    best, came = np.full(count, np.inf), np.full(count, -1, dtype=np.int64)
+    signs, headings = np.ones(count), np.full(count, heading)
+    best[0] = 0.0
+    for j in range(1, count):
+        for i in range(j):
+            away = math.hypot(points[i, 0] - points[j, 0], points[i, 1] - points[j, 1])
+            for sign in (1.0, -1.0):
+                if best[i] + away >= best[j]:
+                    continue
+                price, way = _leg(points[i, 0], points[i, 1], headings[i], points[j], sign, by)
+                price += best[i]
+                if j == count - 1 and price < best[j]:
+                    there = np.array([points[j, 0], points[j, 1], way])
+                    price += _motion(there, np.array([points[j, 0], points[j, 1], end]), by)
+                if price < best[j]:
+                    best[j], came[j], signs[j], headings[j] = price, i, sign, way
+    return best[-1], came, signs
 
 
 class Router:
@@ -134,37 +190,6 @@ class Router:
         self._tight = footprint(robot, 0.5 * margin)
         self._among = obstacles(scene.world.static)
         self._weights = scene.nuisance
-
-    def motion(self, here: FloatArray, there: FloatArray) -> float:
-        """Price of a straight motion or a turn on the spot [m]; inf where a wall is hit."""
-        scene = self.scene
-        return float(
-            _motion(
-                here,
-                there,
-                0.1 * scene.size,
-                scene.config.turn_price * scene.size,
-                self._shape,
-                self._tight,
-                self._among,
-                scene.poses,
-                scene.bodies,
-                self._weights,
-                lattice.ARM * scene.size,
-            )
-        )
-
-    def leg(self, here: FloatArray, point: FloatArray, sign: float) -> tuple[float, float]:
-        """Price of turning to a point (2,) and driving there, and the heading then."""
-        dx, dy = point[0] - here[0], point[1] - here[1]
-        if math.hypot(dx, dy) < 1e-9:
-            return 0.0, float(here[2])
-        heading = math.atan2(sign * dy, sign * dx)
-        turned = np.array([here[0], here[1], heading])
-        price = self.motion(here, turned)
-        if math.isinf(price):
-            return price, heading
-        return price + self.motion(turned, np.array([point[0], point[1], heading])), heading
 
     def route(self, approach: Approach, start: FloatArray, led: int = -1) -> Route | None:
         """The way from the robot to the start (3,) of a push; None if there is none.
@@ -216,39 +241,31 @@ class Router:
 
     def _shortened(self, points: list[FloatArray], here: FloatArray, end: float) -> Route | None:
         """The cheapest way over some of the points to the last, and a turn to a heading there."""
-        count = len(points)
-        best = [math.inf] * count
-        came: list[tuple[int, float]] = [(-1, 1.0)] * count
-        headings = [float(here[2])] * count
-        best[0] = 0.0
-        for j in range(1, count):
-            for i in range(j):
-                if math.isinf(best[i]):
-                    continue
-                pose = np.array([*points[i], headings[i]])
-                for sign in (1.0, -1.0):
-                    if best[i] + math.dist(points[i], points[j]) >= best[j]:
-                        continue
-                    price, heading = self.leg(pose, points[j], sign)
-                    price += best[i]
-                    if j == count - 1:
-                        there = np.array([*points[j], heading])
-                        price += self.motion(there, np.array([*points[j], end]))
-                    if price < best[j]:
-                        best[j], came[j], headings[j] = price, (i, sign), heading
-        if math.isinf(best[-1]):
-            return None
-        legs, j = [], count - 1
-        while j > 0:
-            legs.append((points[j], came[j][1]))
-            j = came[j][0]
-        legs.reverse()
-        return Route(
-            np.array([point for point, _ in legs]),
-            np.array([sign for _, sign in legs]),
+        scene = self.scene
+        bends = np.array(points)
+        price, came, signs = _cheapest(
+            bends,
+            float(here[2]),
             end,
-            best[-1],
+            _Driving(
+                0.1 * scene.size,
+                scene.config.turn_price * scene.size,
+                lattice.ARM * scene.size,
+                self._shape,
+                self._tight,
+                self._among,
+                scene.poses,
+                scene.bodies,
+                self._weights,
+            ),
         )
+        if math.isinf(price):
+            return None
+        chain = [len(points) - 1]
+        while came[chain[-1]] > 0:
+            chain.append(int(came[chain[-1]]))
+        chain.reverse()
+        return Route(bends[chain], signs[chain], end, price)
 
     def _plain(self, points: list[FloatArray], end: float) -> Route:
         """The lattice's own way, ahead or back as the robot stands."""

@@ -9,7 +9,8 @@ import numpy as np
 
 from pushplan.interaction.kernels import sweep_path
 from pushplan.planners.subtasks.push import Push
-from pushplan.planners.subtasks.rollout import EVENTS, all_done, roll_out
+from pushplan.planners.subtasks.recall import Run
+from pushplan.planners.subtasks.rollout import EVENTS, Log, all_done, roll_out
 from pushplan.planners.subtasks.scene import Scene
 from pushplan.world.checks import BoolArray, FloatArray
 
@@ -23,10 +24,13 @@ class Runner:
         sides = scene.world.static.bounds[2:] - scene.world.static.bounds[:2]
         self.longest = 2.0 * float(sides.sum())
         steps = int(self.longest / scene.law.step) + 2
-        self._track = np.empty((steps, 3))
-        self._steps = np.zeros(EVENTS)
-        self._poses = np.zeros((EVENTS, count, 3))
-        self._lengths = np.zeros((EVENTS, count))
+        self._log = Log(
+            np.empty((steps, 3)),
+            np.zeros(EVENTS),
+            np.zeros((EVENTS, count, 3)),
+            np.zeros((EVENTS, count)),
+            np.zeros(4),
+        )
         self._none = np.zeros((0, 2))
         self.left = np.flatnonzero(~scene.done)
 
@@ -58,59 +62,112 @@ class Runner:
             poses: (K, 3) where the objects are when the push begins; where they are now by default.
             spent: (K,) path lengths that getting there has cost them [m].
         """
-        scene, world = self.scene, self.scene.world
+        scene = self.scene
         flags = np.zeros(len(scene.poses), dtype=np.bool_)
         flags[list(wanted) or [led]] = True
-        stages, _, _ = roll_out(
-            start,
-            scene.poses if poses is None else poses,
-            -1 if path is None else led,
-            self._none if path is None else path,
+        way = self._none if path is None else path
+        limit = self.longest if limit is None else limit
+        run = self._run(
+            start, led, way, shift, limit, flags, gain, scene.poses if poses is None else poses
+        )
+        found = []
+        for s in range(len(run.steps)):
+            if frees and s < len(run.steps) - 1:
+                continue
+            push = self._stage(run, s, led, way, shift, gain, frees, spent)
+            if push is not None:
+                found.append(push)
+        return found
+
+    def _run(
+        self,
+        start: FloatArray,
+        led: int,
+        path: FloatArray,
+        shift: float,
+        limit: float,
+        wanted: BoolArray,
+        gain: float,
+        poses: FloatArray,
+    ) -> Run:
+        """Run a push, unless it is known what comes of it. Arguments as in `roll_out`."""
+        scene, log = self.scene, self._log
+        movables, recall = scene.world.movables, scene.recall
+        key = (
+            start.tobytes(),
+            int(movables.ids[led]),
+            path.tobytes(),
             shift,
-            self.longest if limit is None else limit,
-            flags,
+            limit,
+            gain,
+            movables.ids[wanted].tobytes(),
+        )
+        if poses is not scene.poses or (wanted & scene.done).any():
+            recall = None
+        known = None if recall is None else recall.find(key, movables, poses)
+        if known is not None:
+            return known
+        stages, used, _ = roll_out(
+            start,
+            poses,
+            led if len(path) else -1,
+            path,
+            shift,
+            limit,
+            wanted,
             scene.law._replace(gain=gain),
             scene.bodies,
             scene.settings,
             scene.task,
-            self._track,
-            self._steps,
-            self._poses,
-            self._lengths,
+            log,
         )
-        found = []
-        ids = world.movables.ids
-        for s in range(stages):
-            last = s == stages - 1
-            if frees and not last:
-                continue
-            after = self._poses[s]
-            done = all_done(after, scene.bodies, scene.task)
-            covers = np.flatnonzero(done & ~scene.done)
-            if (scene.done & ~done).any():
-                continue  # something came back
-            if not frees and (not len(covers) or (led not in covers and path is not None)):
-                continue
-            track = self._track[: int(self._steps[s])].copy()
-            length = (len(track) - 1) * scene.law.step
-            lengths = self._lengths[s] + (0.0 if spent is None else spent)
-            found.append(
-                Push(
-                    covers=tuple(ids[covers].tolist()),
-                    led=int(ids[led]),
-                    guided=path is not None,
-                    poses=track,
-                    length=length,
-                    work=float(world.movables.masses @ lengths),
-                    price=length + self._effort(after, lengths, done),
-                    object_poses=after.copy(),
-                    box_path=self._none if path is None else path,
-                    shift=shift,
-                    gain=gain,
-                    frees=frees,
-                )
-            )
-        return found
+        run = Run(
+            log.track[:used].copy(),
+            log.steps[:stages].astype(np.int64),
+            log.poses[:stages].copy(),
+            log.lengths[:stages].copy(),
+        )
+        if recall is not None:
+            recall.keep(key, movables, poses, run, log.box)
+        return run
+
+    def _stage(
+        self,
+        run: Run,
+        s: int,
+        led: int,
+        path: FloatArray,
+        shift: float,
+        gain: float,
+        frees: bool,
+        spent: FloatArray | None,
+    ) -> Push | None:
+        """The push up to stage ``s`` of a run; None where nothing is won by it."""
+        scene, movables = self.scene, self.scene.world.movables
+        after, lengths = run.poses[s], run.lengths[s]
+        done = all_done(after, scene.bodies, scene.task)
+        covers = np.flatnonzero(done & ~scene.done)
+        if (scene.done & ~done).any():
+            return None  # something came back
+        if not frees and (not len(covers) or (len(path) and led not in covers)):
+            return None
+        track = run.track[: int(run.steps[s])]
+        length = (len(track) - 1) * scene.law.step
+        lengths = lengths + (0.0 if spent is None else spent)
+        return Push(
+            covers=tuple(movables.ids[covers].tolist()),
+            led=int(movables.ids[led]),
+            guided=len(path) > 0,
+            poses=track,
+            length=length,
+            work=float(movables.masses @ lengths),
+            price=length + self._effort(after, lengths, done),
+            object_poses=after,
+            box_path=path,
+            shift=shift,
+            gain=gain,
+            frees=frees,
+        )
 
     def swing(
         self,
@@ -197,7 +254,7 @@ class Runner:
         price = float(scene.weights @ lengths)
         moved = np.flatnonzero((lengths > 1e-9) & ~done)
         if len(moved):
-            now, then = scene.remaining_now[moved], scene.remaining(poses)[moved]
+            now, then = scene.remaining_now[moved], scene.remaining(poses[moved])
             known = np.isfinite(now) & np.isfinite(then)
             change = np.full(len(moved), self.longest)
             change[known] = then[known] - now[known]

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-import shapely
 
-from pushplan.geometry import convex_penetration, goal_distances
+from pushplan.geometry import convex_penetration
 from pushplan.interaction import QuasiStatic
 from pushplan.interaction.kernels import Bodies, Settings
 from pushplan.planners.kinodynamic.collision import (
@@ -29,14 +29,32 @@ from pushplan.planners.subtasks.lattice import (
     contact_depths,
     floor_of,
 )
+from pushplan.planners.subtasks.recall import Recall
 from pushplan.planners.subtasks.rollout import Law, Task, all_done, task_of
-from pushplan.world import ClearanceArea, Drive, InvalidInputError, Receptacle, World
+from pushplan.planners.subtasks.ways import Ways, ways_of
+from pushplan.world import (
+    ClearanceArea,
+    Drive,
+    InvalidInputError,
+    Receptacle,
+    RobotModel,
+    StaticMap,
+    World,
+)
 from pushplan.world.checks import BoolArray, FloatArray, IntArray
 
 STEP = 0.12
 """Longest step between two commands of a push [circumscribed radii]."""
 LED = 5.0
 """What is added to the price of carrying along an object that is to be pushed afterwards."""
+
+
+@functools.lru_cache(maxsize=8)
+def _fit_of(
+    robot: RobotModel, static: StaticMap, margin: float
+) -> tuple[Footprint, Obstacles, FloatArray]:
+    shape = footprint(robot, margin)
+    return shape, obstacles(static), np.empty_like(shape.vertices)
 
 
 def check_world(world: World) -> None:
@@ -93,10 +111,12 @@ class Scene:
     Args:
         world: the snapshot; its goal is one for the objects.
         config: settings.
+        recall: what is known from the last scene.
     """
 
     world: World
     config: SubTaskConfig
+    recall: Recall | None = None
 
     def __post_init__(self) -> None:
         check_world(self.world)
@@ -209,71 +229,41 @@ class Scene:
 
     def remaining(self, poses: FloatArray) -> FloatArray:
         """(K,) shortest way [m] of each object's middle to the goal from poses (K, 3)."""
-        distances = goal_distances(self.world.static, self.world.goal)
-        out = np.zeros(len(poses))
-        for k, pose in enumerate(poses):
-            if pose[0] < 1e6:
-                out[k] = distances.path_from(pose[:2]).length
-        return out
+        return np.array([self.ways.length(x, y) if x < 1e6 else 0.0 for x, y, _ in poses.tolist()])
 
     @cached_property
     def remaining_now(self) -> FloatArray:
         """(K,) `remaining` now."""
         return self.remaining(self.poses)
 
-    def box_path(self, k: int, clearance: float, deep: bool = False) -> FloatArray | None:
+    @cached_property
+    def ways(self) -> Ways:
+        """Of the objects to their goal."""
+        return ways_of(self.world.static, self.world.goal)
+
+    def box_path(
+        self, k: int, clearance: float, deep: bool = False, pose: FloatArray | None = None
+    ) -> FloatArray | None:
         """(M, 2) way of object ``k`` to where it is done, and on; None if there is none.
 
         Args:
             k: index of the object.
             clearance: distance that its middle keeps from what is static [m].
             deep: to the middle of a receptacle instead of its nearest place.
+            pose: (3,) where it is instead of where it is now.
         """
-        radius = float(self.world.movables.radii[k])
-        goal = self.world.goal
-        assert isinstance(goal, Receptacle | ClearanceArea)
-        goals = self._places(round(radius, 9))
-        middle = goal.polygon.mean(axis=0)
-        if isinstance(goal, Receptacle) and (deep or goals is None):
-            goals = [np.stack([middle, middle])]
-        if goals is None:
-            return None
-        path = goal_distances(self.world.static, goals, clearance=clearance).path_from(
-            self.poses[k, :2]
-        )
-        if not math.isfinite(path.length):
-            return None
-        points = path.points
-        if isinstance(goal, Receptacle):  # on to its far side, where it may be pushed if need be
-            last = points[-1]
-            points = np.concatenate([points, (middle + 0.6 * (middle - last))[None]])
-        steps = np.hypot(*np.diff(points, axis=0).T)
-        points = points[np.concatenate([[True], steps > 1e-6 * radius])]
-        return np.ascontiguousarray(points) if len(points) > 1 else None
-
-    def _places(self, radius: float) -> list[FloatArray] | None:
-        """Where the middle of an object is when it is done: convex polygons and segments."""
-        goal = self.world.goal
-        if isinstance(goal, Receptacle):
-            inner = shapely.Polygon(goal.polygon).buffer(-1.05 * radius, join_style="mitre")
-            if inner.is_empty or inner.area <= 0.0:
-                return None
-            return [np.asarray(inner.exterior.coords)[:-1]]
-        assert isinstance(goal, ClearanceArea)
-        ends = np.stack([goal.polygon, np.roll(goal.polygon, -1, axis=0)], axis=1)
-        along = ends[:, 1] - ends[:, 0]
-        outward = np.stack([along[:, 1], -along[:, 0]], axis=1)
-        outward *= 1.1 * radius / np.hypot(along[:, 0], along[:, 1])[:, None]
-        return list((ends + outward[:, None])[goal.open_edges])
+        point = (self.poses[k] if pose is None else pose)[:2]
+        return self.ways.path(point, float(self.world.movables.radii[k]), clearance, deep)
 
     @cached_property
-    def _fit(self) -> tuple[Footprint, Obstacles, FloatArray]:
-        shape = footprint(self.world.robot, 0.3 * self.config.margin * self.size)
-        return shape, obstacles(self.world.static), np.empty_like(shape.vertices)
+    def fit(self) -> tuple[Footprint, Obstacles, FloatArray]:
+        """Footprint, obstacles and memory for `is_free`."""
+        margin = 0.3 * self.config.margin * self.size
+        return _fit_of(self.world.robot, self.world.static, margin)
 
     def fits(self, pose: FloatArray) -> bool:
         """Whether the robot fits at a pose (3,) among what is static."""
-        shape, among, scratch = self._fit
+        shape, among, scratch = self.fit
         return bool(is_free(pose, shape, among, scratch))
 
     def is_clear(self, pose: FloatArray) -> bool:

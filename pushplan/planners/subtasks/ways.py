@@ -1,0 +1,105 @@
+"""`Ways`: the shortest ways of objects to their goal on one map, worked out once."""
+
+from __future__ import annotations
+
+import functools
+import math
+
+import numpy as np
+import shapely
+
+from pushplan.geometry import GoalDistances, goal_distances
+from pushplan.world import ClearanceArea, Goal, Receptacle, StaticMap
+from pushplan.world.checks import FloatArray
+
+_MOST = 20_000
+"""How many lengths and paths are kept."""
+
+
+class Ways:
+    """Ways on one map to one goal for objects.
+
+    Args:
+        static: walls and columns.
+        goal: the goal of the objects.
+    """
+
+    def __init__(self, static: StaticMap, goal: Goal) -> None:
+        assert isinstance(goal, Receptacle | ClearanceArea)
+        self._static, self._goal = static, goal
+        self._plain = goal_distances(static, goal)
+        self._lengths: dict[tuple[float, float], float] = {}
+        self._paths: dict[object, FloatArray | None] = {}
+        self._distances: dict[tuple[float, float, bool], GoalDistances | None] = {}
+
+    def length(self, x: float, y: float) -> float:
+        """Shortest way of a point to the goal [m]; inf if there is none."""
+        length = self._lengths.get((x, y))
+        if length is None:
+            if len(self._lengths) >= _MOST:
+                self._lengths.clear()
+            length = self._lengths[x, y] = self._plain.path_from((x, y)).length
+        return length
+
+    def path(
+        self, point: FloatArray, radius: float, clearance: float, deep: bool = False
+    ) -> FloatArray | None:
+        """(M, 2) way of an object to where it is done, and on; None if there is none.
+
+        Args:
+            point: (2,) where its middle is [m].
+            radius: of the object [m].
+            clearance: distance that its middle keeps from what is static [m].
+            deep: to the middle of a receptacle instead of its nearest place.
+        """
+        key = (round(radius, 9), clearance, deep)
+        asked = (*point.tolist(), *key)
+        if asked not in self._paths:
+            if len(self._paths) >= _MOST:
+                self._paths.clear()
+            self._paths[asked] = self._path(point, key)
+        return self._paths[asked]
+
+    def _path(self, point: FloatArray, key: tuple[float, float, bool]) -> FloatArray | None:
+        if key not in self._distances:
+            self._distances[key] = self._towards(*key)
+        distances = self._distances[key]
+        if distances is None:
+            return None
+        path = distances.path_from(point)
+        if not math.isfinite(path.length):
+            return None
+        points = path.points
+        if isinstance(self._goal, Receptacle):  # on to its far side, where it may be pushed
+            middle, last = self._goal.polygon.mean(axis=0), points[-1]
+            points = np.concatenate([points, (middle + 0.6 * (middle - last))[None]])
+        steps = np.hypot(*np.diff(points, axis=0).T)
+        points = points[np.concatenate([[True], steps > 1e-6 * key[0]])]
+        return np.ascontiguousarray(points) if len(points) > 1 else None
+
+    def _towards(self, radius: float, clearance: float, deep: bool) -> GoalDistances | None:
+        goals = self._places(radius)
+        if isinstance(self._goal, Receptacle) and (deep or goals is None):
+            middle = self._goal.polygon.mean(axis=0)
+            goals = [np.stack([middle, middle])]
+        return None if goals is None else goal_distances(self._static, goals, clearance=clearance)
+
+    def _places(self, radius: float) -> list[FloatArray] | None:
+        """Where the middle of an object is when it is done: convex polygons and segments."""
+        goal = self._goal
+        if isinstance(goal, Receptacle):
+            inner = shapely.Polygon(goal.polygon).buffer(-1.05 * radius, join_style="mitre")
+            if inner.is_empty or inner.area <= 0.0:
+                return None
+            return [np.asarray(inner.exterior.coords)[:-1]]
+        ends = np.stack([goal.polygon, np.roll(goal.polygon, -1, axis=0)], axis=1)
+        along = ends[:, 1] - ends[:, 0]
+        outward = np.stack([along[:, 1], -along[:, 0]], axis=1)
+        outward *= 1.1 * radius / np.hypot(along[:, 0], along[:, 1])[:, None]
+        return list((ends + outward[:, None])[goal.open_edges])
+
+
+@functools.lru_cache(maxsize=8)
+def ways_of(static: StaticMap, goal: Goal) -> Ways:
+    """The ways on a map; kept for the maps used last."""
+    return Ways(static, goal)
