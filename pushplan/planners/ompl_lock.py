@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import atexit
 import contextlib
 import functools
 import threading
@@ -21,6 +22,9 @@ def own_state(kind: type[base.StateSpace], *arguments: int) -> Any:
     Its Python binding cannot free states (2.0.1), so one for each call would be lost.
     """
     return kind(*arguments).allocState()
+
+
+atexit.register(own_state.cache_clear)  # else the binding complains about what is left
 
 
 @contextlib.contextmanager
