@@ -159,9 +159,12 @@ def markdown(path: Path, cells: list[Cell]) -> str:
 
 
 def shown(kind: str, source: str) -> str:
-    """How the page shows the source of a cell: headings one level down, links from where it is."""
+    """How the page shows the source of a cell: headings one level down, links from where it is.
+
+    The semicolon that keeps Jupyter from showing a value is left out.
+    """
     if kind == "code":
-        return f"```python\n{source}\n```"
+        return f"```python\n{source.removesuffix(';')}\n```"
     return re.sub(r"^#", "##", source, flags=re.MULTILINE).replace("](../docs/", "](")
 
 

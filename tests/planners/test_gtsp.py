@@ -19,6 +19,8 @@ from pushplan.planners.sequencing import (
     solve_gtsp,
     warm_up_solver,
 )
+from pushplan.planners.sequencing.kernels import SPARE, push_values
+from pushplan.planners.sequencing.layers import build, close_gap, keep, link_in, make_layers, undo
 from pushplan.planners.sequencing.segment_swap import improve_by_swaps
 from pushplan.world import Cancellation, Deadline, InvalidInputError, MaxIterations
 
@@ -248,6 +250,44 @@ def test_segment_swaps_keep_the_tour_and_count_what_they_save() -> None:
         gain = improve_by_swaps(costs, np.ascontiguousarray(near), order, nodes, symmetric, 1e-12)
         assert sorted(order) == list(range(count)) and (order == nodes).all()
         assert costs[order, np.roll(order, -1)].sum() == pytest.approx(before - gain)
+
+
+def test_push_values_is_a_minimum_over_nodes() -> None:
+    rng = np.random.default_rng(0)
+    for _ in range(100):
+        n_at, n_to = (int(n) for n in rng.integers(1, 12, 2))
+        at, to = (int(n) for n in rng.integers(0, 9, 2))
+        costs = np.full((20, 20 + SPARE), np.nan)
+        costs[:, :20] = rng.normal(size=(20, 20))
+        values, out = rng.normal(size=(3, n_at)), np.empty(n_to + SPARE)
+        push_values(costs, values, 1, at, n_at, to, n_to, out)
+        expected = (values[1][:, None] + costs[at : at + n_at, to : to + n_to]).min(axis=0)
+        np.testing.assert_array_equal(out[:n_to], expected)
+
+
+def test_changes_of_a_tour_cost_what_building_it_anew_says() -> None:
+    """Clusters taken out and put back at random, then all of it undone."""
+    rng = np.random.default_rng(0)
+    for now in range(200):
+        offsets = np.concatenate(([0], np.cumsum([1, *rng.integers(1, 6, 8)])))
+        count = int(offsets[-1])
+        costs = np.zeros((count, count + SPARE))
+        costs[:, :count] = rng.random((count, count))
+        reverse = np.zeros_like(costs)
+        reverse[:, :count] = costs[:, :count].T
+        order, memory = np.arange(9), make_layers(costs, reverse, offsets, 0)
+        before = build(memory, order, 0)
+        cost, c = before, int(rng.integers(1, 9))
+        keep(memory, c, now)
+        cost += close_gap(memory, memory.before[c], memory.after[c], memory.carry[c], 0, now, 1e-12)
+        behind = int(rng.choice(np.delete(order, c)))
+        cost += link_in(memory, c, behind, 0, now, 1e-12)
+        changed = np.delete(order, c)
+        changed = np.insert(changed, int(np.flatnonzero(changed == behind)[0]) + 1, c)
+        anew = make_layers(costs, reverse, offsets, 0)
+        assert build(anew, changed, 0) == pytest.approx(cost)
+        undo(memory)
+        np.testing.assert_array_equal(memory.after, np.roll(order, -1))
 
 
 def test_node_choice_on_unstructured_costs() -> None:

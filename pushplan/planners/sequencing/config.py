@@ -23,14 +23,16 @@ class GtspConfig:
         lower_bound: whether to spend time on a lower bound and a proof.
         proof_share: of a time budget that the proof may take.
         proof_states: paths that the proof keeps at once at most.
-        neighbours: clusters on the list of each cluster.
+        neighbours: clusters on the list of each cluster; a third more where costs differ both ways.
         swap_neighbours: of these, how many a segment swap tries.
         max_removed: clusters that a round takes out at most.
         removed_share: the same, as a share of all clusters (but at least 4).
         blink: share of places that an insertion overlooks (Christiaens and Vanden Berghe 2020).
         hot: temperature at the beginning of a run.
         cold: temperature at its end.
-        restarts: runs from a random order at most.
+        frozen: a run ends early at this share of the temperature at which its tour was cheapest.
+        restarts: runs from a random order that a budget is planned for at most; where they end
+            early there are more.
         run_rounds: rounds that a run should have for each pair of clusters; fewer runs where they
             would not.
         search_nodes: nodes that a search works with at most; of larger instances it keeps the
@@ -52,8 +54,9 @@ class GtspConfig:
     blink: float = 0.01
     hot: float = 2.0
     cold: float = 0.03
+    frozen: float = 0.4
     restarts: int = 12
-    run_rounds: float = 1.5
+    run_rounds: float = 8.0
     search_nodes: int = 3000
     chunk_s: float = 0.002
 
@@ -68,6 +71,6 @@ class GtspConfig:
         integer("proof_states", self.proof_states, low=1)
         for name in ("memory_mb", "hot", "cold", "run_rounds", "chunk_s"):
             number(name, getattr(self, name), low=0.0, open_low=True)
-        for name in ("proof_share", "removed_share"):
+        for name in ("proof_share", "removed_share", "frozen"):
             number(name, getattr(self, name), low=0.0, high=1.0)
         number("blink", self.blink, low=0.0, high=0.5)

@@ -1,7 +1,8 @@
 """Compiled parts that every search shares: random numbers and the best nodes for an order.
 
 Nodes are numbered so that those of a cluster follow one another: cluster c has the nodes
-``offsets[c]`` to ``offsets[c + 1]``. ``costs`` is (N, N) float64, ``reverse`` its transpose.
+``offsets[c]`` to ``offsets[c + 1]``. ``costs`` is (N, N + SPARE) float64, what is past the last
+node means nothing; ``reverse`` holds its transpose.
 """
 
 from __future__ import annotations
@@ -12,9 +13,14 @@ from numba import njit
 from pushplan.world.checks import FloatArray, IntArray
 
 jit = njit(cache=True, nogil=True)
+inline = njit(cache=True, nogil=True, forceinline=True, _nrt=False)  # type: ignore[call-overload]
+"""For small kernels that make no arrays: without reference counts, which took most of the time."""
+
+SPARE = 3
+"""Columns that the matrices of a search have past the last node, see `push_values`."""
 
 
-@jit
+@inline
 def draw(state: IntArray) -> float:
     """A number in [0, 1) from a xorshift64* generator (Vigna 2016); ``state`` is (1,) uint64."""
     x = state[0]
@@ -26,13 +32,13 @@ def draw(state: IntArray) -> float:
     return float(high) * (1.0 / 9007199254740992.0)
 
 
-@jit
+@inline
 def below(state: IntArray, count: int) -> int:
     """A whole number from 0 to ``count - 1``."""
     return int(draw(state) * count)
 
 
-@jit
+@inline
 def push_layer(
     costs: FloatArray, values: FloatArray, at: int, n_at: int, to: int, n_to: int, out: FloatArray
 ) -> None:
@@ -56,6 +62,42 @@ def push_layer(
             out[w] = min(head + row[w], out[w])
 
 
+@inline
+def push_values(
+    costs: FloatArray,
+    values: FloatArray,
+    a: int,
+    at: int,
+    n_at: int,
+    to: int,
+    n_to: int,
+    out: FloatArray,
+) -> None:
+    """``out[w] = min_v values[a, v] + costs[at + v, to + w]``, four columns at a time.
+
+    Args:
+        costs: (N, N + SPARE); up to `SPARE` columns past the cluster are read.
+        values: (m, >= n_at).
+        a: row of ``values``.
+        at: first node of the cluster that the way comes from.
+        n_at: nodes of it.
+        to: first node of the cluster that it goes to.
+        n_to: nodes of it.
+        out: (>= n_to + SPARE,) filled; what is past ``n_to`` means nothing.
+    """
+    for w in range(0, n_to, 4):
+        first = second = third = fourth = np.inf
+        j = to + w
+        for v in range(n_at):
+            x = values[a, v]
+            i = at + v
+            first = min(first, x + costs[i, j])
+            second = min(second, x + costs[i, j + 1])
+            third = min(third, x + costs[i, j + 2])
+            fourth = min(fourth, x + costs[i, j + 3])
+        out[w], out[w + 1], out[w + 2], out[w + 3] = first, second, third, fourth
+
+
 @jit
 def best_nodes(
     costs: FloatArray,
@@ -70,7 +112,7 @@ def best_nodes(
     A shortest path through the layers for every node of ``order[0]``, which should be small.
 
     Args:
-        costs: (N, N).
+        costs: (N, >= N).
         offsets: (m + 1,).
         order: (>= count,) clusters in visiting order.
         count: how many of them, at least 2.

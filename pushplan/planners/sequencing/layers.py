@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pushplan.planners.sequencing.kernels import jit, push_layer
+from pushplan.planners.sequencing.kernels import SPARE, inline, jit, push_values
 from pushplan.world.checks import FloatArray, IntArray
 
 
@@ -21,8 +21,8 @@ class Layers(NamedTuple):
     """A tour and its values; m clusters of at most K nodes.
 
     Args:
-        costs: (N, N).
-        reverse: (N, N) the transpose.
+        costs: (N, N + SPARE).
+        reverse: (N, N + SPARE) of the transpose.
         at: (m,) first node of each cluster; of the root, the node that counts.
         size: (m,) nodes of each cluster; 1 for the root.
         after: (m,) next cluster.
@@ -36,9 +36,9 @@ class Layers(NamedTuple):
         old_carry: (m,).
         stamp: (m,) round in which a cluster was touched last.
         touched: (m + 1,) how many clusters the round has touched, and which.
-        out: (K,) working memory.
-        left: (K,) working memory.
-        right: (K,) working memory.
+        out: (K + SPARE,) working memory.
+        left: (K + SPARE,) working memory.
+        right: (K + SPARE,) working memory.
     """
 
     costs: FloatArray
@@ -84,9 +84,9 @@ def make_layers(costs: FloatArray, reverse: FloatArray, offsets: IntArray, root:
         np.empty(count),
         np.full(count, -1, np.int64),
         np.zeros(count + 1, np.int64),
-        np.empty(width),
-        np.empty(width),
-        np.empty(width),
+        np.empty(width + SPARE),
+        np.empty(width + SPARE),
+        np.empty(width + SPARE),
     )
 
 
@@ -102,24 +102,27 @@ def build(tour: Layers, order: IntArray, root_node: int) -> float:
         tour.after[c], tour.before[d] = d, c
     tour.ahead[root, 0] = 0.0
     for p in range(1, count):
-        _from(tour.costs, tour.ahead, tour, order[p - 1], order[p], tour.ahead[order[p]])
+        c = order[p]
+        _from(tour.costs, tour.ahead, tour, order[p - 1], c, tour.out)
+        tour.ahead[c, : tour.size[c]] = tour.out[: tour.size[c]]
     _from(tour.costs, tour.ahead, tour, order[count - 1], root, tour.out)
     total = tour.out[0]
     tour.behind[root, 0] = -total
     for p in range(count - 1, 0, -1):
-        d = order[p + 1 if p + 1 < count else 0]
-        _from(tour.reverse, tour.behind, tour, d, order[p], tour.behind[order[p]])
+        c, d = order[p], order[p + 1 if p + 1 < count else 0]
+        _from(tour.reverse, tour.behind, tour, d, c, tour.out)
+        tour.behind[c, : tour.size[c]] = tour.out[: tour.size[c]]
     return float(total)
 
 
-@jit
+@inline
 def _from(
     costs: FloatArray, values: FloatArray, tour: Layers, a: int, b: int, out: FloatArray
 ) -> None:
-    push_layer(costs, values[a], tour.at[a], tour.size[a], tour.at[b], tour.size[b], out)
+    push_values(costs, values, a, tour.at[a], tour.size[a], tour.at[b], tour.size[b], out)
 
 
-@jit
+@inline
 def keep(tour: Layers, c: int, now: int) -> None:
     """Save a cluster as it is, once in a round."""
     if tour.stamp[c] != now:
@@ -132,7 +135,7 @@ def keep(tour: Layers, c: int, now: int) -> None:
             tour.old_ahead[c, v], tour.old_behind[c, v] = tour.ahead[c, v], tour.behind[c, v]
 
 
-@jit
+@inline
 def undo(tour: Layers) -> None:
     """Put back what `keep` has saved in this round."""
     for i in range(1, tour.touched[0] + 1):
@@ -143,7 +146,7 @@ def undo(tour: Layers) -> None:
             tour.ahead[c, v], tour.behind[c, v] = tour.old_ahead[c, v], tour.old_behind[c, v]
 
 
-@jit
+@inline
 def _renew(
     tour: Layers,
     costs: FloatArray,
@@ -171,13 +174,13 @@ def _renew(
         p, c = c, onward[c]
 
 
-@jit
+@inline
 def _renew_both(tour: Layers, c: int, root: int, now: int, tolerance: float) -> None:
     _renew(tour, tour.costs, tour.ahead, tour.after, c, root, now, tolerance)
     _renew(tour, tour.reverse, tour.behind, tour.before, c, root, now, tolerance)
 
 
-@jit
+@inline
 def close_gap(
     tour: Layers, a: int, b: int, carried: float, root: int, now: int, tolerance: float
 ) -> float:
@@ -219,7 +222,7 @@ def close_gap(
     return float(price - carried)
 
 
-@jit
+@inline
 def price_between(tour: Layers, c: int, a: int, b: int) -> float:
     """What the tour becomes dearer by with cluster c between a and b."""
     left, right = tour.left, tour.right
@@ -231,7 +234,7 @@ def price_between(tour: Layers, c: int, a: int, b: int) -> float:
     return float(price)
 
 
-@jit
+@inline
 def link_in(tour: Layers, c: int, a: int, root: int, now: int, tolerance: float) -> float:
     """Put cluster c behind cluster a; returns the change of the tour's cost."""
     b = tour.after[a]
@@ -244,4 +247,4 @@ def link_in(tour: Layers, c: int, a: int, root: int, now: int, tolerance: float)
         tour.ahead[c, v] = tour.left[v] - price
         tour.behind[c, v] = tour.right[v] - price
     _renew_both(tour, c, root, now, tolerance)
-    return price
+    return float(price)

@@ -10,6 +10,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from pushplan.planners.sequencing.kernels import SPARE
 from pushplan.world.checks import FloatArray, IntArray
 
 
@@ -68,21 +69,27 @@ class Problem:
 
     @cached_property
     def finite(self) -> FloatArray:
-        """(N, N) costs with a price for forbidden arcs that no tour over finite arcs reaches."""
+        """(N, N + SPARE) costs; forbidden arcs at a price that no tour over finite arcs reaches."""
         inside = self.outer[np.isfinite(self.outer)]
         low, high = (inside.min(), inside.max()) if inside.size else (0.0, 1.0)
         price = high + (self.count + 1) * (high - low) + (abs(high) or 1.0)
-        return np.where(np.isfinite(self.costs), self.costs, price)
+        wide = np.full((len(self.costs), len(self.costs) + SPARE), price)
+        wide[:, :-SPARE] = np.where(np.isfinite(self.costs), self.costs, price)
+        return wide
 
     @cached_property
     def reverse(self) -> FloatArray:
-        """(N, N) the transpose of `finite`, contiguous."""
-        return np.ascontiguousarray(self.finite.T)
+        """(N, N + SPARE) the same of the transposed costs."""
+        if self.symmetric:
+            return self.finite
+        wide = np.full_like(self.finite, self.finite[0, -1])
+        wide[:, :-SPARE] = self.finite[:, :-SPARE].T
+        return wide
 
     @cached_property
     def symmetric(self) -> bool:
         """Whether every arc costs the same both ways."""
-        return bool(np.array_equal(self.finite, self.reverse))
+        return bool(np.array_equal(self.costs, self.costs.T))
 
     @cached_property
     def floor(self) -> float:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pushplan.planners.sequencing.kernels import below, best_nodes, draw, jit
+from pushplan.planners.sequencing.kernels import below, best_nodes, draw, inline, jit
 from pushplan.planners.sequencing.layers import (
     Layers,
     build,
@@ -22,7 +22,7 @@ FRESH_ROUNDS = 500
 """Values are computed from scratch this often, so that rounding does not add up."""
 
 
-@jit
+@inline
 def _ruin(
     tour: Layers,
     near: IntArray,
@@ -68,7 +68,7 @@ def _ruin(
     return found, change
 
 
-@jit
+@inline
 def _bring_forward(
     near: IntArray,
     between: FloatArray,
@@ -92,23 +92,35 @@ def _bring_forward(
     removed[low], removed[pick] = removed[pick], removed[low]
 
 
-@jit
+@inline
 def _cheapest_place(
-    tour: Layers, near: IntArray, gone: IntArray, c: int, root: int, blink: float, state: IntArray
+    tour: Layers,
+    near: IntArray,
+    gone: IntArray,
+    seen: IntArray,
+    c: int,
+    root: int,
+    blink: float,
+    state: IntArray,
 ) -> int:
     """Behind which cluster c is cheapest, next to one of its neighbours; a few are overlooked."""
     lowest, place = np.inf, root
     interval = int(2.0 / blink) if blink > 0.0 else 0
     skip = below(state, interval) if interval else -1
+    seen[-1] += 1
+    stamp = seen[-1]
     for index in range(2 * near.shape[1]):
         d = near[c, index >> 1]
         if gone[d]:
             continue
+        a = d if index & 1 else tour.before[d]
+        if seen[a] == stamp:
+            continue
+        seen[a] = stamp
         if skip == 0:
             skip = below(state, interval)
             continue
         skip -= 1
-        a = d if index & 1 else tour.before[d]
         price = price_between(tour, c, a, tour.after[a])
         if price < lowest:
             lowest, place = price, a
@@ -150,8 +162,8 @@ def search_tours(
     """Some rounds of simulated annealing.
 
     Args:
-        costs: (N, N) finite.
-        reverse: (N, N) the transpose.
+        costs: (N, N + SPARE) finite.
+        reverse: (N, N + SPARE) of the transpose.
         offsets: (m + 1,) with m at least 3.
         near: (m, k) clusters by distance.
         between: (m, k) these distances.
@@ -174,6 +186,7 @@ def search_tours(
     layers = np.empty((count, tour.ahead.shape[1]))
     order, nodes = np.empty(count, np.int64), np.empty(count, np.int64)
     removed, gone = np.empty(count, np.int64), np.zeros(count, np.int64)
+    seen = np.zeros(count + 1, np.int64)
     values[0] = build(tour, current, current_nodes[0])
     for now in range(rounds):
         tour.touched[0] = 0
@@ -184,7 +197,7 @@ def search_tours(
             if turn >= 2:
                 _bring_forward(near, between, removed, gone, i, found, turn == 2)
             c = removed[i]
-            place = _cheapest_place(tour, near, gone, c, root, blink, state)
+            place = _cheapest_place(tour, near, gone, seen, c, root, blink, state)
             gone[c] = 0
             change += link_in(tour, c, place, root, now, tolerance)
         if change >= -temperature * np.log(1.0 - draw(state)):

@@ -97,7 +97,9 @@ class AnytimeSearch:
 
     def __post_init__(self) -> None:
         problem, config = self.problem, self.config
-        self.near, self.between = problem.nearest(config.neighbours)
+        self.near, self.between = problem.nearest(
+            config.neighbours if problem.symmetric else config.neighbours * 4 // 3
+        )
         self.offsets = problem.offsets
         share = max(4, int(config.removed_share * problem.count))
         self.most = max(1, min(config.max_removed, share, problem.count - 2))
@@ -109,9 +111,15 @@ class AnytimeSearch:
         self.pace = 3e-5 + 3e-7 * problem.width**2
 
     def run(self, budget: Budget, begin: float, end: float) -> None:
-        """One annealing from a random order, from share ``begin`` to ``end`` of the budget."""
+        """One annealing from a random order, until it is frozen.
+
+        Args:
+            budget: of the call.
+            begin: share of it that is gone when the tour is hottest.
+            end: share that is gone when it is coldest, where the run ends at the latest.
+        """
         self._random_start(budget)
-        config, first = self.config, True
+        config, lowest, frozen, first = self.config, np.inf, 0.0, True
         while not budget.stopped():
             gone = budget.gone()
             if gone >= end and np.isfinite(self.values[1]):
@@ -120,6 +128,10 @@ class AnytimeSearch:
             heat = config.hot * (config.cold / config.hot) ** progress
             self._rounds(budget, 0.0 if first else heat * self.scale)
             first = False
+            if self.values[0] < lowest - 1e-9 * abs(self.values[0]):  # not by rounding alone
+                lowest, frozen = self.values[0], config.frozen * heat
+            elif heat < frozen:
+                break
 
     def runs_in(self, budget: Budget, share: float) -> int:
         """How many runs a share of the budget is good for."""
@@ -195,11 +207,11 @@ def search(
     They use a forbidden arc only if no tour without one was found.
     """
     state = AnytimeSearch(problem, config, seed)
-    runs = state.runs_in(budget, share)
-    begin = min(budget.gone(), share)
-    step = (share - begin) / runs
-    for index in range(runs):
-        if index and budget.stopped():
-            break
-        state.run(budget, begin + index * step, begin + (index + 1) * step)
+    length = max(share - budget.gone(), 1e-9) / state.runs_in(budget, share)
+    left, first = share, True
+    while first or (left > 0.0 and not budget.stopped()):
+        begin = min(budget.gone(), share)
+        left = share - begin
+        state.run(budget, begin, begin + left / max(1, round(left / length)))
+        left, first = share - budget.gone(), False
     return state.best_nodes
