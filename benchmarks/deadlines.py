@@ -19,6 +19,7 @@ calls are repeated under tracemalloc, which sees what Python and NumPy allocate.
 from __future__ import annotations
 
 import argparse
+import atexit
 import ctypes
 import gc
 import os
@@ -152,6 +153,7 @@ def deadlines(names: list[str], calls: int) -> None:
             planner.plan(world, stop=Deadline(BUDGET_S), rng=np.random.default_rng(0))
         gc.collect()
         gc.freeze()  # as a controller does after its start
+        atexit.register(gc.unfreeze)
         wall, own, collector = lateness(planner, worlds, calls).T
         numbers = [*np.percentile(wall, [50, 95, 99, 99.9, 100])]
         numbers += [*np.percentile(own, [99.9, 100]), collector.max()]

@@ -19,7 +19,7 @@ from pushplan.planners.kinodynamic.dubins import dubins, sample_pieces
 from pushplan.world import GoalDisc, NavigationGoal
 from pushplan.world.checks import FloatArray
 
-PATIENCE = 4_000
+PATIENCE = 1_500
 """Pairs of objects that may be tested for one repair; that takes some milliseconds."""
 
 

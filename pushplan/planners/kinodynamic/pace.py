@@ -5,12 +5,12 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator
 
-_PIECE_S = 0.002
+_PIECE_S = 0.001
 """Time between two looks [s]."""
 
 
 class Pace:
-    """Cuts work into pieces of about two milliseconds.
+    """Cuts work into pieces of about a millisecond.
 
     What is done must not depend on where the cuts are: they follow the clock.
     """
