@@ -28,7 +28,8 @@ from pushplan.planners.sequencing import (
 )
 from pushplan.world import Deadline
 
-FIRST_SEED = 1000
+FIRST_SEED = 3000
+"""Settings were chosen on seeds from 1000 on."""
 PARTS = ("exact", "proofs", "unstructured", "public", "large")
 PROOF_SECONDS = 10.0
 SEARCH_SHARE = 0.02
