@@ -11,7 +11,15 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
 from pushplan.cli import paper
-from pushplan.cli.common import add_command, add_honest_time, add_trust, positive, say, whole
+from pushplan.cli.common import (
+    add_command,
+    add_honest_time,
+    add_trust,
+    batch_options,
+    positive,
+    say,
+    whole,
+)
 
 if TYPE_CHECKING:
     from pushplan.evaluation import ResultRow, Results
@@ -121,15 +129,11 @@ def _results(options: argparse.Namespace, out: str, progress: _Progress) -> Resu
         options.suite,
         options.policies,
         episodes=options.episodes,
-        seed=options.seed,
-        workers=options.workers,
         out=out,
-        timeout_s=options.timeout,
         observation=options.observation,
-        memory_limit_mb=options.memory,
-        retry_failed=options.retry_failed,
         honest_time=options.honest_time,
         progress=progress,
+        **batch_options(options),
     )
 
 

@@ -23,6 +23,17 @@ def add_command(
     return parser
 
 
+def batch_options(options: argparse.Namespace) -> dict[str, Any]:
+    """What ``bench`` and ``bench paper`` hand to the batch runner under the same names."""
+    return {
+        "seed": options.seed,
+        "workers": options.workers,
+        "timeout_s": options.timeout,
+        "memory_limit_mb": options.memory,
+        "retry_failed": options.retry_failed,
+    }
+
+
 def add_honest_time(parser: argparse.ArgumentParser) -> None:
     """Add the option that lets time pass while a policy computes."""
     parser.add_argument(

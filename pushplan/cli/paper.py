@@ -9,7 +9,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from pushplan.cli.common import check_folder, say
+from pushplan.cli.common import batch_options, check_folder, say
 
 if TYPE_CHECKING:
     from pushplan.evaluation import Comparison
@@ -55,14 +55,10 @@ def compare(options: argparse.Namespace, out: str, progress: Callable[..., None]
         only=options.only,
         policies=options.policies,
         episodes=options.episodes or EPISODES,
-        seed=options.seed,
-        workers=options.workers,
         out=out,
-        timeout_s=options.timeout,
-        memory_limit_mb=options.memory,
-        retry_failed=options.retry_failed,
         progress=progress,
         command=shlex.join(["pushplan", "bench", SUITE, *words]),
+        **batch_options(options),
     )
 
 

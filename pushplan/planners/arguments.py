@@ -1,10 +1,10 @@
-"""What every planner checks before it plans."""
+"""What planners and policies check before they begin."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from pushplan.world import Stop, World
+from pushplan.world import ClearanceArea, Drive, InvalidInputError, Receptacle, Stop, World
 from pushplan.world.checks import expect
 
 
@@ -15,7 +15,35 @@ def check_call(world: object, stop: object, rng: object) -> None:
         InvalidInputError: naming the argument and the type that it must have.
     """
     expect("world", world, World)
+    check_rules(stop, rng)
+
+
+def check_rules(stop: object, rng: object) -> None:
+    """Check the types of a stop rule and a generator, each of which may be None.
+
+    Raises:
+        InvalidInputError: naming the argument and the type that it must have.
+    """
     if stop is not None:
         expect("stop", stop, Stop)  # type: ignore[type-abstract]
     if rng is not None:
         expect("rng", rng, np.random.Generator)
+
+
+def check_pusher(world: World, who: str) -> None:
+    """Refuse a world in which no object can be pushed to a goal.
+
+    Args:
+        world: the snapshot.
+        who: what an error says that this is for.
+
+    Raises:
+        InvalidInputError: if the goal is one for the robot, or the robot cannot stop.
+    """
+    if world.robot.drive is not Drive.DIFFERENTIAL:
+        raise InvalidInputError(f"{who} needs a robot with a differential drive")
+    if not isinstance(world.goal, Receptacle | ClearanceArea):
+        raise InvalidInputError(
+            f"{who} needs a goal for the objects (Receptacle or ClearanceArea), "
+            f"got {type(world.goal).__name__}"
+        )

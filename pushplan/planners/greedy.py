@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 
 from pushplan.control import DriveTo, clamp_twist
+from pushplan.planners.arguments import check_pusher
 from pushplan.planners.lining_up import LineUp, bumper_half, is_done, line_up, unit, way_of
-from pushplan.world import ClearanceArea, Drive, InvalidInputError, Receptacle, Twist, World
+from pushplan.world import Twist, World
 from pushplan.world.checks import FloatArray, expect, number
 
 _RETREATS = ((-1.0, 0.0), (-0.5, 1.0), (-0.5, -1.0), (1.0, 0.0), (0.5, 1.0), (0.5, -1.0))
@@ -98,13 +99,7 @@ class GreedyPusher:
         Raises:
             InvalidInputError: if the goal is one for the robot, or the robot cannot stop.
         """
-        if world.robot.drive is not Drive.DIFFERENTIAL:
-            raise InvalidInputError("the greedy pusher needs a robot with a differential drive")
-        if not isinstance(world.goal, Receptacle | ClearanceArea):
-            raise InvalidInputError(
-                "the greedy pusher needs a goal for the objects (Receptacle or ClearanceArea), "
-                f"got {type(world.goal).__name__}"
-            )
+        check_pusher(world, "the greedy pusher")
         if world.time <= self._last_time:
             self._forget(world.time)
         self._last_time = world.time

@@ -116,7 +116,7 @@ def test_hundreds_of_random_worlds(name: str) -> None:
 @pytest.mark.parametrize("name", ["quick", "published"])
 def test_thousands_of_random_worlds(name: str) -> None:
     planner = ShipLattice(getattr(ShipLatticeConfig, name)())
-    for seed in range(1000, 2500):
+    for seed in range(1000, 4000):
         check_random_world(seed, planner)
 
 

@@ -12,6 +12,7 @@ from conftest import make_u_maze, scattered_boxes
 from ice_scenes import channel
 
 from pushplan.planners import make_planner, planner_names
+from pushplan.planners.kinodynamic import pace
 from pushplan.planners.registry import PLANNERS
 from pushplan.world import (
     Cancellation,
@@ -114,6 +115,23 @@ class TestEveryPlanner:
         planner, world = make_planner(name), start(name)
         plans = [planner.plan(world, stop=rule, rng=np.random.default_rng(3)) for _ in range(2)]
         assert plans[0].plan == plans[1].plan
+
+
+@pytest.mark.parametrize("limit", [*range(0, 12), 37, 60, 211, 1000])
+@pytest.mark.parametrize("name", ["kinodynamic-rrt", "push-aware"])
+def test_where_the_clock_cuts_changes_nothing(name, limit, monkeypatch):
+    made = []
+    for piece_s in (1e-9, 1e-4, 1e3):
+        monkeypatch.setattr(pace, "_PIECE_S", piece_s)
+        made.append(digest(name, limit))
+    assert len(set(made)) == 1
+
+
+def test_no_piece_is_begun_after_a_stop():
+    """One may be, and one may not, would let the length of pieces decide what is found."""
+    assert list(pace.Pace().pieces(10, lambda: True)) == []
+    pieces = list(pace.Pace().pieces(10, lambda: False))
+    assert [k for first, last in pieces for k in range(first, last)] == list(range(10))
 
 
 def test_another_process_gives_the_same_bytes(request):

@@ -10,10 +10,7 @@ _PIECE_S = 0.001
 
 
 class Pace:
-    """Cuts work into pieces of about a millisecond.
-
-    What is done must not depend on where the cuts are: they follow the clock.
-    """
+    """Cuts work into pieces of about a millisecond."""
 
     def __init__(self) -> None:
         self._few = 1.0
@@ -23,10 +20,11 @@ class Pace:
 
         Args:
             total: units to do.
-            stopped: asked between the pieces, not before the first.
+            stopped: asked before each piece. As the cuts follow the clock, nothing but the clock
+                may change its answer from piece to piece.
         """
         done = 0
-        while done < total and not (done and stopped()):
+        while done < total and not stopped():
             upto = min(total, done + max(1, int(self._few)))
             began = time.perf_counter()
             yield done, upto

@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from pushplan.planners.arguments import check_rules
 from pushplan.planners.sequencing.checking import checked_clusters, checked_costs
 from pushplan.planners.sequencing.config import GtspConfig
 from pushplan.planners.sequencing.exact import expected_seconds, solve_exactly, table_mb
@@ -60,9 +61,7 @@ def solve_gtsp(
         InvalidInputError: for input that breaks a rule, or where ``method="exact"`` would need
             more memory than ``config.memory_mb``.
     """
-    for name, value, kind in (("stop", stop, Stop), ("rng", rng, np.random.Generator)):
-        if value is not None and not isinstance(value, kind):
-            raise InvalidInputError(f"{name} must be a {kind.__name__}, got {value!r:.60}")
+    check_rules(stop, rng)
     budget = Budget.start(stop, config.iterations)
     matrix = checked_costs(costs)
     members = checked_clusters(clusters, len(matrix))

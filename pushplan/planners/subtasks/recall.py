@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 
-from pushplan.planners.subtasks.rollout import GONE
+from pushplan.planners.subtasks.rollout import GONE, enclose
 from pushplan.world import Movables
 from pushplan.world.checks import BoolArray, FloatArray, IntArray
 
@@ -127,6 +127,4 @@ def _grown(box: FloatArray, poses: FloatArray, radii: FloatArray) -> BoolArray:
         within = now
         for k in range(len(poses)):
             if within[k]:
-                r = 1.1 * radii[k]
-                box[0], box[1] = min(box[0], poses[k, 0] - r), min(box[1], poses[k, 1] - r)
-                box[2], box[3] = max(box[2], poses[k, 0] + r), max(box[3], poses[k, 1] + r)
+                enclose(box, poses[k], 1.1 * radii[k])

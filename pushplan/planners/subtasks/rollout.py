@@ -214,7 +214,7 @@ class Log(NamedTuple):
 
 
 @njit(cache=True, nogil=True)
-def _enclose(box: FloatArray, pose: FloatArray, reach: float) -> None:
+def enclose(box: FloatArray, pose: FloatArray, reach: float) -> None:
     """Make a box big enough for a disc."""
     box[0], box[1] = min(box[0], pose[0] - reach), min(box[1], pose[1] - reach)
     box[2], box[3] = max(box[2], pose[0] + reach), max(box[3], pose[1] + reach)
@@ -243,7 +243,7 @@ def _take_stock(
     news = False
     for k in range(poses.shape[0]):
         if poses[k, 0] != saved[k, 0] or poses[k, 1] != saved[k, 1]:
-            _enclose(box, poses[k], bodies.radii[k] + room)
+            enclose(box, poses[k], bodies.radii[k] + room)
             was = done[k]
             done[k] = is_done(k, poses, bodies, task)
             news = news or (done[k] and not was)
@@ -295,7 +295,7 @@ def roll_out(
     log.track[0] = here
     room = 2.0 * law.step
     log.box[0], log.box[1], log.box[2], log.box[3] = np.inf, np.inf, -np.inf, -np.inf
-    _enclose(log.box, here, bodies.robot_radius + room)
+    enclose(log.box, here, bodies.robot_radius + room)
     stages, used, travelled, reached, end = 0, 1, 0.0, 0.0, 1
     while used < log.track.shape[0] and travelled < limit:
         ds, turn = law.step, 0.0
@@ -317,7 +317,7 @@ def roll_out(
         log.track[used] = here
         used += 1
         travelled += ds
-        _enclose(log.box, here, bodies.robot_radius + room)
+        enclose(log.box, here, bodies.robot_radius + room)
         news = _take_stock(poses, saved, done, bodies, task, log.box, room)
         if news and stages < EVENTS - 1:
             stages = _write(log, stages, used, poses, lengths)

@@ -12,6 +12,7 @@ import numpy as np
 from pushplan.geometry import convex_penetration
 from pushplan.interaction import QuasiStatic
 from pushplan.interaction.kernels import Bodies, Settings
+from pushplan.planners.arguments import check_pusher
 from pushplan.planners.kinodynamic.collision import (
     Footprint,
     Obstacles,
@@ -33,10 +34,6 @@ from pushplan.planners.subtasks.recall import Recall
 from pushplan.planners.subtasks.rollout import Law, Task, all_done, task_of
 from pushplan.planners.subtasks.ways import Ways, ways_of
 from pushplan.world import (
-    ClearanceArea,
-    Drive,
-    InvalidInputError,
-    Receptacle,
     RobotModel,
     StaticMap,
     World,
@@ -58,18 +55,8 @@ def _fit_of(
 
 
 def check_world(world: World) -> None:
-    """Refuse what no push can be made for.
-
-    Raises:
-        InvalidInputError: if the goal is one for the robot, or the robot cannot stop.
-    """
-    if world.robot.drive is not Drive.DIFFERENTIAL:
-        raise InvalidInputError("pushing objects needs a robot with a differential drive")
-    if not isinstance(world.goal, Receptacle | ClearanceArea):
-        raise InvalidInputError(
-            "pushing objects needs a goal for them (Receptacle or ClearanceArea), "
-            f"got {type(world.goal).__name__}"
-        )
+    """Refuse what no push can be made for; see `check_pusher`."""
+    check_pusher(world, "pushing objects")
 
 
 @dataclass(frozen=True, eq=False)
