@@ -8,11 +8,11 @@ from typing import Any
 from pushplan.cli.common import add_command, say, whole
 
 _EXAMPLES = """\
-  pushplan dataset export --policy push-aware-constant-speed --task maze --episodes 200 --noise 0.02 \\
-      --out runs/maze-data
+  pushplan dataset export --policy push-aware-constant-speed --task maze --episodes 200 \\
+      --noise 0.02 --out runs/maze-data
   pushplan dataset export --policy ship-predictive --task ship_ice --episodes 100 --out runs/ice
-  pushplan dataset export --policy push-aware-constant-speed --task maze --episodes 5 --out runs/few \\
-      --minari pushplan/maze/push-aware-v0
+  pushplan dataset export --policy push-aware-constant-speed --task maze --episodes 5 \\
+      --out runs/few --minari pushplan/maze/push-aware-v0
 """
 
 

@@ -70,6 +70,21 @@ def test_every_box_gets_where_it_belongs(task, preset, simulator, variations):
     assert policy.given_up == {}
 
 
+@pytest.mark.slow
+def test_a_box_between_columns_is_hooked_out():
+    """One lies where the bumper does not fit behind it, from either side."""
+    info = run(
+        make_policy("gtsp-mpc"),
+        task="box_delivery",
+        preset="benchmark",
+        seed=10,
+        limit=8000,
+        simulator="pymunk",
+        variations={"layout": "small_columns", "boxes": 10},
+    )
+    assert info["success"]
+
+
 def test_noisy_poses_do_not_keep_it_from_clearing():
     info = run(
         GtspMpc(),

@@ -19,8 +19,9 @@ from pushplan.planners.subtasks import (
     tour_of,
 )
 from pushplan.planners.subtasks.completions import completions
+from pushplan.planners.subtasks.drive import PathTracer
 from pushplan.planners.subtasks.graph import candidate_pushes
-from pushplan.planners.subtasks.hard import swinging_pushes
+from pushplan.planners.subtasks.maneuvers import maneuvers, way_out
 from pushplan.planners.subtasks.push import signature
 from pushplan.planners.subtasks.recall import Recall
 from pushplan.planners.subtasks.reduction import parts_of, reduce
@@ -36,6 +37,7 @@ from pushplan.world import (
     World,
     box_delivery_robot,
 )
+from pushplan.world.outline import transform
 
 CORNER = Receptacle([(3.0, 3.0), (5.0, 3.0), (5.0, 5.0), (3.0, 5.0)])
 COLUMN = [(-0.5, 0.0), (0.5, 0.0), (0.5, 1.0), (-0.5, 1.0)]
@@ -200,16 +202,72 @@ def test_a_box_at_a_wall_is_freed():
     assert graph.pushes and not graph.infeasible
 
 
-def test_a_box_in_a_corner_is_turned_out_of_it():
-    room = scene([(0.0, 0.0, 0.0)])
-    small = Movables.from_outlines([0.44 * SQUARE], [(-4.5, -4.5, 0.3)])
-    here = Scene(replace(room.world, movables=small), room.config)
-    found = swinging_pushes(Runner(here), 0)
-    assert found
+def small_box(pose, extra=(), robot=(-3.0, -3.0, 0.0)):
+    room = scene([(0.0, 0.0, 0.0)], extra=extra, pose=robot)
+    small = Movables.from_outlines([0.44 * SQUARE], [pose])
+    return Scene(replace(room.world, movables=small), room.config)
+
+
+GAP = [
+    [(-1.6, -0.5), (-0.4, -0.5), (-0.4, 0.5), (-1.6, 0.5)],
+    [(0.4, -0.5), (1.6, -0.5), (1.6, 0.5), (0.4, 0.5)],
+]
+"""Columns between which the robot's body fits, but not its bumper."""
+
+
+@pytest.mark.parametrize("drive_back", [True, False])
+@pytest.mark.parametrize(
+    ("pose", "extra"), [((-4.5, -4.5, 0.3), ()), ((0.1, 0.05, 0.2), GAP), ((0.0, -4.7, 0.0), ())]
+)
+def test_a_box_in_a_tight_place_is_brought_out_of_it(pose, extra, drive_back):
+    here = small_box(pose, extra)
+    if not drive_back:
+        ahead = replace(here.world.robot, min_speed=0.0)
+        here = Scene(replace(here.world, robot=ahead), here.config)
+    found = maneuvers(Runner(here), 0)
+    assert found or not drive_back
+    walls = [shapely.Polygon(part).buffer(-0.01) for part in here.world.static.convex_parts]
     for push in found:
-        assert push.frees and push.turn != 0.0
-        moved = push.object_poses[0, :2] - here.poses[0, :2]
-        assert float(np.hypot(*moved)) > 0.02
+        assert push.frees and push.traced and here.is_clear(push.start)
+        assert math.dist(push.object_poses[0, :2], pose[:2]) > 0.02
+        assert np.abs(np.diff(push.poses, axis=0)).max() < 0.3 * here.size
+        for robot_pose in push.poses:
+            body = [shapely.Polygon(transform(robot_pose, p)) for p in here.world.robot.parts]
+            assert not any(part.intersects(wall) for part in body for wall in walls)
+        if not drive_back:
+            moves = np.diff(push.poses[:, :2], axis=0)
+            ahead = np.column_stack([np.cos(push.poses[:-1, 2]), np.sin(push.poses[:-1, 2])])
+            assert ((moves * ahead).sum(axis=1) > -1e-9).all()
+        [again] = Runner(here).again(push, push.start)
+        assert np.array_equal(again.object_poses, push.object_poses)
+
+
+def test_the_way_out_of_a_gap_touches_nothing():
+    tight = small_box((0.0, 0.25, 0.0), GAP, robot=(0.0, -0.35, -0.5 * math.pi))
+    path = way_out(tight)
+    assert path is not None and path[-1, 1] < -0.8
+    assert Runner(tight).trace(path, 0)[0].work == 0.0
+    assert way_out(small_box((0.0, 0.8, 0.0), GAP)) is None
+
+
+def test_a_path_is_traced_ahead_back_and_round():
+    robot, steps = box_delivery_robot(), []
+    pose = np.array([0.3, -0.2, 2.9])
+    for length, turn in [(0.05, 0.08)] * 9 + [(-0.05, 0.0)] * 7 + [(0.0, -0.1)] * 5:
+        middle = pose[2] + 0.5 * turn
+        pose = pose + np.array([length * math.cos(middle), length * math.sin(middle), turn])
+        steps.append(pose)
+    path = np.array([[0.3, -0.2, 2.9], *steps])
+    at, tracer = np.array([0.31, -0.21, 2.95]), PathTracer(robot, path, 0.2)
+    for _ in range(60):
+        twist = tracer.command(at)
+        if twist is None:
+            break
+        middle = at[2] + 0.1 * twist.angular
+        velocity = [twist.linear * math.cos(middle), twist.linear * math.sin(middle)]
+        at = at + 0.2 * np.array([*velocity, twist.angular])
+    assert twist is None
+    assert np.abs(at - path[-1]).max() < 0.05
 
 
 def test_what_is_remembered_comes_to_the_same():

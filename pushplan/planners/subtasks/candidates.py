@@ -31,6 +31,17 @@ _WAYS = ((1.08, False), (0.0, False), (1.08, True))
 the middle of a receptacle."""
 
 
+def simple_pushes(runner: Runner) -> list[Push]:
+    """Pushes from behind, after which something is where it belongs, or nearer to it."""
+    left = runner.left.tolist()
+    if isinstance(runner.scene.world.goal, ClearanceArea):
+        pushes = area_pushes(runner)
+        covered = {i for push in pushes for i in push.covers}
+        ids = runner.scene.world.movables.ids
+        return pushes + guided_pushes(runner, [k for k in left if int(ids[k]) not in covered])
+    return guided_pushes(runner, left) + collecting_pushes(runner, left)
+
+
 def area_pushes(runner: Runner) -> list[Push]:
     """Line pushes out of a clearance area: across every open edge, of one object or several."""
     scene = runner.scene

@@ -8,16 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from pushplan.planners.subtasks import lattice
-from pushplan.planners.subtasks.candidates import (
-    area_pushes,
-    collecting_pushes,
-    guided_pushes,
-)
-from pushplan.planners.subtasks.hard import freeing_pushes, swinging_pushes
+from pushplan.planners.subtasks.candidates import simple_pushes
+from pushplan.planners.subtasks.freeing import freeing_pushes
+from pushplan.planners.subtasks.maneuvers import maneuvers
 from pushplan.planners.subtasks.push import Push, signature
 from pushplan.planners.subtasks.runner import Runner
 from pushplan.planners.subtasks.scene import Ground, Scene
-from pushplan.world import ClearanceArea
 from pushplan.world.checks import FloatArray, IntArray
 
 _FREED = 2
@@ -92,22 +88,12 @@ def build_graph(
 
 def candidate_pushes(scene: Scene, runner: Runner, freeing: bool = False) -> list[Push]:
     """All candidates of a scene; ``freeing`` see `build_graph`."""
-    left = runner.left.tolist()
-    pushes: list[Push] = []
-    if isinstance(scene.world.goal, ClearanceArea):
-        pushes += area_pushes(runner)
-        covered = {i for push in pushes for i in push.covers}
-        ids = scene.world.movables.ids
-        hard = [k for k in left if int(ids[k]) not in covered]
-        pushes += guided_pushes(runner, hard)
-    else:
-        pushes += guided_pushes(runner, left)
-        pushes += collecting_pushes(runner, left)
+    pushes = simple_pushes(runner)
     if freeing or not pushes:  # what is hard to get at is often freed by what is done before
         freed = 0
         away = np.hypot(*(scene.poses[:, :2] - scene.world.robot_pose[:2]).T)
-        for k in sorted(left, key=lambda k: (float(away[k]), k)):
-            found = freeing_pushes(runner, k) or swinging_pushes(runner, k)
+        for k in sorted(runner.left.tolist(), key=lambda k: (float(away[k]), k)):
+            found = freeing_pushes(runner, k) + maneuvers(runner, k)
             pushes += found
             freed += bool(found)
             if freed == _FREED:

@@ -5,38 +5,18 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-import numpy as np
-from numba import njit
-
-from pushplan.planners.kinodynamic.collision import Footprint, Obstacles, is_free
 from pushplan.planners.subtasks.places import (
     SHIFTS,
-    axes_of,
     behind,
     direction_of,
     length_of,
 )
 from pushplan.planners.subtasks.push import Push
-from pushplan.planners.subtasks.rollout import GONE
 from pushplan.planners.subtasks.runner import Runner
-from pushplan.planners.subtasks.scene import Scene
 from pushplan.world.checks import FloatArray
 
 LEANS = tuple(math.radians(lean) for lean in (20, -20, 40, -40, 60, -60, 80, -80))
 """Directions against that of its way in which an object beside a wall is first pushed [rad]."""
-_TURNS = (0, *(sign * turn for turn in range(15, 151, 15) for sign in (1, -1)))
-"""Directions of freeing pushes against the shortest way [degrees]."""
-
-_BESIDE = (1.1, -1.1, 1.35, -1.35)
-"""Places, as `SHIFTS`, from which the end of the bumper strikes an object flat at a wall."""
-_ENOUGH = 20
-"""After so many ways to free an object no more are looked for."""
-_SIDES = 12
-"""From how many sides an object is struck by a turn."""
-_SWING = math.radians(150.0)
-"""How far the robot turns to strike it [rad]."""
-_NEARLY = tuple(math.radians(turn) for turn in (0, 30, -30, 60, -60))
-"""Directions of a push that bring an object nearer to its goal, against the shortest way [rad]."""
 
 
 def partial_pushes(runner: Runner, k: int, path: FloatArray) -> list[Push]:
@@ -56,7 +36,7 @@ def partial_pushes(runner: Runner, k: int, path: FloatArray) -> list[Push]:
             if limit <= 0.4 * scene.size:
                 continue
             for push in runner.run(start, k, path=path, shift=shift, limit=limit, frees=True):
-                if _gain(runner, k, push) > 0.3 * scene.size:
+                if gain_of(runner, k, push) > 0.3 * scene.size:
                     rest = float(scene.remaining(push.object_poses[[k]])[0])
                     found.append(replace(push, price=push.price + rest + 2.0 * scene.size))
     return found
@@ -85,123 +65,8 @@ def curved_pushes(runner: Runner, k: int, path: FloatArray) -> list[Push]:
     return found
 
 
-def freeing_pushes(runner: Runner, k: int) -> list[Push]:
-    """Short line pushes that bring an object to where it can be got at."""
-    scene = runner.scene
-    way = scene.box_path(k, 0.0)
-    if way is None:
-        return []
-    towards, lacking = direction_of(way, scene.size), _lacking(scene, k, scene.poses[k])
-    found: list[Push] = []
-    for turn in _TURNS:
-        if len(found) >= _ENOUGH:
-            break
-        for share in (*SHIFTS, *_BESIDE):
-            heading = towards + math.radians(turn)
-            start = behind(scene, k, heading, share * scene.half)
-            if not (scene.fits(start) and scene.is_clear(start)):
-                continue
-            for limit in (0.8, 1.8, 3.5):
-                for push in runner.run(start, k, limit=limit * scene.size, frees=True):
-                    extra = _in_vain(runner, k, push, lacking)
-                    if math.isfinite(extra):
-                        found.append(replace(push, price=push.price + extra))
-    return found
-
-
-def _in_vain(runner: Runner, k: int, push: Push, lacking: float) -> float:
-    """Price of what a push leaves to be done until an object can be pushed home [m]; inf if all."""
-    scene = runner.scene
-    if _is_free(runner, k, push):
-        return 0.0
-    if _gain(runner, k, push) > 0.3 * scene.size:
-        return 3.0 * scene.size
-    if math.dist(push.object_poses[k, :2], scene.poses[k, :2]) < 0.05 * scene.size:
-        return math.inf
-    still = _lacking(scene, k, push.object_poses[k])
-    return 3.0 * still + scene.size if still < lacking - 0.05 * scene.size else math.inf
-
-
-def swinging_pushes(runner: Runner, k: int) -> list[Push]:
-    """Turns on the spot that get an object out of a corner with the end of the bumper."""
-    scene = runner.scene
-    box, lacking = scene.poses[k, :2], _lacking(scene, k, scene.poses[k])
-    found: list[Push] = []
-    for share in (0.9, 1.02, 1.15):
-        for n in range(_SIDES):
-            bearing = 2.0 * math.pi * n / _SIDES
-            u, _ = axes_of(bearing)
-            for aside in (0.5 * math.pi, -0.5 * math.pi):
-                start = np.array([*(box - share * scene.size * u), bearing + aside])
-                if not (scene.fits(start) and scene.is_clear(start)):
-                    continue
-                for push in runner.swing(start, k, -math.copysign(_SWING, aside)):
-                    extra = _in_vain(runner, k, push, lacking)
-                    if math.isfinite(extra):
-                        found.append(replace(push, price=push.price + extra))
-    return found
-
-
-def _lacking(scene: Scene, k: int, pose: FloatArray) -> float:
-    """How much farther from the walls an object would have to be for the robot to get behind [m].
-
-    Behind means on the side from which it can be pushed towards its goal, or nearly so.
-    """
-    way = scene.box_path(k, 0.0, pose=pose)
-    if way is None:
-        return math.inf
-    towards, least, step = direction_of(way, scene.size), 1.5 * scene.size, 0.1 * scene.size
-    for turn in _NEARLY:
-        u, _ = axes_of(towards + turn)
-        for shift in SHIFTS:
-            start = behind(scene, k, towards + turn, shift * scene.half, pose)
-            away = _first_free(start, u, step, least, *scene.fit)
-            if math.isfinite(away):
-                least = away
-    return least
-
-
-@njit(cache=True, nogil=True)
-def _first_free(
-    start: FloatArray,
-    u: FloatArray,
-    step: float,
-    limit: float,
-    shape: Footprint,
-    among: Obstacles,
-    scratch: FloatArray,
-) -> float:
-    """How far along ``u`` a free pose is [m]; inf if there is none nearer than the limit."""
-    pose, n = start.copy(), 0
-    while n * step < limit:
-        pose[0], pose[1] = start[0] + n * step * u[0], start[1] + n * step * u[1]
-        if is_free(pose, shape, among, scratch):
-            return n * step
-        n += 1
-    return np.inf
-
-
-def _gain(runner: Runner, k: int, push: Push) -> float:
+def gain_of(runner: Runner, k: int, push: Push) -> float:
     """By how much nearer to its goal an object gets [m]; 0 where no way leads there."""
     scene = runner.scene
     now, then = scene.remaining_now[k], scene.remaining(push.object_poses[[k]])[0]
     return float(now - then) if math.isfinite(now) and math.isfinite(then) else 0.0
-
-
-def _is_free(runner: Runner, k: int, push: Push) -> bool:
-    """Whether the robot can get behind object ``k`` after a push."""
-    scene = runner.scene
-    pose = push.object_poses[k]
-    if pose[0] >= 0.5 * GONE or push.covers:
-        return True
-    moved = float(np.hypot(*(pose[:2] - scene.poses[k, :2])))
-    if moved < 0.15 * scene.size:
-        return False
-    for clearance in (1.08 * scene.half, 0.75 * float(scene.world.movables.radii[k])):
-        path = scene.box_path(k, clearance, pose=pose)
-        if path is None:
-            continue
-        heading = direction_of(path, 0.5 * scene.size)
-        if any(scene.fits(behind(scene, k, heading, share * scene.half, pose)) for share in SHIFTS):
-            return True
-    return False

@@ -8,7 +8,7 @@ import math
 import numpy as np
 
 from pushplan.control import clamp_twist
-from pushplan.planners.subtasks.drive import LegDriver
+from pushplan.planners.subtasks.drive import LegDriver, PathTracer
 from pushplan.planners.subtasks.follow import BoxFollower, suits
 from pushplan.planners.subtasks.push import Push
 from pushplan.planners.subtasks.rollout import guide
@@ -58,6 +58,7 @@ class Job:
         self._predictive = predictive
         self._driver = LegDriver(world.robot, route, period)
         self._follower: BoxFollower | None = None
+        self._tracer: PathTracer | None = None
         self._driven = self._reached = self._asked = 0.0
         self._last: FloatArray | None = None
         self._still = 0
@@ -98,8 +99,8 @@ class Job:
             good, key=lambda end: (len(set(end.covers) & set(push.covers)), -end.length)
         )
         self.pushing, self._still = True, 0
-        if self.push.turn:
-            self._driver = _turning(world, self.push, scene.config.period)
+        if self.push.traced:
+            self._tracer = PathTracer(world.robot, self.push.poses, scene.config.period)
         if self._predictive and suits(scene, self.push):
             self._follower = BoxFollower(scene, self.push)
         return None
@@ -110,8 +111,8 @@ class Job:
         left = np.isin(ids, push.covers) & ~scene.done
         if not push.frees and not left.any():
             return JobEnd.DONE
-        if push.turn:
-            return self._driver.command(pose) or JobEnd.DONE
+        if self._tracer is not None:
+            return self._tracer.command(pose) or JobEnd.DONE
         if self._last is not None:
             self._driven += math.dist(pose[:2], self._last[:2])
         longest = push.length if push.frees else 1.1 * push.length + 0.4 * scene.size
@@ -141,12 +142,6 @@ class Job:
             moved = math.dist(pose[:2], self._last[:2]) + turned * radius
             self._still = self._still + 1 if moved < 0.1 * self._asked else 0
         return self._still >= _PATIENCE
-
-
-def _turning(world: World, push: Push, period: float) -> LegDriver:
-    """A driver that turns on the spot by what a push turns by."""
-    heading = float(world.robot_pose[2]) + push.turn
-    return LegDriver(world.robot, Route(np.zeros((0, 2)), np.zeros(0), heading, 0.0), period)
 
 
 def _along_line(start: FloatArray, pose: FloatArray, size: float) -> float:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -11,8 +12,10 @@ from pushplan.control import clamp_twist
 from pushplan.planners.greedy import GreedyPusher
 from pushplan.planners.subtasks.choose import choose
 from pushplan.planners.subtasks.config import SubTaskConfig
+from pushplan.planners.subtasks.drive import PathTracer
 from pushplan.planners.subtasks.graph import SubTaskGraph
 from pushplan.planners.subtasks.job import Job, JobEnd
+from pushplan.planners.subtasks.maneuvers import way_out
 from pushplan.planners.subtasks.push import Push, signature
 from pushplan.planners.subtasks.recall import Recall
 from pushplan.planners.subtasks.scene import Scene, check_world
@@ -58,10 +61,12 @@ class GtspMpc:
 
     def _forget(self) -> None:
         self._job: Job | None = None
-        self._recall = Recall()
+        self._recalls = Recall(), Recall()
+        self._hopeful = False
         self._penalties: dict[tuple[object, ...], float] = {}
         self._barred: set[tuple[object, ...]] = set()
         self._failures = 0
+        self._leaving: PathTracer | None = None
         self._escape: list[tuple[float, float]] = []
         self._last_time = math.inf
         self._simple = GreedyPusher()
@@ -85,11 +90,11 @@ class GtspMpc:
         if world.time <= self._last_time != math.inf:
             self._forget()
         self._last_time = world.time
-        scene = Scene(world, self.config, self._recall)
+        scene = self._scene(world)
         left = int((~scene.done).sum())
         if left != self._simple_left:  # something was done, or has come back
             self._simple_left, self._in_vain, self._simple_until = left, 0, -math.inf
-            self._stopped_at = None
+            self._stopped_at, self._hopeful = None, False
             self._barred.clear()
         if not left:
             self._job, self.given_up, self.plan = None, {}, ()
@@ -100,6 +105,12 @@ class GtspMpc:
             return self._simple.act(world, observation)
         return self._decide(scene) or self._fall_back(scene)
 
+    def _scene(self, world: World) -> Scene:
+        """What is planned with: after nothing was found, with objects that slide along walls."""
+        if self._hopeful:
+            return Scene(world, replace(self.config, static_friction=0.0), self._recalls[1])
+        return Scene(world, self.config, self._recalls[0])
+
     def _decide(self, scene: Scene) -> Twist | None:
         """The next command of a push; None if none is found."""
         world, chosen = scene.world, None
@@ -107,16 +118,21 @@ class GtspMpc:
             if self._escape:
                 speed, turn = self._escape.pop(0)
                 return clamp_twist(world.robot, speed, turn)
+            if self._leaving is not None:
+                leaving = self._leaving.command(world.robot_pose)
+                if leaving is not None:
+                    return leaving
+                self._leaving = None
             if self._job is None:
                 if chosen is not None:  # one search a step is enough
                     break
-                self._recall.age()
+                self._recalls[self._hopeful].age()
                 barred = dict.fromkeys(self._barred, math.inf)
                 chosen = choose(scene, self._penalties | barred)
                 self.graph, self.plan = chosen.graph, chosen.plan
                 self.given_up = dict(chosen.graph.infeasible)
                 if chosen.first is None:
-                    return None
+                    return self._at_a_loss(scene)
                 push = chosen.first.push
                 self._job = Job(
                     world,
@@ -130,6 +146,15 @@ class GtspMpc:
                 return command
             self._close(scene, self._job, command)
         return Twist(0.0, 0.0)
+
+    def _at_a_loss(self, scene: Scene) -> Twist | None:
+        """Where no push is found: get out of a tight place, or else hope for less friction."""
+        path = way_out(scene)
+        if path is not None:
+            self._leaving = PathTracer(scene.world.robot, path, self.config.period)
+            return self._leaving.command(scene.world.robot_pose)
+        self._hopeful = not self._hopeful
+        return Twist(0.0, 0.0) if self._hopeful else None
 
     def _close(self, scene: Scene, job: Job, end: JobEnd) -> None:
         """Draw the conclusions from how a job ended."""

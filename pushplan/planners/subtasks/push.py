@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -26,8 +27,8 @@ class Push(ArrayRecord):
         shift: how far the robot's middle is to the left of the led object [m].
         gain: of the pushing law, see `Law`.
         frees: whether it only brings the object to where it can be pushed from.
-        turn: angle by which the robot turns on the spot instead of driving, for pushes with the
-            corner of the bumper [rad]; 0 for all others.
+        traced: whether the robot follows ``poses`` themselves, ahead, back and on the spot, as in
+            a maneuver.
     """
 
     covers: tuple[int, ...]
@@ -42,7 +43,7 @@ class Push(ArrayRecord):
     shift: float = 0.0
     gain: float = 1.5
     frees: bool = False
-    turn: float = 0.0
+    traced: bool = False
 
     @property
     def serves(self) -> tuple[int, ...]:
@@ -64,6 +65,7 @@ class Push(ArrayRecord):
 
 def signature(push: Push) -> tuple[object, ...]:
     """What a push is known by when it has failed."""
-    heading = round(float(push.start[2]) / 0.3)
-    way = round(push.turn, 1)
-    return push.led, push.guided, heading, round(push.shift, 2), push.gain, way
+    heading = math.remainder(float(push.start[2]), 2.0 * math.pi)
+    if push.traced:
+        return push.led, push.traced, round(heading / 0.6)
+    return push.led, push.guided, round(heading / 0.3), round(push.shift, 2), push.gain

@@ -14,6 +14,9 @@ from pushplan.planners.subtasks.rollout import EVENTS, Log, all_done, roll_out
 from pushplan.planners.subtasks.scene import Scene
 from pushplan.world.checks import BoolArray, FloatArray
 
+_ALIKE = 0.2
+"""By how much places of an object may differ that a maneuver gets it to [circumscribed radii]."""
+
 
 class Runner:
     """Runs candidate pushes of one scene, and turns stages into pushes."""
@@ -169,26 +172,21 @@ class Runner:
             frees=frees,
         )
 
-    def swing(
+    def trace(
         self,
-        start: FloatArray,
+        path: FloatArray,
         led: int,
-        turn: float,
         poses: FloatArray | None = None,
         spent: FloatArray | None = None,
     ) -> list[Push]:
-        """A turn on the spot that moves an object with the corner of the bumper, if it can be made.
+        """A drive that moves an object with whatever part of the robot meets it, if it can be made.
 
         Args:
-            start: (3,) pose.
+            path: (N, 3) poses of the robot, near each other.
             led: index of the object.
-            turn: how far [rad].
             poses, spent: see `run`.
         """
         scene = self.scene
-        steps = math.ceil(abs(turn) / 0.1)
-        path = np.tile(start, (steps + 1, 1))
-        path[:, 2] += np.linspace(0.0, turn, steps + 1)
         after = np.array(scene.poses if poses is None else poses)
         out = np.empty((len(path), len(after), 3))
         if sweep_path(path, after, scene.bodies, scene.settings, out) >= 0:
@@ -199,19 +197,21 @@ class Runner:
         if (scene.done & ~done).any():
             return []
         ids, masses = scene.world.movables.ids, scene.world.movables.masses
-        price = scene.config.turn_price * scene.size * abs(turn)
+        moves = np.diff(path, axis=0)
+        length = float(np.hypot(moves[:, 0], moves[:, 1]).sum())
+        price = length + scene.config.turn_price * scene.size * float(np.abs(moves[:, 2]).sum())
         return [
             Push(
                 covers=tuple(ids[np.flatnonzero(done & ~scene.done)].tolist()),
                 led=int(ids[led]),
                 guided=False,
                 poses=path,
-                length=0.0,
+                length=length,
                 work=float(masses @ lengths),
                 price=price + self._effort(after, lengths, done),
                 object_poses=after,
                 frees=True,
-                turn=turn,
+                traced=True,
             )
         ]
 
@@ -233,8 +233,11 @@ class Runner:
         scene = self.scene
         ids = scene.world.movables.ids
         led = int(np.flatnonzero(ids == push.led)[0])
-        if push.turn:
-            return self.swing(start, led, push.turn, poses, spent)
+        if push.traced:
+            path = np.vstack([start, push.poses[1:]])
+            path[:, 2] = np.unwrap(path[:, 2])
+            ends = self.trace(path, led, poses, spent)
+            return [end for end in ends if self._alike(push, end, led)]
         return self.run(
             start,
             led,
@@ -247,6 +250,12 @@ class Runner:
             poses=poses,
             spent=spent,
         )
+
+    def _alike(self, push: Push, other: Push, led: int) -> bool:
+        """Whether two maneuvers get an object to about the same place."""
+        gap = other.object_poses[led] - push.object_poses[led]
+        turn = math.remainder(float(gap[2]), 2.0 * math.pi)
+        return math.hypot(gap[0], gap[1]) / self.scene.size + 0.2 * abs(turn) < _ALIKE
 
     def _effort(self, poses: FloatArray, lengths: FloatArray, done: BoolArray) -> float:
         """Work, and what the objects that are left behind have farther or less far to go [m]."""

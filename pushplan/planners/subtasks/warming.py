@@ -5,7 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from pushplan.planners.pushing import warm_up as warm_up_pushing
+from pushplan.planners.subtasks.freeing import freeing_pushes
+from pushplan.planners.subtasks.maneuvers import maneuvers, way_out
 from pushplan.planners.subtasks.policy import GtspMpc
+from pushplan.planners.subtasks.runner import Runner
+from pushplan.planners.subtasks.scene import Scene
 from pushplan.world import (
     ClearanceArea,
     Movables,
@@ -26,9 +30,14 @@ def warm_up_subtasks() -> None:
     ):
         world = World(
             robot=box_delivery_robot(),
-            robot_pose=np.array([-2.0, -2.0, 0.0]),
+            robot_pose=np.array([-2.2, -2.0, 0.0]),
             static=StaticMap.build(polygons=[0.2 * square - 2.9], bounds=(-3.0, -3.0, 3.0, 3.0)),
             movables=Movables.from_outlines([0.44 * square], [(0.2, 0.1, 0.0)]),
             goal=goal,
         )
-        GtspMpc().act(world)
+        policy = GtspMpc()
+        policy.act(world)
+        scene = Scene(world, policy.config)
+        maneuvers(Runner(scene), 0)
+        freeing_pushes(Runner(scene), 0)
+        way_out(scene)

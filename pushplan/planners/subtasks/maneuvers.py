@@ -1,0 +1,351 @@
+"""Maneuvers: short drives that get an object out of a tight place with any part of the robot.
+
+Behind an object in a gap, in a corner or flat at a wall there is no room for the robot. But the end
+of its bumper may reach in and hook it out backwards, or turn it. Such drives are looked for with
+the interaction model: from many places round the object, along arcs forward, backward and on the
+spot, one after another where one is not enough (a beam search over poses of robot and object).
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+import shapely
+from numba import njit
+
+from pushplan.interaction.kernels import Bodies, Settings, advance, make_scratch, robot_held
+from pushplan.planners.subtasks.freeing import goes_home
+from pushplan.planners.subtasks.places import direction_of
+from pushplan.planners.subtasks.push import Push
+from pushplan.planners.subtasks.runner import Runner
+from pushplan.planners.subtasks.scene import Scene
+from pushplan.world import StaticMap
+from pushplan.world.checks import FloatArray, IntArray
+
+_STARTS = 300
+"""From how many places round the object a maneuver may begin."""
+_DRAWS = 3000
+"""How many places are looked at for that."""
+_BENDS = (0.0, 0.7, -0.7, 1.6, -1.6)
+"""Curvatures of the arcs, times the robot's circumscribed radius."""
+_LENGTH = 1.6
+"""Of an arc [circumscribed radii]."""
+_ROUNDS = 3
+"""How many arcs follow one another at most."""
+_BEAM = 60
+"""How many states are driven on from."""
+_TRIALS = 15
+"""In how many places, after each round, it is looked whether the object can be pushed home."""
+_ENOUGH = 3
+"""After so many ways to free an object no more are looked for."""
+_SIDES = 20
+"""How many of them are kept, all sides from which they begin counted."""
+_SHAKEN = ((0.0, 0.0, 0.0), (0.08, 0.08, 0.15), (-0.08, 0.08, -0.15), (0.0, -0.1, 0.0))
+"""Errors of the prediction with which that has to succeed [circumscribed radii, rad]."""
+_LEAST = 0.15
+"""By how much an object has to be moved for it to count [circumscribed radii]."""
+_NEARLY = (0.0, 0.6, -0.6)
+"""Directions in which a push brings an object nearer to its goal, against the way there [rad]."""
+_SPREAD = np.array([0.8191725134, 0.6710436067, 0.5497004779])
+"""Steps of an additive recurrence that fills a cube evenly (Roberts 2018)."""
+
+
+def maneuvers(runner: Runner, k: int) -> list[Push]:
+    """Drives after which object ``k`` can be pushed home, or else lies less tightly than now."""
+    scene = runner.scene
+    search = _Search(runner, k)
+    level = [_State(start[None], scene.poses, -1) for start in _starts(scene, k)]
+    best: list[_State] = []
+    for _ in range(_ROUNDS):
+        if not level:
+            break
+        states = search.drive_on(level)
+        found = search.freed(states)
+        if found:
+            return found
+        best = sorted([*best, *states[:_ENOUGH]], key=lambda state: state.price)[:_ENOUGH]
+        level = search.selected(states)
+    return search.loosened(best)
+
+
+def way_out(scene: Scene) -> FloatArray | None:
+    """A drive (N, 3) out of a tight place that moves no object; None if there is none, or no need.
+
+    It makes at least some more room round the robot, so that a few of them come to an end.
+    """
+    world, size = scene.world, scene.size
+    most = float(_room(world.static, world.robot_pose[:2]))
+    if most > 1.1 * size:
+        return None
+    steps = _steps(scene, 3.0)
+    tracks, poses, reached = _sweep_arcs(
+        world.robot_pose, scene.poses, _arcs(scene), steps, scene.bodies, scene.settings
+    )
+    best, most = None, most + _LEAST * size
+    for track, after, count in zip(tracks, poses, reached, strict=True):
+        still = int((after[:count] == scene.poses).all(axis=(1, 2)).sum())
+        rooms = np.minimum(_room(world.static, track[:still, :2]), 1.2 * size)
+        if rooms.max() > most:
+            best, most = track[: int(rooms.argmax()) + 1], float(rooms.max())
+    return best
+
+
+def _room(static: StaticMap, points: FloatArray) -> FloatArray:
+    """Distance of points (..., 2) from all that is static [m]; negative beyond the bounds."""
+    low, high = static.bounds[:2], static.bounds[2:]
+    sides: FloatArray = np.minimum(points - low, high - points).min(axis=-1)
+    return np.minimum(sides, _from_columns(static, points))
+
+
+def _from_columns(static: StaticMap, points: FloatArray) -> FloatArray:
+    """Distance of points (..., 2) from what stands within the bounds [m]; inf if nothing does."""
+    if not len(static.convex_parts):
+        return np.full(points.shape[:-1], np.inf)
+    out: FloatArray = shapely.distance(_columns(static), shapely.points(points))
+    return out
+
+
+def _arcs(scene: Scene) -> FloatArray:
+    """(A, 2) way [m], negative backward, and turn [rad] of one step of each arc."""
+    step = scene.law.step
+    signs: tuple[float, ...] = (1.0, -1.0)
+    if scene.world.robot.min_speed == 0.0:
+        signs = signs[:1]
+    arcs = [(sign * step, bend * step / scene.size) for sign in signs for bend in _BENDS]
+    out = np.array([*arcs, (0.0, 0.1), (0.0, -0.1)])
+    out[:, 1] = np.clip(out[:, 1], -scene.law.turn, scene.law.turn)
+    return out
+
+
+def _steps(scene: Scene, length: float) -> int:
+    """How many steps an arc of some length [circumscribed radii] has."""
+    return max(2, math.ceil(length * scene.size / scene.law.step))
+
+
+@dataclass(frozen=True, eq=False)
+class _State:
+    """Where some arcs have led to.
+
+    Args:
+        path: (N, 3) of the robot, from the start on.
+        poses: (K, 3) of the objects.
+        arc: the arc driven last, -1 for none.
+        price: by which states are compared [m].
+    """
+
+    path: FloatArray
+    poses: FloatArray
+    arc: int
+    price: float = math.inf
+
+
+class _Search:
+    """What the rounds of one search have in common."""
+
+    def __init__(self, runner: Runner, k: int) -> None:
+        scene = runner.scene
+        self._runner, self._scene, self._k = runner, scene, k
+        self._directions: dict[tuple[int, int], float] = {}
+        self._tight = float(self._tightness(scene.poses[[k], :2])[0])
+        self._arcs, self._steps = _arcs(scene), _steps(scene, _LENGTH)
+
+    def _tightness(self, points: FloatArray) -> FloatArray:
+        """What room the robot lacks for work on the object at points (N, 2) [m].
+
+        Between columns that is room on every side; at the walls, room for the robot behind the
+        object, that is where it would push it towards its goal from, or nearly so.
+        """
+        scene = self._scene
+        depth = scene.front + float(scene.world.movables.radii[self._k])
+        towards = np.array([self._towards(point) for point in points])
+        lacking = np.full(len(points), np.inf)
+        for turn in _NEARLY:
+            u = np.column_stack([np.cos(towards + turn), np.sin(towards + turn)])
+            room = np.minimum(
+                self._sides(points - depth * u) / (1.05 * scene.half),
+                self._sides(points - (depth + scene.front) * u) / scene.size,
+            )
+            lacking = np.minimum(lacking, scene.size * np.maximum(1.0 - room, 0.0))
+        between = 1.05 * scene.half - _from_columns(scene.world.static, points)
+        out: FloatArray = lacking + np.maximum(between, 0.0)
+        return out
+
+    def _sides(self, points: FloatArray) -> FloatArray:
+        """Distance of points (N, 2) from the walls, negative beyond them [m]."""
+        bounds = self._scene.world.static.bounds
+        sides: FloatArray = np.minimum(points - bounds[:2], bounds[2:] - points).min(axis=1)
+        return sides
+
+    def _towards(self, point: FloatArray) -> float:
+        """Direction of the way of the object from a point (2,) [rad]."""
+        unit = 0.1 * self._scene.size
+        key = round(float(point[0]) / unit), round(float(point[1]) / unit)
+        if key not in self._directions:
+            pose = np.array([*point, 0.0])
+            way = self._scene.box_path(self._k, 0.0, pose=pose)
+            ahead = 0.5 * self._scene.size
+            self._directions[key] = math.nan if way is None else direction_of(way, ahead)
+        return self._directions[key]
+
+    def drive_on(self, level: list[_State]) -> list[_State]:
+        """All that comes of driving on from some states along an arc, best first."""
+        scene, k = self._scene, self._k
+        found: list[_State] = []
+        for state in level:
+            tracks, poses, reached = _sweep_arcs(
+                state.path[-1], state.poses, self._arcs, self._steps, scene.bodies, scene.settings
+            )
+            for a, (track, after, count) in enumerate(zip(tracks, poses, reached, strict=True)):
+                for end in _news(after[:count, k], scene.size) if a != state.arc else ():
+                    path = np.concatenate([state.path, track[1 : end + 1]])
+                    found.append(_State(path, after[end].copy(), a))
+        if not found:
+            return []
+        tight = self._tightness(np.array([state.poses[k, :2] for state in found]))
+        driven = 0.05 * scene.law.step * np.array([len(state.path) - 1 for state in found])
+        return [
+            replace(found[n], price=float(tight[n] + driven[n]))
+            for n in np.argsort(tight + driven, kind="stable").tolist()
+        ]
+
+    def freed(self, states: list[_State]) -> list[Push]:
+        """Pushes to the first few places from which the object can be pushed home.
+
+        From several sides each: which is nearest to the robot is for others to say.
+        """
+        scene, k = self._scene, self._k
+        good: dict[tuple[int, ...], list[_State]] = {}
+        seen: set[tuple[int, ...]] = set()
+        for state in states:
+            cell = self._cell(state.poses[k], 0.2, 0.5)
+            if cell in good:
+                good[cell].append(state)
+            if cell in seen or _away(state.poses[k], scene.poses[k], scene.size) < _LEAST:
+                continue
+            if len(seen) >= _TRIALS or len(good) >= _ENOUGH:
+                continue
+            seen.add(cell)
+            if all(goes_home(scene, k, state.poses, state.path[-1], by) for by in _SHAKEN):
+                good[cell] = [state]
+        sides: dict[tuple[int, ...], _State] = {}
+        for cell, alike in good.items():
+            for state in alike:
+                sides.setdefault((*cell, *self._cell(state.path[0], 0.8, 0.8)), state)
+        return [push for state in list(sides.values())[:_SIDES] for push in self._push(state, 0.0)]
+
+    def loosened(self, states: list[_State]) -> list[Push]:
+        """Pushes to states in which the object lies much less tightly than it did."""
+        scene, found = self._scene, []
+        for state in states:
+            tight = float(self._tightness(state.poses[[self._k], :2])[0])
+            if tight < self._tight - 0.08 * scene.size:
+                found += self._push(state, 3.0 * tight + 2.0 * scene.size)
+        return found
+
+    def _push(self, state: _State, extra: float) -> list[Push]:
+        pushes = self._runner.trace(state.path, self._k)
+        return [replace(push, price=push.price + extra) for push in pushes]
+
+    def selected(self, states: list[_State]) -> list[_State]:
+        """The best states to drive on from, no two of them alike."""
+        chosen: dict[tuple[int, ...], _State] = {}
+        for state in states:
+            if len(chosen) >= _BEAM:
+                break
+            pair = (
+                *self._cell(state.poses[self._k], 0.2, 0.5),
+                *self._cell(state.path[-1], 0.3, 0.5),
+            )
+            chosen.setdefault(pair, state)
+        return list(chosen.values())
+
+    def _cell(self, pose: FloatArray, side: float, turn: float) -> tuple[int, ...]:
+        """A box of poses, sides in circumscribed radii and [rad]."""
+        units = (side * self._scene.size, side * self._scene.size, turn)
+        return tuple(round(float(value) / unit) for value, unit in zip(pose, units, strict=True))
+
+
+@functools.lru_cache(maxsize=8)
+def _columns(static: StaticMap) -> shapely.Geometry:
+    """All that is static within the bounds."""
+    columns = shapely.union_all([shapely.Polygon(part) for part in static.convex_parts])
+    shapely.prepare(columns)
+    return columns
+
+
+def _starts(scene: Scene, k: int) -> list[FloatArray]:
+    """Poses (3,) round object ``k`` that touch nothing, evenly spread."""
+    box, radius = scene.poses[k], float(scene.world.movables.radii[k])
+    share = np.mod(0.5 + np.outer(np.arange(1, _DRAWS + 1), _SPREAD), 1.0)
+    away = 0.3 * radius + scene.size * (0.2 + 1.1 * share[:, 0])
+    bearing, heading = 2.0 * np.pi * share[:, 1], 2.0 * np.pi * share[:, 2] - np.pi
+    x, y = box[0] + away * np.cos(bearing), box[1] + away * np.sin(bearing)
+    found: list[FloatArray] = []
+    for pose in np.column_stack([x, y, heading]):
+        if scene.fits(pose) and scene.is_clear(pose):
+            found.append(pose)
+            if len(found) == _STARTS:
+                break
+    return found
+
+
+def _away(pose: FloatArray, other: FloatArray, size: float) -> float:
+    """How far poses (3,) of an object are apart, turns included [circumscribed radii]."""
+    return math.dist(pose[:2], other[:2]) / size + 0.2 * abs(float(pose[2] - other[2]))
+
+
+def _news(poses: FloatArray, size: float) -> list[int]:
+    """Indices at which an object (N, 3) has moved on since the last of them."""
+    found, last = [], poses[0]
+    for n in range(1, len(poses)):
+        if _away(poses[n], last, size) >= 0.05:
+            found.append(n)
+            last = poses[n]
+    return found
+
+
+@njit(cache=True, nogil=True)
+def _sweep_arcs(
+    start: FloatArray,
+    poses: FloatArray,
+    arcs: FloatArray,
+    count: int,
+    bodies: Bodies,
+    settings: Settings,
+) -> tuple[FloatArray, FloatArray, IntArray]:
+    """Drive from one pose along each of some arcs.
+
+    Args:
+        start: (3,) of the robot.
+        poses: (K, 3) of the objects.
+        arcs: (A, 2) way [m], negative backward, and turn [rad] of one step of each.
+        count: steps of each arc.
+        bodies, settings: of the interaction model.
+
+    Returns:
+        (A, count + 1, 3) robot poses, (A, count + 1, K, 3) object poses, and how many of them are
+        reached.
+    """
+    scratch = make_scratch(bodies)
+    lengths = np.zeros(poses.shape[0])
+    tracks = np.empty((arcs.shape[0], count + 1, 3))
+    out = np.empty((arcs.shape[0], count + 1, poses.shape[0], 3))
+    reached = np.ones(arcs.shape[0], dtype=np.int64)
+    for a in range(arcs.shape[0]):
+        step, turn = arcs[a]
+        tracks[a, 0], out[a, 0] = start, poses
+        for n in range(1, count + 1):
+            here, there, after = tracks[a, n - 1], tracks[a, n], out[a, n]
+            there[0] = here[0] + step * math.cos(here[2] + 0.5 * turn)
+            there[1] = here[1] + step * math.sin(here[2] + 0.5 * turn)
+            there[2] = here[2] + turn
+            after[:] = out[a, n - 1]
+            if robot_held(there, bodies, settings, scratch) or not advance(
+                here, there, after, lengths, bodies, settings, scratch
+            ):
+                break
+            reached[a] = n + 1
+    return tracks, out, reached
