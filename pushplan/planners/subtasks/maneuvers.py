@@ -76,28 +76,30 @@ def way_out(scene: Scene) -> FloatArray | None:
 
     It makes at least some more room round the robot, so that a few of them come to an end.
     """
-    world, size = scene.world, scene.size
-    most = float(_room(world.static, world.robot_pose[:2]))
-    if most > 1.1 * size:
+    start, enough = scene.world.robot_pose, 1.1 * scene.size
+    most = float(_room(scene, start[None])[0])
+    if most > enough:
         return None
-    steps = _steps(scene, 3.0)
     tracks, poses, reached = _sweep_arcs(
-        world.robot_pose, scene.poses, _arcs(scene), steps, scene.bodies, scene.settings
+        start, scene.poses, _arcs(scene), _steps(scene, 3.0), scene.bodies, scene.settings
     )
-    best, most = None, most + _LEAST * size
+    best, most = None, most + _LEAST * scene.size
     for track, after, count in zip(tracks, poses, reached, strict=True):
         still = int((after[:count] == scene.poses).all(axis=(1, 2)).sum())
-        rooms = np.minimum(_room(world.static, track[:still, :2]), 1.2 * size)
+        rooms = np.minimum(_room(scene, track[:still]), enough + _LEAST * scene.size)
         if rooms.max() > most:
             best, most = track[: int(rooms.argmax()) + 1], float(rooms.max())
     return best
 
 
-def _room(static: StaticMap, points: FloatArray) -> FloatArray:
-    """Distance of points (..., 2) from all that is static [m]; negative beyond the bounds."""
-    low, high = static.bounds[:2], static.bounds[2:]
-    sides: FloatArray = np.minimum(points - low, high - points).min(axis=-1)
-    return np.minimum(sides, _from_columns(static, points))
+def _room(scene: Scene, path: FloatArray) -> FloatArray:
+    """Distance of the robot's middle on a path (N, 3) from all that is around it [m]."""
+    points, static = path[:, :2], scene.world.static
+    sides = np.minimum(points - static.bounds[:2], static.bounds[2:] - points).min(axis=1)
+    away = np.hypot(*np.moveaxis(points[:, None] - scene.poses[:, :2], 2, 0))
+    objects = (away - scene.world.movables.radii).min(axis=1, initial=np.inf)
+    out: FloatArray = np.minimum(np.minimum(sides, _from_columns(static, points)), objects)
+    return out
 
 
 def _from_columns(static: StaticMap, points: FloatArray) -> FloatArray:
