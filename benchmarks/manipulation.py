@@ -41,7 +41,7 @@ def main() -> None:
     parser.add_argument("--episodes", type=int, default=50)
     parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--only", default="", help="suites whose name holds this text")
+    parser.add_argument("--only", default="", help="a suite, or all whose names hold this text")
     parser.add_argument("--policies", default="greedy,gtsp,gtsp-mpc")
     parser.add_argument("--prices", default="", help="of work, for gtsp-mpc, besides its own")
     parser.add_argument("--figure", default="", help="draw planned sequences to this file instead")
@@ -58,7 +58,8 @@ def main() -> None:
     print(f"| {' | '.join(columns)} |\n|{'---|' * len(columns)}", flush=True)
     failed: list[str] = []
     for name in suite_names():
-        if name == "smoke" or options.only not in name:
+        exact = options.only in suite_names()
+        if name == "smoke" or (options.only != name if exact else options.only not in name):
             continue
         if suite(name, episodes=1).scenarios[0].task not in ("area_clearing", "box_delivery"):
             continue

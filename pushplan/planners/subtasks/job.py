@@ -124,8 +124,9 @@ class Job:
         if not push.guided:
             turn = _along_line(push.start, pose, law.size)
         elif len(led):
+            box = np.array(scene.poses[led[0]])
             step, turn, self._reached, holds = guide(
-                pose, scene.poses[led[0]], push.box_path, self._reached, push.shift, law
+                np.array(pose), box, push.box_path, self._reached, push.shift, law
             )
             if not holds:
                 return JobEnd.FAILED

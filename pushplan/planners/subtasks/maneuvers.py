@@ -80,9 +80,7 @@ def way_out(scene: Scene) -> FloatArray | None:
     most = float(_room(scene, start[None])[0])
     if most > enough:
         return None
-    tracks, poses, reached = _sweep_arcs(
-        start, scene.poses, _arcs(scene), _steps(scene, 3.0), scene.bodies, scene.settings
-    )
+    tracks, poses, reached = _swept(scene, start, scene.poses, _arcs(scene), _steps(scene, 3.0))
     best, most = None, most + _LEAST * scene.size
     for track, after, count in zip(tracks, poses, reached, strict=True):
         still = int((after[:count] == scene.poses).all(axis=(1, 2)).sum())
@@ -197,9 +195,8 @@ class _Search:
         scene, k = self._scene, self._k
         found: list[_State] = []
         for state in level:
-            tracks, poses, reached = _sweep_arcs(
-                state.path[-1], state.poses, self._arcs, self._steps, scene.bodies, scene.settings
-            )
+            here = state.path[-1]
+            tracks, poses, reached = _swept(scene, here, state.poses, self._arcs, self._steps)
             for a, (track, after, count) in enumerate(zip(tracks, poses, reached, strict=True)):
                 for end in _news(after[:count, k], scene.size) if a != state.arc else ():
                     path = np.concatenate([state.path, track[1 : end + 1]])
@@ -307,6 +304,17 @@ def _news(poses: FloatArray, size: float) -> list[int]:
             found.append(n)
             last = poses[n]
     return found
+
+
+def _swept(
+    scene: Scene, start: FloatArray, poses: FloatArray, arcs: FloatArray, count: int
+) -> tuple[FloatArray, FloatArray, IntArray]:
+    """`_sweep_arcs` with arrays that may be written to: one kernel for all."""
+    first, before = np.array(start), np.array(poses)
+    out: tuple[FloatArray, FloatArray, IntArray] = _sweep_arcs(
+        first, before, arcs, count, scene.bodies, scene.settings
+    )
+    return out
 
 
 @njit(cache=True, nogil=True)

@@ -111,8 +111,8 @@ class Runner:
         if known is not None:
             return known
         stages, used, _ = roll_out(
-            start,
-            poses,
+            np.array(start),  # a copy may be written to: one kernel for all
+            np.array(poses),
             led if len(path) else -1,
             path,
             shift,
