@@ -31,15 +31,16 @@ _WAYS = ((1.08, False), (0.0, False), (1.08, True))
 the middle of a receptacle."""
 
 
-def simple_pushes(runner: Runner) -> list[Push]:
-    """Pushes from behind, after which something is where it belongs, or nearer to it."""
+def simple_pushes(runner: Runner, *, partial: bool = True) -> list[Push]:
+    """Pushes from behind, after which something is where it belongs, or, if ``partial``, nearer."""
     left = runner.left.tolist()
     if isinstance(runner.scene.world.goal, ClearanceArea):
         pushes = area_pushes(runner)
         covered = {i for push in pushes for i in push.covers}
         ids = runner.scene.world.movables.ids
-        return pushes + guided_pushes(runner, [k for k in left if int(ids[k]) not in covered])
-    return guided_pushes(runner, left) + collecting_pushes(runner, left)
+        hard = [k for k in left if int(ids[k]) not in covered]
+        return pushes + guided_pushes(runner, hard, partial=partial)
+    return guided_pushes(runner, left, partial=partial) + collecting_pushes(runner, left)
 
 
 def area_pushes(runner: Runner) -> list[Push]:
@@ -109,7 +110,7 @@ def _sweeps(runner: Runner, heading: float, boxes: list[int], single: bool) -> l
     return found
 
 
-def guided_pushes(runner: Runner, boxes: Iterable[int]) -> list[Push]:
+def guided_pushes(runner: Runner, boxes: Iterable[int], *, partial: bool = True) -> list[Push]:
     """Pushes that lead an object along its way to the goal, beside it on either side."""
     scene = runner.scene
     found: list[Push] = []
@@ -134,7 +135,9 @@ def guided_pushes(runner: Runner, boxes: Iterable[int]) -> list[Push]:
         if n >= _HARD and found:
             break
         own = [push for path in hard[k] for push in curved_pushes(runner, k, path)]
-        found += own or [push for path in hard[k] for push in partial_pushes(runner, k, path)]
+        if partial and not own:
+            own = [push for path in hard[k] for push in partial_pushes(runner, k, path)]
+        found += own
     return found
 
 

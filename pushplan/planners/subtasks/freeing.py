@@ -152,4 +152,6 @@ def goes_home(
         return True
     runner = Runner(after)
     runner.left = np.array([index])
-    return any(int(movables.ids[index]) in push.covers for push in simple_pushes(runner))
+    return any(
+        int(movables.ids[index]) in push.covers for push in simple_pushes(runner, partial=False)
+    )

@@ -20,6 +20,7 @@ from pushplan.interaction.kernels import Bodies, Settings, advance, make_scratch
 from pushplan.planners.subtasks.freeing import goes_home
 from pushplan.planners.subtasks.places import direction_of
 from pushplan.planners.subtasks.push import Push
+from pushplan.planners.subtasks.recall import Drive
 from pushplan.planners.subtasks.runner import Runner
 from pushplan.planners.subtasks.scene import Scene
 from pushplan.world import StaticMap
@@ -49,14 +50,34 @@ _LEAST = 0.15
 """By how much an object has to be moved for it to count [circumscribed radii]."""
 _NEARLY = (0.0, 0.6, -0.6)
 """Directions in which a push brings an object nearer to its goal, against the way there [rad]."""
+_NEAR = 8.0
+"""What is farther from the object does not count for a search [circumscribed radii]."""
 _SPREAD = np.array([0.8191725134, 0.6710436067, 0.5497004779])
 """Steps of an additive recurrence that fills a cube evenly (Roberts 2018)."""
 
 
 def maneuvers(runner: Runner, k: int) -> list[Push]:
     """Drives after which object ``k`` can be pushed home, or else lies less tightly than now."""
-    scene = runner.scene
-    search = _Search(runner, k)
+    scene, found = runner.scene, None
+    movables = scene.world.movables
+    near = np.hypot(*(scene.poses[:, :2] - scene.poses[k, :2]).T) < _NEAR * scene.size
+    key = movables.ids[near].tobytes() + scene.poses[near].tobytes()
+    if scene.recall is not None:
+        found = scene.recall.drives(int(movables.ids[k]), key)
+    if found is None:
+        found = _searched(scene, k)
+        if scene.recall is not None:
+            scene.recall.keep_drives(int(movables.ids[k]), key, found)
+    return [
+        replace(push, price=push.price + extra)
+        for path, extra in found
+        for push in runner.trace(path, k)
+    ]
+
+
+def _searched(scene: Scene, k: int) -> list[Drive]:
+    """`maneuvers`, looked for."""
+    search = _Search(scene, k)
     level = [_State(start[None], scene.poses, -1) for start in _starts(scene, k)]
     best: list[_State] = []
     for _ in range(_ROUNDS):
@@ -145,9 +166,8 @@ class _State:
 class _Search:
     """What the rounds of one search have in common."""
 
-    def __init__(self, runner: Runner, k: int) -> None:
-        scene = runner.scene
-        self._runner, self._scene, self._k = runner, scene, k
+    def __init__(self, scene: Scene, k: int) -> None:
+        self._scene, self._k = scene, k
         self._directions: dict[tuple[int, int], float] = {}
         self._tight = float(self._tightness(scene.poses[[k], :2])[0])
         self._arcs, self._steps = _arcs(scene), _steps(scene, _LENGTH)
@@ -210,8 +230,8 @@ class _Search:
             for n in np.argsort(tight + driven, kind="stable").tolist()
         ]
 
-    def freed(self, states: list[_State]) -> list[Push]:
-        """Pushes to the first few places from which the object can be pushed home.
+    def freed(self, states: list[_State]) -> list[Drive]:
+        """Drives to the first few places from which the object can be pushed home.
 
         From several sides each: which is nearest to the robot is for others to say.
         """
@@ -233,20 +253,17 @@ class _Search:
         for cell, alike in good.items():
             for state in alike:
                 sides.setdefault((*cell, *self._cell(state.path[0], 0.8, 0.8)), state)
-        return [push for state in list(sides.values())[:_SIDES] for push in self._push(state, 0.0)]
+        return [(state.path, 0.0) for state in list(sides.values())[:_SIDES]]
 
-    def loosened(self, states: list[_State]) -> list[Push]:
-        """Pushes to states in which the object lies much less tightly than it did."""
-        scene, found = self._scene, []
+    def loosened(self, states: list[_State]) -> list[Drive]:
+        """Drives to states in which the object lies much less tightly than it did."""
+        scene = self._scene
+        found: list[Drive] = []
         for state in states:
             tight = float(self._tightness(state.poses[[self._k], :2])[0])
             if tight < self._tight - 0.08 * scene.size:
-                found += self._push(state, 3.0 * tight + 2.0 * scene.size)
+                found.append((state.path, 3.0 * tight + 2.0 * scene.size))
         return found
-
-    def _push(self, state: _State, extra: float) -> list[Push]:
-        pushes = self._runner.trace(state.path, self._k)
-        return [replace(push, price=push.price + extra) for push in pushes]
 
     def selected(self, states: list[_State]) -> list[_State]:
         """The best states to drive on from, no two of them alike."""

@@ -15,6 +15,10 @@ _OLD = 8
 """For how many plans what is not asked for is kept."""
 
 
+Drive = tuple[FloatArray, float]
+"""Poses (N, 3) of the robot in a maneuver, and what it leaves to be done [m]."""
+
+
 @dataclass(frozen=True, eq=False)
 class Run:
     """What a push came to.
@@ -53,6 +57,16 @@ class Recall:
 
     def __init__(self) -> None:
         self._entries: dict[object, _Entry] = {}
+        self._drives: dict[int, tuple[bytes, list[Drive]]] = {}
+
+    def drives(self, led: int, around: bytes) -> list[Drive] | None:
+        """Maneuvers found for an object, if that was with the same around it."""
+        known = self._drives.get(led)
+        return known[1] if known is not None and known[0] == around else None
+
+    def keep_drives(self, led: int, around: bytes, found: list[Drive]) -> None:
+        """Keep the maneuvers found for an object."""
+        self._drives[led] = around, found
 
     def __len__(self) -> int:
         return len(self._entries)
