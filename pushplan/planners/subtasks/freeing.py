@@ -29,14 +29,20 @@ _NEARLY = tuple(math.radians(turn) for turn in (0, 30, -30, 60, -60))
 """Directions of a push that bring an object nearer to its goal, against the shortest way [rad]."""
 
 
-def freeing_pushes(runner: Runner, k: int) -> list[Push]:
-    """Short line pushes that bring an object to where it can be got at."""
+def freeing_pushes(runner: Runner, k: int) -> tuple[list[Push], bool]:
+    """Short line pushes that bring an object to where it can be got at.
+
+    Returns:
+        Those after which it can be pushed home, or lies better than now; whether one is of the
+        first kind.
+    """
     scene = runner.scene
     way = scene.box_path(k, 0.0)
     if way is None:
-        return []
+        return [], False
     towards, lacking = direction_of(way, scene.size), _lacking(scene, k, scene.poses[k])
     found: list[Push] = []
+    is_freed = False
     for turn in _TURNS:
         if len(found) >= _ENOUGH:
             break
@@ -48,9 +54,10 @@ def freeing_pushes(runner: Runner, k: int) -> list[Push]:
             for limit in (0.8, 1.8, 3.5):
                 for push in runner.run(start, k, limit=limit * scene.size, frees=True):
                     extra = _in_vain(runner, k, push, lacking)
+                    is_freed = is_freed or extra == 0.0
                     if math.isfinite(extra):
                         found.append(replace(push, price=push.price + extra))
-    return found
+    return found, is_freed
 
 
 def _in_vain(runner: Runner, k: int, push: Push, lacking: float) -> float:

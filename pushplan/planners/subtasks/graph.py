@@ -93,7 +93,9 @@ def candidate_pushes(scene: Scene, runner: Runner, freeing: bool = False) -> lis
         freed = 0
         away = np.hypot(*(scene.poses[:, :2] - scene.world.robot_pose[:2]).T)
         for k in sorted(runner.left.tolist(), key=lambda k: (float(away[k]), k)):
-            found = freeing_pushes(runner, k) + maneuvers(runner, k)
+            found, is_freed = freeing_pushes(runner, k)
+            if not is_freed:  # a maneuver takes longer to find
+                found += maneuvers(runner, k)
             pushes += found
             freed += bool(found)
             if freed == _FREED:
