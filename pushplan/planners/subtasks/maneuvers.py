@@ -52,6 +52,8 @@ _NEARLY = (0.0, 0.6, -0.6)
 """Directions in which a push brings an object nearer to its goal, against the way there [rad]."""
 _NEAR = 8.0
 """What is farther from the object does not count for a search [circumscribed radii]."""
+_SEARCHES = 24
+"""How often maneuvers are looked for until something is done; bounds the time of an episode."""
 _SPREAD = np.array([0.8191725134, 0.6710436067, 0.5497004779])
 """Steps of an additive recurrence that fills a cube evenly (Roberts 2018)."""
 
@@ -64,6 +66,8 @@ def maneuvers(runner: Runner, k: int) -> list[Push]:
     key = movables.ids[near].tobytes() + scene.poses[near].tobytes()
     if scene.recall is not None:
         found = scene.recall.drives(int(movables.ids[k]), key)
+        if found is None and scene.recall.searches >= _SEARCHES:
+            return []
     if found is None:
         found = _searched(scene, k)
         if scene.recall is not None:

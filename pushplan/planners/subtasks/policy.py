@@ -96,6 +96,8 @@ class GtspMpc:
             self._simple_left, self._in_vain, self._simple_until = left, 0, -math.inf
             self._stopped_at, self._hopeful = None, False
             self._barred.clear()
+            for recall in self._recalls:
+                recall.searches = 0
         if not left:
             self._job, self.given_up, self.plan = None, {}, ()
             return Twist(0.0, 0.0)

@@ -53,11 +53,15 @@ class Recall:
     """Runs of the plan before, by what was run.
 
     A run counts again if the same objects lie in the same places wherever it came near one.
+
+    Attributes:
+        searches: how often maneuvers have been looked for since something was done.
     """
 
     def __init__(self) -> None:
         self._entries: dict[object, _Entry] = {}
         self._drives: dict[int, tuple[bytes, list[Drive]]] = {}
+        self.searches = 0
 
     def drives(self, led: int, around: bytes) -> list[Drive] | None:
         """Maneuvers found for an object, if that was with the same around it."""
@@ -67,6 +71,7 @@ class Recall:
     def keep_drives(self, led: int, around: bytes, found: list[Drive]) -> None:
         """Keep the maneuvers found for an object."""
         self._drives[led] = around, found
+        self.searches += 1
 
     def __len__(self) -> int:
         return len(self._entries)
