@@ -118,10 +118,17 @@ def way_out(scene: Scene) -> FloatArray | None:
 def _room(scene: Scene, path: FloatArray) -> FloatArray:
     """Distance of the robot's middle on a path (N, 3) from all that is around it [m]."""
     points, static = path[:, :2], scene.world.static
-    sides = np.minimum(points - static.bounds[:2], static.bounds[2:] - points).min(axis=1)
     away = np.hypot(*np.moveaxis(points[:, None] - scene.poses[:, :2], 2, 0))
     objects = (away - scene.world.movables.radii).min(axis=1, initial=np.inf)
-    out: FloatArray = np.minimum(np.minimum(sides, _from_columns(static, points)), objects)
+    out: FloatArray = np.minimum(
+        np.minimum(_from_walls(static, points), _from_columns(static, points)), objects
+    )
+    return out
+
+
+def _from_walls(static: StaticMap, points: FloatArray) -> FloatArray:
+    """Distance of points (N, 2) from the bounds, negative beyond them [m]."""
+    out: FloatArray = np.minimum(points - static.bounds[:2], static.bounds[2:] - points).min(axis=1)
     return out
 
 
@@ -189,19 +196,13 @@ class _Search:
         for turn in _NEARLY:
             u = np.column_stack([np.cos(towards + turn), np.sin(towards + turn)])
             room = np.minimum(
-                self._sides(points - depth * u) / (1.05 * scene.half),
-                self._sides(points - (depth + scene.front) * u) / scene.size,
+                _from_walls(scene.world.static, points - depth * u) / (1.05 * scene.half),
+                _from_walls(scene.world.static, points - (depth + scene.front) * u) / scene.size,
             )
             lacking = np.minimum(lacking, scene.size * np.maximum(1.0 - room, 0.0))
         between = 1.05 * scene.half - _from_columns(scene.world.static, points)
         out: FloatArray = lacking + np.maximum(between, 0.0)
         return out
-
-    def _sides(self, points: FloatArray) -> FloatArray:
-        """Distance of points (N, 2) from the walls, negative beyond them [m]."""
-        bounds = self._scene.world.static.bounds
-        sides: FloatArray = np.minimum(points - bounds[:2], bounds[2:] - points).min(axis=1)
-        return sides
 
     def _towards(self, point: FloatArray) -> float:
         """Direction of the way of the object from a point (2,) [rad]."""
