@@ -1,35 +1,42 @@
-"""Contact between two convex polygons: the points where one holds the other."""
+"""Contact between two convex polygons: the points where one holds the other.
+
+Polygons are rows of an array, from one index to before another: a view of each would be counted by
+the runtime whenever it is passed on, which takes as long as the arithmetic.
+"""
 
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from pushplan.geometry.compiled import kernel
 from pushplan.world.checks import FloatArray
 
 
-@njit(cache=True, nogil=True)
-def least_overlap(a: FloatArray, b: FloatArray) -> tuple[float, int]:
-    """Greatest separation of ``b`` from the edges of ``a``, and the edge that has it.
+@kernel
+def least_overlap(
+    a: FloatArray, a_first: int, a_end: int, b: FloatArray, b_first: int, b_end: int
+) -> tuple[float, int]:
+    """Greatest separation of a polygon from the edges of another, and the edge that has it.
 
     Args:
-        a: (N, 2) counter-clockwise corners [m].
-        b: (M, 2) counter-clockwise corners [m].
+        a: (N, 2) corners, of which ``a_first`` to ``a_end`` are those of a polygon,
+            counter-clockwise [m].
+        a_first, a_end: see above.
+        b, b_first, b_end: the other polygon, likewise.
 
     Returns:
-        Signed gap [m] along the edge's outward normal (negative: overlap) and the edge's index.
-        Stops at the first edge that separates the two.
+        Signed gap [m] along the outward normal of an edge of ``a`` (negative: overlap), and the
+        row that the edge begins at. Stops at the first edge that separates the two.
     """
-    best, edge = -np.inf, 0
-    count = a.shape[0]
-    for i in range(count):
-        j = i + 1 if i + 1 < count else 0
+    best, edge = -np.inf, a_first
+    for i in range(a_first, a_end):
+        j = i + 1 if i + 1 < a_end else a_first
         nx, ny = a[j, 1] - a[i, 1], a[i, 0] - a[j, 0]
         scale = 1.0 / np.sqrt(nx * nx + ny * ny)
         nx *= scale
         ny *= scale
         gap = np.inf
-        for k in range(b.shape[0]):
+        for k in range(b_first, b_end):
             d = (b[k, 0] - a[i, 0]) * nx + (b[k, 1] - a[i, 1]) * ny
             if d < gap:
                 gap = d
@@ -40,47 +47,68 @@ def least_overlap(a: FloatArray, b: FloatArray) -> tuple[float, int]:
     return best, edge
 
 
-@njit(cache=True, nogil=True)
-def contacts(a: FloatArray, b: FloatArray, out: FloatArray) -> int:
+@kernel
+def contacts(
+    a: FloatArray,
+    a_first: int,
+    a_end: int,
+    b: FloatArray,
+    b_first: int,
+    b_end: int,
+    out: FloatArray,
+) -> int:
     """Contact points of two overlapping convex polygons, by clipping the incident edge.
 
     Args:
-        a: (N, 2) counter-clockwise corners [m].
-        b: (M, 2) counter-clockwise corners [m].
-        out: (2, 5) receives for each point x, y [m], the unit normal from ``a`` to ``b``, and the
-            depth [m] by which ``b`` has to move along it.
+        a, a_first, a_end: the first polygon, as in `least_overlap`.
+        b, b_first, b_end: the second one.
+        out: (2, 5) receives for each point x, y [m], the unit normal from the first to the second,
+            and the depth [m] by which the second has to move along it.
 
     Returns:
         The number of points: 0 where the two do not overlap, else 1 or 2.
     """
-    gap_a, edge_a = least_overlap(a, b)
+    gap_a, edge_a = least_overlap(a, a_first, a_end, b, b_first, b_end)
     if gap_a >= 0.0:
         return 0
-    gap_b, edge_b = least_overlap(b, a)
+    gap_b, edge_b = least_overlap(b, b_first, b_end, a, a_first, a_end)
     if gap_b >= 0.0:
         return 0
-    # a small preference for a's edges keeps the choice from flickering on ties
-    flip = gap_b > gap_a + 1e-9 + 0.01 * abs(gap_a)
-    ref, inc, edge = (b, a, edge_b) if flip else (a, b, edge_a)
-    count = ref.shape[0]
-    p, q = ref[edge], ref[edge + 1 if edge + 1 < count else 0]
-    tx, ty = q[0] - p[0], q[1] - p[1]
+    # a small preference for the first one's edges keeps the choice from flickering on ties
+    if gap_b > gap_a + 1e-9 + 0.01 * abs(gap_a):
+        return _clipped(b, b_first, b_end, edge_b, a, a_first, a_end, -1.0, out)
+    return _clipped(a, a_first, a_end, edge_a, b, b_first, b_end, 1.0, out)
+
+
+@kernel
+def _clipped(
+    ref: FloatArray,
+    ref_first: int,
+    ref_end: int,
+    edge: int,
+    inc: FloatArray,
+    inc_first: int,
+    inc_end: int,
+    sign: float,
+    out: FloatArray,
+) -> int:
+    """Clip the edge that faces the reference edge against it; returns the number of points."""
+    after = edge + 1 if edge + 1 < ref_end else ref_first
+    px, py = ref[edge, 0], ref[edge, 1]
+    tx, ty = ref[after, 0] - px, ref[after, 1] - py
     length = np.sqrt(tx * tx + ty * ty)
     tx, ty = tx / length, ty / length
     nx, ny = ty, -tx
-    # the incident edge faces the reference normal most directly
-    side, facing = 0, np.inf
-    total = inc.shape[0]
-    for i in range(total):
-        j = i + 1 if i + 1 < total else 0
+    side, other, facing = inc_first, inc_first, np.inf
+    for i in range(inc_first, inc_end):
+        j = i + 1 if i + 1 < inc_end else inc_first
         ex, ey = inc[j, 1] - inc[i, 1], inc[i, 0] - inc[j, 0]
         d = (ex * nx + ey * ny) / np.sqrt(ex * ex + ey * ey)
         if d < facing:
-            facing, side = d, i
-    u, w = inc[side], inc[side + 1 if side + 1 < total else 0]
-    su, sw = (u[0] - p[0]) * tx + (u[1] - p[1]) * ty, (w[0] - p[0]) * tx + (w[1] - p[1]) * ty
-    du, dw = (u[0] - p[0]) * nx + (u[1] - p[1]) * ny, (w[0] - p[0]) * nx + (w[1] - p[1]) * ny
-    sign = -1.0 if flip else 1.0
+            facing, side, other = d, i, j
+    ux, uy, wx, wy = inc[side, 0] - px, inc[side, 1] - py, inc[other, 0] - px, inc[other, 1] - py
+    su, sw = ux * tx + uy * ty, wx * tx + wy * ty
+    du, dw = ux * nx + uy * ny, wx * nx + wy * ny
     found = 0
     span = sw - su
     for end in range(2):
@@ -91,8 +119,8 @@ def contacts(a: FloatArray, b: FloatArray, out: FloatArray) -> int:
                 continue
             d = du + (clipped - su) / span * (dw - du)
         if d < 0.0:
-            out[found, 0] = p[0] + clipped * tx + d * nx
-            out[found, 1] = p[1] + clipped * ty + d * ny
+            out[found, 0] = px + clipped * tx + d * nx
+            out[found, 1] = py + clipped * ty + d * ny
             out[found, 2] = sign * nx
             out[found, 3] = sign * ny
             out[found, 4] = -d

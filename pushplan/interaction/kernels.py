@@ -15,6 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
+from pushplan.geometry.compiled import copy_into, kernel
 from pushplan.interaction.contact import contacts, least_overlap
 from pushplan.interaction.separation import drag_along, place, separate
 from pushplan.world.checks import FloatArray, IntArray
@@ -63,7 +64,7 @@ class Settings(NamedTuple):
     """Coulomb coefficient between objects and walls."""
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _gather_near(
     bodies: Bodies,
     poses: FloatArray,
@@ -103,7 +104,15 @@ class Scratch(NamedTuple):
     points: FloatArray
     """(2, 5) contact points."""
     fixed: FloatArray
-    """(3,) a pose that stands for whatever cannot move."""
+    """(1, 3) a pose that stands for whatever cannot move."""
+    still: FloatArray
+    """(3,) the same."""
+    here: FloatArray
+    """(3,) where a small step begins."""
+    there: FloatArray
+    """(3,) where it ends."""
+    saved: FloatArray
+    """(K, 3) poses before it."""
     tests: IntArray
     """(1,) pairs of outlines that were tested so far: a measure of time without a clock."""
 
@@ -118,20 +127,27 @@ def make_scratch(bodies: Bodies) -> Scratch:
         np.empty(count, np.int64),
         np.empty((count, 3)),
         np.empty((2, 5)),
+        np.zeros((1, 3)),
         np.zeros(3),
+        np.empty(3),
+        np.empty(3),
+        np.empty((count, 3)),
         np.zeros(1, np.int64),
     )
 
 
-@njit(cache=True, nogil=True)
-def _outline(k: int, bodies: Bodies, poses: FloatArray, scratch: Scratch) -> FloatArray:
-    a, b = bodies.offsets[k], bodies.offsets[k + 1]
-    out = scratch.outlines[a:b]
-    place(poses[k], bodies.vertices[a:b], out)
-    return out
+@kernel
+def _outline(k: int, bodies: Bodies, poses: FloatArray, outlines: FloatArray) -> None:
+    """Carry the corners of object ``k`` to where it is, in their rows of ``outlines``."""
+    x, y = poses[k, 0], poses[k, 1]
+    c, s = np.cos(poses[k, 2]), np.sin(poses[k, 2])
+    for i in range(bodies.offsets[k], bodies.offsets[k + 1]):
+        px, py = bodies.vertices[i, 0], bodies.vertices[i, 1]
+        outlines[i, 0] = x + c * px - s * py
+        outlines[i, 1] = y + s * px + c * py
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _against_robot(
     k: int,
     robot_from: FloatArray,
@@ -142,99 +158,102 @@ def _against_robot(
     scratch: Scratch,
 ) -> float:
     """Move object ``k`` out of the robot; returns the deepest overlap found."""
-    deepest = 0.0
-    points = scratch.points
-    for part in range(bodies.robot_offsets.shape[0] - 1):
-        piece = scratch.robot[bodies.robot_offsets[part] : bodies.robot_offsets[part + 1]]
-        found = contacts(piece, _outline(k, bodies, poses, scratch), points)
+    deepest, inv = 0.0, bodies.inverse_gyration[k]
+    parts, points, outlines = bodies.robot_offsets, scratch.points, scratch.outlines
+    first, end = bodies.offsets[k], bodies.offsets[k + 1]
+    _outline(k, bodies, poses, outlines)
+    for part in range(parts.shape[0] - 1):
+        found = contacts(scratch.robot, parts[part], parts[part + 1], outlines, first, end, points)
         if found == 0:
             continue
         for i in range(found):
             deepest = max(deepest, points[i, 4])
-        inv = bodies.inverse_gyration[k]
-        pushed = separate(points, found, scratch.fixed, 0.0, 0.0, poses[k], 1.0, inv)
+        pushed = separate(points, found, scratch.fixed, 0, 0.0, 0.0, poses, k, 1.0, inv)
         if settings.friction > 0.0:
-            if found == 2:
-                points[0, :2] = 0.5 * (points[0, :2] + points[1, :2])
-            limit = settings.friction * pushed
-            before = scratch.before[k]
-            drag_along(points[0], limit, robot_from, robot_to, before, poses[k], inv)
+            limit, before = settings.friction * pushed, scratch.before
+            drag_along(points, found, limit, robot_from, robot_to, before, poses, k, inv)
+        _outline(k, bodies, poses, outlines)
     return deepest
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _against_static(
     k: int, poses: FloatArray, bodies: Bodies, settings: Settings, scratch: Scratch
 ) -> float:
     """Move object ``k`` out of the walls; returns the deepest overlap found."""
-    deepest = 0.0
-    points = scratch.points
+    deepest, inv = 0.0, bodies.inverse_gyration[k]
+    walls, boxes, parts = bodies.static_vertices, bodies.static_boxes, bodies.static_offsets
+    points, outlines = scratch.points, scratch.outlines
+    first, end = bodies.offsets[k], bodies.offsets[k + 1]
     x, y, r = poses[k, 0], poses[k, 1], bodies.radii[k]
-    for part in range(bodies.static_boxes.shape[0]):
-        box = bodies.static_boxes[part]
-        if x + r <= box[0] or x - r >= box[2] or y + r <= box[1] or y - r >= box[3]:
+    _outline(k, bodies, poses, outlines)
+    for part in range(boxes.shape[0]):
+        if x + r <= boxes[part, 0] or x - r >= boxes[part, 2]:
             continue
-        a, b = bodies.static_offsets[part], bodies.static_offsets[part + 1]
-        wall = bodies.static_vertices[a:b]
-        found = contacts(wall, _outline(k, bodies, poses, scratch), points)
+        if y + r <= boxes[part, 1] or y - r >= boxes[part, 3]:
+            continue
+        found = contacts(walls, parts[part], parts[part + 1], outlines, first, end, points)
+        if found == 0:
+            continue
         for i in range(found):
             deepest = max(deepest, points[i, 4])
-        if found > 0:
-            inv = bodies.inverse_gyration[k]
-            pushed = separate(points, found, scratch.fixed, 0.0, 0.0, poses[k], 1.0, inv)
-            if settings.static_friction > 0.0:
-                if found == 2:
-                    points[0, :2] = 0.5 * (points[0, :2] + points[1, :2])
-                limit = settings.static_friction * pushed
-                still, before = scratch.fixed, scratch.before[k]
-                drag_along(points[0], limit, still, still, before, poses[k], inv)
+        pushed = separate(points, found, scratch.fixed, 0, 0.0, 0.0, poses, k, 1.0, inv)
+        if settings.static_friction > 0.0:
+            limit, still = settings.static_friction * pushed, scratch.still
+            drag_along(points, found, limit, still, still, scratch.before, poses, k, inv)
+        _outline(k, bodies, poses, outlines)
     return deepest
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _against_objects(
     i: int, count: int, poses: FloatArray, bodies: Bodies, settings: Settings, scratch: Scratch
 ) -> tuple[float, int]:
     """Move active object ``i`` and its neighbours apart; neighbours that move become active."""
     deepest = 0.0
-    points = scratch.points
+    points, outlines, offsets = scratch.points, scratch.outlines, bodies.offsets
     k = scratch.active[i]
-    outline = _outline(k, bodies, poses, scratch)
+    first, end = offsets[k], offsets[k + 1]
+    _outline(k, bodies, poses, outlines)
     for other in range(poses.shape[0]):
         dx, dy = poses[other, 0] - poses[k, 0], poses[other, 1] - poses[k, 1]
         reach = bodies.radii[other] + bodies.radii[k]
         if other == k or dx * dx + dy * dy >= reach * reach:
             continue
         scratch.tests[0] += 1
-        found = contacts(outline, _outline(other, bodies, poses, scratch), points)
+        _outline(other, bodies, poses, outlines)
+        found = contacts(outlines, first, end, outlines, offsets[other], offsets[other + 1], points)
         if found == 0:
             continue
         depth = points[0, 4] if found == 1 else max(points[0, 4], points[1, 4])
+        if depth <= settings.tolerance:
+            continue
         known = False
         for j in range(count):
             known = known or scratch.active[j] == other
-        if depth <= settings.tolerance:
-            continue
         if not known:
-            scratch.before[other] = poses[other]
+            for axis in range(3):
+                scratch.before[other, axis] = poses[other, axis]
             scratch.active[count] = other
             count += 1
         deepest = max(deepest, depth)
         separate(
             points,
             found,
-            poses[k],
+            poses,
+            k,
             bodies.inverse_masses[k],
             bodies.inverse_gyration[k],
-            poses[other],
+            poses,
+            other,
             bodies.inverse_masses[other],
             bodies.inverse_gyration[other],
         )
-        _outline(k, bodies, poses, scratch)
+        _outline(k, bodies, poses, outlines)
     return deepest, count
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _resolve(
     robot_from: FloatArray,
     robot_to: FloatArray,
@@ -249,7 +268,8 @@ def _resolve(
         bodies, poses, robot_to[0], robot_to[1], bodies.robot_radius, scratch.active, 0
     )
     for i in range(count):
-        scratch.before[scratch.active[i]] = poses[scratch.active[i]]
+        for axis in range(3):
+            scratch.before[scratch.active[i], axis] = poses[scratch.active[i], axis]
     touched = count  # the robot itself reaches only these
     left = 0.0
     for _ in range(settings.iterations):
@@ -275,7 +295,7 @@ def _resolve(
     return left
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def advance(
     robot_from: FloatArray,
     robot_to: FloatArray,
@@ -308,44 +328,46 @@ def advance(
     if _gather_near(bodies, poses, mid_x, mid_y, reach, scratch.active, 0) == 0:
         return True
     steps = max(1, int(np.ceil(motion / settings.max_step)))
-    here, there = robot_from.copy(), np.empty(3)
+    here, there, saved = scratch.here, scratch.there, scratch.saved
+    copy_into(here, robot_from)
     for step in range(1, steps + 1):
         part = step / steps
         there[0] = robot_from[0] + part * dx
         there[1] = robot_from[1] + part * dy
         there[2] = robot_from[2] + part * turn
-        saved = poses.copy()
+        copy_into(saved, poses)
         left = _resolve(here, there, poses, bodies, settings, scratch)
         if left > settings.jam_depth:
-            poses[:] = saved
+            copy_into(poses, saved)
             return False
         for k in range(poses.shape[0]):
             if poses[k, 0] != saved[k, 0] or poses[k, 1] != saved[k, 1]:
                 lengths[k] += np.sqrt(
                     (poses[k, 0] - saved[k, 0]) ** 2 + (poses[k, 1] - saved[k, 1]) ** 2
                 )
-        here[:] = there
+        copy_into(here, there)
     return True
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def robot_held(pose: FloatArray, bodies: Bodies, settings: Settings, scratch: Scratch) -> bool:
     """Whether the robot at ``pose`` (3,) overlaps something static by more than the jam depth."""
     x, y, r = pose[0], pose[1], bodies.robot_radius
-    placed = False
-    for part in range(bodies.static_boxes.shape[0]):
-        box = bodies.static_boxes[part]
-        if x + r <= box[0] or x - r >= box[2] or y + r <= box[1] or y - r >= box[3]:
+    placed, boxes = False, bodies.static_boxes
+    for part in range(boxes.shape[0]):
+        if x + r <= boxes[part, 0] or x - r >= boxes[part, 2]:
+            continue
+        if y + r <= boxes[part, 1] or y - r >= boxes[part, 3]:
             continue
         if not placed:
             place(pose, bodies.robot_vertices, scratch.robot)
             placed = True
         a, b = bodies.static_offsets[part], bodies.static_offsets[part + 1]
-        wall = bodies.static_vertices[a:b]
+        walls, corners = bodies.static_vertices, scratch.robot
         for piece in range(bodies.robot_offsets.shape[0] - 1):
             c, d = bodies.robot_offsets[piece], bodies.robot_offsets[piece + 1]
-            corners = scratch.robot[c:d]
-            gap = max(least_overlap(wall, corners)[0], least_overlap(corners, wall)[0])
+            gap = least_overlap(walls, a, b, corners, c, d)[0]
+            gap = max(gap, least_overlap(corners, c, d, walls, a, b)[0])
             if gap < -settings.jam_depth:
                 return True
     return False

@@ -31,16 +31,23 @@ _WAYS = ((1.08, False), (0.0, False), (1.08, True))
 the middle of a receptacle."""
 
 
-def simple_pushes(runner: Runner, *, partial: bool = True) -> list[Push]:
-    """Pushes from behind, after which something is where it belongs, or, if ``partial``, nearer."""
+def simple_pushes(runner: Runner, *, thorough: bool = True) -> list[Push]:
+    """Pushes from behind, after which something is where it belongs, or nearer.
+
+    Args:
+        runner: for the scene.
+        thorough: false to know no more than whether there is a push; none that only bring an
+            object nearer are looked for then.
+    """
     left = runner.left.tolist()
     if isinstance(runner.scene.world.goal, ClearanceArea):
         pushes = area_pushes(runner)
         covered = {i for push in pushes for i in push.covers}
         ids = runner.scene.world.movables.ids
         hard = [k for k in left if int(ids[k]) not in covered]
-        return pushes + guided_pushes(runner, hard, partial=partial)
-    return guided_pushes(runner, left, partial=partial) + collecting_pushes(runner, left)
+        return pushes + guided_pushes(runner, hard, thorough=thorough)
+    guided = guided_pushes(runner, left, thorough=thorough)
+    return guided + collecting_pushes(runner, left) if thorough else guided
 
 
 def area_pushes(runner: Runner) -> list[Push]:
@@ -110,8 +117,14 @@ def _sweeps(runner: Runner, heading: float, boxes: list[int], single: bool) -> l
     return found
 
 
-def guided_pushes(runner: Runner, boxes: Iterable[int], *, partial: bool = True) -> list[Push]:
-    """Pushes that lead an object along its way to the goal, beside it on either side."""
+def guided_pushes(runner: Runner, boxes: Iterable[int], *, thorough: bool = True) -> list[Push]:
+    """Pushes that lead an object along its way to the goal, beside it on either side.
+
+    Args:
+        runner: for the scene.
+        boxes: indices of the objects.
+        thorough: see `simple_pushes`.
+    """
     scene = runner.scene
     found: list[Push] = []
     hard: dict[int, list[FloatArray]] = {}
@@ -119,7 +132,7 @@ def guided_pushes(runner: Runner, boxes: Iterable[int], *, partial: bool = True)
         radius = float(scene.world.movables.radii[k])
         ways: list[FloatArray] = []
         own: list[Push] = []
-        for clearance, deep in _WAYS:
+        for clearance, deep in _WAYS if thorough else _WAYS[:2]:
             room = clearance * scene.half if clearance > 0.0 else 0.75 * radius
             path = None if len(own) > 1 and not deep else scene.box_path(k, room, deep)
             if path is None or any(_alike(path, other, radius) for other in ways):
@@ -134,8 +147,11 @@ def guided_pushes(runner: Runner, boxes: Iterable[int], *, partial: bool = True)
     for n, k in enumerate(sorted(hard, key=lambda k: (float(away[k]), k))):
         if n >= _HARD and found:
             break
-        own = [push for path in hard[k] for push in curved_pushes(runner, k, path)]
-        if partial and not own:
+        own = []
+        for path in hard[k]:
+            if thorough or not own:
+                own += curved_pushes(runner, k, path)
+        if thorough and not own:
             own = [push for path in hard[k] for push in partial_pushes(runner, k, path)]
         found += own
     return found

@@ -160,5 +160,5 @@ def goes_home(
     runner = Runner(after)
     runner.left = np.array([index])
     return any(
-        int(movables.ids[index]) in push.covers for push in simple_pushes(runner, partial=False)
+        int(movables.ids[index]) in push.covers for push in simple_pushes(runner, thorough=False)
     )

@@ -14,7 +14,15 @@ import numpy as np
 from numba import njit
 
 from pushplan.geometry import convex_penetration
-from pushplan.interaction.kernels import Bodies, Settings, advance, make_scratch, robot_held
+from pushplan.geometry.compiled import copy_into, kernel
+from pushplan.interaction.kernels import (
+    Bodies,
+    Scratch,
+    Settings,
+    advance,
+    make_scratch,
+    robot_held,
+)
 from pushplan.interaction.separation import place
 from pushplan.world import ClearanceArea, Goal, Receptacle, StaticMap
 from pushplan.world.checks import BoolArray, FloatArray, frozen
@@ -58,7 +66,7 @@ def task_of(goal: Goal, static: StaticMap, slack: float) -> Task:
     )
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _may_be_done(x: float, y: float, task: Task) -> bool:
     """Whether an object with its middle at (x, y) could be where it belongs."""
     if task.delivers:
@@ -105,7 +113,7 @@ def all_done(poses: FloatArray, bodies: Bodies, task: Task) -> BoolArray:
     return out
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def along_path(
     x: float, y: float, path: FloatArray, reached: float, ahead: float
 ) -> tuple[float, float, float, float]:
@@ -162,7 +170,7 @@ class Law(NamedTuple):
     """Curvature of the robot's path for each radian that it is off its heading, times ``size``."""
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def guide(
     robot: FloatArray,
     box: FloatArray,
@@ -213,23 +221,23 @@ class Log(NamedTuple):
     """(4,) x_min, y_min, x_max, y_max of all that moved, and of its surroundings [m]."""
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def enclose(box: FloatArray, pose: FloatArray, reach: float) -> None:
     """Make a box big enough for a disc."""
     box[0], box[1] = min(box[0], pose[0] - reach), min(box[1], pose[1] - reach)
     box[2], box[3] = max(box[2], pose[0] + reach), max(box[3], pose[1] + reach)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _write(log: Log, stages: int, used: int, poses: FloatArray, lengths: FloatArray) -> int:
     """Write a stage down; returns how many there are then."""
     log.steps[stages] = used
-    log.poses[stages] = poses
-    log.lengths[stages] = lengths
+    copy_into(log.poses[stages], poses)
+    copy_into(log.lengths[stages], lengths)
     return stages + 1
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _take_stock(
     poses: FloatArray,
     saved: FloatArray,
@@ -287,12 +295,52 @@ def roll_out(
         jammed, 3 lost. A stage ends where one more object is done; a last stage that ends
         otherwise is kept too.
     """
-    scratch = make_scratch(bodies)
     poses, lengths = first.copy(), np.zeros(first.shape[0])
-    saved = np.empty_like(poses)
-    done = all_done(poses, bodies, task)
-    here, there = start.copy(), np.empty(3)
-    log.track[0] = here
+    done, saved = all_done(poses, bodies, task), np.empty_like(poses)
+    here, there, scratch = start.copy(), np.empty(3), make_scratch(bodies)
+    return _run(
+        here,
+        there,
+        poses,
+        saved,
+        lengths,
+        done,
+        led,
+        path,
+        shift,
+        limit,
+        wanted,
+        law,
+        bodies,
+        settings,
+        task,
+        scratch,
+        log,
+    )
+
+
+@kernel
+def _run(
+    here: FloatArray,
+    there: FloatArray,
+    poses: FloatArray,
+    saved: FloatArray,
+    lengths: FloatArray,
+    done: BoolArray,
+    led: int,
+    path: FloatArray,
+    shift: float,
+    limit: float,
+    wanted: BoolArray,
+    law: Law,
+    bodies: Bodies,
+    settings: Settings,
+    task: Task,
+    scratch: Scratch,
+    log: Log,
+) -> tuple[int, int, int]:
+    """`roll_out` in memory that is given: all of its arguments but ``wanted`` are changed."""
+    copy_into(log.track[0], here)
     room = 2.0 * law.step
     log.box[0], log.box[1], log.box[2], log.box[3] = np.inf, np.inf, -np.inf, -np.inf
     enclose(log.box, here, bodies.robot_radius + room)
@@ -307,23 +355,32 @@ def roll_out(
         there[0] = here[0] + ds * math.cos(here[2] + 0.5 * turn)
         there[1] = here[1] + ds * math.sin(here[2] + 0.5 * turn)
         there[2] = here[2] + turn
-        saved[:] = poses
+        copy_into(saved, poses)
         if robot_held(there, bodies, settings, scratch) or not advance(
             here, there, poses, lengths, bodies, settings, scratch
         ):
             end = 2
             break
-        here[:] = there
-        log.track[used] = here
+        copy_into(here, there)
+        copy_into(log.track[used], here)
         used += 1
         travelled += ds
         enclose(log.box, here, bodies.robot_radius + room)
         news = _take_stock(poses, saved, done, bodies, task, log.box, room)
         if news and stages < EVENTS - 1:
             stages = _write(log, stages, used, poses, lengths)
-        if not (wanted & ~done).any():
+        if not _is_wanting(wanted, done):
             end = 0
             break
     if stages == 0 or log.steps[stages - 1] != used:
         stages = _write(log, stages, used, poses, lengths)
     return stages, used, end
+
+
+@kernel
+def _is_wanting(wanted: BoolArray, done: BoolArray) -> bool:
+    """Whether something that is wanted is not done."""
+    for k in range(wanted.shape[0]):
+        if wanted[k] and not done[k]:
+            return True
+    return False
