@@ -311,10 +311,15 @@ def test_the_search_is_that_of_dijkstra():
         for sign in (1, -1):
             y, x = i + sign * lattice.MOVES[t, 1], j + sign * lattice.MOVES[t, 0]
             if 0 <= y < rows and 0 <= x < cols:
-                length = lattice.LENGTHS[t] * floor.step
-                steps.append(((t * rows + y) * cols + x, length, length))
-        for to, turn in (((t + 1) % count, lattice.TURNS[t]), (t - 1, lattice.TURNS[t - 1])):
-            steps.append(((to % count * rows + i) * cols + j, 0.02 * turn, 0.5 * turn))
+                length, at = lattice.LENGTHS[t] * floor.step, (i, j) if sign > 0 else (y, x)
+                if not floor.barred[0, t, *at]:
+                    steps.append(((t * rows + y) * cols + x, length, length))
+        for to, turn, first in (
+            ((t + 1) % count, lattice.TURNS[t], t),
+            (t - 1, lattice.TURNS[t - 1], t - 1),
+        ):
+            if not floor.barred[1, first, i, j]:
+                steps.append(((to % count * rows + i) * cols + j, 0.02 * turn, 0.5 * turn))
         for other, price, motion in steps:
             if not shut[node] and np.isfinite(best[other]):
                 touched = near[node] > 0.0 and flat[node] >= flat[other]

@@ -46,7 +46,12 @@ class LegDriver:
             distance = math.hypot(dx, dy)
             bearing = math.remainder(math.atan2(sign * dy, sign * dx) - theta, 2.0 * math.pi)
             passed = not self._turning and abs(bearing) > 0.5 * math.pi
-            if distance <= near or (passed and distance < 30.0 * near):
+            beside = abs(bearing) > _ASTRAY  # to turn for so little could sweep into something
+            if (
+                distance <= near
+                or (beside and distance < 8.0 * near)
+                or (passed and distance < 30.0 * near)
+            ):
                 self._next += 1
                 self._turning, self._tries = True, 0
                 continue

@@ -68,6 +68,9 @@ class Floor(NamedTuple):
     step: float
     blocked: BoolArray
     """(16, rows, columns) where something static is in the way."""
+    barred: BoolArray
+    """(2, 16, rows, columns) from where it is in the way of the move ahead, and of the turn to the
+    next heading."""
 
 
 @njit(cache=True, nogil=True)
@@ -90,6 +93,47 @@ def _block(
                 blocked[t, i, j] = not is_free(pose, shape, among, scratch)
 
 
+@njit(cache=True, nogil=True)
+def _bar(
+    barred: BoolArray,
+    blocked: BoolArray,
+    x: float,
+    y: float,
+    step: float,
+    shape: Footprint,
+    among: Obstacles,
+    moves: IntArray,
+    turns: FloatArray,
+    headings: FloatArray,
+) -> None:
+    """Look at a few poses between those of the lattice."""
+    pose, scratch = np.empty(3), np.empty_like(shape.vertices)
+    count, rows, cols = blocked.shape
+    for t in range(count):
+        dx, dy = moves[t, 0], moves[t, 1]
+        other = t + 1 if t + 1 < count else 0
+        between = math.ceil(2.0 * math.hypot(dx, dy))
+        for i in range(rows):
+            for j in range(cols):
+                if blocked[t, i, j]:
+                    continue
+                if 0 <= i + dy < rows and 0 <= j + dx < cols and not blocked[t, i + dy, j + dx]:
+                    pose[2] = headings[t]
+                    for n in range(1, between):
+                        pose[0] = x + (j + dx * n / between) * step
+                        pose[1] = y + (i + dy * n / between) * step
+                        if not is_free(pose, shape, among, scratch):
+                            barred[0, t, i, j] = True
+                            break
+                if not blocked[other, i, j]:
+                    pose[0], pose[1] = x + j * step, y + i * step
+                    for n in range(1, 3):
+                        pose[2] = headings[t] + turns[t] * n / 3.0
+                        if not is_free(pose, shape, among, scratch):
+                            barred[1, t, i, j] = True
+                            break
+
+
 @functools.lru_cache(maxsize=8)
 def floor_of(robot: RobotModel, static: StaticMap, step: float, margin: float) -> Floor:
     """The lattice for a robot among what is static; kept for the maps used last.
@@ -107,8 +151,11 @@ def floor_of(robot: RobotModel, static: StaticMap, step: float, margin: float) -
         x0 + 0.5 * ((x1 - x0) - (cols - 1) * step),
         y0 + 0.5 * ((y1 - y0) - (rows - 1) * step),
     )
-    _block(blocked, x, y, step, HEADINGS, footprint(robot, margin), obstacles(static))
-    return Floor(x, y, step, frozen(blocked))
+    shape, among = footprint(robot, margin), obstacles(static)
+    _block(blocked, x, y, step, HEADINGS, shape, among)
+    barred = np.zeros((2, COUNT, rows, cols), dtype=np.bool_)
+    _bar(barred, blocked, x, y, step, shape, among, MOVES, TURNS, HEADINGS)
+    return Floor(x, y, step, frozen(blocked), frozen(barred))
 
 
 @njit(cache=True, nogil=True)
@@ -279,6 +326,7 @@ def search_poses(
     best = np.full(total, np.inf)
     before = np.full(total, -1, dtype=np.int64)
     flat, shut, near = depths.ravel(), floor.blocked.ravel(), touch.ravel()
+    ahead_shut, turn_shut = floor.barred[0].ravel(), floor.barred[1].ravel()
     # doubly linked lists; the first of bucket b has -2 - b ahead of it, -1 is in no bucket
     after, ahead = np.empty(total, dtype=np.int64), np.full(total, -1, dtype=np.int64)
     heads = np.full(_BUCKETS + 1, -1, dtype=np.int64)
@@ -305,6 +353,9 @@ def search_poses(
                 for move in range(4):
                     other, way = _beside(t, i, j, move, depths.shape, moves)
                     if other < 0 or shut[other]:
+                        continue
+                    first = other if move % 2 else node
+                    if (ahead_shut if move < 2 else turn_shut)[first]:
                         continue
                     if move < 2:
                         price = motion = lengths[way] * floor.step

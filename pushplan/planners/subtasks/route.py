@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -26,6 +27,12 @@ from pushplan.world.checks import ArrayRecord, FloatArray, IntArray
 
 _MOST = 14
 """Points of the lattice's way that a route may bend at."""
+_LONGEST = 6
+"""Points further on that a leg may end at, where the robot has to keep to the lattice's way."""
+_AWAY = (0.3, -0.3, 0.6, -0.6, 1.0, -1.0)
+"""How far ahead the robot may drive first to get to where it can turn [circumscribed radii]."""
+_HALF = math.radians(170.0)
+"""From here on it is not sure in which direction a turn will be made."""
 TIGHT = 25.0
 """Price of driving on, where the robot begins nearer to something static than it should be."""
 
@@ -79,6 +86,23 @@ def _depth(
     return total, touch
 
 
+@njit(cache=True, nogil=True)
+def _depth_inside(
+    pose: FloatArray, shape: Footprint, among: Obstacles, scratch: FloatArray
+) -> float:
+    """How deep the footprint is in what is static [m]; 0 where it is free."""
+    deepest = 0.0
+    if is_free(pose, shape, among, scratch):
+        return deepest
+    place(pose, shape.vertices, scratch)
+    for s in range(among.boxes.shape[0]):
+        obstacle = among.vertices[among.offsets[s] : among.offsets[s + 1]]
+        for p in range(shape.offsets.shape[0] - 1):
+            part = scratch[shape.offsets[p] : shape.offsets[p + 1]]
+            deepest = max(deepest, convex_penetration(part, obstacle)[0])
+    return deepest
+
+
 class _Driving(NamedTuple):
     """What motions are priced from."""
 
@@ -97,15 +121,24 @@ class _Driving(NamedTuple):
 @njit(cache=True, nogil=True)
 def _motion(here: FloatArray, there: FloatArray, by: _Driving) -> float:
     """Price of a straight motion between two poses, or of a turn on the spot; inf at a wall."""
+    turn = there[2] - here[2]
+    turn -= 2.0 * math.pi * np.round(turn / (2.0 * math.pi))
+    price = _priced(here, there, turn, by)
+    if abs(turn) > _HALF:  # it may be made in either direction
+        price = max(price, _priced(here, there, turn - math.copysign(2.0 * math.pi, turn), by))
+    return price
+
+
+@njit(cache=True, nogil=True)
+def _priced(here: FloatArray, there: FloatArray, turn: float, by: _Driving) -> float:
+    """`_motion` with a turn [rad] in the direction of its sign."""
     body = np.empty_like(by.shape.vertices)
     scratch = np.empty_like(by.tight.vertices)
     length = math.hypot(there[0] - here[0], there[1] - here[1])
-    turn = there[2] - here[2]
-    turn -= 2.0 * math.pi * np.round(turn / (2.0 * math.pi))
     steps = max(1, math.ceil((length + abs(turn) * by.shape.radius) / by.step))
     pose = here.copy()
     depth, _ = _depth(pose, by.shape, by.poses, by.bodies, by.weights, body)
-    was_free = is_free(pose, by.tight, by.among, scratch)
+    inside = _depth_inside(pose, by.tight, by.among, scratch)
     motion = (length + by.arm * abs(turn)) / steps
     price = length + by.turn_price * abs(turn)
     for n in range(1, steps + 1):
@@ -113,12 +146,13 @@ def _motion(here: FloatArray, there: FloatArray, by: _Driving) -> float:
         pose[0] = here[0] + part * (there[0] - here[0])
         pose[1] = here[1] + part * (there[1] - here[1])
         pose[2] = here[2] + part * turn
-        if is_free(pose, by.tight, by.among, scratch):
-            was_free = True
-        elif was_free:
-            return np.inf
-        else:
+        if inside > 0.0:  # out of it, but no deeper into it
+            before, inside = inside, _depth_inside(pose, by.tight, by.among, scratch)
+            if inside > before:
+                return np.inf
             price += TIGHT * (length + by.shape.radius * abs(turn)) / steps
+        elif not is_free(pose, by.tight, by.among, scratch):
+            return np.inf
         now, touch = _depth(pose, by.shape, by.poses, by.bodies, by.weights, body)
         if touch > 0.0 and now >= depth:
             price += motion * touch
@@ -145,38 +179,43 @@ def _leg(
 
 @njit(cache=True, nogil=True)
 def _cheapest(
-    points: FloatArray, heading: float, end: float, by: _Driving
-) -> tuple[float, IntArray, FloatArray]:
+    points: FloatArray, heading: float, end: float, first: int, longest: int, by: _Driving
+) -> tuple[FloatArray, IntArray]:
     """The cheapest way over some points to the last one, and a turn to a heading there.
 
     Args:
         points: (N, 2), the first is where the robot is.
         heading: of the robot there [rad].
         end: heading to turn to at the last [rad].
+        first: how many of the first points a leg to any other may begin at.
+        longest: how many points further on a leg from another may end.
         by: what motions are priced from.
 
     Returns:
-        The price, and for each point the one before it, and whether it is got to ahead (1) or
-        back (-1).
+        The price if the last point is got to ahead and back; and for each point, got to ahead and
+        back (rows 2 i and 2 i + 1), which row the leg begins at.
     """
     count = points.shape[0]
-    best, came = np.full(count, np.inf), np.full(count, -1, dtype=np.int64)
-    signs, headings = np.ones(count), np.full(count, heading)
+    best, came = np.full(2 * count, np.inf), np.full(2 * count, -1, dtype=np.int64)
+    headings = np.full(2 * count, heading)
     best[0] = 0.0
-    for j in range(1, count):
-        for i in range(j):
+    for to in range(2, 2 * count):
+        j, sign = to // 2, 1.0 - 2.0 * (to % 2)
+        for at in range(2 * j):
+            i = at // 2
+            if i >= first and i < j - longest:
+                continue
             away = math.hypot(points[i, 0] - points[j, 0], points[i, 1] - points[j, 1])
-            for sign in (1.0, -1.0):
-                if best[i] + away >= best[j]:
-                    continue
-                price, way = _leg(points[i, 0], points[i, 1], headings[i], points[j], sign, by)
-                price += best[i]
-                if j == count - 1 and price < best[j]:
-                    there = np.array([points[j, 0], points[j, 1], way])
-                    price += _motion(there, np.array([points[j, 0], points[j, 1], end]), by)
-                if price < best[j]:
-                    best[j], came[j], signs[j], headings[j] = price, i, sign, way
-    return best[-1], came, signs
+            if best[at] + away >= best[to]:
+                continue
+            price, way = _leg(points[i, 0], points[i, 1], headings[at], points[j], sign, by)
+            price += best[at]
+            if j == count - 1 and price < best[to]:
+                there = np.array([points[j, 0], points[j, 1], way])
+                price += _motion(there, np.array([points[j, 0], points[j, 1], end]), by)
+            if price < best[to]:
+                best[to], came[to], headings[to] = price, at, way
+    return best[-2:], came
 
 
 class Router:
@@ -214,14 +253,20 @@ class Router:
         while approach.before[chain[-1]] >= 0:
             chain.append(int(approach.before[chain[-1]]))
         poses = [lattice.pose_at(scene.fine.floor, node) for node in reversed(chain)]
-        points = _bends(poses)
-        here = scene.world.robot_pose
-        return (
-            self._shortened([here[:2], *points, start[:2]], here, float(start[2]))
-            # too near to a wall to turn there: as near as the lattice gets, which has turned before
-            or self._shortened([here[:2], *points], here, float(start[2]))
-            or self._plain(points, float(start[2]))
-        )
+        here, end = scene.world.robot_pose, float(start[2])
+        ahead = scene.size * np.array([math.cos(here[2]), math.sin(here[2])])
+        near = [here[:2], *(here[:2] + share * ahead for share in _AWAY)]
+        bends, every = _bends(poses), _places(poses)
+        for last in ([start[:2]], []):  # it may be too near to a wall to turn there
+            for first, points, longest in (
+                ([here[:2]], bends, len(bends) + 1),
+                (near, every, _LONGEST),
+                (near, every, 1),
+            ):
+                found = self._shortened([*first, *points, *last], len(first), longest, end)
+                if found is not None:
+                    return found
+        return None
 
     def poses_along(self, route: Route) -> FloatArray:
         """(N, 3) poses on the way, close enough together for a prediction."""
@@ -239,14 +284,18 @@ class Router:
         found.append(_between(here, np.array([here[0], here[1], route.heading])))
         return np.concatenate(found)
 
-    def _shortened(self, points: list[FloatArray], here: FloatArray, end: float) -> Route | None:
+    def _shortened(
+        self, points: list[FloatArray], first: int, longest: int, end: float
+    ) -> Route | None:
         """The cheapest way over some of the points to the last, and a turn to a heading there."""
         scene = self.scene
         bends = np.array(points)
-        price, came, signs = _cheapest(
+        prices, came = _cheapest(
             bends,
-            float(here[2]),
+            float(scene.world.robot_pose[2]),
             end,
+            first,
+            longest,
             _Driving(
                 0.1 * scene.size,
                 scene.config.turn_price * scene.size,
@@ -259,24 +308,15 @@ class Router:
                 self._weights,
             ),
         )
+        row = 2 * len(points) - 2 + int(prices[1] < prices[0])
+        price = float(prices.min())
         if math.isinf(price):
             return None
-        chain = [len(points) - 1]
+        chain = [row]
         while came[chain[-1]] > 0:
             chain.append(int(came[chain[-1]]))
-        chain.reverse()
-        return Route(bends[chain], signs[chain], end, price)
-
-    def _plain(self, points: list[FloatArray], end: float) -> Route:
-        """The lattice's own way, ahead or back as the robot stands."""
-        signs, heading, at = [], float(self.scene.world.robot_pose[2]), self.scene.world.robot_pose
-        for point in points:
-            way = math.atan2(point[1] - at[1], point[0] - at[0])
-            ahead = math.cos(way - heading) >= 0.0
-            signs.append(1.0 if ahead else -1.0)
-            heading, at = way if ahead else way + math.pi, point
-        length = float(np.hypot(*np.diff(np.array(points), axis=0).T).sum())
-        return Route(np.array(points), np.array(signs), end, length)
+        rows = np.array(chain[::-1])
+        return Route(bends[rows // 2], 1.0 - 2.0 * (rows % 2), end, price)
 
 
 def _between(here: FloatArray, there: FloatArray) -> FloatArray:
@@ -287,6 +327,14 @@ def _between(here: FloatArray, there: FloatArray) -> FloatArray:
     end = np.array([there[0], there[1], here[2] + turn])
     poses: FloatArray = here + part * (end - here)
     return poses
+
+
+def _places(poses: list[FloatArray]) -> list[FloatArray]:
+    """Where the lattice's way comes by."""
+    points = [pose[:2] for pose in poses]
+    return points[:1] + [
+        point for before, point in itertools.pairwise(points) if (before != point).any()
+    ]
 
 
 def _bends(poses: list[FloatArray]) -> list[FloatArray]:
