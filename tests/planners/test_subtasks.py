@@ -21,7 +21,8 @@ from pushplan.planners.subtasks import (
 from pushplan.planners.subtasks.completions import completions
 from pushplan.planners.subtasks.drive import PathTracer
 from pushplan.planners.subtasks.graph import candidate_pushes
-from pushplan.planners.subtasks.maneuvers import maneuvers, way_out
+from pushplan.planners.subtasks.leaving import way_out
+from pushplan.planners.subtasks.maneuvers import maneuvers
 from pushplan.planners.subtasks.push import signature
 from pushplan.planners.subtasks.recall import Recall
 from pushplan.planners.subtasks.reduction import parts_of, reduce
@@ -248,6 +249,17 @@ def test_the_way_out_of_a_gap_touches_nothing():
     assert path is not None and path[-1, 1] < -0.8
     assert Runner(tight).trace(path, 0)[0].work == 0.0
     assert way_out(small_box((0.0, 0.8, 0.0), GAP)) is None
+
+
+def test_a_bumper_that_hooks_on_a_corner_is_driven_ahead():
+    column = [(-0.75, 0.47), (0.25, 0.47), (0.25, 1.47), (-0.75, 1.47)]
+    hooked = scene([(4.0, -4.0, 0.0)], extra=[column], pose=(0.0, 0.0, 0.0))
+    path = way_out(hooked)
+    assert path is not None and path[1, 0] > 0.0
+    parts = [
+        shapely.Polygon(transform(pose, part)) for pose in path for part in hooked.world.robot.parts
+    ]
+    assert shapely.area(shapely.intersection(shapely.Polygon(column), parts)).max() < 1e-6
 
 
 def test_a_path_is_traced_ahead_back_and_round():

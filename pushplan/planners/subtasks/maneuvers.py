@@ -96,43 +96,13 @@ def _searched(scene: Scene, k: int) -> list[Drive]:
     return search.loosened(best)
 
 
-def way_out(scene: Scene) -> FloatArray | None:
-    """A drive (N, 3) out of a tight place that moves no object; None if there is none, or no need.
-
-    It makes at least some more room round the robot, so that a few of them come to an end.
-    """
-    start, enough = scene.world.robot_pose, 1.1 * scene.size
-    most = float(_room(scene, start[None])[0])
-    if most > enough:
-        return None
-    tracks, poses, reached = _swept(scene, start, scene.poses, _arcs(scene), _steps(scene, 3.0))
-    best, most = None, most + _LEAST * scene.size
-    for track, after, count in zip(tracks, poses, reached, strict=True):
-        still = int((after[:count] == scene.poses).all(axis=(1, 2)).sum())
-        rooms = np.minimum(_room(scene, track[:still]), enough + _LEAST * scene.size)
-        if rooms.max() > most:
-            best, most = track[: int(rooms.argmax()) + 1], float(rooms.max())
-    return best
-
-
-def _room(scene: Scene, path: FloatArray) -> FloatArray:
-    """Distance of the robot's middle on a path (N, 3) from all that is around it [m]."""
-    points, static = path[:, :2], scene.world.static
-    away = np.hypot(*np.moveaxis(points[:, None] - scene.poses[:, :2], 2, 0))
-    objects = (away - scene.world.movables.radii).min(axis=1, initial=np.inf)
-    out: FloatArray = np.minimum(
-        np.minimum(_from_walls(static, points), _from_columns(static, points)), objects
-    )
-    return out
-
-
-def _from_walls(static: StaticMap, points: FloatArray) -> FloatArray:
+def from_walls(static: StaticMap, points: FloatArray) -> FloatArray:
     """Distance of points (N, 2) from the bounds, negative beyond them [m]."""
     out: FloatArray = np.minimum(points - static.bounds[:2], static.bounds[2:] - points).min(axis=1)
     return out
 
 
-def _from_columns(static: StaticMap, points: FloatArray) -> FloatArray:
+def from_columns(static: StaticMap, points: FloatArray) -> FloatArray:
     """Distance of points (..., 2) from what stands within the bounds [m]; inf if nothing does."""
     if not len(static.convex_parts):
         return np.full(points.shape[:-1], np.inf)
@@ -140,7 +110,7 @@ def _from_columns(static: StaticMap, points: FloatArray) -> FloatArray:
     return out
 
 
-def _arcs(scene: Scene) -> FloatArray:
+def arcs_of(scene: Scene) -> FloatArray:
     """(A, 2) way [m], negative backward, and turn [rad] of one step of each arc."""
     step = scene.law.step
     signs: tuple[float, ...] = (1.0, -1.0)
@@ -152,7 +122,7 @@ def _arcs(scene: Scene) -> FloatArray:
     return out
 
 
-def _steps(scene: Scene, length: float) -> int:
+def steps_of(scene: Scene, length: float) -> int:
     """How many steps an arc of some length [circumscribed radii] has."""
     return max(2, math.ceil(length * scene.size / scene.law.step))
 
@@ -181,7 +151,7 @@ class _Search:
         self._scene, self._k = scene, k
         self._directions: dict[tuple[int, int], float] = {}
         self._tight = float(self._tightness(scene.poses[[k], :2])[0])
-        self._arcs, self._steps = _arcs(scene), _steps(scene, _LENGTH)
+        self._arcs, self._steps = arcs_of(scene), steps_of(scene, _LENGTH)
 
     def _tightness(self, points: FloatArray) -> FloatArray:
         """What room the robot lacks for work on the object at points (N, 2) [m].
@@ -196,11 +166,11 @@ class _Search:
         for turn in _NEARLY:
             u = np.column_stack([np.cos(towards + turn), np.sin(towards + turn)])
             room = np.minimum(
-                _from_walls(scene.world.static, points - depth * u) / (1.05 * scene.half),
-                _from_walls(scene.world.static, points - (depth + scene.front) * u) / scene.size,
+                from_walls(scene.world.static, points - depth * u) / (1.05 * scene.half),
+                from_walls(scene.world.static, points - (depth + scene.front) * u) / scene.size,
             )
             lacking = np.minimum(lacking, scene.size * np.maximum(1.0 - room, 0.0))
-        between = 1.05 * scene.half - _from_columns(scene.world.static, points)
+        between = 1.05 * scene.half - from_columns(scene.world.static, points)
         out: FloatArray = lacking + np.maximum(between, 0.0)
         return out
 
@@ -221,7 +191,7 @@ class _Search:
         found: list[_State] = []
         for state in level:
             here = state.path[-1]
-            tracks, poses, reached = _swept(scene, here, state.poses, self._arcs, self._steps)
+            tracks, poses, reached = swept(scene, here, state.poses, self._arcs, self._steps)
             for a, (track, after, count) in enumerate(zip(tracks, poses, reached, strict=True)):
                 for end in _news(after[:count, k], scene.size) if a != state.arc else ():
                     path = np.concatenate([state.path, track[1 : end + 1]])
@@ -328,7 +298,7 @@ def _news(poses: FloatArray, size: float) -> list[int]:
     return found
 
 
-def _swept(
+def swept(
     scene: Scene, start: FloatArray, poses: FloatArray, arcs: FloatArray, count: int
 ) -> tuple[FloatArray, FloatArray, IntArray]:
     """`_sweep_arcs` with arrays that may be written to: one kernel for all."""

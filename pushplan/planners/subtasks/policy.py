@@ -15,12 +15,12 @@ from pushplan.planners.subtasks.config import SubTaskConfig
 from pushplan.planners.subtasks.drive import PathTracer
 from pushplan.planners.subtasks.graph import SubTaskGraph
 from pushplan.planners.subtasks.job import Job, JobEnd
-from pushplan.planners.subtasks.maneuvers import way_out
+from pushplan.planners.subtasks.leaving import way_out
 from pushplan.planners.subtasks.push import Push, signature
 from pushplan.planners.subtasks.recall import Recall
 from pushplan.planners.subtasks.scene import Scene, check_world
 from pushplan.world import InvalidInputError, Twist, World
-from pushplan.world.checks import expect
+from pushplan.world.checks import FloatArray, expect
 
 _SIMPLE = 60.0
 """How long the simple pusher works where nothing is found [circumscribed radii at full speed]."""
@@ -67,6 +67,7 @@ class GtspMpc:
         self._barred: set[tuple[object, ...]] = set()
         self._failures = 0
         self._leaving: PathTracer | None = None
+        self._left_from: FloatArray | None = None
         self._escape: list[tuple[float, float]] = []
         self._last_time = math.inf
         self._simple = GreedyPusher()
@@ -151,10 +152,14 @@ class GtspMpc:
 
     def _at_a_loss(self, scene: Scene) -> Twist | None:
         """Where no push is found: get out of a tight place, or else hope for less friction."""
-        path = way_out(scene)
-        if path is not None:
+        here, path = scene.world.robot_pose, way_out(scene)
+        known = self._left_from is not None and bool(
+            np.abs(self._left_from - here).max() < 0.02 * scene.size
+        )
+        if path is not None and not known:  # else that has been tried, and it has not moved
+            self._left_from = here
             self._leaving = PathTracer(scene.world.robot, path, self.config.period)
-            return self._leaving.command(scene.world.robot_pose)
+            return self._leaving.command(here)
         self._hopeful = not self._hopeful
         return Twist(0.0, 0.0) if self._hopeful else None
 

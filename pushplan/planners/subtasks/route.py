@@ -87,10 +87,13 @@ def _depth(
 
 
 @njit(cache=True, nogil=True)
-def _depth_inside(
+def depth_inside(
     pose: FloatArray, shape: Footprint, among: Obstacles, scratch: FloatArray
 ) -> float:
-    """How deep the footprint is in what is static [m]; 0 where it is free."""
+    """How deep the footprint is in what is static [m]; 0 where it is free.
+
+    Arguments as those of `is_free`.
+    """
     deepest = 0.0
     if is_free(pose, shape, among, scratch):
         return deepest
@@ -138,7 +141,7 @@ def _priced(here: FloatArray, there: FloatArray, turn: float, by: _Driving) -> f
     steps = max(1, math.ceil((length + abs(turn) * by.shape.radius) / by.step))
     pose = here.copy()
     depth, _ = _depth(pose, by.shape, by.poses, by.bodies, by.weights, body)
-    inside = _depth_inside(pose, by.tight, by.among, scratch)
+    inside = depth_inside(pose, by.tight, by.among, scratch)
     motion = (length + by.arm * abs(turn)) / steps
     price = length + by.turn_price * abs(turn)
     for n in range(1, steps + 1):
@@ -147,7 +150,7 @@ def _priced(here: FloatArray, there: FloatArray, turn: float, by: _Driving) -> f
         pose[1] = here[1] + part * (there[1] - here[1])
         pose[2] = here[2] + part * turn
         if inside > 0.0:  # out of it, but no deeper into it
-            before, inside = inside, _depth_inside(pose, by.tight, by.among, scratch)
+            before, inside = inside, depth_inside(pose, by.tight, by.among, scratch)
             if inside > before:
                 return np.inf
             price += TIGHT * (length + by.shape.radius * abs(turn)) / steps

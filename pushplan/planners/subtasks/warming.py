@@ -6,7 +6,8 @@ import numpy as np
 
 from pushplan.planners.pushing import warm_up as warm_up_pushing
 from pushplan.planners.subtasks.freeing import freeing_pushes
-from pushplan.planners.subtasks.maneuvers import maneuvers, way_out
+from pushplan.planners.subtasks.leaving import way_out
+from pushplan.planners.subtasks.maneuvers import maneuvers
 from pushplan.planners.subtasks.policy import GtspMpc
 from pushplan.planners.subtasks.runner import Runner
 from pushplan.planners.subtasks.scene import Scene
