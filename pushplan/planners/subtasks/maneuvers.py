@@ -18,7 +18,7 @@ from numba import njit
 
 from pushplan.interaction.kernels import Bodies, Settings, advance, make_scratch, robot_held
 from pushplan.planners.subtasks.freeing import goes_home
-from pushplan.planners.subtasks.places import direction_of
+from pushplan.planners.subtasks.places import apart, direction_of
 from pushplan.planners.subtasks.push import Push
 from pushplan.planners.subtasks.recall import Drive
 from pushplan.planners.subtasks.runner import Runner
@@ -217,7 +217,7 @@ class _Search:
             cell = self._cell(state.poses[k], 0.2, 0.5)
             if cell in good:
                 good[cell].append(state)
-            if cell in seen or _away(state.poses[k], scene.poses[k], scene.size) < _LEAST:
+            if cell in seen or apart(state.poses[k], scene.poses[k], scene.size) < _LEAST:
                 continue
             if len(seen) >= _TRIALS or len(good) >= _ENOUGH:
                 continue
@@ -283,16 +283,11 @@ def _starts(scene: Scene, k: int) -> list[FloatArray]:
     return found
 
 
-def _away(pose: FloatArray, other: FloatArray, size: float) -> float:
-    """How far poses (3,) of an object are apart, turns included [circumscribed radii]."""
-    return math.dist(pose[:2], other[:2]) / size + 0.2 * abs(float(pose[2] - other[2]))
-
-
 def _news(poses: FloatArray, size: float) -> list[int]:
     """Indices at which an object (N, 3) has moved on since the last of them."""
     found, last = [], poses[0]
     for n in range(1, len(poses)):
-        if _away(poses[n], last, size) >= 0.05:
+        if apart(poses[n], last, size) >= 0.05:
             found.append(n)
             last = poses[n]
     return found

@@ -61,3 +61,15 @@ def direction_of(path: FloatArray, ahead: float) -> float:
 def length_of(path: FloatArray) -> float:
     """Length [m] of a path (M, 2)."""
     return float(np.hypot(*np.diff(path, axis=0).T).sum())
+
+
+def lengths_of(poses: FloatArray) -> FloatArray:
+    """(K,) way [m] that each object goes over poses (N, K, 3)."""
+    out: FloatArray = np.hypot(*np.moveaxis(np.diff(poses[:, :, :2], axis=0), 2, 0)).sum(axis=0)
+    return out
+
+
+def apart(pose: FloatArray, other: FloatArray, size: float) -> float:
+    """How far two poses (3,) of an object are apart, turns included, in units of ``size``."""
+    turn = math.remainder(float(pose[2] - other[2]), 2.0 * math.pi)
+    return math.dist(pose[:2], other[:2]) / size + 0.2 * abs(turn)

@@ -57,6 +57,7 @@ class GtspMpc:
         if config is None:
             config = SubTaskConfig() if price is None else SubTaskConfig(price=price)
         self.config = expect("config", config, SubTaskConfig)
+        self._hopes = replace(config, static_friction=0.0)
         self._forget()
 
     def _forget(self) -> None:
@@ -111,7 +112,7 @@ class GtspMpc:
     def _scene(self, world: World) -> Scene:
         """What is planned with: after nothing was found, with objects that slide along walls."""
         if self._hopeful:
-            return Scene(world, replace(self.config, static_friction=0.0), self._recalls[1])
+            return Scene(world, self._hopes, self._recalls[1])
         return Scene(world, self.config, self._recalls[0])
 
     def _decide(self, scene: Scene) -> Twist | None:

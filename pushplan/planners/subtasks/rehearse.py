@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pushplan.interaction.kernels import sweep_path
+from pushplan.planners.subtasks.places import length_of, lengths_of
 from pushplan.planners.subtasks.push import Push
 from pushplan.planners.subtasks.route import Route, Router
 from pushplan.planners.subtasks.runner import Runner
@@ -36,9 +37,8 @@ def rehearse(router: Router, runner: Runner, route: Route, push: Push) -> Rehear
     jammed = sweep_path(path, poses, scene.bodies, scene.settings, out)
     if jammed >= 0:
         return Rehearsal(np.inf, route, push)
-    spent = np.hypot(*np.moveaxis(np.diff(out[:, :, :2], axis=0), 2, 0)).sum(axis=0)
-    length = float(np.hypot(*np.diff(path[:, :2], axis=0).T).sum())
-    ends = runner.again(push, path[-1], poses=poses, spent=spent)
+    length = length_of(path[:, :2])
+    ends = runner.again(push, path[-1], poses=poses, spent=lengths_of(out))
     good = [end for end in ends if push.frees or set(push.covers) <= set(end.covers)]
     if not good:
         return Rehearsal(np.inf, route, push)

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 
 import numpy as np
 
 from pushplan.interaction.kernels import sweep_path
+from pushplan.planners.subtasks.places import apart, lengths_of
 from pushplan.planners.subtasks.push import Push
 from pushplan.planners.subtasks.recall import Run
 from pushplan.planners.subtasks.rollout import EVENTS, Log, all_done, roll_out
@@ -191,8 +191,7 @@ class Runner:
         out = np.empty((len(path), len(after), 3))
         if sweep_path(path, after, scene.bodies, scene.settings, out) >= 0:
             return []
-        lengths = np.hypot(*np.moveaxis(np.diff(out[:, :, :2], axis=0), 2, 0)).sum(axis=0)
-        lengths += 0.0 if spent is None else spent
+        lengths = lengths_of(out) + (0.0 if spent is None else spent)
         done = all_done(after, scene.bodies, scene.task)
         if (scene.done & ~done).any():
             return []
@@ -237,7 +236,8 @@ class Runner:
             path = np.vstack([start, push.poses[1:]])
             path[:, 2] = np.unwrap(path[:, 2])
             ends = self.trace(path, led, poses, spent)
-            return [end for end in ends if self._alike(push, end, led)]
+            there, size = push.object_poses[led], scene.size
+            return [end for end in ends if apart(end.object_poses[led], there, size) < _ALIKE]
         return self.run(
             start,
             led,
@@ -250,12 +250,6 @@ class Runner:
             poses=poses,
             spent=spent,
         )
-
-    def _alike(self, push: Push, other: Push, led: int) -> bool:
-        """Whether two maneuvers get an object to about the same place."""
-        gap = other.object_poses[led] - push.object_poses[led]
-        turn = math.remainder(float(gap[2]), 2.0 * math.pi)
-        return math.hypot(gap[0], gap[1]) / self.scene.size + 0.2 * abs(turn) < _ALIKE
 
     def _effort(self, poses: FloatArray, lengths: FloatArray, done: BoolArray) -> float:
         """Work, and what the objects that are left behind have farther or less far to go [m]."""
