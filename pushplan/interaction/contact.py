@@ -1,8 +1,4 @@
-"""Contact between two convex polygons: the points where one holds the other.
-
-Polygons are rows of an array, from one index to before another: a view of each would be counted by
-the runtime whenever it is passed on, which takes as long as the arithmetic.
-"""
+"""Contact between two convex polygons: the points where one holds the other."""
 
 from __future__ import annotations
 
@@ -13,30 +9,26 @@ from pushplan.world.checks import FloatArray
 
 
 @kernel
-def least_overlap(
-    a: FloatArray, a_first: int, a_end: int, b: FloatArray, b_first: int, b_end: int
-) -> tuple[float, int]:
+def least_overlap(a: FloatArray, b: FloatArray) -> tuple[float, int]:
     """Greatest separation of a polygon from the edges of another, and the edge that has it.
 
     Args:
-        a: (N, 2) corners, of which ``a_first`` to ``a_end`` are those of a polygon,
-            counter-clockwise [m].
-        a_first, a_end: see above.
-        b, b_first, b_end: the other polygon, likewise.
+        a: (N, 2) corners of the polygon with the edges, counter-clockwise [m].
+        b: (M, 2) corners of the other one.
 
     Returns:
         Signed gap [m] along the outward normal of an edge of ``a`` (negative: overlap), and the
-        row that the edge begins at. Stops at the first edge that separates the two.
+        corner that the edge begins at. Stops at the first edge that separates the two.
     """
-    best, edge = -np.inf, a_first
-    for i in range(a_first, a_end):
-        j = i + 1 if i + 1 < a_end else a_first
+    best, edge = -np.inf, 0
+    for i in range(a.shape[0]):
+        j = i + 1 if i + 1 < a.shape[0] else 0
         nx, ny = a[j, 1] - a[i, 1], a[i, 0] - a[j, 0]
         scale = 1.0 / np.sqrt(nx * nx + ny * ny)
         nx *= scale
         ny *= scale
         gap = np.inf
-        for k in range(b_first, b_end):
+        for k in range(b.shape[0]):
             d = (b[k, 0] - a[i, 0]) * nx + (b[k, 1] - a[i, 1]) * ny
             if d < gap:
                 gap = d
@@ -48,60 +40,42 @@ def least_overlap(
 
 
 @kernel
-def contacts(
-    a: FloatArray,
-    a_first: int,
-    a_end: int,
-    b: FloatArray,
-    b_first: int,
-    b_end: int,
-    out: FloatArray,
-) -> int:
+def contacts(a: FloatArray, b: FloatArray, out: FloatArray) -> int:
     """Contact points of two overlapping convex polygons, by clipping the incident edge.
 
     Args:
-        a, a_first, a_end: the first polygon, as in `least_overlap`.
-        b, b_first, b_end: the second one.
+        a: (N, 2) corners of the first polygon, counter-clockwise [m].
+        b: (M, 2) corners of the second one.
         out: (2, 5) receives for each point x, y [m], the unit normal from the first to the second,
             and the depth [m] by which the second has to move along it.
 
     Returns:
         The number of points: 0 where the two do not overlap, else 1 or 2.
     """
-    gap_a, edge_a = least_overlap(a, a_first, a_end, b, b_first, b_end)
+    gap_a, edge_a = least_overlap(a, b)
     if gap_a >= 0.0:
         return 0
-    gap_b, edge_b = least_overlap(b, b_first, b_end, a, a_first, a_end)
+    gap_b, edge_b = least_overlap(b, a)
     if gap_b >= 0.0:
         return 0
     # a small preference for the first one's edges keeps the choice from flickering on ties
     if gap_b > gap_a + 1e-9 + 0.01 * abs(gap_a):
-        return _clipped(b, b_first, b_end, edge_b, a, a_first, a_end, -1.0, out)
-    return _clipped(a, a_first, a_end, edge_a, b, b_first, b_end, 1.0, out)
+        return _clipped(b, edge_b, a, -1.0, out)
+    return _clipped(a, edge_a, b, 1.0, out)
 
 
 @kernel
-def _clipped(
-    ref: FloatArray,
-    ref_first: int,
-    ref_end: int,
-    edge: int,
-    inc: FloatArray,
-    inc_first: int,
-    inc_end: int,
-    sign: float,
-    out: FloatArray,
-) -> int:
+def _clipped(ref: FloatArray, edge: int, inc: FloatArray, sign: float, out: FloatArray) -> int:
     """Clip the edge that faces the reference edge against it; returns the number of points."""
-    after = edge + 1 if edge + 1 < ref_end else ref_first
+    after = edge + 1 if edge + 1 < ref.shape[0] else 0
     px, py = ref[edge, 0], ref[edge, 1]
     tx, ty = ref[after, 0] - px, ref[after, 1] - py
     length = np.sqrt(tx * tx + ty * ty)
     tx, ty = tx / length, ty / length
     nx, ny = ty, -tx
-    side, other, facing = inc_first, inc_first, np.inf
-    for i in range(inc_first, inc_end):
-        j = i + 1 if i + 1 < inc_end else inc_first
+    side, other, facing = 0, 0, np.inf
+    for i in range(inc.shape[0]):
+        j = i + 1 if i + 1 < inc.shape[0] else 0
         ex, ey = inc[j, 1] - inc[i, 1], inc[i, 0] - inc[j, 0]
         d = (ex * nx + ey * ny) / np.sqrt(ex * ex + ey * ey)
         if d < facing:

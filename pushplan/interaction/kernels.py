@@ -104,9 +104,7 @@ class Scratch(NamedTuple):
     points: FloatArray
     """(2, 5) contact points."""
     fixed: FloatArray
-    """(1, 3) a pose that stands for whatever cannot move."""
-    still: FloatArray
-    """(3,) the same."""
+    """(3,) a pose that stands for whatever cannot move."""
     here: FloatArray
     """(3,) where a small step begins."""
     there: FloatArray
@@ -127,24 +125,12 @@ def make_scratch(bodies: Bodies) -> Scratch:
         np.empty(count, np.int64),
         np.empty((count, 3)),
         np.empty((2, 5)),
-        np.zeros((1, 3)),
         np.zeros(3),
         np.empty(3),
         np.empty(3),
         np.empty((count, 3)),
         np.zeros(1, np.int64),
     )
-
-
-@kernel
-def _outline(k: int, bodies: Bodies, poses: FloatArray, outlines: FloatArray) -> None:
-    """Carry the corners of object ``k`` to where it is, in their rows of ``outlines``."""
-    x, y = poses[k, 0], poses[k, 1]
-    c, s = np.cos(poses[k, 2]), np.sin(poses[k, 2])
-    for i in range(bodies.offsets[k], bodies.offsets[k + 1]):
-        px, py = bodies.vertices[i, 0], bodies.vertices[i, 1]
-        outlines[i, 0] = x + c * px - s * py
-        outlines[i, 1] = y + s * px + c * py
 
 
 @kernel
@@ -159,20 +145,22 @@ def _against_robot(
 ) -> float:
     """Move object ``k`` out of the robot; returns the deepest overlap found."""
     deepest, inv = 0.0, bodies.inverse_gyration[k]
-    parts, points, outlines = bodies.robot_offsets, scratch.points, scratch.outlines
+    parts, points = bodies.robot_offsets, scratch.points
     first, end = bodies.offsets[k], bodies.offsets[k + 1]
-    _outline(k, bodies, poses, outlines)
+    body, outline = bodies.vertices[first:end], scratch.outlines[first:end]
+    place(poses[k], body, outline)
     for part in range(parts.shape[0] - 1):
-        found = contacts(scratch.robot, parts[part], parts[part + 1], outlines, first, end, points)
+        corners = scratch.robot[parts[part] : parts[part + 1]]
+        found = contacts(corners, outline, points)
         if found == 0:
             continue
         for i in range(found):
             deepest = max(deepest, points[i, 4])
-        pushed = separate(points, found, scratch.fixed, 0, 0.0, 0.0, poses, k, 1.0, inv)
+        pushed = separate(points, found, scratch.fixed, 0.0, 0.0, poses[k], 1.0, inv)
         if settings.friction > 0.0:
-            limit, before = settings.friction * pushed, scratch.before
-            drag_along(points, found, limit, robot_from, robot_to, before, poses, k, inv)
-        _outline(k, bodies, poses, outlines)
+            limit, before = settings.friction * pushed, scratch.before[k]
+            drag_along(points, found, limit, robot_from, robot_to, before, poses[k], inv)
+        place(poses[k], body, outline)
     return deepest
 
 
@@ -182,26 +170,28 @@ def _against_static(
 ) -> float:
     """Move object ``k`` out of the walls; returns the deepest overlap found."""
     deepest, inv = 0.0, bodies.inverse_gyration[k]
-    walls, boxes, parts = bodies.static_vertices, bodies.static_boxes, bodies.static_offsets
-    points, outlines = scratch.points, scratch.outlines
-    first, end = bodies.offsets[k], bodies.offsets[k + 1]
+    boxes, parts = bodies.static_boxes, bodies.static_offsets
+    points, still = scratch.points, scratch.fixed
     x, y, r = poses[k, 0], poses[k, 1], bodies.radii[k]
-    _outline(k, bodies, poses, outlines)
+    first, end = bodies.offsets[k], bodies.offsets[k + 1]
+    body, outline = bodies.vertices[first:end], scratch.outlines[first:end]
+    place(poses[k], body, outline)
     for part in range(boxes.shape[0]):
         if x + r <= boxes[part, 0] or x - r >= boxes[part, 2]:
             continue
         if y + r <= boxes[part, 1] or y - r >= boxes[part, 3]:
             continue
-        found = contacts(walls, parts[part], parts[part + 1], outlines, first, end, points)
+        wall = bodies.static_vertices[parts[part] : parts[part + 1]]
+        found = contacts(wall, outline, points)
         if found == 0:
             continue
         for i in range(found):
             deepest = max(deepest, points[i, 4])
-        pushed = separate(points, found, scratch.fixed, 0, 0.0, 0.0, poses, k, 1.0, inv)
+        pushed = separate(points, found, still, 0.0, 0.0, poses[k], 1.0, inv)
         if settings.static_friction > 0.0:
-            limit, still = settings.static_friction * pushed, scratch.still
-            drag_along(points, found, limit, still, still, scratch.before, poses, k, inv)
-        _outline(k, bodies, poses, outlines)
+            limit = settings.static_friction * pushed
+            drag_along(points, found, limit, still, still, scratch.before[k], poses[k], inv)
+        place(poses[k], body, outline)
     return deepest
 
 
@@ -211,18 +201,20 @@ def _against_objects(
 ) -> tuple[float, int]:
     """Move active object ``i`` and its neighbours apart; neighbours that move become active."""
     deepest = 0.0
-    points, outlines, offsets = scratch.points, scratch.outlines, bodies.offsets
+    points, masses, gyration = scratch.points, bodies.inverse_masses, bodies.inverse_gyration
     k = scratch.active[i]
-    first, end = offsets[k], offsets[k + 1]
-    _outline(k, bodies, poses, outlines)
+    first, end = bodies.offsets[k], bodies.offsets[k + 1]
+    body, outline = bodies.vertices[first:end], scratch.outlines[first:end]
+    place(poses[k], body, outline)
     for other in range(poses.shape[0]):
         dx, dy = poses[other, 0] - poses[k, 0], poses[other, 1] - poses[k, 1]
         reach = bodies.radii[other] + bodies.radii[k]
         if other == k or dx * dx + dy * dy >= reach * reach:
             continue
         scratch.tests[0] += 1
-        _outline(other, bodies, poses, outlines)
-        found = contacts(outlines, first, end, outlines, offsets[other], offsets[other + 1], points)
+        a, b = bodies.offsets[other], bodies.offsets[other + 1]
+        place(poses[other], bodies.vertices[a:b], scratch.outlines[a:b])
+        found = contacts(outline, scratch.outlines[a:b], points)
         if found == 0:
             continue
         depth = points[0, 4] if found == 1 else max(points[0, 4], points[1, 4])
@@ -232,24 +224,21 @@ def _against_objects(
         for j in range(count):
             known = known or scratch.active[j] == other
         if not known:
-            for axis in range(3):
-                scratch.before[other, axis] = poses[other, axis]
+            copy_into(scratch.before[other], poses[other])
             scratch.active[count] = other
             count += 1
         deepest = max(deepest, depth)
         separate(
             points,
             found,
-            poses,
-            k,
-            bodies.inverse_masses[k],
-            bodies.inverse_gyration[k],
-            poses,
-            other,
-            bodies.inverse_masses[other],
-            bodies.inverse_gyration[other],
+            poses[k],
+            masses[k],
+            gyration[k],
+            poses[other],
+            masses[other],
+            gyration[other],
         )
-        _outline(k, bodies, poses, outlines)
+        place(poses[k], body, outline)
     return deepest, count
 
 
@@ -268,8 +257,7 @@ def _resolve(
         bodies, poses, robot_to[0], robot_to[1], bodies.robot_radius, scratch.active, 0
     )
     for i in range(count):
-        for axis in range(3):
-            scratch.before[scratch.active[i], axis] = poses[scratch.active[i], axis]
+        copy_into(scratch.before[scratch.active[i]], poses[scratch.active[i]])
     touched = count  # the robot itself reaches only these
     left = 0.0
     for _ in range(settings.iterations):
@@ -362,12 +350,10 @@ def robot_held(pose: FloatArray, bodies: Bodies, settings: Settings, scratch: Sc
         if not placed:
             place(pose, bodies.robot_vertices, scratch.robot)
             placed = True
-        a, b = bodies.static_offsets[part], bodies.static_offsets[part + 1]
-        walls, corners = bodies.static_vertices, scratch.robot
+        wall = bodies.static_vertices[bodies.static_offsets[part] : bodies.static_offsets[part + 1]]
         for piece in range(bodies.robot_offsets.shape[0] - 1):
-            c, d = bodies.robot_offsets[piece], bodies.robot_offsets[piece + 1]
-            gap = least_overlap(walls, a, b, corners, c, d)[0]
-            gap = max(gap, least_overlap(corners, c, d, walls, a, b)[0])
+            corners = scratch.robot[bodies.robot_offsets[piece] : bodies.robot_offsets[piece + 1]]
+            gap = max(least_overlap(wall, corners)[0], least_overlap(corners, wall)[0])
             if gap < -settings.jam_depth:
                 return True
     return False

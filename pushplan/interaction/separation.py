@@ -1,7 +1,4 @@
-"""Moving overlapping bodies apart by the least total motion, compiled.
-
-A body is a row of an array of poses, given by the array and the index (see `contact`).
-"""
+"""Moving overlapping bodies apart by the least total motion, compiled."""
 
 from __future__ import annotations
 
@@ -21,12 +18,12 @@ def place(pose: FloatArray, points: FloatArray, out: FloatArray) -> None:
 
 
 @kernel
-def _nudge(poses: FloatArray, k: int, x: float, y: float, ix: float, iy: float, inv: float) -> None:
+def _nudge(pose: FloatArray, x: float, y: float, ix: float, iy: float, inv: float) -> None:
     """Move a body by (ix, iy) applied at the world point (x, y)."""
-    arm = (x - poses[k, 0]) * iy - (y - poses[k, 1]) * ix
-    poses[k, 0] += ix
-    poses[k, 1] += iy
-    poses[k, 2] += arm * inv
+    arm = (x - pose[0]) * iy - (y - pose[1]) * ix
+    pose[0] += ix
+    pose[1] += iy
+    pose[2] += arm * inv
 
 
 @kernel
@@ -34,11 +31,9 @@ def separate(
     points: FloatArray,
     found: int,
     a: FloatArray,
-    i: int,
     weight_a: float,
     inv_a: float,
     b: FloatArray,
-    j: int,
     weight_b: float,
     inv_b: float,
 ) -> float:
@@ -47,25 +42,25 @@ def separate(
     Args:
         points: (2, 5) contact points from the first to the second, as `contacts` gives them.
         found: how many of them count.
-        a, i: poses and index of the first body, changed in place.
+        a: (3,) pose of the first body, changed in place.
         weight_a: its inverse mass; 0 if it cannot move.
         inv_a: its 1 / c².
-        b, j: poses and index of the second body, likewise.
+        b: (3,) pose of the second body, likewise.
         weight_b: its inverse mass.
         inv_b: its 1 / c².
     """
     x0, y0, x1, y1 = points[0, 0], points[0, 1], points[1, 0], points[1, 1]
     nx, ny = points[0, 2], points[0, 3]
-    arm_a = (x0 - a[i, 0]) * ny - (y0 - a[i, 1]) * nx
-    arm_b = (x0 - b[j, 0]) * ny - (y0 - b[j, 1]) * nx
+    arm_a = (x0 - a[0]) * ny - (y0 - a[1]) * nx
+    arm_b = (x0 - b[0]) * ny - (y0 - b[1]) * nx
     base = weight_a + weight_b
     wa, wb = weight_a * inv_a, weight_b * inv_b
     k00 = base + wa * arm_a**2 + wb * arm_b**2
     first, second = points[0, 4] / k00, 0.0
     if found == 2:
         # the exact solution of the 2 x 2 complementarity problem: both points, or only one
-        other_a = (x1 - a[i, 0]) * ny - (y1 - a[i, 1]) * nx
-        other_b = (x1 - b[j, 0]) * ny - (y1 - b[j, 1]) * nx
+        other_a = (x1 - a[0]) * ny - (y1 - a[1]) * nx
+        other_b = (x1 - b[0]) * ny - (y1 - b[1]) * nx
         k11 = base + wa * other_a**2 + wb * other_b**2
         k01 = base + wa * arm_a * other_a + wb * arm_b * other_b
         d0, d1 = points[0, 4], points[1, 4]
@@ -76,11 +71,11 @@ def separate(
                 first, second = 0.0, d1 / k11
             elif second < 0.0:
                 first, second = d0 / k00, 0.0
-    _nudge(a, i, x0, y0, -first * weight_a * nx, -first * weight_a * ny, inv_a)
-    _nudge(b, j, x0, y0, first * weight_b * nx, first * weight_b * ny, inv_b)
+    _nudge(a, x0, y0, -first * weight_a * nx, -first * weight_a * ny, inv_a)
+    _nudge(b, x0, y0, first * weight_b * nx, first * weight_b * ny, inv_b)
     if found == 2:
-        _nudge(a, i, x1, y1, -second * weight_a * nx, -second * weight_a * ny, inv_a)
-        _nudge(b, j, x1, y1, second * weight_b * nx, second * weight_b * ny, inv_b)
+        _nudge(a, x1, y1, -second * weight_a * nx, -second * weight_a * ny, inv_a)
+        _nudge(b, x1, y1, second * weight_b * nx, second * weight_b * ny, inv_b)
     total: float = first + second
     return total
 
@@ -93,8 +88,7 @@ def drag_along(
     robot_from: FloatArray,
     robot_to: FloatArray,
     before: FloatArray,
-    poses: FloatArray,
-    k: int,
+    pose: FloatArray,
     inv: float,
 ) -> None:
     """Coulomb friction: carry the contact sideways with the robot, up to ``limit`` [m].
@@ -103,8 +97,8 @@ def drag_along(
         points, found: as in `separate`; two points count as the one between them.
         limit: friction times what the body was moved along the normal [m].
         robot_from, robot_to: (3,) what the body touches has moved from the one to the other.
-        before: (K, 3) poses of the bodies before the step.
-        poses, k: poses and index of the body, changed in place.
+        before: (3,) pose of the body before the step.
+        pose: (3,) pose of the body, changed in place.
         inv: its 1 / c².
     """
     x, y, nx, ny = points[0, 0], points[0, 1], points[0, 2], points[0, 3]
@@ -114,9 +108,9 @@ def drag_along(
     turn = robot_to[2] - robot_from[2]
     robot = (robot_to[0] - robot_from[0] - turn * (y - robot_to[1])) * tx
     robot += (robot_to[1] - robot_from[1] + turn * (x - robot_to[0])) * ty
-    turn = poses[k, 2] - before[k, 2]
-    body = (poses[k, 0] - before[k, 0] - turn * (y - poses[k, 1])) * tx
-    body += (poses[k, 1] - before[k, 1] + turn * (x - poses[k, 0])) * ty
-    arm = (x - poses[k, 0]) * ty - (y - poses[k, 1]) * tx
+    turn = pose[2] - before[2]
+    body = (pose[0] - before[0] - turn * (y - pose[1])) * tx
+    body += (pose[1] - before[1] + turn * (x - pose[0])) * ty
+    arm = (x - pose[0]) * ty - (y - pose[1]) * tx
     by = min(max((robot - body) / (1.0 + arm * arm * inv), -limit), limit)
-    _nudge(poses, k, x, y, by * tx, by * ty, inv)
+    _nudge(pose, x, y, by * tx, by * ty, inv)

@@ -20,6 +20,7 @@ from pushplan.planners.subtasks import (
 )
 from pushplan.planners.subtasks.completions import completions
 from pushplan.planners.subtasks.drive import PathTracer
+from pushplan.planners.subtasks.floor import LENGTHS, MOVES, TURNS, near_poses
 from pushplan.planners.subtasks.graph import candidate_pushes
 from pushplan.planners.subtasks.leaving import way_out
 from pushplan.planners.subtasks.maneuvers import maneuvers
@@ -306,8 +307,8 @@ def test_the_search_is_that_of_dijkstra():
     here, _ = example("clearing")
     ground = here.coarse
     floor, (depths, touch) = ground.floor, ground.contacts()
-    starts, costs = lattice.near_poses(floor, here.world.robot_pose, 1.5)
-    table = (lattice.MOVES, lattice.LENGTHS, lattice.TURNS, 0.02, 0.5)
+    starts, costs = near_poses(floor, here.world.robot_pose, 1.5)
+    table = (MOVES, LENGTHS, TURNS, 0.02, 0.5)
     none = np.zeros(0, dtype=np.int64)
     best, before = lattice.search_poses(starts, costs, floor, depths, touch, *table, none)
     assert np.isfinite(best).mean() > 0.3
@@ -321,14 +322,14 @@ def test_the_search_is_that_of_dijkstra():
         t, i, j = node // (rows * cols), node // cols % rows, node % cols
         steps = []
         for sign in (1, -1):
-            y, x = i + sign * lattice.MOVES[t, 1], j + sign * lattice.MOVES[t, 0]
+            y, x = i + sign * MOVES[t, 1], j + sign * MOVES[t, 0]
             if 0 <= y < rows and 0 <= x < cols:
-                length, at = lattice.LENGTHS[t] * floor.step, (i, j) if sign > 0 else (y, x)
+                length, at = LENGTHS[t] * floor.step, (i, j) if sign > 0 else (y, x)
                 if not floor.barred[0, t, *at]:
                     steps.append(((t * rows + y) * cols + x, length, length))
         for to, turn, first in (
-            ((t + 1) % count, lattice.TURNS[t], t),
-            (t - 1, lattice.TURNS[t - 1], t - 1),
+            ((t + 1) % count, TURNS[t], t),
+            (t - 1, TURNS[t - 1], t - 1),
         ):
             if not floor.barred[1, first, i, j]:
                 steps.append(((to % count * rows + i) * cols + j, 0.02 * turn, 0.5 * turn))

@@ -9,6 +9,7 @@ import numpy as np
 
 from pushplan.planners.subtasks import lattice
 from pushplan.planners.subtasks.candidates import simple_pushes
+from pushplan.planners.subtasks.floor import LENGTHS, MOVES, TURNS, near_poses
 from pushplan.planners.subtasks.freeing import freeing_pushes
 from pushplan.planners.subtasks.maneuvers import maneuvers
 from pushplan.planners.subtasks.push import Push, signature
@@ -123,7 +124,7 @@ def _search(
     targets: IntArray = _EVERYWHERE,
 ) -> Approach:
     for reach in (1.5, 4.0):
-        starts, costs = lattice.near_poses(ground.floor, pose, reach)
+        starts, costs = near_poses(ground.floor, pose, reach)
         if len(starts):
             break
     best, before = lattice.search_poses(
@@ -131,9 +132,9 @@ def _search(
         costs,
         ground.floor,
         *ground.contacts(share, without, led),
-        lattice.MOVES,
-        lattice.LENGTHS,
-        lattice.TURNS,
+        MOVES,
+        LENGTHS,
+        TURNS,
         scene.config.turn_price * scene.size,
         lattice.ARM * scene.size,
         targets,
@@ -155,9 +156,9 @@ def arrival_poses(ground: Ground, start: FloatArray) -> tuple[IntArray, FloatArr
     """Lattice poses from which the start of a push is reached, and what the rest costs [m]."""
     floor = ground.floor
     u = np.array([np.cos(start[2]), np.sin(start[2]), 0.0])
-    nodes, extra = lattice.near_poses(floor, start - 0.7 * floor.step * u, 1.3)
+    nodes, extra = near_poses(floor, start - 0.7 * floor.step * u, 1.3)
     if not len(nodes):
-        nodes, extra = lattice.near_poses(floor, start, 2.0)
+        nodes, extra = near_poses(floor, start, 2.0)
     return nodes, extra
 
 

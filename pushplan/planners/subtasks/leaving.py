@@ -7,7 +7,8 @@ import itertools
 import numpy as np
 
 from pushplan.planners.kinodynamic.collision import footprint, obstacles
-from pushplan.planners.subtasks.maneuvers import arcs_of, from_columns, from_walls, steps_of, swept
+from pushplan.planners.subtasks.arcs import arcs_of, steps_of, swept
+from pushplan.planners.subtasks.places import from_columns, from_walls
 from pushplan.planners.subtasks.route import depth_inside
 from pushplan.planners.subtasks.scene import Scene
 from pushplan.world.checks import FloatArray

@@ -8,30 +8,24 @@ spot, one after another where one is not enough (a beam search over poses of rob
 
 from __future__ import annotations
 
-import functools
 import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-import shapely
-from numba import njit
 
-from pushplan.interaction.kernels import Bodies, Settings, advance, make_scratch, robot_held
+from pushplan.planners.subtasks.arcs import arcs_of, steps_of, swept
 from pushplan.planners.subtasks.freeing import goes_home
-from pushplan.planners.subtasks.places import apart, direction_of
+from pushplan.planners.subtasks.places import apart, direction_of, from_columns, from_walls
 from pushplan.planners.subtasks.push import Push
 from pushplan.planners.subtasks.recall import Drive
 from pushplan.planners.subtasks.runner import Runner
 from pushplan.planners.subtasks.scene import Scene
-from pushplan.world import StaticMap
-from pushplan.world.checks import FloatArray, IntArray
+from pushplan.world.checks import FloatArray
 
 _STARTS = 300
 """From how many places round the object a maneuver may begin."""
 _DRAWS = 3000
 """How many places are looked at for that."""
-_BENDS = (0.0, 0.7, -0.7, 1.6, -1.6)
-"""Curvatures of the arcs, times the robot's circumscribed radius."""
 _LENGTH = 1.6
 """Of an arc [circumscribed radii]."""
 _ROUNDS = 3
@@ -94,37 +88,6 @@ def _searched(scene: Scene, k: int) -> list[Drive]:
         best = sorted([*best, *states[:_ENOUGH]], key=lambda state: state.price)[:_ENOUGH]
         level = search.selected(states)
     return search.loosened(best)
-
-
-def from_walls(static: StaticMap, points: FloatArray) -> FloatArray:
-    """Distance of points (N, 2) from the bounds, negative beyond them [m]."""
-    out: FloatArray = np.minimum(points - static.bounds[:2], static.bounds[2:] - points).min(axis=1)
-    return out
-
-
-def from_columns(static: StaticMap, points: FloatArray) -> FloatArray:
-    """Distance of points (..., 2) from what stands within the bounds [m]; inf if nothing does."""
-    if not len(static.convex_parts):
-        return np.full(points.shape[:-1], np.inf)
-    out: FloatArray = shapely.distance(_columns(static), shapely.points(points))
-    return out
-
-
-def arcs_of(scene: Scene) -> FloatArray:
-    """(A, 2) way [m], negative backward, and turn [rad] of one step of each arc."""
-    step = scene.law.step
-    signs: tuple[float, ...] = (1.0, -1.0)
-    if scene.world.robot.min_speed == 0.0:
-        signs = signs[:1]
-    arcs = [(sign * step, bend * step / scene.size) for sign in signs for bend in _BENDS]
-    out = np.array([*arcs, (0.0, 0.1), (0.0, -0.1)])
-    out[:, 1] = np.clip(out[:, 1], -scene.law.turn, scene.law.turn)
-    return out
-
-
-def steps_of(scene: Scene, length: float) -> int:
-    """How many steps an arc of some length [circumscribed radii] has."""
-    return max(2, math.ceil(length * scene.size / scene.law.step))
 
 
 @dataclass(frozen=True, eq=False)
@@ -259,14 +222,6 @@ class _Search:
         return tuple(round(float(value) / unit) for value, unit in zip(pose, units, strict=True))
 
 
-@functools.lru_cache(maxsize=8)
-def _columns(static: StaticMap) -> shapely.Geometry:
-    """All that is static within the bounds."""
-    columns = shapely.union_all([shapely.Polygon(part) for part in static.convex_parts])
-    shapely.prepare(columns)
-    return columns
-
-
 def _starts(scene: Scene, k: int) -> list[FloatArray]:
     """Poses (3,) round object ``k`` that touch nothing, evenly spread."""
     box, radius = scene.poses[k], float(scene.world.movables.radii[k])
@@ -291,58 +246,3 @@ def _news(poses: FloatArray, size: float) -> list[int]:
             found.append(n)
             last = poses[n]
     return found
-
-
-def swept(
-    scene: Scene, start: FloatArray, poses: FloatArray, arcs: FloatArray, count: int
-) -> tuple[FloatArray, FloatArray, IntArray]:
-    """`_sweep_arcs` with arrays that may be written to: one kernel for all."""
-    first, before = np.array(start), np.array(poses)
-    out: tuple[FloatArray, FloatArray, IntArray] = _sweep_arcs(
-        first, before, arcs, count, scene.bodies, scene.settings
-    )
-    return out
-
-
-@njit(cache=True, nogil=True)
-def _sweep_arcs(
-    start: FloatArray,
-    poses: FloatArray,
-    arcs: FloatArray,
-    count: int,
-    bodies: Bodies,
-    settings: Settings,
-) -> tuple[FloatArray, FloatArray, IntArray]:
-    """Drive from one pose along each of some arcs.
-
-    Args:
-        start: (3,) of the robot.
-        poses: (K, 3) of the objects.
-        arcs: (A, 2) way [m], negative backward, and turn [rad] of one step of each.
-        count: steps of each arc.
-        bodies, settings: of the interaction model.
-
-    Returns:
-        (A, count + 1, 3) robot poses, (A, count + 1, K, 3) object poses, and how many of them are
-        reached.
-    """
-    scratch = make_scratch(bodies)
-    lengths = np.zeros(poses.shape[0])
-    tracks = np.empty((arcs.shape[0], count + 1, 3))
-    out = np.empty((arcs.shape[0], count + 1, poses.shape[0], 3))
-    reached = np.ones(arcs.shape[0], dtype=np.int64)
-    for a in range(arcs.shape[0]):
-        step, turn = arcs[a]
-        tracks[a, 0], out[a, 0] = start, poses
-        for n in range(1, count + 1):
-            here, there, after = tracks[a, n - 1], tracks[a, n], out[a, n]
-            there[0] = here[0] + step * math.cos(here[2] + 0.5 * turn)
-            there[1] = here[1] + step * math.sin(here[2] + 0.5 * turn)
-            there[2] = here[2] + turn
-            after[:] = out[a, n - 1]
-            if robot_held(there, bodies, settings, scratch) or not advance(
-                here, there, after, lengths, bodies, settings, scratch
-            ):
-                break
-            reached[a] = n + 1
-    return tracks, out, reached

@@ -260,6 +260,24 @@ def _take_stock(
     return news
 
 
+class Run(NamedTuple):
+    """Memory of one push."""
+
+    here: FloatArray
+    """(3,) the robot."""
+    there: FloatArray
+    """(3,) where it goes."""
+    poses: FloatArray
+    """(K, 3)"""
+    saved: FloatArray
+    """(K, 3) before the step."""
+    lengths: FloatArray
+    """(K,) path lengths [m]."""
+    done: BoolArray
+    """(K,)"""
+    scratch: Scratch
+
+
 @njit(cache=True, nogil=True)
 def roll_out(
     start: FloatArray,
@@ -295,38 +313,22 @@ def roll_out(
         jammed, 3 lost. A stage ends where one more object is done; a last stage that ends
         otherwise is kept too.
     """
-    poses, lengths = first.copy(), np.zeros(first.shape[0])
-    done, saved = all_done(poses, bodies, task), np.empty_like(poses)
-    here, there, scratch = start.copy(), np.empty(3), make_scratch(bodies)
-    return _run(
-        here,
-        there,
+    poses = first.copy()
+    run = Run(
+        start.copy(),
+        np.empty(3),
         poses,
-        saved,
-        lengths,
-        done,
-        led,
-        path,
-        shift,
-        limit,
-        wanted,
-        law,
-        bodies,
-        settings,
-        task,
-        scratch,
-        log,
+        np.empty_like(poses),
+        np.zeros(poses.shape[0]),
+        all_done(poses, bodies, task),
+        make_scratch(bodies),
     )
+    return _run(run, led, path, shift, limit, wanted, law, bodies, settings, task, log)
 
 
 @kernel
 def _run(
-    here: FloatArray,
-    there: FloatArray,
-    poses: FloatArray,
-    saved: FloatArray,
-    lengths: FloatArray,
-    done: BoolArray,
+    run: Run,
     led: int,
     path: FloatArray,
     shift: float,
@@ -336,10 +338,10 @@ def _run(
     bodies: Bodies,
     settings: Settings,
     task: Task,
-    scratch: Scratch,
     log: Log,
 ) -> tuple[int, int, int]:
-    """`roll_out` in memory that is given: all of its arguments but ``wanted`` are changed."""
+    """`roll_out` in memory that is given."""
+    here, there, poses, saved, lengths, done, scratch = run
     copy_into(log.track[0], here)
     room = 2.0 * law.step
     log.box[0], log.box[1], log.box[2], log.box[3] = np.inf, np.inf, -np.inf, -np.inf

@@ -21,6 +21,7 @@ from pushplan.planners.kinodynamic.collision import (
     obstacles,
 )
 from pushplan.planners.subtasks import lattice
+from pushplan.planners.subtasks.floor import pose_at
 from pushplan.planners.subtasks.graph import Approach, arrival_poses
 from pushplan.planners.subtasks.scene import LED, Scene
 from pushplan.world.checks import ArrayRecord, FloatArray, IntArray
@@ -231,7 +232,6 @@ class Router:
         self._shape = footprint(robot, margin)
         self._tight = footprint(robot, 0.5 * margin)
         self._among = obstacles(scene.world.static)
-        self._weights = scene.nuisance
 
     def route(self, approach: Approach, start: FloatArray, led: int = -1) -> Route | None:
         """The way from the robot to the start (3,) of a push; None if there is none.
@@ -242,9 +242,6 @@ class Router:
             led: index of the object that is to be pushed and must not be moved before; -1 if none.
         """
         scene = self.scene
-        self._weights = scene.nuisance.copy()
-        if led >= 0:
-            self._weights[led] += LED
         nodes, extra = arrival_poses(scene.fine, start)
         if not len(nodes):
             return None
@@ -255,18 +252,20 @@ class Router:
         chain = [int(nodes[best])]
         while approach.before[chain[-1]] >= 0:
             chain.append(int(approach.before[chain[-1]]))
-        poses = [lattice.pose_at(scene.fine.floor, node) for node in reversed(chain)]
+        poses = [pose_at(scene.fine.floor, node) for node in reversed(chain)]
         here, end = scene.world.robot_pose, float(start[2])
         ahead = scene.size * np.array([math.cos(here[2]), math.sin(here[2])])
         near = [here[:2], *(here[:2] + share * ahead for share in _AWAY)]
         bends, every = _bends(poses), _places(poses)
+        by = self._driving(led)
         for last in ([start[:2]], []):  # it may be too near to a wall to turn there
             for first, points, longest in (
                 ([here[:2]], bends, len(bends) + 1),
                 (near, every, _LONGEST),
                 (near, every, 1),
             ):
-                found = self._shortened([*first, *points, *last], len(first), longest, end)
+                through = np.array([*first, *points, *last])
+                found = _shortened(through, float(here[2]), end, len(first), longest, by)
                 if found is not None:
                     return found
         return None
@@ -287,39 +286,38 @@ class Router:
         found.append(_between(here, np.array([here[0], here[1], route.heading])))
         return np.concatenate(found)
 
-    def _shortened(
-        self, points: list[FloatArray], first: int, longest: int, end: float
-    ) -> Route | None:
-        """The cheapest way over some of the points to the last, and a turn to a heading there."""
+    def _driving(self, led: int) -> _Driving:
+        """What motions are priced from, where object ``led`` must not be moved."""
         scene = self.scene
-        bends = np.array(points)
-        prices, came = _cheapest(
-            bends,
-            float(scene.world.robot_pose[2]),
-            end,
-            first,
-            longest,
-            _Driving(
-                0.1 * scene.size,
-                scene.config.turn_price * scene.size,
-                lattice.ARM * scene.size,
-                self._shape,
-                self._tight,
-                self._among,
-                scene.poses,
-                scene.bodies,
-                self._weights,
-            ),
+        weights = scene.nuisance.copy()
+        if led >= 0:
+            weights[led] += LED
+        return _Driving(
+            0.1 * scene.size,
+            scene.config.turn_price * scene.size,
+            lattice.ARM * scene.size,
+            self._shape,
+            self._tight,
+            self._among,
+            scene.poses,
+            scene.bodies,
+            weights,
         )
-        row = 2 * len(points) - 2 + int(prices[1] < prices[0])
-        price = float(prices.min())
-        if math.isinf(price):
-            return None
-        chain = [row]
-        while came[chain[-1]] > 0:
-            chain.append(int(came[chain[-1]]))
-        rows = np.array(chain[::-1])
-        return Route(bends[rows // 2], 1.0 - 2.0 * (rows % 2), end, price)
+
+
+def _shortened(
+    points: FloatArray, heading: float, end: float, first: int, longest: int, by: _Driving
+) -> Route | None:
+    """`_cheapest` as a route; arguments as there."""
+    prices, came = _cheapest(points, heading, end, first, longest, by)
+    price = float(prices.min())
+    if math.isinf(price):
+        return None
+    chain = [2 * len(points) - 2 + int(prices[1] < prices[0])]
+    while came[chain[-1]] > 0:
+        chain.append(int(came[chain[-1]]))
+    rows = np.array(chain[::-1])
+    return Route(points[rows // 2], 1.0 - 2.0 * (rows % 2), end, price)
 
 
 def _between(here: FloatArray, there: FloatArray) -> FloatArray:

@@ -22,14 +22,8 @@ from pushplan.planners.kinodynamic.collision import (
 )
 from pushplan.planners.lining_up import bumper_half
 from pushplan.planners.subtasks.config import SubTaskConfig
-from pushplan.planners.subtasks.lattice import (
-    HEADINGS,
-    Floor,
-    Layers,
-    add_up,
-    contact_depths,
-    floor_of,
-)
+from pushplan.planners.subtasks.floor import HEADINGS, Floor, floor_of
+from pushplan.planners.subtasks.lattice import Layers, add_up, contact_depths
 from pushplan.planners.subtasks.recall import Recall
 from pushplan.planners.subtasks.rollout import Law, Task, all_done, task_of
 from pushplan.planners.subtasks.ways import Ways, ways_of
