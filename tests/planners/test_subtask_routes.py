@@ -89,11 +89,24 @@ def test_ways_among_columns_touch_nothing():
 
 
 @pytest.mark.parametrize("y", [-1.94, 1.08])
-def test_where_there_is_no_room_to_turn_about_the_robot_drives_off_first(y):
-    """Near a wall, or a column: one way about may be free, but it is not sure which is taken."""
-    scene = among_columns((-0.1, y, 0.0))
-    route = Router(scene).route(approach_from(scene), np.array([-0.1, y, math.pi]))
-    assert touched(scene, driven(scene, route)) < 1e-6
+@pytest.mark.parametrize(("heading", "to", "turn"), [(0.0, 3.1, 1), (0.0, -3.1, 1), (3.1, 0.0, -1)])
+def test_where_there_is_room_to_turn_one_way_only_it_is_taken(y, heading, to, turn):
+    """Near a wall, or a column: its wide bumper cannot pass on the side that is near."""
+    scene = among_columns((-0.1, y, heading))
+    route = Router(scene).route(approach_from(scene), np.array([-0.1, y, to]))
+    assert np.ptp(route.points, axis=0).max() < 0.1
+    assert route.turns[-1] in (0, turn)
+    poses = driven(scene, route)
+    assert touched(scene, poses) < 1e-6
+    assert math.copysign(1.0, poses[-1, 2] - heading) == turn
+
+
+def test_the_way_that_is_predicted_is_the_one_that_is_driven():
+    scene = among_columns((-0.1, -1.94, 0.0))
+    router = Router(scene)
+    route = router.route(approach_from(scene), np.array([-0.1, -1.94, -3.0]))
+    predicted, poses = router.poses_along(route), driven(scene, route)
+    assert np.abs(predicted[-1] - poses[-1]).max() < 0.05
 
 
 def test_out_of_a_wall_but_not_into_it():

@@ -200,7 +200,7 @@ def test_a_walled_in_box_is_infeasible():
 
 def test_a_box_at_a_wall_is_freed():
     here = scene([(0.0, -4.49, 0.0)])
-    graph = build_graph(here, freeing=True)
+    graph = build_graph(here, freeing=1)
     assert graph.pushes and not graph.infeasible
 
 
@@ -250,6 +250,51 @@ def test_the_way_out_of_a_gap_touches_nothing():
     assert path is not None and path[-1, 1] < -0.8
     assert Runner(tight).trace(path, 0)[0].work == 0.0
     assert way_out(small_box((0.0, 0.8, 0.0), GAP)) is None
+
+
+def test_the_way_out_from_between_two_columns_is_to_and_fro():
+    """Neither straight on nor along one arc, and there is no room to turn about."""
+    columns = [[(0.0, y), (1.0, y), (1.0, y + 1.0), (0.0, y + 1.0)] for y in (0.0, 2.0)]
+    for pose in ((0.8, 1.47, -1.57), (0.4, 1.5, 1.4)):
+        tight = scene([(4.0, -4.0, 0.0)], extra=columns, pose=pose)
+        path = way_out(tight)
+        assert path is not None and len(path) > 20
+        moves = np.diff(path, axis=0)
+        assert np.abs(moves[:, 2]).max() < 0.1 and np.hypot(*moves[:, :2].T).max() < 0.1
+        walls = shapely.union_all([shapely.Polygon(column) for column in columns])
+        bodies = [
+            shapely.union_all(
+                [shapely.Polygon(transform(p, part)) for part in tight.world.robot.parts]
+            )
+            for p in path
+        ]
+        assert shapely.area(shapely.intersection(walls, bodies)).max() < 1e-3
+        assert shapely.distance(walls, shapely.Point(path[-1, :2])) > tight.size
+        assert np.array_equal(path, way_out(tight))
+
+
+def test_there_is_no_way_out_of_a_cell():
+    sides = [[(-1, -1), (1, -1), (1, -0.9), (-1, -0.9)], [(-1, 0.9), (1, 0.9), (1, 1), (-1, 1)]]
+    sides += [[(-1, -1), (-0.9, -1), (-0.9, 1), (-1, 1)], [(0.9, -1), (1, -1), (1, 1), (0.9, 1)]]
+    cell = [1.4 * 0.45 * np.array(side) for side in sides]
+    assert way_out(scene([(4.0, -4.0, 0.0)], extra=cell, pose=(0.0, 0.0, 0.0))) is None
+
+
+def test_an_object_that_cannot_be_got_to_later_does_not_keep_the_others_waiting():
+    """From where some of these pushes end the robot cannot get to where others begin."""
+    left_below = [(-2.54, 0.4), (-1.55, 2.38), (2.32, -3.07), (-1.58, -1.5), (0.31, -2.74)]
+    here = scene(
+        [(1.96, -2.28, 2.11), (0.3, -1.21, -2.8), (-1.07, 0.48, 0.44), (0.81, -1.21, 1.67)],
+        extra=[
+            [(x, y), (x + 1.0, y), (x + 1.0, y + 1.0), (x, y + 1.0)]
+            for x, y in [*left_below, (2.07, 2.38), (0.51, -0.57)]
+        ],
+        pose=(3.85, -3.43, -2.61),
+    )
+    graph = build_graph(here)
+    assert len(graph.pushes) > 1
+    later = graph.costs[:-1][~np.eye(len(graph.pushes), dtype=bool)]
+    assert np.isfinite(later).all() and later.max() > 30.0
 
 
 def test_a_bumper_that_hooks_on_a_corner_is_driven_ahead():

@@ -7,7 +7,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pushplan.planners.subtasks.graph import Approach, SubTaskGraph, approach_from, build_graph
+from pushplan.planners.subtasks.graph import (
+    FREED,
+    Approach,
+    SubTaskGraph,
+    approach_from,
+    build_graph,
+)
 from pushplan.planners.subtasks.push import Push, signature
 from pushplan.planners.subtasks.rehearse import Rehearsal, rehearse
 from pushplan.planners.subtasks.route import Router
@@ -39,15 +45,18 @@ class Choice:
 def choose(scene: Scene, penalties: dict[tuple[object, ...], float]) -> Choice:
     """Sequence anew: the pushes to make, and the first of them with the way to it.
 
-    Where no push can be carried out, those that only free an object are looked at too.
+    Where no push can be carried out, those that only free an object are looked at too: first those
+    for the nearest objects, then for all.
 
     Args:
         scene: the scene.
         penalties: what to add to the price of a push, by `signature` [m].
     """
     choice = _chosen(scene, build_graph(scene, penalties), penalties)
-    if choice.first is None and not any(push.frees for push in choice.graph.pushes):
-        choice = _chosen(scene, build_graph(scene, penalties, freeing=True), penalties)
+    frees = any(push.frees for push in choice.graph.pushes)
+    for freeing in (FREED, int((~scene.done).sum())):
+        if choice.first is None and not (frees and freeing <= FREED):
+            choice = _chosen(scene, build_graph(scene, penalties, freeing=freeing), penalties)
     return choice
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from pushplan.control import clamp_twist
-from pushplan.planners.subtasks.route import Route
+from pushplan.planners.subtasks.route import Route, turn_to
 from pushplan.world import RobotModel, Twist
 from pushplan.world.checks import FloatArray
 
@@ -44,7 +44,11 @@ class LegDriver:
                 sign = 1.0  # it cannot drive back
             dx, dy = route.points[self._next, 0] - x, route.points[self._next, 1] - y
             distance = math.hypot(dx, dy)
-            bearing = math.remainder(math.atan2(sign * dy, sign * dx) - theta, 2.0 * math.pi)
+            bearing = turn_to(
+                theta,
+                math.atan2(sign * dy, sign * dx),
+                float(route.turns[self._next]) if self._turning else 0.0,
+            )
             passed = not self._turning and abs(bearing) > 0.5 * math.pi
             beside = abs(bearing) > _ASTRAY  # to turn for so little could sweep into something
             if (
@@ -65,7 +69,7 @@ class LegDriver:
             return clamp_twist(
                 robot, sign * speed, bearing / period if distance > 5 * near else 0.0
             )
-        error = math.remainder(route.heading - theta, 2.0 * math.pi)
+        error = turn_to(theta, route.heading, float(route.turns[-1]))
         if abs(error) > _ALIGNED and self._tries < 80:
             self._tries += 1
             return clamp_twist(robot, 0.0, error / period)

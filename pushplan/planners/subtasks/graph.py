@@ -17,9 +17,11 @@ from pushplan.planners.subtasks.runner import Runner
 from pushplan.planners.subtasks.scene import Ground, Scene
 from pushplan.world.checks import FloatArray, IntArray
 
-_FREED = 2
-"""How many objects, the nearest ones, freeing pushes are looked for at a time."""
+FREED = 2
+"""For how many objects, the nearest ones, freeing pushes are looked for if there are no others."""
 
+_FAR = 5.0
+"""Price of getting to what cannot be got to later [diagonals of the floor]."""
 _EVERYWHERE = np.zeros(0, dtype=np.int64)
 
 
@@ -58,15 +60,15 @@ def build_graph(
     scene: Scene,
     penalties: dict[tuple[object, ...], float] | None = None,
     *,
-    freeing: bool = False,
+    freeing: int = 0,
 ) -> SubTaskGraph:
     """Make the candidate pushes of a scene and price them.
 
     Args:
         scene: the scene.
         penalties: what to add to the price of a push, by `signature` [m].
-        freeing: whether pushes that only free an object are wanted too; where there are no others
-            they are in any case.
+        freeing: for how many objects, the nearest ones first, pushes that only free them are wanted
+            too; where there are no others they are in any case.
     """
     approach = approach_from(scene)
     runner = Runner(scene)
@@ -87,7 +89,7 @@ def build_graph(
     return SubTaskGraph(tuple(pushes), costs, approach, infeasible)
 
 
-def candidate_pushes(scene: Scene, runner: Runner, freeing: bool = False) -> list[Push]:
+def candidate_pushes(scene: Scene, runner: Runner, freeing: int = 0) -> list[Push]:
     """All candidates of a scene; ``freeing`` see `build_graph`."""
     pushes = simple_pushes(runner)
     if freeing or not pushes:  # what is hard to get at is often freed by what is done before
@@ -99,7 +101,7 @@ def candidate_pushes(scene: Scene, runner: Runner, freeing: bool = False) -> lis
                 found += maneuvers(runner, k)
             pushes += found
             freed += bool(found)
-            if freed == _FREED:
+            if freed >= max(freeing, FREED):
                 break
     return pushes
 
@@ -181,8 +183,14 @@ def _best(scene: Scene, pushes: Sequence[Push], row: FloatArray) -> tuple[list[P
 
 
 def _between(scene: Scene, pushes: Sequence[Push]) -> FloatArray:
-    """(N, N) cost of the approach from the end of each push to the start of each other [m]."""
+    """(N, N) cost of the approach from the end of each push to the start of each other [m].
+
+    What cannot be got to from there, as far as one can say now, is put off rather than ruled out:
+    otherwise one object would be enough for there to be no order at all.
+    """
     ground, ids = scene.coarse, scene.world.movables.ids
+    bounds = scene.world.static.bounds
+    far = _FAR * float(np.hypot(*(bounds[2:] - bounds[:2])))
     arrivals = _arrivals(ground, pushes)
     out = np.full((len(pushes), len(pushes)), np.inf)
     known: dict[tuple[object, ...], FloatArray] = {}
@@ -199,6 +207,6 @@ def _between(scene: Scene, pushes: Sequence[Push]) -> FloatArray:
                 scene, ground, push.end, scene.config.later, gone, targets=arrivals.nodes
             )
             known[key] = lattice.least_costs(found.costs, arrivals)
-        out[n] = known[key]
+        out[n] = np.minimum(known[key], far)
     np.fill_diagonal(out, np.inf)
     return out

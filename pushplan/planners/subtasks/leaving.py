@@ -2,65 +2,132 @@
 
 from __future__ import annotations
 
-import itertools
+import math
 
 import numpy as np
+from numba import njit
 
-from pushplan.planners.kinodynamic.collision import footprint, obstacles
-from pushplan.planners.subtasks.arcs import arcs_of, steps_of, swept
-from pushplan.planners.subtasks.places import from_columns, from_walls
+from pushplan.planners.kinodynamic.collision import Footprint, Obstacles, footprint, obstacles
 from pushplan.planners.subtasks.route import depth_inside
 from pushplan.planners.subtasks.scene import Scene
 from pushplan.world.checks import FloatArray
 
-_LEAST = 0.15
-"""By how much a way out has to make more room [circumscribed radii]."""
-_BETWEEN = 4
-"""In how many places between two poses it is looked whether something static is in the way."""
+_STEP = 0.08
+"""Length of a step [circumscribed radii], and turn of one on the spot [rad]."""
+_CELL = 0.6
+"""Sides of the boxes of poses of which one is looked at each [steps]."""
+_REACH = 3.0
+"""How far away the room to turn may be [circumscribed radii]."""
+_MOST = 100_000
+"""Poses that are looked at."""
+_ROOM = 1.05
+"""Room that the robot needs to turn about [circumscribed radii]."""
 _DEEPER = 1e-3
 """By how much the robot may get deeper into what it touches [circumscribed radii]."""
 
 
 def way_out(scene: Scene) -> FloatArray | None:
-    """A drive (N, 3) out of a tight place that moves no object; None if there is none, or no need.
+    """A drive (N, 3) that moves no object, to the nearest place with room to turn about.
 
-    It makes at least some more room round the robot, so that a few of them come to an end.
+    None if there is no such place within reach, or the robot is in one. What the robot touches at
+    first it may touch on the way, but no deeper: a bumper can hook on a corner. The drive keeps
+    away from all else if it can.
     """
-    start, enough = np.array(scene.world.robot_pose), 1.1 * scene.size
-    most = float(_room(scene, start[None])[0])
-    if most > enough:
+    world = scene.world
+    objects = [world.movables.outline_world(k) for k in range(len(world.movables))]
+    among, start = obstacles(world.static, objects), np.array(world.robot_pose)
+    if _has_room(start, _ROOM * scene.size, among):
         return None
-    tracks, poses, reached = swept(scene, start, scene.poses, arcs_of(scene), steps_of(scene, 3.0))
-    best, most = None, most + _LEAST * scene.size
-    for track, after, count in zip(tracks, poses, reached, strict=True):
-        still = int((after[:count] == scene.poses).all(axis=(1, 2)).sum())
-        rooms = np.minimum(_room(scene, track[:still]), enough + _LEAST * scene.size)
-        if rooms.max() > most:
-            end = int(rooms.argmax()) + 1
-            if _gets_out(scene, track[:end]):
-                best, most = track[:end], float(rooms.max())
-    return best
+    steps = scene.size * _STEP * np.array([(1.0, 0.0), (1.0, 1.0), (1.0, -1.0)])
+    steps[:, 1] /= scene.size
+    if world.robot.min_speed < 0.0:
+        steps = np.concatenate([steps, steps * (-1.0, 1.0)])
+    steps = np.concatenate([steps, [(0.0, _STEP), (0.0, -_STEP)]])
+    for share in (0.5, 0.0):
+        shape = footprint(world.robot, share * scene.config.margin * scene.size)
+        path = _search(start, steps, shape, among, scene.size)
+        if len(path):
+            return path
+    return None
 
 
-def _room(scene: Scene, path: FloatArray) -> FloatArray:
-    """Distance of the robot's middle on a path (N, 3) from all that is around it [m]."""
-    points, static = path[:, :2], scene.world.static
-    away = np.hypot(*np.moveaxis(points[:, None] - scene.poses[:, :2], 2, 0))
-    objects = (away - scene.world.movables.radii).min(axis=1, initial=np.inf)
-    out: FloatArray = np.minimum(
-        np.minimum(from_walls(static, points), from_columns(static, points)), objects
-    )
-    return out
-
-
-def _gets_out(scene: Scene, track: FloatArray) -> bool:
-    """Whether the robot gets no deeper into what it may touch: a bumper can hook on a corner."""
-    shape, among = footprint(scene.world.robot, 0.0), obstacles(scene.world.static)
-    scratch = np.empty_like(shape.vertices)
-    deepest = depth_inside(track[0].copy(), shape, among, scratch) + _DEEPER * scene.size
-    for before, after in itertools.pairwise(track):
-        for n in range(1, _BETWEEN + 1):
-            pose = before + n / _BETWEEN * (after - before)
-            if depth_inside(pose, shape, among, scratch) > deepest:
+@njit(cache=True, nogil=True)
+def _has_room(pose: FloatArray, radius: float, among: Obstacles) -> bool:
+    """Whether a disc about a pose is within the bounds and overlaps nothing."""
+    x, y, bounds = pose[0], pose[1], among.bounds
+    if min(x - bounds[0], bounds[2] - x, y - bounds[1], bounds[3] - y) < radius:
+        return False
+    for s in range(among.boxes.shape[0]):
+        box = among.boxes[s]
+        if x + radius <= box[0] or x - radius >= box[2]:
+            continue
+        if y + radius <= box[1] or y - radius >= box[3]:
+            continue
+        corners = among.vertices[among.offsets[s] : among.offsets[s + 1]]
+        inside = True
+        for i in range(corners.shape[0]):
+            j = i + 1 if i + 1 < corners.shape[0] else 0
+            ax, ay = x - corners[i, 0], y - corners[i, 1]
+            ex, ey = corners[j, 0] - corners[i, 0], corners[j, 1] - corners[i, 1]
+            t = min(max((ax * ex + ay * ey) / (ex * ex + ey * ey), 0.0), 1.0)
+            if math.hypot(ax - t * ex, ay - t * ey) < radius:
                 return False
+            inside = inside and ex * ay - ey * ax >= 0.0
+        if inside:
+            return False
     return True
+
+
+@njit(cache=True, nogil=True)
+def _search(
+    start: FloatArray, steps: FloatArray, shape: Footprint, among: Obstacles, size: float
+) -> FloatArray:
+    """The drive with the fewest steps, (N, 3), to room enough; (0, 3) if there is none.
+
+    Args:
+        start: (3,) pose of the robot.
+        steps: (A, 2) way [m] and turn [rad] of each step that it may take.
+        shape: its footprint.
+        among: what it must not touch.
+        size: its circumscribed radius [m].
+    """
+    unit = _CELL * _STEP
+    half, turns = int(_REACH / unit), math.ceil(2.0 * math.pi / unit)
+    seen = np.zeros((2 * half + 1, 2 * half + 1, turns), dtype=np.bool_)
+    nodes, before = np.empty((_MOST, 3)), np.empty(_MOST, dtype=np.int64)
+    pose, scratch = np.empty(3), np.empty_like(shape.vertices)
+    limit = depth_inside(start, shape, among, scratch) + _DEEPER * size
+    nodes[0], before[0], count = start, -1, 1
+    at = 0
+    while at < count:
+        for a in range(steps.shape[0]):
+            way, turn = steps[a]
+            free = True
+            for part in (0.5, 1.0):
+                middle = nodes[at, 2] + 0.5 * part * turn
+                pose[0] = nodes[at, 0] + part * way * math.cos(middle)
+                pose[1] = nodes[at, 1] + part * way * math.sin(middle)
+                pose[2] = nodes[at, 2] + part * turn
+                if free and part == 1.0:
+                    j = half + int(np.round((pose[0] - start[0]) / (unit * size)))
+                    i = half + int(np.round((pose[1] - start[1]) / (unit * size)))
+                    t = int(np.floor(pose[2] % (2.0 * math.pi) / unit))
+                    free = 0 <= j <= 2 * half and 0 <= i <= 2 * half and not seen[i, j, t]
+                free = free and depth_inside(pose, shape, among, scratch) <= limit
+            if not free:
+                continue
+            seen[i, j, t] = True
+            nodes[count], before[count] = pose, at
+            count += 1
+            if count == _MOST:
+                return nodes[:0]
+            if _has_room(pose, _ROOM * size, among):
+                length, node = 0, count - 1
+                while node >= 0:
+                    length, node = length + 1, before[node]
+                out, node = np.empty((length, 3)), count - 1
+                for n in range(length - 1, -1, -1):
+                    out[n], node = nodes[node], before[node]
+                return out
+        at += 1
+    return nodes[:0]

@@ -85,7 +85,7 @@ def _searched(scene: Scene, k: int) -> list[Drive]:
         found = search.freed(states)
         if found:
             return found
-        best = sorted([*best, *states[:_ENOUGH]], key=lambda state: state.price)[:_ENOUGH]
+        best = search.from_all_sides(sorted([*best, *states], key=lambda state: state.price))
         level = search.selected(states)
     return search.loosened(best)
 
@@ -187,11 +187,15 @@ class _Search:
             seen.add(cell)
             if all(goes_home(scene, k, state.poses, state.path[-1], by) for by in _SHAKEN):
                 good[cell] = [state]
+        found = [state for alike in good.values() for state in self.from_all_sides(alike)]
+        return [(state.path, 0.0) for state in found[:_SIDES]]
+
+    def from_all_sides(self, states: list[_State]) -> list[_State]:
+        """The first few states with drives that begin in different places."""
         sides: dict[tuple[int, ...], _State] = {}
-        for cell, alike in good.items():
-            for state in alike:
-                sides.setdefault((*cell, *self._cell(state.path[0], 0.8, 0.8)), state)
-        return [(state.path, 0.0) for state in list(sides.values())[:_SIDES]]
+        for state in states:
+            sides.setdefault(self._cell(state.path[0], 0.8, 0.8), state)
+        return list(sides.values())[:_SIDES]
 
     def loosened(self, states: list[_State]) -> list[Drive]:
         """Drives to states in which the object lies much less tightly than it did."""

@@ -79,7 +79,7 @@ class Gtsp:
         nodes = [node for k in np.flatnonzero(~scene.done) for node in _pushes(scene, int(k))]
         heading = float(world.robot_pose[2])
         if not nodes:
-            return Route(np.zeros((0, 2)), np.zeros(0), heading, 0.0)
+            return Route(np.zeros((0, 2)), np.zeros(0), np.zeros(1), heading, 0.0)
         count = len(nodes)
         costs = np.full((count + 1, count + 1), np.inf)
         for m, (_, start, end) in enumerate(nodes):
@@ -99,7 +99,8 @@ class Gtsp:
             way = graph.shortest_path(points[-1], start)
             points += [*(way.points[1:] if len(way.points) > 1 else [start]), end]
         legs = np.array(points[1:])
-        return Route(legs, np.ones(len(legs)), heading, float(tour.cost))
+        ahead, either = np.ones(len(legs)), np.zeros(len(legs) + 1)
+        return Route(legs, ahead, either, heading, float(tour.cost))
 
 
 def _pushes(scene: Scene, k: int) -> list[tuple[int, FloatArray, FloatArray]]:

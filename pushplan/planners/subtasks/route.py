@@ -32,8 +32,10 @@ _LONGEST = 6
 """Points further on that a leg may end at, where the robot has to keep to the lattice's way."""
 _AWAY = (0.3, -0.3, 0.6, -0.6, 1.0, -1.0)
 """How far ahead the robot may drive first to get to where it can turn [circumscribed radii]."""
-_HALF = math.radians(170.0)
-"""From here on it is not sure in which direction a turn will be made."""
+_SURE = math.radians(170.0)
+"""Up to here a turn is made the shorter way if nothing is said."""
+_LITTLE = 0.6
+"""A turn by less is not made the longer way [rad]."""
 TIGHT = 25.0
 """Price of driving on, where the robot begins nearer to something static than it should be."""
 
@@ -45,12 +47,15 @@ class Route(ArrayRecord):
     Args:
         points: (N, 2) where each leg ends [m].
         signs: (N,) 1 ahead, -1 back.
+        turns: (N + 1,) how to turn on the spot before each leg, and at the end: 1 to the left, -1
+            to the right, 0 the shorter way.
         heading: to turn to at the end [rad].
         price: length, and what is pushed about on the way [m].
     """
 
     points: FloatArray
     signs: FloatArray
+    turns: FloatArray
     heading: float
     price: float
 
@@ -123,19 +128,23 @@ class _Driving(NamedTuple):
 
 
 @njit(cache=True, nogil=True)
-def _motion(here: FloatArray, there: FloatArray, by: _Driving) -> float:
-    """Price of a straight motion between two poses, or of a turn on the spot; inf at a wall."""
-    turn = there[2] - here[2]
+def _turn(x: float, y: float, heading: float, to: float, by: _Driving) -> tuple[float, float]:
+    """Price of a turn on the spot from one heading to another, and how to make it; see `Route`."""
+    here, there = np.array([x, y, heading]), np.array([x, y, to])
+    turn = to - heading
     turn -= 2.0 * math.pi * np.round(turn / (2.0 * math.pi))
-    price = _priced(here, there, turn, by)
-    if abs(turn) > _HALF:  # it may be made in either direction
-        price = max(price, _priced(here, there, turn - math.copysign(2.0 * math.pi, turn), by))
-    return price
+    other = turn - math.copysign(2.0 * math.pi, turn)
+    price = _motion(here, there, turn, by)
+    if abs(turn) > _LITTLE and by.turn_price * abs(other) < price:
+        longer = _motion(here, there, other, by)
+        if longer < price:
+            price, turn = longer, other
+    return price, math.copysign(1.0, turn) if abs(turn) > _SURE else 0.0
 
 
 @njit(cache=True, nogil=True)
-def _priced(here: FloatArray, there: FloatArray, turn: float, by: _Driving) -> float:
-    """`_motion` with a turn [rad] in the direction of its sign."""
+def _motion(here: FloatArray, there: FloatArray, turn: float, by: _Driving) -> float:
+    """Price of a straight motion between two poses, or of a turn on the spot; inf at a wall."""
     body = np.empty_like(by.shape.vertices)
     scratch = np.empty_like(by.tight.vertices)
     length = math.hypot(there[0] - here[0], there[1] - here[1])
@@ -168,23 +177,22 @@ def _priced(here: FloatArray, there: FloatArray, turn: float, by: _Driving) -> f
 @njit(cache=True, nogil=True)
 def _leg(
     x: float, y: float, heading: float, point: FloatArray, sign: float, by: _Driving
-) -> tuple[float, float]:
-    """Price of turning to a point (2,) and driving there, and the heading then."""
+) -> tuple[float, float, float]:
+    """Price of turning to a point (2,) and driving there, the heading then, and how to turn."""
     dx, dy = point[0] - x, point[1] - y
     if math.hypot(dx, dy) < 1e-9:
-        return 0.0, heading
+        return 0.0, heading, 0.0
     way = math.atan2(sign * dy, sign * dx)
-    turned = np.array([x, y, way])
-    price = _motion(np.array([x, y, heading]), turned, by)
+    price, turn = _turn(x, y, heading, way, by)
     if price < np.inf:
-        price += _motion(turned, np.array([point[0], point[1], way]), by)
-    return price, way
+        price += _motion(np.array([x, y, way]), np.array([point[0], point[1], way]), 0.0, by)
+    return price, way, turn
 
 
 @njit(cache=True, nogil=True)
 def _cheapest(
     points: FloatArray, heading: float, end: float, first: int, longest: int, by: _Driving
-) -> tuple[FloatArray, IntArray]:
+) -> tuple[FloatArray, IntArray, FloatArray]:
     """The cheapest way over some points to the last one, and a turn to a heading there.
 
     Args:
@@ -196,12 +204,13 @@ def _cheapest(
         by: what motions are priced from.
 
     Returns:
-        The price if the last point is got to ahead and back; and for each point, got to ahead and
-        back (rows 2 i and 2 i + 1), which row the leg begins at.
+        The price if the last point is got to ahead and back; for each point, got to ahead and back
+        (rows 2 i and 2 i + 1), which row the leg begins at; and how to turn before it, and at the
+        end if it is the last: (2 N, 2), see `Route`.
     """
     count = points.shape[0]
     best, came = np.full(2 * count, np.inf), np.full(2 * count, -1, dtype=np.int64)
-    headings = np.full(2 * count, heading)
+    headings, turns = np.full(2 * count, heading), np.zeros((2 * count, 2))
     best[0] = 0.0
     for to in range(2, 2 * count):
         j, sign = to // 2, 1.0 - 2.0 * (to % 2)
@@ -212,14 +221,15 @@ def _cheapest(
             away = math.hypot(points[i, 0] - points[j, 0], points[i, 1] - points[j, 1])
             if best[at] + away >= best[to]:
                 continue
-            price, way = _leg(points[i, 0], points[i, 1], headings[at], points[j], sign, by)
-            price += best[at]
+            price, way, turn = _leg(points[i, 0], points[i, 1], headings[at], points[j], sign, by)
+            price, last = best[at] + price, 0.0
             if j == count - 1 and price < best[to]:
-                there = np.array([points[j, 0], points[j, 1], way])
-                price += _motion(there, np.array([points[j, 0], points[j, 1], end]), by)
+                more, last = _turn(points[j, 0], points[j, 1], way, end, by)
+                price += more
             if price < best[to]:
                 best[to], came[to], headings[to] = price, at, way
-    return best[-2:], came
+                turns[to, 0], turns[to, 1] = turn, last
+    return best[-2:], came, turns
 
 
 class Router:
@@ -274,16 +284,14 @@ class Router:
         """(N, 3) poses on the way, close enough together for a prediction."""
         here: FloatArray = self.scene.world.robot_pose
         found = [here[None]]
-        for point, sign in zip(route.points, route.signs, strict=True):
+        for point, sign, turn in zip(route.points, route.signs, route.turns[:-1], strict=True):
             dx, dy = (sign * (point - here[:2])).tolist()
             if math.hypot(dx, dy) > 1e-9:
-                for there in (
-                    np.array([here[0], here[1], math.atan2(dy, dx)]),
-                    np.array([point[0], point[1], math.atan2(dy, dx)]),
-                ):
-                    found.append(_between(here, there))
-                    here = there
-        found.append(_between(here, np.array([here[0], here[1], route.heading])))
+                way = math.atan2(dy, dx)
+                found.append(_turned(here, way, turn))
+                here = np.array([point[0], point[1], found[-1][-1, 2]])
+                found.append(here[None])
+        found.append(_turned(here, route.heading, float(route.turns[-1])))
         return np.concatenate(found)
 
     def _driving(self, led: int) -> _Driving:
@@ -309,7 +317,7 @@ def _shortened(
     points: FloatArray, heading: float, end: float, first: int, longest: int, by: _Driving
 ) -> Route | None:
     """`_cheapest` as a route; arguments as there."""
-    prices, came = _cheapest(points, heading, end, first, longest, by)
+    prices, came, turns = _cheapest(points, heading, end, first, longest, by)
     price = float(prices.min())
     if math.isinf(price):
         return None
@@ -317,16 +325,34 @@ def _shortened(
     while came[chain[-1]] > 0:
         chain.append(int(came[chain[-1]]))
     rows = np.array(chain[::-1])
-    return Route(points[rows // 2], 1.0 - 2.0 * (rows % 2), end, price)
+    return Route(
+        points[rows // 2],
+        1.0 - 2.0 * (rows % 2),
+        np.array([*turns[rows, 0], turns[rows[-1], 1]]),
+        end,
+        price,
+    )
 
 
-def _between(here: FloatArray, there: FloatArray) -> FloatArray:
-    """Poses (N, 3) after ``here`` up to ``there``, turned the shorter way."""
-    turn = math.remainder(float(there[2] - here[2]), 2.0 * math.pi)
-    steps = max(1, math.ceil(abs(turn) / 0.3))
-    part = np.linspace(0.0, 1.0, steps + 1)[1:, None]
-    end = np.array([there[0], there[1], here[2] + turn])
-    poses: FloatArray = here + part * (end - here)
+def turn_to(heading: float, to: float, turn: float) -> float:
+    """The turn [rad] that is still to be made from one heading to another, the way it is meant.
+
+    Args:
+        heading, to: [rad].
+        turn: as in `Route`; the last bit of a turn is made the shorter way in any case.
+    """
+    left = math.remainder(to - heading, 2.0 * math.pi)
+    if left * turn < 0.0 and abs(left) > 0.5 * _LITTLE:
+        left += math.copysign(2.0 * math.pi, turn)
+    return left
+
+
+def _turned(here: FloatArray, to: float, turn: float) -> FloatArray:
+    """Poses (N, 3) of a turn on the spot after ``here``, close enough for a prediction."""
+    angle = turn_to(float(here[2]), to, turn)
+    steps = max(1, math.ceil(abs(angle) / 0.3))
+    poses = np.repeat(here[None], steps, axis=0)
+    poses[:, 2] += np.linspace(0.0, angle, steps + 1)[1:]
     return poses
 
 
