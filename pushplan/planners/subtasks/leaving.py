@@ -10,7 +10,7 @@ from numba import njit
 from pushplan.planners.kinodynamic.collision import Footprint, Obstacles, footprint, obstacles
 from pushplan.planners.subtasks.route import depth_inside
 from pushplan.planners.subtasks.scene import Scene
-from pushplan.world.checks import FloatArray
+from pushplan.world.checks import FloatArray, IntArray
 
 _STEP = 0.08
 """Length of a step [circumscribed radii], and turn of one on the spot [rad]."""
@@ -79,6 +79,24 @@ def _has_room(pose: FloatArray, radius: float, among: Obstacles) -> bool:
 
 
 @njit(cache=True, nogil=True)
+def _moved(pose: FloatArray, way: float, turn: float) -> FloatArray:
+    """(3,) where a step leads from a pose."""
+    middle = pose[2] + 0.5 * turn
+    x, y = pose[0] + way * math.cos(middle), pose[1] + way * math.sin(middle)
+    return np.array([x, y, pose[2] + turn])
+
+
+@njit(cache=True, nogil=True)
+def _up_to(node: int, nodes: FloatArray, before: IntArray) -> FloatArray:
+    """(N, 3) the poses that have led to one."""
+    chain = [node]
+    while before[chain[-1]] >= 0:
+        chain.append(before[chain[-1]])
+    path: FloatArray = nodes[np.array(chain[::-1])]
+    return path
+
+
+@njit(cache=True, nogil=True)
 def _search(
     start: FloatArray, steps: FloatArray, shape: Footprint, among: Obstacles, size: float
 ) -> FloatArray:
@@ -95,26 +113,22 @@ def _search(
     half, turns = int(_REACH / unit), math.ceil(2.0 * math.pi / unit)
     seen = np.zeros((2 * half + 1, 2 * half + 1, turns), dtype=np.bool_)
     nodes, before = np.empty((_MOST, 3)), np.empty(_MOST, dtype=np.int64)
-    pose, scratch = np.empty(3), np.empty_like(shape.vertices)
+    scratch = np.empty_like(shape.vertices)
     limit = depth_inside(start, shape, among, scratch) + _DEEPER * size
     nodes[0], before[0], count = start, -1, 1
     at = 0
     while at < count:
-        for a in range(steps.shape[0]):
-            way, turn = steps[a]
-            free = True
-            for part in (0.5, 1.0):
-                middle = nodes[at, 2] + 0.5 * part * turn
-                pose[0] = nodes[at, 0] + part * way * math.cos(middle)
-                pose[1] = nodes[at, 1] + part * way * math.sin(middle)
-                pose[2] = nodes[at, 2] + part * turn
-                if free and part == 1.0:
-                    j = half + int(np.round((pose[0] - start[0]) / (unit * size)))
-                    i = half + int(np.round((pose[1] - start[1]) / (unit * size)))
-                    t = int(np.floor(pose[2] % (2.0 * math.pi) / unit))
-                    free = 0 <= j <= 2 * half and 0 <= i <= 2 * half and not seen[i, j, t]
-                free = free and depth_inside(pose, shape, among, scratch) <= limit
-            if not free:
+        for way, turn in steps:
+            pose = _moved(nodes[at], way, turn)
+            j = half + round((pose[0] - start[0]) / (unit * size))
+            i = half + round((pose[1] - start[1]) / (unit * size))
+            t = math.floor(pose[2] % (2.0 * math.pi) / unit)
+            if not (0 <= j <= 2 * half and 0 <= i <= 2 * half) or seen[i, j, t]:
+                continue
+            if depth_inside(pose, shape, among, scratch) > limit:
+                continue
+            between = _moved(nodes[at], 0.5 * way, 0.5 * turn)
+            if depth_inside(between, shape, among, scratch) > limit:
                 continue
             seen[i, j, t] = True
             nodes[count], before[count] = pose, at
@@ -122,12 +136,6 @@ def _search(
             if count == _MOST:
                 return nodes[:0]
             if _has_room(pose, _ROOM * size, among):
-                length, node = 0, count - 1
-                while node >= 0:
-                    length, node = length + 1, before[node]
-                out, node = np.empty((length, 3)), count - 1
-                for n in range(length - 1, -1, -1):
-                    out[n], node = nodes[node], before[node]
-                return out
+                return _up_to(count - 1, nodes, before)
         at += 1
     return nodes[:0]
