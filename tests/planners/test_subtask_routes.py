@@ -8,8 +8,8 @@ import shapely
 from conftest import make_boxes
 
 from pushplan.planners.subtasks import Scene, SubTaskConfig
+from pushplan.planners.subtasks.approach import approach_from
 from pushplan.planners.subtasks.drive import LegDriver
-from pushplan.planners.subtasks.graph import approach_from
 from pushplan.planners.subtasks.route import Router
 from pushplan.world import Receptacle, StaticMap, World, box_delivery_robot
 from pushplan.world.outline import transform

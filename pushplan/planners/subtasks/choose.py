@@ -7,13 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pushplan.planners.subtasks.graph import (
-    FREED,
-    Approach,
-    SubTaskGraph,
-    approach_from,
-    build_graph,
-)
+from pushplan.planners.subtasks.approach import Approach, approach_from
+from pushplan.planners.subtasks.graph import FREED, SubTaskGraph, build_graph
 from pushplan.planners.subtasks.push import Push, signature
 from pushplan.planners.subtasks.rehearse import Rehearsal, rehearse
 from pushplan.planners.subtasks.route import Router

@@ -8,34 +8,20 @@ from dataclasses import dataclass
 import numpy as np
 
 from pushplan.planners.subtasks import lattice
+from pushplan.planners.subtasks.approach import Approach, approach_from, arrivals_at, ways_from
 from pushplan.planners.subtasks.candidates import simple_pushes
-from pushplan.planners.subtasks.floor import LENGTHS, MOVES, TURNS, near_poses
 from pushplan.planners.subtasks.freeing import freeing_pushes
 from pushplan.planners.subtasks.maneuvers import maneuvers
 from pushplan.planners.subtasks.push import Push, signature
 from pushplan.planners.subtasks.runner import Runner
-from pushplan.planners.subtasks.scene import Ground, Scene
-from pushplan.world.checks import FloatArray, IntArray
+from pushplan.planners.subtasks.scene import Scene
+from pushplan.world.checks import FloatArray
 
 FREED = 2
 """For how many objects, the nearest ones, freeing pushes are looked for if there are no others."""
 
 _FAR = 5.0
 """Price of getting to what cannot be got to later [diagonals of the floor]."""
-_EVERYWHERE = np.zeros(0, dtype=np.int64)
-
-
-@dataclass(frozen=True, eq=False)
-class Approach:
-    """Cheapest ways of the robot from where it is to every pose of the lattice.
-
-    Args:
-        costs: (16 * rows * columns,) [m].
-        before: the pose before each, -1 for none.
-    """
-
-    costs: FloatArray
-    before: IntArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,7 +59,7 @@ def build_graph(
     approach = approach_from(scene)
     runner = Runner(scene)
     pushes = candidate_pushes(scene, runner, freeing)
-    row = lattice.least_costs(approach.costs, _arrivals(scene.fine, pushes))
+    row = lattice.least_costs(approach.costs, arrivals_at(scene.fine, pushes))
     extra = np.array([(penalties or {}).get(signature(push), 0.0) for push in pushes])
     pushes, keep = _best(scene, pushes, row + extra)
     row = row[keep]
@@ -106,64 +92,6 @@ def candidate_pushes(scene: Scene, runner: Runner, freeing: int = 0) -> list[Pus
     return pushes
 
 
-def approach_from(scene: Scene, led: int = -1) -> Approach:
-    """Cheapest ways from where the robot is.
-
-    Args:
-        scene: the scene.
-        led: index of an object that is not to be moved on the way; -1 if none.
-    """
-    return _search(scene, scene.fine, scene.world.robot_pose, led=led)
-
-
-def _search(
-    scene: Scene,
-    ground: Ground,
-    pose: FloatArray,
-    share: float = 1.0,
-    without: IntArray | None = None,
-    led: int = -1,
-    targets: IntArray = _EVERYWHERE,
-) -> Approach:
-    for reach in (1.5, 4.0):
-        starts, costs = near_poses(ground.floor, pose, reach)
-        if len(starts):
-            break
-    best, before = lattice.search_poses(
-        starts,
-        costs,
-        ground.floor,
-        *ground.contacts(share, without, led),
-        MOVES,
-        LENGTHS,
-        TURNS,
-        scene.config.turn_price * scene.size,
-        lattice.ARM * scene.size,
-        targets,
-    )
-    return Approach(best, before)
-
-
-def _arrivals(ground: Ground, pushes: Sequence[Push]) -> lattice.Arrivals:
-    """Where the starts of pushes are reached from."""
-    found = [arrival_poses(ground, push.start) for push in pushes]
-    return lattice.Arrivals(
-        np.concatenate([nodes for nodes, _ in found] or [np.zeros(0, dtype=np.int64)]),
-        np.concatenate([extra for _, extra in found] or [np.zeros(0)]),
-        np.cumsum([len(nodes) for nodes, _ in found], dtype=np.int64),
-    )
-
-
-def arrival_poses(ground: Ground, start: FloatArray) -> tuple[IntArray, FloatArray]:
-    """Lattice poses from which the start of a push is reached, and what the rest costs [m]."""
-    floor = ground.floor
-    u = np.array([np.cos(start[2]), np.sin(start[2]), 0.0])
-    nodes, extra = near_poses(floor, start - 0.7 * floor.step * u, 1.3)
-    if not len(nodes):
-        nodes, extra = near_poses(floor, start, 2.0)
-    return nodes, extra
-
-
 def _best(scene: Scene, pushes: Sequence[Push], row: FloatArray) -> tuple[list[Push], list[int]]:
     """The best few pushes for each object, of those that the robot can get to."""
     keep: set[int] = set()
@@ -191,7 +119,7 @@ def _between(scene: Scene, pushes: Sequence[Push]) -> FloatArray:
     ground, ids = scene.coarse, scene.world.movables.ids
     bounds = scene.world.static.bounds
     far = _FAR * float(np.hypot(*(bounds[2:] - bounds[:2])))
-    arrivals = _arrivals(ground, pushes)
+    arrivals = arrivals_at(ground, pushes)
     out = np.full((len(pushes), len(pushes)), np.inf)
     known: dict[tuple[object, ...], FloatArray] = {}
     step = 2.0 * ground.floor.step
@@ -203,7 +131,7 @@ def _between(scene: Scene, pushes: Sequence[Push]) -> FloatArray:
         )
         if key not in known:
             gone = np.flatnonzero(np.isin(ids, push.covers))
-            found = _search(
+            found = ways_from(
                 scene, ground, push.end, scene.config.later, gone, targets=arrivals.nodes
             )
             known[key] = lattice.least_costs(found.costs, arrivals)

@@ -21,8 +21,8 @@ from pushplan.planners.kinodynamic.collision import (
     obstacles,
 )
 from pushplan.planners.subtasks import lattice
+from pushplan.planners.subtasks.approach import Approach, arrival_poses
 from pushplan.planners.subtasks.floor import pose_at
-from pushplan.planners.subtasks.graph import Approach, arrival_poses
 from pushplan.planners.subtasks.scene import LED, Scene
 from pushplan.world.checks import ArrayRecord, FloatArray, IntArray
 
