@@ -7,6 +7,7 @@ import math
 import numpy as np
 from numba import njit
 
+from pushplan.geometry import core_distance
 from pushplan.planners.kinodynamic.collision import Footprint, Obstacles, footprint, obstacles
 from pushplan.planners.subtasks.route import depth_inside
 from pushplan.planners.subtasks.scene import Scene
@@ -63,17 +64,8 @@ def _has_room(pose: FloatArray, radius: float, among: Obstacles) -> bool:
             continue
         if y + radius <= box[1] or y - radius >= box[3]:
             continue
-        corners = among.vertices[among.offsets[s] : among.offsets[s + 1]]
-        inside = True
-        for i in range(corners.shape[0]):
-            j = i + 1 if i + 1 < corners.shape[0] else 0
-            ax, ay = x - corners[i, 0], y - corners[i, 1]
-            ex, ey = corners[j, 0] - corners[i, 0], corners[j, 1] - corners[i, 1]
-            t = min(max((ax * ex + ay * ey) / (ex * ex + ey * ey), 0.0), 1.0)
-            if math.hypot(ax - t * ex, ay - t * ey) < radius:
-                return False
-            inside = inside and ex * ay - ey * ax >= 0.0
-        if inside:
+        first, end = among.offsets[s], among.offsets[s + 1]
+        if core_distance(x, y, among.vertices, first, end) < radius:
             return False
     return True
 
