@@ -91,7 +91,8 @@ def _data(record: Mapping[str, Any]) -> str:
             f"{about['noise']:g})."
         )
     drawn = "; ".join(json.dumps(one) for one in config["scenarios"])
-    return f"random starts of {drawn}; rewards of the task times {config['reward_scale']:g}."
+    bonus = f" plus {more:g} for each object that is done," if (more := config.get("bonus")) else ""
+    return f"random starts of {drawn}; rewards of the task{bonus} times {config['reward_scale']:g}."
 
 
 def _scores(scores: Sequence[ScoreRow]) -> list[str]:
