@@ -251,38 +251,6 @@ class TestEnvironment:
         assert truncated and not terminated
         assert info == {"is_success": False, "share": 0.0}
 
-    def test_a_bonus_is_paid_for_each_object_and_taken_back(self):
-        """Against the same environment without: the difference is what has been done since."""
-        config = tiny(
-            "ppo",
-            task="area_clearing",
-            action={"mode": "heading", "output": "direction"},
-            observation={**SMALL, "range": 5.0},
-            reward_scale=0.5,
-            scenarios=[{"layout": "clear_small", "boxes": 10}],
-            limit=0,
-        )
-        paid_config = dataclasses.replace(config, bonus=3.0)
-        plain, paid = TrainingEnv(config), TrainingEnv(paid_config)
-        for env in (plain, paid):
-            env.reset(options={"layout": 1})
-        rng, changes, before = np.random.default_rng(0), [], 0
-        for _ in range(200):
-            action = rng.uniform(-1.0, 1.0, 2).astype(np.float32)
-            _, without, *_ = plain.step(action)
-            _, reward, terminated, truncated, _ = paid.step(action)
-            done = int(paid._env.task.cleared(paid._env.world).sum())
-            assert reward - without == pytest.approx(0.5 * 3.0 * (done - before), abs=1e-6)
-            changes.append(done - before)
-            before = done
-            if terminated or truncated:
-                break
-        assert max(changes) > 0
-
-    def test_a_bonus_needs_objects_to_be_done(self):
-        with pytest.raises(InvalidInputError, match="'maze' has none"):
-            TrainingEnv(tiny("ppo", bonus=1.0))
-
     def test_a_direction_is_where_the_robot_goes(self):
         config = tiny(
             "ppo",
@@ -339,7 +307,6 @@ class TestConfigs:
             ({"observation": {"kind": "sound"}}, "unknown observation kind"),
             ({"steps": 0}, "steps"),
             ({"reward_scale": float("nan")}, "reward_scale"),
-            ({"bonus": -1.0}, "bonus"),
         ],
     )
     def test_what_is_wrong_is_said(self, changes, message):

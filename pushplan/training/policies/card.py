@@ -91,8 +91,7 @@ def _data(record: Mapping[str, Any]) -> str:
             f"{about['noise']:g})."
         )
     drawn = "; ".join(json.dumps(one) for one in config["scenarios"])
-    bonus = f" plus {more:g} for each object that is done," if (more := config.get("bonus")) else ""
-    return f"random starts of {drawn}; rewards of the task{bonus} times {config['reward_scale']:g}."
+    return f"random starts of {drawn}; rewards of the task times {config['reward_scale']:g}."
 
 
 def _scores(scores: Sequence[ScoreRow]) -> list[str]:

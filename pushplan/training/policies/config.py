@@ -61,8 +61,6 @@ class TrainingConfig:
         chunk: decisions between two checkpoints, each with a validation. Every chunk starts with
             fresh episodes and generators of its own, so that a resumed training continues exactly.
         reward_scale: factor of the task's reward.
-        bonus: added to the task's reward for each object that is done, taken back if it comes back;
-            in the units of the task.
         limit: decisions after which a training episode is cut off, 0 for the task's own end.
         validation: episodes of each validation.
         suites: on which the result is scored, with scenarios that training never draws.
@@ -81,7 +79,6 @@ class TrainingConfig:
     envs: int = 4
     chunk: int = 10_000
     reward_scale: float = 1.0
-    bonus: float = 0.0
     limit: int = 0
     validation: int = 20
     suites: tuple[str, ...] = field(default_factory=tuple)
@@ -98,7 +95,6 @@ class TrainingConfig:
         for name in ("seed", "limit", "validation"):
             integer(name, getattr(self, name), low=0)
         put(self, "reward_scale", number("reward_scale", self.reward_scale, low=0.0, open_low=True))
-        put(self, "bonus", number("bonus", self.bonus, low=0.0))
         if not self.scenarios:
             raise InvalidInputError("scenarios must hold at least one mapping of variations")
         if not isinstance(self.options, OPTIONS[self.algorithm]):

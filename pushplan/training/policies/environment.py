@@ -10,7 +10,6 @@ from gymnasium.spaces import Box, Discrete
 from numpy.typing import NDArray
 
 from pushplan.envs import PushEnv
-from pushplan.envs.tasks.manipulation import ManipulationTask
 from pushplan.learned.builders import builder_from_dict
 from pushplan.learned.outputs import MODES, ActionSpec
 from pushplan.learned.specification import RobotSpec, Specification
@@ -40,7 +39,7 @@ class _Blank:
 
 
 class TrainingEnv(gymnasium.Env[NDArray[Any], Any]):
-    """Draws a scenario for each episode, repeats each decision, scales the reward, adds the bonus.
+    """Draws a scenario for each episode, repeats each decision, scales the reward.
 
     Observations are those of the configuration; actions are outputs of the network in [-1, 1]
     (`ActionSpec`), or with spatial action maps the number of a pixel. ``info`` at the end of an
@@ -62,11 +61,6 @@ class TrainingEnv(gymnasium.Env[NDArray[Any], Any]):
                     f"the scenarios of one network must have actions alike, got {self.action} and "
                     f"{other}"
                 )
-        if config.bonus and not isinstance(self._env.task, ManipulationTask):
-            raise InvalidInputError(
-                f"a bonus is for objects that are brought away, {config.task!r} has none of these: "
-                f"got {config.bonus:g}, it must be 0"
-            )
         self.observation_space: Any = self._env.observation_space
         self.action_space: Any = (
             Discrete(int(np.prod(self.action.shape)))
@@ -74,7 +68,7 @@ class TrainingEnv(gymnasium.Env[NDArray[Any], Any]):
             else Box(-1.0, 1.0, self.action.shape, np.float32)
         )
         self._rng = stream(config.seed, "starts")
-        self._decisions, self._done = 0, 0
+        self._decisions = 0
         self._limit = config.limit
 
     def _make(self, variations: dict[str, Any]) -> PushEnv:
@@ -123,7 +117,7 @@ class TrainingEnv(gymnasium.Env[NDArray[Any], Any]):
             self._env = self._envs[int(self._rng.integers(len(self._envs)))]
             layout = TRAINING_SEEDS + int(self._rng.integers(_SEED_COUNT))
             self._limit = self.config.limit
-        self._decisions, self._done = 0, 0
+        self._decisions = 0
         self._env.reset(seed=layout)
         return self.observe(), {}
 
@@ -137,7 +131,7 @@ class TrainingEnv(gymnasium.Env[NDArray[Any], Any]):
         total = 0.0
         for _ in range(self.action.repeat):
             _, reward, terminated, truncated, info = self._env.step(command)
-            total += reward + self._bonus(info)
+            total += reward
             if terminated or truncated:
                 break
         self._decisions += 1
@@ -152,12 +146,6 @@ class TrainingEnv(gymnasium.Env[NDArray[Any], Any]):
                 "share": float(success) if done is None else float(np.mean(done)),
             }
         return self.observe(), self.config.reward_scale * total, terminated, truncated, told
-
-    def _bonus(self, info: dict[str, Any]) -> float:
-        """What the configuration adds to the reward for what has been done in a step."""
-        before = self._done
-        self._done = int(np.sum(info.get("completed", ())))
-        return self.config.bonus * (self._done - before)
 
     def observe(self) -> NDArray[Any]:
         """What the network sees now."""
