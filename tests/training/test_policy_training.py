@@ -52,7 +52,16 @@ MAP = {
 TINY = {
     "ppo": {"rollout": 16, "batch": 16, "epochs": 1, "widths": [8]},
     "sac": {"first": 8, "batch": 8, "every": 4, "updates": 1, "buffer": 64, "widths": [8]},
-    "sam": {"first": 6, "batch": 4, "buffer": 16, "widths": [4, 8], "blocks": 1, "every": 2},
+    "sam": {
+        "first": 6,
+        "batch": 4,
+        "buffer": 16,
+        "widths": [4, 8],
+        "blocks": 1,
+        "every": 2,
+        "lookahead": 2,
+        "follow": 0.01,
+    },
     "bc": {"batch": 16, "widths": [8]},
 }
 
@@ -384,18 +393,58 @@ class TestReplay:
         with pytest.raises(InvalidInputError, match="empty"):
             buffer.sample(1, np.random.default_rng(0))
         for i in range(5):
-            buffer.add(np.full(2, i), i, float(i), np.full(2, i + 1), i == 4)
+            buffer.add(np.full(2, i), i, float(i), np.full(2, i + 1), 0.5 * (i < 4))
         assert len(buffer) == 3
-        seen, actions, rewards, following, ends = buffer.sample(50, np.random.default_rng(0))
+        seen, actions, rewards, following, discounts = buffer.sample(50, np.random.default_rng(0))
         assert set(actions.tolist()) == {2, 3, 4}
         assert (seen[:, 0] == actions).all() and (following[:, 0] == actions + 1).all()
-        assert (rewards == actions).all() and (ends == (actions == 4)).all()
+        assert (rewards == actions).all() and (discounts == 0.5 * (actions < 4)).all()
         other = ReplayBuffer(3, (2,), np.uint8)
         other.restore(buffer.state())
         assert np.array_equal(other.seen, buffer.seen) and other.position == buffer.position
 
 
 class TestSamLearner:
+    @pytest.mark.parametrize("terminated", [True, False])
+    def test_rewards_are_added_up_as_far_as_is_looked_ahead(self, terminated):
+        pytest.importorskip("torch")
+        from pushplan.training.policies.sam import Lookahead
+
+        memory = ReplayBuffer(8, (1,))
+        ahead = Lookahead(memory, discount=0.5, decisions=3)
+        for i in range(5):
+            ahead.add(np.full(1, i), i, 1.0)
+            ahead.settle(np.full(1, i + 1), terminated and i == 4, last=i == 4)
+        assert memory.actions[:5].tolist() == [0, 1, 2, 3, 4]
+        assert memory.rewards[:5].tolist() == [1.75, 1.75, 1.75, 1.5, 1.0]
+        assert memory.next[:5, 0].tolist() == [3, 4, 5, 5, 5]
+        left = [0.0] * 3 if terminated else [0.125, 0.25, 0.5]
+        assert memory.discounts[:5].tolist() == [0.125, 0.125, *left]
+
+    def test_a_target_that_follows_is_the_average_and_the_policy(self):
+        torch = pytest.importorskip("torch")
+        from pushplan.training.policies.sam import SamLearner
+
+        options = {"batch": 4, "buffer": 8, "widths": [4, 8], "blocks": 1, "follow": 0.25}
+        learner = SamLearner(tiny("sam", options=options), (4, 16, 16), "cpu")
+        assert learner.result is learner.target
+        before = [p.clone() for p in learner.target.parameters()]
+        learner.memory.add(np.zeros((4, 16, 16), np.uint8), 3, 1.0, np.zeros((4, 16, 16)), 0.0)
+        learner.update(np.random.default_rng(0), 0.01)
+        now = zip(before, learner.target.parameters(), learner.network.parameters(), strict=True)
+        for old, slow, fast in now:
+            assert torch.allclose(slow, 0.75 * old + 0.25 * fast, atol=1e-6)
+
+    def test_a_map_that_is_shrunk_has_a_value_for_each_pixel(self):
+        torch = pytest.importorskip("torch")
+        from pushplan.training.policies.networks import SpatialActionNetwork
+        from pushplan.training.policies.sam import SamLearner
+
+        network = SpatialActionNetwork(4, (4, 8), 1, shrink=2)
+        assert network(torch.zeros(3, 4, 32, 48)).shape == (3, 32, 48)
+        with pytest.raises(InvalidInputError, match="divisible by 8"):
+            SamLearner(tiny("sam", options={"shrink": 2}), (4, 16, 20), "cpu")
+
     def test_it_learns_which_pixel_pays(self):
         pytest.importorskip("torch")
         from pushplan.training.policies.sam import SamLearner
@@ -409,7 +458,7 @@ class TestSamLearner:
             lit = int(rng.integers(256))
             seen[0].flat[lit] = 255
             action = lit if rng.random() < 0.5 else int(rng.integers(256))
-            learner.memory.add(seen, action, float(action == lit), seen, True)
+            learner.memory.add(seen, action, float(action == lit), seen, 0.0)
         for _ in range(150):
             learner.update(rng, 0.01)
         near = 0

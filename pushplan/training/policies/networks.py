@@ -90,12 +90,22 @@ class SpatialActionNetwork(nn.Module):
         channels: of the map.
         widths: channels at half and at a quarter of the resolution.
         blocks: residual blocks.
+        shrink: factor by which everything after the first layer is coarser still; values are
+            interpolated between.
     """
 
-    def __init__(self, channels: int, widths: tuple[int, ...] = (16, 32), blocks: int = 4) -> None:
+    def __init__(
+        self,
+        channels: int,
+        widths: tuple[int, ...] = (16, 32),
+        blocks: int = 4,
+        shrink: int = 1,
+    ) -> None:
         super().__init__()
         half, quarter = widths
-        self.first = nn.Conv2d(channels, half, 5, stride=2, padding=2)
+        self.shrink = shrink
+        reach = 2 * shrink
+        self.first = nn.Conv2d(channels, half, 2 * reach + 1, stride=reach, padding=reach)
         self.second = nn.Conv2d(half, quarter, 3, stride=2, padding=1)
         dilations = [(1, 2, 4)[i % 3] for i in range(blocks)]
         self.blocks = nn.Sequential(*(_Residual(quarter, d) for d in dilations))
@@ -104,12 +114,15 @@ class SpatialActionNetwork(nn.Module):
         self.values = nn.Conv2d(half, 4, 1)
 
     def forward(self, maps: Tensor) -> Tensor:
-        """(B, H, W) values from (B, C, H, W) maps, 0 to 255; H and W divisible by 4."""
+        """(B, H, W) values from (B, C, H, W) maps, 0 to 255; H, W divisible by 4 times shrink."""
         high = F.relu(self.first(maps.float() / IMAGE_SCALE))
         low = self.blocks(F.relu(self.second(high)))
         high = F.relu(high + F.pixel_shuffle(self.rise(low), 2))
         high = F.relu(high + self.mix(high))
-        return F.pixel_shuffle(self.values(high), 2)[:, 0]
+        values = F.pixel_shuffle(self.values(high), 2)
+        if self.shrink > 1:
+            values = F.interpolate(values, scale_factor=float(self.shrink), mode="bilinear")
+        return values[:, 0]
 
 
 class SquashedActor(nn.Module):

@@ -109,7 +109,10 @@ class SamOptions:
         batch: decisions in a gradient step.
         every: decisions for each gradient step.
         discount: of a decision.
+        lookahead: decisions whose rewards are added up before the value of what is seen then.
         target_every: gradient steps between two copies of the network to the target.
+        follow: share by which the target follows the network in each gradient step instead of
+            being copied; it is then their running average, is validated and becomes the policy.
         explore: share of the decisions over which exploration falls from 1 to ``explore_end``.
         explore_end: probability of a random pixel then.
         at_objects: share of the random pixels that are drawn around movable objects.
@@ -117,6 +120,8 @@ class SamOptions:
         mirror: learn from mirrored maps as often as from others; both tasks are symmetric.
         widths: channels at half and at a quarter of the map's resolution.
         blocks: residual blocks at a quarter.
+        shrink: factor by which the network is coarser than that behind its first layer; 2 for maps
+            of twice the resolution.
     """
 
     rate: float = 5e-4
@@ -125,7 +130,9 @@ class SamOptions:
     batch: int = 32
     every: int = 1
     discount: float = 0.85
+    lookahead: int = 1
     target_every: int = 500
+    follow: float = 0.0
     explore: float = 0.15
     explore_end: float = 0.05
     at_objects: float = 0.5
@@ -133,13 +140,17 @@ class SamOptions:
     mirror: bool = True
     widths: tuple[int, ...] = (16, 32)
     blocks: int = 4
+    shrink: int = 1
 
     def __post_init__(self) -> None:
         _check(
             self,
             positive=("rate", "clip"),
-            shares=("discount", "explore", "explore_end", "at_objects"),
-            whole=("buffer", "first", "batch", "every", "target_every", "blocks"),
+            shares=("discount", "follow", "explore", "explore_end", "at_objects"),
+            whole=(
+                *("buffer", "first", "batch", "every"),
+                *("lookahead", "target_every", "blocks", "shrink"),
+            ),
         )
         if len(self.widths) != 2:
             raise InvalidInputError(f"widths of sam are two numbers, got {self.widths}")

@@ -27,31 +27,36 @@ class ReplayBuffer:
         self.next = np.zeros((size, *shape), dtype)
         self.actions = np.zeros(size, np.int64)
         self.rewards = np.zeros(size, np.float32)
-        self.ends = np.zeros(size, np.bool_)
+        self.discounts = np.zeros(size, np.float32)
 
     def __len__(self) -> int:
         return self.count
 
     def add(
-        self, seen: NDArray[Any], action: int, reward: float, following: NDArray[Any], ends: bool
+        self,
+        seen: NDArray[Any],
+        action: int,
+        reward: float,
+        following: NDArray[Any],
+        discount: float,
     ) -> None:
         """Remember a decision, and forget the oldest if there are too many.
 
         Args:
             seen: before it.
             action: number of the pixel.
-            reward: of it.
-            following: what was seen after it.
-            ends: whether the task was over then, not only cut off.
+            reward: of it, and of those after it that are looked ahead.
+            following: what was seen after them.
+            discount: of the value of that; 0 where the task was over then, not only cut off.
         """
         i = self.position
         self.seen[i], self.next[i] = seen, following
-        self.actions[i], self.rewards[i], self.ends[i] = action, reward, ends
+        self.actions[i], self.rewards[i], self.discounts[i] = action, reward, discount
         self.position = (i + 1) % self.size
         self.count = min(self.count + 1, self.size)
 
     def sample(self, count: int, rng: np.random.Generator) -> tuple[NDArray[Any], ...]:
-        """Some decisions: seen, actions, rewards, following, ends.
+        """Some decisions: seen, actions, rewards, following, discounts.
 
         Raises:
             InvalidInputError: if there are none yet.
@@ -59,7 +64,7 @@ class ReplayBuffer:
         if not self.count:
             raise InvalidInputError("the replay buffer is empty")
         chosen = rng.integers(self.count, size=count)
-        arrays = (self.seen, self.actions, self.rewards, self.next, self.ends)
+        arrays = (self.seen, self.actions, self.rewards, self.next, self.discounts)
         return tuple(array[chosen] for array in arrays)
 
     def state(self) -> dict[str, Any]:
@@ -78,4 +83,4 @@ class ReplayBuffer:
             getattr(self, name)[: self.count] = np.asarray(state[name])
 
 
-_ARRAYS = ("seen", "next", "actions", "rewards", "ends")
+_ARRAYS = ("seen", "next", "actions", "rewards", "discounts")

@@ -10,7 +10,9 @@ from __future__ import annotations
 import copy
 import logging
 import time
+from collections import deque
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -45,9 +47,12 @@ class SamLearner:
     def __init__(self, config: TrainingConfig, shape: tuple[int, ...], device: str) -> None:
         from pushplan.training.policies.networks import SpatialActionNetwork
 
-        if shape[1] % 4 or shape[2] % 4:
-            raise InvalidInputError(f"the sides of a map must be divisible by 4, got {shape[1:]}")
         assert isinstance(config.options, SamOptions)
+        least = 4 * config.options.shrink
+        if shape[1] % least or shape[2] % least:
+            raise InvalidInputError(
+                f"the sides of a map must be divisible by {least}, got {shape[1:]}"
+            )
         self.torch = need("torch")
         self.options = config.options
         self.device = device
@@ -55,42 +60,48 @@ class SamLearner:
         self.occupancy = channels.index("occupancy") if "occupancy" in channels else None
         self.torch.manual_seed(chunk_seed(config.seed, 0))
         options = self.options
-        self.network = SpatialActionNetwork(shape[0], options.widths, options.blocks).to(device)
+        network: Any = SpatialActionNetwork(
+            shape[0], options.widths, options.blocks, options.shrink
+        )
+        self.network = network.to(device, memory_format=self.torch.channels_last)
         self.target = copy.deepcopy(self.network)
         self.optimizer = self.torch.optim.Adam(self.network.parameters(), lr=options.rate)
         self.memory = ReplayBuffer(options.buffer, shape)
         self.updates = 0
         self.losses: list[float] = []
 
-    def values(self, seen: NDArray[Any]) -> NDArray[np.float32]:
-        """(H, W) value of each pixel."""
+    @property
+    def result(self) -> Any:
+        """The network that is the policy."""
+        return self.target if self.options.follow else self.network
+
+    def best(self, seen: NDArray[Any], network: Any = None) -> int:
+        """Number of the pixel with the greatest value, by the network that learns or another."""
         with self.torch.no_grad():
             batch = self.torch.from_numpy(seen[None]).to(self.device)
-            found: NDArray[np.float32] = self.network(batch)[0].cpu().numpy()
-        return found
-
-    def best(self, seen: NDArray[Any]) -> int:
-        """Number of the pixel with the greatest value."""
-        return int(np.argmax(self.values(seen)))
+            return int((network or self.network)(batch).argmax())
 
     def update(self, rng: np.random.Generator, rate: float) -> None:
         """One gradient step on decisions drawn from the memory."""
         torch, options = self.torch, self.options
-        seen, actions, rewards, following, ends = self.memory.sample(options.batch, rng)
+        seen, actions, rewards, following, discounts = self.memory.sample(options.batch, rng)
         cols = seen.shape[-1]
         if options.mirror and rng.random() < 0.5:  # what is left is right
             seen, following = seen[..., ::-1], following[..., ::-1]
             actions = actions - actions % cols + (cols - 1 - actions % cols)
         seen, following = (
-            torch.from_numpy(np.ascontiguousarray(a)).to(self.device) for a in (seen, following)
+            torch.from_numpy(np.ascontiguousarray(a)).to(
+                self.device, memory_format=torch.channels_last
+            )
+            for a in (seen, following)
         )
-        chosen, reward, over = (
-            torch.from_numpy(a).to(self.device) for a in (actions, rewards, ends)
+        chosen, reward, discount = (
+            torch.from_numpy(a).to(self.device) for a in (actions, rewards, discounts)
         )
         with torch.no_grad():
             choice = self.network(following).flatten(1).argmax(1, keepdim=True)
             future = self.target(following).flatten(1).gather(1, choice)[:, 0]
-            wanted = reward + options.discount * future * (~over)
+            wanted = reward + discount * future
         value = self.network(seen).flatten(1).gather(1, chosen[:, None])[:, 0]
         loss = torch.nn.functional.smooth_l1_loss(value, wanted)
         for group in self.optimizer.param_groups:
@@ -101,7 +112,12 @@ class SamLearner:
         self.optimizer.step()
         self.losses.append(float(loss.detach()))
         self.updates += 1
-        if self.updates % options.target_every == 0:
+        if options.follow:
+            with torch.no_grad():
+                pairs = (self.target.parameters(), self.network.parameters())
+                for slow, fast in zip(*pairs, strict=True):
+                    slow.lerp_(fast, options.follow)
+        elif self.updates % options.target_every == 0:
             self.target.load_state_dict(self.network.state_dict())
 
     def state(self) -> dict[str, Any]:
@@ -111,7 +127,8 @@ class SamLearner:
             for key, value in self.memory.state().items()
         }
         return {
-            "weights": self.network.state_dict(),
+            "weights": self.result.state_dict(),
+            "network": self.network.state_dict(),
             "target": self.target.state_dict(),
             "optimizer": self.optimizer.state_dict(),
             "memory": memory,
@@ -120,7 +137,7 @@ class SamLearner:
 
     def restore(self, state: Any) -> None:
         """From a checkpoint."""
-        self.network.load_state_dict(state["weights"])
+        self.network.load_state_dict(state["network"])
         self.target.load_state_dict(state["target"])
         self.optimizer.load_state_dict(state["optimizer"])
         self.memory.restore(state["memory"])
@@ -153,7 +170,7 @@ def train_sam(
             break
         episodes = _chunk(learner, config, envs, chunk)
         began = time.perf_counter()
-        scores = validate(envs[0], learner.best, config.validation)
+        scores = validate(envs[0], partial(learner.best, network=learner.result), config.validation)
         watch.forget(time.perf_counter() - began)
         returns, successes = zip(*episodes, strict=True) if episodes else ((), ())
         point = CurvePoint(
@@ -176,8 +193,8 @@ def train_sam(
     for env in envs:
         env.close()
     if run.done:
-        learner.network.load_state_dict(run.best_weights())
-    return learner.network
+        learner.result.load_state_dict(run.best_weights())
+    return learner.result
 
 
 def _chunk(
@@ -190,13 +207,15 @@ def _chunk(
     rng = stream(seed, "exploration")
     seen = [env.reset(seed=seed + i)[0] for i, env in enumerate(envs)]
     totals = [0.0] * len(envs)
+    behind = [Lookahead(learner.memory, options.discount, options.lookahead) for _ in envs]
     ended: list[tuple[float, bool]] = []
     first = chunk * config.chunk
     for step in range(first, min(first + config.chunk, config.steps)):
         i = step % len(envs)
         action = _explore(learner, seen[i], rng, step / config.steps)
         following, reward, terminated, truncated, info = envs[i].step(action)
-        learner.memory.add(seen[i], action, reward, following, terminated)
+        behind[i].add(seen[i], action, reward)
+        behind[i].settle(following, terminated, last=terminated or truncated)
         totals[i] += reward
         if terminated or truncated:
             ended.append((totals[i], bool(info["is_success"])))
@@ -224,6 +243,33 @@ def _explore(
             row, col = np.clip(spot, 0, (rows - 1, cols - 1)).tolist()
             return int(row * cols + col)
     return int(rng.integers(rows * cols))
+
+
+class Lookahead:
+    """Decisions of an episode whose rewards are still added up.
+
+    Args:
+        memory: where they go.
+        discount: of a decision.
+        decisions: how many are added up.
+    """
+
+    def __init__(self, memory: ReplayBuffer, discount: float, decisions: int) -> None:
+        self._memory, self._discount, self._decisions = memory, discount, decisions
+        self._open: deque[tuple[NDArray[Any], int, float]] = deque()
+
+    def add(self, seen: NDArray[Any], action: int, reward: float) -> None:
+        """A decision and what it brought."""
+        self._open.append((seen, action, reward))
+
+    def settle(self, following: NDArray[Any], terminated: bool, *, last: bool) -> None:
+        """Hand over what has been looked ahead far enough; at the end of an episode everything."""
+        while self._open and (last or len(self._open) >= self._decisions):
+            rewards = [reward for _, _, reward in self._open]
+            total = sum(self._discount**k * reward for k, reward in enumerate(rewards))
+            left = 0.0 if terminated else self._discount ** len(rewards)
+            seen, action, _ = self._open.popleft()
+            self._memory.add(seen, action, total, following, left)
 
 
 class _Board:
