@@ -31,7 +31,7 @@ from pushplan.training.policies.dataset import (
 )
 from pushplan.training.policies.environment import TRAINING_SEEDS, TrainingEnv
 from pushplan.training.policies.options import OPTIONS
-from pushplan.training.policies.replay import ReplayBuffer
+from pushplan.training.policies.replay import Lookahead, ReplayBuffer
 from pushplan.training.policies.run import CurvePoint, TrainingRun
 from pushplan.training.policies.training import train_policy
 from pushplan.world import InvalidInputError, SchemaError, UnknownNameError
@@ -403,13 +403,8 @@ class TestReplay:
         other.restore(buffer.state())
         assert np.array_equal(other.seen, buffer.seen) and other.position == buffer.position
 
-
-class TestSamLearner:
     @pytest.mark.parametrize("terminated", [True, False])
     def test_rewards_are_added_up_as_far_as_is_looked_ahead(self, terminated):
-        pytest.importorskip("torch")
-        from pushplan.training.policies.sam import Lookahead
-
         memory = ReplayBuffer(8, (1,))
         ahead = Lookahead(memory, discount=0.5, decisions=3)
         for i in range(5):
@@ -421,6 +416,8 @@ class TestSamLearner:
         left = [0.0] * 3 if terminated else [0.125, 0.25, 0.5]
         assert memory.discounts[:5].tolist() == [0.125, 0.125, *left]
 
+
+class TestSamLearner:
     def test_a_target_that_follows_is_the_average_and_the_policy(self):
         torch = pytest.importorskip("torch")
         from pushplan.training.policies.sam import SamLearner

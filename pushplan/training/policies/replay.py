@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import deque
 from typing import Any
 
 import numpy as np
@@ -81,6 +82,33 @@ class ReplayBuffer:
         self.count, self.position = int(state["count"]), int(state["position"])
         for name in _ARRAYS:
             getattr(self, name)[: self.count] = np.asarray(state[name])
+
+
+class Lookahead:
+    """Decisions of an episode whose rewards are still added up.
+
+    Args:
+        memory: where they go.
+        discount: of a decision.
+        decisions: how many are added up.
+    """
+
+    def __init__(self, memory: ReplayBuffer, discount: float, decisions: int) -> None:
+        self._memory, self._discount, self._decisions = memory, discount, decisions
+        self._open: deque[tuple[NDArray[Any], int, float]] = deque()
+
+    def add(self, seen: NDArray[Any], action: int, reward: float) -> None:
+        """A decision and what it brought."""
+        self._open.append((seen, action, reward))
+
+    def settle(self, following: NDArray[Any], terminated: bool, *, last: bool) -> None:
+        """Hand over what has been looked ahead far enough; at the end of an episode everything."""
+        while self._open and (last or len(self._open) >= self._decisions):
+            rewards = [reward for _, _, reward in self._open]
+            total = sum(self._discount**k * reward for k, reward in enumerate(rewards))
+            left = 0.0 if terminated else self._discount ** len(rewards)
+            seen, action, _ = self._open.popleft()
+            self._memory.add(seen, action, total, following, left)
 
 
 _ARRAYS = ("seen", "next", "actions", "rewards", "discounts")

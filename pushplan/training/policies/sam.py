@@ -10,7 +10,6 @@ from __future__ import annotations
 import copy
 import logging
 import time
-from collections import deque
 from collections.abc import Callable
 from functools import partial
 from typing import Any
@@ -23,7 +22,7 @@ from pushplan.training.policies.config import TrainingConfig
 from pushplan.training.policies.environment import TrainingEnv
 from pushplan.training.policies.libraries import need
 from pushplan.training.policies.options import SamOptions
-from pushplan.training.policies.replay import ReplayBuffer
+from pushplan.training.policies.replay import Lookahead, ReplayBuffer
 from pushplan.training.policies.run import CurvePoint, Stopwatch, TrainingRun, validate
 from pushplan.training.policies.sb3_training import chunk_seed
 from pushplan.world import InvalidInputError, stream
@@ -243,33 +242,6 @@ def _explore(
             row, col = np.clip(spot, 0, (rows - 1, cols - 1)).tolist()
             return int(row * cols + col)
     return int(rng.integers(rows * cols))
-
-
-class Lookahead:
-    """Decisions of an episode whose rewards are still added up.
-
-    Args:
-        memory: where they go.
-        discount: of a decision.
-        decisions: how many are added up.
-    """
-
-    def __init__(self, memory: ReplayBuffer, discount: float, decisions: int) -> None:
-        self._memory, self._discount, self._decisions = memory, discount, decisions
-        self._open: deque[tuple[NDArray[Any], int, float]] = deque()
-
-    def add(self, seen: NDArray[Any], action: int, reward: float) -> None:
-        """A decision and what it brought."""
-        self._open.append((seen, action, reward))
-
-    def settle(self, following: NDArray[Any], terminated: bool, *, last: bool) -> None:
-        """Hand over what has been looked ahead far enough; at the end of an episode everything."""
-        while self._open and (last or len(self._open) >= self._decisions):
-            rewards = [reward for _, _, reward in self._open]
-            total = sum(self._discount**k * reward for k, reward in enumerate(rewards))
-            left = 0.0 if terminated else self._discount ** len(rewards)
-            seen, action, _ = self._open.popleft()
-            self._memory.add(seen, action, total, following, left)
 
 
 class _Board:
