@@ -73,9 +73,8 @@ def test_it_beats_the_model_without_friction_between_floes():
     assert abs(ours - truth) < abs(other - truth)
 
 
-@settings(max_examples=25, deadline=None)
-@given(seed=st.integers(0, 10_000), bend=st.floats(-0.7, 0.7))
-def test_nothing_overlaps_much_afterwards(seed, bend):
+def overlaps(seed, bend):
+    """Greatest share of a floe that lies under the hull, and under another floe, at the end."""
     rng = np.random.default_rng(seed)
     floes = [
         (rng.uniform(0.3, 0.6) * SQUARE, [x, y, rng.uniform(0, 3)])
@@ -84,7 +83,7 @@ def test_nothing_overlaps_much_afterwards(seed, bend):
         if rng.random() < 0.7
     ]
     if not floes:
-        return
+        return 0.0, 0.0
     world = channel(floes)
     along = np.linspace(0.0, 3.0, 31)
     theta = np.pi / 2 + bend * along
@@ -95,11 +94,29 @@ def test_nothing_overlaps_much_afterwards(seed, bend):
         shapely.Polygon(transform(pose, world.movables.outline(k)))
         for k, pose in enumerate(swept.object_poses[-1])
     ]
-    # the greatest in 27,000 of these scenes: 0.06 under the hull, 0.10 between floes (99 %: 0.03)
-    for k, shape in enumerate(shapes):
-        assert hull.intersection(shape).area < 0.1 * shape.area
-        for other in shapes[:k]:
-            assert shape.intersection(other).area < 0.15 * min(shape.area, other.area)
+    under_hull = max(hull.intersection(shape).area / shape.area for shape in shapes)
+    between = [
+        shape.intersection(other).area / min(shape.area, other.area)
+        for k, shape in enumerate(shapes)
+        for other in shapes[:k]
+    ]
+    return under_hull, max(between, default=0.0)
+
+
+@settings(max_examples=25, deadline=None)
+@given(seed=st.integers(0, 10_000), bend=st.floats(-0.7, 0.7))
+def test_nothing_overlaps_much_afterwards(seed, bend):
+    # the greatest in 27,000 of these scenes: 0.06 under the hull, 0.10 between floes
+    under_hull, between = overlaps(seed, bend)
+    assert under_hull < 0.1
+    assert between < 0.15
+
+
+def test_almost_nothing_overlaps_afterwards_in_99_of_100_scenes():
+    scenes = [overlaps(seed, bend) for seed in range(100) for bend in (-0.5, 0.0, 0.5)]
+    under_hull, between = np.percentile(scenes, 99, axis=0)
+    assert under_hull < 0.05
+    assert between < 0.06
 
 
 def test_same_call_same_bytes():
