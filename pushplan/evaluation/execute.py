@@ -101,6 +101,7 @@ def rehearse(job: Job, settings: JobSettings) -> None:
         return
     _rehearsed.add(what)
     with contextlib.suppress(Exception, SystemExit):
+        job.policy.warm_up()
         policy = job.policy.make()
         env = settings.environment(job.scenario, policy)
         try:

@@ -87,7 +87,7 @@ def misfit(spec: PolicySpec, scenario: Any, settings: JobSettings) -> str | None
         return str(error)
     with contextlib.closing(env):
         if spec.is_ours:
-            return _first_step(policy, scenario, env)
+            return _first_step(spec, policy, scenario, env)
     return None
 
 
@@ -101,7 +101,8 @@ def _made_for(policy: Policy, scenario: Any) -> str | None:
     return None
 
 
-def _first_step(policy: Policy, scenario: Any, env: Any) -> str | None:
+def _first_step(spec: PolicySpec, policy: Policy, scenario: Any, env: Any) -> str | None:
+    spec.warm_up()  # compiled here, kernels are in their cache before workers need them
     try:
         Recording(policy, scenario).run(env, limit=1)
     except PolicyError as error:

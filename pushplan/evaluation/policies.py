@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import functools
 import hashlib
 import re
@@ -72,6 +73,11 @@ class PolicySpec:
     def network(self) -> Path | None:
         """The file of the network, if it is one."""
         return _network_file(self.source) if isinstance(self.source, str) else None
+
+    def warm_up(self) -> None:
+        """Load, once in a process, what a planner of ours may need in any step of an episode."""
+        if isinstance(self.source, str) and self.is_ours and self.network is None:
+            _warm_up(self.source)
 
     def make(self) -> Policy:
         """A fresh policy.
@@ -197,3 +203,11 @@ def parse_policies(
                 f"two policies are labelled {label!r}: tell them apart as 'label=policy'"
             )
     return specs
+
+
+@functools.cache
+def _warm_up(name: str) -> None:
+    from pushplan.planners import warm_up
+
+    with contextlib.suppress(UnknownNameError):  # one without a planner, such as "random"
+        warm_up(name)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import Any
 
@@ -14,12 +15,19 @@ from pushplan.observation import ObservationBuilder
 from pushplan.world import InvalidInputError, World
 from pushplan.world.checks import FloatArray
 
+_STILL, _STILL_TURN = 0.005, 0.02
+"""What moves less than this has hardly moved [sides of the map of pixel values, rad]."""
+
 Function = Callable[[NDArray[Any]], NDArray[Any]]
 """From one observation, without batch axis, to the output for it."""
 
 
 class NetworkPolicy:
     """Asks a network what to do, and holds each decision for as long as it was trained to.
+
+    With ``pixel_values``, a pixel that was chosen before when robot and objects were where they are
+    now is not chosen again, nor are its neighbours: without memory, a network that drives against
+    a wall does so for ever.
 
     Args:
         function: the network.
@@ -35,6 +43,7 @@ class NetworkPolicy:
         self._function = function
         self._left = 0
         self._action: FloatArray = np.zeros(0)
+        self._tried: list[tuple[World, tuple[int, int]]] = []
 
     def __repr__(self) -> str:
         return f"{type(self).__name__}({self.label!r})"
@@ -64,6 +73,7 @@ class NetworkPolicy:
             InvalidInputError: if the robot is another one than the network was made for.
         """
         self._left = 0
+        self._tried.clear()
         if self.specification.robot is None:
             return
         if (difference := self.specification.robot.difference(world.robot)) is not None:
@@ -84,13 +94,23 @@ class NetworkPolicy:
             seen = self.observation.observe(world) if observation is None else observation
             self._check(seen)
             try:
-                action = self.specification.action.read(self._function(seen))
+                action = self._decide(world, seen)
             except BadOutputError as error:
                 raise BadOutputError(f"policy {self.label!r}: {error}") from None
             self._action = action.astype(np.float64)
             self._left = self.specification.action.repeat
         self._left -= 1
         return self._action
+
+    def _decide(self, world: World, seen: NDArray[Any]) -> NDArray[np.float32]:
+        spec, output = self.specification.action, self._function(seen)
+        if spec.output != "pixel_values":
+            return spec.read(output)
+        still = _STILL * spec.window
+        tried = [pixel for then, pixel in self._tried if _hardly_moved(then, world, still)]
+        pixel = spec.pixel(output, tried)
+        self._tried.append((world, pixel))
+        return spec.waypoint(*pixel)
 
     def _check(self, seen: Any) -> None:
         shape, dtype = self.observation.shape, self.observation.dtype
@@ -101,3 +121,14 @@ class NetworkPolicy:
             f"policy {self.label!r} was made for observations {dtype} of shape {shape}, "
             f"the environment gave {found}"
         )
+
+
+def _hardly_moved(before: World, after: World, still: float) -> bool:
+    """Whether the robot and all objects, still the same ones, are within ``still`` [m]."""
+    if not np.array_equal(before.movables.ids, after.movables.ids):
+        return False
+    dx, dy, turn = (after.robot_pose - before.robot_pose).tolist()
+    if math.hypot(dx, dy) >= still or abs(math.remainder(turn, math.tau)) >= _STILL_TURN:
+        return False
+    moves = after.movables.poses - before.movables.poses
+    return bool((np.hypot(moves[:, 0], moves[:, 1]) < still).all())

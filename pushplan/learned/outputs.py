@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -17,6 +17,9 @@ MODES = {"turn_rate": 1, "velocity": 2, "wheels": 2, "heading": 1, "waypoint": 2
 """Action modes of `pushplan.envs` and the number of elements of an action."""
 
 OUTPUTS = ("continuous", "direction", "pixel_values")
+NEIGHBOURS = 1.0 / 32.0
+"""How far around a tried pixel `ActionSpec.pixel` leaves pixels out, in sides of the map."""
+
 _KEYS = ("mode", "output", "shape", "repeat", "window", "step")
 
 
@@ -89,6 +92,37 @@ class ActionSpec:
         Raises:
             BadOutputError: if it is not finite or has another shape.
         """
+        if self.output == "pixel_values":
+            return self.waypoint(*self.pixel(output))
+        values = self._checked(output)
+        if self.output == "direction":
+            heading = math.atan2(float(values[1]), float(values[0])) / math.pi
+            return np.array([heading], dtype=np.float32)
+        clipped: NDArray[np.float32] = np.clip(values, -1.0, 1.0).astype(np.float32)
+        return clipped
+
+    def pixel(self, output: ArrayLike, tried: Collection[tuple[int, int]] = ()) -> tuple[int, int]:
+        """Row and column of the best pixel of ``pixel_values``.
+
+        Args:
+            output: values of the pixels.
+            tried: pixels to leave out, each with its neighbours up to `NEIGHBOURS` of the map's
+                side away; if nothing is left then, none is left out.
+
+        Raises:
+            BadOutputError: as `read`.
+        """
+        values = self._checked(output)
+        near = int(NEIGHBOURS * max(self.shape))
+        open_ = np.ones(values.shape, dtype=np.bool_)
+        for row, col in tried:
+            open_[max(row - near, 0) : row + near + 1, max(col - near, 0) : col + near + 1] = False
+        if open_.any():
+            values = np.where(open_, values, -np.inf)
+        row, col = divmod(int(np.argmax(values)), self.shape[1])
+        return row, col
+
+    def _checked(self, output: ArrayLike) -> NDArray[Any]:
         values = np.asarray(output)
         if values.shape != self.shape or values.dtype.kind not in "fiu":
             raise BadOutputError(
@@ -97,14 +131,7 @@ class ActionSpec:
             )
         if not np.isfinite(values).all():
             raise BadOutputError("the network gave values that are not finite")
-        if self.output == "pixel_values":
-            row, col = divmod(int(np.argmax(values)), self.shape[1])
-            return self.waypoint(row, col)
-        if self.output == "direction":
-            heading = math.atan2(float(values[1]), float(values[0])) / math.pi
-            return np.array([heading], dtype=np.float32)
-        clipped: NDArray[np.float32] = np.clip(values, -1.0, 1.0).astype(np.float32)
-        return clipped
+        return values
 
     def waypoint(self, row: int, col: int) -> NDArray[np.float32]:
         """(2,) the action that drives to the middle of a pixel."""

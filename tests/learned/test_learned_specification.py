@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ from policy_files import map_specification, maze_specification
 
 from pushplan.envs import PushEnv
 from pushplan.learned import ActionSpec, FeatureObservation, RobotSpec, Specification
+from pushplan.learned.network_policy import NetworkPolicy
 from pushplan.learned.outputs import BadOutputError
 from pushplan.observation import ImageObservation
 from pushplan.world import InvalidInputError, SchemaError, UnknownNameError
@@ -146,3 +148,74 @@ class TestOutputs:
         values = np.zeros((96, 96))
         values[tuple(shown[7])] = 1.0
         assert np.array_equal(spec.read(values), spec.waypoint(*map(int, shown[7])))
+
+    def test_a_tried_pixel_is_left_out_with_its_neighbours(self):
+        spec = ActionSpec("waypoint", "pixel_values", (96, 96), window=10.0)
+        values = np.random.default_rng(0).uniform(size=(96, 96))
+        best = np.unravel_index(np.argmax(values), values.shape)
+        assert spec.pixel(values) == best
+        second = spec.pixel(values, [best])
+        apart = np.abs(np.subtract(np.indices(values.shape).T, best)).max(axis=2).T
+        assert apart[second] > 3
+        assert values[second] == values[apart > 3].max()
+        everywhere = [(row, col) for row in range(96) for col in range(96)]
+        assert spec.pixel(values, everywhere) == best
+
+
+class TestNoRepeat:
+    @pytest.fixture()
+    def world(self):
+        env = PushEnv(task="box_delivery", observation="state", action="waypoint")
+        env.reset(seed=0)
+        return env.world
+
+    def policy(self, world, values):
+        policy = NetworkPolicy(lambda seen: values, map_specification())
+        policy.reset(world, np.random.default_rng(0))
+        return policy
+
+    def act(self, policy, world):
+        return tuple(policy.act(world, np.zeros(policy.observation.shape, np.uint8)))
+
+    @pytest.mark.parametrize(
+        ("move", "is_elsewhere"),
+        [
+            ((0.0, 0.0, 0.0), False),
+            ((0.04, 0.0, 0.01), False),  # by the width of less than a pixel
+            ((0.0, 0.06, 0.0), True),
+            ((0.0, 0.0, 0.03), True),
+            ((0.0, 0.0, 2.0 * np.pi), False),
+        ],
+    )
+    def test_a_pixel_that_led_nowhere_is_not_chosen_again(self, world, move, is_elsewhere):
+        policy = self.policy(world, np.random.default_rng(1).uniform(size=(32, 32)))
+        first = self.act(policy, world)
+        moved = world.moved(robot_pose=world.robot_pose + move)
+        assert (self.act(policy, moved) == first) == is_elsewhere
+
+    def test_an_object_elsewhere_is_another_place(self, world):
+        policy = self.policy(world, np.random.default_rng(1).uniform(size=(32, 32)))
+        first = self.act(policy, world)
+        poses = np.array(world.movables.poses)
+        poses[3, 0] += 0.1
+        assert self.act(policy, world.moved(movable_poses=poses)) == first
+        fewer = replace(world, movables=world.movables.select(np.arange(4)))
+        assert self.act(policy, fewer) == first
+
+    def test_each_is_another_until_the_next_episode(self, world):
+        policy = self.policy(world, np.random.default_rng(1).uniform(size=(32, 32)))
+        chosen = [self.act(policy, world) for _ in range(21)]
+        assert len(set(chosen)) == len(chosen)
+        policy.reset(world, np.random.default_rng(0))
+        assert [self.act(policy, world) for _ in range(21)] == chosen
+
+    def test_it_goes_on_when_everything_was_tried(self, world):
+        policy = self.policy(world, np.zeros((32, 32)))
+        chosen = [self.act(policy, world) for _ in range(300)]
+        assert len(set(chosen)) == 256  # neighbours go with each
+        assert chosen[-1] == chosen[0]
+
+    def test_other_outputs_repeat(self, world):
+        policy = NetworkPolicy(lambda seen: np.array([0.5], np.float32), maze_specification())
+        seen = np.zeros(policy.observation.shape, np.float32)
+        assert [float(policy.act(world, seen)[0]) for _ in range(3)] == [0.5] * 3

@@ -7,16 +7,22 @@ import sys
 
 import pytest
 
-LOOK = """
+LOADED = """
 import gc, sys
 from numba.core.dispatcher import Dispatcher
-from pushplan.envs import make
-from pushplan.planners import MaxIterations, make_planner, warm_up
-from pushplan.scenarios import Scenario
 
 def loaded():
     found = (x for x in gc.get_objects() if isinstance(x, Dispatcher))
     return {f"{x.py_func.__module__}.{x.py_func.__name__}": len(x.signatures) for x in found}
+
+def newer(before):
+    return [kernel for kernel, count in loaded().items() if count > before.get(kernel, 0)]
+"""
+
+PLAN = """
+from pushplan.envs import make
+from pushplan.planners import MaxIterations, make_planner, warm_up
+from pushplan.scenarios import Scenario
 
 name, task, iterations = sys.argv[1:]
 env = make(Scenario(task, seed=1), observation="state")
@@ -24,7 +30,21 @@ env.reset(seed=1)
 warm_up(name)
 before = loaded()
 make_planner(name).plan(env.world, stop=MaxIterations(int(iterations)))
-print([kernel for kernel, count in loaded().items() if count > before.get(kernel, 0)])
+print(newer(before))
+"""
+
+EPISODE = """
+from pushplan.evaluation import run_episode
+from pushplan.envs import make
+from pushplan.planners import make_policy, warm_up
+from pushplan.scenarios import suite
+
+name, of = sys.argv[1:]
+warm_up(name)
+before = loaded()
+scenario = suite(of, episodes=2).scenarios[1]
+run_episode(make(scenario, observation="state", action="velocity"), make_policy(name), scenario)
+print([kernel for kernel in newer(before) if kernel.startswith("pushplan.planners")])
 """
 
 
@@ -39,6 +59,18 @@ print([kernel for kernel, count in loaded().items() if count > before.get(kernel
     ],
 )
 def test_the_first_plan_after_warming_up_loads_nothing(name, task, iterations):
-    command = [sys.executable, "-c", LOOK, name, task, str(iterations)]
+    assert output(PLAN, name, task, str(iterations)) == "[]"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "suite", ["area-clearing-2d-10-walled-with-columns", "box-delivery-2d-small-columns-10"]
+)
+def test_an_episode_after_warming_up_loads_nothing(suite):
+    assert output(EPISODE, "gtsp-mpc", suite) == "[]"
+
+
+def output(script, *arguments):
+    command = [sys.executable, "-c", LOADED + script, *arguments]
     done = subprocess.run(command, capture_output=True, text=True, check=True)
-    assert done.stdout.strip() == "[]"
+    return done.stdout.strip()

@@ -442,6 +442,39 @@ class TestSamLearner:
         with pytest.raises(InvalidInputError, match="divisible by 8"):
             SamLearner(tiny("sam", options={"shrink": 2}), (4, 16, 20), "cpu")
 
+    def test_it_starts_with_the_weights_of_an_exported_network(self, tmp_path, data):
+        torch = pytest.importorskip("torch")
+        from pushplan.training.policies.sam import SamLearner
+
+        options = {**TINY["sam"], "start": str(tmp_path / "first" / "policy.onnx")}
+        first = trained(tiny("sam"), tmp_path / "first", data)
+        config = tiny("sam", seed=1, options=options)
+        learner = SamLearner(config, (4, 16, 16), "cpu")
+        seen = np.random.default_rng(0).integers(0, 255, (4, 16, 16)).astype(np.uint8)
+        with torch.no_grad():
+            values = learner.network(torch.from_numpy(seen[None]))[0].numpy()
+        np.testing.assert_allclose(values, OnnxPolicy(first).decide(seen), atol=1e-5)
+        for network in (learner.target, learner.result):
+            assert all(map(torch.equal, network.parameters(), learner.network.parameters()))
+        again = trained(config, tmp_path / "second", data)  # from the first decision by its values
+        assert not np.array_equal(behaviour(again), behaviour(first))
+
+    @pytest.mark.parametrize(
+        ("start", "said"),
+        [
+            ("maze-ppo", r"first\.weight has shape None"),
+            ("box-delivery-sam", "does not fit"),
+            ("box-delivery-sum", "is no file and none of the policies"),
+            (__file__, "is no ONNX file"),
+        ],
+    )
+    def test_weights_of_another_network_are_refused(self, start, said):
+        pytest.importorskip("torch")
+        from pushplan.training.policies.sam import SamLearner
+
+        with pytest.raises(InvalidInputError, match=said):
+            SamLearner(tiny("sam", options={**TINY["sam"], "start": start}), (4, 16, 16), "cpu")
+
     def test_it_learns_which_pixel_pays(self):
         pytest.importorskip("torch")
         from pushplan.training.policies.sam import SamLearner

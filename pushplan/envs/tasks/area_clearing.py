@@ -28,7 +28,6 @@ from pushplan.world import (
 )
 from pushplan.world.checks import BoolArray, FloatArray
 
-PROGRESS_REWARD = 0.2
 CLEARED_REWARD = 10.0
 BACK_REWARD = -10.0
 STATIC_REWARD = -0.25
@@ -50,10 +49,10 @@ class AreaClearingVariations(ManipulationVariations):
 class AreaClearingTask(ManipulationTask):
     """Area-Clearing, as in the Bench-Push paper.
 
-    Reward of an action: 0.2 for each metre by which the shortest way of a box's centre to an open
-    edge of the area gets shorter, the same as a penalty where it gets longer; +10 for each box
-    that is cleared and -10 for each that has come back; -0.25 if the robot touches something
-    static; +50 when the area is clear.
+    Reward of an action: 0.2 (testbed 2.5) for each metre by which the shortest way of a box's
+    centre to an open edge of the area gets shorter, the same as a penalty where it gets longer; +10
+    for each box that is cleared and -10 for each that has come back; -0.25 if the robot touches
+    something static; +50 when the area is clear.
     """
 
     name = "area_clearing"
@@ -152,7 +151,7 @@ class AreaClearingTask(ManipulationTask):
         far, was_cleared = self._state(before)
         near, cleared = self._state(after)
         gained = int((cleared & ~was_cleared).sum())
-        reward = PROGRESS_REWARD * float((far - near).sum()) + CLEARED_REWARD * gained
+        reward = self.preset.progress_reward * float((far - near).sum()) + CLEARED_REWARD * gained
         reward += BACK_REWARD * int((was_cleared & ~cleared).sum())
         if touched_static:
             reward += STATIC_REWARD

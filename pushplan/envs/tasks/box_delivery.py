@@ -21,7 +21,6 @@ from pushplan.envs.tasks.manipulation import (
 from pushplan.world import InvalidInputError, Receptacle, StaticMap, UnknownNameError, World
 from pushplan.world.checks import FloatArray, IntArray
 
-PROGRESS_REWARD = 0.2
 TOWARDS = 3.0
 """How much more a metre towards the receptacle counts than one away from it."""
 DELIVERY_REWARD = 10.0
@@ -47,10 +46,10 @@ class BoxDeliveryVariations(ManipulationVariations):
 class BoxDeliveryTask(ManipulationTask):
     """Box-Delivery, as in the Bench-Push paper (there after Spatial Action Maps, Wu et al. 2020).
 
-    Reward of an action: 0.2 for each metre by which the shortest way of a box's centre to the
-    receptacle gets longer or shorter, three times as much where it gets shorter; +10 for each
-    delivered box (+1 with waypoint actions); -0.25 if the robot touches something static; with
-    waypoint actions -0.25 if it does not move.
+    Reward of an action: 0.2 (testbed 0.703) for each metre by which the shortest way of a box's
+    centre to the receptacle gets longer or shorter, three times as much where it gets shorter; +10
+    for each delivered box (+1 with waypoint actions); -0.25 if the robot touches something static;
+    with waypoint actions -0.25 if it does not move.
     """
 
     name = "box_delivery"
@@ -185,8 +184,8 @@ class BoxDeliveryTask(ManipulationTask):
         closer = self._distances(before) - self._distances(after)
         delivered = len(before.movables) - len(after.movables)
         each = WAYPOINT_DELIVERY_REWARD if self.action == "waypoint" else DELIVERY_REWARD
-        reward = PROGRESS_REWARD * float((closer * np.where(closer > 0.0, TOWARDS, 1.0)).sum())
-        reward += each * delivered
+        progress = float((closer * np.where(closer > 0.0, TOWARDS, 1.0)).sum())
+        reward = self.preset.progress_reward * progress + each * delivered
         if touched_static:
             reward += STATIC_REWARD
         if self.action == "waypoint" and self._is_still(before, after):

@@ -59,6 +59,7 @@ BENCHMARK = BoxDeliveryPreset(
     heading_step=1.75,
     windows=dict.fromkeys(LAYOUTS, 10.0),
     field_resolution=0.1,
+    progress_reward=0.2,
     rooms={
         "small_empty": (10.0, 5.0),
         "small_columns": (10.0, 5.0),
@@ -99,6 +100,7 @@ TESTBED = BoxDeliveryPreset(
     heading_step=0.4,
     windows=dict.fromkeys(LAYOUTS, 2.845),
     field_resolution=0.025,
+    progress_reward=0.2 / 0.2845,  # the same for the same motion, each length 0.2845 times as large
     rooms={
         "small_empty": (1.505, 1.55),
         "small_columns": (1.505, 1.55),

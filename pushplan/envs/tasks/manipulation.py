@@ -63,6 +63,7 @@ class ManipulationPreset:
         heading_step: how far a heading action drives [m].
         windows: side of the observed square by layout [m].
         field_resolution: side of a cell of the distance field [m].
+        progress_reward: for each metre that an object gets closer to its goal [1/m].
     """
 
     robots: Mapping[str, Callable[..., RobotModel]]
@@ -77,6 +78,7 @@ class ManipulationPreset:
     heading_step: float
     windows: Mapping[str, float]
     field_resolution: float
+    progress_reward: float
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from pushplan.planners.pushing import warm_up as warm_up_pushing
+from pushplan.planners.sequencing import warm_up_solver
 from pushplan.planners.subtasks.freeing import freeing_pushes
 from pushplan.planners.subtasks.leaving import way_out
 from pushplan.planners.subtasks.maneuvers import maneuvers
@@ -16,15 +19,27 @@ from pushplan.world import (
     Movables,
     Receptacle,
     StaticMap,
+    Twist,
     World,
     box_delivery_robot,
 )
 
+_STEPS = 150
+_PERIOD = 0.2  # [s]
+_WEDGED = (-2.2, -0.985, 0.0)
+"""A box a little in one of the columns."""
+
 
 def warm_up_subtasks() -> None:
-    """Plan once for a box in each kind of task, so that the first step of an episode is quick."""
+    """Plan and drive for boxes in each kind of task, so that every step of an episode is quick.
+
+    The robot starts between two columns that leave it no room to turn about, and its boxes do not
+    move: it has to get out, get to a box, push and plan again.
+    """
+    warm_up_solver()
     warm_up_pushing()
     square = np.array([[0.5, 0.5], [-0.5, 0.5], [-0.5, -0.5], [0.5, -0.5]])
+    columns = [0.2 * square + (-2.2, y) for y in (-2.7, -1.3)]
     for goal in (
         ClearanceArea(3.0 * square, np.array([True, False, False, False])),
         Receptacle(square + 2.5),
@@ -32,13 +47,23 @@ def warm_up_subtasks() -> None:
         world = World(
             robot=box_delivery_robot(),
             robot_pose=np.array([-2.2, -2.0, 0.0]),
-            static=StaticMap.build(polygons=[0.2 * square - 2.9], bounds=(-3.0, -3.0, 3.0, 3.0)),
-            movables=Movables.from_outlines([0.44 * square], [(0.2, 0.1, 0.0)]),
+            static=StaticMap.build(polygons=columns, bounds=(-3.0, -3.0, 3.0, 3.0)),
+            movables=Movables.from_outlines(2 * [0.44 * square], [(0.2, 0.1, 0.0), _WEDGED]),
             goal=goal,
         )
         policy = GtspMpc()
-        policy.act(world)
         scene = Scene(world, policy.config)
         maneuvers(Runner(scene), 0)
         freeing_pushes(Runner(scene), 0)
         way_out(scene)
+        for _ in range(_STEPS):
+            world = _driven(world, policy.act(world))
+
+
+def _driven(world: World, twist: Twist) -> World:
+    """A step later, when nothing is in the robot's way."""
+    x, y, heading = world.robot_pose
+    ahead, turn = _PERIOD * twist.linear, _PERIOD * twist.angular
+    middle = heading + 0.5 * turn
+    pose = (x + ahead * math.cos(middle), y + ahead * math.sin(middle), heading + turn)
+    return world.moved(robot_pose=pose, time=world.time + _PERIOD)

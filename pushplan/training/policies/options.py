@@ -122,6 +122,8 @@ class SamOptions:
         blocks: residual blocks at a quarter.
         shrink: factor by which the network is coarser than that behind its first layer; 2 for maps
             of twice the resolution.
+        start: shipped policy, or ONNX file, with the weights to begin with; its network must have
+            the same layers. Random ones by default.
     """
 
     rate: float = 5e-4
@@ -141,6 +143,7 @@ class SamOptions:
     widths: tuple[int, ...] = (16, 32)
     blocks: int = 4
     shrink: int = 1
+    start: str = ""
 
     def __post_init__(self) -> None:
         _check(
@@ -156,6 +159,8 @@ class SamOptions:
             raise InvalidInputError(f"widths of sam are two numbers, got {self.widths}")
         if not isinstance(self.mirror, bool):
             raise InvalidInputError(f"mirror must be true or false, got {self.mirror!r}")
+        if not isinstance(self.start, str):
+            raise InvalidInputError(f"start must be a policy's name or a file, got {self.start!r}")
 
 
 @dataclass(frozen=True)

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from pushplan.observation.channels import MOVABLE
 from pushplan.training.policies.config import TrainingConfig
 from pushplan.training.policies.environment import TrainingEnv
+from pushplan.training.policies.initial import load_weights
 from pushplan.training.policies.libraries import need
 from pushplan.training.policies.options import SamOptions
 from pushplan.training.policies.replay import Lookahead, ReplayBuffer
@@ -62,6 +63,8 @@ class SamLearner:
         network: Any = SpatialActionNetwork(
             shape[0], options.widths, options.blocks, options.shrink
         )
+        if options.start:
+            load_weights(network, options.start)
         self.network = network.to(device, memory_format=self.torch.channels_last)
         self.target = copy.deepcopy(self.network)
         self.optimizer = self.torch.optim.Adam(self.network.parameters(), lr=options.rate)
@@ -232,7 +235,8 @@ def _explore(
     """A pixel: the best, or with the probability of this part of the training a random one."""
     options = learner.options
     fallen = 1.0 - (1.0 - options.explore_end) * min(1.0, share / max(options.explore, 1e-9))
-    if rng.random() >= fallen and len(learner.memory) >= options.first:
+    knows = bool(options.start) or len(learner.memory) >= options.first
+    if rng.random() >= fallen and knows:
         return learner.best(seen)
     rows, cols = seen.shape[1:]
     if learner.occupancy is not None and rng.random() < options.at_objects:
