@@ -109,11 +109,11 @@ def paper_sheet(
         mine = [row for row in rows if row.policy == label]
         scores = _our_scores(table, mine, names, points.get(label, ()))
         cells.append((*_counts(label, mine), *scores, _decision(mine), training.get(label, "none")))
-    # a network of this task is looked for here; what is for other tasks fits on a line
+    # a network of this task and preset is looked for here; what is for others fits on a line
     near = {
         label: why
         for label, why in misfits.items()
-        if label in training and not why.startswith("made for task")
+        if label in training and not why.startswith(("made for task", "made for preset"))
     }
     blank = [""] * (len(headings) - 2)
     for label, why in near.items():
@@ -136,7 +136,7 @@ def _columns(table: PublishedTable, rows: Sequence[ResultRow]) -> list[str]:
 def _note(table: PublishedTable, others: Sequence[str]) -> str:
     parts = [f"source of the paper's rows: {table.source}", *table.notes]
     if others:
-        parts.append(f"made for other tasks: {', '.join(others)}")
+        parts.append(f"made for other tasks or presets: {', '.join(others)}")
     return ".\n".join(f"- {part[0].upper()}{part[1:]}" for part in parts)
 
 
