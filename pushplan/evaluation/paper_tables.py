@@ -233,7 +233,8 @@ def training_cost(network: Path) -> str:
     said = card.read_text("utf-8") if card.is_file() else ""
     found = re.search(r"^- ([\d,]+ \w+), ([\d.]+ h) of training", said, re.MULTILINE)
     if found:
-        return "\n".join(found.groups())
+        begin = re.findall(r"^- Begins with the weights of `(.+)`", said, re.MULTILINE)
+        return "\n".join([*found.groups(), *(f"after {name}" for name in begin)])
     try:
         steps = read_specification(network).training.get("steps")
     except InvalidInputError:  # no ONNX file

@@ -112,6 +112,8 @@ def test_the_time_of_a_decision_holds_the_observation_and_no_simulation(tmp_path
 def test_training_is_what_the_model_card_says(tmp_path: Path) -> None:
     weights = weights_of("maze-ppo")
     assert training_cost(weights).split("\n")[0].endswith("decisions")
+    begun = training_cost(weights_of("box-delivery-sam-testbed")).split("\n")
+    assert len(begun) == 3 and begun[2] == "after box-delivery-sam"
     alone = tmp_path / "mine.onnx"
     alone.write_bytes(weights.read_bytes())
     assert training_cost(alone).endswith("steps")

@@ -458,6 +458,8 @@ class TestSamLearner:
             assert all(map(torch.equal, network.parameters(), learner.network.parameters()))
         again = trained(config, tmp_path / "second", data)  # from the first decision by its values
         assert not np.array_equal(behaviour(again), behaviour(first))
+        card = write_card(tmp_path / "second", [], tmp_path / "card.md").read_text()
+        assert f"- Begins with the weights of `{options['start']}`.\n" in card
 
     @pytest.mark.parametrize(
         ("start", "said"),

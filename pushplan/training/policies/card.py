@@ -65,10 +65,13 @@ def _head(record: Mapping[str, Any]) -> list[str]:
 def _training(record: Mapping[str, Any]) -> list[str]:
     config = record["config"]
     hours = record["seconds"] / 3600.0
+    start = config["options"].get("start")
+    begin = [f"- Begins with the weights of `{start}`."] if start else []
     lines = [
         "## Training",
         "",
         f"- Data: {_data(record)}",
+        *begin,
         f"- {record['steps']:,} {'pairs' if config['algorithm'] == 'bc' else 'decisions'}, "
         f"{hours:.2f} h of training on a {record['hardware']}, seed {config['seed']}.",
         f"- The weights are those after {record['best_steps']:,}: the best in validation on "
