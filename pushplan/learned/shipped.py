@@ -12,7 +12,7 @@ from pushplan.world import UnknownNameError
 @functools.lru_cache(maxsize=1)
 def _shipped() -> dict[str, Path]:
     folder = Path(str(resources.files("pushplan.learned"))) / "weights"
-    return {path.stem: path for path in sorted(folder.glob("*.onnx"))}
+    return {path.stem: path for path in sorted(folder.glob("*.onnx"), key=lambda path: path.stem)}
 
 
 def learned_names() -> tuple[str, ...]:
