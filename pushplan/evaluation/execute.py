@@ -100,8 +100,9 @@ def rehearse(job: Job, settings: JobSettings) -> None:
     if what in _rehearsed:
         return
     _rehearsed.add(what)
-    with contextlib.suppress(Exception, SystemExit):
+    with contextlib.suppress(Exception):
         job.policy.warm_up()
+    with contextlib.suppress(Exception, SystemExit):
         policy = job.policy.make()
         env = settings.environment(job.scenario, policy)
         try:

@@ -87,7 +87,10 @@ def misfit(spec: PolicySpec, scenario: Any, settings: JobSettings) -> str | None
         return str(error)
     with contextlib.closing(env):
         if spec.is_ours:
-            return _first_step(spec, policy, scenario, env)
+            reason = _first_step(policy, scenario, env)
+            if reason is None and settings.rehearse:
+                spec.warm_up()  # what is compiled here, workers find in the cache
+            return reason
     return None
 
 
@@ -101,8 +104,7 @@ def _made_for(policy: Policy, scenario: Any) -> str | None:
     return None
 
 
-def _first_step(spec: PolicySpec, policy: Policy, scenario: Any, env: Any) -> str | None:
-    spec.warm_up()  # compiled here, kernels are in their cache before workers need them
+def _first_step(policy: Policy, scenario: Any, env: Any) -> str | None:
     try:
         Recording(policy, scenario).run(env, limit=1)
     except PolicyError as error:

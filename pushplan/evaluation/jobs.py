@@ -71,8 +71,9 @@ class JobSettings:
             ``observation`` asks for, by name or as a builder, else ``"state"``.
         timeout_s: wall-clock limit of one job [s], None for none.
         grace_s: how much later a job is ended by force [s].
-        rehearse: run the first steps of a policy's first job in each process once without
-            recording them, so that loading and compiling are in nobody's planning times.
+        rehearse: in each process, warm up a planner of ours before its first job, and run the
+            first steps of a policy's first job once without recording them, so that loading and
+            compiling are in nobody's planning times.
         honest_time: seconds of the world's clock for each second that a policy computes; None
             for a world that stands still meanwhile. See `run_episode`.
     """

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import functools
 import hashlib
 import re
@@ -209,5 +208,4 @@ def parse_policies(
 def _warm_up(name: str) -> None:
     from pushplan.planners import warm_up
 
-    with contextlib.suppress(UnknownNameError):  # one without a planner, such as "random"
-        warm_up(name)
+    warm_up(name)

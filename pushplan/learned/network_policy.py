@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections import deque
 from collections.abc import Callable
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,10 +14,11 @@ from pushplan.learned.outputs import BadOutputError
 from pushplan.learned.specification import Specification
 from pushplan.observation import ObservationBuilder
 from pushplan.world import InvalidInputError, World
-from pushplan.world.checks import FloatArray
+from pushplan.world.checks import FloatArray, IntArray
 
 _STILL, _STILL_TURN = 0.005, 0.02
 """What moves less than this has hardly moved [sides of the map of pixel values, rad]."""
+_REMEMBERED = 1000
 
 Function = Callable[[NDArray[Any]], NDArray[Any]]
 """From one observation, without batch axis, to the output for it."""
@@ -25,9 +27,9 @@ Function = Callable[[NDArray[Any]], NDArray[Any]]
 class NetworkPolicy:
     """Asks a network what to do, and holds each decision for as long as it was trained to.
 
-    With ``pixel_values``, a pixel that was chosen before when robot and objects were where they are
-    now is not chosen again, nor are its neighbours: without memory, a network that drives against
-    a wall does so for ever.
+    With ``pixel_values``, a pixel that was chosen before in the episode, when robot and objects
+    were where they are now, is not chosen again, nor are its neighbours, as long as others are
+    left: without memory, a network that drives against a wall does so for ever.
 
     Args:
         function: the network.
@@ -43,7 +45,7 @@ class NetworkPolicy:
         self._function = function
         self._left = 0
         self._action: FloatArray = np.zeros(0)
-        self._tried: list[tuple[World, tuple[int, int]]] = []
+        self._decisions: deque[_Decision] = deque(maxlen=_REMEMBERED)
 
     def __repr__(self) -> str:
         return f"{type(self).__name__}({self.label!r})"
@@ -73,7 +75,7 @@ class NetworkPolicy:
             InvalidInputError: if the robot is another one than the network was made for.
         """
         self._left = 0
-        self._tried.clear()
+        self._decisions.clear()
         if self.specification.robot is None:
             return
         if (difference := self.specification.robot.difference(world.robot)) is not None:
@@ -81,6 +83,9 @@ class NetworkPolicy:
 
     def act(self, world: World, observation: Any = None) -> FloatArray:
         """The action for this step.
+
+        With ``pixel_values``, to be asked for once for each waypoint, when the last one was reached
+        or given up: from the same place it gives another one the next time.
 
         Args:
             world: the snapshot.
@@ -107,9 +112,10 @@ class NetworkPolicy:
         if spec.output != "pixel_values":
             return spec.read(output)
         still = _STILL * spec.window
-        tried = [pixel for then, pixel in self._tried if _hardly_moved(then, world, still)]
+        tried = [old.pixel for old in self._decisions if old.was_made_at(world, still)]
         pixel = spec.pixel(output, tried)
-        self._tried.append((world, pixel))
+        objects = world.movables
+        self._decisions.append(_Decision(objects.ids, world.robot_pose, objects.poses, pixel))
         return spec.waypoint(*pixel)
 
     def _check(self, seen: Any) -> None:
@@ -123,12 +129,20 @@ class NetworkPolicy:
         )
 
 
-def _hardly_moved(before: World, after: World, still: float) -> bool:
-    """Whether the robot and all objects, still the same ones, are within ``still`` [m]."""
-    if not np.array_equal(before.movables.ids, after.movables.ids):
-        return False
-    dx, dy, turn = (after.robot_pose - before.robot_pose).tolist()
-    if math.hypot(dx, dy) >= still or abs(math.remainder(turn, math.tau)) >= _STILL_TURN:
-        return False
-    moves = after.movables.poses - before.movables.poses
-    return bool((np.hypot(moves[:, 0], moves[:, 1]) < still).all())
+class _Decision(NamedTuple):
+    """Where things were when a pixel was chosen, and which."""
+
+    ids: IntArray
+    robot: FloatArray
+    objects: FloatArray
+    pixel: tuple[int, int]
+
+    def was_made_at(self, world: World, still: float) -> bool:
+        """Whether robot and centres of the objects, still the same ones, are within ``still``."""
+        if not np.array_equal(self.ids, world.movables.ids):
+            return False
+        dx, dy, turn = (world.robot_pose - self.robot).tolist()
+        if math.hypot(dx, dy) >= still or abs(math.remainder(turn, math.tau)) >= _STILL_TURN:
+            return False
+        moves = world.movables.poses - self.objects
+        return bool((np.hypot(moves[:, 0], moves[:, 1]) < still).all())

@@ -37,7 +37,8 @@ class ActionSpec:
             ``heading``: a vector (2,) in the robot's frame, x ahead and y to the left, along which
             the robot goes. ``"pixel_values"``, with mode ``waypoint``: a value for each pixel of
             a map around the robot, row 0 ahead and column 0 to the left; the robot drives to the
-            middle of the pixel with the greatest, of equals the first.
+            middle of the pixel with the greatest, of equals the first, without those that
+            `NetworkPolicy` leaves out.
         shape: of the output, without the batch axis.
         repeat: steps of the environment for which a decision stands.
         window: with ``pixel_values``, the side of the map [m], which has to be the task's
@@ -110,13 +111,16 @@ class ActionSpec:
                 side away; if nothing is left then, none is left out.
 
         Raises:
+            InvalidInputError: if the output is another one.
             BadOutputError: as `read`.
         """
+        if self.output != "pixel_values":
+            raise InvalidInputError(f"output {self.output!r} has no pixels")
         values = self._checked(output)
-        near = int(NEIGHBOURS * max(self.shape))
+        up, side = (int(NEIGHBOURS * pixels) for pixels in self.shape)
         open_ = np.ones(values.shape, dtype=np.bool_)
         for row, col in tried:
-            open_[max(row - near, 0) : row + near + 1, max(col - near, 0) : col + near + 1] = False
+            open_[max(row - up, 0) : row + up + 1, max(col - side, 0) : col + side + 1] = False
         if open_.any():
             values = np.where(open_, values, -np.inf)
         row, col = divmod(int(np.argmax(values)), self.shape[1])

@@ -102,6 +102,20 @@ def test_rewards_by_hand():
     assert wall.reward == pytest.approx(-0.2 * 0.5 - 0.25, abs=0.005)
 
 
+def test_the_same_motion_pays_the_same_in_the_testbed():
+    rewards = []
+    for preset, scale in (("benchmark", 1.0), ("testbed", 0.08)):
+        clearing = task(preset=preset, boxes=2)
+        start = clearing.start(stream(0, "layout"))
+        before, after = (
+            placed(start, [(scale * x, 0.0, 0.0), (0.0, scale * y, 0.0)])
+            for x, y in ((3.0, 2.0), (3.6, 1.9))
+        )
+        rewards.append(clearing.score(before, after, work=0.0, touched_static=False).reward)
+    assert rewards[0] == pytest.approx(0.2 * (0.6 - 0.1), abs=0.005)
+    assert rewards[1] == pytest.approx(rewards[0], rel=0.05)
+
+
 def test_a_cleared_box_can_come_back():
     clearing = task(boxes=2)
     start = clearing.start(stream(0, "layout"))

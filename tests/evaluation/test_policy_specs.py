@@ -79,9 +79,7 @@ def test_only_planners_of_ours_are_warmed_up_and_once(monkeypatch: pytest.Monkey
     asked = []
     monkeypatch.setattr(pushplan.planners, "warm_up", asked.append)
     policies._warm_up.cache_clear()
-    for given in ("skeleton", f"{HERE}:Ahead", Ahead, "maze-ppo", "skeleton"):
+    for given in ("skeleton", f"{HERE}:Ahead", Ahead, "maze-ppo", "gtsp-mpc", "skeleton"):
         parse_policy(given).warm_up()
-    assert asked == ["skeleton"]
-    monkeypatch.undo()
+    assert asked == ["skeleton", "gtsp-mpc"]
     policies._warm_up.cache_clear()
-    parse_policy("random").warm_up()  # nothing to load

@@ -158,6 +158,13 @@ class TestOutputs:
         apart = np.abs(np.subtract(np.indices(values.shape).T, best)).max(axis=2).T
         assert apart[second] > 3
         assert values[second] == values[apart > 3].max()
+        flat = ActionSpec("waypoint", "pixel_values", (32, 96), window=10.0)
+        values = np.full((32, 96), 0.5)
+        values[16, 48], values[16, 51], values[18, 48] = 1.0, 0.9, 0.8
+        assert flat.pixel(values, [(16, 48)]) == (18, 48)  # a pixel up is as far as three aside
+        with pytest.raises(InvalidInputError, match="no pixels"):
+            ActionSpec("turn_rate", "continuous", (1,)).pixel(np.zeros(1))
+        values = np.random.default_rng(0).uniform(size=(96, 96))
         everywhere = [(row, col) for row in range(96) for col in range(96)]
         assert spec.pixel(values, everywhere) == best
 
@@ -199,6 +206,9 @@ class TestNoRepeat:
         poses = np.array(world.movables.poses)
         poses[3, 0] += 0.1
         assert self.act(policy, world.moved(movable_poses=poses)) == first
+        poses[3, 0] -= 0.07
+        poses[:, 2] += 1.0  # centres count
+        assert self.act(policy, world.moved(movable_poses=poses)) != first
         fewer = replace(world, movables=world.movables.select(np.arange(4)))
         assert self.act(policy, fewer) == first
 

@@ -7,6 +7,9 @@ import sys
 
 import pytest
 
+from pushplan.planners import warm_up
+from pushplan.world import UnknownNameError
+
 LOADED = """
 import gc, sys
 from numba.core.dispatcher import Dispatcher
@@ -35,15 +38,15 @@ print(newer(before))
 
 EPISODE = """
 from pushplan.evaluation import run_episode
-from pushplan.envs import make
+from pushplan.evaluation import JobSettings
 from pushplan.planners import make_policy, warm_up
 from pushplan.scenarios import suite
 
 name, of = sys.argv[1:]
 warm_up(name)
 before = loaded()
-scenario = suite(of, episodes=2).scenarios[1]
-run_episode(make(scenario, observation="state", action="velocity"), make_policy(name), scenario)
+scenario, policy = suite(of, episodes=2).scenarios[1], make_policy(name)
+run_episode(JobSettings().environment(scenario, policy), policy, scenario)
 print([kernel for kernel in newer(before) if kernel.startswith("pushplan.planners")])
 """
 
@@ -64,10 +67,22 @@ def test_the_first_plan_after_warming_up_loads_nothing(name, task, iterations):
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    "suite", ["area-clearing-2d-10-walled-with-columns", "box-delivery-2d-small-columns-10"]
+    ("name", "suite"),
+    [
+        ("push-aware-constant-speed", "maze-3d-6"),
+        ("ship-lattice", "ship-ice-2d-20"),
+        ("gtsp-mpc", "area-clearing-2d-10-walled-with-columns"),
+        ("gtsp-mpc", "box-delivery-2d-small-columns-10"),
+    ],
 )
-def test_an_episode_after_warming_up_loads_nothing(suite):
-    assert output(EPISODE, "gtsp-mpc", suite) == "[]"
+def test_an_episode_after_warming_up_loads_nothing(name, suite):
+    assert output(EPISODE, name, suite) == "[]"
+
+
+def test_every_name_can_be_warmed_up():
+    warm_up("random")
+    with pytest.raises(UnknownNameError, match="skeletton"):
+        warm_up("skeletton")
 
 
 def output(script, *arguments):

@@ -444,38 +444,59 @@ class TestSamLearner:
 
     def test_it_starts_with_the_weights_of_an_exported_network(self, tmp_path, data):
         torch = pytest.importorskip("torch")
-        from pushplan.training.policies.sam import SamLearner
+        from pushplan.training.policies.sam import SamLearner, _explore
 
-        options = {**TINY["sam"], "start": str(tmp_path / "first" / "policy.onnx")}
         first = trained(tiny("sam"), tmp_path / "first", data)
+        never = {"explore": 0.0, "explore_end": 0.0}
+        options = {**TINY["sam"], "start": str(first.with_suffix("")), **never}
         config = tiny("sam", seed=1, options=options)
         learner = SamLearner(config, (4, 16, 16), "cpu")
+        learner.begin_with(options["start"])
         seen = np.random.default_rng(0).integers(0, 255, (4, 16, 16)).astype(np.uint8)
         with torch.no_grad():
             values = learner.network(torch.from_numpy(seen[None]))[0].numpy()
         np.testing.assert_allclose(values, OnnxPolicy(first).decide(seen), atol=1e-5)
         for network in (learner.target, learner.result):
             assert all(map(torch.equal, network.parameters(), learner.network.parameters()))
-        again = trained(config, tmp_path / "second", data)  # from the first decision by its values
-        assert not np.array_equal(behaviour(again), behaviour(first))
+        # it acts by them from the first decision on
+        rng = np.random.default_rng(0)
+        assert all(_explore(learner, seen, rng, 0.5) == learner.best(seen) for _ in range(20))
+        assert trained(config, tmp_path / "second", data, until=lambda done: done == 1) is None
+        first.unlink()  # a training that is resumed needs it no more
+        assert trained(config, tmp_path / "second", data, resume=True) is not None
         card = write_card(tmp_path / "second", [], tmp_path / "card.md").read_text()
-        assert f"- Begins with the weights of `{options['start']}`.\n" in card
+        assert "- Begins with the weights of `policy`.\n" in card
 
     @pytest.mark.parametrize(
         ("start", "said"),
         [
-            ("maze-ppo", r"first\.weight has shape None"),
+            ("maze-ppo", r"first\.weight is missing there and \(4, 4, 5, 5\) here"),
             ("box-delivery-sam", "does not fit"),
-            ("box-delivery-sum", "is no file and none of the policies"),
-            (__file__, "is no ONNX file"),
+            ("area-clearing-sam", r"does not fit .* blocks\.\d.first.weight"),
+            ("box-delivery-sum", "there is no file box-delivery-sum"),
+            (__file__, "cannot be read"),
         ],
     )
-    def test_weights_of_another_network_are_refused(self, start, said):
+    def test_weights_of_another_network_are_refused(self, start, said, tmp_path, data):
         pytest.importorskip("torch")
-        from pushplan.training.policies.sam import SamLearner
-
+        options = {**TINY["sam"], "start": start}
+        if start == "area-clearing-sam":  # the same but for the number of blocks
+            options |= {"widths": [16, 32], "blocks": 1}
         with pytest.raises(InvalidInputError, match=said):
-            SamLearner(tiny("sam", options={**TINY["sam"], "start": start}), (4, 16, 16), "cpu")
+            trained(tiny("sam", options=options), tmp_path / "run", data)
+        assert trained(tiny("sam"), tmp_path / "run", data) is not None  # the folder is free
+
+    def test_weights_that_are_no_numbers_are_refused(self, tmp_path, data):
+        onnx = pytest.importorskip("onnx")
+        first = trained(tiny("sam"), tmp_path / "first", data)
+        model = onnx.load(str(first))
+        weights = np.full(tuple(model.graph.initializer[0].dims), np.nan, np.float32)
+        name = model.graph.initializer[0].name
+        model.graph.initializer[0].CopyFrom(onnx.numpy_helper.from_array(weights, name))
+        onnx.save(model, str(tmp_path / "bad.onnx"))
+        options = {**TINY["sam"], "start": str(tmp_path / "bad.onnx")}
+        with pytest.raises(InvalidInputError, match="not finite"):
+            trained(tiny("sam", options=options), tmp_path / "run", data)
 
     def test_it_learns_which_pixel_pays(self):
         pytest.importorskip("torch")

@@ -100,7 +100,7 @@ TESTBED = BoxDeliveryPreset(
     heading_step=0.4,
     windows=dict.fromkeys(LAYOUTS, 2.845),
     field_resolution=0.025,
-    progress_reward=0.2 / 0.2845,  # the same for the same motion, each length 0.2845 times as large
+    progress_reward=0.2 / 0.2845,  # windows and large rooms are 0.2845 times as large
     rooms={
         "small_empty": (1.505, 1.55),
         "small_columns": (1.505, 1.55),

@@ -63,7 +63,7 @@ class ManipulationPreset:
         heading_step: how far a heading action drives [m].
         windows: side of the observed square by layout [m].
         field_resolution: side of a cell of the distance field [m].
-        progress_reward: for each metre that an object gets closer to its goal [1/m].
+        progress_reward: for each metre by which the way of an object to its goal changes [1/m].
     """
 
     robots: Mapping[str, Callable[..., RobotModel]]

@@ -65,7 +65,7 @@ def _head(record: Mapping[str, Any]) -> list[str]:
 def _training(record: Mapping[str, Any]) -> list[str]:
     config = record["config"]
     hours = record["seconds"] / 3600.0
-    start = config["options"].get("start")
+    start = Path(config["options"].get("start", "")).name
     begin = [f"- Begins with the weights of `{start}`."] if start else []
     lines = [
         "## Training",

@@ -177,7 +177,7 @@ def read_config(path: str | Path) -> TrainingConfig:
 def shipped_configs() -> dict[str, Path]:
     """The configurations that come with the package, by name, such as ``maze-ppo``."""
     folder = Path(str(resources.files("pushplan.training.policies"))) / "configs"
-    return {path.stem: path for path in sorted(folder.glob("*.yaml"))}
+    return {path.stem: path for path in sorted(folder.glob("*.yaml"), key=lambda p: p.stem)}
 
 
 def config_named(task: str, algorithm: str) -> TrainingConfig:

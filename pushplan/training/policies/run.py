@@ -87,6 +87,11 @@ class TrainingRun:
         if resume and self.path(CURVE).is_file():
             self.curve = _read_curve(self.path(CURVE))
 
+    def abandon(self) -> None:
+        """Leave the folder to another training, if nothing was learned in it."""
+        if not self.curve:
+            self.path(CONFIG).unlink(missing_ok=True)
+
     def path(self, name: str) -> Path:
         """A file of the run."""
         return self.folder / name

@@ -63,8 +63,6 @@ class SamLearner:
         network: Any = SpatialActionNetwork(
             shape[0], options.widths, options.blocks, options.shrink
         )
-        if options.start:
-            load_weights(network, options.start)
         self.network = network.to(device, memory_format=self.torch.channels_last)
         self.target = copy.deepcopy(self.network)
         self.optimizer = self.torch.optim.Adam(self.network.parameters(), lr=options.rate)
@@ -76,6 +74,11 @@ class SamLearner:
     def result(self) -> Any:
         """The network that is the policy."""
         return self.target if self.options.follow else self.network
+
+    def begin_with(self, source: str) -> None:
+        """Take the weights of a network that was exported before."""
+        load_weights(self.network, source)
+        self.target.load_state_dict(self.network.state_dict())
 
     def best(self, seen: NDArray[Any], network: Any = None) -> int:
         """Number of the pixel with the greatest value, by the network that learns or another."""
@@ -165,6 +168,8 @@ def train_sam(
     state = run.load()
     if state is not None:
         learner.restore(state)
+    elif learner.options.start:
+        learner.begin_with(learner.options.start)
     watch = Stopwatch(run.seconds)
     logger = _Board(run)
     for chunk in range(run.done, run.chunks):

@@ -58,20 +58,27 @@ def train_policy(
     device = chosen_device(device)
     run = TrainingRun(folder, config, resume=resume)
     options: dict[str, Any] = {"device": device, "until": until}
-    if config.algorithm == "bc":
-        from pushplan.training.policies.cloning import train_bc
-
-        network = train_bc(run, str(data), **options)
-    elif config.algorithm == "sam":
-        from pushplan.training.policies.sam import train_sam
-
-        network = train_sam(run, **options)
-    else:
-        network = _train_actor(run, processes, options)
+    try:
+        network = _train(run, processes, str(data), options)
+    except InvalidInputError:  # the configuration asks for what cannot be
+        run.abandon()
+        raise
     _draw(run)
     if run.done < run.chunks:
         return None
     return _finish(run, network, device, threads, data, command)
+
+
+def _train(run: TrainingRun, processes: bool, data: str, options: dict[str, Any]) -> Any:
+    if run.config.algorithm == "bc":
+        from pushplan.training.policies.cloning import train_bc
+
+        return train_bc(run, data, **options)
+    if run.config.algorithm == "sam":
+        from pushplan.training.policies.sam import train_sam
+
+        return train_sam(run, **options)
+    return _train_actor(run, processes, options)
 
 
 def _train_actor(run: TrainingRun, processes: bool, options: dict[str, Any]) -> Any:
