@@ -76,7 +76,9 @@ class PolicySpec:
     def warm_up(self) -> None:
         """Load, once in a process, what a planner of ours may need in any step of an episode."""
         if isinstance(self.source, str) and self.is_ours and self.network is None:
-            _warm_up(self.source)
+            from pushplan.planners import warm_up
+
+            warm_up(self.source)
 
     def make(self) -> Policy:
         """A fresh policy.
@@ -202,10 +204,3 @@ def parse_policies(
                 f"two policies are labelled {label!r}: tell them apart as 'label=policy'"
             )
     return specs
-
-
-@functools.cache
-def _warm_up(name: str) -> None:
-    from pushplan.planners import warm_up
-
-    warm_up(name)

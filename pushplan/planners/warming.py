@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from dataclasses import replace
 
 import numpy as np
@@ -37,7 +38,7 @@ def warm_up(*names: str) -> None:
 
     Numba compiles a kernel on its first use after an installation (seconds) and loads it from its
     cache on the first use in a process (a second or so, three for those that push objects to a
-    goal). A controller calls this once when it starts.
+    goal). A controller calls this once when it starts; again for the same names it does nothing.
 
     Args:
         names: planners or policies of `planner_names()` and `policy_names()`; all by default.
@@ -53,6 +54,7 @@ def warm_up(*names: str) -> None:
             _warm_up_planner(name)
 
 
+@functools.cache
 def _warm_up_planner(name: str) -> None:
     planner = make_planner(name)
     room, water = _room(), _water()

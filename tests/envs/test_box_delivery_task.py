@@ -272,7 +272,7 @@ def test_a_pushed_box_leaves_the_floor_of_the_environment():
     assert env.world.movables.ids.tolist() == [1]
     assert info["completed"].tolist() == [True, False] and not (terminated or truncated)
     per_metre = 3.0 * 0.2 / 0.2845  # towards the receptacle, at the scale of the testbed
-    assert sum(rewards) == pytest.approx(10.0 + per_metre * 0.15, abs=0.03)
+    assert sum(rewards) == pytest.approx(10.0 + per_metre * 0.15, abs=0.01)
 
 
 def test_kernels_agree_with_shapely():

@@ -7,7 +7,7 @@ import sys
 
 import pytest
 
-from pushplan.planners import warm_up
+from pushplan.planners import make_planner, warm_up, warming
 from pushplan.world import UnknownNameError
 
 LOADED = """
@@ -37,8 +37,7 @@ print(newer(before))
 """
 
 EPISODE = """
-from pushplan.evaluation import run_episode
-from pushplan.evaluation import JobSettings
+from pushplan.evaluation import JobSettings, run_episode
 from pushplan.planners import make_policy, warm_up
 from pushplan.scenarios import suite
 
@@ -83,6 +82,16 @@ def test_every_name_can_be_warmed_up():
     warm_up("random")
     with pytest.raises(UnknownNameError, match="skeletton"):
         warm_up("skeletton")
+
+
+def test_a_second_time_nothing_is_done(monkeypatch):
+    made, straight = [], make_planner("straight")
+    monkeypatch.setattr(warming, "make_planner", lambda name: made.append(name) or straight)
+    warming._warm_up_planner.cache_clear()
+    for _ in range(2):
+        warm_up("straight", "push-aware-constant-speed", "push-aware")
+    assert made == ["straight", "push-aware"]
+    warming._warm_up_planner.cache_clear()
 
 
 def output(script, *arguments):

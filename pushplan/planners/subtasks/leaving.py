@@ -71,7 +71,7 @@ def _has_room(pose: FloatArray, radius: float, among: Obstacles) -> bool:
 
 
 @njit(cache=True, nogil=True)
-def _moved(pose: FloatArray, way: float, turn: float) -> FloatArray:
+def stepped(pose: FloatArray, way: float, turn: float) -> FloatArray:
     """(3,) where a step leads from a pose."""
     middle = pose[2] + 0.5 * turn
     x, y = pose[0] + way * math.cos(middle), pose[1] + way * math.sin(middle)
@@ -111,7 +111,7 @@ def _search(
     at = 0
     while at < count:
         for way, turn in steps:
-            pose = _moved(nodes[at], way, turn)
+            pose = stepped(nodes[at], way, turn)
             j = half + round((pose[0] - start[0]) / (unit * size))
             i = half + round((pose[1] - start[1]) / (unit * size))
             t = math.floor(pose[2] % (2.0 * math.pi) / unit)
@@ -119,7 +119,7 @@ def _search(
                 continue
             if depth_inside(pose, shape, among, scratch) > limit:
                 continue
-            between = _moved(nodes[at], 0.5 * way, 0.5 * turn)
+            between = stepped(nodes[at], 0.5 * way, 0.5 * turn)
             if depth_inside(between, shape, among, scratch) > limit:
                 continue
             seen[i, j, t] = True

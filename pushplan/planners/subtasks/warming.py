@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import math
+import functools
 
 import numpy as np
 
 from pushplan.planners.pushing import warm_up as warm_up_pushing
 from pushplan.planners.sequencing import warm_up_solver
 from pushplan.planners.subtasks.freeing import freeing_pushes
-from pushplan.planners.subtasks.leaving import way_out
+from pushplan.planners.subtasks.leaving import stepped, way_out
 from pushplan.planners.subtasks.maneuvers import maneuvers
 from pushplan.planners.subtasks.policy import GtspMpc
 from pushplan.planners.subtasks.runner import Runner
@@ -30,11 +30,12 @@ _WEDGED = (-2.2, -0.985, 0.0)
 """A box a little in one of the columns."""
 
 
+@functools.cache
 def warm_up_subtasks() -> None:
     """Plan and drive for boxes in each kind of task, so that every step of an episode is quick.
 
     The robot starts between two columns that leave it no room to turn about, and its boxes do not
-    move: it has to get out, get to a box, push and plan again.
+    move: it has to get out, get to a box, push and plan again. A second call does nothing.
     """
     warm_up_solver()
     warm_up_pushing()
@@ -62,8 +63,6 @@ def warm_up_subtasks() -> None:
 
 def _driven(world: World, twist: Twist) -> World:
     """A step later, when nothing is in the robot's way."""
-    x, y, heading = world.robot_pose
-    ahead, turn = _PERIOD * twist.linear, _PERIOD * twist.angular
-    middle = heading + 0.5 * turn
-    pose = (x + ahead * math.cos(middle), y + ahead * math.sin(middle), heading + turn)
+    here = np.array(world.robot_pose)
+    pose = stepped(here, _PERIOD * twist.linear, _PERIOD * twist.angular)
     return world.moved(robot_pose=pose, time=world.time + _PERIOD)
