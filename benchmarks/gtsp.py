@@ -19,7 +19,7 @@ from pathlib import Path
 
 import numpy as np
 
-from pushplan.planners.sequencing import (
+from pushplan.gtsp import (
     GtspConfig,
     TourStatus,
     read_gtsp,

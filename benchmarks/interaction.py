@@ -16,7 +16,7 @@ import numpy as np
 
 from pushplan.envs import RolloutInteraction, make
 from pushplan.interaction import Interaction, QuasiStatic
-from pushplan.planners.kinodynamic.dubins import along_arc
+from pushplan.motion.dubins import along_arc
 from pushplan.scenarios import Scenario
 from pushplan.world import World
 from pushplan.world.checks import FloatArray

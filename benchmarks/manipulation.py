@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 from pushplan.drawing import draw_sequence, save_image
 from pushplan.envs import make
 from pushplan.evaluation import PolicySpec, ResultRow, bench
-from pushplan.planners.subtasks import GtspMpc
+from pushplan.planners.rearrangement import GtspMpc
 from pushplan.scenarios import suite, suite_names
 
 SCORES = ("S_manip", "E_manip", "I_manip")

@@ -23,10 +23,10 @@ matplotlib.use("Agg")
 from matplotlib import pyplot as plt
 
 from pushplan.evaluation import PolicySpec, bench, bootstrap_interval
-from pushplan.planners.kinodynamic import KinodynamicRRT, KinodynamicRRTConfig
+from pushplan.planners.following.plan_follower import PlanFollower
 from pushplan.planners.policies import push_aware_constant_speed
-from pushplan.planners.policy import PlanFollower
 from pushplan.planners.push_aware import PushAware, PushAwareConfig, cautious_model
+from pushplan.planners.rrt import KinodynamicRRT, KinodynamicRRTConfig
 
 NAMES = {"push-aware-constant-speed": "o-", "kinodynamic-rrt": "s--"}
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from pushplan.envs import make
 from pushplan.planners import make_planner
-from pushplan.planners.kinodynamic import KinodynamicRRTConfig
+from pushplan.planners.rrt import KinodynamicRRTConfig
 from pushplan.scenarios import suite
 from pushplan.world import Deadline, FirstSolution, MaxIterations, World
 from pushplan.world.checks import FloatArray

@@ -25,10 +25,11 @@ import numpy as np
 from pushplan.envs.tasks.ship_ice import ShipIceTask
 from pushplan.evaluation import ResultRow, bench
 from pushplan.evaluation.statistics import estimate
+from pushplan.motion.speed_profile import turning_radius
 from pushplan.planners import make_planner, warm_up
-from pushplan.planners.kinodynamic.timing import turning_radius
-from pushplan.planners.lattice import LatticeBuilder, ShipLattice, ShipLatticeConfig
-from pushplan.planners.lattice.paths import open_search
+from pushplan.planners.ship_lattice import ShipLattice, ShipLatticeConfig
+from pushplan.planners.ship_lattice.build import LatticeBuilder
+from pushplan.planners.ship_lattice.paths import open_search
 from pushplan.scenarios import Scenario
 from pushplan.world import World, stream
 

@@ -23,8 +23,8 @@ import numpy as np
 
 from pushplan.control import MpcConfig, MpcTracker, PathFollower, PurePursuit
 from pushplan.envs import PushEnv
+from pushplan.motion.dubins import along_arc
 from pushplan.planners import KinodynamicRRT, MaxIterations, ShortestPath
-from pushplan.planners.kinodynamic.dubins import along_arc
 from pushplan.world import Controller, Drive, Plan, RobotModel, StaticMap, World
 from pushplan.world.checks import FloatArray
 

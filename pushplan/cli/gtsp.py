@@ -44,7 +44,7 @@ def add(commands: Any) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Read, solve, say what was found; 1 if there is no tour."""
-    from pushplan.planners.sequencing import (
+    from pushplan.gtsp import (
         GtspConfig,
         read_gtsp,
         solve_gtsp,

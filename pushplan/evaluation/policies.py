@@ -109,7 +109,7 @@ def as_policy(thing: Any, label: str) -> Policy:
     if callable(getattr(thing, "act", None)) and callable(getattr(thing, "reset", None)):
         return cast(Policy, thing)
     if callable(getattr(thing, "plan", None)):
-        from pushplan.planners.policy import policy_for
+        from pushplan.planners.following.plan_follower import policy_for
 
         return policy_for(thing)
     if callable(getattr(thing, "predict", None)):

@@ -14,7 +14,7 @@ from pushplan.world import InvalidInputError, UnknownNameError
 WARMUPS: dict[str, str] = {
     "policies": "pushplan.evaluation.warmup:policies",
     "observations": "pushplan.evaluation.warmup:observations",
-    "planners": "pushplan.planners.warming:warm_up",
+    "planners": "pushplan.planners.kernel_warmup:warm_up",
     "metrics": "pushplan.evaluation.warmup:metrics",
 }
 """What -> "module:function" that is called without arguments."""

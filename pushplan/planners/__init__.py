@@ -30,16 +30,16 @@ __all__ = [
 ]
 
 _LAZY = {
-    "GeometricRRT": "pushplan.planners.geometric",
-    "GtspMpc": "pushplan.planners.subtasks",
-    "KinodynamicRRT": "pushplan.planners.kinodynamic",
-    "PlanFollower": "pushplan.planners.policy",
-    "PredictiveShip": "pushplan.planners.predictive",
+    "GeometricRRT": "pushplan.planners.rrt",
+    "GtspMpc": "pushplan.planners.rearrangement",
+    "KinodynamicRRT": "pushplan.planners.rrt",
+    "PlanFollower": "pushplan.planners.following.plan_follower",
+    "PredictiveShip": "pushplan.planners.ship_predictive",
     "PushAware": "pushplan.planners.push_aware",
-    "ShipLattice": "pushplan.planners.lattice.ship",
-    "ShortestPath": "pushplan.planners.straight",
-    "policy_for": "pushplan.planners.policy",
-    "warm_up": "pushplan.planners.warming",
+    "ShipLattice": "pushplan.planners.ship_lattice.ship_lattice",
+    "ShortestPath": "pushplan.planners.shortest_path",
+    "policy_for": "pushplan.planners.following.plan_follower",
+    "warm_up": "pushplan.planners.kernel_warmup",
 }
 
 

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import numpy as np
-
-from pushplan.world import ClearanceArea, Drive, InvalidInputError, Receptacle, Stop, World
+from pushplan.world import ClearanceArea, Drive, InvalidInputError, Receptacle, World
 from pushplan.world.checks import expect
+from pushplan.world.stop import check_rules
 
 
 def check_call(world: object, stop: object, rng: object) -> None:
@@ -16,18 +15,6 @@ def check_call(world: object, stop: object, rng: object) -> None:
     """
     expect("world", world, World)
     check_rules(stop, rng)
-
-
-def check_rules(stop: object, rng: object) -> None:
-    """Check the types of a stop rule and a generator, each of which may be None.
-
-    Raises:
-        InvalidInputError: naming the argument and the type that it must have.
-    """
-    if stop is not None:
-        expect("stop", stop, Stop)  # type: ignore[type-abstract]
-    if rng is not None:
-        expect("rng", rng, np.random.Generator)
 
 
 def check_pusher(world: World, who: str) -> None:

@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 from pushplan.control import PathFollower, PurePursuit
-from pushplan.planners.geometric import GeometricRRT
-from pushplan.planners.kinodynamic import KinodynamicRRT
-from pushplan.planners.policy import PlanFollower
-from pushplan.planners.predictive import (
+from pushplan.planners.following.plan_follower import PlanFollower
+from pushplan.planners.following.replanning import Replanning
+from pushplan.planners.push_aware import PushAware, cautious_model
+from pushplan.planners.rrt import GeometricRRT, KinodynamicRRT
+from pushplan.planners.ship_predictive import (
     PredictivePublished,
     PredictiveShip,
     PredictiveShipNetwork,
 )
-from pushplan.planners.predictive.policy import RenewingFollower
-from pushplan.planners.push_aware import PushAware, cautious_model
-from pushplan.planners.replanning import Replanning
-from pushplan.planners.straight import ShortestPath
+from pushplan.planners.ship_predictive.renewing_follower import RenewingFollower
+from pushplan.planners.shortest_path import ShortestPath
 from pushplan.world import Planner, Stop
 
 

@@ -9,17 +9,17 @@ from typing import Any, cast
 from pushplan.world import Planner, Policy, UnknownNameError
 
 PLANNERS: dict[str, str] = {
-    "straight": "pushplan.planners.straight:ShortestPath",
-    "geometric-rrt": "pushplan.planners.geometric:GeometricRRT",
-    "kinodynamic-rrt": "pushplan.planners.kinodynamic:KinodynamicRRT",
+    "straight": "pushplan.planners.shortest_path:ShortestPath",
+    "geometric-rrt": "pushplan.planners.rrt:GeometricRRT",
+    "kinodynamic-rrt": "pushplan.planners.rrt:KinodynamicRRT",
     "push-aware": "pushplan.planners.push_aware:PushAware",
-    "skeleton": "pushplan.planners.skeleton:Skeleton",
-    "ship-lattice": "pushplan.planners.lattice.ship:ShipLattice",
-    "ship-lattice-quick": "pushplan.planners.lattice.ship:quick",
-    "ship-lattice-published": "pushplan.planners.lattice.ship:published",
-    "ship-predictive": "pushplan.planners.predictive:PredictiveShip",
-    "ship-predictive-network": "pushplan.planners.predictive:PredictiveShipNetwork",
-    "ship-predictive-published": "pushplan.planners.predictive:PredictivePublished",
+    "skeleton": "pushplan.planners.voronoi_roadmap:Skeleton",
+    "ship-lattice": "pushplan.planners.ship_lattice.ship_lattice:ShipLattice",
+    "ship-lattice-quick": "pushplan.planners.ship_lattice.ship_lattice:quick",
+    "ship-lattice-published": "pushplan.planners.ship_lattice.ship_lattice:published",
+    "ship-predictive": "pushplan.planners.ship_predictive:PredictiveShip",
+    "ship-predictive-network": "pushplan.planners.ship_predictive:PredictiveShipNetwork",
+    "ship-predictive-published": "pushplan.planners.ship_predictive:PredictivePublished",
 }
 """Name -> "module:Class"; each is constructed without arguments by default."""
 
@@ -32,17 +32,17 @@ POLICIES: dict[str, str] = {
     "kinodynamic-rrt": "pushplan.planners.policies:kinodynamic_rrt",
     "push-aware": "pushplan.planners.policies:push_aware",
     "push-aware-constant-speed": "pushplan.planners.policies:push_aware_constant_speed",
-    "skeleton": "pushplan.planners.skeleton:skeleton",
-    "ship-lattice": "pushplan.planners.lattice.policy:ship_lattice",
-    "ship-lattice-quick": "pushplan.planners.lattice.policy:ship_lattice_quick",
-    "ship-lattice-published": "pushplan.planners.lattice.policy:ship_lattice_published",
+    "skeleton": "pushplan.planners.voronoi_roadmap:skeleton",
+    "ship-lattice": "pushplan.planners.ship_lattice.ship_follower:ship_lattice",
+    "ship-lattice-quick": "pushplan.planners.ship_lattice.ship_follower:ship_lattice_quick",
+    "ship-lattice-published": "pushplan.planners.ship_lattice.ship_follower:ship_lattice_published",
     "ship-predictive": "pushplan.planners.policies:ship_predictive",
     "ship-predictive-network": "pushplan.planners.policies:ship_predictive_network",
     "ship-predictive-published": "pushplan.planners.policies:ship_predictive_published",
-    "random": "pushplan.planners.policy:RandomTwist",
-    "greedy": "pushplan.planners.greedy:GreedyPusher",
-    "gtsp": "pushplan.planners.subtasks:Gtsp",
-    "gtsp-mpc": "pushplan.planners.subtasks:GtspMpc",
+    "random": "pushplan.planners.random_twist:RandomTwist",
+    "greedy": "pushplan.planners.rearrangement.greedy:GreedyPusher",
+    "gtsp": "pushplan.planners.rearrangement:Gtsp",
+    "gtsp-mpc": "pushplan.planners.rearrangement:GtspMpc",
 }
 """Name -> "module:callable" that makes a policy."""
 

@@ -13,7 +13,9 @@ from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import Protocol
 
-from pushplan.world.checks import integer, number
+import numpy as np
+
+from pushplan.world.checks import expect, integer, number
 from pushplan.world.errors import InvalidInputError
 
 
@@ -155,3 +157,15 @@ class AnyOf(Stop):
 
 def _rules(stop: Stop) -> tuple[Stop, ...]:
     return stop.rules if isinstance(stop, AnyOf) else (stop,)
+
+
+def check_rules(stop: object, rng: object) -> None:
+    """Check the types of a stop rule and a generator, each of which may be None.
+
+    Raises:
+        InvalidInputError: naming the argument and the type that it must have.
+    """
+    if stop is not None:
+        expect("stop", stop, Stop)  # type: ignore[type-abstract]
+    if rng is not None:
+        expect("rng", rng, np.random.Generator)

@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from pushplan.control import PathFollower, Progress, PurePursuit, TwistLimiter, clamp_twist
-from pushplan.planners.kinodynamic.dubins import along_arc
+from pushplan.motion.dubins import along_arc
 from pushplan.world import Controller, InvalidInputError, Plan, StaticMap, Twist, World
 
 FLOOR = StaticMap.build(bounds=[-50, -50, 50, 50])

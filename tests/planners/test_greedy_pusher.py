@@ -6,8 +6,8 @@ from conftest import make_boxes, make_u_maze
 
 from pushplan.envs import PushEnv
 from pushplan.planners import make_policy
-from pushplan.planners.greedy import GreedyConfig, GreedyPusher
-from pushplan.planners.lining_up import is_done, line_up, way_of
+from pushplan.planners.rearrangement.greedy import GreedyConfig, GreedyPusher
+from pushplan.planners.rearrangement.line_up import is_done, line_up, way_of
 from pushplan.world import (
     ClearanceArea,
     InvalidInputError,

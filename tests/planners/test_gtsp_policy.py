@@ -12,7 +12,7 @@ from conftest import make_boxes, make_robot, make_u_maze
 from pushplan.drawing import draw_sequence
 from pushplan.envs import PushEnv
 from pushplan.planners import make_policy, policy_names
-from pushplan.planners.subtasks import GtspMpc, SubTaskConfig
+from pushplan.planners.rearrangement import GtspMpc, SubTaskConfig
 from pushplan.world import (
     InvalidInputError,
     Receptacle,

@@ -14,11 +14,10 @@ from shapely.ops import unary_union
 
 from pushplan.control import TwistLimiter
 from pushplan.interaction import QuasiStatic
+from pushplan.motion.dubins import along_arc
 from pushplan.planners import make_planner, make_policy, planner_names, policy_for
-from pushplan.planners.geometric import GeometricRRT, GeometricRRTConfig
-from pushplan.planners.kinodynamic import KinodynamicRRT
-from pushplan.planners.kinodynamic.dubins import along_arc
-from pushplan.planners.recovery import back_off
+from pushplan.planners.following.recovery import back_off
+from pushplan.planners.rrt import GeometricRRT, GeometricRRTConfig, KinodynamicRRT
 from pushplan.world import (
     Deadline,
     Drive,

@@ -17,7 +17,7 @@ from shapely.ops import unary_union
 
 from pushplan.interaction import QuasiStatic
 from pushplan.planners import make_planner, planner_names
-from pushplan.planners.kinodynamic import KinodynamicRRT, KinodynamicRRTConfig
+from pushplan.planners.rrt import KinodynamicRRT, KinodynamicRRTConfig
 from pushplan.world import (
     Cancellation,
     Deadline,

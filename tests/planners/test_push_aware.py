@@ -15,17 +15,17 @@ from shapely.ops import unary_union
 from pushplan.envs import RolloutInteraction
 from pushplan.geometry import VisibilityGraph
 from pushplan.interaction import QuasiStatic
+from pushplan.motion.collision import footprint, obstacles
+from pushplan.motion.dubins import along_arc, dubins
+from pushplan.motion.shortcutting import Pricing, goal_numbers
 from pushplan.planners import make_planner, make_policy, policy_names
-from pushplan.planners.kinodynamic import KinodynamicRRT, KinodynamicRRTConfig
-from pushplan.planners.kinodynamic.collision import footprint, obstacles
-from pushplan.planners.kinodynamic.dubins import along_arc, dubins
-from pushplan.planners.kinodynamic.improve import Pricing, goal_numbers
 from pushplan.planners.push_aware import PushAware, PushAwareConfig
 from pushplan.planners.push_aware.bound import lower_bound, turning_length
 from pushplan.planners.push_aware.cost_to_go import length_to_go
 from pushplan.planners.push_aware.nodes import make_nodes, plant, trace
 from pushplan.planners.push_aware.random_tree import DRAWS, grow
 from pushplan.planners.push_aware.tables import TableMaker
+from pushplan.planners.rrt import KinodynamicRRT, KinodynamicRRTConfig
 from pushplan.world import (
     Deadline,
     FirstSolution,

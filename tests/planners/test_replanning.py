@@ -10,9 +10,9 @@ from conftest import make_boxes, make_robot, make_u_maze
 
 from pushplan.control import Progress
 from pushplan.interaction import QuasiStatic
-from pushplan.planners.policy import PlanFollower
-from pushplan.planners.replanning import Reason, Replanning, price, rest_of, sweep_rest
-from pushplan.planners.stitching import joined, passed, world_ahead
+from pushplan.planners.following.plan_follower import PlanFollower
+from pushplan.planners.following.replanning import Reason, Replanning, price, rest_of, sweep_rest
+from pushplan.planners.following.splicing import joined, passed, world_ahead
 from pushplan.world import (
     Drive,
     InvalidInputError,

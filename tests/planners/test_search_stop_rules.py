@@ -11,8 +11,8 @@ import pytest
 from conftest import make_u_maze, scattered_boxes
 from ice_scenes import channel
 
+from pushplan.motion import time_slicing
 from pushplan.planners import make_planner, planner_names
-from pushplan.planners.kinodynamic import pace
 from pushplan.planners.registry import PLANNERS
 from pushplan.world import (
     Cancellation,
@@ -122,15 +122,15 @@ class TestEveryPlanner:
 def test_where_the_clock_cuts_changes_nothing(name, limit, monkeypatch):
     made = []
     for piece_s in (1e-9, 1e-4, 1e3):
-        monkeypatch.setattr(pace, "_PIECE_S", piece_s)
+        monkeypatch.setattr(time_slicing, "_PIECE_S", piece_s)
         made.append(digest(name, limit))
     assert len(set(made)) == 1
 
 
 def test_no_piece_is_begun_after_a_stop():
     """One may be, and one may not, would let the length of pieces decide what is found."""
-    assert list(pace.Pace().pieces(10, lambda: True)) == []
-    pieces = list(pace.Pace().pieces(10, lambda: False))
+    assert list(time_slicing.Pace().pieces(10, lambda: True)) == []
+    pieces = list(time_slicing.Pace().pieces(10, lambda: False))
     assert [k for first, last in pieces for k in range(first, last)] == list(range(10))
 
 

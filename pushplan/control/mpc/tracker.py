@@ -10,8 +10,8 @@ from itertools import pairwise
 import numpy as np
 
 from pushplan.control.limits import clamp_twist
-from pushplan.control.mpc.config import MpcConfig
 from pushplan.control.mpc.kernels import Track, Tuning, arc, assemble, errors, locate
+from pushplan.control.mpc.mpc_config import MpcConfig
 from pushplan.control.mpc.solver import QuadraticProgram
 from pushplan.control.pure_pursuit import PurePursuit
 from pushplan.world import Drive, Plan, RobotModel, Twist, World

@@ -9,7 +9,7 @@ Edges are driven only when they come first in the queue (Cohen, Phillips and Lik
 Single-arm Manipulations with N-arm Robots", 2014: lazy weighted A*); until then they count as if
 they pushed nothing.
 
-To the A* of `pushplan.planners.lattice.astar` it is a lattice whose nodes are made as it goes.
+To the A* of `pushplan.search.astar` it is a lattice whose nodes are made as it goes.
 Node k of the tree has two numbers there: 2 k is its arc as guessed, whose only successor is
 2 k + 1, the arc as driven; from that the next arcs branch.
 """
@@ -22,12 +22,12 @@ import numpy as np
 from numba import njit
 
 from pushplan.interaction.kernels import Bodies, Scratch, Settings, make_scratch
-from pushplan.planners.kinodynamic.collision import Footprint, Obstacles
-from pushplan.planners.kinodynamic.dubins import along_arc
-from pushplan.planners.kinodynamic.improve import Pricing, in_goal
-from pushplan.planners.lattice.astar import AStar, register
+from pushplan.motion.collision import Footprint, Obstacles
+from pushplan.motion.dubins import along_arc
+from pushplan.motion.shortcutting import Pricing, in_goal
 from pushplan.planners.push_aware.cost_to_go import CostToGo, length_to_go
 from pushplan.planners.push_aware.nodes import Nodes, drive
+from pushplan.search.astar import AStar, register
 from pushplan.world.checks import FloatArray, IntArray
 
 
@@ -47,7 +47,7 @@ class Branching(NamedTuple):
 
 
 class PushLattice(NamedTuple):
-    """Poses and pushed objects, as a lattice of `pushplan.planners.lattice.astar`."""
+    """Poses and pushed objects, as a lattice of `pushplan.search.astar`."""
 
     nodes: Nodes
     table: CostToGo

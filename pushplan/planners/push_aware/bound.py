@@ -6,7 +6,7 @@ import numpy as np
 
 from pushplan.geometry import VisibilityGraph
 from pushplan.geometry.shortest_path import leave_inflation
-from pushplan.planners.kinodynamic.timing import TIGHTEST
+from pushplan.motion.speed_profile import TIGHTEST
 from pushplan.world import Drive, GoalDisc, NavigationGoal, StaticMap, World
 from pushplan.world.checks import FloatArray
 

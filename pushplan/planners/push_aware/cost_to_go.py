@@ -16,8 +16,8 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from pushplan.planners.kinodynamic.collision import Footprint, Obstacles, is_free
-from pushplan.planners.kinodynamic.improve import in_goal
+from pushplan.motion.collision import Footprint, Obstacles, is_free
+from pushplan.motion.shortcutting import in_goal
 from pushplan.world.checks import BoolArray, FloatArray, IntArray
 
 

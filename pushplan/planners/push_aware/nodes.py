@@ -8,9 +8,9 @@ import numpy as np
 from numba import njit
 
 from pushplan.interaction.kernels import Bodies, Scratch, Settings, advance
-from pushplan.planners.kinodynamic.collision import Footprint, Obstacles, is_free
-from pushplan.planners.kinodynamic.dubins import along_arc, step_along
-from pushplan.planners.kinodynamic.improve import Pricing, in_goal
+from pushplan.motion.collision import Footprint, Obstacles, is_free
+from pushplan.motion.dubins import along_arc, step_along
+from pushplan.motion.shortcutting import Pricing, in_goal
 from pushplan.world.checks import FloatArray, IntArray
 
 

@@ -9,10 +9,10 @@ import numpy as np
 
 from pushplan.interaction import QuasiStatic
 from pushplan.planners.arguments import check_call
-from pushplan.planners.kinodynamic.rrt import DefaultBudget
 from pushplan.planners.push_aware.bound import lower_bound
-from pushplan.planners.push_aware.config import PushAwareConfig
+from pushplan.planners.push_aware.push_aware_config import PushAwareConfig
 from pushplan.planners.push_aware.search import PushAwareSearch
+from pushplan.planners.rrt.kinodynamic import DefaultBudget
 from pushplan.world import PlanResult, PlanStats, PlanStatus, Stop, World
 from pushplan.world.checks import expect
 

@@ -15,9 +15,9 @@ import numpy as np
 from numba import njit
 
 from pushplan.interaction.kernels import Bodies, Settings, make_scratch
-from pushplan.planners.kinodynamic.collision import Footprint, Obstacles
-from pushplan.planners.kinodynamic.dubins import along_arc
-from pushplan.planners.kinodynamic.improve import Pricing, in_goal
+from pushplan.motion.collision import Footprint, Obstacles
+from pushplan.motion.dubins import along_arc
+from pushplan.motion.shortcutting import Pricing, in_goal
 from pushplan.planners.push_aware.nodes import Nodes, drive
 from pushplan.world.checks import FloatArray
 

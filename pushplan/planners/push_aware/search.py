@@ -7,19 +7,19 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pushplan.interaction import QuasiStatic
-from pushplan.planners.kinodynamic.collision import first_blocked
-from pushplan.planners.kinodynamic.dubins import step_along
-from pushplan.planners.kinodynamic.improve import lay_out, make_path
-from pushplan.planners.kinodynamic.search import Search, _Candidate
-from pushplan.planners.kinodynamic.timing import turning_radius
-from pushplan.planners.lattice.astar import EXHAUSTED, FOUND
+from pushplan.motion.collision import first_blocked
+from pushplan.motion.dubins import step_along
+from pushplan.motion.shortcutting import lay_out, make_path
+from pushplan.motion.speed_profile import turning_radius
 from pushplan.planners.push_aware.best_first import Branching, make_search
-from pushplan.planners.push_aware.config import PushAwareConfig
 from pushplan.planners.push_aware.cost_to_go import CostToGo, length_to_go
+from pushplan.planners.push_aware.dubins_warm_start import taut_arcs
 from pushplan.planners.push_aware.nodes import Nodes, make_nodes, plant, trace
+from pushplan.planners.push_aware.push_aware_config import PushAwareConfig
 from pushplan.planners.push_aware.random_tree import DRAWS, grow
 from pushplan.planners.push_aware.tables import table_maker
-from pushplan.planners.push_aware.taut import taut_arcs
+from pushplan.planners.rrt.kinodynamic_search import Search, _Candidate
+from pushplan.search.astar import EXHAUSTED, FOUND
 from pushplan.world import Drive, GoalDisc, PlanStatus, StopCheck, World
 from pushplan.world.checks import FloatArray
 

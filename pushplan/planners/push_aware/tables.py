@@ -8,9 +8,9 @@ from collections.abc import Callable
 
 import numpy as np
 
-from pushplan.planners.kinodynamic.collision import footprint, obstacles
-from pushplan.planners.kinodynamic.dubins import along_arc
-from pushplan.planners.kinodynamic.improve import goal_numbers
+from pushplan.motion.collision import footprint, obstacles
+from pushplan.motion.dubins import along_arc
+from pushplan.motion.shortcutting import goal_numbers
 from pushplan.planners.push_aware.cost_to_go import CostToGo, flood, mark_free, sweep
 from pushplan.world import GoalDisc, NavigationGoal, RobotModel, StaticMap
 

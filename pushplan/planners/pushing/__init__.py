@@ -16,7 +16,6 @@ from pushplan.planners.pushing.parameters import (
 if TYPE_CHECKING:
     from pushplan.planners.pushing.approach import Approach, best_offset, find_approach
     from pushplan.planners.pushing.bumper import Bumper, Face, face_towards
-    from pushplan.planners.pushing.config import PushingConfig
     from pushplan.planners.pushing.executor import (
         ExecutorConfig,
         PushExecutor,
@@ -25,12 +24,13 @@ if TYPE_CHECKING:
         PushTask,
     )
     from pushplan.planners.pushing.fit import PushFit, fit_push_model, identify
+    from pushplan.planners.pushing.kernel_warmup import warm_up
     from pushplan.planners.pushing.log import PushLog, push_log
     from pushplan.planners.pushing.model import ContactMode, ContactReport, PushModel, PushState
     from pushplan.planners.pushing.mpc import PushingMpc
     from pushplan.planners.pushing.path import PushPath
+    from pushplan.planners.pushing.pushing_config import PushingConfig
     from pushplan.planners.pushing.reference import NonlinearPushingMpc
-    from pushplan.planners.pushing.warming import warm_up
 
 __all__ = [
     "Approach",

@@ -11,7 +11,7 @@ import numpy as np
 import shapely
 
 from pushplan.geometry import convex_overlap
-from pushplan.planners.kinodynamic.collision import footprint, is_free, obstacles
+from pushplan.motion.collision import footprint, is_free, obstacles
 from pushplan.planners.pushing import kernels
 from pushplan.planners.pushing.bumper import face_towards
 from pushplan.planners.pushing.model import PushModel

@@ -12,10 +12,10 @@ from pushplan.control import clamp_twist
 from pushplan.planners.pushing import kernels
 from pushplan.planners.pushing.approach import find_approach
 from pushplan.planners.pushing.clearance import Clearance
-from pushplan.planners.pushing.config import PushingConfig
 from pushplan.planners.pushing.estimate import PoseEstimate
 from pushplan.planners.pushing.mpc import PushingMpc
 from pushplan.planners.pushing.path import PushPath
+from pushplan.planners.pushing.pushing_config import PushingConfig
 from pushplan.planners.pushing.walk import Walk
 from pushplan.world import Drive, InvalidInputError, Plan, StaticMap, Twist, World
 from pushplan.world.checks import FloatArray, expect, integer, number

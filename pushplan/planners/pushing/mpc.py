@@ -12,12 +12,12 @@ from pushplan.control.mpc.kernels import Track, locate
 from pushplan.control.mpc.solver import QuadraticProgram
 from pushplan.planners.pushing.bumper import face_towards
 from pushplan.planners.pushing.clearance import Clearance
-from pushplan.planners.pushing.config import PushingConfig
 from pushplan.planners.pushing.cost import ROWS, Weights
 from pushplan.planners.pushing.estimate import Estimate
 from pushplan.planners.pushing.kernels import box_pose, observe
 from pushplan.planners.pushing.model import PushModel, PushState
 from pushplan.planners.pushing.problem import assemble
+from pushplan.planners.pushing.pushing_config import PushingConfig
 from pushplan.world import Drive, InvalidInputError, Plan, RobotModel, StaticMap, Twist, World
 from pushplan.world.checks import FloatArray, IntArray, expect
 

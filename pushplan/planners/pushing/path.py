@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pushplan.planners.kinodynamic.dubins import along_arc
+from pushplan.motion.dubins import along_arc
 from pushplan.world import InvalidInputError, Plan, RobotModel, SubTask
 from pushplan.world.checks import ArrayRecord, FloatArray, array, expect, integer, number
 

@@ -1,0 +1,23 @@
+"""Which cluster next, and which of its nodes: the generalized travelling salesman problem."""
+
+from pushplan.gtsp.gtsp_config import GtspConfig
+from pushplan.gtsp.gtsplib import read_gtsp
+from pushplan.gtsp.gtsplib_write import read_tour, write_gtsp, write_tour
+from pushplan.gtsp.instance import GtspInstance
+from pushplan.gtsp.kernel_warmup import warm_up_solver
+from pushplan.gtsp.solve import solve_gtsp
+from pushplan.gtsp.tour import Tour, TourStats, TourStatus
+
+__all__ = [
+    "GtspConfig",
+    "GtspInstance",
+    "Tour",
+    "TourStats",
+    "TourStatus",
+    "read_gtsp",
+    "read_tour",
+    "solve_gtsp",
+    "warm_up_solver",
+    "write_gtsp",
+    "write_tour",
+]

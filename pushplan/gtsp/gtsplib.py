@@ -1,0 +1,263 @@
+"""Reading GTSPLIB files: TSPLIB 95 (Reinelt 1995) with a section for the clusters.
+
+Keywords stand before the data; a colon after them is optional. Every complaint names the file, the
+line and the rule that it breaks.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from pushplan.gtsp.distances import COORDINATE_TYPES
+from pushplan.gtsp.instance import GtspInstance
+from pushplan.world.checks import FloatArray
+from pushplan.world.errors import InvalidInputError, SchemaError, unknown_name_message
+
+TYPES = ("GTSP", "AGTSP")
+FORMATS = (
+    "FULL_MATRIX",
+    "LOWER_COL",
+    "LOWER_DIAG_COL",
+    "LOWER_DIAG_ROW",
+    "LOWER_ROW",
+    "UPPER_COL",
+    "UPPER_DIAG_COL",
+    "UPPER_DIAG_ROW",
+    "UPPER_ROW",
+)
+LARGEST_DIMENSION = 20_000
+_SECTIONS = (
+    "DISPLAY_DATA_SECTION",
+    "EDGE_WEIGHT_SECTION",
+    "GTSP_SET_SECTION",
+    "NODE_COORD_SECTION",
+    "TOUR_SECTION",
+)
+_KEYWORDS = (
+    "COMMENT",
+    "DIMENSION",
+    "DISPLAY_DATA_TYPE",
+    "EDGE_WEIGHT_FORMAT",
+    "EDGE_WEIGHT_TYPE",
+    "GTSP_SETS",
+    "NAME",
+    "NODE_COORD_TYPE",
+    "TYPE",
+)
+
+
+@dataclass
+class TsplibText:
+    """The keywords and sections of a file, each with the line it stands in.
+
+    Args:
+        path: of the file.
+        keywords: value and line number of each keyword.
+        sections: the line number of its heading and the (line number, words) below it.
+    """
+
+    path: Path
+    keywords: dict[str, tuple[str, int]] = field(default_factory=dict)
+    sections: dict[str, tuple[int, list[tuple[int, list[str]]]]] = field(default_factory=dict)
+
+    def wrong(self, line: int, rule: str) -> SchemaError:
+        """An error at a line."""
+        return SchemaError(f"{self.path}, line {line}: {rule}")
+
+    def value(self, key: str, default: str | None = None) -> str:
+        """The value of a keyword."""
+        if key in self.keywords:
+            return self.keywords[key][0]
+        if default is None:
+            raise SchemaError(f"{self.path}: the keyword {key} is missing")
+        return default
+
+    def choice(self, key: str, valid: tuple[str, ...]) -> str:
+        """The value of a keyword, which must be one of these."""
+        value = self.value(key).upper()
+        if value not in valid:
+            raise self.wrong(self.keywords[key][1], unknown_name_message(key, value, valid))
+        return value
+
+    def count(self, key: str, high: int) -> int:
+        """The value of a keyword that counts something."""
+        value = self.value(key)
+        short = value.isdecimal() and len(value) <= 18
+        if not short or not 1 <= int(value) <= high:
+            rule = f"{key} must be a whole number from 1 to {high}, got {value!r:.40}"
+            raise self.wrong(self.keywords[key][1], rule)
+        return int(value)
+
+    def section(self, name: str) -> tuple[int, list[tuple[int, list[str]]]]:
+        """Where a section begins, and its lines as words."""
+        if name not in self.sections:
+            raise SchemaError(f"{self.path}: the section {name} is missing")
+        return self.sections[name]
+
+    def number(self, line: int, word: str) -> float:
+        """A word as a number; NaN is none."""
+        try:
+            value = float(word)
+        except ValueError:
+            value = float("nan")
+        if value != value:
+            raise self.wrong(line, f"{word!r:.40} is not a number")
+        return value
+
+    def whole(self, line: int, word: str) -> int:
+        """A word as a whole number."""
+        try:
+            return int(word if len(word) <= 18 else "too long")
+        except ValueError:
+            raise self.wrong(line, f"{word!r:.40} is not a whole number") from None
+
+
+def read_text(path: str | Path) -> TsplibText:
+    """Split a TSPLIB file into keywords and sections.
+
+    Raises:
+        InvalidInputError: if the file cannot be read.
+        SchemaError: if a line is neither.
+    """
+    text = TsplibText(Path(path))
+    try:
+        lines = text.path.read_text(encoding="utf-8-sig").splitlines()
+    except (OSError, UnicodeDecodeError) as error:
+        raise InvalidInputError(f"cannot read {path}: {error}") from error
+    rows: list[tuple[int, list[str]]] | None = None
+    for number, line in enumerate(lines, start=1):
+        words = line.split()
+        if not words:
+            continue
+        head = words[0].rstrip(":").upper()
+        if head == "EOF":
+            break
+        if head in _SECTIONS:
+            if head in text.sections:
+                raise text.wrong(number, f"{head} stands here a second time")
+            rows = []
+            text.sections[head] = (number, rows)
+        elif head in _KEYWORDS:
+            if head in text.keywords and head != "COMMENT":
+                raise text.wrong(number, f"{head} stands here a second time")
+            rest = line.strip()[len(words[0].rstrip(":")) :].strip()
+            text.keywords[head] = (rest.removeprefix(":").strip(), number)
+            rows = None
+        elif head[0].isalpha() and head not in ("INF", "INFINITY", "NAN"):
+            raise text.wrong(number, unknown_name_message("keyword", head, _KEYWORDS + _SECTIONS))
+        elif rows is None:
+            raise text.wrong(number, f"data outside of a section: {line.strip()[:40]!r}")
+        else:
+            rows.append((number, words))
+    return text
+
+
+def read_gtsp(path: str | Path) -> GtspInstance:
+    """Read an instance.
+
+    Weights may be EXPLICIT in any matrix format of TSPLIB, ``inf`` for a forbidden arc, or follow
+    from coordinates: EUC_2D, CEIL_2D, MAN_2D, MAX_2D, ATT, GEO. Nodes are numbered from 1 in the
+    file and from 0 in the result.
+
+    Raises:
+        InvalidInputError: if the file cannot be read.
+        SchemaError: if it breaks a rule of the format; file, line and rule are named.
+    """
+    text = read_text(path)
+    text.choice("TYPE", TYPES)
+    size = text.count("DIMENSION", LARGEST_DIMENSION)
+    kind = text.choice("EDGE_WEIGHT_TYPE", ("EXPLICIT", *COORDINATE_TYPES))
+    clusters = _clusters(text, size)
+    name, comment = text.value("NAME", text.path.stem), text.value("COMMENT", "")
+    try:
+        if kind == "EXPLICIT":
+            return GtspInstance(name, _matrix(text, size), clusters, comment=comment)
+        return GtspInstance.from_coordinates(name, _points(text, size), clusters, kind, comment)
+    except SchemaError:
+        raise
+    except InvalidInputError as error:
+        raise SchemaError(f"{text.path}: {error}") from error
+
+
+def _clusters(text: TsplibText, size: int) -> tuple[tuple[int, ...], ...]:
+    """Node lists, each a line or more: its number, its nodes, -1."""
+    count = text.count("GTSP_SETS", size)
+    begin, rows = text.section("GTSP_SET_SECTION")
+    found: list[list[int]] = []
+    current: list[int] | None = None
+    owner: dict[int, int] = {}
+    line = begin
+    for line, words in rows:
+        for word in words:
+            value = text.whole(line, word)
+            if current is None:
+                if value == -1 and len(found) == count:  # some writers close the section so
+                    continue
+                if value != len(found) + 1:
+                    raise text.wrong(line, f"expected set {len(found) + 1}, got {value}")
+                if value > count:
+                    raise text.wrong(line, f"set {value} of GTSP_SETS {count}")
+                current = []
+            elif value == -1:
+                if not current:
+                    raise text.wrong(line, f"set {len(found) + 1} has no node")
+                found.append(current)
+                current = None
+            elif not 1 <= value <= size:
+                raise text.wrong(line, f"nodes are 1 to {size}, got {value}")
+            elif value in owner:
+                rule = f"node {value} is in set {owner[value]} already: sets must not overlap"
+                raise text.wrong(line, rule)
+            else:
+                owner[value] = len(found) + 1
+                current.append(value - 1)
+    if current is not None:
+        raise text.wrong(line, f"set {len(found) + 1} does not end with -1")
+    if len(found) != count:
+        raise text.wrong(line, f"expected {count} sets, got {len(found)}")
+    missing = [node for node in range(1, size + 1) if node not in owner]
+    if missing:
+        raise text.wrong(line, f"every node must be in a set, but node {missing[0]} is in none")
+    return tuple(tuple(nodes) for nodes in found)
+
+
+def _points(text: TsplibText, size: int) -> FloatArray:
+    begin, rows = text.section("NODE_COORD_SECTION")
+    points = np.full((size, 2), np.nan)
+    for line, words in rows:
+        if len(words) != 3:
+            raise text.wrong(line, f"expected a node and two coordinates, got {len(words)} words")
+        node = text.whole(line, words[0])
+        if not 1 <= node <= size:
+            raise text.wrong(line, f"nodes are 1 to {size}, got {node}")
+        if not np.isnan(points[node - 1, 0]):
+            raise text.wrong(line, f"node {node} has coordinates already")
+        points[node - 1] = text.number(line, words[1]), text.number(line, words[2])
+    if len(rows) != size:
+        raise text.wrong(begin, f"expected coordinates of {size} nodes, got {len(rows)}")
+    return points
+
+
+def _matrix(text: TsplibText, size: int) -> FloatArray:
+    layout = text.choice("EDGE_WEIGHT_FORMAT", FORMATS)
+    begin, rows = text.section("EDGE_WEIGHT_SECTION")
+    full, diagonal = layout == "FULL_MATRIX", "DIAG" in layout
+    wanted = size * size if full else size * (size + (1 if diagonal else -1)) // 2
+    values = [text.number(line, word) for line, words in rows for word in words]
+    if len(values) != wanted:
+        rule = f"{layout} of {size} nodes has {wanted} numbers, got {len(values)}"
+        raise text.wrong(begin, rule)
+    data = np.array(values, dtype=np.float64)
+    if full:
+        return data.reshape(size, size)
+    # columns of one triangle are the rows of the other
+    upper = layout.startswith("UPPER") == layout.endswith("ROW")
+    shift = 0 if diagonal else 1
+    result = np.zeros((size, size))
+    place = np.triu_indices(size, shift) if upper else np.tril_indices(size, -shift)
+    result[place] = data
+    result[place[1], place[0]] = data
+    return result

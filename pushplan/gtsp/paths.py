@@ -1,0 +1,114 @@
+"""Dynamic programming over the few paths that walks leave below the best tour."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pushplan.gtsp.walk_kernels import extend_paths
+from pushplan.gtsp.walks import CHUNK_ARCS, Walks
+from pushplan.world.checks import FloatArray, IntArray
+
+
+def cheaper_tour(walks: Walks, most: int) -> tuple[bool, IntArray | None, int]:
+    """The cheapest tour below the limit of the walks, by paths of more and more clusters.
+
+    A path is known by its clusters and its last node. The walks bound what completes it.
+
+    Args:
+        walks: filled; changed by `Walks.allow_memories`.
+        most: paths of one length at most.
+
+    Returns:
+        Whether the paths were few enough; the nodes of the tour, None if there is none; how many
+        paths there were.
+    """
+    walks.allow_memories()
+    paths, total = _first_paths(walks), 0
+    trail = [(paths.ends, paths.parents)]
+    slots = np.empty(1 << int(np.ceil(np.log2(2 * most))), dtype=np.int64)
+    for k in range(walks.count - 2, -1, -1):
+        slots[:] = -1
+        longer = _longer(walks, paths, walks.walks[k], slots, most)
+        if longer is None:
+            return False, None, total
+        paths = longer
+        total += len(paths.ends)
+        trail.append((paths.ends, paths.parents))
+    costs = paths.values + walks.last.ravel()[paths.ends]
+    if not len(costs) or not costs.min() < walks.limit:
+        return True, None, total
+    at, chosen = int(costs.argmin()), []
+    for ends, parents in reversed(trail):
+        chosen.append(walks.names.ravel()[ends[at]])
+        at = int(parents[at])
+    return True, np.array([walks.node, *chosen[::-1]], dtype=np.int64), total
+
+
+class _Paths:
+    """Paths of one length.
+
+    Args:
+        size: room for so many.
+    """
+
+    def __init__(self, size: int) -> None:
+        self.sets = np.empty(size, dtype=np.int64)  # clusters, a bit mask
+        self.ends = np.empty(size, dtype=np.int64)  # last node, cluster * K + node
+        self.values = np.empty(size)  # cost
+        self.rests = np.empty(size)  # prices of the clusters that are missing
+        self.parents = np.empty(size, dtype=np.int64)
+
+    def only(self, which: slice | NDArray[np.bool_]) -> _Paths:
+        """A copy of some of them."""
+        result = _Paths(0)
+        for name, values in vars(self).items():
+            setattr(result, name, values[which].copy())
+        return result
+
+
+def _first_paths(walks: Walks) -> _Paths:
+    """From the root to one node."""
+    ends = np.flatnonzero(walks.names.ravel() >= 0)
+    cluster = ends // walks.width
+    paths = _Paths(len(ends))
+    paths.ends[:], paths.parents[:] = ends, 0
+    paths.sets[:] = np.int64(1) << cluster
+    paths.values[:] = walks.first.ravel()[ends]
+    paths.rests[:] = walks.prices.sum() - walks.prices[cluster]
+    hope = walks.walks[-1, :, -1].ravel()[ends]
+    return paths.only(paths.values + hope + paths.rests < walks.limit)
+
+
+def _longer(
+    walks: Walks, paths: _Paths, within: FloatArray, slots: IntArray, most: int
+) -> _Paths | None:
+    """All of them with one node more; None if they are too many."""
+    new, found = _Paths(most), 0
+    step = max(1, CHUNK_ARCS // (4 * walks.count * walks.width))
+    for low in range(0, len(paths.ends), step):
+        found = extend_paths(
+            paths.sets,
+            paths.ends,
+            paths.values,
+            paths.rests,
+            low,
+            min(low + step, len(paths.ends)),
+            within,
+            walks.costs,
+            walks.known,
+            walks.prices,
+            walks.sizes,
+            walks.limit,
+            slots,
+            new.sets,
+            new.ends,
+            new.values,
+            new.rests,
+            new.parents,
+            found,
+        )
+        walks.look()
+        if found < 0:
+            return None
+    return new.only(slice(found))

@@ -1,0 +1,165 @@
+"""An instance as the kernels want it: nodes of a cluster side by side, useless ones left out."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pushplan.gtsp.kernels import SPARE
+from pushplan.world.checks import FloatArray, IntArray
+
+
+@dataclass(frozen=True)
+class Problem:
+    """Costs with the nodes ordered by clusters.
+
+    Args:
+        costs: (N, N) float64; inf forbids an arc. Arcs inside a cluster mean nothing.
+        offsets: (m + 1,) cluster c has the nodes ``offsets[c]`` to ``offsets[c + 1] - 1``.
+        names: (N,) what the caller calls each node.
+    """
+
+    costs: FloatArray
+    offsets: IntArray
+    names: IntArray
+
+    @staticmethod
+    def build(costs: NDArray[np.number], members: Sequence[IntArray]) -> Problem:
+        """Gather the members of each cluster; copies nothing where the order is right already."""
+        names = np.concatenate(members)
+        offsets = np.concatenate(([0], np.cumsum([len(nodes) for nodes in members])))
+        if len(names) == len(costs) and (names == np.arange(len(names))).all():
+            gathered = np.ascontiguousarray(costs, dtype=np.float64)
+        else:
+            gathered = costs[np.ix_(names, names)].astype(np.float64)
+        return Problem(gathered, offsets.astype(np.int64), names.astype(np.int64))
+
+    @property
+    def count(self) -> int:
+        """How many clusters there are."""
+        return len(self.offsets) - 1
+
+    @property
+    def width(self) -> int:
+        """Nodes of the largest cluster."""
+        return int(np.diff(self.offsets).max())
+
+    @property
+    def root(self) -> int:
+        """The smallest cluster."""
+        return int(np.argmin(np.diff(self.offsets)))
+
+    @cached_property
+    def cluster_of(self) -> IntArray:
+        """(N,) the cluster of each node."""
+        return np.repeat(np.arange(self.count), np.diff(self.offsets))
+
+    @cached_property
+    def outer(self) -> FloatArray:
+        """(N, N) costs, infinite inside of clusters."""
+        result = self.costs.copy()
+        for low, high in zip(self.offsets[:-1], self.offsets[1:], strict=True):
+            result[low:high, low:high] = np.inf
+        return result
+
+    @cached_property
+    def finite(self) -> FloatArray:
+        """(N, N + SPARE) costs; forbidden arcs at a price that no tour over finite arcs reaches."""
+        inside = self.outer[np.isfinite(self.outer)]
+        low, high = (inside.min(), inside.max()) if inside.size else (0.0, 1.0)
+        price = high + (self.count + 1) * (high - low) + (abs(high) or 1.0)
+        wide = np.full((len(self.costs), len(self.costs) + SPARE), price)
+        wide[:, :-SPARE] = np.where(np.isfinite(self.costs), self.costs, price)
+        return wide
+
+    @cached_property
+    def reverse(self) -> FloatArray:
+        """(N, N + SPARE) the same of the transposed costs."""
+        if self.symmetric:
+            return self.finite
+        wide = np.full_like(self.finite, self.finite[0, -1])
+        wide[:, :-SPARE] = self.finite[:, :-SPARE].T
+        return wide
+
+    @cached_property
+    def symmetric(self) -> bool:
+        """Whether every arc costs the same both ways."""
+        return bool(np.array_equal(self.costs, self.costs.T))
+
+    @cached_property
+    def floor(self) -> float:
+        """No tour is cheaper: into every cluster by its cheapest arc, or out of it."""
+        starts = self.offsets[:-1]
+        into = np.minimum.reduceat(self.outer.min(axis=0), starts)
+        out = np.minimum.reduceat(self.outer.min(axis=1), starts)
+        return max(math.fsum(into), math.fsum(out))  # rounded once, as the cost of a tour is
+
+    def nearest(self, most: int) -> tuple[IntArray, FloatArray]:
+        """(m, k) nearest clusters of each and their distances: reduced costs, the cheaper way.
+
+        The column minima, then the row minima are taken off, as a price of its own that every arc
+        into a node has says nothing about which cluster is near.
+        """
+        reduced = self.outer - _known(self.outer.min(axis=0))
+        reduced -= _known(reduced.min(axis=1))[:, None]
+        starts = self.offsets[:-1]
+        between = np.minimum.reduceat(np.minimum.reduceat(reduced, starts, 0), starts, 1)
+        between = np.minimum(between, between.T)
+        np.fill_diagonal(between, np.inf)
+        order = np.argsort(between, axis=1, kind="stable")
+        order = order[order != np.arange(self.count)[:, None]].reshape(self.count, -1)
+        near = np.ascontiguousarray(order[:, :most])
+        return near, np.ascontiguousarray(np.take_along_axis(between, near, 1))
+
+    def path_cost(self, nodes: Sequence[int] | IntArray) -> float:
+        """Cost of a closed tour of own node numbers, rounded once; 0 for a single node."""
+        return tour_cost(self.costs, nodes)
+
+
+def tour_cost(costs: NDArray[np.number], nodes: Sequence[int] | IntArray) -> float:
+    """Cost of a closed tour: the sum of its arcs, rounded once; 0 for a single node."""
+    if len(nodes) < 2:
+        return 0.0
+    arcs = costs[np.asarray(nodes), np.roll(nodes, -1)]
+    return math.inf if np.isinf(arcs).any() else math.fsum(arcs.tolist())
+
+
+def _known(values: FloatArray) -> FloatArray:
+    return np.where(np.isfinite(values), values, 0.0)
+
+
+def usable(
+    costs: NDArray[np.number], members: Sequence[IntArray]
+) -> tuple[list[IntArray], int | None]:
+    """Leave out nodes that no tour can enter or leave.
+
+    Args:
+        costs: (N, N).
+        members: nodes of each cluster.
+
+    Returns:
+        The members that are left, and a cluster that has none left, if there is one.
+    """
+    kept = [np.asarray(nodes) for nodes in members]
+    if len(kept) < 2 or costs.dtype.kind != "f" or not np.isinf(costs.max()):
+        return kept, None
+    arcs = np.isfinite(costs)
+    for nodes in kept:
+        arcs[np.ix_(nodes, nodes)] = False
+    active = np.ones(len(costs), dtype=bool)
+    while True:
+        good = active & arcs.any(axis=0) & arcs.any(axis=1)
+        if (good == active).all():
+            break
+        gone = active & ~good
+        arcs[gone] = False
+        arcs[:, gone] = False
+        active = good
+    kept = [nodes[active[nodes]] for nodes in kept]
+    empty = next((index for index, nodes in enumerate(kept) if not len(nodes)), None)
+    return kept, empty

@@ -1,0 +1,217 @@
+"""Anytime search: annealed ruin and recreate from several random orders, then from the best."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from pushplan.gtsp.gtsp_config import GtspConfig
+from pushplan.gtsp.kernels import best_nodes
+from pushplan.gtsp.problem import Problem
+from pushplan.gtsp.ruin_recreate import search_tours
+from pushplan.world.checks import FloatArray, IntArray
+from pushplan.world.stop import AnyOf, MaxIterations, Stop, StopCheck
+
+MOST_ROUNDS = 2000
+
+
+@dataclass
+class Budget:
+    """What a call may use, and how much of it is gone.
+
+    Args:
+        check: the armed stop rule.
+        began: when the call began, of `time.perf_counter` [s].
+        seconds: wall-clock budget [s], infinite if none.
+        rounds: budget of rounds, infinite if none.
+        used: rounds so far.
+        cost: of the best tour so far.
+        best_s: when it was found, since the beginning of the call [s].
+    """
+
+    check: StopCheck
+    began: float
+    seconds: float
+    rounds: float
+    used: int = 0
+    cost: float = np.inf
+    best_s: float = np.nan
+
+    @staticmethod
+    def start(stop: Stop | None, iterations: int) -> Budget:
+        """Arm the stop rule of a call."""
+        began = time.perf_counter()
+        if stop is None:
+            stop = MaxIterations(iterations)
+        rounds = float(min((r.limit for r in _rules(stop)), default=np.inf))
+        if stop.seconds == np.inf and rounds == np.inf:
+            rounds = float(iterations)
+        return Budget(stop.start(), began, stop.seconds, rounds)
+
+    @property
+    def elapsed(self) -> float:
+        """Time since the call began [s]."""
+        return time.perf_counter() - self.began
+
+    def note(self, cost: float) -> None:
+        """A tour of this cost was found."""
+        if cost < self.cost:
+            self.cost = cost
+            self.best_s = self.elapsed
+
+    def gone(self) -> float:
+        """Share of the budget that is used."""
+        by_time = self.elapsed / self.seconds if self.seconds > 0.0 else 1.0
+        return max(by_time, self.used / self.rounds if self.rounds > 0.0 else 1.0)
+
+    def stopped(self) -> bool:
+        """Whether to return now."""
+        return self.used >= self.rounds or self.check(self.used, self.cost)
+
+
+def _rules(stop: Stop) -> list[MaxIterations]:
+    rules = stop.rules if isinstance(stop, AnyOf) else (stop,)
+    return [rule for rule in rules if isinstance(rule, MaxIterations)]
+
+
+@dataclass
+class AnytimeSearch:
+    """The state of a search, which may be continued.
+
+    Args:
+        problem: with at least 3 clusters.
+        config: parameters.
+        state: (1,) uint64 of the random numbers.
+    """
+
+    problem: Problem
+    config: GtspConfig
+    state: IntArray
+    order: IntArray = field(init=False)
+    nodes: IntArray = field(init=False)
+    best: IntArray = field(init=False)
+    best_nodes: IntArray = field(init=False)
+    values: FloatArray = field(init=False)
+
+    def __post_init__(self) -> None:
+        problem, config = self.problem, self.config
+        self.near, self.between = problem.nearest(
+            config.neighbours if problem.symmetric else config.neighbours * 4 // 3
+        )
+        self.offsets = problem.offsets
+        share = max(4, int(config.removed_share * problem.count))
+        self.most = max(1, min(config.max_removed, share, problem.count - 2))
+        self.best = np.concatenate(
+            ([problem.root], np.delete(np.arange(problem.count), problem.root))
+        )
+        self.best_nodes = problem.offsets[self.best]
+        self.values = np.full(2, np.inf)
+        self.pace = 3e-5 + 3e-7 * problem.width**2
+
+    def run(self, budget: Budget, begin: float, end: float) -> None:
+        """One annealing from a random order, until it is frozen.
+
+        Args:
+            budget: of the call.
+            begin: share of it that is gone when the tour is hottest.
+            end: share that is gone when it is coldest, where the run ends at the latest.
+        """
+        self._random_start(budget)
+        config, lowest, frozen, first = self.config, np.inf, 0.0, True
+        while not budget.stopped():
+            gone = budget.gone()
+            if gone >= end and np.isfinite(self.values[1]):
+                break
+            progress = min(max((gone - begin) / (end - begin), 0.0), 1.0)
+            heat = config.hot * (config.cold / config.hot) ** progress
+            self._rounds(budget, 0.0 if first else heat * self.scale)
+            first = False
+            if self.values[0] < lowest - 1e-9 * abs(self.values[0]):  # not by rounding alone
+                lowest, frozen = self.values[0], config.frozen * heat
+            elif heat < frozen:
+                break
+
+    def runs_in(self, budget: Budget, share: float) -> int:
+        """How many runs a share of the budget is good for."""
+        rounds = budget.rounds
+        if rounds == np.inf:
+            self.run(budget, 0.0, 1e-9)  # one piece, for the pace
+            rounds = budget.seconds / self.pace
+        wanted = self.config.run_rounds * self.problem.count**2
+        return int(min(max(share * rounds / wanted, 1.0), self.config.restarts))
+
+    @property
+    def scale(self) -> float:
+        """Mean reduced arc of the best tour."""
+        spread = (self.values[1] - self.problem.floor) / self.problem.count
+        return float(spread) if np.isfinite(spread) else 0.0
+
+    def _rounds(self, budget: Budget, temperature: float) -> None:
+        problem, config = self.problem, self.config
+        rounds = int(min(max(config.chunk_s / self.pace, 1.0), MOST_ROUNDS))
+        if budget.rounds < np.inf:  # the same pieces on every machine
+            rounds = max(1, int(min(100, budget.rounds // 200, budget.rounds - budget.used)))
+        began = time.perf_counter()
+        search_tours(
+            problem.finite,
+            problem.reverse,
+            self.offsets,
+            self.near,
+            self.between,
+            self.order,
+            self.nodes,
+            self.best,
+            self.best_nodes,
+            self.values,
+            temperature,
+            self.most,
+            config.blink,
+            min(config.swap_neighbours, self.near.shape[1]),
+            problem.symmetric,
+            1e-12 * max(abs(self.values[1]), abs(self.values[0])),
+            rounds,
+            self.state,
+        )
+        self.pace = 0.5 * self.pace + 0.5 * (time.perf_counter() - began) / rounds
+        budget.used += rounds
+        if self.values[1] < budget.cost:
+            budget.note(self.tour_cost())
+
+    def tour_cost(self) -> float:
+        """Cost of the best tour, infinite if it has a forbidden arc."""
+        return self.problem.path_cost(self.best_nodes)
+
+    def _random_start(self, budget: Budget) -> None:
+        problem = self.problem
+        rest = np.delete(np.arange(problem.count), problem.root)
+        rng = np.random.default_rng(int(self.state[0]) + budget.used)
+        self.order = np.concatenate(([problem.root], rng.permutation(rest)))
+        self.nodes = problem.offsets[self.order]
+        layers = np.empty((problem.count, problem.width))
+        self.values[0] = best_nodes(
+            problem.finite, self.offsets, self.order, problem.count, self.nodes, layers
+        )
+        if self.values[0] < self.values[1]:
+            self.values[1] = self.values[0]
+            self.best, self.best_nodes = self.order.copy(), self.nodes.copy()
+            budget.note(self.tour_cost())
+
+
+def search(
+    problem: Problem, config: GtspConfig, seed: IntArray, budget: Budget, share: float
+) -> IntArray:
+    """The best nodes in visiting order that a share of the budget allows.
+
+    They use a forbidden arc only if no tour without one was found.
+    """
+    state = AnytimeSearch(problem, config, seed)
+    length = max(share - budget.gone(), 1e-9) / state.runs_in(budget, share)
+    left, first = share, True
+    while first or (left > 0.0 and not budget.stopped()):
+        begin = min(budget.gone(), share)
+        left = share - begin
+        state.run(budget, begin, begin + left / max(1, round(left / length)))
+        left, first = share - budget.gone(), False
+    return state.best_nodes

@@ -1,0 +1,253 @@
+"""Compiled parts of the proof: relaxed walks, and paths that only they allow.
+
+Everything is numbered without the root: cluster d, node i of it; arrays are padded to K nodes. A
+memory M is a bit mask over the clusters that ``lists[d]`` names.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pushplan.gtsp.kernels import jit
+from pushplan.world.checks import FloatArray, IntArray
+
+
+@jit
+def memory_moves(lists: IntArray) -> IntArray:
+    """What a walk remembers when cluster d is put in front of a walk that begins in e.
+
+    Args:
+        lists: (n, b) the clusters that each cluster remembers.
+
+    Returns:
+        (n, n, 2^b) the new memory, -1 where the walk remembers d and must not visit it again.
+    """
+    count, bits = lists.shape
+    moves = np.full((count, count, 1 << bits), -1, np.int64)
+    kept = np.empty(bits, np.int64)  # what d remembers of each cluster that e remembers
+    for d in range(count):
+        for e in range(count):
+            if d == e:
+                continue
+            forbidden, of_e = 0, 0
+            for j in range(bits):
+                kept[j] = 0
+                if lists[e, j] == d:
+                    forbidden = 1 << j
+                if lists[d, j] == e:
+                    of_e = 1 << j
+                for k in range(bits):
+                    if lists[d, k] == lists[e, j]:
+                        kept[j] = 1 << k
+            for memory in range(1 << bits):
+                if memory & forbidden:
+                    continue
+                new = of_e
+                for j in range(bits):
+                    if (memory >> j) & 1:
+                        new |= kept[j]
+                moves[d, e, memory] = new
+    return moves
+
+
+@jit
+def extend_walks(
+    walks: FloatArray,
+    longer: FloatArray,
+    blocks: FloatArray,
+    moves: IntArray,
+    prices: FloatArray,
+    sizes: IntArray,
+    low: int,
+    high: int,
+) -> None:
+    """Put a node of clusters ``low`` to ``high - 1`` in front of every walk to the root.
+
+    Args:
+        walks: (n, 2^b, K) cost of the cheapest walk of k arcs from a node to the root.
+        longer: (n, 2^b, K) filled with that of k + 1 arcs.
+        blocks: (n, K, n, K) ``blocks[e, j, d, i]`` is the cost from node i of d to node j of e.
+        moves: (n, n, 2^b).
+        prices: (n,) what a visit of each cluster earns.
+        sizes: (n,) nodes of each cluster.
+        low: first cluster.
+        high: end of the range.
+    """
+    count, memories, width = walks.shape
+    for d in range(low, high):
+        longer[d] = np.inf
+        for e in range(count):
+            for memory in range(memories):
+                new = moves[d, e, memory]
+                if new < 0:
+                    continue
+                out = longer[d, new]
+                for j in range(sizes[e]):
+                    value = walks[e, memory, j] - prices[e]
+                    if value < np.inf:
+                        row = blocks[e, j, d]
+                        for i in range(width):
+                            out[i] = min(out[i], value + row[i])
+
+
+@jit
+def read_visits(
+    walks: FloatArray,
+    first: FloatArray,
+    blocks: FloatArray,
+    moves: IntArray,
+    prices: FloatArray,
+    sizes: IntArray,
+    visits: IntArray,
+) -> float:
+    """The cheapest walk from the root through n nodes and back.
+
+    Args:
+        walks: (n, n, 2^b, K) by number of arcs less 1.
+        first: (n, K) cost from the root to each node.
+        blocks: (n, K, n, K).
+        moves: (n, n, 2^b).
+        prices: (n,).
+        sizes: (n,).
+        visits: (n,) filled with how often it comes to each cluster.
+
+    Returns:
+        Its cost less the prices, infinite if there is none.
+    """
+    count, memories = walks.shape[1], walks.shape[2]
+    visits[:] = 0
+    best = np.inf
+    d, at, i = -1, 0, 0
+    next_d, next_at, next_i = 0, 0, 0
+    for e in range(count):
+        for memory in range(memories):
+            for j in range(sizes[e]):
+                x = walks[count - 1, e, memory, j] - prices[e] + first[e, j]
+                if x < best:
+                    best, d, at, i = x, e, memory, j
+    if d < 0:
+        return best
+    visits[d] = 1
+    for k in range(count - 1, 0, -1):
+        value, found = walks[k, d, at, i], False
+        for e in range(count):
+            for memory in range(memories):
+                if found or moves[d, e, memory] != at:
+                    continue
+                for j in range(sizes[e]):
+                    if not found and (
+                        walks[k - 1, e, memory, j] - prices[e] + blocks[e, j, d, i] == value
+                    ):
+                        found = True
+                        next_d, next_at, next_i = e, memory, j
+            if found:
+                break
+        if not found:
+            break
+        d, at, i = next_d, next_at, next_i
+        visits[d] += 1
+    return best
+
+
+@jit
+def allow_memories(walks: FloatArray) -> None:
+    """Turn the entries ``walks[:, M]`` into the least of all memories that lie within M."""
+    count, memories, width = walks.shape
+    for d in range(count):
+        bit = 1
+        while bit < memories:
+            for memory in range(memories):
+                if memory & bit:
+                    for i in range(width):
+                        x = walks[d, memory ^ bit, i]
+                        if x < walks[d, memory, i]:
+                            walks[d, memory, i] = x
+            bit <<= 1
+
+
+@jit
+def extend_paths(
+    sets: IntArray,
+    ends: IntArray,
+    values: FloatArray,
+    rests: FloatArray,
+    low: int,
+    high: int,
+    within: FloatArray,
+    costs: FloatArray,
+    lists: IntArray,
+    prices: FloatArray,
+    sizes: IntArray,
+    limit: float,
+    slots: IntArray,
+    new_sets: IntArray,
+    new_ends: IntArray,
+    new_values: FloatArray,
+    new_rests: FloatArray,
+    parents: IntArray,
+    found: int,
+) -> int:
+    """One more node for the paths ``low`` to ``high - 1``, where walks leave hope.
+
+    Args:
+        sets: clusters of each path as a bit mask.
+        ends: its last node, ``d * K + i``.
+        values: its cost.
+        rests: sum of the prices of the clusters that it lacks.
+        low: first path.
+        high: end of the range.
+        within: (n, 2^b, K) walks to the root from the new node, by `allow_memories`.
+        costs: (n, K, n, K) from a node (first two) to a node.
+        lists: (n, b).
+        prices: (n,).
+        sizes: (n,).
+        limit: paths that cannot stay below this are dropped.
+        slots: hash table, a power of two in size, -1 where empty.
+        new_sets: the paths that are kept, and so on; one for a set and an end.
+        new_ends: see above.
+        new_values: see above.
+        new_rests: see above.
+        parents: the path that each comes from.
+        found: how many there are.
+
+    Returns:
+        How many there are now, -1 if they do not fit.
+    """
+    count, memories, width = within.shape
+    mask = len(slots) - 1
+    for p in range(low, high):
+        c, v = ends[p] // width, ends[p] % width
+        for d in range(count):
+            if (sets[p] >> d) & 1:
+                continue
+            free = memories - 1
+            for j in range(lists.shape[1]):
+                if (sets[p] >> lists[d, j]) & 1:
+                    free &= ~(1 << j)
+            row, hope = costs[c, v, d], within[d, free]
+            rest = rests[p] - prices[d]
+            joined = sets[p] | (1 << d)
+            for i in range(sizes[d]):
+                value = values[p] + row[i]
+                if not value + hope[i] + rest < limit:
+                    continue
+                key = joined * 1000003 + d * width + i
+                key ^= key >> 29
+                key *= 668265263
+                slot = (key ^ (key >> 17)) & mask
+                while slots[slot] >= 0 and not (
+                    new_sets[slots[slot]] == joined and new_ends[slots[slot]] == d * width + i
+                ):
+                    slot = (slot + 1) & mask
+                at = slots[slot]
+                if at < 0:
+                    if found >= len(new_sets):
+                        return -1
+                    at = found
+                    found += 1
+                    slots[slot] = at
+                    new_sets[at], new_ends[at] = joined, d * width + i
+                    new_values[at], new_rests[at], parents[at] = value, rest, p
+                elif value < new_values[at]:
+                    new_values[at], parents[at] = value, p
+    return found

@@ -1,0 +1,183 @@
+"""Relaxed tours: walks from one node of the root through every other cluster once on average.
+
+A tour of m clusters is a walk of m arcs from the root to the root. A walk may come to a cluster
+twice, but not while it remembers it: at each cluster it knows those on a short list (the ng-route
+relaxation of Baldacci, Mingozzi and Roberti 2011). Lagrangian prices of the clusters make walks
+visit each about once; the cheapest walk less the prices is a lower bound (Held and Karp 1971).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from pushplan.gtsp.walk_kernels import (
+    allow_memories,
+    extend_walks,
+    memory_moves,
+    read_visits,
+)
+from pushplan.world.checks import FloatArray, IntArray
+
+MARGIN = 1e-10
+"""Share of the largest cost by which sums of floats may be off."""
+CHUNK_ARCS = 2_000_000
+"""Arcs that are looked at between two looks at the stop rule."""
+
+
+class Stopped(Exception):
+    """The stop rule has fired."""
+
+
+class Walks:
+    """Walks from one node of the root, through nodes that may be part of a cheaper tour.
+
+    Args:
+        costs: (N, N), infinite inside of clusters.
+        node: of the root.
+        members: nodes of each other cluster.
+        lists: (n, n - 1) the other clusters by distance from each.
+        limit: only tours below this cost matter; may be infinite.
+        stopped: asked every few milliseconds; `Stopped` is raised where it says so.
+    """
+
+    def __init__(
+        self,
+        costs: FloatArray,
+        node: int,
+        members: list[IntArray],
+        lists: IntArray,
+        limit: float,
+        stopped: Callable[[], bool],
+    ) -> None:
+        finite = costs[np.isfinite(costs)]
+        self.margin = MARGIN * float(np.abs(finite).max()) if finite.size else 0.0
+        whole = bool((finite == np.round(finite)).all()) and self.margin < 0.25
+        self.goal = limit
+        self.limit = limit - (0.5 if whole and np.isfinite(limit) else self.margin)
+        self.node, self.count, self.lists = node, len(members), lists
+        self.prices = np.zeros(self.count)
+        self.bound = -np.inf
+        self._all, self._stopped = costs, stopped
+        self._gather(members)
+        self.remember(0)
+
+    def _gather(self, members: list[IntArray]) -> None:
+        """Costs between these nodes, padded with infinities to K nodes a cluster."""
+        self.members = members
+        self.sizes = np.array([len(nodes) for nodes in members], dtype=np.int64)
+        self.width = int(self.sizes.max())
+        self.names = np.full((self.count, self.width), -1)
+        for cluster, nodes in enumerate(members):
+            self.names[cluster, : len(nodes)] = nodes
+        flat = self.names.ravel()
+        costs = self._all[np.ix_(flat, flat)]
+        costs[flat < 0] = np.inf
+        costs[:, flat < 0] = np.inf
+        self.costs = costs.reshape(self.names.shape * 2)  # (n, K, n, K) from, to
+        self.blocks = np.ascontiguousarray(self.costs.transpose(2, 3, 0, 1))  # to, from
+        self.first = np.where(self.names < 0, np.inf, self._all[self.node, self.names])
+        self.last = np.where(self.names < 0, np.inf, self._all[self.names, self.node])
+
+    def look(self) -> None:
+        """Ask the stop rule."""
+        if self._stopped():
+            raise Stopped
+
+    def size_with(self, bits: int) -> tuple[float, float]:
+        """Numbers in the table, and arcs to look at, with a memory of so many clusters."""
+        numbers = self.count**2 * 2.0**bits * self.width
+        return numbers, numbers * self.count * self.width
+
+    def remember(self, bits: int) -> None:
+        """Make walks know so many clusters of each list."""
+        self.bits = bits
+        self.known = np.ascontiguousarray(self.lists[:, :bits])
+        self._moves = memory_moves(self.known)
+        self._empty()
+
+    def _empty(self) -> None:
+        # walks[k, d, M, i]: cheapest from node i of d over k more clusters to the root
+        self.walks = np.empty((self.count, self.count, 1 << self.bits, self.width))
+
+    def _longer(self, walks: FloatArray, longer: FloatArray, blocks: FloatArray) -> None:
+        per_cluster = self.count * len(walks[0]) * self.width**2
+        step = max(1, CHUNK_ARCS // per_cluster)
+        for low in range(0, self.count, step):
+            high = min(low + step, self.count)
+            extend_walks(walks, longer, blocks, self._moves, self.prices, self.sizes, low, high)
+            self.look()
+
+    def fill(self) -> None:
+        """All walks to the root with the prices as they are."""
+        self.walks[0] = np.inf
+        self.walks[0, :, 0] = self.last
+        for k in range(1, self.count):
+            self._longer(self.walks[k - 1], self.walks[k], self.blocks)
+
+    def ascend(self, steps: int) -> None:
+        """Subgradient steps on the prices; leaves the best ones, and a table to be filled."""
+        visits = np.zeros(self.count, dtype=np.int64)
+        best, top = self.prices, -np.inf
+        scale, since = 1.0, 0
+        for _ in range(steps):
+            self.fill()
+            value = (
+                float(self.prices.sum())
+                - self.margin
+                + read_visits(
+                    self.walks,
+                    self.first,
+                    self.blocks,
+                    self._moves,
+                    self.prices,
+                    self.sizes,
+                    visits,
+                )
+            )
+            self.bound = max(self.bound, value)
+            since += 1
+            if value > top:
+                top, best, since = value, self.prices, 0
+            if since >= 4:
+                scale, since, self.prices = 0.5 * scale, 0, best
+            slope = 1.0 - visits
+            norm = float(slope @ slope)
+            if self.bound > self.limit or norm == 0.0 or not np.isfinite(value):
+                break
+            goal = self.goal if np.isfinite(self.goal) else value + abs(value) + self.margin
+            self.prices = self.prices + scale * max(goal - value, 0.0) / norm * slope
+        self.prices = best
+
+    def thin(self) -> bool:
+        """Leave out nodes that no walk below the limit comes to.
+
+        Fills the table.
+
+        Returns:
+            Whether every cluster has a node left.
+        """
+        self.fill()
+        ahead, longer = np.full_like(self.walks[0], np.inf), np.empty_like(self.walks[0])
+        ahead[:, 0] = self.first
+        through = np.full(self.names.shape, np.inf)  # (n, K)
+        for k in range(self.count):
+            np.minimum(through, ahead.min(axis=1) + self.walks[-1 - k].min(axis=1), out=through)
+            if k + 1 < self.count:
+                self._longer(ahead, longer, self.costs)
+                ahead, longer = longer, ahead
+        keep = through + (self.prices.sum() - self.prices)[:, None] < self.limit
+        if not keep.any(axis=1).all():
+            return False
+        if keep.sum() < self.sizes.sum():
+            self._gather([row[kept] for row, kept in zip(self.names, keep, strict=True)])
+            self._empty()
+            self.fill()
+        return True
+
+    def allow_memories(self) -> None:
+        """Turn the entry of every memory M into the least of those within M."""
+        for walks in self.walks:
+            allow_memories(walks)
+            self.look()

@@ -1,0 +1,1 @@
+"""A robot's motion: footprints, curves of bounded curvature, shortcutting, speed profiles."""

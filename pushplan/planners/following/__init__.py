@@ -1,0 +1,1 @@
+"""Policies that follow the plans of a planner and plan again."""

@@ -1,0 +1,267 @@
+"""A planner with a controller and a replanning rule is a policy."""
+
+from __future__ import annotations
+
+import time
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from pushplan.control import PathFollower, clamp_twist
+from pushplan.control.tracking import Progress
+from pushplan.interaction import InteractionModel, QuasiStatic
+from pushplan.planners.following.recovery import back_off
+from pushplan.planners.following.replanning import Reason, Replanning, price, rest_of, sweep_rest
+from pushplan.planners.following.splicing import joined, passed, world_ahead
+from pushplan.world import (
+    Controller,
+    InvalidInputError,
+    Plan,
+    Planner,
+    PlanResult,
+    Stop,
+    Twist,
+    World,
+)
+from pushplan.world.checks import number
+
+_REMEMBERED = 5
+"""Planning calls whose times say how long the next one will take."""
+
+
+@dataclass(frozen=True)
+class _Order:
+    """A planning call whose plan may not be there yet."""
+
+    result: PlanResult
+    stretch: Plan | None
+    reason: Reason
+    made: float
+    """When it was asked for, by the clock of the world [s]."""
+    ready: float
+    """When its plan is there [s]."""
+
+
+class PlanFollower:
+    """Plans, drives the plan, and plans again when the world departs from the prediction.
+
+    At every step the rest of the plan is swept again from where everything is now; where that
+    costs more than was predicted, or jams, or the robot has left the path, or the plan is used
+    up, a new plan is made. If none is found the old one is kept. A differential drive that has no
+    plan, or does not get on with its plans, backs off.
+
+    In honest time (`keep_time`) planning goes on beside driving: a plan is there only after the
+    time that it took, and the old one is driven until then.
+
+    Args:
+        planner: makes the plans.
+        controller: drives them; `pushplan.control.PathFollower` by default.
+        replanning: when to plan again.
+        interaction: predicts what the rest of a plan will do; quasi-static by default.
+        stop: stop rule of each planning call; the planner's own default if None.
+    """
+
+    actions = ("turn_rate", "velocity")
+
+    def __init__(
+        self,
+        planner: Planner,
+        controller: Controller | None = None,
+        *,
+        replanning: Replanning | None = None,
+        interaction: InteractionModel | None = None,
+        stop: Stop | None = None,
+    ) -> None:
+        self.planner = planner
+        self.controller = PathFollower() if controller is None else controller
+        self.replanning = Replanning() if replanning is None else replanning
+        self.interaction = QuasiStatic() if interaction is None else interaction
+        self.stop = stop
+        self._progress: Progress | None = None
+        self._forget(np.random.default_rng(0))
+
+    def reset(self, world: World, rng: np.random.Generator) -> None:
+        """Forget the last episode; time stands still while it plans until `keep_time` is called."""
+        self._forget(rng)
+        self._progress = Progress(window=2.0 * world.robot.circumscribed_radius)
+
+    def keep_time(self, factor: float, clock: Callable[[], float] = time.perf_counter) -> None:
+        """From now to the next reset a plan is there only after the time that it took.
+
+        Args:
+            factor: seconds of the world's clock for one of ``clock``.
+            clock: returns seconds.
+        """
+        self._factor, self._clock = number("factor", factor, low=0.0), clock
+
+    def _forget(self, rng: np.random.Generator) -> None:
+        self.plan_log: list[PlanResult] = []
+        """Every planning call since the last reset."""
+        self.current_plan: Plan | None = None
+        self.background_s = 0.0
+        """How much of the last call of `act` a robot would do beside driving [s]."""
+        self._factor, self._clock = 0.0, time.perf_counter
+        self._took: deque[float] = deque(maxlen=_REMEMBERED)
+        self._order: _Order | None = None
+        self._rng = rng
+        self._planned_at = -np.inf
+        self._planned_from = np.full(2, np.nan)
+        self._planned_ids = np.zeros(0, dtype=np.int64)
+        self._tight = False
+        self._in_vain = 0
+
+    def act(self, world: World, observation: Any = None) -> Twist:
+        """The twist for this step; plans first where that is necessary."""
+        if self._progress is None:
+            self.reset(world, self._rng)
+        self.background_s = 0.0
+        self._receive(world)
+        if self._order is None:
+            reason = self._needs_plan(world)
+            if reason is not None:
+                self._ask(world, reason)
+                self._receive(world)
+        if self.current_plan is None and self._order is not None:
+            return clamp_twist(world.robot, 0.0, 0.0)
+        if self.current_plan is None or self._in_vain > 3:
+            away = back_off(world)
+            if away is not None:
+                return away
+        if self.current_plan is None:
+            return clamp_twist(world.robot, 0.0, 0.0)
+        return self.controller.command(world, self.current_plan)
+
+    def _ask(self, world: World, reason: Reason) -> None:
+        """Call the planner; its plan is there after the time that the call takes."""
+        assert self._progress is not None
+        start, stretch = world_ahead(
+            world, self.current_plan, self._progress.along, self._latency(), self.interaction
+        )
+        began = self._clock()
+        result = self.planner.plan(start, stop=self.stop, rng=self._rng)
+        took = self._clock() - began
+        self.plan_log.append(result)
+        if self._factor > 0.0:
+            self.background_s = took
+            self._took.append(took)
+        moved = float(np.hypot(*(world.robot_pose[:2] - self._planned_from)))
+        stuck = moved < 0.05 * world.robot.circumscribed_radius and reason is not Reason.PERIOD
+        self._in_vain = self._in_vain + 1 if stuck or result.plan is None else 0
+        self._planned_at, self._planned_from = world.time, world.robot_pose[:2]
+        self._planned_ids = world.movables.ids
+        ready = world.time + self._factor * took
+        self._order = _Order(result, stretch, reason, world.time, ready)
+
+    def _latency(self) -> float:
+        """How long the next planning call is expected to take, by the clock of the world [s]."""
+        if self.replanning.latency is not None:
+            return self.replanning.latency
+        if self._factor == 0.0:
+            return 0.0
+        budget = np.inf if self.stop is None else self.stop.seconds
+        if self._took:
+            return self._factor * min(budget, max(self._took))
+        return self._factor * budget if np.isfinite(budget) else 0.0
+
+    def _receive(self, world: World) -> None:
+        """Take up a plan that has been waited for long enough."""
+        order = self._order
+        if order is None or world.time < order.ready - 1e-9:
+            return
+        self._order = None
+        if order.result.plan is None:
+            return
+        new = joined(order.stretch, order.result.plan)
+        if world.time > order.made:
+            new = rest_of(new, passed(world, new, world.time - order.made), None)
+        if self._keeps_old(world, new, order.reason):
+            return
+        self.current_plan = new
+        self._tight = order.result.stats.detail.get("tight", 0.0) > 0.0
+
+    def _keeps_old(self, world: World, new: Plan, reason: Reason) -> bool:
+        """Whether the new plan is not enough better than what is left of the old one."""
+        old, margin = self.current_plan, self.replanning.margin
+        if margin is None or reason.urgent or old is None:
+            return False
+        assert self._progress is not None
+        index = self._progress.index(self._progress.along)
+        weight = self.replanning.weight(self.planner)
+        swept, path = sweep_rest(world, old, index, self.interaction)
+        old_price = price(world, path, swept, weight)
+        swept_new, path = sweep_rest(world, new, 0, self.interaction)
+        new_price = price(world, path, swept_new, weight)
+        robot = world.robot
+        if new_price < old_price - margin * robot.circumscribed_radius * robot.mass:
+            return False
+        if np.isinf(old_price):
+            return False
+        # what is expected of it from now on
+        self.current_plan = rest_of(old, index, swept.object_poses)
+        self._progress.update(self.current_plan, *(float(v) for v in world.robot_pose[:2]))
+        return True
+
+    def _needs_plan(self, world: World) -> Reason | None:
+        plan, rule = self.current_plan, self.replanning
+        size = world.robot.circumscribed_radius
+        waited = world.time - self._planned_at
+        # a robot that stays stuck thinks less and less often, so that the episode ends in time
+        patience: float = rule.interval * 2 ** min(max(self._in_vain - 20, 0), 6)
+        rested = waited >= patience * size / world.robot.max_speed - 1e-9
+        if plan is None:
+            return Reason.NO_PLAN if rested else None
+        if rule.never:
+            return None
+        if not np.array_equal(world.movables.ids, self._planned_ids):
+            return Reason.OBJECTS  # something was delivered, lost or found
+        assert self._progress is not None
+        x, y = (float(value) for value in world.robot_pose[:2])
+        along = self._progress.update(plan, x, y)
+        index = self._progress.index(along)
+        here = self._progress.pose(along)
+        if rested and np.hypot(x - here[0], y - here[1]) > rule.offset * size:
+            return Reason.OFFSET
+        if along >= self._progress.total - 1e-9:
+            return Reason.USED_UP if rested else None
+        if self._tight and waited >= 4.0 * patience * size / world.robot.max_speed:
+            return Reason.TIGHT  # there may be a plan that keeps its distance
+        driven = np.hypot(*(world.robot_pose[:2] - self._planned_from))
+        if waited >= rule.every_seconds - 1e-9 or driven >= rule.every_metres:
+            return Reason.PERIOD
+        end = None
+        if np.isfinite(rule.look_ahead):
+            end = self._progress.index(along + rule.look_ahead * size) + 2
+        return self._surprise(world, plan, slice(index, end), rested)
+
+    def _surprise(self, world: World, plan: Plan, part: slice, rested: bool) -> Reason | None:
+        """Whether a part of the plan would do something else than was predicted."""
+        surprise = self.replanning.surprise
+        if np.isinf(surprise) and not world.static.convex_parts:
+            return None  # nothing can jam
+        predicted = plan.object_poses
+        if predicted is None or predicted.shape[1] != len(world.movables) or not predicted.size:
+            return None
+        now, _ = sweep_rest(world, plan, part.start, self.interaction, part.stop)
+        if now.jammed_at >= 0:
+            at_once = now.jammed_at <= 3 and self._in_vain < 20
+            return Reason.JAM if rested or at_once else None
+        steps = np.diff(predicted[part, :, :2], axis=0)
+        expected = float(np.hypot(steps[..., 0], steps[..., 1]).sum(axis=0) @ world.movables.masses)
+        allowed = surprise * world.robot.circumscribed_radius * world.robot.mass
+        return Reason.SURPRISE if rested and now.work - expected > allowed else None
+
+
+def policy_for(planner: Planner) -> PlanFollower:
+    """The default policy around a planner: follow its plans, plan again when they do not fit.
+
+    Raises:
+        InvalidInputError: if the object has no ``plan`` method.
+    """
+    if not isinstance(planner, Planner):
+        raise InvalidInputError(
+            f"a planner needs a method plan(world, *, stop, rng), {type(planner).__name__} has none"
+        )
+    return PlanFollower(planner)

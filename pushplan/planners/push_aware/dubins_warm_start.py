@@ -1,0 +1,82 @@
+"""A first guess without a search: the taut path around the walls, as Dubins curves.
+
+The shortest path of a disc around the walls bends at a few places. The robot is sent along the
+tangents there, and from place to place on the shortest curve of bounded curvature (Dubins 1957).
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+
+from pushplan.geometry import VisibilityGraph
+from pushplan.motion.dubins import dubins
+from pushplan.planners.push_aware.bound import graph_is_quick
+from pushplan.world import NavigationGoal, StaticMap, World
+from pushplan.world.checks import FloatArray
+
+_SHARP = 0.8
+"""Turn beyond which a bend is driven through its ends, not only through its middle [rad]."""
+
+
+def taut_arcs(
+    world: World, goal: NavigationGoal, clearance: float, radius: float, depth: float
+) -> FloatArray | None:
+    """Arcs along the taut path; they may touch walls and objects.
+
+    Args:
+        world: gives the start and the walls.
+        goal: where to.
+        clearance: of the taut path [m].
+        radius: least turning radius [m].
+        depth: how far into the goal the arcs end [m].
+
+    Returns:
+        (E, 2) length [m] and curvature [1/m] of each arc, or None if there is no way.
+    """
+    start = world.robot_pose[:2]
+    # on a map of many parts only the straight way is quick to find
+    static = world.static if graph_is_quick(world.static) else _without_walls(world.static)
+    corners = VisibilityGraph(static, clearance).to_goal(start, goal).points
+    if len(corners) < 2:
+        return None
+    vias = _vias(corners, radius, depth)
+    arcs = np.empty((3 * len(vias), 2))
+    here = world.robot_pose
+    for i, there in enumerate(vias):
+        dubins(here, there, radius, arcs[3 * i : 3 * i + 3])
+        here = there
+    return arcs
+
+
+@lru_cache(maxsize=16)
+def _without_walls(static: StaticMap) -> StaticMap:
+    return StaticMap.build(bounds=static.bounds)
+
+
+def _vias(corners: FloatArray, radius: float, depth: float) -> FloatArray:
+    """Poses (V, 3) on a polyline: some at each bend, one ``depth`` [m] past its end."""
+    legs = np.diff(corners, axis=0)
+    lengths = np.hypot(legs[:, 0], legs[:, 1])
+    keep = lengths > 1e-9
+    if not keep.any():
+        return np.zeros((0, 3))
+    legs, lengths = legs[keep], lengths[keep]
+    ends = corners[1:][keep]
+    headings = np.unwrap(np.arctan2(legs[:, 1], legs[:, 0]))
+    found = []
+    first = 0
+    for i in range(1, len(legs)):
+        # the corners first .. i - 1 follow each other closely: they are one bend
+        if lengths[i] < radius and i < len(legs) - 1:
+            continue
+        at = {(first + i - 1) // 2}
+        if abs(headings[i] - headings[first]) > _SHARP:
+            at |= {first, i - 1}
+        for k in sorted(at):
+            found.append([*ends[k], 0.5 * (headings[k] + headings[k + 1])])
+        first = i
+    last = headings[-1]
+    found.append([*(ends[-1] + depth * np.array([np.cos(last), np.sin(last)])), last])
+    return np.array(found)

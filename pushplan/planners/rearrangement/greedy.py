@@ -1,0 +1,223 @@
+"""`GreedyPusher`: the nearest box that is not done, pushed straight towards its goal. The floor."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, fields
+from typing import Any
+
+import numpy as np
+
+from pushplan.control import DriveTo, clamp_twist
+from pushplan.planners.arguments import check_pusher
+from pushplan.planners.rearrangement.line_up import (
+    LineUp,
+    bumper_half,
+    is_done,
+    line_up,
+    unit,
+    way_of,
+)
+from pushplan.world import Twist, World
+from pushplan.world.checks import FloatArray, expect, number
+
+_RETREATS = ((-1.0, 0.0), (-0.5, 1.0), (-0.5, -1.0), (1.0, 0.0), (0.5, 1.0), (0.5, -1.0))
+"""Speed and turn rate, as shares of the greatest, that are tried in turn to get away."""
+_WAYS = 8
+"""How many ways to push a box are tried before the first comes again."""
+_MOVED = 0.03
+"""Less than this is no motion [circumscribed radii]."""
+_ASTRAY = 0.8
+"""Difference between heading and push at which the robot lines up anew [rad]."""
+
+
+@dataclass(frozen=True)
+class GreedyConfig:
+    """Settings of `GreedyPusher`. Lengths are in units of the robot's circumscribed radius.
+
+    Args:
+        period: time for which a command is held [s].
+        slack: room between bumper and box when the robot lines up.
+        retreat: how far it backs off after a push.
+        detour: how far it pushes in a direction other than that of the shortest way.
+        offset: distance from the line of push at which it lines up anew, as a share of half the
+            bumper's width.
+        patience: time without moving after which it gives up [s].
+    """
+
+    period: float = 0.2
+    slack: float = 0.08
+    retreat: float = 0.6
+    detour: float = 1.5
+    offset: float = 0.7
+    patience: float = 1.5
+
+    def __post_init__(self) -> None:
+        for item in fields(self):
+            number(f"greedy {item.name}", getattr(self, item.name), low=0.0, open_low=True)
+
+
+@dataclass
+class _Job:
+    """One push: of which box, how, and where it began (None before that)."""
+
+    box: int
+    push: LineUp
+    driver: DriveTo
+    heading: float
+    begun_at: FloatArray | None = None
+
+
+class GreedyPusher:
+    """Takes the nearest box that is not done, drives behind it and pushes until it is done.
+
+    Behind means opposite to the box's shortest way around static things to its goal; where the
+    robot does not fit there it stands aside or pushes at an angle, along a wall for instance.
+    Other boxes are not looked at. A box that cannot be got at or got on with is put off until the
+    others have had their turn. No chance is involved.
+
+    Args:
+        config: settings.
+    """
+
+    actions = ("velocity",)
+
+    def __init__(self, config: GreedyConfig | None = None) -> None:
+        self.config = expect("config", config or GreedyConfig(), GreedyConfig)
+        self._forget(0.0)
+
+    def _forget(self, time: float) -> None:
+        self._job: _Job | None = None
+        self._failures: dict[int, int] = {}
+        self._retreats: list[tuple[float, float]] = []
+        self._retreat_pose: FloatArray = np.zeros(3)
+        self._attempt_pose: FloatArray = np.zeros(3)
+        self._wait_until = -math.inf
+        self._last_time = math.inf
+        self._note(np.zeros(3), time)
+
+    def reset(self, world: World, rng: np.random.Generator) -> None:
+        """Forget the last episode."""
+        self._forget(world.time)
+
+    def act(self, world: World, observation: Any = None) -> Twist:
+        """The velocity for this step; stops when every box is done.
+
+        Raises:
+            InvalidInputError: if the goal is one for the robot, or the robot cannot stop.
+        """
+        check_pusher(world, "the greedy pusher")
+        if world.time <= self._last_time:
+            self._forget(world.time)
+        self._last_time = world.time
+        if self._job is not None and self._is_over(world, self._job):
+            self._job = None
+            self._back_off(world)
+        command = self._retreat(world) or self._work(world)
+        return command or self._retreat(world) or Twist(0.0, 0.0)
+
+    def _work(self, world: World) -> Twist | None:
+        """The next command of the job in hand or of a new one; None where it has ended."""
+        if self._job is None and world.time >= self._wait_until:
+            self._job = self._choose(world)
+            self._note(world.robot_pose, world.time)
+            self._wait_until = world.time + (self.config.patience if self._job is None else 0.0)
+        job = self._job
+        if job is None:
+            return None
+        if job.begun_at is None:
+            command = job.driver.command(world.robot_pose)
+            if command is not None:
+                return command
+            if job.driver.arrived:
+                job.begun_at = world.robot_pose
+        sound = job.begun_at is not None and not self._is_stuck(world, self.config.patience)
+        command = self._push(world, job) if sound else None
+        if command is None:
+            if not sound:  # it is the box's fault, which comes last from now on
+                self._failures[job.box] = self._failures.get(job.box, 0) + 1
+            self._job = None
+            self._back_off(world)
+        return command
+
+    def _is_over(self, world: World, job: _Job) -> bool:
+        k = np.flatnonzero(world.movables.ids == job.box)
+        return len(k) == 0 or is_done(world, int(k[0]))
+
+    def _choose(self, world: World) -> _Job | None:
+        """The nearest box that the robot can get behind, of those that failed least often."""
+        boxes = world.movables
+        left = [k for k in range(len(boxes)) if not is_done(world, k)]
+        away = np.hypot(*(boxes.poses[:, :2] - world.robot_pose[:2]).T)
+        ids = boxes.ids.tolist()
+        slack = self.config.slack * world.robot.circumscribed_radius
+        for k in sorted(left, key=lambda k: (self._failures.get(ids[k], 0), away[k], k)):
+            push = line_up(world, k, slack, skip=self._failures.get(ids[k], 0) % _WAYS)
+            if push is not None:
+                driver = DriveTo(world.robot, push.points, self.config.period)
+                return _Job(ids[k], push, driver, push.heading)
+            self._failures[ids[k]] = self._failures.get(ids[k], 0) + 1
+        return None
+
+    def _push(self, world: World, job: _Job) -> Twist | None:
+        """Follow the line through the box towards its goal; None where the box has been lost."""
+        k = int(np.flatnonzero(world.movables.ids == job.box)[0])
+        robot, size, shift = world.robot, world.robot.circumscribed_radius, job.push.shift
+        if job.push.turn == 0.0:
+            way = way_of(world, k)
+            job.heading = job.heading if way is None else way
+        elif _distance(world.robot_pose, job.begun_at) > self.config.detour * size:
+            return None
+        u, half = unit(job.heading), bumper_half(robot)
+        gap = world.movables.poses[k, :2] - world.robot_pose[:2]
+        error = math.remainder(job.heading - float(world.robot_pose[2]), 2.0 * math.pi)
+        left = float(gap[0] * u[1] - gap[1] * u[0])  # robot left of the box [m]
+        reach = float(robot.vertices[:, 0].max()) + world.movables.radii[k] + 0.3 * size
+        lost = abs(left) > max(self.config.offset, abs(shift) + 0.25) * half
+        if lost or abs(error) > _ASTRAY or not 0.0 < float(gap @ u) < reach:
+            return None
+        wanted = error - math.atan((left - shift * half) / size)
+        return clamp_twist(robot, robot.max_speed, 1.5 * wanted * robot.max_speed / size)
+
+    def _back_off(self, world: World) -> None:
+        self._retreats = list(_RETREATS)
+        self._retreat_pose = self._attempt_pose = world.robot_pose
+        self._note(world.robot_pose, world.time)
+
+    def _retreat(self, world: World) -> Twist | None:
+        """Get away from where the last job ended: straight back, or however it goes."""
+        robot = world.robot
+        far = self.config.retreat * robot.circumscribed_radius
+        turned = abs(float(world.robot_pose[2] - self._retreat_pose[2]))
+        if _distance(world.robot_pose, self._retreat_pose) >= far or turned > 1.0:
+            self._retreats = []
+        if self._retreats and self._is_stuck(world, 2.5 * self.config.period):
+            freed = _moved(world, self._attempt_pose) > _MOVED and len(self._retreats) > 1
+            self._retreats = ([_RETREATS[0]] if freed else []) + self._retreats[1:]
+            self._attempt_pose = world.robot_pose
+            self._note(world.robot_pose, world.time)
+        if not self._retreats:
+            return None
+        speed, turn = self._retreats[0]
+        return clamp_twist(robot, speed * robot.max_speed, turn * robot.max_turn_rate)
+
+    def _note(self, pose: FloatArray, time: float) -> None:
+        self._rest_pose, self._moved_at = pose, time
+
+    def _is_stuck(self, world: World, patience: float) -> bool:
+        """Whether the robot has hardly moved for so long [s]."""
+        if _moved(world, self._rest_pose) > _MOVED:
+            self._note(world.robot_pose, world.time)
+        return world.time - self._moved_at >= patience - 1e-9
+
+
+def _moved(world: World, pose: FloatArray) -> float:
+    """How far the robot, or its rim, is from a pose, in circumscribed radii."""
+    size = world.robot.circumscribed_radius
+    turned = abs(float(world.robot_pose[2] - pose[2]))
+    return max(_distance(world.robot_pose, pose) / size, turned)
+
+
+def _distance(a: FloatArray, b: FloatArray | None) -> float:
+    assert b is not None
+    return float(np.hypot(a[0] - b[0], a[1] - b[1]))

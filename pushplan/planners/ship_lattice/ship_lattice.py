@@ -1,0 +1,91 @@
+"""`ShipLattice`: A* over motion primitives among floes, then made better against the prediction."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from pushplan.interaction import InteractionModel
+from pushplan.motion.speed_profile import turning_radius
+from pushplan.planners.arguments import check_call
+from pushplan.planners.ship_lattice.build import LatticeBuilder
+from pushplan.planners.ship_lattice.call import ShipCall
+from pushplan.planners.ship_lattice.ship_lattice_config import ShipLatticeConfig
+from pushplan.world import PlanResult, PlanStats, PlanStatus, Stop, World
+from pushplan.world.checks import expect
+
+
+@dataclass(frozen=True)
+class ShipLattice:
+    """State lattice for a vehicle of bounded turn rate in a field of things that it may push.
+
+    After de Schaetzen et al., "Real-time navigation for autonomous surface vehicles in ice-covered
+    waters" (2023), and AUTO-IceNav (arXiv 2411.17155). Use it on the way to a goal line through
+    many small objects; a goal disc and walls are understood too. The robot's origin stays within
+    the bounds. One iteration is a batch of expanded nodes or one repair.
+
+    Args:
+        config: parameters.
+        interaction: predicts what a path does to the objects; by default `IceInteraction` in open
+            water, and `QuasiStatic` where there are walls.
+    """
+
+    config: ShipLatticeConfig = field(default_factory=ShipLatticeConfig)
+    interaction: InteractionModel | None = None
+
+    def __post_init__(self) -> None:
+        expect("config", self.config, ShipLatticeConfig)
+        if self.interaction is not None:
+            expect("interaction", self.interaction, InteractionModel)  # type: ignore[type-abstract]
+
+    def plan(
+        self,
+        world: World,
+        *,
+        stop: Stop | None = None,
+        rng: np.random.Generator | None = None,
+    ) -> PlanResult:
+        """Plan from ``world``; see `pushplan.world.Planner`.
+
+        Raises:
+            InvalidInputError: if the world's goal is not one for the robot.
+        """
+        began = time.perf_counter()
+        check_call(world, stop, rng)
+        check = None if stop is None else stop.start()
+        rng = np.random.default_rng(0) if rng is None else rng
+        call = ShipCall(world, self.config, self.interaction, check, rng, began)
+        status = call.run()
+        if status is None:
+            cancelled = stop is not None and stop.cancelled
+            status = PlanStatus.CANCELLED if cancelled else PlanStatus.TIMED_OUT
+        stats = PlanStats(
+            wall_time_s=time.perf_counter() - began,
+            first_solution_s=call.first_solution_s,
+            iterations=call.iterations,
+            nodes=call.expanded,
+            detail={"lattice_cost": call.lattice_cost, "repairs": float(call.repairs)},
+        )
+        return PlanResult(status, call.plan() if status.has_plan else None, stats)
+
+    def prepare(self, world: World) -> None:
+        """Make what depends on the ship alone, which the first call would do otherwise.
+
+        That is the motion primitives and what the hull covers along them, 20 to 60 ms; it is kept
+        for all planners of this process. `ShipFollower` does it
+        at the start of an episode.
+        """
+        radius = turning_radius(world.robot, self.config.turn_share)
+        LatticeBuilder(world, self.config, radius=radius, side=0.0).build()
+
+
+def published() -> ShipLattice:
+    """The planner as published, see `ShipLatticeConfig.published`; the reference."""
+    return ShipLattice(ShipLatticeConfig.published())
+
+
+def quick() -> ShipLattice:
+    """One search and nothing after it, see `ShipLatticeConfig.quick`."""
+    return ShipLattice(ShipLatticeConfig.quick())

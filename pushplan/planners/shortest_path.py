@@ -1,0 +1,57 @@
+"""`ShortestPath`: as straight as the walls allow, through whatever is in the way. The floor."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+
+import numpy as np
+
+from pushplan.geometry import VisibilityGraph
+from pushplan.motion.polyline import polyline_plan
+from pushplan.motion.speed_profile import start_margin
+from pushplan.planners.arguments import check_call
+from pushplan.world import PlanResult, PlanStats, PlanStatus, Stop, World
+from pushplan.world.checks import number
+
+
+@dataclass(frozen=True)
+class ShortestPath:
+    """The shortest path around static obstacles; movable objects are ignored.
+
+    It is what a robot does that knows its map and not its surroundings, so every other planner is
+    measured against it. The clearance is the circumscribed radius of the footprint, or, where the
+    goal cannot be reached with that, the inscribed one.
+
+    Args:
+        spacing: distance between the poses of the plan, in circumscribed radii.
+    """
+
+    spacing: float = 0.15
+
+    def __post_init__(self) -> None:
+        number("spacing", self.spacing, low=0.0, open_low=True)
+
+    def plan(
+        self,
+        world: World,
+        *,
+        stop: Stop | None = None,
+        rng: np.random.Generator | None = None,
+    ) -> PlanResult:
+        """Plan from ``world``; exact and without chance, so ``stop`` and ``rng`` are not needed."""
+        began = time.perf_counter()
+        check_call(world, stop, rng)
+        robot, goal = world.robot, world.navigation_goal
+        start = world.robot_pose[:2]
+        for clearance in (robot.circumscribed_radius, robot.inscribed_radius):
+            path = VisibilityGraph(world.static, clearance).to_goal(start, goal)
+            if np.isfinite(path.length):
+                spacing = self.spacing * robot.circumscribed_radius
+                plan = polyline_plan(world, path.points, spacing)
+                wall = time.perf_counter() - began
+                stats = PlanStats(wall, first_solution_s=wall, iterations=1)
+                return PlanResult(PlanStatus.SOLVED, plan, stats)
+        blocked = start_margin(world, 0.0) is None
+        status = PlanStatus.START_BLOCKED if blocked else PlanStatus.GOAL_UNREACHABLE
+        return PlanResult(status, None, PlanStats(time.perf_counter() - began))

@@ -1,0 +1,234 @@
+"""`Skeleton`: along the middle of the open water between the objects. A floor for ships."""
+
+from __future__ import annotations
+
+import math
+import time
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+from scipy.sparse import csr_matrix
+from scipy.sparse.csgraph import dijkstra
+from scipy.spatial import Delaunay, QhullError, cKDTree
+
+from pushplan.control import PurePursuit
+from pushplan.geometry import VisibilityGraph
+from pushplan.motion.polyline import polyline_plan
+from pushplan.motion.speed_profile import start_margin
+from pushplan.planners.arguments import check_call
+from pushplan.planners.following.plan_follower import PlanFollower
+from pushplan.planners.following.replanning import Replanning
+from pushplan.world import (
+    GoalDisc,
+    Planner,
+    PlanResult,
+    PlanStats,
+    PlanStatus,
+    Stop,
+    StopCheck,
+    World,
+)
+from pushplan.world.checks import BoolArray, FloatArray, IntArray, number
+
+_MOST_SITES = 2000
+"""Points on outlines at most, but for three on each: the time of a call grows with them."""
+
+
+@dataclass(frozen=True)
+class Skeleton:
+    """Shortest path along the Voronoi diagram of the objects' and obstacles' outlines.
+
+    A metre costs more where the water is narrower than the robot, in proportion to what is
+    missing. The path is a polyline: it does not know how the robot turns, nor what the objects
+    weigh. The skeleton planner that AUTO-IceNav (arXiv 2411.17155) is compared with works
+    likewise on an image.
+
+    Args:
+        spacing: distance between points on outlines, and between poses of the plan [R]; points
+            are farther apart where there are many outlines.
+        narrow: price of a metre where there is no water at all, beside the metre itself.
+    """
+
+    spacing: float = 0.25
+    narrow: float = 10.0
+
+    def __post_init__(self) -> None:
+        number("spacing", self.spacing, low=0.0, open_low=True)
+        number("narrow", self.narrow, low=0.0)
+
+    def plan(
+        self,
+        world: World,
+        *,
+        stop: Stop | None = None,
+        rng: np.random.Generator | None = None,
+    ) -> PlanResult:
+        """Plan from ``world``; exact and without chance, so ``rng`` is not needed.
+
+        The stop rule is looked at before the diagram is made, which cannot be interrupted: 5 to
+        30 ms in open water. Where the diagram leads nowhere, the shortest way around the walls is
+        taken, which may take long among hundreds of obstacles.
+
+        Raises:
+            InvalidInputError: if the world's goal is not one for the robot.
+        """
+        began = time.perf_counter()
+        check_call(world, stop, rng)
+        check = None if stop is None else stop.start()
+        status, points = self._path(world, check)
+        if stop is not None and stop.cancelled:
+            status, points = PlanStatus.CANCELLED, None
+        plan = None
+        if points is not None:
+            plan = polyline_plan(world, points, self.spacing * world.robot.circumscribed_radius)
+        wall = time.perf_counter() - began
+        first = wall if plan is not None else float("nan")
+        return PlanResult(status, plan, PlanStats(wall, first_solution_s=first, iterations=1))
+
+    def _path(self, world: World, check: StopCheck | None) -> tuple[PlanStatus, FloatArray | None]:
+        """Corners of the path (N, 2) [m] from the robot to the goal."""
+        if start_margin(world, 0.0) is None:
+            return PlanStatus.START_BLOCKED, None
+        start = world.robot_pose[:2]
+        goal = world.navigation_goal
+        if goal.distance(float(start[0]), float(start[1])) <= 0.0:
+            return PlanStatus.SOLVED, start[None]
+        if check is not None and check(0, math.inf):
+            return PlanStatus.TIMED_OUT, None
+        sites, owners = self._sites(world)
+        points = self._along(world, sites, owners) if len(set(owners.tolist())) > 1 else None
+        if points is not None:
+            return PlanStatus.SOLVED, points
+        direct = VisibilityGraph(world.static, world.robot.inscribed_radius).to_goal(start, goal)
+        if not np.isfinite(direct.length):
+            return PlanStatus.GOAL_UNREACHABLE, None
+        return PlanStatus.SOLVED, direct.points
+
+    def _sites(self, world: World) -> tuple[FloatArray, IntArray]:
+        """(S, 2) points on all outlines [m], and whose they are."""
+        corners, counts = _outlines(world)
+        if len(counts) == 0:
+            return np.zeros((0, 2)), np.zeros(0, dtype=np.int64)
+        ends = np.cumsum(counts)
+        after = np.arange(1, len(corners) + 1)
+        after[ends - 1] = ends - counts
+        edges = corners[after] - corners
+        reached = np.cumsum(np.hypot(edges[:, 0], edges[:, 1]))
+        around = np.diff(reached[ends - 1], prepend=0.0)
+        spacing = max(self.spacing * world.robot.circumscribed_radius, around.sum() / _MOST_SITES)
+        samples = np.maximum(np.ceil(around / spacing), 3.0).astype(np.int64)
+        owners = np.repeat(np.arange(len(counts)), samples)
+        first = np.cumsum(samples) - samples
+        share = (np.arange(len(owners)) - first[owners] + 0.5) / samples[owners]
+        along = reached[ends[owners] - 1] - (1.0 - share) * around[owners]
+        at = np.minimum(np.searchsorted(reached, along), ends[owners] - 1)
+        left = (reached[at] - along) / np.maximum(np.hypot(edges[at, 0], edges[at, 1]), 1e-12)
+        return corners[after[at]] - edges[at] * left[:, None], owners
+
+    def _along(self, world: World, sites: FloatArray, owners: IntArray) -> FloatArray | None:
+        """The cheapest path along the diagram, None where it does not lead to the goal."""
+        try:
+            triangles = Delaunay(sites)
+        except QhullError:
+            return None  # all points on one line
+        # its dual: corners of the diagram are circumcentres, and neighbours share a ridge
+        corners = _circumcentres(sites[triangles.simplices])
+        first, opposite = np.nonzero(triangles.neighbors > np.arange(len(corners))[:, None])
+        ridges = np.column_stack([first, triangles.neighbors[first, opposite]])
+        turn = np.array([[1, 2], [2, 0], [0, 1]])[opposite]
+        between = owners[np.take_along_axis(triangles.simplices[first], turn, axis=1)]
+        low, high = world.static.bounds[:2], world.static.bounds[2:]
+        inside: BoolArray = np.all((corners >= low) & (corners <= high), axis=1)
+        corners[~inside] = low  # some are infinitely far; no ridge that stays leads to them
+        ridges = ridges[(between[:, 0] != between[:, 1]) & inside[ridges].all(axis=1)]
+        if len(ridges) == 0:
+            return None
+        goal, start = world.navigation_goal, world.robot_pose[:2]
+        vertices = np.concatenate([corners, start[None]])
+        # the robot enters the diagram by the nearest vertices
+        known = np.unique(ridges)
+        _, nearest = cKDTree(corners[known]).query(start, k=min(8, len(known)))
+        entry = known[np.atleast_1d(nearest)]
+        ways = np.column_stack([np.full(len(entry), len(vertices) - 1), entry])
+        edges = np.concatenate([ridges, ways])
+        walls = _walls(world)
+        edges = edges[_is_clear(walls, vertices[edges[:, 0]], vertices[edges[:, 1]])]
+        half = max(world.robot.inscribed_radius, 0.1 * world.robot.circumscribed_radius)
+        clear = np.asarray(cKDTree(sites).query(vertices)[0])
+        a, b = edges[:, 0], edges[:, 1]
+        lengths = np.hypot(*(vertices[a] - vertices[b]).T)
+        missing = np.maximum(1.0 - np.minimum(clear[a], clear[b]) / half, 0)
+        costs = lengths * (1.0 + self.narrow * missing) + 1e-12
+        graph = csr_matrix((costs, (a, b)), shape=(len(vertices), len(vertices)))
+        table, previous = dijkstra(
+            graph, directed=False, indices=[len(vertices) - 1], return_predecessors=True
+        )
+        best, before = table[0], previous[0]
+        # the last stretch is straight ahead to the goal
+        if isinstance(goal, GoalDisc):
+            gap = np.hypot(*(vertices - goal.center).T) - goal.radius
+            towards = goal.center - vertices
+            towards /= np.maximum(np.hypot(*towards.T), 1e-12)[:, None]
+        else:
+            gap = (goal.point - vertices) @ goal.normal
+            towards = np.broadcast_to(goal.normal, vertices.shape)
+        gap = np.maximum(gap, 0.0)
+        size = world.robot.circumscribed_radius
+        ends = vertices + (gap + 0.02 * size)[:, None] * towards
+        best = np.where(np.isfinite(best) & _is_clear(walls, vertices, ends), best, np.inf)
+        total = best + gap * (1.0 + self.narrow * (gap > size))
+        end = int(np.argmin(total))
+        if not np.isfinite(total[end]):
+            return None
+        chain = [end]
+        while before[chain[-1]] >= 0:
+            chain.append(int(before[chain[-1]]))
+        path = vertices[chain[::-1]]
+        return np.concatenate([path, ends[end][None]])
+
+
+def _walls(world: World) -> shapely.Geometry | None:
+    """Where the robot's inscribed disc touches something static; None in open water."""
+    parts = [shapely.Polygon(part) for part in world.static.convex_parts]
+    if not parts:
+        return None
+    walls = shapely.buffer(shapely.union_all(parts), (1.0 - 1e-6) * world.robot.inscribed_radius)
+    shapely.prepare(walls)
+    return walls
+
+
+def _is_clear(walls: shapely.Geometry | None, a: FloatArray, b: FloatArray) -> BoolArray:
+    """Whether the lines from (N, 2) ``a`` to (N, 2) ``b`` keep clear of walls."""
+    if walls is None:
+        return np.ones(len(a), dtype=np.bool_)
+    lines = shapely.linestrings(np.stack([a, b], axis=1))
+    return np.asarray(~shapely.intersects(walls, lines), dtype=np.bool_)
+
+
+def _circumcentres(triangles: FloatArray) -> FloatArray:
+    """(T, 2) of triangles (T, 3, 2), not finite where one is flat."""
+    u, v = triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]
+    uu, vv = (u**2).sum(axis=1), (v**2).sum(axis=1)
+    twice = 2.0 * (u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0])
+    away = np.column_stack([v[:, 1] * uu - u[:, 1] * vv, u[:, 0] * vv - v[:, 0] * uu])
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.asarray(triangles[:, 0] + away / twice[:, None])
+
+
+def _outlines(world: World) -> tuple[FloatArray, IntArray]:
+    """(V, 2) corners of all objects, then of all obstacles [m], and how many each has."""
+    floes, parts = world.movables, world.static.convex_parts
+    counts = np.diff(floes.offsets)
+    x, y, theta = np.repeat(floes.poses, counts, axis=0).T
+    c, s, (u, v) = np.cos(theta), np.sin(theta), floes.vertices.T
+    turned = np.column_stack([x + c * u - s * v, y + s * u + c * v])
+    sizes = np.array([len(part) for part in parts], dtype=np.int64)
+    return np.concatenate([turned, *parts]), np.concatenate([counts, sizes])
+
+
+def skeleton(planner: Planner | None = None, stop: Stop | None = None) -> PlanFollower:
+    """Plans once along the open water and follows it."""
+    return PlanFollower(
+        planner or Skeleton(), PurePursuit(), replanning=Replanning(never=True), stop=stop
+    )

@@ -1,0 +1,246 @@
+"""One compiled A* for every lattice: a lattice knows its kinematics, the search does not.
+
+A lattice is a named tuple of arrays that has been made known by `register` with three compiled
+functions: `expand` lists the successors of a node with the costs of the edges, `estimate` bounds
+the cost to the goal from below, and `is_goal` says where to stop. Numba compiles one search for
+each type of lattice. Hart, Nilsson and Raphael (1968); nodes are opened again where the estimate is
+not consistent, so the cost found is optimal whenever the estimate is admissible.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numba import njit, types
+from numba.extending import overload
+from numpy.typing import NDArray
+
+from pushplan.search.heap import pop_least, push_or_lift
+from pushplan.world.checks import BoolArray, FloatArray, IntArray
+
+EXHAUSTED, FOUND, PAUSED = 0, 1, 2
+"""What `AStar.run` returns: no path exists; the goal was reached; the budget was used up."""
+SIZE, EXPANDED, GENERATED, GOAL = 0, 1, 2, 3
+"""Entries of `SearchState.counters`."""
+
+
+def expand(lattice: Any, node: int, nodes: IntArray, costs: FloatArray, edges: IntArray) -> int:
+    """List the successors of a node; by the type of lattice.
+
+    Args:
+        lattice: the lattice.
+        node: index in [0, number of nodes).
+        nodes: (B,) receives the successors.
+        costs: (B,) receives the costs of the edges, not negative; infinite where closed.
+        edges: (B,) receives labels of the edges, from which a path is put together later.
+
+    Returns:
+        The number of successors.
+    """
+    raise NotImplementedError(f"no successors are known for a {type(lattice).__name__}")
+
+
+def estimate(lattice: Any, node: int) -> float:
+    """A lower bound of the cost from a node to the goal, by the type of lattice."""
+    raise NotImplementedError(f"no estimate is known for a {type(lattice).__name__}")
+
+
+def is_goal(lattice: Any, node: int) -> bool:
+    """Whether a node is a goal; by the type of lattice."""
+    raise NotImplementedError(f"no goal is known for a {type(lattice).__name__}")
+
+
+def register(kind: type, successors: Any, bound: Any, reached: Any) -> None:
+    """Teach the search a type of lattice.
+
+    Args:
+        kind: a named tuple class of arrays and numbers.
+        successors: compiled function for `expand`.
+        bound: compiled function for `estimate`.
+        reached: compiled function for `is_goal`.
+    """
+
+    def handles(lattice: Any) -> bool:
+        return isinstance(lattice, types.NamedTuple) and lattice.instance_class is kind
+
+    @overload(expand)
+    def _expand(lattice, node, nodes, costs, edges):  # type: ignore[no-untyped-def]
+        if handles(lattice):
+            return lambda lattice, node, nodes, costs, edges: successors(
+                lattice, node, nodes, costs, edges
+            )
+        return None
+
+    @overload(estimate)
+    def _estimate(lattice, node):  # type: ignore[no-untyped-def]
+        return (lambda lattice, node: bound(lattice, node)) if handles(lattice) else None
+
+    @overload(is_goal)
+    def _is_goal(lattice, node):  # type: ignore[no-untyped-def]
+        return (lambda lattice, node: reached(lattice, node)) if handles(lattice) else None
+
+
+class SearchState(NamedTuple):
+    """Everything that a search has found out so far, so that it can be taken up again.
+
+    Entries of nodes that are not ``known`` hold nothing: a large lattice costs what is looked at.
+    """
+
+    known: BoolArray
+    """(N,) nodes to which a way has been found."""
+    costs: FloatArray
+    """(N,) least cost known to each node."""
+    parents: IntArray
+    """(N,) node before each node, -1 at a start."""
+    edges: IntArray
+    """(N,) label of the edge that leads to each node."""
+    closed: BoolArray
+    """(N,) nodes that have been expanded at their present cost."""
+    keys: FloatArray
+    """(N,) cost plus estimate of the nodes in the heap, in heap order."""
+    heap: IntArray
+    """(N,) nodes in the heap, in heap order."""
+    places: IntArray
+    """(N,) where in the heap a node is, -1 if it is not."""
+    counters: IntArray
+    """(4,) size of the heap, nodes expanded, edges generated, goal or -1."""
+
+
+def new_state(size: int) -> SearchState:
+    """An empty search over nodes 0 to ``size`` - 1."""
+    return SearchState(
+        known=np.zeros(size, dtype=np.bool_),
+        costs=np.empty(size),
+        parents=np.empty(size, dtype=np.int64),
+        edges=np.empty(size, dtype=np.int64),
+        closed=np.empty(size, dtype=np.bool_),
+        keys=np.empty(size),
+        heap=np.empty(size, dtype=np.int64),
+        places=np.empty(size, dtype=np.int64),
+        counters=np.array([0, 0, 0, -1], dtype=np.int64),
+    )
+
+
+@njit(cache=True, nogil=True)
+def offer(state: SearchState, node: int, cost: float, bound: float, parent: int, edge: int) -> None:
+    """Take note of a way to ``node``; it is opened if none as cheap was known.
+
+    Args:
+        state: the search.
+        node: where the way leads.
+        cost: of the whole way.
+        bound: lower bound of the cost from there on.
+        parent: node before it, -1 for a start.
+        edge: label of the last edge.
+    """
+    if not cost + bound < np.inf or (state.known[node] and cost >= state.costs[node]):
+        return
+    if not state.known[node]:
+        state.known[node] = True
+        state.places[node] = -1
+    state.costs[node] = cost
+    state.parents[node] = parent
+    state.edges[node] = edge
+    state.closed[node] = False
+    push_or_lift(state.keys, state.heap, state.places, state.counters, node, cost + bound)
+
+
+@njit(cache=True, nogil=True)
+def take(state: SearchState) -> int:
+    """The open node of least cost plus estimate, now closed; -1 if none is open."""
+    if state.counters[SIZE] == 0:
+        return -1
+    node = pop_least(state.keys, state.heap, state.places, state.counters)
+    state.closed[node] = True
+    state.counters[EXPANDED] += 1
+    return node
+
+
+@njit(cache=True, nogil=True)
+def search(
+    lattice: Any,
+    state: SearchState,
+    budget: int,
+    nodes: IntArray,
+    costs: FloatArray,
+    edges: IntArray,
+) -> int:
+    """Expand up to ``budget`` nodes; see `AStar.run`. The last three are memory for successors."""
+    for _ in range(budget):
+        if state.counters[SIZE] == 0:
+            return EXHAUSTED
+        if is_goal(lattice, state.heap[0]):
+            state.counters[GOAL] = state.heap[0]
+            return FOUND
+        node = take(state)
+        count = expand(lattice, node, nodes, costs, edges)
+        state.counters[GENERATED] += count
+        here = state.costs[node]
+        for i in range(count):
+            cost = here + costs[i]
+            if not state.known[nodes[i]] or cost < state.costs[nodes[i]]:
+                bound = estimate(lattice, nodes[i])
+                offer(state, nodes[i], cost, bound, node, edges[i])
+    return PAUSED
+
+
+class AStar:
+    """A search that runs in batches and can be taken up again.
+
+    Args:
+        lattice: a named tuple with overloads of `expand`, `estimate` and `is_goal`; None for a
+            search that is driven from outside with `take` and `offer`.
+        size: number of nodes.
+        branching: greatest number of successors of a node.
+    """
+
+    def __init__(self, lattice: Any, size: int, branching: int) -> None:
+        self.lattice = lattice
+        self.state = new_state(size)
+        self._nodes = np.empty(branching, dtype=np.int64)
+        self._costs = np.empty(branching)
+        self._edges = np.empty(branching, dtype=np.int64)
+
+    def start(self, node: int, *, cost: float = 0.0, bound: float = 0.0, edge: int = -1) -> None:
+        """Open a node from which paths may begin."""
+        offer(self.state, node, float(cost), float(bound), -1, edge)
+
+    def run(self, budget: int) -> int:
+        """Expand up to ``budget`` nodes.
+
+        Returns:
+            `FOUND` when the cheapest open node is a goal (then `goal` is set), `EXHAUSTED` when
+            no open node is left, `PAUSED` when the budget was used up.
+        """
+        return int(search(self.lattice, self.state, budget, self._nodes, self._costs, self._edges))
+
+    @property
+    def goal(self) -> int:
+        """The goal that was reached, -1 before."""
+        return int(self.state.counters[GOAL])
+
+    @property
+    def expanded(self) -> int:
+        """How many nodes have been expanded."""
+        return int(self.state.counters[EXPANDED])
+
+    @property
+    def cost(self) -> float:
+        """Cost of the path to the goal, infinite before it is reached."""
+        return float(self.state.costs[self.goal]) if self.goal >= 0 else float("inf")
+
+    def path(self, node: int | None = None) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """Nodes from a start to ``node``, by default the goal, and the labels of the edges.
+
+        Returns:
+            (P,) nodes and (P,) labels; label i is that of the edge that leads to node i, the
+            first being the one given to `start`.
+        """
+        at = self.goal if node is None else node
+        nodes: list[int] = []
+        while at >= 0:
+            nodes.append(at)
+            at = int(self.state.parents[at])
+        chain = np.array(nodes[::-1], dtype=np.int64)
+        return chain, self.state.edges[chain]

@@ -1,0 +1,54 @@
+"""`GraphLattice`: an explicit graph, the plainest of lattices."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from numba import njit
+
+from pushplan.search.astar import register
+from pushplan.world.checks import BoolArray, FloatArray, IntArray
+
+
+class GraphLattice(NamedTuple):
+    """A directed graph in compressed rows.
+
+    Args:
+        first: (N + 1,) where the edges of each node start.
+        targets: (E,) where each edge leads.
+        costs: (E,) its cost, not negative.
+        bounds: (N,) lower bounds of the cost from each node to a goal.
+        goals: (N,) which nodes are goals.
+    """
+
+    first: IntArray
+    targets: IntArray
+    costs: FloatArray
+    bounds: FloatArray
+    goals: BoolArray
+
+
+@njit(cache=True, nogil=True)
+def _successors(
+    lattice: GraphLattice, node: int, nodes: IntArray, costs: FloatArray, edges: IntArray
+) -> int:
+    count = 0
+    for e in range(lattice.first[node], lattice.first[node + 1]):
+        nodes[count], costs[count], edges[count] = lattice.targets[e], lattice.costs[e], e
+        count += 1
+    return count
+
+
+@njit(cache=True, nogil=True)
+def _bound(lattice: GraphLattice, node: int) -> float:
+    bound: float = lattice.bounds[node]
+    return bound
+
+
+@njit(cache=True, nogil=True)
+def _reached(lattice: GraphLattice, node: int) -> bool:
+    reached: bool = lattice.goals[node]
+    return reached
+
+
+register(GraphLattice, _successors, _bound, _reached)

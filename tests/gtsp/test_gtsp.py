@@ -1,0 +1,432 @@
+"""The sequencing solver against brute force, at its doors."""
+
+from __future__ import annotations
+
+import itertools
+import math
+import subprocess
+import sys
+import threading
+import time
+
+import numpy as np
+import pytest
+
+from pushplan.gtsp import (
+    GtspConfig,
+    Tour,
+    TourStatus,
+    solve_gtsp,
+    warm_up_solver,
+)
+from pushplan.gtsp.kernels import SPARE, push_values
+from pushplan.gtsp.layers import build, close_gap, keep, link_in, make_layers, undo
+from pushplan.gtsp.segment_swap import improve_by_swaps
+from pushplan.world import Cancellation, Deadline, InvalidInputError, MaxIterations
+
+SEARCH = GtspConfig(method="search")
+PROOF = GtspConfig(method="search", lower_bound=True)
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _compiled() -> None:
+    warm_up_solver()
+
+
+def brute_force(costs: np.ndarray, clusters: list[list[int]]) -> float:
+    """The cost of the cheapest tour by trying all of them."""
+    if len(clusters) == 1:
+        return 0.0
+    best = math.inf
+    for rest in itertools.permutations(clusters[1:]):
+        for nodes in itertools.product(clusters[0], *rest):
+            total = math.fsum(costs[u, v] for u, v in itertools.pairwise((*nodes, nodes[0])))
+            best = min(best, total)
+    return best
+
+
+def check_tour(tour: Tour, costs: np.ndarray, clusters: list[list[int]]) -> None:
+    """A tour visits every cluster once, begins in the first, and costs what it says."""
+    if not tour.status.has_tour:
+        assert tour.cost == math.inf
+        return
+    owner = {node: index for index, nodes in enumerate(clusters) for node in nodes}
+    assert sorted(owner[node] for node in tour.nodes) == list(range(len(clusters)))
+    assert owner[tour.nodes[0]] == 0
+    if len(tour.nodes) > 1:
+        arcs = [costs[u, v] for u, v in itertools.pairwise((*tour.nodes, tour.nodes[0]))]
+        assert tour.cost == math.fsum(arcs)
+    assert tour.lower_bound <= tour.cost
+
+
+def random_instance(
+    rng: np.random.Generator, most: int = 5, width: int = 4
+) -> tuple[np.ndarray, list[list[int]]]:
+    """Asymmetric, with a kind of costs and of forbidden arcs drawn at random, nodes shuffled."""
+    sizes = rng.integers(1, width + 1, rng.integers(1, most + 1))
+    count = int(sizes.sum())
+    kind = rng.integers(5)
+    if kind == 0:
+        costs = rng.random((count, count))
+    elif kind == 1:
+        costs = rng.integers(0, 4, (count, count)).astype(float)  # ties and zeros
+    elif kind == 2:
+        costs = 10.0 ** rng.uniform(-9.0, 9.0, (count, count))
+    elif kind == 3:
+        costs = rng.normal(0.0, 10.0 ** rng.integers(-9, 10), (count, count))
+    else:
+        costs = 1e9 + rng.random((count, count))
+    costs[rng.random((count, count)) < rng.choice([0.0, 0.2, 0.5, 0.8])] = np.inf
+    nodes = iter(rng.permutation(count).tolist())
+    return costs, [[next(nodes) for _ in range(size)] for size in sizes]
+
+
+def close(a: float, b: float, costs: np.ndarray) -> bool:
+    """Equal up to what rounding does to a sum of these costs."""
+    finite = np.abs(costs[np.isfinite(costs)])
+    return a == b or abs(a - b) <= 1e-12 * len(costs) * (finite.max() if finite.size else 1.0)
+
+
+def test_exact_is_brute_force_on_thousands_of_instances() -> None:
+    rng = np.random.default_rng(1)
+    found = {status: 0 for status in TourStatus}
+    for _ in range(2000):
+        costs, clusters = random_instance(rng)
+        if math.prod(map(len, clusters)) * math.factorial(len(clusters) - 1) > 2500:
+            continue
+        tour = solve_gtsp(costs, clusters)
+        best = brute_force(costs, clusters)
+        assert close(tour.cost, best, costs), (costs, clusters)
+        assert tour.status is (TourStatus.OPTIMAL if best < math.inf else TourStatus.INFEASIBLE)
+        assert tour.lower_bound == tour.cost
+        check_tour(tour, costs, clusters)
+        found[tour.status] += 1
+    assert found[TourStatus.OPTIMAL] > 500
+    assert found[TourStatus.INFEASIBLE] > 100
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_search_finds_most_optima_and_nothing_below(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    hits = 0
+    for _ in range(20):
+        costs, clusters = random_instance(rng, most=9, width=5)
+        exact = solve_gtsp(costs, clusters)
+        tour = solve_gtsp(costs, clusters, stop=MaxIterations(300), config=SEARCH)
+        check_tour(tour, costs, clusters)
+        assert tour.cost > exact.cost or close(tour.cost, exact.cost, costs)
+        hits += close(tour.cost, exact.cost, costs)
+    assert hits >= 18
+
+
+def test_lower_bound_and_proof_agree_with_the_optimum() -> None:
+    rng = np.random.default_rng(5)
+    proven = 0
+    for _ in range(40):
+        costs, clusters = random_instance(rng, most=8, width=4)
+        exact = solve_gtsp(costs, clusters)
+        tour = solve_gtsp(costs, clusters, stop=MaxIterations(100), config=PROOF)
+        check_tour(tour, costs, clusters)
+        assert tour.lower_bound <= exact.cost or close(tour.lower_bound, exact.cost, costs)
+        if tour.status is TourStatus.OPTIMAL:
+            proven += 1
+            assert close(tour.cost, exact.cost, costs)
+        if exact.status.has_tour:
+            assert tour.status is not TourStatus.INFEASIBLE
+    assert proven >= 15
+
+
+def test_proof_is_brute_force_whatever_the_costs() -> None:
+    """Bounds never above the optimum; negative costs, ties, and 1e9 for a forbidden arc."""
+    rng = np.random.default_rng(11)
+    proven = 0
+    for _ in range(150):
+        sizes = rng.integers(1, 4, rng.integers(4, 7))
+        count = int(sizes.sum())
+        low = rng.choice([-5.0, 0.0])
+        costs = rng.uniform(low, 5.0, (count, count))
+        if rng.random() < 0.4:
+            costs = np.round(costs)
+        costs[rng.random((count, count)) < 0.3] = rng.choice([1e9, math.inf])
+        nodes = iter(rng.permutation(count).tolist())
+        clusters = [[next(nodes) for _ in range(size)] for size in sizes]
+        if math.prod(map(len, clusters)) * math.factorial(len(clusters) - 1) > 3000:
+            continue
+        best = brute_force(costs, clusters)
+        tour = solve_gtsp(costs, clusters, stop=MaxIterations(20), config=PROOF)
+        check_tour(tour, costs, clusters)
+        assert tour.lower_bound <= best + 1e-9 * max(1.0, abs(best))
+        if tour.status is TourStatus.OPTIMAL:
+            assert tour.cost == pytest.approx(best, rel=1e-9, abs=1e-9)
+            proven += 1
+        elif tour.status is TourStatus.INFEASIBLE:
+            assert best == math.inf
+    assert proven >= 60
+
+
+def test_a_large_number_for_a_forbidden_arc_does_not_blur_the_proof() -> None:
+    """Two tours that differ by a ten-thousandth, other arcs cost 1e9."""
+    rng = np.random.default_rng(2)
+    clusters = [[3 * c, 3 * c + 1, 3 * c + 2] for c in range(9)]
+    costs = np.where(rng.random((27, 27)) < 0.5, 1e9, 1.0 + 1e-4 * rng.random((27, 27)))
+    exact = solve_gtsp(costs, clusters)
+    tour = solve_gtsp(costs, clusters, stop=MaxIterations(1), config=PROOF)
+    assert exact.cost < 10.0
+    assert tour.status is TourStatus.OPTIMAL
+    assert tour.cost == pytest.approx(exact.cost, abs=1e-9)
+
+
+@pytest.mark.parametrize("config", [GtspConfig(), SEARCH, PROOF])
+def test_small_shapes(config: GtspConfig) -> None:
+    """One cluster, one node, two clusters, free tours, and nothing allowed at all."""
+    assert solve_gtsp([[7.0]], [[0]], config=config).nodes == (0,)
+    single = solve_gtsp(np.ones((3, 3)), [[2, 0, 1]], config=config)
+    assert (single.cost, single.status) == (0.0, TourStatus.OPTIMAL)
+    two = solve_gtsp([[0, 9, 1], [2, 0, 9], [5, 9, 0]], [[0], [1, 2]], config=config)
+    assert (two.nodes, two.cost, two.status) == ((0, 2), 6.0, TourStatus.OPTIMAL)
+    groups = [[2 * c, 2 * c + 1] for c in range(6)]
+    free = solve_gtsp(np.zeros((12, 12)), groups, stop=MaxIterations(50), config=config)
+    assert free.cost == 0.0 and free.lower_bound == 0.0
+    none = solve_gtsp(np.full((12, 12), np.inf), groups, stop=MaxIterations(50), config=config)
+    assert (none.status, none.nodes) == (TourStatus.INFEASIBLE, ())
+
+
+def test_dynamic_programming_that_is_too_slow_leaves_time_to_search() -> None:
+    """What is expected to take minutes goes to the search even without a clock."""
+    costs = np.random.default_rng(0).random((16 * 60, 16 * 60))
+    clusters = [range(60 * c, 60 * c + 60) for c in range(16)]
+    tour = solve_gtsp(costs, clusters, stop=MaxIterations(40))
+    assert tour.stats.method == "search"
+    check_tour(tour, costs, [list(nodes) for nodes in clusters])
+
+
+@pytest.mark.parametrize("config", [SEARCH, PROOF, GtspConfig(method="exact")])
+def test_cancellation_from_another_thread(config: GtspConfig) -> None:
+    costs, clusters = pushes(17, 16, 0)
+    token = Cancellation()
+    threading.Timer(0.1, token.cancel).start()
+    began = time.perf_counter()
+    tour = solve_gtsp(costs, clusters, stop=token | Deadline(30.0), config=config)
+    assert time.perf_counter() - began < 10.0
+    assert tour.status in (TourStatus.CANCELLED, TourStatus.FEASIBLE)
+
+
+def pushes(boxes: int, options: int, seed: int) -> tuple[np.ndarray, list[list[int]]]:
+    """An open-ended sequence: a robot, boxes in a square, straight pushes out of it."""
+    rng = np.random.default_rng(seed)
+    box = rng.uniform(1.0, 9.0, (boxes, 1, 2))
+    angle = rng.uniform(0.0, 6.28, (boxes, 1)) + np.arange(options) * 2.0 * np.pi / options
+    way = np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+    out = np.where(way > 0.0, (10.0 - box) / way, -box / way).min(axis=-1)
+    begin = np.concatenate([[[5.0, 5.0]], (box - 0.6 * way).reshape(-1, 2)])
+    end = np.concatenate([[[5.0, 5.0]], (box + way * out[..., None]).reshape(-1, 2)])
+    costs = np.linalg.norm(end[:, None] - begin[None], axis=-1)
+    costs[:, 1:] += 2.0 * out.reshape(-1)
+    costs[:, 0] = 0.0
+    groups = [list(range(1 + b * options, 1 + (b + 1) * options)) for b in range(boxes)]
+    return costs, [[0], *groups]
+
+
+def test_search_and_proof_on_pushes_agree_with_dynamic_programming() -> None:
+    for seed in range(3):
+        costs, clusters = pushes(12, 8, seed)
+        exact = solve_gtsp(costs, clusters)
+        assert exact.stats.method == "exact"
+        tour = solve_gtsp(costs, clusters, stop=MaxIterations(600), config=PROOF)
+        assert tour.status is TourStatus.OPTIMAL
+        assert tour.cost == pytest.approx(exact.cost, rel=1e-12)
+        assert tour.gap == 0.0
+
+
+def test_segment_swaps_keep_the_tour_and_count_what_they_save() -> None:
+    rng = np.random.default_rng(0)
+    for _ in range(200):
+        count, symmetric = int(rng.integers(3, 12)), bool(rng.integers(2))
+        costs = rng.random((count, count))
+        costs = costs + costs.T if symmetric else costs
+        order = rng.permutation(count)
+        nodes, before = order.copy(), costs[order, np.roll(order, -1)].sum()
+        near = np.argsort(costs + 9.0 * np.eye(count), axis=1)[:, : int(rng.integers(1, count))]
+        gain = improve_by_swaps(costs, np.ascontiguousarray(near), order, nodes, symmetric, 1e-12)
+        assert sorted(order) == list(range(count)) and (order == nodes).all()
+        assert costs[order, np.roll(order, -1)].sum() == pytest.approx(before - gain)
+
+
+def test_push_values_is_a_minimum_over_nodes() -> None:
+    rng = np.random.default_rng(0)
+    for _ in range(100):
+        n_at, n_to = (int(n) for n in rng.integers(1, 12, 2))
+        at, to = (int(n) for n in rng.integers(0, 9, 2))
+        costs = np.full((20, 20 + SPARE), np.nan)
+        costs[:, :20] = rng.normal(size=(20, 20))
+        values, out = rng.normal(size=(3, n_at)), np.empty(n_to + SPARE)
+        push_values(costs, values, 1, at, n_at, to, n_to, out)
+        expected = (values[1][:, None] + costs[at : at + n_at, to : to + n_to]).min(axis=0)
+        np.testing.assert_array_equal(out[:n_to], expected)
+
+
+def test_changes_of_a_tour_cost_what_building_it_anew_says() -> None:
+    """Clusters taken out and put back at random, then all of it undone."""
+    rng = np.random.default_rng(0)
+    for now in range(200):
+        offsets = np.concatenate(([0], np.cumsum([1, *rng.integers(1, 6, 8)])))
+        count = int(offsets[-1])
+        costs = np.zeros((count, count + SPARE))
+        costs[:, :count] = rng.random((count, count))
+        reverse = np.zeros_like(costs)
+        reverse[:, :count] = costs[:, :count].T
+        order, memory = np.arange(9), make_layers(costs, reverse, offsets, 0)
+        before = build(memory, order, 0)
+        cost, c = before, int(rng.integers(1, 9))
+        keep(memory, c, now)
+        cost += close_gap(memory, memory.before[c], memory.after[c], memory.carry[c], 0, now, 1e-12)
+        behind = int(rng.choice(np.delete(order, c)))
+        cost += link_in(memory, c, behind, 0, now, 1e-12)
+        changed = np.delete(order, c)
+        changed = np.insert(changed, int(np.flatnonzero(changed == behind)[0]) + 1, c)
+        anew = make_layers(costs, reverse, offsets, 0)
+        assert build(anew, changed, 0) == pytest.approx(cost)
+        undo(memory)
+        np.testing.assert_array_equal(memory.after, np.roll(order, -1))
+
+
+def test_node_choice_on_unstructured_costs() -> None:
+    """Insertions that see one node of each neighbour only end far above."""
+    rng = np.random.default_rng(0)
+    costs = rng.integers(0, 1000, (144, 144))
+    clusters = [range(12 * c, 12 * c + 12) for c in range(12)]
+    exact = solve_gtsp(costs, clusters)
+    tour = solve_gtsp(costs, clusters, stop=MaxIterations(8000), config=SEARCH)
+    assert tour.cost <= 2.2 * exact.cost
+
+
+def test_same_seed_same_tour_in_another_process() -> None:
+    code = (
+        "import numpy as np\n"
+        "from pushplan.gtsp import GtspConfig, solve_gtsp\n"
+        "from pushplan.world import MaxIterations\n"
+        "costs = np.random.default_rng(3).random((56, 56))\n"
+        "clusters = [range(4 * c, 4 * c + 4) for c in range(14)]\n"
+        "tour = solve_gtsp(costs, clusters, stop=MaxIterations(700),\n"
+        "                  rng=np.random.default_rng(9),\n"
+        "                  config=GtspConfig(method='search', lower_bound=True))\n"
+        "print(tour.nodes, tour.cost.hex(), tour.lower_bound.hex(), tour.stats.iterations)\n"
+    )
+    runs = [
+        subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+        for _ in range(2)
+    ]
+    assert runs[0].stdout == runs[1].stdout != ""
+
+
+def test_iterations_are_counted_and_other_seeds_differ() -> None:
+    costs = np.random.default_rng(3).random((300, 300))
+    clusters = [range(5 * c, 5 * c + 5) for c in range(60)]
+    tours = [
+        solve_gtsp(costs, clusters, stop=MaxIterations(130), rng=np.random.default_rng(seed))
+        for seed in range(2)
+    ]
+    assert [tour.stats.iterations for tour in tours] == [130, 130]
+    assert tours[0].nodes != tours[1].nodes
+
+
+@pytest.mark.parametrize("config", [GtspConfig(), SEARCH, PROOF])
+def test_deadline_holds(config: GtspConfig) -> None:
+    costs, clusters = pushes(16, 16, 0)
+    over, found = [], 0
+    for seconds in (0.02, 0.1, 0.25, 0.5):
+        began = time.perf_counter()
+        tour = solve_gtsp(costs, clusters, stop=Deadline(seconds), config=config)
+        over.append(time.perf_counter() - began - seconds)
+        found += tour.status.has_tour
+    assert found
+    assert min(over) < 0.05
+
+
+def test_stop_before_anything() -> None:
+    costs, clusters = pushes(18, 8, 0)
+    token = Cancellation()
+    token.cancel()
+    assert solve_gtsp(costs, clusters, stop=token).status is TourStatus.CANCELLED
+    tour = solve_gtsp(costs, clusters, stop=Deadline(0.0))
+    assert tour.status is TourStatus.TIMED_OUT
+    assert tour.nodes == () and tour.lower_bound == -math.inf
+    assert "more time" in tour.status.remedy
+
+
+def test_forbidden_arcs_leave_one_tour() -> None:
+    """Only one order is allowed: the search has to find its way through."""
+    count = 12
+    costs = np.full((2 * count, 2 * count), np.inf)
+    for c in range(count):
+        d = (5 * c + 5) % count
+        costs[2 * ((5 * c) % count), 2 * d] = 1.0
+        costs[2 * ((5 * c) % count) + 1, 2 * d] = 2.0
+    clusters = [[2 * c, 2 * c + 1] for c in range(count)]
+    assert solve_gtsp(costs, clusters).cost == 12.0
+
+
+def test_a_cluster_that_cannot_be_left_is_infeasible_however_large() -> None:
+    costs, clusters = pushes(30, 8, 0)
+    costs[clusters[7]] = np.inf
+    tour = solve_gtsp(costs, clusters)
+    assert tour.status is TourStatus.INFEASIBLE
+    assert tour.lower_bound == math.inf
+
+
+def test_large_instances_keep_promising_nodes() -> None:
+    costs, clusters = pushes(60, 30, 0)
+    few = GtspConfig(search_nodes=400)
+    tour = solve_gtsp(costs.astype(np.float32), clusters, stop=MaxIterations(300), config=few)
+    full = solve_gtsp(costs, clusters, stop=MaxIterations(300))
+    check_tour(tour, costs.astype(np.float32), clusters)
+    assert tour.stats.detail["nodes"] <= 400
+    assert tour.cost < 1.05 * full.cost
+
+
+@pytest.mark.parametrize(
+    ("costs", "clusters", "words"),
+    [
+        ([[0.0, math.nan], [1.0, 0.0]], [[0], [1]], "NaN from node 0 to node 1"),
+        ([[0.0, -math.inf], [1.0, 0.0]], [[0], [1]], "-inf from node 0 to node 1"),
+        (np.zeros((2, 3)), [[0], [1]], r"shape \(N, N\)"),
+        (np.zeros((0, 0)), [], r"shape \(N, N\)"),
+        ([[0.0], [1.0, 2.0]], [[0], [1]], "costs must be"),
+        ([["a", "b"], ["c", "d"]], [[0], [1]], "numbers"),
+        (np.full((2, 2), 1e300), [[0], [1]], "at most"),
+        (np.full((2, 2), 2**60), [[0], [1]], "2\\^53"),
+        (np.zeros((3, 3)), [[0], [1]], "1 are in none: 2"),
+        (np.zeros((3, 3)), [[0, 1], [1, 2]], "node 1 is in clusters 0 and 1"),
+        (np.zeros((3, 3)), [[0, 0], [1, 2]], "node 0 is in cluster 0 twice"),
+        (np.zeros((3, 3)), [[0, 1], [], [2]], "cluster 1 must be a list of at least one node"),
+        (np.zeros((3, 3)), [[0, 1], [3]], "cluster 1 has node 3"),
+        (np.zeros((3, 3)), [[0, 1], [-1]], "cluster 1 has node -1"),
+        (np.zeros((3, 3)), [[0.5], [1], [2]], "whole numbers"),
+        (np.zeros((3, 3)), "abc", "sequence of node lists"),
+        (np.zeros((3, 3)), None, "sequence of node lists"),
+    ],
+)
+def test_hostile_input_is_one_clear_error(costs: object, clusters: object, words: str) -> None:
+    with pytest.raises(InvalidInputError, match=words):
+        solve_gtsp(costs, clusters)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("changes", [{"stop": 5}, {"rng": 3}])
+def test_wrong_kinds_are_named(changes: dict[str, object]) -> None:
+    with pytest.raises(InvalidInputError, match=r"(stop|rng) must be a (Stop|Generator), got"):
+        solve_gtsp([[0.0]], [[0]], **changes)  # type: ignore[arg-type]
+
+
+def test_a_table_that_does_not_fit_is_refused() -> None:
+    costs, clusters = pushes(40, 4, 0)
+    with pytest.raises(InvalidInputError, match=r"MB for 41 clusters .* raise it, or use method"):
+        solve_gtsp(costs, clusters, config=GtspConfig(method="exact"))
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [{"method": "magic"}, {"restarts": 0}, {"hot": 0.0}, {"blink": 2.0}, {"lower_bound": 1}],
+)
+def test_config_is_checked(changes: dict[str, object]) -> None:
+    with pytest.raises(InvalidInputError):
+        GtspConfig(**changes)  # type: ignore[arg-type]

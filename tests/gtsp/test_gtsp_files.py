@@ -1,0 +1,188 @@
+"""GTSPLIB files: what is read, what is written, what is refused."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pushplan.cli import main
+from pushplan.gtsp import (
+    GtspInstance,
+    read_gtsp,
+    read_tour,
+    write_gtsp,
+    write_tour,
+)
+from pushplan.world import InvalidInputError, SchemaError
+
+CLUSTERS = ((0, 2), (1,), (3,))
+HEAD = "NAME: small\nTYPE: AGTSP\nDIMENSION: 4\nGTSP_SETS: 3\n"
+SETS = "GTSP_SET_SECTION\n1 1 3 -1\n2 2 -1\n3 4 -1\nEOF\n"
+FULL = [[0, 1, 2, 4], [1, 0, 3, 5], [2, 3, 0, 6], [4, 5, 6, 0]]
+LAYOUTS = {
+    "FULL_MATRIX": "0 1 2 4 1 0 3 5\n2 3 0 6 4 5 6 0",
+    "UPPER_ROW": "1 2 4\n3 5\n6",
+    "UPPER_DIAG_ROW": "0 1 2 4 0 3 5 0 6 0",
+    "LOWER_ROW": "1 2 3 4 5 6",
+    "LOWER_DIAG_ROW": "0\n1 0\n2 3 0\n4 5 6 0",
+    "UPPER_COL": "1 2 3 4 5 6",
+    "UPPER_DIAG_COL": "0 1 0 2 3 0 4 5 6 0",
+    "LOWER_COL": "1 2 4 3 5 6",
+    "LOWER_DIAG_COL": "0 1 2 4 0 3 5 0 6 0",
+}
+
+
+def explicit(layout: str, data: str) -> str:
+    return (
+        f"{HEAD}EDGE_WEIGHT_TYPE: EXPLICIT\nEDGE_WEIGHT_FORMAT: {layout}\n"
+        f"EDGE_WEIGHT_SECTION\n{data}\n{SETS}"
+    )
+
+
+def written(tmp_path: Path, text: str) -> Path:
+    path = tmp_path / "small.gtsp"
+    path.write_text(text)
+    return path
+
+
+@pytest.mark.parametrize("layout", sorted(LAYOUTS))
+def test_matrix_layouts(tmp_path: Path, layout: str) -> None:
+    instance = read_gtsp(written(tmp_path, explicit(layout, LAYOUTS[layout])))
+    assert instance.costs.tolist() == FULL
+    assert instance.clusters == CLUSTERS
+    assert instance.name == "small"
+
+
+@pytest.mark.parametrize(
+    ("kind", "points", "distance"),
+    [
+        ("EUC_2D", [(0, 0), (3, 4.4)], 5),
+        ("CEIL_2D", [(0, 0), (3, 4.01)], 6),
+        ("MAN_2D", [(0, 0), (3, -4.4)], 7),
+        ("MAX_2D", [(0, 0), (3, -4.6)], 5),
+        ("ATT", [(0, 0), (10, 0)], 4),  # sqrt(10) = 3.16 is rounded up
+        ("GEO", [(38.24, 20.42), (39.57, 26.15)], 509),  # ulysses16, Ithaca to Troy
+    ],
+)
+def test_coordinates(kind: str, points: list[tuple[float, float]], distance: int) -> None:
+    instance = GtspInstance.from_coordinates("two", points, [[0], [1]], kind)
+    assert instance.costs.tolist() == [[0, distance], [distance, 0]]
+
+
+def test_round_trip_of_any_float(tmp_path: Path) -> None:
+    rng = np.random.default_rng(0)
+    costs = 10.0 ** rng.uniform(-9, 9, (4, 4)) * rng.choice([-1, 1], (4, 4))
+    costs[0, 3] = np.inf
+    for name, value in (("a", costs), ("b", np.array(FULL, dtype=float))):
+        instance = GtspInstance(name, value, CLUSTERS, comment="of a test: with a colon")
+        write_gtsp(tmp_path / name, instance)
+        assert read_gtsp(tmp_path / name) == instance
+    places = GtspInstance.from_coordinates("c", rng.normal(0, 50, (4, 2)), CLUSTERS, "CEIL_2D")
+    write_gtsp(tmp_path / "c", places)
+    assert read_gtsp(tmp_path / "c") == places
+
+
+def test_a_file_cut_anywhere_is_one_clear_error(tmp_path: Path) -> None:
+    text = explicit("FULL_MATRIX", LAYOUTS["FULL_MATRIX"])
+    complete = text.index("\nEOF")
+    for length in range(complete):
+        with pytest.raises(SchemaError, match=r"small\.gtsp"):
+            read_gtsp(written(tmp_path, text[:length]))
+    assert read_gtsp(written(tmp_path, text[:complete])).clusters == CLUSTERS
+
+
+def test_marks_of_other_systems(tmp_path: Path) -> None:
+    text = "\ufeff" + explicit("FULL_MATRIX", LAYOUTS["FULL_MATRIX"]).replace("\n", "\r\n")
+    path = tmp_path / "small.gtsp"
+    path.write_bytes(text.encode())
+    assert read_gtsp(path).costs.tolist() == FULL
+
+
+def test_round_trip_of_tours(tmp_path: Path) -> None:
+    write_tour(tmp_path / "tour", (4, 0, 2), name="three")
+    assert read_tour(tmp_path / "tour") == (4, 0, 2)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "rule"),
+    [
+        ("AGTSP", "TSP", "line 2: unknown TYPE 'TSP'"),
+        ("DIMENSION: 4", "DIMENSION: x", "line 3: DIMENSION must be a whole number from 1"),
+        ("DIMENSION: 4", "DIMENSION: 999999999999", "from 1 to 20000, got '999999999999'"),
+        ("DIMENSION: 4", "DIMENSION: 5", "DIMENSION|FULL_MATRIX of 5|node 5 is in none"),
+        ("SETS: 3", "SETS: " + "9" * 5000, "line 4: GTSP_SETS must be a whole number from 1 to 4"),
+        ("1 1 3 -1", "1 1 " + "9" * 5000, "line 11: '9{39}.* is not a whole number"),
+        ("DIMENSION: 4\n", "", "the keyword DIMENSION is missing"),
+        ("DIMENSION: 4", "DIMENSIONS: 4", "line 3: unknown keyword.*did you mean 'DIMENSION'"),
+        ("EXPLICIT", "EUC_3D", "line 5: unknown EDGE_WEIGHT_TYPE"),
+        ("FULL_MATRIX", "FUNCTION", "line 6: unknown EDGE_WEIGHT_FORMAT"),
+        ("4 5 6 0", "4 5 6", "line 7: FULL_MATRIX of 4 nodes has 16 numbers, got 15"),
+        ("4 5 6 0", "4 5 x 0", "line 9: 'x' is not a number"),
+        ("4 5 6 0", "4 5 nan 0", "line 9: 'nan' is not a number"),
+        ("4 5 6 0", "4 5 -inf 0", "-inf from node 3 to node 2"),
+        ("1 1 3 -1", "1 1 3", "line 12: node 2 is in set 1|line 12"),
+        ("1 1 3 -1", "1 1 9 -1", "line 11: nodes are 1 to 4, got 9"),
+        ("2 2 -1", "2 3 -1", "line 12: node 3 is in set 1 already"),
+        ("1 1 3 -1", "1 1 -1", "node 3 is in none"),
+        ("2 2 -1", "3 2 -1", "line 12: expected set 2, got 3"),
+        ("2 2 -1", "2 -1", "line 12: set 2 has no node"),
+        ("3 4 -1\n", "", "expected 3 sets, got 2"),
+        ("NAME: small", "5 6 7", "line 1: data outside of a section"),
+        ("TYPE: AGTSP", "NAME: again", "line 2: NAME stands here a second time"),
+        ("GTSP_SET_SECTION\n1 1 3 -1\n2 2 -1\n3 4 -1\n", "", "GTSP_SET_SECTION is missing"),
+    ],
+)
+def test_errors_name_file_line_and_rule(tmp_path: Path, old: str, new: str, rule: str) -> None:
+    text = explicit("FULL_MATRIX", LAYOUTS["FULL_MATRIX"])
+    assert old in text
+    path = written(tmp_path, text.replace(old, new, 1))
+    with pytest.raises(SchemaError, match=rule) as error:
+        read_gtsp(path)
+    assert str(path) in str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("data", "rule"),
+    [
+        ("1 2\n-1\n", "expected 3 nodes, as DIMENSION says, got 2"),
+        ("1 2 2 -1\n", "line 4: node 2 is visited twice"),
+        ("0 1 2 -1\n", "line 4: nodes are numbered from 1, got 0"),
+        ("1 2 3 -1 4\n", "line 4: expected nothing after -1"),
+        ("", "the tour has no node"),
+    ],
+)
+def test_bad_tours(tmp_path: Path, data: str, rule: str) -> None:
+    path = written(tmp_path, f"TYPE: TOUR\nDIMENSION: 3\nTOUR_SECTION\n{data}")
+    with pytest.raises(SchemaError, match=rule):
+        read_tour(path)
+
+
+def test_files_that_are_not_there(tmp_path: Path) -> None:
+    with pytest.raises(InvalidInputError, match="cannot read"):
+        read_gtsp(tmp_path / "none.gtsp")
+    with pytest.raises(InvalidInputError, match="cannot write"):
+        write_tour(tmp_path / "none" / "tour", (0,))
+    (tmp_path / "bytes.gtsp").write_bytes(b"\xff\xfe\x00")
+    with pytest.raises(InvalidInputError, match="cannot read"):
+        read_gtsp(tmp_path / "bytes.gtsp")
+
+
+def test_command_writes_a_tour(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = written(tmp_path, explicit("FULL_MATRIX", LAYOUTS["FULL_MATRIX"]))
+    out = tmp_path / "small.gtsp-tour"
+    assert main(["gtsp", str(path), "--iterations", "10", "--out", str(out)]) == 0
+    assert "optimal, cost 10, lower bound 10" in capsys.readouterr().out
+    assert sorted(read_tour(out)) == [0, 1, 3]
+    assert main(["gtsp", str(tmp_path / "none.gtsp")]) == 1
+    assert "cannot read" in capsys.readouterr().err
+
+
+def test_command_says_why_there_is_no_tour(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    data = "0 1 2 inf 1 0 3 inf\n2 3 0 inf 4 5 6 0"
+    path = written(tmp_path, explicit("FULL_MATRIX", data))
+    assert main(["gtsp", str(path)]) == 1
+    assert "infeasible: No tour visits every cluster" in capsys.readouterr().out

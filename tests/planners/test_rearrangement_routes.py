@@ -1,0 +1,120 @@
+"""Ways to the start of a push, driven as the policy drives them: nothing static is touched."""
+
+import math
+
+import numpy as np
+import pytest
+import shapely
+from conftest import make_boxes
+
+from pushplan.planners.rearrangement import Scene, SubTaskConfig
+from pushplan.planners.rearrangement.approach import approach_from
+from pushplan.planners.rearrangement.drive import LegDriver
+from pushplan.planners.rearrangement.route import Router
+from pushplan.world import Receptacle, StaticMap, World, box_delivery_robot
+from pushplan.world.outline import transform
+
+CORNER = Receptacle([(3.0, 3.0), (5.0, 3.0), (5.0, 5.0), (3.0, 5.0)])
+COLUMNS = [shapely.box(x, -0.5, x + 1.0, 0.5) for x in (-2.7, -0.6, 1.5)]
+WALLS = [
+    shapely.box(-5.2, -2.7, 5.2, -2.5),
+    shapely.box(-5.2, 5.0, 5.2, 5.2),
+    shapely.box(-5.2, -2.5, -5.0, 5.0),
+    shapely.box(5.0, -2.5, 5.2, 5.0),
+]
+STATIC = shapely.union_all([*COLUMNS, *WALLS])
+
+
+def among_columns(pose):
+    world = World(
+        robot=box_delivery_robot(),
+        robot_pose=pose,
+        static=StaticMap.build(
+            polygons=[part.exterior.coords[:-1] for part in [*COLUMNS, *WALLS]],
+            bounds=(-5, -2.5, 5, 5),
+        ),
+        movables=make_boxes([(4.0, -1.0, 0.0)]),
+        goal=CORNER,
+    )
+    return Scene(world, SubTaskConfig())
+
+
+def driven(scene, route):
+    """Poses of a robot that does exactly as it is told."""
+    pose, period = np.array(scene.world.robot_pose), scene.config.period
+    driver, found = LegDriver(scene.world.robot, route, period), [pose.copy()]
+    for _ in range(1000):
+        twist = driver.command(pose)
+        if twist is None:
+            return np.array(found)
+        for _ in range(5):
+            pose[2] += 0.1 * period * twist.angular
+            pose[:2] += 0.2 * period * twist.linear * np.array([np.cos(pose[2]), np.sin(pose[2])])
+            pose[2] += 0.1 * period * twist.angular
+            found.append(pose.copy())
+    raise AssertionError("the driver does not come to an end")
+
+
+def touched(scene, poses):
+    """How deep the robot has been in what is static [m^2], at most."""
+    bodies = [
+        shapely.union_all(
+            [shapely.Polygon(transform(pose, part)) for part in scene.world.robot.parts]
+        )
+        for pose in poses
+    ]
+    return float(shapely.area(shapely.intersection(STATIC, bodies)).max())
+
+
+def test_ways_among_columns_touch_nothing():
+    rng = np.random.default_rng(3)
+    found = asked = 0
+    while asked < 40:
+        pose = np.array([*rng.uniform((-4.5, -2.0), (4.5, 1.5)), rng.uniform(-math.pi, math.pi)])
+        scene = among_columns(pose)
+        target = np.array([*rng.uniform((-4.5, -2.0), (3.0, 1.5)), rng.uniform(-math.pi, math.pi)])
+        if not (scene.fits(pose) and scene.is_clear(pose) and scene.fits(target)):
+            continue
+        asked += 1
+        route = Router(scene).route(approach_from(scene), target)
+        if route is None:
+            continue
+        found += 1
+        poses = driven(scene, route)
+        assert touched(scene, poses) < 1e-6
+        if np.allclose(route.points[-1], target[:2]):
+            assert math.dist(poses[-1][:2], target[:2]) < 0.05
+        assert abs(math.remainder(poses[-1][2] - target[2], 2.0 * math.pi)) < 0.02
+    assert found >= 36
+
+
+@pytest.mark.parametrize("y", [-1.94, 1.08])
+@pytest.mark.parametrize(("heading", "to", "turn"), [(0.0, 3.1, 1), (0.0, -3.1, 1), (3.1, 0.0, -1)])
+def test_where_there_is_room_to_turn_one_way_only_it_is_taken(y, heading, to, turn):
+    """Near a wall, or a column: its wide bumper cannot pass on the side that is near."""
+    scene = among_columns((-0.1, y, heading))
+    route = Router(scene).route(approach_from(scene), np.array([-0.1, y, to]))
+    assert np.ptp(route.points, axis=0).max() < 0.1
+    assert route.turns[-1] in (0, turn)
+    poses = driven(scene, route)
+    assert touched(scene, poses) < 1e-6
+    assert math.copysign(1.0, poses[-1, 2] - heading) == turn
+
+
+def test_the_way_that_is_predicted_is_the_one_that_is_driven():
+    scene = among_columns((-0.1, -1.94, 0.0))
+    router = Router(scene)
+    route = router.route(approach_from(scene), np.array([-0.1, -1.94, -3.0]))
+    predicted, poses = router.poses_along(route), driven(scene, route)
+    assert np.abs(predicted[-1] - poses[-1]).max() < 0.05
+
+
+def test_out_of_a_wall_but_not_into_it():
+    """A robot whose bumper overlaps a column a little drives away from it."""
+    robot = box_delivery_robot()
+    reach = float(robot.vertices[:, 0].max())
+    scene = among_columns((-0.1, 0.5 + reach - 0.005, -0.5 * math.pi))
+    route = Router(scene).route(approach_from(scene), np.array([-0.1, 2.5, 0.0]))
+    poses = driven(scene, route)
+    assert touched(scene, poses) <= touched(scene, poses[:1]) + 1e-9
+    assert touched(scene, poses[-1:]) == 0.0

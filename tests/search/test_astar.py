@@ -1,0 +1,144 @@
+"""The A* kernel and the primitives."""
+
+import json
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.sparse import csr_matrix
+from scipy.sparse.csgraph import dijkstra
+
+from pushplan.motion.dubins import along_arc
+from pushplan.motion.state_lattice.generate import SHIPPED, main
+from pushplan.motion.state_lattice.heuristic import dubins_to_line
+from pushplan.motion.state_lattice.primitives import (
+    PrimitiveConfig,
+    PrimitiveSet,
+    generate,
+    primitives,
+)
+from pushplan.search.astar import EXHAUSTED, FOUND, PAUSED, AStar, offer, take
+from pushplan.search.graph_lattice import GraphLattice
+from pushplan.world import InvalidInputError, SchemaError
+
+
+def random_graph(seed: int, nodes: int = 120, edges: int = 500) -> tuple[csr_matrix, np.ndarray]:
+    rng = np.random.default_rng(seed)
+    ends = (rng.integers(0, nodes, edges), rng.integers(0, nodes, edges))
+    graph = csr_matrix((rng.random(edges) + 0.01, ends), shape=(nodes, nodes))
+    graph.sum_duplicates()
+    return graph, dijkstra(graph.T.tocsr(), indices=7)
+
+
+def lattice_of(graph: csr_matrix, bounds: np.ndarray) -> GraphLattice:
+    goals = np.zeros(graph.shape[0], dtype=bool)
+    goals[7] = True
+    rows = (graph.indptr.astype(np.int64), graph.indices.astype(np.int64))
+    return GraphLattice(*rows, graph.data, bounds, goals)
+
+
+@settings(max_examples=150, deadline=None)
+@given(seed=st.integers(0, 10**6), batch=st.integers(1, 50))
+def test_cost_is_least_whatever_the_batch_and_the_admissible_bound(seed: int, batch: int) -> None:
+    graph, exact = random_graph(seed)
+    share = np.random.default_rng(seed).random(len(exact))
+    bounds = np.where(np.isfinite(exact), exact * share, np.inf)  # admissible, not consistent
+    star = AStar(lattice_of(graph, bounds), len(exact), 64)
+    star.start(0)
+    while (result := star.run(batch)) == PAUSED:
+        pass
+    assert result == (FOUND if np.isfinite(exact[0]) else EXHAUSTED)
+    assert star.cost == pytest.approx(exact[0]) or result == EXHAUSTED
+    if result == FOUND:
+        nodes, edges = star.path()
+        assert nodes[0] == 0 and nodes[-1] == 7
+        assert graph.data[edges[1:]].sum() == pytest.approx(exact[0])
+
+
+def test_a_better_bound_expands_fewer_nodes() -> None:
+    counts = []
+    for share in (0.0, 0.5, 1.0):
+        graph, exact = random_graph(3)
+        bounds = np.where(np.isfinite(exact), share * np.nan_to_num(exact, posinf=0.0), np.inf)
+        star = AStar(lattice_of(graph, bounds), len(exact), 64)
+        star.start(0)
+        star.run(10_000)
+        counts.append(star.expanded)
+    assert counts[0] > counts[1] > counts[2]
+
+
+def test_a_search_can_be_driven_from_outside() -> None:
+    star = AStar(None, 5, 1)
+    star.start(3, cost=1.0)
+    offer(star.state, 4, 0.5, 0.0, 3, 9)
+    assert take(star.state) == 4
+    assert take(star.state) == 3
+    assert take(star.state) == -1
+    nodes, edges = star.path(4)
+    assert nodes.tolist() == [3, 4] and edges.tolist() == [-1, 9]
+
+
+def test_no_start_means_no_path() -> None:
+    star = AStar(lattice_of(*random_graph(0)), 120, 64)
+    assert star.run(10) == EXHAUSTED
+
+
+@pytest.mark.parametrize("headings", [8, 16, 32])
+@pytest.mark.parametrize("radius", [2.0, 6.0, 11.5])
+def test_primitives_join_lattice_states(headings: int, radius: float) -> None:
+    motions = generate(PrimitiveConfig(headings, radius))
+    assert (np.diff(motions.first) >= 1).all()
+    for p in range(len(motions)):
+        pose = np.array([0.0, 0.0, motions.angles[motions.heading_of(p)]])
+        for length, bend in motions.pieces[p]:
+            assert abs(bend) <= 1.0 / radius + 1e-12
+            along_arc(pose.copy(), length, bend, pose)
+        x, y, heading = motions.ends[p]
+        assert pose[:2] == pytest.approx([x, y], abs=1e-6)
+        turn = pose[2] - motions.angles[heading]
+        assert abs((turn + np.pi) % (2 * np.pi) - np.pi) < 1e-6
+
+
+@pytest.mark.parametrize("config", SHIPPED)
+def test_shipped_sets_are_what_the_tool_makes(config: PrimitiveConfig) -> None:
+    stored, made = primitives(config), generate(config)
+    assert np.array_equal(stored.ends, made.ends)
+    assert stored.pieces == pytest.approx(made.pieces, abs=1e-9)
+
+
+def test_tool_writes_a_file_that_reads_back(tmp_path) -> None:  # type: ignore[no-untyped-def]
+    assert main(["--headings", "8", "--radius", "4", "--out", str(tmp_path)]) == 0
+    (file,) = tmp_path.iterdir()
+    data = json.loads(file.read_text())
+    assert PrimitiveSet.from_json(data) == generate(PrimitiveConfig(8, 4.0))
+    data["color"] = 1
+    with pytest.raises(SchemaError):
+        PrimitiveSet.from_json(data)
+
+
+def test_config_is_checked() -> None:
+    with pytest.raises(InvalidInputError):
+        PrimitiveConfig(headings=7)
+    with pytest.raises(InvalidInputError):
+        PrimitiveConfig(radius=float("nan"))
+
+
+@settings(max_examples=80, deadline=None)
+@given(
+    heading=st.floats(-3.1, 3.1),
+    distance=st.floats(0.01, 20.0),
+    bends=st.lists(st.floats(-1.0, 1.0), min_size=200, max_size=200),
+)
+def test_no_drivable_path_is_shorter_than_the_bound(
+    heading: float, distance: float, bends: list[float]
+) -> None:
+    pose = np.array([0.0, 0.0, heading])
+    bound = float(dubins_to_line(np.array(distance), np.array(heading), 1.0))
+    for k, bend in enumerate(bends):
+        # half of the steps steer home, so that some paths are nearly the shortest
+        turn = bend if k % 2 else -np.sign(pose[2])
+        along_arc(pose.copy(), 0.1, float(turn), pose)
+        if pose[0] >= distance:
+            assert 0.1 * (k + 1) >= bound - 1e-6
+            return
