@@ -67,7 +67,7 @@ __all__ = [
 _LAZY = {
     "approach": ("Approach", "best_offset", "find_approach"),
     "bumper": ("Bumper", "Face", "face_towards"),
-    "config": ("PushingConfig",),
+    "pushing_config": ("PushingConfig",),
     "executor": ("ExecutorConfig", "PushExecutor", "PushPhase", "PushStatus", "PushTask"),
     "fit": ("PushFit", "fit_push_model", "identify"),
     "log": ("PushLog", "push_log"),
@@ -75,7 +75,7 @@ _LAZY = {
     "mpc": ("PushingMpc",),
     "path": ("PushPath",),
     "reference": ("NonlinearPushingMpc",),
-    "warming": ("warm_up",),
+    "kernel_warmup": ("warm_up",),
 }
 _HOMES = {name: module for module, names in _LAZY.items() for name in names}
 
