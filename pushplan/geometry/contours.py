@@ -7,8 +7,8 @@ from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
+from pushplan.compiled import kernel
 from pushplan.geometry.obstacles import Obstacles, obstacle_distance, obstacles_of
 from pushplan.world import StaticMap
 from pushplan.world.checks import BoolArray, FloatArray, IntArray, frozen
@@ -114,7 +114,7 @@ def _loop(core: FloatArray, radius: float, step: float) -> FloatArray:
     return np.ascontiguousarray(np.concatenate(points))
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def free_points(points: FloatArray, obstacles: Obstacles, box: FloatArray, gap: float) -> BoolArray:
     """Which of the points (N, 2) [m] lie in the box (4,) and ``gap`` or more off every obstacle."""
     keep = np.empty(points.shape[0], dtype=np.bool_)
@@ -127,7 +127,7 @@ def free_points(points: FloatArray, obstacles: Obstacles, box: FloatArray, gap: 
     return keep
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def segment_crossings(first: FloatArray, second: FloatArray) -> FloatArray:
     """Points (N, 2) [m] where a segment of one list crosses one of the other.
 

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import math
 
-from numba import njit
-
+from pushplan.compiled import kernel
 from pushplan.world.checks import FloatArray
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def _best_edge(a: FloatArray, b: FloatArray) -> tuple[float, float, float]:
     """Outward edge normal of ``a`` along which ``b`` is farthest away: gap [m] and normal."""
     best, bx, by = -math.inf, 1.0, 0.0
@@ -31,7 +30,7 @@ def _best_edge(a: FloatArray, b: FloatArray) -> tuple[float, float, float]:
     return best, bx, by
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def convex_penetration(a: FloatArray, b: FloatArray) -> tuple[float, float, float]:
     """Least translation that separates two convex polygons (separating axis theorem).
 
@@ -51,7 +50,7 @@ def convex_penetration(a: FloatArray, b: FloatArray) -> tuple[float, float, floa
     return -gap_b, -bx, -by
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def _is_separated_by_edge(a: FloatArray, b: FloatArray) -> bool:
     n = a.shape[0]
     for i in range(n):
@@ -69,7 +68,7 @@ def _is_separated_by_edge(a: FloatArray, b: FloatArray) -> bool:
     return False
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def convex_overlap(a: FloatArray, b: FloatArray) -> bool:
     """Whether the interiors of two convex counter-clockwise polygons meet; touching is no overlap.
 
@@ -80,7 +79,7 @@ def convex_overlap(a: FloatArray, b: FloatArray) -> bool:
     return not (_is_separated_by_edge(a, b) or _is_separated_by_edge(b, a))
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def point_segment_distance_sq(
     x: float, y: float, ax: float, ay: float, bx: float, by: float
 ) -> float:
@@ -95,7 +94,7 @@ def point_segment_distance_sq(
     return ex * ex + ey * ey
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def _least_corner_distance_sq(a: FloatArray, b: FloatArray) -> float:
     best = math.inf
     n = a.shape[0]
@@ -107,7 +106,7 @@ def _least_corner_distance_sq(a: FloatArray, b: FloatArray) -> float:
     return best
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def convex_distance(a: FloatArray, b: FloatArray) -> float:
     """Euclidean distance [m] between two convex counter-clockwise polygons, 0 if they overlap.
 

@@ -8,10 +8,10 @@ from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 
 import numpy as np
-from numba import njit
 from numpy.typing import ArrayLike
 from scipy import ndimage
 
+from pushplan.compiled import kernel
 from pushplan.geometry.contours import standoff_of
 from pushplan.geometry.grid import Grid, clearance_field
 from pushplan.geometry.obstacles import Obstacles, obstacle_distance
@@ -22,7 +22,7 @@ from pushplan.world import Goal, StaticMap
 from pushplan.world.checks import FloatArray, array, frozen, number
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def _fill_distances(
     out: FloatArray,
     ox: float,
@@ -52,7 +52,7 @@ def _fill_distances(
             out[i, j] = best
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def sample_values(
     values: FloatArray, ox: float, oy: float, step: float, x: float, y: float
 ) -> float:

@@ -6,9 +6,9 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import ArrayLike
 
+from pushplan.compiled import kernel
 from pushplan.geometry.obstacles import obstacle_distance, obstacles_of
 from pushplan.world import InvalidInputError, StaticMap
 from pushplan.world.checks import (
@@ -88,7 +88,7 @@ class Grid(ArrayRecord):
         return row, col
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def _fill_clearance(
     out: FloatArray,
     ox: float,

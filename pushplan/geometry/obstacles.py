@@ -12,8 +12,8 @@ from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
+from pushplan.compiled import kernel
 from pushplan.geometry.convex import point_segment_distance_sq
 from pushplan.world import StaticMap
 from pushplan.world.checks import FloatArray, IntArray, frozen
@@ -49,7 +49,7 @@ def obstacles_of(static: StaticMap, clearance: float = 0.0) -> Obstacles:
     return Obstacles(vertices, offsets, frozen(radii), frozen(boxes))
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def core_distance(x: float, y: float, vertices: FloatArray, first: int, last: int) -> float:
     """Signed distance [m] of a point to the core ``vertices[first:last]``, negative inside."""
     best_sq, inside = math.inf, last - first > 2
@@ -63,7 +63,7 @@ def core_distance(x: float, y: float, vertices: FloatArray, first: int, last: in
     return -distance if inside else distance
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def obstacle_distance(
     x: float, y: float, vertices: FloatArray, offsets: IntArray, radii: FloatArray
 ) -> float:
@@ -78,7 +78,7 @@ def obstacle_distance(
     return best
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def _segments_closer(
     px: float,
     py: float,
@@ -107,7 +107,7 @@ def _segments_closer(
     )
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def line_of_sight(
     px: float,
     py: float,

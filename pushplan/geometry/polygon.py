@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import math
 
-from numba import njit
-
+from pushplan.compiled import kernel
 from pushplan.world.checks import FloatArray
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def polygon_area(v: FloatArray) -> float:
     """Shoelace area [m²] of the polygon with corners ``v`` (N, 2) [m], positive if CCW."""
     total = 0.0
@@ -22,7 +21,7 @@ def polygon_area(v: FloatArray) -> float:
     return 0.5 * total
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def polygon_centroid(v: FloatArray) -> tuple[float, float]:
     """Centre of area x, y [m] of the polygon with corners ``v`` (N, 2) [m].
 
@@ -46,7 +45,7 @@ def polygon_centroid(v: FloatArray) -> tuple[float, float]:
     return x0 + mx / (3.0 * twice), y0 + my / (3.0 * twice)
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def polygon_inertia(v: FloatArray) -> float:
     """Polar second moment about the centroid per unit mass [m²] of a uniform polygon.
 
@@ -72,7 +71,7 @@ def polygon_inertia(v: FloatArray) -> float:
     return moment / (6.0 * twice)
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def point_in_polygon(x: float, y: float, v: FloatArray) -> bool:
     """Whether the point lies inside the simple polygon ``v`` (N, 2) [m], by crossing number.
 
@@ -91,7 +90,7 @@ def point_in_polygon(x: float, y: float, v: FloatArray) -> bool:
     return inside
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def transform_points(
     x: float, y: float, theta: float, points_body: FloatArray, out: FloatArray
 ) -> None:

@@ -9,13 +9,13 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from numba import njit
 from numpy.typing import NDArray
 
+from pushplan.compiled import kernel
 from pushplan.world.checks import FloatArray, IntArray
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def fill_convex(image: NDArray[Any], vertices_px: FloatArray, value: Any) -> None:
     """Set every pixel whose centre is inside a convex polygon, clipped to the image.
 
@@ -63,7 +63,7 @@ def fill_convex(image: NDArray[Any], vertices_px: FloatArray, value: Any) -> Non
             image[r, c] = value
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def fill_convex_parts(
     image: NDArray[Any], vertices_px: FloatArray, offsets: IntArray, value: Any
 ) -> None:

@@ -7,9 +7,9 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import ArrayLike
 
+from pushplan.compiled import kernel
 from pushplan.geometry.contours import segment_crossings
 from pushplan.world import (
     ClearanceArea,
@@ -101,7 +101,7 @@ def outside_area(target: Target, points: FloatArray) -> BoolArray:
     return outside
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def _nearest_in_polygon(
     x: float, y: float, corners: FloatArray, first: int, last: int
 ) -> tuple[float, float]:
@@ -126,7 +126,7 @@ def _nearest_in_polygon(
     return bx, by
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def nearest_in_region(k: int, x: float, y: float, regions: Regions) -> tuple[float, float]:
     """Point of region ``k`` that is nearest to x, y [m]: the point itself if it is inside."""
     discs, lines = regions.discs.shape[0], regions.lines.shape[0]

@@ -13,10 +13,10 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 from scipy import ndimage
 
+from pushplan.compiled import kernel
 from pushplan.geometry.contours import Contours, contours_of, gap_of, standoff_of
 from pushplan.geometry.grid import Grid, occupancy
 from pushplan.geometry.obstacles import Obstacles, line_of_sight, obstacle_distance, obstacles_of
@@ -35,7 +35,7 @@ Mask = NDArray[np.uint8]
 Table = NDArray[np.float32]
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def _outermost(x: float, y: float, corners: FloatArray) -> tuple[int, int]:
     """The two corners of a convex polygon between which a viewpoint sees it; -1 from inside."""
     n = corners.shape[0]
@@ -62,7 +62,7 @@ def _outermost(x: float, y: float, corners: FloatArray) -> tuple[int, int]:
     return first, last
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def fill_shadow(mask: Mask, x: float, y: float, corners: FloatArray, value: int) -> None:
     """Fill a convex polygon and everything that it hides from a viewpoint.
 
@@ -103,7 +103,7 @@ def fill_shadow(mask: Mask, x: float, y: float, corners: FloatArray, value: int)
     fill_convex(mask, hull, value)
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def fill_shadows(
     mask: Mask, x: float, y: float, corners: FloatArray, offsets: IntArray, value: int
 ) -> None:
@@ -112,7 +112,7 @@ def fill_shadows(
         fill_shadow(mask, x, y, corners[offsets[k] : offsets[k + 1]], value)
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def _fill_table(
     table: Table,
     origin: FloatArray,
@@ -156,7 +156,7 @@ def _fill_table(
                 table[i, j, m] = best[m]
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def _bends_in_sight(
     x: float, y: float, bends: Contours, obstacles: Obstacles, gap: float, sliver: float
 ) -> tuple[IntArray, FloatArray]:

@@ -9,9 +9,9 @@ from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import ArrayLike
 
+from pushplan.compiled import kernel
 from pushplan.geometry.contours import (
     Contours,
     box_edges,
@@ -108,7 +108,7 @@ def _ways_out(static: StaticMap, clearance: float) -> FloatArray:
     return points[keep]
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def _first_legs(
     points: FloatArray, regions: Regions, obstacles: Obstacles, box: FloatArray, gap: float
 ) -> FloatArray:

@@ -6,8 +6,8 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
+from pushplan.compiled import kernel
 from pushplan.geometry.obstacles import Obstacles, line_of_sight
 from pushplan.geometry.regions import Regions, nearest_in_region
 from pushplan.world.checks import FloatArray, IntArray
@@ -34,7 +34,7 @@ class Nodes(NamedTuple):
     distances: FloatArray
 
 
-@njit(cache=True, nogil=True, inline="always")
+@kernel(allocates=True, inline=True)
 def is_tangent(
     dx: float, dy: float, ix: float, iy: float, ox: float, oy: float, gap: float
 ) -> bool:
@@ -47,7 +47,7 @@ def is_tangent(
     return (before >= -gap and after <= gap) or (before <= gap and after >= -gap)
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def _sees(px: float, py: float, qx: float, qy: float, obstacles: Obstacles, gap: float) -> bool:
     return bool(
         line_of_sight(
@@ -64,7 +64,7 @@ def _sees(px: float, py: float, qx: float, qy: float, obstacles: Obstacles, gap:
     )
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def visible_pairs(
     points: FloatArray,
     incoming: FloatArray,
@@ -104,7 +104,7 @@ def visible_pairs(
     return pairs[:count].copy(), lengths[:count].copy()
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def relax(
     distances: FloatArray, parents: IntArray, starts: IntArray, ends: IntArray, lengths: FloatArray
 ) -> None:
@@ -133,7 +133,7 @@ def relax(
                 parents[other] = node
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def goal_leg(
     x: float,
     y: float,
@@ -158,7 +158,7 @@ def goal_leg(
     return best, bx, by
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def node_leg(
     x: float,
     y: float,

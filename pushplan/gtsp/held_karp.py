@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from pushplan.gtsp.kernels import jit
+from pushplan.compiled import kernel
 from pushplan.world.checks import FloatArray, IntArray
 
 
-@jit
+@kernel(allocates=True)
 def fill_subsets(
     low: int,
     high: int,
@@ -47,7 +47,7 @@ def fill_subsets(
                     _relax(table[rest, c], blocks[c, :, d], sizes[c], out, width)
 
 
-@jit
+@kernel(allocates=True)
 def _relax(values: FloatArray, block: FloatArray, size: int, out: FloatArray, width: int) -> None:
     """``out = min(out, values + block)`` over the rows of a block, four at a time."""
     i = 0
@@ -67,7 +67,7 @@ def _relax(values: FloatArray, block: FloatArray, size: int, out: FloatArray, wi
         i += 1
 
 
-@jit
+@kernel(allocates=True)
 def read_path(
     table: FloatArray, blocks: FloatArray, sizes: IntArray, last: FloatArray, path: IntArray
 ) -> float:

@@ -8,19 +8,15 @@ node means nothing; ``reverse`` holds its transpose.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from pushplan.compiled import kernel
 from pushplan.world.checks import FloatArray, IntArray
-
-jit = njit(cache=True, nogil=True)
-inline = njit(cache=True, nogil=True, forceinline=True, _nrt=False)  # type: ignore[call-overload]
-"""For small kernels that make no arrays: without reference counts, which took most of the time."""
 
 SPARE = 3
 """Columns that the matrices of a search have past the last node, see `push_values`."""
 
 
-@inline
+@kernel(inline=True)
 def draw(state: IntArray) -> float:
     """A number in [0, 1) from a xorshift64* generator (Vigna 2016); ``state`` is (1,) uint64."""
     x = state[0]
@@ -32,13 +28,13 @@ def draw(state: IntArray) -> float:
     return float(high) * (1.0 / 9007199254740992.0)
 
 
-@inline
+@kernel(inline=True)
 def below(state: IntArray, count: int) -> int:
     """A whole number from 0 to ``count - 1``."""
     return int(draw(state) * count)
 
 
-@inline
+@kernel(inline=True)
 def push_layer(
     costs: FloatArray, values: FloatArray, at: int, n_at: int, to: int, n_to: int, out: FloatArray
 ) -> None:
@@ -62,7 +58,7 @@ def push_layer(
             out[w] = min(head + row[w], out[w])
 
 
-@inline
+@kernel(inline=True)
 def push_values(
     costs: FloatArray,
     values: FloatArray,
@@ -98,7 +94,7 @@ def push_values(
         out[w], out[w + 1], out[w + 2], out[w + 3] = first, second, third, fourth
 
 
-@jit
+@kernel(allocates=True)
 def best_nodes(
     costs: FloatArray,
     offsets: IntArray,

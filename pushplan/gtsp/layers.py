@@ -13,7 +13,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pushplan.gtsp.kernels import SPARE, inline, jit, push_values
+from pushplan.compiled import kernel
+from pushplan.gtsp.kernels import SPARE, push_values
 from pushplan.world.checks import FloatArray, IntArray
 
 
@@ -61,7 +62,7 @@ class Layers(NamedTuple):
     right: FloatArray
 
 
-@jit
+@kernel(allocates=True)
 def make_layers(costs: FloatArray, reverse: FloatArray, offsets: IntArray, root: int) -> Layers:
     """Memory for a search."""
     count = len(offsets) - 1
@@ -90,7 +91,7 @@ def make_layers(costs: FloatArray, reverse: FloatArray, offsets: IntArray, root:
     )
 
 
-@jit
+@kernel(allocates=True)
 def build(tour: Layers, order: IntArray, root_node: int) -> float:
     """All values of a closed tour from scratch; returns its cost."""
     count = len(order)
@@ -115,14 +116,14 @@ def build(tour: Layers, order: IntArray, root_node: int) -> float:
     return float(total)
 
 
-@inline
+@kernel(inline=True)
 def _from(
     costs: FloatArray, values: FloatArray, tour: Layers, a: int, b: int, out: FloatArray
 ) -> None:
     push_values(costs, values, a, tour.at[a], tour.size[a], tour.at[b], tour.size[b], out)
 
 
-@inline
+@kernel(inline=True)
 def keep(tour: Layers, c: int, now: int) -> None:
     """Save a cluster as it is, once in a round."""
     if tour.stamp[c] != now:
@@ -135,7 +136,7 @@ def keep(tour: Layers, c: int, now: int) -> None:
             tour.old_ahead[c, v], tour.old_behind[c, v] = tour.ahead[c, v], tour.behind[c, v]
 
 
-@inline
+@kernel(inline=True)
 def undo(tour: Layers) -> None:
     """Put back what `keep` has saved in this round."""
     for i in range(1, tour.touched[0] + 1):
@@ -146,7 +147,7 @@ def undo(tour: Layers) -> None:
             tour.ahead[c, v], tour.behind[c, v] = tour.old_ahead[c, v], tour.old_behind[c, v]
 
 
-@inline
+@kernel(inline=True)
 def _renew(
     tour: Layers,
     costs: FloatArray,
@@ -174,13 +175,13 @@ def _renew(
         p, c = c, onward[c]
 
 
-@inline
+@kernel(inline=True)
 def _renew_both(tour: Layers, c: int, root: int, now: int, tolerance: float) -> None:
     _renew(tour, tour.costs, tour.ahead, tour.after, c, root, now, tolerance)
     _renew(tour, tour.reverse, tour.behind, tour.before, c, root, now, tolerance)
 
 
-@inline
+@kernel(inline=True)
 def close_gap(
     tour: Layers, a: int, b: int, carried: float, root: int, now: int, tolerance: float
 ) -> float:
@@ -222,7 +223,7 @@ def close_gap(
     return float(price - carried)
 
 
-@inline
+@kernel(inline=True)
 def price_between(tour: Layers, c: int, a: int, b: int) -> float:
     """What the tour becomes dearer by with cluster c between a and b."""
     left, right = tour.left, tour.right
@@ -234,7 +235,7 @@ def price_between(tour: Layers, c: int, a: int, b: int) -> float:
     return float(price)
 
 
-@inline
+@kernel(inline=True)
 def link_in(tour: Layers, c: int, a: int, root: int, now: int, tolerance: float) -> float:
     """Put cluster c behind cluster a; returns the change of the tour's cost."""
     b = tour.after[a]

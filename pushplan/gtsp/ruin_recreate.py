@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from pushplan.gtsp.kernels import below, best_nodes, draw, inline, jit
+from pushplan.compiled import kernel
+from pushplan.gtsp.kernels import below, best_nodes, draw
 from pushplan.gtsp.layers import (
     Layers,
     build,
@@ -22,7 +23,7 @@ FRESH_ROUNDS = 500
 """Values are computed from scratch this often, so that rounding does not add up."""
 
 
-@inline
+@kernel(inline=True)
 def _ruin(
     tour: Layers,
     near: IntArray,
@@ -68,7 +69,7 @@ def _ruin(
     return found, change
 
 
-@inline
+@kernel(inline=True)
 def _bring_forward(
     near: IntArray,
     between: FloatArray,
@@ -92,7 +93,7 @@ def _bring_forward(
     removed[low], removed[pick] = removed[pick], removed[low]
 
 
-@inline
+@kernel(inline=True)
 def _cheapest_place(
     tour: Layers,
     near: IntArray,
@@ -127,7 +128,7 @@ def _cheapest_place(
     return place
 
 
-@jit
+@kernel(allocates=True)
 def _to_front(order: IntArray, root: int, scratch: IntArray) -> None:
     """Rotate a closed order so that it begins with the root."""
     p = 0
@@ -138,7 +139,7 @@ def _to_front(order: IntArray, root: int, scratch: IntArray) -> None:
         order[q] = scratch[(p + q) % len(order)]
 
 
-@jit
+@kernel(allocates=True)
 def search_tours(
     costs: FloatArray,
     reverse: FloatArray,

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from pushplan.gtsp.kernels import jit
+from pushplan.compiled import kernel
 from pushplan.world.checks import FloatArray, IntArray
 
 
-@jit
+@kernel(allocates=True)
 def _rotate(values: IntArray, scratch: IntArray, low: int, middle: int, high: int) -> None:
     """``values[low:middle]`` and ``values[middle:high]`` change places."""
     first = middle - low
@@ -19,7 +19,7 @@ def _rotate(values: IntArray, scratch: IntArray, low: int, middle: int, high: in
     values[low + second : high] = scratch[:first]
 
 
-@jit
+@kernel(allocates=True)
 def improve_by_swaps(
     costs: FloatArray,
     near: IntArray,
@@ -63,7 +63,7 @@ def improve_by_swaps(
     return total
 
 
-@jit
+@kernel(allocates=True)
 def _first_swap(
     costs: FloatArray,
     near: IntArray,
@@ -106,7 +106,7 @@ def _first_swap(
     return 0.0
 
 
-@jit
+@kernel(allocates=True)
 def _swap(
     order: IntArray, nodes: IntArray, place: IntArray, scratch: IntArray, i: int, j: int, k: int
 ) -> None:
@@ -121,7 +121,7 @@ def _swap(
         place[order[p]] = p
 
 
-@jit
+@kernel(allocates=True)
 def _first_reversal(
     costs: FloatArray,
     near: IntArray,

@@ -8,11 +8,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from pushplan.gtsp.kernels import jit
+from pushplan.compiled import kernel
 from pushplan.world.checks import FloatArray, IntArray
 
 
-@jit
+@kernel(allocates=True)
 def memory_moves(lists: IntArray) -> IntArray:
     """What a walk remembers when cluster d is put in front of a walk that begins in e.
 
@@ -50,7 +50,7 @@ def memory_moves(lists: IntArray) -> IntArray:
     return moves
 
 
-@jit
+@kernel(allocates=True)
 def extend_walks(
     walks: FloatArray,
     longer: FloatArray,
@@ -90,7 +90,7 @@ def extend_walks(
                             out[i] = min(out[i], value + row[i])
 
 
-@jit
+@kernel(allocates=True)
 def read_visits(
     walks: FloatArray,
     first: FloatArray,
@@ -149,7 +149,7 @@ def read_visits(
     return best
 
 
-@jit
+@kernel(allocates=True)
 def allow_memories(walks: FloatArray) -> None:
     """Turn the entries ``walks[:, M]`` into the least of all memories that lie within M."""
     count, memories, width = walks.shape
@@ -165,7 +165,7 @@ def allow_memories(walks: FloatArray) -> None:
             bit <<= 1
 
 
-@jit
+@kernel(allocates=True)
 def extend_paths(
     sets: IntArray,
     ends: IntArray,

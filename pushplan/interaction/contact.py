@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pushplan.geometry.compiled import kernel
+from pushplan.compiled import kernel
 from pushplan.world.checks import FloatArray
 
 

@@ -12,8 +12,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
+from pushplan.compiled import kernel
 from pushplan.world.checks import FloatArray, IntArray
 
 ROBOT = -1
@@ -74,7 +74,7 @@ class Memory(NamedTuple):
     """(2, 5) points of one pair: x, y, normal, gap."""
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def make_memory(crowd: Crowd) -> Memory:
     """Memory for `advance_ice`; one per thread and crowd."""
     count = crowd.radii.shape[0]
@@ -90,7 +90,7 @@ def make_memory(crowd: Crowd) -> Memory:
     )
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def place_corners(pose: FloatArray, points: FloatArray, out: FloatArray) -> None:
     """Carry (N, 2) body-frame points to the world frame, into ``out``."""
     c, s = np.cos(pose[2]), np.sin(pose[2])
@@ -99,7 +99,7 @@ def place_corners(pose: FloatArray, points: FloatArray, out: FloatArray) -> None
         out[i, 1] = pose[1] + s * points[i, 0] + c * points[i, 1]
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def _widest_gap(a: FloatArray, b: FloatArray, enough: float) -> tuple[float, int]:
     """Greatest gap from an edge of ``a`` to ``b`` and that edge; stops at one beyond ``enough``."""
     best, edge = -np.inf, 0
@@ -121,7 +121,7 @@ def _widest_gap(a: FloatArray, b: FloatArray, enough: float) -> tuple[float, int
     return best, edge
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def near_contacts(a: FloatArray, b: FloatArray, margin: float, out: FloatArray) -> int:
     """Points where two convex polygons touch or may soon touch.
 
@@ -182,7 +182,7 @@ def near_contacts(a: FloatArray, b: FloatArray, margin: float, out: FloatArray) 
     return found
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def _note(
     a: int,
     b: int,
@@ -219,7 +219,7 @@ def _note(
     return count
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def _meet_neighbours(
     k: int,
     count: int,
@@ -248,7 +248,7 @@ def _meet_neighbours(
     return count
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def _relax(
     count: int, by: FloatArray, poses: FloatArray, crowd: Crowd, solver: Solver, memory: Memory
 ) -> None:
@@ -282,7 +282,7 @@ def _relax(
             moves[a, 2] -= weight * crowd.inverse_gyration[a] * (ax * iy - ay * ix)
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def advance_ice(
     here: FloatArray,
     by: FloatArray,
@@ -346,7 +346,7 @@ def advance_ice(
     return work
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def sweep_ice(
     path: FloatArray,
     poses: FloatArray,

@@ -13,9 +13,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
-from pushplan.geometry.compiled import copy_into, kernel
+from pushplan.compiled import copy_into, kernel
 from pushplan.interaction.contact import contacts, least_overlap
 from pushplan.interaction.separation import drag_along, place, separate
 from pushplan.world.checks import FloatArray, IntArray
@@ -115,7 +114,7 @@ class Scratch(NamedTuple):
     """(1,) pairs of outlines that were tested so far: a measure of time without a clock."""
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def make_scratch(bodies: Bodies) -> Scratch:
     """Memory for `advance`; one per thread."""
     count = bodies.radii.shape[0]
@@ -359,7 +358,7 @@ def robot_held(pose: FloatArray, bodies: Bodies, settings: Settings, scratch: Sc
     return False
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def sweep_path(
     path: FloatArray, poses: FloatArray, bodies: Bodies, settings: Settings, out: FloatArray
 ) -> int:

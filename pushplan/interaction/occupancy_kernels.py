@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from pushplan.compiled import kernel
 from pushplan.geometry.raster import fill_convex
 from pushplan.interaction.separation import place
 from pushplan.world.checks import FloatArray, IntArray
@@ -18,7 +18,7 @@ SUBCELLS = 4
 """Samples along each side of a cell: coverage comes in steps of 1/16."""
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def _to_pixels(points: FloatArray, frame: FloatArray, scale: float, out: FloatArray) -> None:
     """Carry (N, 2) world points [m] into samples of a raster; see `cover_objects` for the frame."""
     c, s = math.cos(frame[2]), math.sin(frame[2])
@@ -28,7 +28,7 @@ def _to_pixels(points: FloatArray, frame: FloatArray, scale: float, out: FloatAr
         out[i, 1] = scale * (c * dy - s * dx)
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def _average(fine: NDArray[np.uint8], out: Patch) -> None:
     for r in range(out.shape[0]):
         for col in range(out.shape[1]):
@@ -39,7 +39,7 @@ def _average(fine: NDArray[np.uint8], out: Patch) -> None:
             out[r, col] = total / (SUBCELLS * SUBCELLS)
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def cover_objects(
     poses: FloatArray,
     vertices: FloatArray,
@@ -71,7 +71,7 @@ def cover_objects(
     _average(fine, out)
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def cover_sweep(
     path: FloatArray,
     vertices: FloatArray,

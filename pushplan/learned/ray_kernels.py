@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from pushplan.compiled import kernel
 from pushplan.world.checks import FloatArray, IntArray
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def cast_rays(
     out: FloatArray,
     x: float,
@@ -51,7 +51,7 @@ def cast_rays(
                     out[n % count] = away
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def near_outlines(
     x: float,
     y: float,

@@ -6,8 +6,8 @@ import functools
 import heapq
 
 import numpy as np
-from numba import njit
 
+from pushplan.compiled import kernel
 from pushplan.geometry import core_distance
 from pushplan.world import GoalDisc, StaticMap, World
 from pushplan.world.checks import BoolArray, FloatArray, IntArray, frozen
@@ -19,7 +19,7 @@ _MOST = 400
 """Cells along the longer side at most."""
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def _prices(
     origin: FloatArray,
     cell: float,
@@ -51,7 +51,7 @@ def _prices(
     return price
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def _search(price: FloatArray, start: int, goal: BoolArray, cell: float) -> FloatArray:
     """Dijkstra over 8 neighbours from ``start``; returns the cells to the cheapest goal cell."""
     rows, cols = price.shape

@@ -7,9 +7,9 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from shapely import Polygon
 
+from pushplan.compiled import kernel
 from pushplan.geometry import convex_overlap
 from pushplan.interaction.separation import place
 from pushplan.world import RobotModel, StaticMap
@@ -62,7 +62,7 @@ def obstacles(static: StaticMap, outlines: Sequence[FloatArray] = ()) -> Obstacl
     return Obstacles(vertices, offsets, np.array(boxes).reshape(-1, 4), static.bounds)
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def is_free(pose: FloatArray, shape: Footprint, among: Obstacles, scratch: FloatArray) -> bool:
     """Whether the footprint at ``pose`` (3,) overlaps nothing and its origin is in bounds.
 
@@ -91,7 +91,7 @@ def is_free(pose: FloatArray, shape: Footprint, among: Obstacles, scratch: Float
     return True
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def first_blocked(
     poses: FloatArray, count: int, shape: Footprint, among: Obstacles, scratch: FloatArray
 ) -> int:

@@ -11,8 +11,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
+from pushplan.compiled import kernel
 from pushplan.interaction.kernels import Bodies, Settings, advance, make_scratch
 from pushplan.motion.collision import Footprint, Obstacles, first_blocked
 from pushplan.motion.dubins import dubins, sample_pieces
@@ -77,7 +77,7 @@ def make_path(capacity: int, objects: int) -> Path:
     )
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def in_goal(x: float, y: float, goal: FloatArray) -> bool:
     """Whether a point counts as the goal."""
     if goal[0] == 0.0:
@@ -87,7 +87,7 @@ def in_goal(x: float, y: float, goal: FloatArray) -> bool:
     return inside
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def price_from(
     path: Path,
     first: int,
@@ -139,7 +139,7 @@ def price_from(
     return cost
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def lay_out(start: FloatArray, arcs: FloatArray, path: Path, pricing: Pricing) -> int:
     """Write the poses of consecutive arcs into a path, cut off where the goal is reached.
 
@@ -163,7 +163,7 @@ def lay_out(start: FloatArray, arcs: FloatArray, path: Path, pricing: Pricing) -
     return found + 1
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def _new_end(at: FloatArray, last: FloatArray, draw: FloatArray, pricing: Pricing) -> FloatArray:
     """A pose in the goal near ``last`` that a robot at ``at`` would drive straight into."""
     goal = pricing.goal
@@ -187,7 +187,7 @@ def _new_end(at: FloatArray, last: FloatArray, draw: FloatArray, pricing: Pricin
     return end
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def _pick_piece(count: int, draw: FloatArray) -> tuple[int, int]:
     """First and last pose of the piece to replace: short pieces as often as long ones."""
     span = int(2 + (count - 2) * draw[0] * draw[0])
@@ -195,7 +195,7 @@ def _pick_piece(count: int, draw: FloatArray) -> tuple[int, int]:
     return first, min(first + span, count - 1)
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def _propose(
     path: Path,
     count: int,
@@ -263,7 +263,7 @@ def _propose(
     return first, new, size + rest
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def improve(
     path: Path,
     count: int,

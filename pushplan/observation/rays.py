@@ -5,14 +5,14 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
+from pushplan.compiled import kernel
 from pushplan.geometry.shadows import BendDistances, Table, fill_shadows
 from pushplan.observation.view import Image, View, to_pixels
 from pushplan.world.checks import FloatArray, IntArray
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def draw_ray(image: Image, x: float, y: float, dx: float, dy: float, value: int) -> None:
     """A line one pixel wide from a point to the edge of the image.
 
@@ -72,7 +72,7 @@ def fill_hidden(image: Image, view: View, source: BendDistances, per_metre: floa
     )
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def _fill_hidden(
     image: Image,
     view: FloatArray,

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numba import njit
 
+from pushplan.compiled import kernel
 from pushplan.geometry import fill_convex
 from pushplan.world import World
 from pushplan.world.checks import FloatArray, IntArray
@@ -78,7 +78,7 @@ class View:
         _sample(image, self.numbers, values, origin[0], origin[1], step)
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def to_pixels(view: FloatArray, points: FloatArray, out: FloatArray) -> None:
     """World points (N, 2) [m] to column and row [px]."""
     c, s = np.cos(view[2]), np.sin(view[2])
@@ -88,7 +88,7 @@ def to_pixels(view: FloatArray, points: FloatArray, out: FloatArray) -> None:
         out[i, 1] = 0.5 * view[3] - (c * dx + s * dy) / view[5]
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def _fill_parts(
     image: Image, view: FloatArray, vertices: FloatArray, offsets: IntArray, value: int
 ) -> None:
@@ -98,7 +98,7 @@ def _fill_parts(
         fill_convex(image, spots[offsets[k] : offsets[k + 1]], value)
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def _fill_bodies(
     image: Image,
     view: FloatArray,
@@ -123,7 +123,7 @@ def _fill_bodies(
         fill_convex(image, spots[a:b], value)
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def _sample(
     image: Image, view: FloatArray, values: Image, ox: float, oy: float, step: float
 ) -> None:

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
+from pushplan.compiled import kernel
 from pushplan.geometry import polygon_area
 from pushplan.world.checks import FloatArray, IntArray
 
@@ -14,7 +14,7 @@ ROOM = 48
 """Corners that a buffer holds; a floe has far fewer."""
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def throw_discs(
     radii: FloatArray,
     throws: FloatArray,
@@ -76,7 +76,7 @@ def throw_discs(
     return centres
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def _is_taken(
     x: float,
     y: float,
@@ -99,7 +99,7 @@ def _is_taken(
     return False
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def _is_blocked(x: float, y: float, reach: float, blocks: FloatArray, offsets: IntArray) -> bool:
     for b in range(offsets.shape[0] - 1):
         gap, _, _ = _nearest(x, y, blocks[offsets[b] : offsets[b + 1]])
@@ -108,7 +108,7 @@ def _is_blocked(x: float, y: float, reach: float, blocks: FloatArray, offsets: I
     return False
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def _nearest(x: float, y: float, polygon: FloatArray) -> tuple[float, float, float]:
     """Distance [m] of a point to a convex polygon and its nearest point; 0 and itself inside."""
     best, bx, by = math.inf, x, y
@@ -130,7 +130,7 @@ def _nearest(x: float, y: float, polygon: FloatArray) -> tuple[float, float, flo
     return best, bx, by
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def cut_cells(
     centres: FloatArray,
     weights: FloatArray,
@@ -189,7 +189,7 @@ def cut_cells(
     return cells, sizes
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def _clip(
     corners: FloatArray, n: int, ux: float, uy: float, bound: float, spare: FloatArray
 ) -> int:
@@ -218,7 +218,7 @@ def _clip(
     return int(m) if m > 2 else 0
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def _cut_out(
     shape: FloatArray,
     scale: float,
@@ -244,7 +244,7 @@ def _cut_out(
     return n
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def fit_floes(
     shapes: FloatArray,
     shape_sizes: IntArray,
@@ -293,7 +293,7 @@ def fit_floes(
     return floes, sizes
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def _simplify(corners: FloatArray, n: int, shortest: float) -> int:
     """Leave out corners, in place, while an edge is shorter than ``shortest`` [m].
 
@@ -318,7 +318,7 @@ def _simplify(corners: FloatArray, n: int, shortest: float) -> int:
     return n
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def _loss(corners: FloatArray, n: int, i: int) -> float:
     """Area [m²] that a polygon loses with corner ``i``."""
     a, b = (i - 1) % n, (i + 1) % n

@@ -12,10 +12,11 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit, types
+from numba import types
 from numba.extending import overload
 from numpy.typing import NDArray
 
+from pushplan.compiled import kernel
 from pushplan.search.heap import pop_least, push_or_lift
 from pushplan.world.checks import BoolArray, FloatArray, IntArray
 
@@ -122,7 +123,7 @@ def new_state(size: int) -> SearchState:
     )
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def offer(state: SearchState, node: int, cost: float, bound: float, parent: int, edge: int) -> None:
     """Take note of a way to ``node``; it is opened if none as cheap was known.
 
@@ -146,7 +147,7 @@ def offer(state: SearchState, node: int, cost: float, bound: float, parent: int,
     push_or_lift(state.keys, state.heap, state.places, state.counters, node, cost + bound)
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def take(state: SearchState) -> int:
     """The open node of least cost plus estimate, now closed; -1 if none is open."""
     if state.counters[SIZE] == 0:
@@ -157,7 +158,7 @@ def take(state: SearchState) -> int:
     return node
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def search(
     lattice: Any,
     state: SearchState,

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from numba import njit
-
+from pushplan.compiled import kernel
 from pushplan.search.astar import register
 from pushplan.world.checks import BoolArray, FloatArray, IntArray
 
@@ -28,7 +27,7 @@ class GraphLattice(NamedTuple):
     goals: BoolArray
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def _successors(
     lattice: GraphLattice, node: int, nodes: IntArray, costs: FloatArray, edges: IntArray
 ) -> int:
@@ -39,13 +38,13 @@ def _successors(
     return count
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def _bound(lattice: GraphLattice, node: int) -> float:
     bound: float = lattice.bounds[node]
     return bound
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def _reached(lattice: GraphLattice, node: int) -> bool:
     reached: bool = lattice.goals[node]
     return reached

@@ -5,17 +5,16 @@ Equal keys are taken in the order of the nodes' numbers: the same search on ever
 
 from __future__ import annotations
 
-from numba import njit
-
+from pushplan.compiled import kernel
 from pushplan.world.checks import FloatArray, IntArray
 
 
-@njit(cache=True, nogil=True, inline="always")
+@kernel(allocates=True, inline=True)
 def _before(key_a: float, node_a: int, key_b: float, node_b: int) -> bool:
     return key_a < key_b or (key_a == key_b and node_a < node_b)
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def push_or_lift(
     keys: FloatArray, heap: IntArray, places: IntArray, size: IntArray, node: int, key: float
 ) -> None:
@@ -47,7 +46,7 @@ def push_or_lift(
     places[node] = at
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def _sink(
     keys: FloatArray, heap: IntArray, places: IntArray, size: int, at: int, node: int, key: float
 ) -> None:
@@ -68,7 +67,7 @@ def _sink(
     places[node] = at
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def pop_least(keys: FloatArray, heap: IntArray, places: IntArray, size: IntArray) -> int:
     """Take out the node of the least key; the heap must not be empty. Arguments as above."""
     least: int = heap[0]

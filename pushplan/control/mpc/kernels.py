@@ -12,8 +12,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
+from pushplan.compiled import kernel
 from pushplan.world.checks import FloatArray
 
 
@@ -46,7 +46,7 @@ class Tuning(NamedTuple):
     speed_weight: float
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def locate(track: Track, x: float, y: float, low: float, high: float) -> tuple[float, int, float]:
     """Nearest point of the path between path lengths ``low`` and ``high`` [m].
 
@@ -79,7 +79,7 @@ def locate(track: Track, x: float, y: float, low: float, high: float) -> tuple[f
     return along, index, share
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def errors(
     track: Track, x: float, y: float, theta: float, index: int, share: float
 ) -> tuple[float, float, float, float]:
@@ -113,7 +113,7 @@ def errors(
     return offset, error, heading, curvature
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def _speed_at(track: Track, along: float, index: int, tuning: Tuning, dt: float) -> float:
     """Speed [m/s] that the plan has at a place, and that still allows to stop at its end."""
     speed: float = min(track.speeds[index], tuning.max_speed)
@@ -125,7 +125,7 @@ def _speed_at(track: Track, along: float, index: int, tuning: Tuning, dt: float)
     return speed
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def arc(x: float, y: float, theta: float, v: float, w: float, dt: float, out: FloatArray) -> None:
     """Motion under a constant twist: the change of pose, and its derivatives.
 
@@ -151,7 +151,7 @@ def arc(x: float, y: float, theta: float, v: float, w: float, dt: float, out: Fl
     out[7], out[8] = dt * sinc * c, dt * sinc * s
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def assemble(
     track: Track,
     tuning: Tuning,
@@ -219,7 +219,7 @@ def assemble(
         _price_inputs(hessian, gradient, k, count, asked, before, tau, tuning)
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def _differentiate(
     jacobian: FloatArray, k: int, count: int, motion: FloatArray, dt: float, tuning: Tuning
 ) -> None:
@@ -235,7 +235,7 @@ def _differentiate(
         jacobian[1, count + k] += motion[8] * tuning.max_speed
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def _price_inputs(
     hessian: FloatArray,
     gradient: FloatArray,
@@ -272,7 +272,7 @@ def _price_inputs(
         hessian[k, k - 1] -= calm
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def _add(
     hessian: FloatArray,
     gradient: FloatArray,
@@ -301,7 +301,7 @@ def _add(
             hessian[i, j] += part * row[i]
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def _diagonal(
     hessian: FloatArray, gradient: FloatArray, k: int, wanted: float, weight: float
 ) -> None:

@@ -6,8 +6,8 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
+from pushplan.compiled import kernel
 from pushplan.envs.simulators.base import Materials
 from pushplan.geometry import polygon_inertia
 from pushplan.world import World
@@ -80,7 +80,7 @@ class Momentum:
         return out
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def slow_down(velocities: FloatArray, keeps: FloatArray, drag: FloatArray, h: float) -> FloatArray:
     """Solve ``v' = -(b + c |v|) v`` over ``h`` [s] for each body, and for its rotation.
 
@@ -101,7 +101,7 @@ def slow_down(velocities: FloatArray, keeps: FloatArray, drag: FloatArray, h: fl
     return out
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def _kept(speed: float, b: float, c: float, h: float) -> float:
     """Share of the speed that is left after ``h``."""
     decay = math.exp(-b * h)

@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import math
 
-from numba import njit
-
+from pushplan.compiled import kernel
 from pushplan.world.checks import FloatArray
 
 ASLEEP, AWAKE, STATIC = 0, 1, -1
 """States of a body, as in MuJoCo's mjtSleepState."""
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def planar_rows(qpos: FloatArray, first: int, out: FloatArray) -> None:
     """Planar poses of free bodies.
 
@@ -30,7 +29,7 @@ def planar_rows(qpos: FloatArray, first: int, out: FloatArray) -> None:
             out[n, b, 2] = math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def sleep_lists(
     asleep: FloatArray,
     tree_of_body: FloatArray,
@@ -79,7 +78,7 @@ def sleep_lists(
     return trees, some, children, moving
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def drag_damping(velocities: FloatArray, drag: FloatArray, damping: FloatArray) -> None:
     """Linear damping that equals combined linear and quadratic drag at the velocities now.
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
+from pushplan.compiled import kernel
 from pushplan.geometry.convex import convex_penetration
 from pushplan.interaction.separation import place
 from pushplan.world.checks import BoolArray, FloatArray, IntArray
@@ -15,7 +15,7 @@ TILT = 1e-4
 """Square of half the sine of the greatest tilt at which an object may rest."""
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def quiet_objects(
     velocities: FloatArray,
     positions: FloatArray,
@@ -58,7 +58,7 @@ def quiet_objects(
         quiet[k] = upright and fastest < speed and moved < speed * interval
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def _root(parent: IntArray, k: int) -> int:
     while parent[k] != k:
         parent[k] = parent[parent[k]]
@@ -66,7 +66,7 @@ def _root(parent: IntArray, k: int) -> int:
     return k
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def rest_cycles(
     poses: FloatArray,
     vertices: FloatArray,

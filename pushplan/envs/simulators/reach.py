@@ -5,13 +5,13 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
+from pushplan.compiled import kernel
 from pushplan.geometry import convex_distance, convex_overlap, transform_points
 from pushplan.world.checks import BoolArray, FloatArray, IntArray
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def within_reach(
     robot: FloatArray,
     reach: float,
@@ -71,7 +71,7 @@ def within_reach(
     return found
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def footprint_gap(
     robot: FloatArray,
     parts: FloatArray,
@@ -101,7 +101,7 @@ def footprint_gap(
     return best
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def struck(
     loaded: BoolArray,
     paths: FloatArray,

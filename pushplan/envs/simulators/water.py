@@ -6,8 +6,8 @@ import math
 from dataclasses import dataclass, fields
 
 import numpy as np
-from numba import njit
 
+from pushplan.compiled import kernel
 from pushplan.geometry import polygon_area, polygon_centroid, polygon_inertia
 from pushplan.world import World
 from pushplan.world.checks import FloatArray, IntArray, frozen, number
@@ -110,7 +110,7 @@ def _hull_inertia(world: World) -> float:
     return moment / total
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def flow_shapes(vertices: FloatArray, offsets: IntArray) -> FloatArray:
     """What the flow meets of flat convex bodies.
 
@@ -143,7 +143,7 @@ def flow_shapes(vertices: FloatArray, offsets: IntArray) -> FloatArray:
     return out
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def _cubed_distance(ax: float, ay: float, bx: float, by: float) -> float:
     """Mean of |p|³ over the edge a-b, over 5: times the cross product, the triangle's integral."""
     total = 0.0

@@ -5,15 +5,15 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
+from pushplan.compiled import kernel
 from pushplan.geometry.convex import convex_penetration
 from pushplan.geometry.distance_field import sample_values
 from pushplan.geometry.polygon import transform_points
 from pushplan.world.checks import BoolArray, FloatArray, IntArray
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def all_corners_inside(
     poses: FloatArray, vertices: FloatArray, offsets: IntArray, polygon: FloatArray
 ) -> BoolArray:
@@ -43,7 +43,7 @@ def all_corners_inside(
     return inside
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def no_longer_touches(
     poses: FloatArray, vertices: FloatArray, offsets: IntArray, polygon: FloatArray
 ) -> BoolArray:
@@ -61,7 +61,7 @@ def no_longer_touches(
     return clear
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def sample_at(
     values: FloatArray, ox: float, oy: float, step: float, farthest: float, poses: FloatArray
 ) -> FloatArray:

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from pushplan.compiled import kernel
 from pushplan.motion.state_lattice.swaths import row_span
 from pushplan.world.checks import FloatArray, IntArray
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def add_floes(
     outlines: FloatArray,
     offsets: IntArray,
@@ -72,7 +72,7 @@ def add_floes(
                 break
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def block(outlines: FloatArray, offsets: IntArray, margin: float, grid: FloatArray) -> None:
     """Set to 1 every cell within ``margin`` [cells] of one of some convex outlines.
 
@@ -105,7 +105,7 @@ def block(outlines: FloatArray, offsets: IntArray, margin: float, grid: FloatArr
                     grid[row, column] = 1.0
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def prefix_sums(grid: FloatArray) -> FloatArray:
     """(columns, rows + 1) sums of each column of a (rows, columns) grid before each row."""
     rows, columns = grid.shape

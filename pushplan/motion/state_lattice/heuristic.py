@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
+from pushplan.compiled import kernel
 from pushplan.world.checks import FloatArray, IntArray
 
 LEAN = 0.3
@@ -54,7 +54,7 @@ def row_bounds(
     return np.ascontiguousarray(lengths)
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def _drift(values: FloatArray, first: int, last: int, price: float) -> None:
     """Let each value be reached from the others at ``price`` for each cell across."""
     for i in range(first + 1, last + 1):
@@ -82,7 +82,7 @@ class Window(NamedTuple):
     """Angle φ [rad]."""
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def place_costs(
     sums: FloatArray,
     places: IntArray,

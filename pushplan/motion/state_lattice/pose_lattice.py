@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
+from pushplan.compiled import kernel
 from pushplan.search.astar import register
 from pushplan.world.checks import FloatArray, IntArray
 
@@ -57,7 +57,7 @@ class PoseLattice(NamedTuple):
     """Factor on both."""
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def swath_sum(sums: FloatArray, runs: IntArray, begin: int, end: int, at: int) -> float:
     """Sum of a map over the runs ``begin`` to ``end`` around a cell.
 
@@ -80,7 +80,7 @@ def flat_runs(runs: IntArray, stride: int) -> IntArray:
     return flat
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def within(planes: FloatArray, u: int, v: int, box: FloatArray) -> bool:
     """Whether a path whose origin stays in ``box`` around (u, v) keeps to all half planes."""
     for i in range(planes.shape[0]):
@@ -92,7 +92,7 @@ def within(planes: FloatArray, u: int, v: int, box: FloatArray) -> bool:
     return True
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def edge_cost(lattice: PoseLattice, u: int, v: int, p: int) -> float:
     """Length plus price of primitive ``p`` from place (u, v) [m]; infinite where it is closed."""
     at = (lattice.corner[1] + v * lattice.cells) * lattice.stride
@@ -106,7 +106,7 @@ def edge_cost(lattice: PoseLattice, u: int, v: int, p: int) -> float:
     return cost
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def _successors(
     lattice: PoseLattice, node: int, nodes: IntArray, costs: FloatArray, edges: IntArray
 ) -> int:
@@ -140,7 +140,7 @@ def _successors(
     return count
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def bound_at(lattice: PoseLattice, node: int) -> float:
     """Bound or estimate of the cost from a node to the goal [m], times the inflation."""
     v = node % lattice.columns
@@ -155,7 +155,7 @@ def bound_at(lattice: PoseLattice, node: int) -> float:
     return away
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def reached(lattice: PoseLattice, node: int) -> bool:
     """Whether a node lies in the goal."""
     v = node % lattice.columns

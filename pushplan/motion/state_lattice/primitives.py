@@ -14,8 +14,8 @@ from dataclasses import asdict, dataclass
 from importlib import resources
 
 import numpy as np
-from numba import njit
 
+from pushplan.compiled import kernel
 from pushplan.motion.dubins import dubins, sample_pieces
 from pushplan.world.checks import ArrayRecord, FloatArray, IntArray, frozen, integer, known_keys
 from pushplan.world.checks import number as checked_number
@@ -160,7 +160,7 @@ def _angles(headings: int) -> FloatArray:
     return angles.astype(np.float64)
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def connections(
     heading: float,
     target: float,

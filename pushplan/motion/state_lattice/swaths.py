@@ -6,8 +6,8 @@ import functools
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
+from pushplan.compiled import kernel
 from pushplan.motion.dubins import sample_pieces
 from pushplan.motion.state_lattice.primitives import PrimitiveSet
 from pushplan.world.checks import BoolArray, FloatArray, IntArray
@@ -26,7 +26,7 @@ class Swaths(NamedTuple):
     runs: IntArray
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def row_span(outline: FloatArray, row: float) -> tuple[float, float]:
     """Least and greatest column of a convex outline (N, 2) in a row; empty as (inf, -inf)."""
     low, high = np.inf, -np.inf
@@ -46,7 +46,7 @@ def row_span(outline: FloatArray, row: float) -> tuple[float, float]:
     return low, high
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def _stamp(
     pose: FloatArray,
     vertices: FloatArray,
@@ -73,7 +73,7 @@ def _stamp(
                 window[row, column] = value
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def _runs(window: BoolArray, middle: int, out: IntArray) -> int:
     """Write the runs of set cells into ``out`` (M, 3) and return their number."""
     count = 0
@@ -93,7 +93,7 @@ def _runs(window: BoolArray, middle: int, out: IntArray) -> int:
     return count
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def sweep_cells(
     heading: float,
     pieces: FloatArray,

@@ -19,8 +19,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
+from pushplan.compiled import kernel
 from pushplan.interaction.kernels import Bodies, Scratch, Settings, make_scratch
 from pushplan.motion.collision import Footprint, Obstacles
 from pushplan.motion.dubins import along_arc
@@ -102,7 +102,7 @@ def make_search(
     return star
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def _signature(objects: FloatArray, start: FloatArray, bodies: Bodies, count: int) -> int:
     """Which objects have been moved, folded into a number below ``count``."""
     if count == 1:
@@ -115,7 +115,7 @@ def _signature(objects: FloatArray, start: FloatArray, bodies: Bodies, count: in
     return int(code % count)
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def _cell(nodes: Nodes, table: CostToGo, pose: FloatArray) -> tuple[int, int, int]:
     rows, cols, headings = nodes.best.shape[:3]
     r = min(max(int((pose[1] - table.origin[1]) / table.cell), 0), rows - 1)
@@ -124,7 +124,7 @@ def _cell(nodes: Nodes, table: CostToGo, pose: FloatArray) -> tuple[int, int, in
     return r, c, k
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def _best_there(nodes: Nodes, node: int, table: CostToGo, bodies: Bodies) -> float:
     """Least cost of a node in the cell of this one."""
     r, c, k = _cell(nodes, table, nodes.poses[node])
@@ -135,7 +135,7 @@ def _best_there(nodes: Nodes, node: int, table: CostToGo, bodies: Bodies) -> flo
     return best
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def _settle(lattice: PushLattice, node: int, length: float) -> bool:
     """Write down what a node really costs; False if its cell has a cheaper one."""
     nodes, bodies, pricing = lattice.nodes, lattice.bodies, lattice.pricing
@@ -168,7 +168,7 @@ def _settle(lattice: PushLattice, node: int, length: float) -> bool:
     return True
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def _drive_to(lattice: PushLattice, node: int) -> bool:
     """Drive a node's arc; False if that leads nowhere, or memory is full."""
     nodes = lattice.nodes
@@ -186,7 +186,7 @@ def _drive_to(lattice: PushLattice, node: int) -> bool:
     return bool(nodes.costs[node] < lattice.bound)
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def _successors(
     lattice: PushLattice, number: int, numbers: IntArray, costs: FloatArray, edges: IntArray
 ) -> int:
@@ -234,7 +234,7 @@ def _successors(
     return found
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def _estimate(lattice: PushLattice, number: int) -> float:
     """What is left to pay; the arc of a guess is paid when it is driven."""
     nodes, node = lattice.nodes, number >> 1
@@ -243,7 +243,7 @@ def _estimate(lattice: PushLattice, number: int) -> float:
     return left
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def _reached(lattice: PushLattice, number: int) -> bool:
     pose = lattice.nodes.poses[number >> 1]
     return number % 2 == 1 and in_goal(pose[0], pose[1], lattice.pricing.goal)

@@ -14,8 +14,8 @@ import heapq
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
+from pushplan.compiled import kernel
 from pushplan.motion.collision import Footprint, Obstacles, is_free
 from pushplan.motion.shortcutting import in_goal
 from pushplan.world.checks import BoolArray, FloatArray, IntArray
@@ -34,7 +34,7 @@ class CostToGo(NamedTuple):
     """Side of a cell [m]."""
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def mark_free(
     origin: FloatArray,
     cell: float,
@@ -66,7 +66,7 @@ def mark_free(
             free[r, c, k] = is_free(pose, shape, among, scratch)
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def flood(
     origin: FloatArray, cell: float, open_cells: BoolArray, goal: FloatArray, center: IntArray
 ) -> tuple[FloatArray, IntArray]:
@@ -106,7 +106,7 @@ def flood(
     return far, order[:count]
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def _between(
     values: FloatArray, ox: float, oy: float, cell: float, x: float, y: float, theta: float
 ) -> float:
@@ -137,7 +137,7 @@ def _between(
     return total / weight if weight > 0.25 else np.inf
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def sweep(
     values: FloatArray,
     free: BoolArray,
@@ -183,7 +183,7 @@ def sweep(
     return change
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def length_to_go(table: CostToGo, x: float, y: float, theta: float) -> float:
     """Length to the goal [m] from a pose: the table's, or its floor where it has none."""
     value = _between(table.values, table.origin[0], table.origin[1], table.cell, x, y, theta)

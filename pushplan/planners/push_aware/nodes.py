@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
+from pushplan.compiled import kernel
 from pushplan.interaction.kernels import Bodies, Scratch, Settings, advance
 from pushplan.motion.collision import Footprint, Obstacles, is_free
 from pushplan.motion.dubins import along_arc, step_along
@@ -62,7 +62,7 @@ def make_nodes(
     )
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def plant(nodes: Nodes, pose: FloatArray, objects: FloatArray, estimate: float) -> None:
     """Begin a search at ``pose`` (3,) with the objects at ``objects`` (K, 3)."""
     nodes.best[:] = np.inf
@@ -78,7 +78,7 @@ def plant(nodes: Nodes, pose: FloatArray, objects: FloatArray, estimate: float) 
     nodes.counts[3] = 0
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def drive(
     nodes: Nodes,
     node: int,
@@ -120,7 +120,7 @@ def drive(
     return longest
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def trace(nodes: Nodes, node: int) -> FloatArray:
     """The arcs (E, 2) from the root to a node."""
     count = 0

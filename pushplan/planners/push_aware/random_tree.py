@@ -12,8 +12,8 @@ quicker to good plans; this is what finds, in the end, any plan that it cannot r
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from pushplan.compiled import kernel
 from pushplan.interaction.kernels import Bodies, Settings, make_scratch
 from pushplan.motion.collision import Footprint, Obstacles
 from pushplan.motion.dubins import along_arc
@@ -25,7 +25,7 @@ DRAWS = 6
 """Random numbers that one iteration takes."""
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def straight_to_goal(x: float, y: float, goal: FloatArray) -> float:
     """Distance [m] to the goal as `Pricing` holds it, 0 inside."""
     if goal[0] == 0.0:
@@ -36,7 +36,7 @@ def straight_to_goal(x: float, y: float, goal: FloatArray) -> float:
     return left
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def nearest(nodes: Nodes, target: FloatArray, scales: FloatArray, bound: float) -> int:
     """The node nearest to a target (4,) x, y, theta, cost, among those that cost less than a bound.
 
@@ -59,7 +59,7 @@ def nearest(nodes: Nodes, target: FloatArray, scales: FloatArray, bound: float) 
     return best
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def grow(
     nodes: Nodes,
     draws: FloatArray,

@@ -6,8 +6,8 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
+from pushplan.compiled import kernel
 from pushplan.geometry.convex import convex_distance, convex_penetration
 from pushplan.geometry.obstacles import Obstacles, obstacles_of
 from pushplan.planners.pushing.kernels import Contact, advance, box_pose
@@ -95,7 +95,7 @@ class _Scene(NamedTuple):
     obstacles: Obstacles
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def _gaps(contact: Contact, state: FloatArray, scene: _Scene) -> tuple[float, float]:
     """Least distance of the robot and of the box from static things [m], negative inside one."""
     found = np.full(2, np.inf)
@@ -127,7 +127,7 @@ def _gaps(contact: Contact, state: FloatArray, scene: _Scene) -> tuple[float, fl
     return found[0], found[1]
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def _clear(
     contact: Contact, state: FloatArray, scene: _Scene, robot: float, box: float, travel: float
 ) -> bool:
@@ -137,7 +137,7 @@ def _clear(
     return here[0] >= robot and here[1] >= box - graze
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def _free_share(
     contact: Contact, start: FloatArray, v: float, w: float, duration: float, scene: _Scene
 ) -> float:

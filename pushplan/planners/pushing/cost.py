@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
+from pushplan.compiled import kernel
 from pushplan.planners.pushing.kernels import Contact, flush_angle, standoff
 from pushplan.world.checks import FloatArray, IntArray
 
@@ -39,7 +39,7 @@ class Weights(NamedTuple):
     terminal: float
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def residuals(
     weights: Weights,
     lateral: float,
@@ -78,7 +78,7 @@ def residuals(
         out[5] = root * np.sqrt(weights.grip) * (over if w > 0.0 else -over)
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def differentiate(
     contact: Contact,
     weights: Weights,
@@ -117,7 +117,7 @@ def differentiate(
         out[4, j] = root * np.sqrt(weights.angle) * (da - slope * ds)
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def price_commands(
     weights: Weights,
     k: int,

@@ -10,9 +10,9 @@ from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
-from numba import njit
 from scipy.optimize import least_squares
 
+from pushplan.compiled import kernel
 from pushplan.planners.pushing import kernels
 from pushplan.planners.pushing.bumper import Bumper, contact_of, face_towards
 from pushplan.planners.pushing.kernels import Contact
@@ -138,7 +138,7 @@ def _errors(pieces: Sequence[_Piece], friction: float, spread: float) -> FloatAr
     return left.ravel()
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def _predicted(
     contact: Contact, start: FloatArray, twists: FloatArray, steps: FloatArray
 ) -> tuple[float, float]:

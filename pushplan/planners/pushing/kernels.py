@@ -14,8 +14,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
+from pushplan.compiled import kernel
 from pushplan.world.checks import FloatArray
 
 FREE, STICK, SLIDE, CORNER_STICK, CORNER_SLIDE = range(5)
@@ -47,7 +47,7 @@ class Contact(NamedTuple):
     """Between bumper and box."""
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def line(contact: Contact, offset: float) -> tuple[float, float]:
     """The part of the face that is in front of the bumper, along t [m]; empty if low >= high."""
     low = max(contact.low, -contact.half - offset)
@@ -55,7 +55,7 @@ def line(contact: Contact, offset: float) -> tuple[float, float]:
     return low, high
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def flush_angle(contact: Contact, offset: float) -> float:
     """Angle of the face against the robot's heading when it lies on the bumper [rad]."""
     low, high = line(contact, offset)
@@ -65,7 +65,7 @@ def flush_angle(contact: Contact, offset: float) -> float:
     return -bend * (offset + 0.5 * (low + high)) / (1.0 - bend * contact.depth)
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def standoff(contact: Contact, offset: float, angle: float) -> tuple[float, float]:
     """X of the box's centre when it touches the bumper [m], and where it does, along t [m]."""
     c, s = np.cos(angle), np.sin(angle)
@@ -85,7 +85,7 @@ def standoff(contact: Contact, offset: float, angle: float) -> tuple[float, floa
     return best, at
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def _corner(
     contact: Contact, y: float, tilt: float, un: float, ut: float, w: float, out: FloatArray
 ) -> None:
@@ -114,7 +114,7 @@ def _corner(
     out[4], out[5] = float(CORNER_SLIDE), ratio
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def contact_velocity(
     contact: Contact, offset: float, angle: float, v: float, w: float, dt: float, out: FloatArray
 ) -> None:
@@ -174,7 +174,7 @@ def contact_velocity(
     _corner(contact, y, tilt, un, ut, w, out)
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def _drive(state: FloatArray, v: float, w: float, dt: float) -> None:
     """Move the robot along an arc and leave the box where it is on the ground."""
     theta, turn = state[2], w * dt
@@ -185,7 +185,7 @@ def _drive(state: FloatArray, v: float, w: float, dt: float) -> None:
     state[2] = theta + turn
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def _leave(contact: Contact, state: FloatArray, v: float, w: float, dt: float) -> float:
     """Move the robot for ``dt`` while the box stands; the gap after it [m]."""
     turn = w * dt
@@ -201,7 +201,7 @@ def _leave(contact: Contact, state: FloatArray, v: float, w: float, dt: float) -
     return gap
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def push_step(
     contact: Contact, state: FloatArray, v: float, w: float, dt: float, out: FloatArray
 ) -> None:
@@ -220,7 +220,7 @@ def push_step(
     _drive(state, v, w, dt)
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def advance(
     contact: Contact, state: FloatArray, v: float, w: float, dt: float, out: FloatArray
 ) -> None:
@@ -259,7 +259,7 @@ def advance(
             push_step(contact, state, v, w, (1.0 - share) * step, out)
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def rollout(
     contact: Contact,
     state: FloatArray,
@@ -275,7 +275,7 @@ def rollout(
         advance(contact, states[k + 1], twists[k, 0], twists[k, 1], steps[k], details[k])
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def observe(
     contact: Contact, normal: float, robot: FloatArray, box: FloatArray, out: FloatArray
 ) -> None:
@@ -297,7 +297,7 @@ def observe(
     out[5] = c * dx + s * dy - standoff(contact, out[3], out[4])[0]
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def box_pose(contact: Contact, state: FloatArray, out: FloatArray) -> None:
     """x, y [m] of the box's centre and direction [rad] of the pushed face's normal, world."""
     x = standoff(contact, state[3], state[4])[0] + state[5]

@@ -9,8 +9,8 @@ which leaves a problem in the commands alone whose constraints can always be met
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from pushplan.compiled import kernel
 from pushplan.control.mpc.kernels import Track, arc, errors, locate
 from pushplan.planners.pushing.cost import ROWS, Weights, differentiate, price_commands, residuals
 from pushplan.planners.pushing.kernels import Contact, advance, flush_angle, standoff
@@ -21,7 +21,7 @@ NEAR = 1e-4
 condition of P, and is nothing once the commands do not change any more."""
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def _relative(
     contact: Contact, s: float, angle: float, v: float, w: float, dt: float, work: FloatArray
 ) -> tuple[float, float]:
@@ -33,7 +33,7 @@ def _relative(
     return state[3], state[4]
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def linearise(
     contact: Contact,
     s: float,
@@ -75,7 +75,7 @@ def linearise(
         slopes[1, j] = (a[1] - b[1]) / (h + low)
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def _propagate(
     rows: FloatArray,
     motion: FloatArray,
@@ -112,7 +112,7 @@ def _propagate(
     rows[4, moves + g] += slopes[1, 3] * units[1]
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def assemble(
     contact: Contact,
     track: Track,
@@ -221,7 +221,7 @@ def assemble(
     return value
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def _square(
     jacobian: FloatArray,
     residual: FloatArray,
@@ -271,7 +271,7 @@ def _square(
         gradient[a] -= keep * z[i]
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def _box(contact: Contact, state: FloatArray) -> tuple[float, float]:
     x = standoff(contact, state[3], state[4])[0] + state[5]
     c, s = np.cos(state[2]), np.sin(state[2])

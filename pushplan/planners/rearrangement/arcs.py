@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
+from pushplan.compiled import kernel
 from pushplan.interaction.kernels import Bodies, Settings, advance, make_scratch, robot_held
 from pushplan.planners.rearrangement.scene import Scene
 from pushplan.world.checks import FloatArray, IntArray
@@ -43,7 +43,7 @@ def swept(
     return out
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def _sweep_arcs(
     start: FloatArray,
     poses: FloatArray,

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from pushplan.compiled import kernel
 from pushplan.world.checks import FloatArray, IntArray
 
 MOST = 62
@@ -13,7 +13,7 @@ EXACT = 11
 """Up to so many objects every completion is computed exactly."""
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def completions(costs: FloatArray, masks: IntArray, boxes: int) -> tuple[FloatArray, IntArray]:
     """What it costs to cover the rest, from every set covered so far and every last push.
 

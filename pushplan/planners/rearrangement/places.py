@@ -7,8 +7,8 @@ import math
 
 import numpy as np
 import shapely
-from numba import njit
 
+from pushplan.compiled import kernel
 from pushplan.planners.rearrangement.rollout import along_path
 from pushplan.planners.rearrangement.scene import Scene
 from pushplan.world import StaticMap
@@ -41,7 +41,7 @@ def behind(
     return _behind(scene.poses[k] if pose is None else pose, outline, heading, shift, room)
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def _behind(
     pose: FloatArray, outline: FloatArray, heading: float, shift: float, room: float
 ) -> FloatArray:

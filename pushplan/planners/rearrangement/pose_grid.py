@@ -11,8 +11,8 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
+from pushplan.compiled import kernel
 from pushplan.motion.collision import (
     Footprint,
     Obstacles,
@@ -59,7 +59,7 @@ class Floor(NamedTuple):
     next heading."""
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def _block(
     blocked: BoolArray,
     x: float,
@@ -79,7 +79,7 @@ def _block(
                 blocked[t, i, j] = not is_free(pose, shape, among, scratch)
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def _bar(
     barred: BoolArray,
     blocked: BoolArray,
@@ -144,7 +144,7 @@ def floor_of(robot: RobotModel, static: StaticMap, step: float, margin: float) -
     return Floor(x, y, step, frozen(blocked), frozen(barred))
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def near_poses(floor: Floor, pose: FloatArray, reach: float) -> tuple[IntArray, FloatArray]:
     """Free poses of the lattice near a pose: flat indices and what it costs to get there [m].
 

@@ -9,9 +9,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from pushplan.compiled import kernel
 from pushplan.geometry import convex_penetration
 from pushplan.interaction.separation import place
 from pushplan.motion.collision import Footprint
@@ -30,7 +30,7 @@ _WIDTH = 0.1
 """Costs that one bucket spans [cells]."""
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def contact_depths(
     floor: Floor,
     headings: FloatArray,
@@ -76,7 +76,7 @@ def contact_depths(
     return out
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def add_up(layers: Layers, weights: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Depth in all objects together at each pose [m], and the weights of those it is in.
 
@@ -97,7 +97,7 @@ def add_up(layers: Layers, weights: FloatArray) -> tuple[FloatArray, FloatArray]
     return depths.reshape((turns, rows, cols)), touch.reshape((turns, rows, cols))
 
 
-@njit(cache=True, nogil=True, inline="always")
+@kernel(allocates=True, inline=True)
 def _unlink(node: int, heads: IntArray, after: IntArray, ahead: IntArray) -> None:
     """Take a node out of its bucket."""
     if ahead[node] >= 0:
@@ -109,7 +109,7 @@ def _unlink(node: int, heads: IntArray, after: IntArray, ahead: IntArray) -> Non
     ahead[node] = -1
 
 
-@njit(cache=True, nogil=True, inline="always")
+@kernel(allocates=True, inline=True)
 def _link(node: int, bucket: int, heads: IntArray, after: IntArray, ahead: IntArray) -> None:
     """Put a node that is in no bucket into one."""
     after[node], ahead[node] = heads[bucket], -2 - bucket
@@ -118,7 +118,7 @@ def _link(node: int, bucket: int, heads: IntArray, after: IntArray, ahead: IntAr
     heads[bucket] = node
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def _deal(
     best: FloatArray, width: float, heads: IntArray, after: IntArray, ahead: IntArray
 ) -> float:
@@ -135,7 +135,7 @@ def _deal(
     return base
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def _beside(
     t: int, i: int, j: int, move: int, shape: tuple[int, int, int], moves: IntArray
 ) -> tuple[int, int]:
@@ -159,7 +159,7 @@ def _beside(
     return (to * rows + i) * cols + j, t if move == 2 else to
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def search_poses(
     starts: IntArray,
     costs: FloatArray,
@@ -256,7 +256,7 @@ class Arrivals(NamedTuple):
     """(N,) where the poses of each place end."""
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def least_costs(costs: FloatArray, arrivals: Arrivals) -> FloatArray:
     """(N,) cost of getting to each of some places [m], from what `search_poses` returns."""
     out = np.full(arrivals.ends.shape[0], np.inf)

@@ -6,8 +6,8 @@ import math
 from dataclasses import replace
 
 import numpy as np
-from numba import njit
 
+from pushplan.compiled import kernel
 from pushplan.motion.collision import Footprint, Obstacles, is_free
 from pushplan.planners.rearrangement.candidates import simple_pushes
 from pushplan.planners.rearrangement.hard import gain_of
@@ -92,7 +92,7 @@ def _lacking(scene: Scene, k: int, pose: FloatArray) -> float:
     return least
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def _first_free(
     start: FloatArray,
     u: FloatArray,

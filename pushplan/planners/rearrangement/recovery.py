@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
+from pushplan.compiled import kernel
 from pushplan.geometry import core_distance
 from pushplan.motion.collision import Footprint, Obstacles, footprint, obstacles
 from pushplan.planners.rearrangement.route import depth_inside
@@ -52,7 +52,7 @@ def way_out(scene: Scene) -> FloatArray | None:
     return None
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def _has_room(pose: FloatArray, radius: float, among: Obstacles) -> bool:
     """Whether a disc about a pose is within the bounds and overlaps nothing."""
     x, y, bounds = pose[0], pose[1], among.bounds
@@ -70,7 +70,7 @@ def _has_room(pose: FloatArray, radius: float, among: Obstacles) -> bool:
     return True
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def stepped(pose: FloatArray, way: float, turn: float) -> FloatArray:
     """(3,) where a step leads from a pose."""
     middle = pose[2] + 0.5 * turn
@@ -78,7 +78,7 @@ def stepped(pose: FloatArray, way: float, turn: float) -> FloatArray:
     return np.array([x, y, pose[2] + turn])
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def _up_to(node: int, nodes: FloatArray, before: IntArray) -> FloatArray:
     """(N, 3) the poses that have led to one."""
     chain = [node]
@@ -88,7 +88,7 @@ def _up_to(node: int, nodes: FloatArray, before: IntArray) -> FloatArray:
     return path
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def _search(
     start: FloatArray, steps: FloatArray, shape: Footprint, among: Obstacles, size: float
 ) -> FloatArray:

@@ -11,10 +11,9 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
+from pushplan.compiled import copy_into, kernel
 from pushplan.geometry import convex_penetration
-from pushplan.geometry.compiled import copy_into, kernel
 from pushplan.interaction.kernels import (
     Bodies,
     Scratch,
@@ -84,7 +83,7 @@ def _may_be_done(x: float, y: float, task: Task) -> bool:
     return False
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def is_done(k: int, poses: FloatArray, bodies: Bodies, task: Task) -> bool:
     """Whether object ``k`` is where it belongs."""
     if poses[k, 0] >= 0.5 * GONE:
@@ -104,7 +103,7 @@ def is_done(k: int, poses: FloatArray, bodies: Bodies, task: Task) -> bool:
     return bool(convex_penetration(outline, task.polygon)[0] < -task.slack)
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def all_done(poses: FloatArray, bodies: Bodies, task: Task) -> BoolArray:
     """(K,) whether each object is where it belongs."""
     out = np.empty(poses.shape[0], dtype=np.bool_)
@@ -278,7 +277,7 @@ class Run(NamedTuple):
     scratch: Scratch
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def roll_out(
     start: FloatArray,
     first: FloatArray,

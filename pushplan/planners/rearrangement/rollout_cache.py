@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
+from pushplan.compiled import kernel
 from pushplan.planners.rearrangement.rollout import GONE, enclose
 from pushplan.world import Movables
 from pushplan.world.checks import BoolArray, FloatArray, IntArray
@@ -125,7 +125,7 @@ class Recall:
         self._entries[key] = _Entry(kept, box.copy(), movables.ids[near], poses[near], moved)
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def _within(box: FloatArray, poses: FloatArray, radii: FloatArray) -> BoolArray:
     """(K,) which objects reach into a box."""
     within = np.empty(len(poses), dtype=np.bool_)
@@ -135,7 +135,7 @@ def _within(box: FloatArray, poses: FloatArray, radii: FloatArray) -> BoolArray:
     return within
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def _grown(box: FloatArray, poses: FloatArray, radii: FloatArray) -> BoolArray:
     """Make a box big enough for what reaches into it: a jam may go on from object to object."""
     within = np.zeros(len(poses), dtype=np.bool_)

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
+from pushplan.compiled import kernel
 from pushplan.geometry import convex_penetration
 from pushplan.interaction.kernels import Bodies
 from pushplan.interaction.separation import place
@@ -60,7 +60,7 @@ class Route(ArrayRecord):
     price: float
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def _depth(
     pose: FloatArray,
     shape: Footprint,
@@ -92,7 +92,7 @@ def _depth(
     return total, touch
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def depth_inside(
     pose: FloatArray, shape: Footprint, among: Obstacles, scratch: FloatArray
 ) -> float:
@@ -127,7 +127,7 @@ class _Driving(NamedTuple):
     weights: FloatArray
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def _turn(x: float, y: float, heading: float, to: float, by: _Driving) -> tuple[float, float]:
     """Price of a turn on the spot from one heading to another, and how to make it; see `Route`."""
     here, there = np.array([x, y, heading]), np.array([x, y, to])
@@ -142,7 +142,7 @@ def _turn(x: float, y: float, heading: float, to: float, by: _Driving) -> tuple[
     return price, math.copysign(1.0, turn) if abs(turn) > _SURE else 0.0
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def _motion(here: FloatArray, there: FloatArray, turn: float, by: _Driving) -> float:
     """Price of a straight motion between two poses, or of a turn on the spot; inf at a wall."""
     body = np.empty_like(by.shape.vertices)
@@ -174,7 +174,7 @@ def _motion(here: FloatArray, there: FloatArray, turn: float, by: _Driving) -> f
     return total
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def _leg(
     x: float, y: float, heading: float, point: FloatArray, sign: float, by: _Driving
 ) -> tuple[float, float, float]:
@@ -189,7 +189,7 @@ def _leg(
     return price, way, turn
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def _cheapest(
     points: FloatArray, heading: float, end: float, first: int, longest: int, by: _Driving
 ) -> tuple[FloatArray, IntArray, FloatArray]:

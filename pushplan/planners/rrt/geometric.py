@@ -6,9 +6,9 @@ import time
 from dataclasses import dataclass, field
 
 import numpy as np
-from numba import njit
 from ompl import base, geometric
 
+from pushplan.compiled import kernel
 from pushplan.geometry import core_distance
 from pushplan.motion.collision import Obstacles, obstacles
 from pushplan.motion.polyline import polyline_plan
@@ -207,7 +207,7 @@ class _GoalRegion(base.GoalSampleableRegion):
         return self.goal.distance(state[0], state[1])
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def _near(point: FloatArray, among: Obstacles, radius: float) -> bool:
     """Whether a disc about ``point`` (2,) touches an obstacle."""
     x, y = point[0], point[1]

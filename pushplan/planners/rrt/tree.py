@@ -13,9 +13,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from ompl import base, control
 
+from pushplan.compiled import kernel
 from pushplan.motion.collision import Footprint, Obstacles, is_free
 from pushplan.motion.dubins import along_arc, step_along
 from pushplan.planners.rrt.ompl_lock import own_state, seeded_ompl
@@ -40,7 +40,7 @@ class TreeLimits:
     turn_weight: float
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def steer(
     start: FloatArray,
     target: FloatArray,

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
+from pushplan.compiled import kernel
 from pushplan.planners.ship_lattice.ship_lattice_config import ShipLatticeConfig
 from pushplan.world import World
 from pushplan.world.checks import FloatArray, IntArray
@@ -24,7 +24,7 @@ class FloePrices(NamedTuple):
     """Softening of the profile, see `cost_map.add_floes`."""
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def world_outlines(vertices: FloatArray, offsets: IntArray, poses: FloatArray) -> FloatArray:
     """(V, 2) corners in the world frame [m] of flattened body outlines at (K, 3) poses."""
     out = np.empty_like(vertices)

@@ -6,13 +6,13 @@ Shortcutting after Geraerts and Overmars, "Creating high-quality paths for motio
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from pushplan.compiled import kernel
 from pushplan.motion.dubins import dubins, sample_pieces
 from pushplan.world.checks import FloatArray
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def _add(
     start: FloatArray,
     end: FloatArray,
@@ -33,7 +33,7 @@ def _add(
     return sample_pieces(start, pieces, spacing, poses, bends)
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def propose(
     path: FloatArray,
     bends: FloatArray,

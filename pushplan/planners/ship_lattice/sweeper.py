@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-from numba import njit
 
+from pushplan.compiled import kernel
 from pushplan.interaction import InteractionModel, QuasiStatic
 from pushplan.interaction.ice import IceInteraction
 from pushplan.interaction.ice_contacts import Crowd, Solver, make_memory, sweep_ice
@@ -89,7 +89,7 @@ class Sweeper(Protocol):
         ...
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def add_works(out: FloatArray, masses: FloatArray, works: FloatArray) -> None:
     """Work on K objects from each of N poses to the next [kg m], from (N, K, 3) ``out``."""
     for n in range(works.shape[0]):
@@ -99,7 +99,7 @@ def add_works(out: FloatArray, masses: FloatArray, works: FloatArray) -> None:
             works[n] += masses[k] * np.sqrt(dx * dx + dy * dy)
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def sweep_near(
     path: FloatArray,
     poses: FloatArray,

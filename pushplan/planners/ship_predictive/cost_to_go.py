@@ -13,8 +13,8 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
+from pushplan.compiled import kernel
 from pushplan.world.checks import FloatArray
 
 STEEPEST = math.radians(80.0)
@@ -48,7 +48,7 @@ class Guide(NamedTuple):
     """How far ahead of the ship's origin its bow meets ice."""
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def ice_field(
     poses: FloatArray,
     radii: FloatArray,
@@ -91,7 +91,7 @@ def ice_field(
                 out[r, c] *= price[0] * (1.0 + price[1] * out[r, c] / typical)
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def _sample(field: FloatArray, r: float, c: float) -> float:
     """Bilinear value of an (F, C) array, that of its edge beyond it."""
     r = min(max(r, 0.0), field.shape[0] - 1.000001)
@@ -103,7 +103,7 @@ def _sample(field: FloatArray, r: float, c: float) -> float:
     return value
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def in_the_way(guide: Guide, x: float, y: float, theta: float) -> float:
     """Mass in the way of a ship at a pose [kg]: work of a metre, if no floe had moved before."""
     bx, by = x + guide.bow * math.cos(theta), y + guide.bow * math.sin(theta)
@@ -111,7 +111,7 @@ def in_the_way(guide: Guide, x: float, y: float, theta: float) -> float:
     return _sample(guide.field, (by - guide.field_low) / cell, (bx - guide.left) / cell)
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def fill_table(guide: Guide, mass: float, weight: float, radius: float) -> None:
     """Costs to go, from the last row (the goal line) backwards.
 
@@ -141,7 +141,7 @@ def fill_table(guide: Guide, mass: float, weight: float, radius: float) -> None:
                 guide.table[r, c, h] = way * (mass + weight * share) + best
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def _look_up(guide: Guide, r: int, c: float, h: float, mass: float) -> float:
     """Bilinear value in one row of the table, with a price for being beside it."""
     layer = guide.table[r]
@@ -156,7 +156,7 @@ def _look_up(guide: Guide, r: int, c: float, h: float, mass: float) -> float:
     return value
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def cost_to_go(guide: Guide, x: float, y: float, theta: float, mass: float) -> float:
     """Estimated cost from a pose to the goal line [kg m].
 
@@ -180,7 +180,7 @@ def cost_to_go(guide: Guide, x: float, y: float, theta: float, mass: float) -> f
     return value
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def price_ahead(guide: Guide, way: FloatArray, step: float, mass: float) -> tuple[float, float]:
     """What the guide expects along a piece of path and after it.
 
@@ -200,7 +200,7 @@ def price_ahead(guide: Guide, way: FloatArray, step: float, mass: float) -> tupl
     return work, cost_to_go(guide, end[0], end[1], end[2], mass)
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def steer_on(
     guide: Guide,
     pose: FloatArray,
@@ -246,7 +246,7 @@ def steer_on(
     return out.shape[0] if y >= goal else 0
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def arc_ahead(
     pose: FloatArray,
     bend: float,

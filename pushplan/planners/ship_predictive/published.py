@@ -7,8 +7,8 @@ import time
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numba import njit
 
+from pushplan.compiled import kernel
 from pushplan.interaction.ice import IceInteraction
 from pushplan.interaction.network import IceNetwork
 from pushplan.interaction.occupancy import PATCH_CELLS
@@ -30,7 +30,7 @@ from pushplan.world import Movables, Plan, PlanResult, PlanStats, PlanStatus, St
 from pushplan.world.checks import FloatArray, IntArray, expect, number
 
 
-@njit(cache=True, nogil=True)
+@kernel(allocates=True)
 def list_successors(
     lattice: PoseLattice, node: int, nodes: IntArray, costs: FloatArray, edges: IntArray
 ) -> int:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numba.core.errors import NumbaError
 
-from pushplan.geometry.compiled import copy_into, kernel
+from pushplan.compiled import copy_into, kernel
 
 
 @pytest.mark.parametrize("shape", [(4,), (3, 2), (0, 3)])
