@@ -418,6 +418,7 @@ class TestReplay:
 class TestSamLearner:
     def test_a_target_that_follows_is_the_average_and_the_policy(self):
         import torch
+
         from pushplan.training.policies.sam import SamLearner
 
         options = {"batch": 4, "buffer": 8, "widths": [4, 8], "blocks": 1, "follow": 0.25}
@@ -432,6 +433,7 @@ class TestSamLearner:
 
     def test_a_map_that_is_shrunk_has_a_value_for_each_pixel(self):
         import torch
+
         from pushplan.training.policies.networks import SpatialActionNetwork
         from pushplan.training.policies.sam import SamLearner
 
@@ -442,6 +444,7 @@ class TestSamLearner:
 
     def test_it_starts_with_the_weights_of_an_exported_network(self, tmp_path, data):
         import torch
+
         from pushplan.training.policies.sam import SamLearner, _explore
 
         first = trained(tiny("sam"), tmp_path / "first", data)
@@ -485,6 +488,7 @@ class TestSamLearner:
 
     def test_weights_that_are_no_numbers_are_refused(self, tmp_path, data):
         import onnx
+
         first = trained(tiny("sam"), tmp_path / "first", data)
         model = onnx.load(str(first))
         weights = np.full(tuple(model.graph.initializer[0].dims), np.nan, np.float32)
