@@ -63,8 +63,8 @@ class Scoreboard:
         tree, shortest = self._tree(done)
         efficiency = manipulation.efficiency(tree, self._driven, everything=bool(done.all()))
         effort = manipulation.effort(self._start, shortest, self._lengths, self._driven)
-        share = f"{int(done.sum())} of {len(done)} done"
-        return [first, f"{share}   E {efficiency:.2f}   I {effort:.2f}"]
+        fraction = f"{int(done.sum())} of {len(done)} done"
+        return [first, f"{fraction}   E {efficiency:.2f}   I {effort:.2f}"]
 
     def _tree(self, done: BoolArray) -> tuple[float, FloatArray]:
         key = done.tobytes()

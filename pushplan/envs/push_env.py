@@ -16,7 +16,7 @@ from pushplan.envs.actions import ActionMode, Motion, waiting
 from pushplan.envs.registry import ACTIONS, SIMULATORS, TASKS, default_preset, look_up
 from pushplan.envs.roster import Roster
 from pushplan.envs.simulators.base import Simulator
-from pushplan.envs.tasks.base import Outcome, Task
+from pushplan.envs.tasks.base import StepOutcome, Task
 from pushplan.envs.trace import Trace
 from pushplan.envs.window import Window, has_display
 from pushplan.observation import ObservationBuilder
@@ -171,7 +171,7 @@ class PushEnv(gymnasium.Env[NDArray[Any], NDArray[Any]]):
         )
         self._over = ""
         self._show()
-        info = _info(Outcome(0.0, False, "", False, False), 0.0, False)
+        info = _info(StepOutcome(0.0, False, "", False, False), 0.0, False)
         if isinstance(world.goal, Receptacle | ClearanceArea):
             info["completed"] = np.zeros(len(world.movables), dtype=bool)
         return self._observe(world), info
@@ -371,7 +371,7 @@ def _picture(world: World) -> NDArray[np.uint8]:
     return draw_world(world)
 
 
-def _info(outcome: Outcome, work: float, held: bool) -> dict[str, Any]:
+def _info(outcome: StepOutcome, work: float, held: bool) -> dict[str, Any]:
     info = {"success": outcome.success, "reason": outcome.reason, "work": work, "held": held}
     return info if outcome.completed is None else {**info, "completed": outcome.completed}
 

@@ -42,7 +42,7 @@ def run_episode(
     scenario: Any,
     *,
     observer: Observer | None = None,
-    honest_time: float | None = None,
+    latency_factor: float | None = None,
     clock: Clock = time.perf_counter,
 ) -> Episode:
     """Run ``policy`` in ``env`` from the start of ``scenario`` to the end of the episode.
@@ -56,17 +56,17 @@ def run_episode(
         policy: chooses the actions.
         scenario: what ``env`` was made for; gives the seed.
         observer: sees each step; for pictures and windows.
-        honest_time: seconds of the world's clock for each second that the policy computes; until
+        latency_factor: seconds of the world's clock for each second that the policy computes; until
             its action is there, the robot goes on as it was commanded last. None: the world stands
             still while the policy computes.
         clock: measures how long the policy takes [s].
 
     Raises:
-        InvalidInputError: if ``honest_time`` is negative, or ``env`` cannot simulate that time.
+        InvalidInputError: if ``latency_factor`` is negative, or ``env`` cannot simulate that time.
         PolicyError: if the policy raises.
         InvalidActionError: if it returns an action that is not finite or has the wrong shape.
     """
-    recording = Recording(policy, scenario, honest_time=honest_time, clock=clock)
+    recording = Recording(policy, scenario, latency_factor=latency_factor, clock=clock)
     recording.run(env, observer)
     return recording.episode()
 
@@ -78,7 +78,7 @@ class Recording:
         policy: chooses the actions.
         scenario: what is run.
         label: what results call the policy.
-        honest_time: see `run_episode`.
+        latency_factor: see `run_episode`.
         clock: measures how long the policy takes [s].
     """
 
@@ -88,11 +88,11 @@ class Recording:
         scenario: Any,
         label: str = "",
         *,
-        honest_time: float | None = None,
+        latency_factor: float | None = None,
         clock: Clock = time.perf_counter,
     ) -> None:
         self.policy = policy
-        self.honest_time = checked_honest_time(honest_time)
+        self.latency_factor = checked_latency_factor(latency_factor)
         self._clock = clock
         self.scenario = scenario
         self.label = label or type(policy).__name__
@@ -118,7 +118,7 @@ class Recording:
         self._begin(world)
         rng = stream(self.scenario.seed, "policy")
         self._ask(self.policy.reset, world, rng)
-        self._keep_time(env)
+        self._simulate_latency(env)
         if observer is not None:
             observer(0, world, self.policy)
         ended = False
@@ -128,10 +128,10 @@ class Recording:
             action = self._ask(self.policy.act, world, observation)
             elapsed = self._clock() - begin
             command = checked_action(env, action)
-            if self.honest_time is None:
+            if self.latency_factor is None:
                 observation, reward, terminated, truncated, info = env.step(command)
             else:
-                lag = self.honest_time * (seeing + blocking_time(self.policy, elapsed))
+                lag = self.latency_factor * (seeing + blocking_time(self.policy, elapsed))
                 observation, reward, terminated, truncated, info = env.step_late(command, lag)
             elapsed += seeing
             world = env.world
@@ -169,23 +169,23 @@ class Recording:
                 "key": self.scenario.key,
                 "seed": self.scenario.seed,
                 "pushplan": pushplan.__version__,
-                **({} if self.honest_time is None else {"honest_time": self.honest_time}),
+                **({} if self.latency_factor is None else {"latency_factor": self.latency_factor}),
                 **({} if held_for(self.policy) == 1 else {"held_for": held_for(self.policy)}),
             },
         )
 
-    def _keep_time(self, env: Any) -> None:
+    def _simulate_latency(self, env: Any) -> None:
         """Tell a policy that plans beside driving how time passes in this episode."""
-        if self.honest_time is None:
+        if self.latency_factor is None:
             return
         if not callable(getattr(env, "step_late", None)):
             raise InvalidInputError(
-                f"honest time needs an environment with a method step_late(action, lag), "
+                "latency-aware simulation needs an environment with step_late(action, lag), "
                 f"{type(env).__name__} has none"
             )
-        keep_time = getattr(self.policy, "keep_time", None)
-        if callable(keep_time):
-            self._ask(keep_time, self.honest_time, self._clock)
+        simulate_latency = getattr(self.policy, "simulate_latency", None)
+        if callable(simulate_latency):
+            self._ask(simulate_latency, self.latency_factor, self._clock)
 
     def _begin(self, world: World) -> None:
         self.started = True
@@ -211,13 +211,13 @@ class Recording:
             raise PolicyError(describe(error)) from error
 
 
-def checked_honest_time(factor: float | None) -> float | None:
-    """The factor of honest time, None where the world stands still meanwhile.
+def checked_latency_factor(factor: float | None) -> float | None:
+    """The factor of latency-aware simulation, None where the world stands still meanwhile.
 
     Raises:
         InvalidInputError: if it is no number, negative or not finite.
     """
-    return None if factor is None else number("honest_time", factor, low=0.0)
+    return None if factor is None else number("latency_factor", factor, low=0.0)
 
 
 def blocking_time(policy: Policy, elapsed_s: float) -> float:

@@ -54,8 +54,8 @@ class PlanFollower:
     up, a new plan is made. If none is found the old one is kept. A differential drive that has no
     plan, or does not get on with its plans, backs off.
 
-    In honest time (`keep_time`) planning goes on beside driving: a plan is there only after the
-    time that it took, and the old one is driven until then.
+    In latency-aware simulation (`simulate_latency`) planning goes on beside driving: a plan is
+    there only after the time that it took, and the old one is driven until then.
 
     Args:
         planner: makes the plans.
@@ -85,11 +85,13 @@ class PlanFollower:
         self._forget(np.random.default_rng(0))
 
     def reset(self, world: World, rng: np.random.Generator) -> None:
-        """Forget the last episode; time stands still while it plans until `keep_time` is called."""
+        """Forget the last episode; planning takes no time until `simulate_latency` is called."""
         self._forget(rng)
         self._progress = Progress(window=2.0 * world.robot.circumscribed_radius)
 
-    def keep_time(self, factor: float, clock: Callable[[], float] = time.perf_counter) -> None:
+    def simulate_latency(
+        self, factor: float, clock: Callable[[], float] = time.perf_counter
+    ) -> None:
         """From now to the next reset a plan is there only after the time that it took.
 
         Args:

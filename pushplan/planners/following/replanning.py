@@ -52,7 +52,8 @@ class Replanning:
         every_metres: plan again when the robot is this far from where it planned [m].
         latency: time for which a planning call takes [s]. A plan then starts where the robot will
             be after it, and is joined to the part of the old plan up to there. None stands for 0
-            where plans are there at once, and for what the last calls took in honest time.
+            where plans are there at once, and for what the last calls took in latency-aware
+            simulation.
     """
 
     offset: float = 0.3

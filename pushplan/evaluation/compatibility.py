@@ -36,7 +36,7 @@ def usable_policies(
         starts = {Job(spec, scenario).title: scenario for scenario in scenarios}
         reasons: dict[str, str] = {}
         for title, scenario in starts.items():
-            reason = misfit(spec, scenario, settings)
+            reason = incompatibility(spec, scenario, settings)
             if reason is None:
                 reasons.clear()
                 break
@@ -60,7 +60,7 @@ def read_policies(given: Any) -> list[PolicySpec]:
         raise UnusablePolicyError(str(error)) from error
 
 
-def misfit(spec: PolicySpec, scenario: Any, settings: JobSettings) -> str | None:
+def incompatibility(spec: PolicySpec, scenario: Any, settings: JobSettings) -> str | None:
     """Why a policy cannot run a scenario; None if it can.
 
     The policy is made, and so is its environment. A policy of ours and a network also take one
@@ -88,7 +88,7 @@ def misfit(spec: PolicySpec, scenario: Any, settings: JobSettings) -> str | None
     with contextlib.closing(env):
         if spec.is_ours:
             reason = _first_step(policy, scenario, env)
-            if reason is None and settings.rehearse:
+            if reason is None and settings.dry_run:
                 spec.warm_up()  # what is compiled here, workers find in the cache
             return reason
     return None
