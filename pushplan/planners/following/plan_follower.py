@@ -27,6 +27,7 @@ from pushplan.world import (
     World,
 )
 from pushplan.world.checks import number
+from pushplan.world.polyline import path_lengths
 
 _REMEMBERED = 5
 """Planning calls whose times say how long the next one will take."""
@@ -250,8 +251,7 @@ class PlanFollower:
         if now.jammed_at >= 0:
             at_once = now.jammed_at <= 3 and self._in_vain < 20
             return Reason.JAM if rested or at_once else None
-        steps = np.diff(predicted[part, :, :2], axis=0)
-        expected = float(np.hypot(steps[..., 0], steps[..., 1]).sum(axis=0) @ world.movables.masses)
+        expected = float(path_lengths(predicted[part]) @ world.movables.masses)
         allowed = surprise * world.robot.circumscribed_radius * world.robot.mass
         return Reason.SURPRISE if rested and now.work - expected > allowed else None
 
