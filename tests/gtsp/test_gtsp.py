@@ -19,9 +19,9 @@ from pushplan.gtsp import (
     solve_gtsp,
     warm_up_solver,
 )
-from pushplan.gtsp.kernels import SPARE, push_values
-from pushplan.gtsp.layers import build, close_gap, keep, link_in, make_layers, undo
-from pushplan.gtsp.segment_swap import improve_by_swaps
+from pushplan.gtsp.layer_kernels import build, close_gap, keep, link_in, make_layers, undo
+from pushplan.gtsp.node_choice_kernels import SPARE, push_values
+from pushplan.gtsp.segment_swap_kernels import improve_by_swaps
 from pushplan.world import Cancellation, Deadline, InvalidInputError, MaxIterations
 
 SEARCH = GtspConfig(method="search")
