@@ -16,9 +16,7 @@ from pushplan.world.checks import FloatArray, IntArray
 
 def track_of(plan: Plan) -> Track:
     """The path of a plan as the kernels read it."""
-    moves = np.diff(plan.poses[:, :2], axis=0)
-    lengths = np.concatenate([[0.0], np.cumsum(np.hypot(moves[:, 0], moves[:, 1]))])
-    return Track(plan.poses, lengths, plan.speeds)
+    return Track(plan.poses, plan.arc_lengths, plan.speeds)
 
 
 def driven_twist(world: World) -> Twist:

@@ -12,13 +12,13 @@ from pushplan.planners.rearrangement.push_poses import (
     SHIFTS,
     heading_axes,
     initial_heading,
-    polyline_length,
     pose_behind,
 )
 from pushplan.planners.rearrangement.push_simulator import PushSimulator
 from pushplan.planners.rearrangement.wall_pushes import curved_pushes, partial_pushes
 from pushplan.world import ClearanceArea
 from pushplan.world.checks import FloatArray
+from pushplan.world.polyline import path_length
 
 TILTS = tuple(math.radians(tilt) for tilt in (0.0, 20.0, -20.0, 40.0, -40.0))
 """Directions of line pushes against the normal of an edge [rad]."""
@@ -172,7 +172,7 @@ def _path_push(
     start = pose_behind(scene, k, initial_heading(path, 0.5 * scene.size), shift)
     if not scene.fits(start):
         return []
-    length = float(np.hypot(*np.diff(path, axis=0).T).sum())
+    length = path_length(path)
     limit = 1.5 * length + 4.0 * scene.size
     return simulator.simulate(start, k, path=path, shift=shift, limit=limit, wanted=wanted)
 
@@ -188,7 +188,7 @@ def collecting_pushes(simulator: PushSimulator, boxes: Iterable[int]) -> list[Pu
         own = paths[k]
         if own is None:
             continue
-        own_length = polyline_length(own)
+        own_length = path_length(own)
         away = np.hypot(*(scene.poses[:, :2] - scene.poses[k, :2]).T)
         for j in sorted(boxes, key=lambda j: (float(away[j]), j))[: _PARTNERS + 1]:
             other = paths[j]
@@ -196,7 +196,7 @@ def collecting_pushes(simulator: PushSimulator, boxes: Iterable[int]) -> list[Pu
                 continue
             width = 0.75 * float(movables.radii[j] + movables.radii[k])
             if (
-                float(away[j]) + polyline_length(other) > own_length + 1.5 * scene.size
+                float(away[j]) + path_length(other) > own_length + 1.5 * scene.size
                 or width > 1.3 * scene.half
             ):
                 continue

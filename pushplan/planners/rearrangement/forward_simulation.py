@@ -8,9 +8,9 @@ import numpy as np
 
 from pushplan.interaction.kernels import sweep_path
 from pushplan.planners.rearrangement.push import Push
-from pushplan.planners.rearrangement.push_poses import object_path_lengths, polyline_length
 from pushplan.planners.rearrangement.push_simulator import PushSimulator
 from pushplan.planners.rearrangement.route import Route, RoutePlanner
+from pushplan.world.polyline import path_length, path_lengths
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,8 +39,8 @@ def simulate_push(
     jammed = sweep_path(path, poses, scene.bodies, scene.settings, out)
     if jammed >= 0:
         return SimulatedPush(np.inf, route, push)
-    length = polyline_length(path[:, :2])
-    ends = simulator.resimulate(push, path[-1], poses=poses, spent=object_path_lengths(out))
+    length = path_length(path[:, :2])
+    ends = simulator.resimulate(push, path[-1], poses=poses, spent=path_lengths(out))
     good = [end for end in ends if push.pre_relocates or set(push.delivers) <= set(end.delivers)]
     if not good:
         return SimulatedPush(np.inf, route, push)

@@ -8,8 +8,8 @@ import numpy as np
 
 from pushplan.compiled import kernel
 from pushplan.geometry import convex_penetration
+from pushplan.geometry.transforms import transform_points
 from pushplan.interaction.kernels import Bodies
-from pushplan.interaction.separation import place
 from pushplan.world.checks import BoolArray, FloatArray
 
 REMOVED = 1e7
@@ -56,7 +56,7 @@ def is_done(k: int, poses: FloatArray, bodies: Bodies, goal: ObjectGoal) -> bool
         return False
     a, b = bodies.offsets[k], bodies.offsets[k + 1]
     outline = np.empty((b - a, 2))
-    place(poses[k], bodies.vertices[a:b], outline)
+    transform_points(poses[k], bodies.vertices[a:b], outline)
     if goal.is_receptacle:
         for e in range(goal.edges.shape[0]):
             for i in range(b - a):

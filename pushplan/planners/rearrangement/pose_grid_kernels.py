@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from pushplan.compiled import kernel
 from pushplan.geometry import convex_penetration
+from pushplan.geometry.transforms import transform_points
 from pushplan.interaction.kernels import Bodies
-from pushplan.interaction.separation import place
 from pushplan.motion.collision import Footprint, Obstacles, is_free
 from pushplan.world.checks import BoolArray, FloatArray, IntArray
 
@@ -133,7 +133,7 @@ def contact_depths(grid: PoseGrid, shape: Footprint, poses: FloatArray, bodies: 
     body = np.empty_like(shape.vertices)
     for k in range(poses.shape[0]):
         a, b = bodies.offsets[k], bodies.offsets[k + 1]
-        place(poses[k], bodies.vertices[a:b], outline[a:b])
+        transform_points(poses[k], bodies.vertices[a:b], outline[a:b])
         reach = shape.radius + bodies.radii[k]
         i0 = max(0, int(np.ceil((poses[k, 1] - reach - grid.y) / grid.step)))
         i1 = min(rows - 1, int(np.floor((poses[k, 1] + reach - grid.y) / grid.step)))
@@ -142,7 +142,7 @@ def contact_depths(grid: PoseGrid, shape: Footprint, poses: FloatArray, bodies: 
         for t in range(count):
             pose[:] = 0.0
             pose[2] = HEADINGS[t]
-            place(pose, shape.vertices, body)
+            transform_points(pose, shape.vertices, body)
             for i in range(i0, i1 + 1):
                 y = grid.y + i * grid.step
                 for j in range(j0, j1 + 1):

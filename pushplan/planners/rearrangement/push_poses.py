@@ -48,17 +48,6 @@ def initial_heading(path: FloatArray, ahead: float) -> float:
     return math.atan2(y - path[0, 1], x - path[0, 0])
 
 
-def polyline_length(path: FloatArray) -> float:
-    """Length [m] of a path (M, 2)."""
-    return float(np.hypot(*np.diff(path, axis=0).T).sum())
-
-
-def object_path_lengths(poses: FloatArray) -> FloatArray:
-    """(K,) path length [m] of each object over poses (N, K, 3)."""
-    out: FloatArray = np.hypot(*np.moveaxis(np.diff(poses[:, :, :2], axis=0), 2, 0)).sum(axis=0)
-    return out
-
-
 def pose_distance(pose: FloatArray, other: FloatArray, size: float) -> float:
     """How far two poses (3,) of an object are apart, turns included, in units of ``size``."""
     turn = math.remainder(float(pose[2] - other[2]), 2.0 * math.pi)

@@ -9,7 +9,7 @@ import numpy as np
 from pushplan.interaction.kernels import sweep_path
 from pushplan.planners.rearrangement.goal_kernels import all_done
 from pushplan.planners.rearrangement.push import Push
-from pushplan.planners.rearrangement.push_poses import object_path_lengths, pose_distance
+from pushplan.planners.rearrangement.push_poses import pose_distance
 from pushplan.planners.rearrangement.push_scene import PushScene
 from pushplan.planners.rearrangement.rollout_cache import Rollout
 from pushplan.planners.rearrangement.rollout_kernels import (
@@ -19,6 +19,7 @@ from pushplan.planners.rearrangement.rollout_kernels import (
     roll_out,
 )
 from pushplan.world.checks import BoolArray, FloatArray
+from pushplan.world.polyline import path_length, path_lengths
 
 _ALIKE = 0.2
 """By how much places of an object may differ that an extraction primitive gets it to
@@ -183,14 +184,13 @@ class PushSimulator:
         out = np.empty((len(path), len(after), 3))
         if sweep_path(path, after, scene.bodies, scene.settings, out) >= 0:
             return []
-        lengths = object_path_lengths(out) + (0.0 if spent is None else spent)
+        lengths = path_lengths(out) + (0.0 if spent is None else spent)
         done = all_done(after, scene.bodies, scene.object_goal)
         if (scene.done & ~done).any():
             return []
         ids, masses = scene.world.movables.ids, scene.world.movables.masses
-        moves = np.diff(path, axis=0)
-        length = float(np.hypot(moves[:, 0], moves[:, 1]).sum())
-        cost = length + scene.turn_cost * float(np.abs(moves[:, 2]).sum())
+        length = path_length(path)
+        cost = length + scene.turn_cost * float(np.abs(np.diff(path[:, 2])).sum())
         return [
             Push(
                 delivers=tuple(ids[np.flatnonzero(done & ~scene.done)].tolist()),

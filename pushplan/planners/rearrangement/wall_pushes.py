@@ -9,11 +9,11 @@ from pushplan.planners.rearrangement.push import Push
 from pushplan.planners.rearrangement.push_poses import (
     SHIFTS,
     initial_heading,
-    polyline_length,
     pose_behind,
 )
 from pushplan.planners.rearrangement.push_simulator import PushSimulator
 from pushplan.world.checks import FloatArray
+from pushplan.world.polyline import path_length
 
 LEANS = tuple(math.radians(lean) for lean in (20, -20, 40, -40, 60, -60, 80, -80))
 """Directions against that of its path in which an object beside a wall is first pushed [rad]."""
@@ -52,7 +52,7 @@ def curved_pushes(simulator: PushSimulator, k: int, path: FloatArray) -> list[Pu
     scene = simulator.scene
     found: list[Push] = []
     towards = initial_heading(path, 0.5 * scene.size)
-    limit = 1.5 * polyline_length(path) + 6.0 * scene.size
+    limit = 1.5 * path_length(path) + 6.0 * scene.size
     for lean in LEANS:
         for fraction in SHIFTS:
             start = pose_behind(scene, k, towards + lean, fraction * scene.half)
