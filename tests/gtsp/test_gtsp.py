@@ -431,3 +431,14 @@ def test_a_table_that_does_not_fit_is_refused() -> None:
 def test_config_is_checked(changes: dict[str, object]) -> None:
     with pytest.raises(InvalidInputError):
         GtspConfig(**changes)  # type: ignore[arg-type]
+
+
+def test_the_solver_knows_no_robot() -> None:
+    code = (
+        "import sys\n"
+        "from pushplan.gtsp import read_gtsp, solve_gtsp\n"
+        "print(sorted(m for m in sys.modules if m.startswith('pushplan.') and m.split('.')[1]\n"
+        "             not in ('gtsp', 'world', 'compiled')))\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout == "[]\n"
