@@ -330,6 +330,7 @@ def test_iterations_are_counted_and_other_seeds_differ() -> None:
     assert tours[0].nodes != tours[1].nodes
 
 
+@pytest.mark.clock
 @pytest.mark.parametrize("config", [GtspConfig(), SEARCH, PROOF])
 def test_deadline_holds(config: GtspConfig) -> None:
     costs, clusters = pushes(16, 16, 0)
