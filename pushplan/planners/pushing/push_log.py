@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pushplan.planners.pushing import kernels
+from pushplan.planners.pushing import contact_kernels
 from pushplan.planners.pushing.bumper import face_towards
 from pushplan.planners.pushing.model import PushModel
 from pushplan.planners.pushing.parameters import PushParameters
@@ -29,7 +29,7 @@ class PushLog(ArrayRecord):
         times: (T,) [s].
         offset: (T,) of the box from the middle of the bumper, left positive [half bumpers].
         angle: (T,) of the pushed face against how it would lie on the bumper [rad].
-        margin: (T,) share of the friction cone and of the line of contact that the robot's turn
+        margin: (T,) fraction of the friction cone and of the line of contact that the robot's turn
             leaves unused, 1 straight ahead, negative where the box slips; -1 stands for all less.
         lateral: (T,) distance from the path, left positive [m]; NaN without a path.
         touching: (T,) whether the box is being pushed; the other entries mean nothing where not.
@@ -79,9 +79,9 @@ def push_log(
         face = face_towards(outline, float(pose[2] - box[2]))
         model = models.setdefault(face.normal, PushModel(robot, outline, parameters, face))
         state = model.state(pose, box)
-        low, high = kernels.line(model.contact, state.offset)
+        low, high = contact_kernels.line(model.contact, state.offset)
         touching[i] = abs(state.gap) < _TOUCH * model.reach and low < 0.0 < high
-        flush = kernels.flush_angle(model.contact, state.offset)
+        flush = contact_kernels.flush_angle(model.contact, state.offset)
         j = min(i, count - 2)
         margin = _margin(episode, j, model.stable_curvature(state.offset)) if count > 1 else 1.0
         columns[:3, i] = state.offset / model.bumper.half, state.angle - flush, margin
@@ -92,7 +92,7 @@ def push_log(
 
 
 def _margin(episode: Episode, i: int, bound: float) -> float:
-    """Unused share of the stable curvature between two recorded instants."""
+    """Unused fraction of the stable curvature between two recorded instants."""
     a, b = episode.robot_poses[i], episode.robot_poses[i + 1]
     turn = abs(math.remainder(float(b[2] - a[2]), math.tau))
     move = math.hypot(float(b[0] - a[0]), float(b[1] - a[1]))

@@ -2,7 +2,7 @@
 
 ``ahead[c, v]`` is the cost of the cheapest way from the root's node along the tour to node v of
 cluster c, ``behind[c, v]`` of that from there to the root. A change moves all values past it by
-what the tour has become dearer. That amount is carried by the cluster beside the change instead
+what the tour costs more. That amount is carried by the cluster beside the change instead
 (both its values are lowered by ``carry[c]``), so that only a few values have to be renewed, up to
 where they agree with the old ones; and in every gap of the tour the cheapest way across costs 0.
 """
@@ -14,50 +14,38 @@ from typing import NamedTuple
 import numpy as np
 
 from pushplan.compiled import kernel
-from pushplan.gtsp.kernels import SPARE, push_values
+from pushplan.gtsp.node_choice_kernels import SPARE, push_values
 from pushplan.world.checks import FloatArray, IntArray
 
 
 class Layers(NamedTuple):
-    """A tour and its values; m clusters of at most K nodes.
-
-    Args:
-        costs: (N, N + SPARE).
-        reverse: (N, N + SPARE) of the transpose.
-        at: (m,) first node of each cluster; of the root, the node that counts.
-        size: (m,) nodes of each cluster; 1 for the root.
-        after: (m,) next cluster.
-        before: (m,) previous cluster.
-        ahead: (m, K).
-        behind: (m, K).
-        carry: (m,).
-        old_links: (m, 2) what ``after`` and ``before`` were when the round began.
-        old_ahead: (m, K).
-        old_behind: (m, K).
-        old_carry: (m,).
-        stamp: (m,) round in which a cluster was touched last.
-        touched: (m + 1,) how many clusters the round has touched, and which.
-        out: (K + SPARE,) working memory.
-        left: (K + SPARE,) working memory.
-        right: (K + SPARE,) working memory.
-    """
+    """A tour and its values; m clusters of at most K nodes."""
 
     costs: FloatArray
+    """(N, N + SPARE)"""
     reverse: FloatArray
+    """(N, N + SPARE) of the transpose."""
     at: IntArray
+    """(m,) first node of each cluster; of the root, the node that counts."""
     size: IntArray
+    """(m,) nodes of each cluster; 1 for the root."""
     after: IntArray
+    """(m,) next cluster."""
     before: IntArray
-    ahead: FloatArray
-    behind: FloatArray
-    carry: FloatArray
+    """(m,) previous cluster."""
+    ahead: FloatArray  # (m, K)
+    behind: FloatArray  # (m, K)
+    carry: FloatArray  # (m,)
     old_links: IntArray
-    old_ahead: FloatArray
-    old_behind: FloatArray
-    old_carry: FloatArray
+    """(m, 2) what ``after`` and ``before`` were when the round began."""
+    old_ahead: FloatArray  # (m, K)
+    old_behind: FloatArray  # (m, K)
+    old_carry: FloatArray  # (m,)
     stamp: IntArray
+    """(m,) round in which a cluster was touched last."""
     touched: IntArray
-    out: FloatArray
+    """(m + 1,) how many clusters the round has touched, and which."""
+    out: FloatArray  # (K + SPARE,) working memory, as the next two
     left: FloatArray
     right: FloatArray
 
@@ -93,7 +81,7 @@ def make_layers(costs: FloatArray, reverse: FloatArray, offsets: IntArray, root:
 
 @kernel(allocates=True)
 def build(tour: Layers, order: IntArray, root_node: int) -> float:
-    """All values of a closed tour from scratch; returns its cost."""
+    """Compute all values of a closed tour from scratch; returns its cost."""
     count = len(order)
     root = order[0]
     tour.at[root] = root_node
@@ -120,6 +108,7 @@ def build(tour: Layers, order: IntArray, root_node: int) -> float:
 def _from(
     costs: FloatArray, values: FloatArray, tour: Layers, a: int, b: int, out: FloatArray
 ) -> None:
+    """Fill ``out`` with the values of cluster b from those of cluster a."""
     push_values(costs, values, a, tour.at[a], tour.size[a], tour.at[b], tour.size[b], out)
 
 
@@ -177,75 +166,69 @@ def _renew(
 
 @kernel(inline=True)
 def _renew_both(tour: Layers, c: int, root: int, now: int, tolerance: float) -> None:
+    """Renew the values on both sides of cluster c."""
     _renew(tour, tour.costs, tour.ahead, tour.after, c, root, now, tolerance)
     _renew(tour, tour.reverse, tour.behind, tour.before, c, root, now, tolerance)
 
 
 @kernel(inline=True)
 def close_gap(
-    tour: Layers, a: int, b: int, carried: float, root: int, now: int, tolerance: float
+    tour: Layers,
+    a: int,
+    b: int,
+    carried: float,  # sum of ``carry`` of the clusters that were between them
+    root: int,
+    now: int,  # number of the round
+    tolerance: float,  # of values that count as equal
 ) -> float:
-    """Link cluster a to b, what was between them being gone.
-
-    Args:
-        tour: changed.
-        a: a cluster of the tour.
-        b: another one.
-        carried: sum of ``carry`` of the clusters that were between them.
-        root: of the tour.
-        now: number of the round.
-        tolerance: of values that count as equal.
-
-    Returns:
-        The change of the tour's cost.
-    """
+    """Link cluster a to b, what was between them being gone; returns the change of cost."""
     keep(tour, a, now)
     keep(tour, b, now)
     tour.after[a], tour.before[b] = b, a
     out = tour.out
     _from(tour.costs, tour.ahead, tour, a, b, out)
-    price = np.inf
+    cost = np.inf
     for v in range(tour.size[b]):
-        price = min(price, out[v] + tour.behind[b, v])
+        cost = min(cost, out[v] + tour.behind[b, v])
     if a != root:
-        tour.carry[a] += price
+        tour.carry[a] += cost
         _from(tour.reverse, tour.behind, tour, b, a, out)
         for v in range(tour.size[a]):
-            tour.ahead[a, v] -= price
+            tour.ahead[a, v] -= cost
             tour.behind[a, v] = out[v] - tour.carry[a]
         _renew_both(tour, a, root, now, tolerance)
     else:
-        tour.carry[b] += price
+        tour.carry[b] += cost
         for v in range(tour.size[b]):
             tour.ahead[b, v] = out[v] - tour.carry[b]
-            tour.behind[b, v] -= price
+            tour.behind[b, v] -= cost
         _renew_both(tour, b, root, now, tolerance)
-    return float(price - carried)
+    return float(cost - carried)
 
 
 @kernel(inline=True)
-def price_between(tour: Layers, c: int, a: int, b: int) -> float:
-    """What the tour becomes dearer by with cluster c between a and b."""
+def insertion_cost(tour: Layers, c: int, a: int, b: int) -> float:
+    """What the tour costs more by with cluster c between a and b."""
     left, right = tour.left, tour.right
     _from(tour.costs, tour.ahead, tour, a, c, left)
     _from(tour.reverse, tour.behind, tour, b, c, right)
-    price = np.inf
+    cost = np.inf
     for v in range(tour.size[c]):
-        price = min(price, left[v] + right[v])
-    return float(price)
+        cost = min(cost, left[v] + right[v])
+    return float(cost)
 
 
 @kernel(inline=True)
 def link_in(tour: Layers, c: int, a: int, root: int, now: int, tolerance: float) -> float:
     """Put cluster c behind cluster a; returns the change of the tour's cost."""
     b = tour.after[a]
-    price = price_between(tour, c, a, b)
+    cost = insertion_cost(tour, c, a, b)
     keep(tour, a, now)
     keep(tour, b, now)
     tour.after[a], tour.before[c], tour.after[c], tour.before[b] = c, a, b, c
-    tour.carry[c] = price
+    tour.carry[c] = cost
     for v in range(tour.size[c]):
-        tour.ahead[c, v] = tour.left[v] - price
-        tour.behind[c, v] = tour.right[v] - price
+        tour.ahead[c, v] = tour.left[v] - cost
+        tour.behind[c, v] = tour.right[v] - cost
     _renew_both(tour, c, root, now, tolerance)
-    return float(price)
+    return float(cost)

@@ -1,4 +1,4 @@
-"""`Walk`: drive along a polyline to a pose, by poses that may be off."""
+"""`WaypointFollower`: drive along a polyline to a pose, by poses that may be off."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _BEST = 0.02
 """What counts as getting on [circumscribed radii, rad]."""
 
 
-class Walk:
+class WaypointFollower:
     """Turns to each point of a polyline, drives there, and turns to a heading at the end.
 
     `pushplan.control.DriveTo` is more exact where poses are; this one bears noise and delays.

@@ -1,32 +1,32 @@
-"""`BoxFollower`: a push of one object along its way by predictive control."""
+"""`MpcFollower`: a push of one object along its path by predictive control."""
 
 from __future__ import annotations
 
 import math
 
 from pushplan.planners.pushing import PushingConfig, PushingMpc, PushParameters, PushPath
-from pushplan.planners.rearrangement.places import direction_of
 from pushplan.planners.rearrangement.push import Push
-from pushplan.planners.rearrangement.scene import Scene
+from pushplan.planners.rearrangement.push_poses import initial_heading
+from pushplan.planners.rearrangement.push_scene import PushScene
 from pushplan.world import Twist, World
 
 _ALIGNED = math.radians(20.0)
-"""A push that begins farther off the object's way is left to the geometric law."""
+"""A push that begins farther off the object's path is left to the geometric controller."""
 _BLOCKED = 0.2
 """Share of a command that is driven, below which the push does not get on."""
 _PATIENCE = 4
 """Commands for which it may be so."""
 
 
-def suits(scene: Scene, push: Push) -> bool:
-    """Whether the contact model of `PushingMpc` describes a push: of one object, along its way."""
-    if not push.guided or push.frees or push.covers != (push.led,):
+def suits_mpc(scene: PushScene, push: Push) -> bool:
+    """Whether the contact model of `PushingMpc` describes a push: of one object, along its path."""
+    if not push.follows_path or push.pre_relocates or push.delivers != (push.target,):
         return False
-    away = direction_of(push.box_path, 0.5 * scene.size) - float(scene.world.robot_pose[2])
+    away = initial_heading(push.object_path, 0.5 * scene.size) - float(scene.world.robot_pose[2])
     return abs(math.remainder(away, math.tau)) < _ALIGNED
 
 
-class BoxFollower:
+class MpcFollower:
     """Drives one push by `PushingMpc`.
 
     Args:
@@ -34,13 +34,13 @@ class BoxFollower:
         push: a push that `suits`.
     """
 
-    def __init__(self, scene: Scene, push: Push) -> None:
+    def __init__(self, scene: PushScene, push: Push) -> None:
         config = PushingConfig(
             parameters=PushParameters(scene.config.friction), period=scene.config.period
         )
         self._mpc = PushingMpc(config)
         robot = scene.world.robot
-        self._plan = PushPath.through(push.box_path, radius=scene.size).plan(robot, push.led)
+        self._plan = PushPath.through(push.object_path, radius=scene.size).plan(robot, push.target)
         self._blocked = 0
 
     def command(self, world: World) -> Twist | None:

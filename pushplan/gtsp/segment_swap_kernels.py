@@ -21,29 +21,16 @@ def _rotate(values: IntArray, scratch: IntArray, low: int, middle: int, high: in
 
 @kernel(allocates=True)
 def improve_by_swaps(
-    costs: FloatArray,
-    near: IntArray,
-    order: IntArray,
-    nodes: IntArray,
-    symmetric: bool,
-    tolerance: float,
+    costs: FloatArray,  # (N, N)
+    near: IntArray,  # (m, k) clusters by distance
+    order: IntArray,  # (m,) closed tour of clusters; changed
+    nodes: IntArray,  # (m,) their nodes; changed
+    symmetric: bool,  # whether a reversed segment costs the same
+    tolerance: float,  # least gain that counts
 ) -> float:
-    """Swap neighbouring segments, and reverse one where costs are symmetric, while it pays.
-
-    A move takes out the arcs after positions i, j and k and links a = order[i] to one of its
-    neighbours, which must be cheaper than the arc that is taken out.
-
-    Args:
-        costs: (N, N).
-        near: (m, k) clusters by distance.
-        order: (m,) closed tour of clusters; changed.
-        nodes: (m,) their nodes; changed.
-        symmetric: whether a reversed segment costs the same.
-        tolerance: least gain that counts.
-
-    Returns:
-        What the tour has become cheaper by.
-    """
+    """Swap neighbouring segments, and reverse one where costs are symmetric; returns the gain."""
+    # a move takes out the arcs after positions i, j and k and links a = order[i] to one of its
+    # neighbours, which must be cheaper than the arc that is taken out
     count, reach = len(order), near.shape[1]
     place, scratch = np.empty(count, np.int64), np.empty(count, np.int64)
     for p in range(count):
@@ -75,6 +62,7 @@ def _first_swap(
     reach: int,
     tolerance: float,
 ) -> float:
+    """Make the first swap after position i that pays; returns its gain, 0 if there is none."""
     count = len(order)
     i1 = i + 1 if i + 1 < count else 0
     a, a1 = nodes[i], nodes[i1]

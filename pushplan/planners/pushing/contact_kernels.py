@@ -33,7 +33,7 @@ class Contact(NamedTuple):
     """x of the bumper in its middle, from the axle [m]."""
     half: float
     """Half the bumper's width [m]."""
-    bend: float
+    curvature: float
     """Curvature of the bumper's front [1/m]; positive where its ends reach ahead."""
     depth: float
     """a: from the pushed face to the box's centre [m]."""
@@ -59,10 +59,10 @@ def line(contact: Contact, offset: float) -> tuple[float, float]:
 def flush_angle(contact: Contact, offset: float) -> float:
     """Angle of the face against the robot's heading when it lies on the bumper [rad]."""
     low, high = line(contact, offset)
-    bend = contact.bend
-    if bend <= 0.0 or low >= high:
+    curvature = contact.curvature
+    if curvature <= 0.0 or low >= high:
         return 0.0
-    return -bend * (offset + 0.5 * (low + high)) / (1.0 - bend * contact.depth)
+    return -curvature * (offset + 0.5 * (low + high)) / (1.0 - curvature * contact.depth)
 
 
 @kernel(allocates=True)
@@ -74,12 +74,12 @@ def standoff(contact: Contact, offset: float, angle: float) -> tuple[float, floa
         low = high = min(max(0.0, contact.low), contact.high)
     best, at = -np.inf, 0.0
     middle = 0.5 * (low + high)
-    if contact.bend < 0.0 and c > 1e-3:
-        middle = (-s / (c * contact.bend) - offset + contact.depth * s) / c
+    if contact.curvature < 0.0 and c > 1e-3:
+        middle = (-s / (c * contact.curvature) - offset + contact.depth * s) / c
         middle = min(max(middle, low), high)
     for y in (low, middle, high):
         lateral = offset - contact.depth * s + y * c
-        x = contact.front + 0.5 * contact.bend * lateral * lateral + contact.depth * c + y * s
+        x = contact.front + 0.5 * contact.curvature * lateral * lateral + contact.depth * c + y * s
         if x > best + 1e-12:
             best, at = x, y
     return best, at
@@ -116,46 +116,41 @@ def _corner(
 
 @kernel(allocates=True)
 def contact_velocity(
-    contact: Contact, offset: float, angle: float, v: float, w: float, dt: float, out: FloatArray
+    contact: Contact,
+    offset: float,  # of the box's centre to the left of the robot's x axis [m]
+    angle: float,  # of the face's normal against the robot's heading [rad]
+    v: float,
+    w: float,
+    dt: float,  # step in which an open line of contact should close [s]
+    out: FloatArray,  # (6,) of a box that touches the bumper
 ) -> None:
-    """Velocity of a box that touches the bumper.
-
-    Args:
-        contact: bumper and face.
-        offset: of the box's centre to the left of the robot's x axis [m].
-        angle: of the face's normal against the robot's heading [rad].
-        v: forward speed [m/s].
-        w: turn rate [rad/s].
-        dt: step in which an open line of contact should close [s].
-        out: (6,) receives v_n, v_t [m/s], ω [rad/s], the centre of pressure y [m], the mode, and
-            tangential over normal force beyond what the bumper's shape gives.
-    """
+    """Fill v_n, v_t [m/s], ω [rad/s], pressure centre [m], mode, shear over normal force."""
     x, touch = standoff(contact, offset, angle)
     c, s = np.cos(angle), np.sin(angle)
     ux, uy = v - w * offset, w * x
     un, ut = c * ux + s * uy, c * uy - s * ux
     low, high = line(contact, offset)
-    bend, a, square = contact.bend, contact.depth, contact.spread * contact.spread
+    curvature, a, square = contact.curvature, contact.depth, contact.spread * contact.spread
     if low >= high:
         _corner(contact, touch, 0.0, un, ut, w, out)
         return
-    if bend < 0.0:  # a nose: one point that rolls along the face
+    if curvature < 0.0:  # a nose: one point that rolls along the face
         _corner(contact, touch, 0.0, un, ut, w, out)
         return
     off = angle - flush_angle(contact, offset)
-    slope = -bend / (1.0 - bend * a)
+    slope = -curvature / (1.0 - curvature * a)
     closing = w - off / dt
     normal = un + (closing - w) * touch
     # held fast: no motion along the bumper
     vt, omega = ut, closing
-    grip = 1.0 - bend * a
-    shear = vt * grip - bend * square * omega
+    grip = 1.0 - curvature * a
+    shear = vt * grip - curvature * square * omega
     mode = STICK
     if abs(shear) > contact.friction * max(normal, 0.0):
         mode = SLIDE
         ratio = contact.friction if shear > 0.0 else -contact.friction
-        vt = (ratio * max(normal, 0.0) + bend * square * (closing - slope * ut)) / (
-            grip - bend * square * slope
+        vt = (ratio * max(normal, 0.0) + curvature * square * (closing - slope * ut)) / (
+            grip - curvature * square * slope
         )
         omega = closing + slope * (vt - ut)
         shear = ratio * normal
@@ -170,7 +165,7 @@ def contact_velocity(
     tilt = 0.0
     if (y == contact.high and y == high) or (y == contact.low and y == low):
         lateral = offset - a * s + y * c
-        tilt = -bend * lateral - angle  # the box's corner on the bumper, not the bumper's end
+        tilt = -curvature * lateral - angle  # the box's corner on the bumper, not the bumper's end
     _corner(contact, y, tilt, un, ut, w, out)
 
 
@@ -213,7 +208,7 @@ def push_step(
     before = state[4] - flush_angle(contact, state[3])
     state[3] += dt * (out[0] * s + out[1] * c - uy)
     state[4] += dt * (out[2] - w)
-    if contact.bend >= 0.0 and abs(before) > FLUSH:
+    if contact.curvature >= 0.0 and abs(before) > FLUSH:
         flush = flush_angle(contact, state[3])
         if before * (state[4] - flush) < 0.0:
             state[4] = flush  # the other end touches before the step is over
@@ -222,20 +217,14 @@ def push_step(
 
 @kernel(allocates=True)
 def advance(
-    contact: Contact, state: FloatArray, v: float, w: float, dt: float, out: FloatArray
+    contact: Contact,
+    state: FloatArray,  # (6,) robot pose, the box's offset, its face's angle, gap >= 0; changed
+    v: float,
+    w: float,
+    dt: float,
+    out: FloatArray,  # (6,) of the last substep; of mode `FREE` without contact
 ) -> None:
-    """Move robot and box on by ``dt`` [s] under one command.
-
-    Args:
-        contact: bumper and face.
-        state: (6,) robot x, y [m], theta [rad], the box's offset [m], its face's angle [rad] and
-            the gap between bumper and box [m], at least 0; changed in place.
-        v: forward speed [m/s].
-        w: turn rate [rad/s].
-        dt: [s].
-        out: (6,) as in `contact_velocity`, of the last substep; of mode `FREE` where the robot
-            did not touch the box.
-    """
+    """Move robot and box on by ``dt`` [s] under one command; ``out`` as in `contact_velocity`."""
     reach = contact.front + contact.depth
     travel = abs(v) * dt + abs(w) * dt * reach
     count = max(1, min(_SUBSTEPS, int(np.ceil(travel / (_SUBSTEP * reach)))))
@@ -251,12 +240,12 @@ def advance(
             state[:] = trial
             out[:] = 0.0
             continue
-        share = gap / (gap - after) if gap > 1e-9 and gap > after else 0.0
-        if share > 0.0:
-            _leave(contact, state, v, w, share * step)
+        fraction = gap / (gap - after) if gap > 1e-9 and gap > after else 0.0
+        if fraction > 0.0:
+            _leave(contact, state, v, w, fraction * step)
         state[5] = 0.0
-        if share < 1.0:
-            push_step(contact, state, v, w, (1.0 - share) * step, out)
+        if fraction < 1.0:
+            push_step(contact, state, v, w, (1.0 - fraction) * step, out)
 
 
 @kernel(allocates=True)
@@ -276,18 +265,21 @@ def rollout(
 
 
 @kernel(allocates=True)
+def predicted(
+    contact: Contact, start: FloatArray, twists: FloatArray, steps: FloatArray
+) -> tuple[float, float]:
+    """Offset [m] and angle [rad] after twists (N, 2) held for steps (N,) [s]."""
+    state, detail = start.copy(), np.empty(6)
+    for k in range(steps.shape[0]):
+        advance(contact, state, twists[k, 0], twists[k, 1], steps[k], detail)
+    return state[3], state[4]
+
+
+@kernel(allocates=True)
 def observe(
     contact: Contact, normal: float, robot: FloatArray, box: FloatArray, out: FloatArray
 ) -> None:
-    """State (6,) of poses (3,); the gap is negative where bumper and box overlap.
-
-    Args:
-        contact: bumper and face.
-        normal: direction of the face's inward normal in the box's frame [rad].
-        robot: x, y [m], theta [rad].
-        box: likewise.
-        out: receives it.
-    """
+    """State (6,) of poses (3,) with the face's normal [rad]; the gap is negative in overlap."""
     dx, dy = box[0] - robot[0], box[1] - robot[1]
     c, s = np.cos(robot[2]), np.sin(robot[2])
     out[:3] = robot

@@ -10,27 +10,16 @@ from pushplan.world.checks import FloatArray, IntArray
 
 @kernel(allocates=True)
 def fill_subsets(
-    low: int,
+    low: int,  # at least 1
     high: int,
-    table: FloatArray,
-    blocks: FloatArray,
-    sizes: IntArray,
-    first: FloatArray,
+    table: FloatArray,  # (2^m, m, K), filled up to ``low``
+    blocks: FloatArray,  # (m, K, m, K) cost from node i of c to node j of d, infinite padding
+    sizes: IntArray,  # (m,) nodes of each cluster
+    first: FloatArray,  # (m, K) cost from the root to each node
 ) -> None:
-    """The entries of the subsets ``low`` to ``high - 1`` (Held and Karp 1962, over clusters).
-
-    ``table[S, c, j]`` is the cost of the cheapest path from the root through one node of every
-    cluster in S (a bit mask) that ends in node j of cluster c. A subset is larger than its
-    subsets as a number, so ascending order has everything at hand.
-
-    Args:
-        low: first subset, at least 1.
-        high: end of the range.
-        table: (2^m, m, K), filled up to ``low``.
-        blocks: (m, K, m, K) cost from node i of cluster c to node j of cluster d, infinite padding.
-        sizes: (m,) nodes of each cluster.
-        first: (m, K) cost from the root to each node.
-    """
+    """Fill the subsets ``low`` to ``high - 1`` (Held and Karp 1962, over clusters)."""
+    # table[S, c, j]: cost of the cheapest path from the root through one node of every cluster in S
+    # (a bit mask) that ends in node j of cluster c; subsets come before what holds them
     count, width = first.shape
     for subset in range(low, high):
         for d in range(count):
@@ -69,20 +58,13 @@ def _relax(values: FloatArray, block: FloatArray, size: int, out: FloatArray, wi
 
 @kernel(allocates=True)
 def read_path(
-    table: FloatArray, blocks: FloatArray, sizes: IntArray, last: FloatArray, path: IntArray
+    table: FloatArray,  # (2^m, m, K)
+    blocks: FloatArray,  # (m, K, m, K)
+    sizes: IntArray,  # (m,)
+    last: FloatArray,  # (m, K) cost from each node back to the root
+    path: IntArray,  # (m,) filled with ``cluster * K + node``
 ) -> float:
-    """The cheapest closed tour in a filled table.
-
-    Args:
-        table: (2^m, m, K).
-        blocks: (m, K, m, K).
-        sizes: (m,).
-        last: (m, K) cost from each node back to the root.
-        path: (m,) filled with ``cluster * K + node`` in visiting order.
-
-    Returns:
-        Its cost, infinite if there is none.
-    """
+    """The cost of the cheapest closed tour in a filled table; ``path`` in visiting order."""
     count, width = last.shape
     subset = (1 << count) - 1
     best, at = np.inf, -1

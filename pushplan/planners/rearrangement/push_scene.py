@@ -1,4 +1,4 @@
-"""`Scene`: a snapshot with everything that candidate pushes are made and priced from."""
+"""`PushScene`: a snapshot with all that candidate pushes and their costs are computed from."""
 
 from __future__ import annotations
 
@@ -20,24 +20,30 @@ from pushplan.motion.collision import (
     obstacles,
 )
 from pushplan.planners.arguments import check_pusher
+from pushplan.planners.rearrangement.controller_kernels import PushingController
+from pushplan.planners.rearrangement.goal_kernels import ObjectGoal, all_done
 from pushplan.planners.rearrangement.line_up import bumper_half
-from pushplan.planners.rearrangement.object_paths import Ways, ways_of
-from pushplan.planners.rearrangement.pose_grid import HEADINGS, Floor, floor_of
-from pushplan.planners.rearrangement.pose_search import Layers, add_up, contact_depths
-from pushplan.planners.rearrangement.rearrangement_config import SubTaskConfig
-from pushplan.planners.rearrangement.rollout import Law, Task, all_done, task_of
-from pushplan.planners.rearrangement.rollout_cache import Recall
-from pushplan.world import (
-    RobotModel,
-    StaticMap,
-    World,
+from pushplan.planners.rearrangement.object_paths import ObjectPaths, object_paths
+from pushplan.planners.rearrangement.pose_grid import make_pose_grid
+from pushplan.planners.rearrangement.pose_grid_kernels import (
+    Layers,
+    PoseGrid,
+    add_layers,
+    contact_depths,
 )
-from pushplan.world.checks import BoolArray, FloatArray, IntArray
+from pushplan.planners.rearrangement.rearrangement_config import RearrangementConfig
+from pushplan.planners.rearrangement.rollout_cache import RolloutCache
+from pushplan.world import ClearanceArea, Goal, Receptacle, RobotModel, StaticMap, World
+from pushplan.world.checks import BoolArray, FloatArray, IntArray, frozen
 
-STEP = 0.12
+_STEP = 0.12
 """Longest step between two commands of a push [circumscribed radii]."""
-LED = 5.0
-"""What is added to the price of carrying along an object that is to be pushed afterwards."""
+_ARM = 0.8
+"""How far a turn by one radian carries an object along [circumscribed radii]."""
+_GOAL_SLACK = 0.012
+"""By how much an object has to be clear of its goal's edge [circumscribed radii]."""
+TARGET_COST = 5.0
+"""What is added to the cost of carrying along an object that is to be pushed afterwards."""
 
 
 @functools.lru_cache(maxsize=8)
@@ -53,51 +59,68 @@ def check_world(world: World) -> None:
     check_pusher(world, "pushing objects")
 
 
+def make_object_goal(goal: Goal, static: StaticMap, slack: float) -> ObjectGoal:
+    """The goal for kernels. Sides of a receptacle that lie on the bounds do not count."""
+    assert isinstance(goal, ClearanceArea | Receptacle)
+    polygon = goal.polygon
+    along = np.roll(polygon, -1, axis=0) - polygon
+    normals = np.stack([along[:, 1], -along[:, 0]], axis=1) / np.hypot(*along.T)[:, None]
+    offsets = (normals * polygon).sum(axis=1)
+    low, high = static.bounds[:2], static.bounds[2:]
+    corners = np.array([[low[0], low[1]], [high[0], low[1]], [high[0], high[1]], [low[0], high[1]]])
+    # the sides of a receptacle that stand at the walls
+    inner = (corners @ normals.T).max(axis=0) > offsets + 4.0 * slack
+    edges = np.column_stack([normals, offsets])[inner]
+    return ObjectGoal(
+        polygon, frozen(np.ascontiguousarray(edges)), isinstance(goal, Receptacle), slack
+    )
+
+
 @dataclass(frozen=True, eq=False)
-class Ground:
+class ContactGrid:
     """A lattice with the objects on it.
 
     Args:
-        floor: the lattice.
+        grid: the lattice.
         layers: (K, 16, rows, columns) depth in each object [m].
-        weights: (K,) price of carrying each object along.
+        weights: (K,) cost of carrying each object along.
     """
 
-    floor: Floor
+    grid: PoseGrid
     layers: Layers
     weights: FloatArray
 
     def contacts(
-        self, share: float = 1.0, without: IntArray | None = None, led: int = -1
+        self, fraction: float = 1.0, without: IntArray | None = None, target: int = -1
     ) -> tuple[FloatArray, FloatArray]:
         """(16, rows, columns) depth in the objects [m] at each pose, and their weights.
 
         Args:
-            share: factor on the weights.
+            fraction: factor on the weights.
             without: indices of objects that are not there any more.
-            led: index of an object that is not to be moved; -1 if none.
+            target: index of an object that is not to be moved; -1 if none.
         """
-        weights = share * self.weights
+        weights = fraction * self.weights
         if without is not None:
             weights[without] = 0.0
-        if led >= 0:
-            weights[led] += LED
-        return add_up(self.layers, weights)
+        if target >= 0:
+            weights[target] += TARGET_COST
+        return add_layers(self.layers, weights)
 
 
 @dataclass(frozen=True, eq=False)
-class Scene:
+class PushScene:
     """A world, and what the kernels need to know of it.
 
     Args:
         world: the snapshot; its goal is one for the objects.
         config: settings.
-        recall: what is known from the last scene.
+        cache: what is known from the last scene.
     """
 
     world: World
-    config: SubTaskConfig
-    recall: Recall | None = None
+    config: RearrangementConfig
+    cache: RolloutCache | None = None
 
     def __post_init__(self) -> None:
         check_world(self.world)
@@ -144,16 +167,16 @@ class Scene:
         return self._model.settings(self.world)
 
     @cached_property
-    def task(self) -> Task:
+    def object_goal(self) -> ObjectGoal:
         """When objects are done."""
-        return task_of(self.world.goal, self.world.static, 0.012 * self.size)
+        return make_object_goal(self.world.goal, self.world.static, _GOAL_SLACK * self.size)
 
     @cached_property
-    def law(self) -> Law:
-        """Parameters of the pushing law for this robot."""
+    def controller(self) -> PushingController:
+        """Parameters of the pushing controller for this robot."""
         robot, period = self.world.robot, self.config.period
-        return Law(
-            step=min(robot.max_speed * period, STEP * self.size),
+        return PushingController(
+            step=min(robot.max_speed * period, _STEP * self.size),
             turn=robot.max_turn_rate * period,
             size=self.size,
             half=self.half,
@@ -165,52 +188,56 @@ class Scene:
     @cached_property
     def done(self) -> BoolArray:
         """(K,) whether each object is where it belongs."""
-        return all_done(self.poses, self.bodies, self.task)
+        return all_done(self.poses, self.bodies, self.object_goal)
+
+    @property
+    def turn_cost(self) -> float:
+        """Cost of a turn on the spot [m/rad]."""
+        return self.config.turn_cost * self.size
+
+    @property
+    def arm(self) -> float:
+        """How far a turn carries an object along [m/rad]."""
+        return _ARM * self.size
 
     @cached_property
     def weights(self) -> FloatArray:
         """(K,) metres of the robot's path that a metre of each object's path is worth."""
         world = self.world
-        return self.config.price * world.movables.masses / world.robot.mass
+        return self.config.work_weight * world.movables.masses / world.robot.mass
 
     @cached_property
-    def nuisance(self) -> FloatArray:
-        """(K,) price of carrying each object a metre along on an approach.
+    def contact_weights(self) -> FloatArray:
+        """(K,) cost of carrying each object a metre along on an approach.
 
         However light it is, it will not be where it was expected.
         """
-        return np.maximum(self.weights, self.config.nuisance)
+        return np.maximum(self.weights, self.config.contact_cost)
 
     @cached_property
-    def fine(self) -> Ground:
+    def fine(self) -> ContactGrid:
         """The lattice on which the next approach is planned."""
-        return self._ground(self.config.cell)
+        return self._contact_grid(self.config.cell)
 
     @cached_property
-    def coarse(self) -> Ground:
-        """The lattice on which approaches between pushes are priced."""
-        return self._ground(self.config.coarse_cell)
+    def coarse(self) -> ContactGrid:
+        """The lattice on which the cost of approaches between pushes is computed."""
+        return self._contact_grid(self.config.coarse_cell)
 
-    def _ground(self, cell: float) -> Ground:
-        world, size, movables = self.world, self.size, self.world.movables
+    def _contact_grid(self, cell: float) -> ContactGrid:
+        world, size = self.world, self.size
         sides = world.static.bounds[2:] - world.static.bounds[:2]
         step = max(cell, 0.012 * float(sides.max()) / size) * size
-        floor = floor_of(world.robot, world.static, step, self.config.margin * size)
-        layers = contact_depths(
-            floor,
-            HEADINGS,
-            footprint(world.robot, self.config.margin * size),
-            self.poses,
-            movables.vertices,
-            movables.offsets,
-            movables.radii,
-            np.ones(len(movables), dtype=np.bool_),
-        )
-        return Ground(floor, layers, self.nuisance)
+        grid = make_pose_grid(world.robot, world.static, step, self.config.margin * size)
+        shape = footprint(world.robot, self.config.margin * size)
+        layers = contact_depths(grid, shape, self.poses, self.bodies)
+        return ContactGrid(grid, layers, self.contact_weights)
 
     def remaining(self, poses: FloatArray) -> FloatArray:
-        """(K,) shortest way [m] of each object's middle to the goal from poses (K, 3)."""
-        return np.array([self.ways.length(x, y) if x < 1e6 else 0.0 for x, y, _ in poses.tolist()])
+        """(K,) shortest path [m] of each object's middle to the goal from poses (K, 3)."""
+        return np.array(
+            [self.object_paths.length(x, y) if x < 1e6 else 0.0 for x, y, _ in poses.tolist()]
+        )
 
     @cached_property
     def remaining_now(self) -> FloatArray:
@@ -218,14 +245,14 @@ class Scene:
         return self.remaining(self.poses)
 
     @cached_property
-    def ways(self) -> Ways:
-        """Of the objects to their goal."""
-        return ways_of(self.world.static, self.world.goal)
+    def object_paths(self) -> ObjectPaths:
+        """Shortest paths of the objects to their goal."""
+        return object_paths(self.world.static, self.world.goal)
 
-    def box_path(
+    def object_path(
         self, k: int, clearance: float, deep: bool = False, pose: FloatArray | None = None
     ) -> FloatArray | None:
-        """(M, 2) way of object ``k`` to where it is done, and on; None if there is none.
+        """(M, 2) path of object ``k`` to where it is done, and on; None if there is none.
 
         Args:
             k: index of the object.
@@ -234,7 +261,7 @@ class Scene:
             pose: (3,) where it is instead of where it is now.
         """
         point = (self.poses[k] if pose is None else pose)[:2]
-        return self.ways.path(point, float(self.world.movables.radii[k]), clearance, deep)
+        return self.object_paths.path(point, float(self.world.movables.radii[k]), clearance, deep)
 
     @cached_property
     def fit(self) -> tuple[Footprint, Obstacles, FloatArray]:

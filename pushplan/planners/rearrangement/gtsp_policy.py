@@ -10,11 +10,11 @@ import numpy as np
 from pushplan.control import clamp_twist
 from pushplan.geometry import VisibilityGraph
 from pushplan.gtsp import solve_gtsp
-from pushplan.planners.rearrangement.drive import LegDriver
-from pushplan.planners.rearrangement.places import behind
-from pushplan.planners.rearrangement.rearrangement_config import SubTaskConfig
+from pushplan.planners.rearrangement.push_poses import pose_behind
+from pushplan.planners.rearrangement.push_scene import PushScene, check_world
+from pushplan.planners.rearrangement.rearrangement_config import RearrangementConfig
 from pushplan.planners.rearrangement.route import Route
-from pushplan.planners.rearrangement.scene import Scene, check_world
+from pushplan.planners.rearrangement.route_follower import RouteFollower
 from pushplan.world import ClearanceArea, MaxIterations, Receptacle, Twist, World
 from pushplan.world.checks import FloatArray, expect
 
@@ -31,17 +31,17 @@ class Gtsp:
     chance is involved.
 
     Args:
-        config: settings; of the price, nothing is used.
+        config: settings; of the cost, nothing is used.
     """
 
     actions = ("velocity",)
 
-    def __init__(self, config: SubTaskConfig | None = None) -> None:
-        self.config = expect("config", config or SubTaskConfig(), SubTaskConfig)
+    def __init__(self, config: RearrangementConfig | None = None) -> None:
+        self.config = expect("config", config or RearrangementConfig(), RearrangementConfig)
         self._forget()
 
     def _forget(self) -> None:
-        self._driver: LegDriver | None = None
+        self._route_follower: RouteFollower | None = None
         self._last: FloatArray | None = None
         self._still = 0
         self._last_time = math.inf
@@ -57,9 +57,9 @@ class Gtsp:
             InvalidInputError: if the goal is one for the robot, or the robot cannot stop.
         """
         check_world(world)
-        if self._driver is None or world.time <= self._last_time != math.inf:
+        if self._route_follower is None or world.time <= self._last_time != math.inf:
             self._forget()
-            self._driver = LegDriver(world.robot, self._path(world), self.config.period)
+            self._route_follower = RouteFollower(world.robot, self._path(world), self.config.period)
         self._last_time = world.time
         pose = world.robot_pose
         if self._last is not None:
@@ -68,14 +68,14 @@ class Gtsp:
             self._still = self._still + 1 if moved < 1e-3 else 0
         self._last = pose
         if self._still >= _PATIENCE:
-            self._driver.skip()
+            self._route_follower.skip()
             self._still = 0
-        command = self._driver.command(pose)
+        command = self._route_follower.command(pose)
         return clamp_twist(world.robot, 0.0, 0.0) if command is None else command
 
     def _path(self, world: World) -> Route:
         """The whole path: for each object of the tour, behind it and then to the edge."""
-        scene = Scene(world, self.config)
+        scene = PushScene(world, self.config)
         nodes = [node for k in np.flatnonzero(~scene.done) for node in _pushes(scene, int(k))]
         heading = float(world.robot_pose[2])
         if not nodes:
@@ -103,7 +103,7 @@ class Gtsp:
         return Route(legs, ahead, either, heading, float(tour.cost))
 
 
-def _pushes(scene: Scene, k: int) -> list[tuple[int, FloatArray, FloatArray]]:
+def _pushes(scene: PushScene, k: int) -> list[tuple[int, FloatArray, FloatArray]]:
     """The object, where the robot's middle begins and where it ends, for every straight push."""
     goal, box = scene.world.goal, scene.poses[k, :2]
     radius = float(scene.world.movables.radii[k])
@@ -121,6 +121,6 @@ def _pushes(scene: Scene, k: int) -> list[tuple[int, FloatArray, FloatArray]]:
     pushes = []
     for target in found:
         way = target - box
-        start = behind(scene, k, math.atan2(way[1], way[0]), 0.0)
+        start = pose_behind(scene, k, math.atan2(way[1], way[0]), 0.0)
         pushes.append((k, start[:2], start[:2] + way))
     return pushes

@@ -1,4 +1,4 @@
-"""Covering as a generalised travelling salesman problem.
+"""Set covering as a generalised travelling salesman problem.
 
 Each object is a cluster. A push that takes one object along is one node. A push that takes several
 becomes one copy for each of them, one in each of their clusters, chained by free arcs: the chain is
@@ -22,8 +22,8 @@ PARTS = 3
 
 
 @dataclass(frozen=True, eq=False)
-class Reduction:
-    """A covering problem as a GTSP.
+class GtspReduction:
+    """A set-covering problem as a GTSP.
 
     Args:
         costs: (M, M) arcs between nodes, node 0 is the robot.
@@ -45,16 +45,16 @@ class Reduction:
         return found
 
 
-def reduce(costs: FloatArray, masks: list[int], boxes: int) -> Reduction:
-    """Write a covering problem as a GTSP.
+def reduce_to_gtsp(costs: FloatArray, masks: list[int], objects: int) -> GtspReduction:
+    """Write a set-covering problem as a GTSP.
 
     Args:
         costs: (N + 1, N) cost of each push after each other one, the last row after the start.
-        masks: what each push covers, one bit an object.
-        boxes: how many objects there are.
+        masks: what each push delivers, one bit an object.
+        objects: how many objects there are.
     """
     firsts, lasts, chains = [], [], []
-    clusters: list[list[int]] = [[] for _ in range(boxes)]
+    clusters: list[list[int]] = [[] for _ in range(objects)]
     owners, count = [-1], 1
     for n, mask in enumerate(masks):
         if not np.isfinite(costs[:, n]).any():
@@ -76,7 +76,7 @@ def reduce(costs: FloatArray, masks: list[int], boxes: int) -> Reduction:
         out[lasts, 0] = 0.0
     for a, b in chains:
         out[a, b] = 0.0
-    return Reduction(out, [*clusters, [0]], owners)
+    return GtspReduction(out, [*clusters, [0]], owners)
 
 
 def parts_of(mask: int) -> list[tuple[int, ...]]:

@@ -1,4 +1,4 @@
-"""Where a push begins, and along which way an object goes."""
+"""Poses from which pushes begin, and measures of paths and places."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ import math
 import numpy as np
 import shapely
 
-from pushplan.compiled import kernel
-from pushplan.planners.rearrangement.rollout import along_path
-from pushplan.planners.rearrangement.scene import Scene
+from pushplan.planners.rearrangement.controller_kernels import along_path
+from pushplan.planners.rearrangement.push_pose_kernels import pose_behind_outline
+from pushplan.planners.rearrangement.push_scene import PushScene
 from pushplan.world import StaticMap
 from pushplan.world.checks import FloatArray
 
@@ -18,14 +18,14 @@ SHIFTS = (0.0, 0.4, -0.4, 0.75, -0.75)
 """Places of the robot's middle beside the object, in half widths of the bumper."""
 
 
-def axes_of(heading: float) -> tuple[FloatArray, FloatArray]:
+def heading_axes(heading: float) -> tuple[FloatArray, FloatArray]:
     """Unit vectors (2,) along a heading [rad] and to the left of it."""
     c, s = math.cos(heading), math.sin(heading)
     return np.array([c, s]), np.array([-s, c])
 
 
-def behind(
-    scene: Scene, k: int, heading: float, shift: float, pose: FloatArray | None = None
+def pose_behind(
+    scene: PushScene, k: int, heading: float, shift: float, pose: FloatArray | None = None
 ) -> FloatArray:
     """(3,) a pose behind object ``k`` from which to push it along a heading.
 
@@ -37,54 +37,30 @@ def behind(
         pose: (3,) of the object, if it is not where it is now.
     """
     outline = scene.world.movables.outline(k)
-    room = scene.front + scene.config.slack * scene.size
-    return _behind(scene.poses[k] if pose is None else pose, outline, heading, shift, room)
+    distance = scene.front + scene.config.slack * scene.size
+    at = scene.poses[k] if pose is None else pose
+    return pose_behind_outline(at, outline, heading, shift, distance)
 
 
-@kernel(allocates=True)
-def _behind(
-    pose: FloatArray, outline: FloatArray, heading: float, shift: float, room: float
-) -> FloatArray:
-    c, s = math.cos(heading), math.sin(heading)
-    cos, sin = math.cos(pose[2]), math.sin(pose[2])
-    depth = -np.inf
-    for i in range(outline.shape[0]):
-        x, y = outline[i, 0], outline[i, 1]
-        depth = max(depth, -((cos * x - sin * y) * c + (sin * x + cos * y) * s))
-    depth += room
-    return np.array([pose[0] - depth * c - shift * s, pose[1] - depth * s + shift * c, heading])
-
-
-def direction_of(path: FloatArray, ahead: float) -> float:
-    """Heading [rad] from the start of a path to a point some way along it [m]."""
+def initial_heading(path: FloatArray, ahead: float) -> float:
+    """Heading [rad] from the start of a path to a point some distance along it [m]."""
     x, y, _, _ = along_path(path[0, 0], path[0, 1], path, 0.0, ahead)
     return math.atan2(y - path[0, 1], x - path[0, 0])
 
 
-def length_of(path: FloatArray) -> float:
-    """Length [m] of a path (M, 2)."""
-    return float(np.hypot(*np.diff(path, axis=0).T).sum())
-
-
-def lengths_of(poses: FloatArray) -> FloatArray:
-    """(K,) way [m] that each object goes over poses (N, K, 3)."""
-    out: FloatArray = np.hypot(*np.moveaxis(np.diff(poses[:, :, :2], axis=0), 2, 0)).sum(axis=0)
-    return out
-
-
-def apart(pose: FloatArray, other: FloatArray, size: float) -> float:
+def pose_distance(pose: FloatArray, other: FloatArray, size: float) -> float:
     """How far two poses (3,) of an object are apart, turns included, in units of ``size``."""
     turn = math.remainder(float(pose[2] - other[2]), 2.0 * math.pi)
     return math.dist(pose[:2], other[:2]) / size + 0.2 * abs(turn)
 
 
-def from_walls(static: StaticMap, points: FloatArray) -> FloatArray:
+def distance_to_bounds(static: StaticMap, points: FloatArray) -> FloatArray:
     """Distance of points (N, 2) from the bounds, negative beyond them [m]."""
     out: FloatArray = np.minimum(points - static.bounds[:2], static.bounds[2:] - points).min(axis=1)
     return out
 
 
-def from_columns(static: StaticMap, points: FloatArray) -> FloatArray:
+def distance_to_obstacles(static: StaticMap, points: FloatArray) -> FloatArray:
     """Distance of points (..., 2) from what stands within the bounds [m]; inf if nothing does."""
     if not len(static.convex_parts):
         return np.full(points.shape[:-1], np.inf)

@@ -13,7 +13,7 @@ from pushplan.world import StaticMap
 from pushplan.world.checks import FloatArray
 
 
-class Ways:
+class PathsFromStart:
     """As `pushplan.geometry.VisibilityGraph.shortest_path`, with the start looked up once.
 
     Args:

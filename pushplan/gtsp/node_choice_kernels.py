@@ -60,27 +60,16 @@ def push_layer(
 
 @kernel(inline=True)
 def push_values(
-    costs: FloatArray,
-    values: FloatArray,
-    a: int,
-    at: int,
+    costs: FloatArray,  # (N, N + SPARE); up to `SPARE` columns past the cluster are read
+    values: FloatArray,  # (m, >= n_at)
+    a: int,  # row of ``values``
+    at: int,  # first node of the cluster that the path comes from
     n_at: int,
-    to: int,
+    to: int,  # first node of the cluster that it goes to
     n_to: int,
-    out: FloatArray,
+    out: FloatArray,  # (>= n_to + SPARE,) what is past ``n_to`` means nothing
 ) -> None:
-    """``out[w] = min_v values[a, v] + costs[at + v, to + w]``, four columns at a time.
-
-    Args:
-        costs: (N, N + SPARE); up to `SPARE` columns past the cluster are read.
-        values: (m, >= n_at).
-        a: row of ``values``.
-        at: first node of the cluster that the way comes from.
-        n_at: nodes of it.
-        to: first node of the cluster that it goes to.
-        n_to: nodes of it.
-        out: (>= n_to + SPARE,) filled; what is past ``n_to`` means nothing.
-    """
+    """Fill ``out[w] = min_v values[a, v] + costs[at + v, to + w]``, four columns at a time."""
     for w in range(0, n_to, 4):
         first = second = third = fourth = np.inf
         j = to + w
@@ -96,28 +85,15 @@ def push_values(
 
 @kernel(allocates=True)
 def best_nodes(
-    costs: FloatArray,
-    offsets: IntArray,
-    order: IntArray,
-    count: int,
-    nodes: IntArray,
-    layers: FloatArray,
+    costs: FloatArray,  # (N, >= N)
+    offsets: IntArray,  # (m + 1,)
+    order: IntArray,  # (>= count,) clusters in visiting order
+    count: int,  # how many of them, at least 2
+    nodes: IntArray,  # (>= count,) filled with the chosen nodes
+    layers: FloatArray,  # (>= count, K) working memory
 ) -> float:
-    """The cheapest choice of nodes for a closed order of clusters (Fischetti et al. 1997).
-
-    A shortest path through the layers for every node of ``order[0]``, which should be small.
-
-    Args:
-        costs: (N, >= N).
-        offsets: (m + 1,).
-        order: (>= count,) clusters in visiting order.
-        count: how many of them, at least 2.
-        nodes: (>= count,) filled with the chosen nodes.
-        layers: (>= count, K) working memory.
-
-    Returns:
-        The cost of the closed tour.
-    """
+    """Fill the cheapest nodes for a closed order of clusters; returns its cost (Fischetti 1997)."""
+    # a shortest path through the layers for every node of ``order[0]``, which should be small
     root, last = order[0], order[count - 1]
     a, z = offsets[last], offsets[last + 1]
     best = np.inf

@@ -2,21 +2,23 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from pushplan.compiled import kernel
-from pushplan.gtsp.kernels import below, best_nodes, draw
-from pushplan.gtsp.layers import (
+from pushplan.gtsp.layer_kernels import (
     Layers,
     build,
     close_gap,
+    insertion_cost,
     keep,
     link_in,
     make_layers,
-    price_between,
     undo,
 )
-from pushplan.gtsp.segment_swap import improve_by_swaps
+from pushplan.gtsp.node_choice_kernels import below, best_nodes, draw
+from pushplan.gtsp.segment_swap_kernels import improve_by_swaps
 from pushplan.world.checks import FloatArray, IntArray
 
 FRESH_ROUNDS = 500
@@ -35,11 +37,8 @@ def _ruin(
     tolerance: float,
     state: IntArray,
 ) -> tuple[int, float]:
-    """Take out strings of clusters near a random one (Christiaens and Vanden Berghe 2020).
-
-    Returns:
-        How many, and the change of cost.
-    """
+    """Take out strings of clusters near a random one; how many, and the change of cost."""
+    # Christiaens and Vanden Berghe 2020
     longest = 1 + below(state, target)
     seed = below(state, len(gone))
     found, change = 0, 0.0
@@ -122,9 +121,9 @@ def _cheapest_place(
             skip = below(state, interval)
             continue
         skip -= 1
-        price = price_between(tour, c, a, tour.after[a])
-        if price < lowest:
-            lowest, place = price, a
+        cost = insertion_cost(tour, c, a, tour.after[a])
+        if cost < lowest:
+            lowest, place = cost, a
     return place
 
 
@@ -139,49 +138,53 @@ def _to_front(order: IntArray, root: int, scratch: IntArray) -> None:
         order[q] = scratch[(p + q) % len(order)]
 
 
+class TourProblem(NamedTuple):
+    """What a search works on."""
+
+    costs: FloatArray
+    """(N, N + SPARE) finite."""
+    reverse: FloatArray
+    """(N, N + SPARE) of the transpose."""
+    offsets: IntArray
+    """(m + 1,) with m at least 3."""
+    near: IntArray
+    """(m, k) clusters by distance."""
+    between: FloatArray
+    """(m, k) these distances."""
+    max_removed: int
+    """Clusters that a round removes at most, at most m - 2."""
+    blink: float
+    """Fraction of places that an insertion overlooks."""
+    reach: int
+    """Neighbours that a segment swap tries."""
+    symmetric: bool
+    """Whether a reversed segment costs the same."""
+
+
+class TourState(NamedTuple):
+    """What a search has found; all of it is changed."""
+
+    current: IntArray
+    """(m,) order, the root (a small cluster) first."""
+    current_nodes: IntArray
+    """(m,) its nodes."""
+    best: IntArray
+    """(m,) best order so far."""
+    best_nodes: IntArray
+    """(m,) its nodes."""
+    values: FloatArray
+    """(2,) costs of both."""
+    random: IntArray
+    """(1,) state of the random numbers."""
+
+
 @kernel(allocates=True)
 def search_tours(
-    costs: FloatArray,
-    reverse: FloatArray,
-    offsets: IntArray,
-    near: IntArray,
-    between: FloatArray,
-    current: IntArray,
-    current_nodes: IntArray,
-    best: IntArray,
-    best_choice: IntArray,
-    values: FloatArray,
-    temperature: float,
-    max_removed: int,
-    blink: float,
-    reach: int,
-    symmetric: bool,
-    tolerance: float,
-    rounds: int,
-    state: IntArray,
+    problem: TourProblem, found: TourState, temperature: float, tolerance: float, rounds: int
 ) -> None:
-    """Some rounds of simulated annealing.
-
-    Args:
-        costs: (N, N + SPARE) finite.
-        reverse: (N, N + SPARE) of the transpose.
-        offsets: (m + 1,) with m at least 3.
-        near: (m, k) clusters by distance.
-        between: (m, k) these distances.
-        current: (m,) order, the root (a small cluster) first; changed.
-        current_nodes: (m,) its nodes.
-        best: (m,) best order so far; changed.
-        best_choice: (m,) its nodes.
-        values: (2,) costs of both; changed.
-        temperature: of the annealing.
-        max_removed: clusters that a round removes at most, at most m - 2.
-        blink: share of places that an insertion overlooks.
-        reach: neighbours that a segment swap tries.
-        symmetric: whether a reversed segment costs the same.
-        tolerance: of costs that count as equal.
-        rounds: how many.
-        state: (1,) of the random numbers.
-    """
+    """Some rounds of simulated annealing; costs within the tolerance count as equal."""
+    costs, reverse, offsets, near, between, max_removed, blink, reach, symmetric = problem
+    current, current_nodes, best, best_choice, values, state = found
     count, root = len(offsets) - 1, current[0]
     tour = make_layers(costs, reverse, offsets, root)
     layers = np.empty((count, tour.ahead.shape[1]))
@@ -192,11 +195,11 @@ def search_tours(
     for now in range(rounds):
         tour.touched[0] = 0
         target = 1 + below(state, max_removed)
-        found, change = _ruin(tour, near, removed, gone, target, root, now, tolerance, state)
+        taken, change = _ruin(tour, near, removed, gone, target, root, now, tolerance, state)
         turn = below(state, 4)
-        for i in range(found):
+        for i in range(taken):
             if turn >= 2:
-                _bring_forward(near, between, removed, gone, i, found, turn == 2)
+                _bring_forward(near, between, removed, gone, i, taken, turn == 2)
             c = removed[i]
             place = _cheapest_place(tour, near, gone, seen, c, root, blink, state)
             gone[c] = 0
