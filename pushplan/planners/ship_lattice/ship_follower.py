@@ -1,4 +1,4 @@
-"""Ship policies: the lattice planner, a path follower, and plans renewed on the way."""
+"""Ship policies: the lattice planner, a path follower, and plans renewed while it drives."""
 
 from __future__ import annotations
 
@@ -7,8 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from pushplan.control import PathFollower
-from pushplan.interaction import QuasiStatic
-from pushplan.interaction.ice import IceInteraction
+from pushplan.interaction.path_sweepers import default_interaction
 from pushplan.planners.following.plan_follower import PlanFollower
 from pushplan.planners.following.replanning import Replanning
 from pushplan.planners.ship_lattice.ship_lattice import ShipLattice, published, quick
@@ -25,8 +24,7 @@ class ShipFollower(PlanFollower):
 
     def reset(self, world: World, rng: np.random.Generator) -> None:
         """Forget the last episode."""
-        walls = bool(world.static.convex_parts)
-        self.interaction = QuasiStatic(friction=1.0) if walls else IceInteraction()
+        self.interaction = default_interaction(world)
         if not self.replanning.never:
             every = RENEWAL * world.robot.circumscribed_radius
             self.replanning = replace(self.replanning, every_metres=every)
@@ -36,7 +34,7 @@ class ShipFollower(PlanFollower):
 
 
 def ship_lattice(planner: Planner | None = None, stop: Stop | None = None) -> PlanFollower:
-    """The ship lattice with plans renewed on the way, compared by their predicted cost."""
+    """The ship lattice with plans renewed while it drives, compared by their predicted cost."""
     rule = Replanning(surprise=1e9, margin=MARGIN)
     return ShipFollower(
         planner or ShipLattice(),

@@ -1,4 +1,4 @@
-"""A follower that looks for a better plan each time the ship has gone some way."""
+"""A follower that looks for a better plan each time the ship has gone some distance."""
 
 from __future__ import annotations
 
