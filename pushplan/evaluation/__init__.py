@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from pushplan.evaluation.batch import run_batch
     from pushplan.evaluation.benchmark import bench
+    from pushplan.evaluation.compatibility import UnusablePolicyError
     from pushplan.evaluation.episode import InvalidActionError, PolicyError, run_episode
-    from pushplan.evaluation.fitness import UnusablePolicyError
-    from pushplan.evaluation.jobs import Job, JobSettings, Outcome
+    from pushplan.evaluation.jobs import Job, JobResult, JobSettings
     from pushplan.evaluation.paper import Comparison, bench_paper
     from pushplan.evaluation.policies import PolicySpec, parse_policies, parse_policy
     from pushplan.evaluation.pool import WorkerPool
@@ -27,8 +27,8 @@ _HOMES = {
     "batch": ("run_batch",),
     "benchmark": ("bench",),
     "episode": ("InvalidActionError", "PolicyError", "run_episode"),
-    "fitness": ("UnusablePolicyError",),
-    "jobs": ("Job", "JobSettings", "Outcome"),
+    "compatibility": ("UnusablePolicyError",),
+    "jobs": ("Job", "JobSettings", "JobResult"),
     "paper": ("Comparison", "bench_paper"),
     "policies": ("PolicySpec", "parse_policies", "parse_policy"),
     "pool": ("WorkerPool",),
@@ -47,8 +47,8 @@ __all__ = [
     "Estimate",
     "InvalidActionError",
     "Job",
+    "JobResult",
     "JobSettings",
-    "Outcome",
     "PairedDifference",
     "PolicyError",
     "PolicySpec",

@@ -41,10 +41,10 @@ class Estimate:
 
 @dataclass(frozen=True)
 class Proportion:
-    """A share of successes with its Wilson 95 % interval."""
+    """A fraction of successes with its Wilson 95 % interval."""
 
     count: int
-    share: float
+    fraction: float
     low: float
     high: float
 
@@ -95,8 +95,8 @@ def bootstrap_interval(
     acceleration = float((gaps**3).sum() / (6.0 * (gaps**2).sum() ** 1.5))
     tails = ndtri(np.array([(1.0 - level) / 2.0, (1.0 + level) / 2.0]))
     shifted = bias + tails
-    shares = ndtr(bias + shifted / (1.0 - acceleration * shifted))
-    low, high = np.quantile(means, shares)
+    fractions = ndtr(bias + shifted / (1.0 - acceleration * shifted))
+    low, high = np.quantile(means, fractions)
     return float(low), float(high)
 
 
@@ -108,13 +108,15 @@ def wilson(successes: int, count: int, *, z: float = 1.959963984540054) -> Propo
     """
     if not 0 <= successes <= count or count == 0:
         raise InvalidInputError(f"need 0 <= successes <= trials > 0, got {successes} of {count}")
-    share = successes / count
+    fraction = successes / count
     scale = 1.0 + z * z / count
-    centre = (share + z * z / (2.0 * count)) / scale
-    half = z / scale * math.sqrt(share * (1.0 - share) / count + z * z / (4.0 * count * count))
+    centre = (fraction + z * z / (2.0 * count)) / scale
+    half = (
+        z / scale * math.sqrt(fraction * (1.0 - fraction) / count + z * z / (4.0 * count * count))
+    )
     low = 0.0 if successes == 0 else centre - half
     high = 1.0 if successes == count else centre + half
-    return Proportion(count, share, low, high)
+    return Proportion(count, fraction, low, high)
 
 
 def _resampled_means(sample: FloatArray, resamples: int) -> FloatArray:

@@ -19,6 +19,12 @@ from pushplan.evaluation.rows import COLUMNS, ResultRow, Status
 from pushplan.world import InvalidInputError, SchemaError
 
 SCHEMA = "pushplan-run/1"
+DATABASE = "results.db"
+REPORT = (
+    *("report.html", "summary.md", "summary.csv", "differences.csv"),
+    *("tradeoff.png", "scores.png", "planning_time.png"),
+)
+"""Files that `Results.report` derives from the rows, beside ``results.csv``."""
 _TYPES = dict.fromkeys(("policy", "task", "simulator", "scenario", "status", "reason"), "TEXT")
 _TYPES |= dict.fromkeys(("seed", "success", "steps", "plan_calls"), "INTEGER")
 
@@ -49,7 +55,7 @@ class RunDirectory:
             raise InvalidInputError(f"another process is writing into {path}") from error
         for leftover in [*self.path.glob("*.tmp"), *self.episodes.glob("*.tmp")]:
             leftover.unlink()
-        self._db = _connect(self.path / "results.db")
+        self._db = _connect(self.path / DATABASE)
         columns = ", ".join(f'"{name}" {_TYPES.get(name, "REAL")}' for name in COLUMNS)
         with self._db:
             self._db.execute(
@@ -151,9 +157,13 @@ class RunDirectory:
         return read_rows(self._db)
 
     def write_csv(self) -> Path:
-        """Write ``results.csv`` from the database, sorted, all at once."""
+        """Write ``results.csv`` from the database; a report of other rows is removed."""
         path = self.path / "results.csv"
-        write_atomic(path, csv_text(self.rows()).encode())
+        text = csv_text(self.rows()).encode()
+        if not path.is_file() or path.read_bytes() != text:
+            for name in REPORT:
+                (self.path / name).unlink(missing_ok=True)
+            write_atomic(path, text)
         return path
 
     def close(self) -> None:
@@ -170,7 +180,7 @@ def open_results(path: str | Path) -> tuple[list[ResultRow], Mapping[str, Any]]:
     Raises:
         InvalidInputError: if there are no results.
     """
-    file = Path(path) / "results.db"
+    file = Path(path) / DATABASE
     if not file.is_file():
         raise InvalidInputError(f"{path} holds no results: there is no {file.name} in it")
     db = _connect(file)

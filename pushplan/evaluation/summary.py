@@ -32,7 +32,7 @@ class PolicySummary:
         policy: label.
         episodes: number of rows.
         failed: rows that did not end by the rules of the task.
-        success: share of successes; failed rows count as none.
+        success: fraction of successes; failed rows count as none.
         metrics: estimate of each column that has values.
     """
 

@@ -13,9 +13,9 @@ import numpy as np
 
 from pushplan.compiled import copy_into, kernel
 from pushplan.geometry.angles import wrap_angle
+from pushplan.geometry.transforms import transform_outlines, transform_points
 from pushplan.interaction.ice_bodies import IceProblem
 from pushplan.interaction.ice_contact_points import near_contacts
-from pushplan.interaction.separation import place
 from pushplan.world.checks import FloatArray
 
 ROBOT = -1
@@ -112,7 +112,7 @@ def _meet_hull(poses: FloatArray, problem: IceProblem) -> int:
     """Contacts of the hull at ``scratch.pose[0]`` with the objects; their number."""
     bodies, scratch, margin = problem.bodies, problem.scratch, problem.settings.step
     here = scratch.pose[0]
-    place(here, bodies.hull, scratch.hull)
+    transform_points(here, bodies.hull, scratch.hull)
     scratch.state[:] = 0
     count = 0
     for k in range(poses.shape[0]):
@@ -156,7 +156,7 @@ def advance_ice(poses: FloatArray, problem: IceProblem) -> float:
                 poses[k, 2] += turn
                 work += bodies.masses[k] * np.sqrt(dx * dx + dy * dy)
                 a, b = bodies.offsets[k], bodies.offsets[k + 1]
-                place(poses[k], bodies.vertices[a:b], scratch.corners[a:b])
+                transform_points(poses[k], bodies.vertices[a:b], scratch.corners[a:b])
     return work
 
 
@@ -165,9 +165,7 @@ def sweep_ice(path: FloatArray, poses: FloatArray, problem: IceProblem, out: Flo
     """Sweep the hull along (N, 3) poses among objects (K, 3), into ``out`` (N, K, 3); the work."""
     bodies, scratch = problem.bodies, problem.scratch
     work = 0.0
-    for k in range(poses.shape[0]):
-        a, b = bodies.offsets[k], bodies.offsets[k + 1]
-        place(poses[k], bodies.vertices[a:b], scratch.corners[a:b])
+    transform_outlines(poses, bodies.vertices, bodies.offsets, scratch.corners)
     copy_into(out[0], poses)
     here, by = scratch.pose[0], scratch.pose[1]
     for n in range(1, path.shape[0]):

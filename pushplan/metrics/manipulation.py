@@ -26,7 +26,7 @@ class ManipulationScores:
     """How well a robot brought objects to where they belong.
 
     Args:
-        success: S_manip in [0, 1]: the share of the objects whose sub-task was completed.
+        success: S_manip in [0, 1]: the fraction of the objects whose sub-task was completed.
         efficiency: E_manip: L*(O') over driven length. The tree is no strict lower bound, so it
             can pass 1; 0 if nothing was completed.
         effort: I_manip in [0, 1]: the least work for what was completed over all work.
@@ -68,14 +68,14 @@ def manipulation_scores(episode: Episode, *, straight: bool = False) -> Manipula
     """
     _goal(episode.world)
     done = _completed(episode)
-    share = float(done.mean()) if len(done) else 1.0
+    fraction = float(done.mean()) if len(done) else 1.0
     needed = done & ~completed_objects(episode.world)
     shortest = shortest_lengths(episode.world, needed, straight=straight)
     tree = tree_length(episode.world, needed, straight=straight)
     driven, work = robot_path_length(episode), interaction_work(episode)
     return ManipulationScores(
-        success=share,
-        efficiency=efficiency(tree, driven, everything=share == 1.0),
+        success=fraction,
+        efficiency=efficiency(tree, driven, everything=fraction == 1.0),
         effort=effort(episode.world, shortest, object_path_lengths(episode), driven),
         completed=int(done.sum()),
         path_length_m=driven,

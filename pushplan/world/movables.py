@@ -166,6 +166,13 @@ class Movables(ArrayRecord):
         """(N, 2) corners of object ``k`` in the world frame [m]."""
         return transform(self.poses[k], self.outline(k))
 
+    @property
+    def vertices_world(self) -> FloatArray:
+        """(V, 2) `vertices` in the world frame [m]."""
+        x, y, theta = np.repeat(self.poses, np.diff(self.offsets), axis=0).T
+        c, s, (u, v) = np.cos(theta), np.sin(theta), self.vertices.T
+        return np.column_stack([x + c * u - s * v, y + s * u + c * v])
+
     def moved_to(self, poses: ArrayLike, twists: ArrayLike | None = None) -> Movables:
         """The same objects at other poses (K, 3); at rest unless twists (K, 3) are given.
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pushplan.evaluation import ResultRow, Results, compare
+from pushplan.evaluation import ResultRow, Results, bench, compare
 from pushplan.evaluation.store import RunDirectory
 from pushplan.world import InvalidInputError
 
@@ -74,7 +74,7 @@ def test_policies_keep_their_order_and_settings_are_sorted_by_number(results: Re
 def test_a_failed_job_counts_against_its_policy(results: Results) -> None:
     better = next(s for s in results.summary() if s.policy == "better")
     assert (better.episodes, better.failed) == (20, 1)
-    assert better.success.share == 0.95
+    assert better.success.fraction == 0.95
     assert better.metrics["E_nav"].count == 20
     assert better.metrics["I_nav"].count == 19
 
@@ -150,3 +150,22 @@ def test_one_policy_and_one_episode_are_enough(tmp_path: Path) -> None:
 def test_no_results_is_an_error(tmp_path: Path) -> None:
     with pytest.raises(InvalidInputError, match="holds no results"):
         Results.load(tmp_path)
+
+
+def test_page_csv_and_database_of_a_folder_say_the_same(tmp_path: Path) -> None:
+    many = bench("smoke", ["straight", "random"], episodes=4, workers=0, out=tmp_path)
+    many.report()
+    few = bench("smoke", ["straight"], episodes=2, workers=0)
+    with pytest.raises(InvalidInputError, match=f"{tmp_path}.*another folder"):
+        few.report(tmp_path)
+    assert f"episodes {len(many.rows)}" in (tmp_path / "report.html").read_text()
+    assert len((tmp_path / "results.csv").read_text().splitlines()) == len(many.rows) + 1
+
+    few.report(tmp_path / "few")
+    assert len((tmp_path / "few" / "results.csv").read_text().splitlines()) == len(few.rows) + 1
+    longer = bench("smoke", ["straight"], episodes=3, workers=0, out=tmp_path / "few")
+    assert not (tmp_path / "few" / "report.html").exists()  # it was about other rows
+    with pytest.raises(InvalidInputError, match="another folder"):
+        few.report(tmp_path / "few")
+    longer.report()
+    Results.load(tmp_path / "few").report()

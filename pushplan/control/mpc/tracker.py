@@ -232,9 +232,7 @@ class MpcTracker:
 
 
 def _track(plan: Plan) -> Track:
-    moves = np.diff(plan.poses[:, :2], axis=0)
-    lengths = np.concatenate([[0.0], np.cumsum(np.hypot(moves[:, 0], moves[:, 1]))])
-    return Track(plan.poses, lengths, plan.speeds)
+    return Track(plan.poses, plan.arc_lengths, plan.speeds)
 
 
 def _optimises_speed(robot: RobotModel, config: MpcConfig) -> bool:

@@ -10,7 +10,7 @@ import numpy as np
 import shapely
 
 from pushplan.envs.tasks.area_clearing_presets import LAYOUTS, PRESETS, AreaClearingPreset
-from pushplan.envs.tasks.base import Outcome
+from pushplan.envs.tasks.base import StepOutcome
 from pushplan.envs.tasks.box_kernels import no_longer_touches
 from pushplan.envs.tasks.layout import Floor, rectangle, squares, walls_around
 from pushplan.envs.tasks.manipulation import (
@@ -144,7 +144,9 @@ class AreaClearingTask(ManipulationTask):
             self._seen = (world, *self._measure(world))
         return self._seen[1:]
 
-    def score(self, before: World, after: World, *, work: float, touched_static: bool) -> Outcome:
+    def score(
+        self, before: World, after: World, *, work: float, touched_static: bool
+    ) -> StepOutcome:
         """The reward above; over when every box is clear of the area."""
         if self._field is None:
             raise InvalidInputError("area_clearing: start() has to be called before score()")
@@ -157,8 +159,8 @@ class AreaClearingTask(ManipulationTask):
             reward += STATIC_REWARD
         idle = self._idle(after, gained > 0)
         if cleared.all():
-            return Outcome(reward + END_REWARD, True, "cleared", True, False, cleared)
-        return Outcome(reward, False, "no_progress" if idle else "", False, idle, cleared)
+            return StepOutcome(reward + END_REWARD, True, "cleared", True, False, cleared)
+        return StepOutcome(reward, False, "no_progress" if idle else "", False, idle, cleared)
 
 
 def open_edges(static: StaticMap, polygon: FloatArray, size: float) -> BoolArray:

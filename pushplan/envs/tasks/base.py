@@ -16,7 +16,7 @@ from pushplan.world.checks import BoolArray, FloatArray, IntArray
 
 
 @dataclass(frozen=True)
-class Outcome:
+class StepOutcome:
     """What one step of an episode was worth.
 
     Args:
@@ -95,7 +95,9 @@ class Task(ABC):
         raise NotImplementedError(f"nothing ever leaves the floor in task {self.name!r}")
 
     @abstractmethod
-    def score(self, before: World, after: World, *, work: float, touched_static: bool) -> Outcome:
+    def score(
+        self, before: World, after: World, *, work: float, touched_static: bool
+    ) -> StepOutcome:
         """What the step from ``before`` to ``after`` was worth, and whether the episode ends.
 
         Args:

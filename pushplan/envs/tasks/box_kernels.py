@@ -9,7 +9,7 @@ import numpy as np
 from pushplan.compiled import kernel
 from pushplan.geometry.convex import convex_penetration
 from pushplan.geometry.distance_field import sample_values
-from pushplan.geometry.polygon import transform_points
+from pushplan.geometry.transforms import transform_points
 from pushplan.world.checks import BoolArray, FloatArray, IntArray
 
 
@@ -32,7 +32,7 @@ def all_corners_inside(
     corners = np.empty_like(vertices)
     for k in range(poses.shape[0]):
         a, b = offsets[k], offsets[k + 1]
-        transform_points(poses[k, 0], poses[k, 1], poses[k, 2], vertices[a:b], corners[a:b])
+        transform_points(poses[k], vertices[a:b], corners[a:b])
         for i in range(polygon.shape[0]):
             j = i + 1 if i + 1 < polygon.shape[0] else 0
             ex, ey = polygon[j, 0] - polygon[i, 0], polygon[j, 1] - polygon[i, 1]
@@ -55,7 +55,7 @@ def no_longer_touches(
     corners = np.empty_like(vertices)
     for k in range(poses.shape[0]):
         a, b = offsets[k], offsets[k + 1]
-        transform_points(poses[k, 0], poses[k, 1], poses[k, 2], vertices[a:b], corners[a:b])
+        transform_points(poses[k], vertices[a:b], corners[a:b])
         depth, _, _ = convex_penetration(corners[a:b], polygon)
         clear[k] = depth < 0.0
     return clear

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pushplan.geometry import transform_outlines
 from pushplan.motion.state_lattice.cost_map import (
     FloeCosts,
     PlacedFloes,
@@ -15,7 +16,6 @@ from pushplan.motion.state_lattice.cost_map import (
     prefix_sums,
 )
 from pushplan.motion.state_lattice.frame import Frame
-from pushplan.motion.state_lattice.swath_kernels import place_outlines
 from pushplan.world import Movables, StaticMap
 from pushplan.world.checks import FloatArray, IntArray
 from pushplan.world.outline import flatten
@@ -47,7 +47,8 @@ class LatticeMap:
 
     def cost_sums(self, floes: Movables, costs: FloeCosts) -> FloatArray:
         """(columns, rows + 1) sums of the costs of each column before each row [m]."""
-        corners = place_outlines(floes.vertices, floes.offsets, floes.poses)
+        corners = np.empty_like(floes.vertices)
+        transform_outlines(floes.poses, floes.vertices, floes.offsets, corners)
         placed = PlacedFloes(
             np.ascontiguousarray(self.to_cells(corners)),
             floes.offsets,

@@ -10,6 +10,7 @@ from pushplan.motion.state_lattice.built_lattice import BuiltLattice
 from pushplan.motion.state_lattice.lattice_config import LatticeConfig
 from pushplan.world import GoalLine, World
 from pushplan.world.checks import FloatArray
+from pushplan.world.polyline import arc_lengths
 
 
 def sample_arcs(
@@ -66,6 +67,5 @@ def _cut_at_line(
 
 def bare_path(poses: FloatArray, curvatures: FloatArray) -> Path:
     """A path about which nothing is predicted."""
-    moves = np.diff(poses[:, :2], axis=0)
-    lengths = np.concatenate([[0.0], np.cumsum(np.hypot(moves[:, 0], moves[:, 1]))])
-    return Path(poses, curvatures, None, lengths, np.zeros(len(poses)))  # type: ignore[arg-type]
+    works = np.zeros(len(poses))
+    return Path(poses, curvatures, None, arc_lengths(poses), works)  # type: ignore[arg-type]

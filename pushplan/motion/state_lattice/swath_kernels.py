@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from pushplan.compiled import kernel
-from pushplan.interaction.separation import place
 from pushplan.motion.dubins import sample_pieces
 from pushplan.world.checks import BoolArray, FloatArray, IntArray
 
@@ -104,12 +103,3 @@ def sweep_cells(
     _stamp(start, vertices, offsets, middle, False, window)
     runs = np.empty((window.shape[0] * 8, 3), np.int64)
     return runs[: _runs(window, middle, runs)]
-
-
-@kernel(allocates=True)
-def place_outlines(vertices: FloatArray, offsets: IntArray, poses: FloatArray) -> FloatArray:
-    """(V, 2) corners in the world frame [m] of flattened body outlines at (K, 3) poses."""
-    out = np.empty_like(vertices)
-    for k in range(poses.shape[0]):
-        place(poses[k], vertices[offsets[k] : offsets[k + 1]], out[offsets[k] : offsets[k + 1]])
-    return out

@@ -155,9 +155,7 @@ class PushingMpc:
         """A new path: which face is pushed, and memory for the problem."""
         config = self.config
         self._plan = plan
-        moves = np.diff(plan.poses[:, :2], axis=0)
-        lengths = np.concatenate([[0.0], np.cumsum(np.hypot(moves[:, 0], moves[:, 1]))])
-        self._track = Track(plan.poses, lengths, plan.speeds)
+        self._track = Track(plan.poses, plan.arc_lengths, plan.speeds)
         self._take_face(world, k)
         self._estimate.forget()
         self.along, self._missed = 0.0, 0

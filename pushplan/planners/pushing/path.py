@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 from pushplan.motion.dubins import along_arc
 from pushplan.world import InvalidInputError, Plan, RobotModel, SubTask
 from pushplan.world.checks import ArrayRecord, FloatArray, array, expect, integer, number
+from pushplan.world.polyline import arc_lengths, step_lengths
 
 _PIECES = 24
 """Least number of poses along a path of one piece."""
@@ -76,8 +77,7 @@ class PushPath(ArrayRecord):
         corners: FloatArray = array("points", points, (None, 2))
         radius = number("radius", radius, low=0.0)
         if len(corners) > 1:
-            steps = np.hypot(*np.diff(corners, axis=0).T)
-            corners = corners[np.concatenate([[True], steps > 1e-9])]
+            corners = corners[np.concatenate([[True], step_lengths(corners) > 1e-9])]
         if len(corners) < 2:
             raise InvalidInputError("a push path needs two different points or more")
         legs = np.diff(corners, axis=0)
@@ -104,8 +104,7 @@ class PushPath(ArrayRecord):
     @property
     def lengths(self) -> FloatArray:
         """(N,) length of the path up to each pose [m]."""
-        steps = np.diff(self.poses[:, :2], axis=0)
-        return np.concatenate([[0.0], np.cumsum(np.hypot(steps[:, 0], steps[:, 1]))])
+        return arc_lengths(self.poses)
 
     @property
     def length(self) -> float:

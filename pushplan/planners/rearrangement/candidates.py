@@ -19,6 +19,7 @@ from pushplan.planners.rearrangement.push import Push
 from pushplan.planners.rearrangement.runner import Runner
 from pushplan.world import ClearanceArea
 from pushplan.world.checks import FloatArray
+from pushplan.world.polyline import path_length
 
 TILTS = tuple(math.radians(tilt) for tilt in (0.0, 20.0, -20.0, 40.0, -40.0))
 """Directions of line pushes against the normal of an edge [rad]."""
@@ -168,7 +169,7 @@ def _led(
     start = behind(scene, k, direction_of(path, 0.5 * scene.size), shift)
     if not scene.fits(start):
         return []
-    length = float(np.hypot(*np.diff(path, axis=0).T).sum())
+    length = path_length(path)
     limit = 1.5 * length + 4.0 * scene.size
     return runner.run(start, k, path=path, shift=shift, limit=limit, wanted=wanted)
 

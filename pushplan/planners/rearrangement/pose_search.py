@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from pushplan.compiled import kernel
 from pushplan.geometry import convex_penetration
-from pushplan.interaction.separation import place
+from pushplan.geometry.transforms import transform_points
 from pushplan.motion.collision import Footprint
 from pushplan.planners.rearrangement.pose_grid import Floor
 from pushplan.world.checks import BoolArray, FloatArray, IntArray
@@ -50,7 +50,7 @@ def contact_depths(
         if not chosen[k]:
             continue
         a, b = offsets[k], offsets[k + 1]
-        place(poses[k], vertices[a:b], outline[a:b])
+        transform_points(poses[k], vertices[a:b], outline[a:b])
         reach = shape.radius + radii[k]
         i0 = max(0, int(np.ceil((poses[k, 1] - reach - floor.y) / floor.step)))
         i1 = min(rows - 1, int(np.floor((poses[k, 1] + reach - floor.y) / floor.step)))
@@ -59,7 +59,7 @@ def contact_depths(
         for t in range(headings.shape[0]):
             pose[:] = 0.0
             pose[2] = headings[t]
-            place(pose, shape.vertices, body)
+            transform_points(pose, shape.vertices, body)
             for i in range(i0, i1 + 1):
                 y = floor.y + i * floor.step
                 for j in range(j0, j1 + 1):

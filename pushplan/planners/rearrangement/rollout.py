@@ -14,6 +14,7 @@ import numpy as np
 
 from pushplan.compiled import copy_into, kernel
 from pushplan.geometry import convex_penetration
+from pushplan.geometry.transforms import transform_points
 from pushplan.interaction.kernels import (
     Bodies,
     Scratch,
@@ -22,7 +23,6 @@ from pushplan.interaction.kernels import (
     make_scratch,
     robot_held,
 )
-from pushplan.interaction.separation import place
 from pushplan.world import ClearanceArea, Goal, Receptacle, StaticMap
 from pushplan.world.checks import BoolArray, FloatArray, frozen
 
@@ -92,7 +92,7 @@ def is_done(k: int, poses: FloatArray, bodies: Bodies, task: Task) -> bool:
         return False
     a, b = bodies.offsets[k], bodies.offsets[k + 1]
     outline = np.empty((b - a, 2))
-    place(poses[k], bodies.vertices[a:b], outline)
+    transform_points(poses[k], bodies.vertices[a:b], outline)
     if task.delivers:
         for e in range(task.edges.shape[0]):
             for i in range(b - a):

@@ -11,8 +11,8 @@ import numpy as np
 
 from pushplan.compiled import kernel
 from pushplan.geometry import convex_penetration
+from pushplan.geometry.transforms import transform_points
 from pushplan.interaction.kernels import Bodies
-from pushplan.interaction.separation import place
 from pushplan.motion.collision import (
     Footprint,
     Obstacles,
@@ -77,11 +77,11 @@ def _depth(
         if weights[k] == 0.0 or dx * dx + dy * dy >= reach * reach:
             continue
         if not placed:
-            place(pose, shape.vertices, body)
+            transform_points(pose, shape.vertices, body)
             placed = True
         a, b = bodies.offsets[k], bodies.offsets[k + 1]
         outline = np.empty((b - a, 2))
-        place(poses[k], bodies.vertices[a:b], outline)
+        transform_points(poses[k], bodies.vertices[a:b], outline)
         deepest = 0.0
         for p in range(shape.offsets.shape[0] - 1):
             part = body[shape.offsets[p] : shape.offsets[p + 1]]
@@ -103,7 +103,7 @@ def depth_inside(
     deepest = 0.0
     if is_free(pose, shape, among, scratch):
         return deepest
-    place(pose, shape.vertices, scratch)
+    transform_points(pose, shape.vertices, scratch)
     for s in range(among.boxes.shape[0]):
         obstacle = among.vertices[among.offsets[s] : among.offsets[s + 1]]
         for p in range(shape.offsets.shape[0] - 1):

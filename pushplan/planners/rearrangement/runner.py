@@ -13,6 +13,7 @@ from pushplan.planners.rearrangement.rollout import EVENTS, Log, all_done, roll_
 from pushplan.planners.rearrangement.rollout_cache import Run
 from pushplan.planners.rearrangement.scene import Scene
 from pushplan.world.checks import BoolArray, FloatArray
+from pushplan.world.polyline import path_length
 
 _ALIKE = 0.2
 """By how much places of an object may differ that a maneuver gets it to [circumscribed radii]."""
@@ -196,9 +197,10 @@ class Runner:
         if (scene.done & ~done).any():
             return []
         ids, masses = scene.world.movables.ids, scene.world.movables.masses
-        moves = np.diff(path, axis=0)
-        length = float(np.hypot(moves[:, 0], moves[:, 1]).sum())
-        price = length + scene.config.turn_price * scene.size * float(np.abs(moves[:, 2]).sum())
+        length = path_length(path)
+        price = length + scene.config.turn_price * scene.size * float(
+            np.abs(np.diff(path[:, 2])).sum()
+        )
         return [
             Push(
                 covers=tuple(ids[np.flatnonzero(done & ~scene.done)].tolist()),

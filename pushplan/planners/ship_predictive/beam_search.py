@@ -14,6 +14,7 @@ from pushplan.planners.ship_predictive.cost_to_go import cost_ahead
 from pushplan.planners.ship_predictive.predictive_config import PredictiveConfig
 from pushplan.world import StopCheck
 from pushplan.world.checks import FloatArray
+from pushplan.world.polyline import step_lengths
 
 SPACING = 0.05
 """Between the poses of a path, in hull lengths."""
@@ -205,7 +206,7 @@ class BeamSearch(Generic[Ice]):
         """A path with one more piece (N, 4) at its end, predicted."""
         ice, work = self.propagator.advance([node.ice], [arc[:, :3]])[0]
         self.iterations += 1
-        pieces = np.hypot(*np.diff(arc[:, :2], axis=0).T)
+        pieces = step_lengths(arc)
         return BeamNode(
             pose=arc[-1, :3],
             arc=arc,

@@ -10,7 +10,7 @@ from pushplan.evaluation.episode import PolicyError, Recording, describe
 from pushplan.evaluation.jobs import Job, JobSettings
 from pushplan.evaluation.limits import EpisodeTimeout, soft_limit
 from pushplan.evaluation.policies import PolicySpec, parse_policies
-from pushplan.world import InvalidInputError, Policy, PushplanError
+from pushplan.world import ChecksScenario, InvalidInputError, Policy, PushplanError
 
 
 class UnusablePolicyError(InvalidInputError):
@@ -36,7 +36,7 @@ def usable_policies(
         starts = {Job(spec, scenario).title: scenario for scenario in scenarios}
         reasons: dict[str, str] = {}
         for title, scenario in starts.items():
-            reason = misfit(spec, scenario, settings)
+            reason = incompatibility(spec, scenario, settings)
             if reason is None:
                 reasons.clear()
                 break
@@ -60,7 +60,7 @@ def read_policies(given: Any) -> list[PolicySpec]:
         raise UnusablePolicyError(str(error)) from error
 
 
-def misfit(spec: PolicySpec, scenario: Any, settings: JobSettings) -> str | None:
+def incompatibility(spec: PolicySpec, scenario: Any, settings: JobSettings) -> str | None:
     """Why a policy cannot run a scenario; None if it can.
 
     The policy is made, and so is its environment. A policy of ours and a network also take one
@@ -79,7 +79,7 @@ def misfit(spec: PolicySpec, scenario: Any, settings: JobSettings) -> str | None
     except (Exception, SystemExit) as error:
         said = str(error) if isinstance(error, PushplanError) else describe(error)
         raise UnusablePolicyError(f"policy {spec.label!r} cannot be made: {said}") from error
-    if (reason := _made_for(policy, scenario)) is not None:
+    if isinstance(policy, ChecksScenario) and (reason := policy.incompatibility(scenario)):
         return reason
     try:
         env = settings.environment(scenario, policy)
@@ -88,19 +88,9 @@ def misfit(spec: PolicySpec, scenario: Any, settings: JobSettings) -> str | None
     with contextlib.closing(env):
         if spec.is_ours:
             reason = _first_step(policy, scenario, env)
-            if reason is None and settings.rehearse:
+            if reason is None and settings.dry_run:
                 spec.warm_up()  # what is compiled here, workers find in the cache
             return reason
-    return None
-
-
-def _made_for(policy: Policy, scenario: Any) -> str | None:
-    """What a network says that it was made for, if that is something else."""
-    specification = getattr(policy, "specification", None)
-    for kind in ("task", "preset"):
-        mine = getattr(specification, f"{kind}s", ())
-        if mine and getattr(scenario, kind) not in mine:
-            return f"made for {kind} {', '.join(mine)}"
     return None
 
 

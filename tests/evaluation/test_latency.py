@@ -55,7 +55,7 @@ class Stops(Turns):
 
     background_s = 0.0
 
-    def keep_time(self, factor, clock) -> None:
+    def simulate_latency(self, factor, clock) -> None:
         self.kept = (factor, clock)
 
     def act(self, world, observation):
@@ -173,15 +173,15 @@ class TestStepLate:
 class TestRunEpisode:
     def test_the_clock_of_the_world_goes_on_by_the_time_times_the_factor(self):
         policy = Turns()
-        episode = run_episode(maze(), policy, MAZE, honest_time=3.0, clock=Ticks(0.1))
+        episode = run_episode(maze(), policy, MAZE, latency_factor=3.0, clock=Ticks(0.1))
         assert np.diff(policy.times) == pytest.approx(0.8 + 0.3)
-        assert episode.about["honest_time"] == 3.0
+        assert episode.about["latency_factor"] == 3.0
         assert (np.diff(episode.times) > 0.0).all()
 
     def test_it_repeats_with_the_same_clock(self):
         one, other = (
             run_episode(
-                maze(), make_policy("kinodynamic-rrt"), MAZE, honest_time=5.0, clock=Ticks(0.2)
+                maze(), make_policy("kinodynamic-rrt"), MAZE, latency_factor=5.0, clock=Ticks(0.2)
             )
             for _ in range(2)
         )
@@ -194,13 +194,13 @@ class TestRunEpisode:
                 return 0.0
 
         frozen = run_episode(maze(), Turns(), MAZE)
-        instant = run_episode(maze(), Turns(), MAZE, honest_time=1.0, clock=Instant(0.0))
+        instant = run_episode(maze(), Turns(), MAZE, latency_factor=1.0, clock=Instant(0.0))
         assert frozen == instant
-        assert "honest_time" not in frozen.about
+        assert "latency_factor" not in frozen.about
 
     def test_what_goes_on_beside_driving_does_not_hold_the_robot(self):
         policy, clock = Stops(), Ticks(1.0)
-        run_episode(maze(), policy, MAZE, honest_time=2.0, clock=clock)
+        run_episode(maze(), policy, MAZE, latency_factor=2.0, clock=clock)
         assert policy.kept == (2.0, clock)
         assert np.diff(policy.times) == pytest.approx(0.8 + 2.0 * 0.25)
 
@@ -208,7 +208,7 @@ class TestRunEpisode:
         """It drives the old plan until the new one is there; one that waits for it does not."""
         frozen = run_episode(maze(), make_policy("kinodynamic-rrt"), MAZE)
         beside, waiting = (
-            run_episode(maze(), policy, MAZE, honest_time=1.0, clock=policy.clock)
+            run_episode(maze(), policy, MAZE, latency_factor=1.0, clock=policy.clock)
             for policy in (SlowPlanner(), Waits())
         )
         assert beside.success
@@ -218,39 +218,39 @@ class TestRunEpisode:
     def test_an_environment_that_cannot(self):
         scenario = LineScenario(0)
         with pytest.raises(InvalidInputError, match="step_late"):
-            run_episode(LineEnv(scenario), Ahead(), scenario, honest_time=1.0)
+            run_episode(LineEnv(scenario), Ahead(), scenario, latency_factor=1.0)
 
     @pytest.mark.parametrize("factor", [-1.0, np.nan, np.inf, "1", True])
     def test_a_factor_is_a_number(self, factor):
-        with pytest.raises(InvalidInputError, match="honest_time"):
-            run_episode(maze(), Turns(), MAZE, honest_time=factor)
-        with pytest.raises(InvalidInputError, match="honest_time"):
-            JobSettings(honest_time=factor)
+        with pytest.raises(InvalidInputError, match="latency_factor"):
+            run_episode(maze(), Turns(), MAZE, latency_factor=factor)
+        with pytest.raises(InvalidInputError, match="latency_factor"):
+            JobSettings(latency_factor=factor)
 
 
 class TestBatch:
     def test_results_say_in_which_mode_they_were_made(self, tmp_path):
-        results = bench([MAZE], [straight], workers=0, out=tmp_path, honest_time=2.0)
-        assert results.about["configuration"]["honest_time"] == 2.0
-        assert "honest time x 2" in results.table()
-        assert "honest_time 2" in results.report().read_text()
+        results = bench([MAZE], [straight], workers=0, out=tmp_path, latency_factor=2.0)
+        assert results.about["configuration"]["latency_factor"] == 2.0
+        assert "latency-aware x 2" in results.table()
+        assert "latency_factor 2" in results.report().read_text()
         trace = next((tmp_path / "episodes").glob("*.npz"))
-        assert Episode.load(trace).about["honest_time"] == 2.0
+        assert Episode.load(trace).about["latency_factor"] == 2.0
 
     def test_frozen_results_do_not_mention_it(self, tmp_path):
         results = bench([MAZE], [straight], workers=0, out=tmp_path)
-        assert "honest_time" not in results.about["configuration"]
+        assert "latency_factor" not in results.about["configuration"]
         assert "honest" not in results.table()
 
     def test_a_run_is_not_continued_in_another_mode(self, tmp_path):
         jobs = [Job(parse_policy(straight), MAZE)]
         run_batch(jobs, out=tmp_path, workers=0)
-        with pytest.raises(InvalidInputError, match="honest_time was None, is now 1"):
-            run_batch(jobs, out=tmp_path, workers=0, settings=JobSettings(honest_time=1.0))
+        with pytest.raises(InvalidInputError, match="latency_factor was None, is now 1"):
+            run_batch(jobs, out=tmp_path, workers=0, settings=JobSettings(latency_factor=1.0))
 
     def test_the_columns_are_the_same(self, tmp_path):
         for name, factor in (("frozen", None), ("honest", 1.0)):
-            bench([MAZE], [straight], workers=0, out=tmp_path / name, honest_time=factor)
+            bench([MAZE], [straight], workers=0, out=tmp_path / name, latency_factor=factor)
         heads = [
             next(csv.reader((tmp_path / name / "results.csv").open()))
             for name in ("frozen", "honest")
@@ -268,19 +268,19 @@ class TestCommands:
         code = main(
             [
                 *("bench", "maze-2d-3", "--policies", "straight", "--episodes", "1"),
-                *("--workers", "0", "--honest-time", "1.0", "--out", str(tmp_path)),
+                *("--workers", "0", "--latency", "1.0", "--out", str(tmp_path)),
             ]
         )
         assert code == 0
-        assert "honest time x 1" in capsys.readouterr().out
+        assert "latency-aware x 1" in capsys.readouterr().out
 
     def test_run(self, capsys):
-        assert main(["run", "maze-2d-3", "--policy", "straight", "--honest-time", "0.5"]) == 0
+        assert main(["run", "maze-2d-3", "--policy", "straight", "--latency", "0.5"]) == 0
         assert "was 0.5 s for the robot" in capsys.readouterr().out
 
     @pytest.mark.parametrize("factor", ["0", "-1", "fast"])
     def test_bad_factors(self, factor, capsys):
-        assert main(["run", "maze-2d-3", "--policy", "straight", "--honest-time", factor]) == 2
+        assert main(["run", "maze-2d-3", "--policy", "straight", "--latency", factor]) == 2
 
 
 def test_a_foreign_environment_can_do_it_too():
@@ -292,10 +292,10 @@ def test_a_foreign_environment_can_do_it_too():
             return self.step(action)
 
     scenario = LineScenario(0)
-    episode = run_episode(Late(scenario), Ahead(), scenario, honest_time=2.0, clock=Ticks(0.5))
+    episode = run_episode(Late(scenario), Ahead(), scenario, latency_factor=2.0, clock=Ticks(0.5))
     assert Late.lags == [1.0] * len(episode.actions)
     assert HERE.endswith("evaluation_doubles.py")
 
 
 def test_scenarios_do_not_know_about_it():
-    assert "honest_time" not in Scenario.from_dict(MAZE.to_dict()).to_dict()
+    assert "latency_factor" not in Scenario.from_dict(MAZE.to_dict()).to_dict()

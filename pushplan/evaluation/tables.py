@@ -13,7 +13,7 @@ from pushplan.evaluation.statistics import Estimate
 from pushplan.evaluation.summary import PairedDifference, PolicySummary
 
 if TYPE_CHECKING:
-    from rich.table import Table
+    from rich.table import Table as RichTable
 
 HEADINGS = {
     "E_nav": "E_nav",
@@ -34,7 +34,7 @@ _TIMES = {
 
 
 @dataclass(frozen=True)
-class Sheet:
+class Table:
     """A table of texts. A line break in a cell separates a value from its interval.
 
     Args:
@@ -66,17 +66,17 @@ PAIR_NOTE = (
 )
 
 
-def score_sheets(
+def score_tables(
     summaries: Sequence[PolicySummary], titles: dict[str, str], *, wide: bool = False
-) -> list[Sheet]:
-    """One sheet a setting with a row for each policy.
+) -> list[Table]:
+    """One table a setting with a row for each policy.
 
     Args:
         summaries: of a run.
         titles: text for each setting.
         wide: with medians and further columns, for files and pages.
     """
-    sheets = []
+    tables = []
     for setting in dict.fromkeys(s.setting for s in summaries):
         mine = [s for s in summaries if s.setting == setting]
         metrics = [name for name in SCORES if any(name in s.metrics for s in mine)]
@@ -87,17 +87,17 @@ def score_sheets(
         headings = ("policy", "runs", "success", *(HEADINGS[name] for name in metrics))
         cells = tuple(_policy_cells(summary, metrics, wide) for summary in mine)
         note = SCORE_NOTE + ("; med is the median" if wide else "")
-        sheets.append(Sheet(titles.get(setting, setting), headings, cells, note))
-    return sheets
+        tables.append(Table(titles.get(setting, setting), headings, cells, note))
+    return tables
 
 
-def measured_sheets(
+def measured_tables(
     estimates: Mapping[tuple[str, str, str], Estimate],
     policies: Sequence[str],
     metrics: Sequence[str],
     titles: Mapping[str, str],
-) -> list[Sheet]:
-    """One sheet a setting of metrics that were computed from stored episodes.
+) -> list[Table]:
+    """One table a setting of metrics that were computed from stored episodes.
 
     Args:
         estimates: (setting, policy, metric) -> estimate.
@@ -105,22 +105,22 @@ def measured_sheets(
         metrics: columns, in order.
         titles: text for each setting, in order.
     """
-    sheets = []
+    tables = []
     for setting, title in titles.items():
         cells = []
         for policy in policies:
             found = [estimates.get((setting, policy, name)) for name in metrics]
             if any(found):
                 cells.append((policy, *("" if e is None else _estimate(e) for e in found)))
-        sheets.append(Sheet(title, ("policy", *metrics), tuple(cells), MEASURED_NOTE))
-    return sheets
+        tables.append(Table(title, ("policy", *metrics), tuple(cells), MEASURED_NOTE))
+    return tables
 
 
-def pair_sheets(
+def difference_tables(
     pairs: Sequence[PairedDifference], titles: dict[str, str], *, wide: bool = False
-) -> list[Sheet]:
-    """One sheet a setting with a row for each pair of policies and metric."""
-    sheets = []
+) -> list[Table]:
+    """One table a setting with a row for each pair of policies and metric."""
+    tables = []
     if not wide:
         pairs = [pair for pair in pairs if pair.metric in SCORES]
     for setting in dict.fromkeys(pair.setting for pair in pairs):
@@ -137,19 +137,19 @@ def pair_sheets(
         )
         headings = ("metric", "pair", "difference", "95 % interval", "wins / losses / of")
         title = f"Paired differences: {titles.get(setting, setting)}"
-        sheets.append(Sheet(title, headings, cells, PAIR_NOTE))
-    return sheets
+        tables.append(Table(title, headings, cells, PAIR_NOTE))
+    return tables
 
 
-def markdown(sheets: Sequence[Sheet]) -> str:
-    """The sheets as a Markdown document."""
+def markdown(tables: Sequence[Table]) -> str:
+    """The tables as a Markdown document."""
     blocks = []
-    for sheet in sheets:
-        lines = [f"## {sheet.title}", "", _line(sheet.headings)]
-        lines.append(_line(["---"] * len(sheet.headings)))
-        lines += [_line([cell.replace("\n", "<br>") for cell in row]) for row in sheet.cells]
-        if sheet.note:
-            lines += ["", f"{sheet.note[0].upper()}{sheet.note[1:]}."]
+    for table in tables:
+        lines = [f"## {table.title}", "", _line(table.headings)]
+        lines.append(_line(["---"] * len(table.headings)))
+        lines += [_line([cell.replace("\n", "<br>") for cell in row]) for row in table.cells]
+        if table.note:
+            lines += ["", f"{table.note[0].upper()}{table.note[1:]}."]
         blocks.append("\n".join(lines))
     return "\n\n".join(blocks) + "\n"
 
@@ -162,7 +162,7 @@ def summary_csv(summaries: Sequence[PolicySummary], titles: dict[str, str]) -> s
     for summary in summaries:
         who = (titles.get(summary.setting, summary.setting), summary.policy)
         rate = summary.success
-        writer.writerow((*who, "success", rate.count, rate.share, "", "", rate.low, rate.high))
+        writer.writerow((*who, "success", rate.count, rate.fraction, "", "", rate.low, rate.high))
         for name, value in summary.metrics.items():
             numbers = (value.count, value.mean, value.sd, value.median, value.low, value.high)
             writer.writerow((*who, name, *numbers))
@@ -183,28 +183,28 @@ def differences_csv(pairs: Sequence[PairedDifference], titles: dict[str, str]) -
     return buffer.getvalue()
 
 
-def rich_table(sheet: Sheet) -> Table:
-    """The sheet for a terminal."""
+def rich_table(table: Table) -> RichTable:
+    """The table for a terminal."""
     from rich import box
-    from rich.table import Table
+    from rich.table import Table as RichTable
     from rich.text import Text
 
-    table = Table(
-        title=Text(sheet.title),
+    rich = RichTable(
+        title=Text(table.title),
         box=box.SIMPLE_HEAD,
         show_edge=False,
         title_justify="left",
         padding=(0, 1, 0, 0),
     )
-    for i, heading in enumerate(sheet.headings):
-        table.add_column(Text(heading), justify="left" if i == 0 else "right", no_wrap=i == 0)
-    for row in sheet.cells:
-        table.add_row(*(Text(cell) for cell in row))
-    return table
+    for i, heading in enumerate(table.headings):
+        rich.add_column(Text(heading), justify="left" if i == 0 else "right", no_wrap=i == 0)
+    for row in table.cells:
+        rich.add_row(*(Text(cell) for cell in row))
+    return rich
 
 
-def text(sheets: Sequence[Sheet], width: int = 160) -> str:
-    """The sheets as plain text."""
+def text(tables: Sequence[Table], width: int = 160) -> str:
+    """The tables as plain text."""
     from rich.console import Console
 
     console = Console(
@@ -215,8 +215,8 @@ def text(sheets: Sequence[Sheet], width: int = 160) -> str:
         color_system=None,
     )
     with console.capture() as capture:
-        for sheet in sheets:
-            console.print(rich_table(sheet))
+        for table in tables:
+            console.print(rich_table(table))
             console.print()
     return "\n".join(line.rstrip() for line in capture.get().rstrip().splitlines()) + "\n"
 
@@ -227,7 +227,7 @@ def _policy_cells(summary: PolicySummary, metrics: Sequence[str], wide: bool) ->
     cells = [
         summary.policy,
         f"{summary.episodes}{failed}",
-        f"{rate.share:.2f}\n[{rate.low:.2f}, {rate.high:.2f}]",
+        f"{rate.fraction:.2f}\n[{rate.low:.2f}, {rate.high:.2f}]",
     ]
     for name in metrics:
         value = summary.metrics.get(name)
