@@ -2,16 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
-import numpy as np
-
-from pushplan.control import PathFollower
-from pushplan.interaction.path_sweepers import default_interaction
 from pushplan.planners.following.plan_follower import PlanFollower
+from pushplan.planners.following.renewing_follower import RenewingFollower
 from pushplan.planners.following.replanning import Replanning
 from pushplan.planners.ship_lattice.ship_lattice import ShipLattice, published, quick
-from pushplan.world import Planner, Stop, World
+from pushplan.world import Planner, Stop
 
 RENEWAL = 2.0
 """A new plan is made when the robot has gone this far [R]."""
@@ -19,29 +14,10 @@ MARGIN = 0.05
 """It is followed if it is cheaper than the rest of the old one by this much travel [R]."""
 
 
-class ShipFollower(PlanFollower):
-    """Makes a new plan every two circumscribed radii of the robot, and takes it if it is better."""
-
-    def reset(self, world: World, rng: np.random.Generator) -> None:
-        """Forget the last episode."""
-        self.interaction = default_interaction(world)
-        if not self.replanning.never:
-            every = RENEWAL * world.robot.circumscribed_radius
-            self.replanning = replace(self.replanning, every_metres=every)
-        if isinstance(self.planner, ShipLattice):
-            self.planner.prepare(world)
-        super().reset(world, rng)
-
-
 def ship_lattice(planner: Planner | None = None, stop: Stop | None = None) -> PlanFollower:
     """The ship lattice with plans renewed while it drives, compared by their predicted cost."""
     rule = Replanning(surprise=1e9, margin=MARGIN)
-    return ShipFollower(
-        planner or ShipLattice(),
-        PathFollower(),
-        replanning=rule,
-        stop=stop,
-    )
+    return RenewingFollower(planner or ShipLattice(), renewal=RENEWAL, replanning=rule, stop=stop)
 
 
 def ship_lattice_quick(planner: Planner | None = None, stop: Stop | None = None) -> PlanFollower:
@@ -53,9 +29,4 @@ def ship_lattice_published(
     planner: Planner | None = None, stop: Stop | None = None
 ) -> PlanFollower:
     """The lattice as published, which plans once in Ship-Ice; the reference."""
-    return PlanFollower(
-        planner or published(),
-        PathFollower(),
-        replanning=Replanning(never=True),
-        stop=stop,
-    )
+    return PlanFollower(planner or published(), replanning=Replanning(never=True), stop=stop)
