@@ -25,7 +25,7 @@ from pushplan.world import (
 from pushplan.world.outline import transform
 
 HULL = [[1, 0], [0.9, 0.1], [0.5, 0.25], [-1, 0.25], [-1, -0.25], [0.5, -0.25], [0.9, -0.1]]
-QUICK = ShipLatticeConfig(repairs=10)
+QUICK = ShipLatticeConfig(shortcuts=10)
 NAMES = ("ship-lattice", "ship-lattice-quick", "ship-lattice-published", "skeleton")
 
 
@@ -270,7 +270,7 @@ def test_goal_disc_among_walls() -> None:
 
 
 def test_far_goal_is_approached() -> None:
-    config = ShipLatticeConfig(horizon=4.0, repairs=0)
+    config = ShipLatticeConfig(horizon=4.0, shortcuts=0)
     result = ShipLattice(config).plan(ship_world(0))
     assert result.status is PlanStatus.APPROXIMATE and result.plan is not None
     assert 3.9 < result.plan.length < 5.0
@@ -299,7 +299,7 @@ def test_a_lattice_needs_no_lattice_type() -> None:
         {"step": 0.0},
         {"searches": (-1.0,)},
         {"searches": ()},
-        {"guide": "none"},
+        {"heuristic": "none"},
     ],
 )
 def test_config_is_checked(changes: dict[str, object]) -> None:
@@ -321,7 +321,7 @@ def test_continuous_refinement_never_makes_it_worse(seed: int) -> None:
     world = ship_world(seed, floes=150)
     plans = []
     for refinement in (0, 30):
-        config = ShipLatticeConfig(repairs=0, refinement=refinement)
+        config = ShipLatticeConfig(shortcuts=0, refinement=refinement)
         plan = ShipLattice(config).plan(world).plan
         assert plan is not None
         assert_drivable(world, plan)

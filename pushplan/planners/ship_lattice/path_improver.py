@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pushplan.planners.ship_lattice.repairs import propose
-from pushplan.planners.ship_lattice.sweeper import Sweeper
+from pushplan.interaction.path_sweepers import PathSweeper
+from pushplan.planners.ship_lattice.shortcut_proposals import ShortcutProblem, propose
 from pushplan.world.checks import FloatArray
 
 _PORTION = 8
@@ -21,7 +21,7 @@ class Candidate:
 
     Args:
         poses: (N, 3) [m, m, rad].
-        bends: (N,) curvatures that lead to them [1/m].
+        curvatures: (N,) that lead to them [1/m].
         lengths: (N,) path length so far [m].
         objects: (M, K, 3) poses of the objects at the first M poses of the path.
         works: (M,) work so far [kg m].
@@ -29,23 +29,22 @@ class Candidate:
     """
 
     poses: FloatArray
-    bends: FloatArray
+    curvatures: FloatArray
     lengths: FloatArray
     objects: FloatArray
     works: FloatArray
     cost: float
 
 
-class Improver:
-    """Prices paths by sweeps and changes them at random.
+class PathImprover:
+    """Finds the costs of paths by sweeps and changes paths at random.
 
     Args:
         sweeper: carries the objects.
         start: (K, 3) poses of the objects now.
         robot_mass: [kg]
-        weight: w, price of work.
-        numbers: (5,) as in `repairs.propose`.
-        goal: (4,) point and normal of the line where paths end.
+        weight: w, cost of work.
+        problem: what changed paths have to keep to.
         ahead: how far along a path it is swept [m].
         stopped: whether to return now.
         free: whether poses (N, 3) keep clear of walls and within the bounds.
@@ -53,32 +52,33 @@ class Improver:
 
     def __init__(
         self,
-        sweeper: Sweeper,
+        sweeper: PathSweeper,
         start: FloatArray,
         *,
         robot_mass: float,
         weight: float,
-        numbers: FloatArray,
-        goal: FloatArray,
+        problem: ShortcutProblem,
         ahead: float,
         stopped: Callable[[], bool],
         free: Callable[[FloatArray], bool],
     ) -> None:
         self.sweeper, self.start = sweeper, start
         self.robot_mass, self.weight, self.ahead = robot_mass, weight, ahead
-        self.numbers, self.goal = numbers, goal
-        self.stopped, self.free = stopped, free
+        self.problem, self.stopped, self.free = problem, stopped, free
         self.best: Candidate | None = None
-        self.tried = self.kept = 0
 
     def consider(
-        self, poses: FloatArray, bends: FloatArray, first: int = 0, base: Candidate | None = None
+        self,
+        poses: FloatArray,
+        curvatures: FloatArray,
+        first: int = 0,
+        base: Candidate | None = None,
     ) -> bool:
-        """Price a path and keep it if it is the cheapest so far.
+        """Find the cost of a path and keep it if it is the cheapest so far.
 
         Args:
             poses: (N, 3) the path.
-            bends: (N,) its curvatures.
+            curvatures: (N,) that lead to its poses [1/m].
             first: last pose that it shares with ``base``.
             base: a candidate whose prediction holds up to there.
 
@@ -115,40 +115,32 @@ class Improver:
             if own + self.weight * works[at] >= limit:
                 return False
         self.best = Candidate(
-            poses, bends, lengths, objects, works, own + self.weight * float(works[-1])
+            poses, curvatures, lengths, objects, works, own + self.weight * float(works[-1])
         )
         return True
 
-    def repair(self, rng: np.random.Generator) -> bool:
+    def shortcut(self, rng: np.random.Generator) -> bool:
         """Try one random change of the best path; whether it was kept."""
         assert self.best is not None
         best = self.best
         count = len(best.poses)
         part = count if len(best.objects) >= count else len(best.objects)
-        out, bends = np.empty((2 * part + 60, 3)), np.zeros(2 * part + 60)
-        numbers = self.numbers.copy()
-        if part < count:
-            numbers[4] = 0.0  # the end of what is swept is not the end of the path
-        self.tried += 1
+        out, curvatures = np.empty((2 * part + 60, 3)), np.zeros(2 * part + 60)
+        # where only a part is swept, its end is not the end of the path
+        problem = self.problem if part == count else self.problem._replace(end_fraction=0.0)
         first, new, size = propose(
             best.poses[:part],
-            best.bends[:part],
+            best.curvatures[:part],
             rng.random(4),
             rng.standard_normal(2),
-            numbers,
-            self.goal,
+            problem,
             out,
-            bends,
+            curvatures,
         )
         if size == 0 or not self.free(out[first + 1 : new]):
             return False
-        if part < count:
-            turns = 2.0 * np.pi * round((out[size - 1, 2] - best.poses[part - 1, 2]) / (2 * np.pi))
-            rest = best.poses[part:] + np.array([0.0, 0.0, turns])
-            poses = np.concatenate([out[:size], rest])
-            curvatures = np.concatenate([bends[:size], best.bends[part:]])
-        else:
-            poses, curvatures = out[:size], bends[:size]
-        kept = self.consider(poses, curvatures, first, best)
-        self.kept += kept
-        return kept
+        turns = 2.0 * np.pi * round((out[size - 1, 2] - best.poses[part - 1, 2]) / (2 * np.pi))
+        rest = best.poses[part:] + np.array([0.0, 0.0, turns])
+        poses = np.concatenate([out[:size], rest])
+        curvatures = np.concatenate([curvatures[:size], best.curvatures[part:]])
+        return self.consider(poses, curvatures, first, best)

@@ -1,4 +1,4 @@
-"""Carrying single floes along a path, pushed by the contact model."""
+"""`FloePropagator`: single floes along a path, pushed by the contact model."""
 
 from __future__ import annotations
 
@@ -6,28 +6,29 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from pushplan.interaction.ice_contacts import make_memory, sweep_ice
-from pushplan.planners.ship_predictive.beam import Partial
-from pushplan.planners.ship_predictive.ice_scene import Scene
+from pushplan.interaction.ice_bodies import ice_problem
+from pushplan.interaction.ice_contacts import sweep_ice
+from pushplan.planners.ship_predictive.beam_node import BeamNode
+from pushplan.planners.ship_predictive.channel_view import ChannelView
 from pushplan.world.checks import FloatArray
 
 
-class FloeCarrier:
+class FloePropagator:
     """The ice as poses (N, K, 3) of the floes in reach, at each pose of the last piece of path.
 
     Args:
-        scene: what is searched.
+        view: what is searched.
     """
 
     batch = 1
 
-    def __init__(self, scene: Scene) -> None:
-        self._scene = scene
-        self._memory = make_memory(scene.crowd)
+    def __init__(self, view: ChannelView) -> None:
+        self._floes = view.floes
+        self._problem = ice_problem(view.bodies, view.settings)
 
     def start(self) -> FloatArray:
         """The floes now."""
-        return self._scene.floes[None]
+        return self._floes[None]
 
     def advance(
         self, ices: Sequence[FloatArray], paths: Sequence[FloatArray]
@@ -44,12 +45,9 @@ class FloeCarrier:
         """
         poses = floes.copy()
         out = np.empty((len(path), *poses.shape))
-        way = np.ascontiguousarray(path)
-        scene = self._scene
-        work = sweep_ice(way, poses, scene.crowd, scene.solver, self._memory, out)
-        return out, work
+        return out, sweep_ice(np.ascontiguousarray(path), poses, self._problem, out)
 
-    def trace(self, node: Partial[FloatArray], stopped: Callable[[], bool]) -> FloatArray:
+    def trace(self, node: BeamNode[FloatArray], stopped: Callable[[], bool]) -> FloatArray:
         """(N, K, 3) poses of the floes at each pose of a path: they are known."""
-        first, *others = node.ices()
-        return np.concatenate([first, *(ice[1:] for ice in others)])
+        first, *others = node.chain()
+        return np.concatenate([first.ice, *(later.ice[1:] for later in others)])

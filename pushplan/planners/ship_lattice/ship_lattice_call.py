@@ -4,26 +4,38 @@ from __future__ import annotations
 
 import math
 import time
+from functools import partial
 
 import numpy as np
 
 from pushplan.interaction import InteractionModel
+from pushplan.interaction.path_sweepers import path_sweeper
 from pushplan.motion.coarse_path import reachable
 from pushplan.motion.collision import first_blocked, footprint, is_free, obstacles
 from pushplan.motion.shortcutting import Path
 from pushplan.motion.speed_profile import check_turns, timed_plan, turning_radius
-from pushplan.planners.ship_lattice.build import BuiltLattice, LatticeBuilder
-from pushplan.planners.ship_lattice.improve import Improver
-from pushplan.planners.ship_lattice.paths import lay_path, open_search, path_arcs
+from pushplan.motion.state_lattice.built_lattice import BuiltLattice
+from pushplan.motion.state_lattice.lattice_builder import LatticeBuilder
+from pushplan.motion.state_lattice.lattice_path import bare_path, lay_path
+from pushplan.motion.state_lattice.lattice_search import open_search, path_arcs
+from pushplan.planners.ship_lattice.floe_costs import floe_costs
+from pushplan.planners.ship_lattice.nearby_objects import NearbyObjects
+from pushplan.planners.ship_lattice.path_improver import PathImprover
 from pushplan.planners.ship_lattice.ship_lattice_config import ShipLatticeConfig
-from pushplan.planners.ship_lattice.sweeper import Near, make_sweeper
+from pushplan.planners.ship_lattice.shortcut_proposals import ShortcutProblem
 from pushplan.search.astar import FOUND, PAUSED
 from pushplan.world import GoalLine, Plan, PlanStatus, StopCheck, World
 from pushplan.world.checks import FloatArray
-from pushplan.world.polyline import arc_lengths
+
+_SPREAD = 0.6
+"""Typical sideways displacement of a shortcut [R]."""
+_MOST_TURN = 2.5
+"""Greatest turn of one of its curves [rad]."""
+_END_FRACTION = 0.15
+"""Fraction of the shortcuts that move the end."""
 
 
-class ShipCall:
+class ShipLatticeCall:
     """Lattice, search and improvement of one planning call.
 
     Args:
@@ -31,7 +43,7 @@ class ShipCall:
         config: parameters.
         interaction: predicts what a path does.
         check: armed stop rule, None for the planner's own budget.
-        rng: for the repairs.
+        rng: for the shortcuts.
         began: when the call began, on the clock of `time.perf_counter`.
     """
 
@@ -49,13 +61,13 @@ class ShipCall:
         self.check, self.rng, self.began = check, rng, began
         self.goal = world.navigation_goal
         self.size = world.robot.circumscribed_radius
-        self.iterations = self.expanded = self.repairs = 0
+        self.iterations = self.expanded = self.shortcuts = 0
         self.lattice_cost = math.inf
         self.first_solution_s = float("nan")
         self.built: BuiltLattice | None = None
         self.side = 0.0
-        self.near: Near | None = None
-        self.improver: Improver | None = None
+        self.near: NearbyObjects | None = None
+        self.improver: PathImprover | None = None
         self.cost = math.inf
         self.poses: FloatArray = np.zeros((0, 3))
         self.curvatures: FloatArray = np.zeros(0)
@@ -70,28 +82,34 @@ class ShipCall:
             self.poses, self.curvatures = world.robot_pose[None].copy(), np.zeros(1)
             self.first_solution_s = time.perf_counter() - self.began
             return PlanStatus.SOLVED
-        for share, side in self._limits():
+        for fraction, side in self._limits():
             if self.stopped():
                 return None
-            radius = turning_radius(world.robot, share)
-            builder = LatticeBuilder(world, self.config, radius=radius, side=side)
+            radius = turning_radius(world.robot, fraction)
+            builder = LatticeBuilder(
+                world,
+                self.config,
+                radius=radius,
+                side=side,
+                floe_costs=partial(floe_costs, self.config),
+            )
             self.side = side
             found = self._search(builder, self.config.searches[0])
             if found is None:
                 return None
             if found:
-                if self.config.sweep_ahead > 0.0:
+                if self.config.sweep_horizon > 0.0:
                     self._improve(builder)
                 assert self.built is not None
                 return PlanStatus.SOLVED if self.built.arrives else PlanStatus.APPROXIMATE
-        # the lattice is coarse: where it leads nowhere there may be a way nevertheless
+        # the lattice is coarse: where it leads nowhere there may be a path nevertheless
         return None if reachable(world) else PlanStatus.GOAL_UNREACHABLE
 
     def _limits(self) -> list[tuple[float, float]]:
-        """Shares of the turn rate and distances from the bounds [m] to try, one after the other."""
-        share = self.config.turn_share
+        """Fractions of the turn rate and distances from the bounds [m] to try in turn."""
+        fraction = self.config.turn_share
         side = self.config.side * 2.0 * self.world.robot.inscribed_radius
-        nearer = [(share, part * side) for part in (1.0, 0.8, 0.6, 0.4, 0.2, 0.0)]
+        nearer = [(fraction, part * side) for part in (1.0, 0.8, 0.6, 0.4, 0.2, 0.0)]
         return [*nearer, (1.0, 0.0)]
 
     def stopped(self) -> bool:
@@ -111,7 +129,7 @@ class ShipCall:
             return None
         self.expanded += star.expanded
         if result != FOUND:
-            return None if builder.clipped else False  # there may be a way elsewhere
+            return None if builder.clipped else False  # there may be a path elsewhere
         arcs = path_arcs(built, star, curves)
         poses, curvatures = lay_path(built, arcs, self.world, self.config)
         if not self._free(poses):
@@ -146,16 +164,22 @@ class ShipCall:
         config, world = self.config, self.world
         assert self.built is not None
         point, normal = self.built.finish(world)
-        ahead = config.sweep_ahead * self.size
-        self.near = Near.around(world, normal, ahead)
-        numbers = [builder.radius, config.spacing * self.size, 0.6 * self.size, 2.5, 0.15]
-        self.improver = Improver(
-            make_sweeper(self.near.world, self.interaction),
+        ahead = config.sweep_horizon * self.size
+        self.near = NearbyObjects.around(world, normal, ahead)
+        problem = ShortcutProblem(
+            radius=builder.radius,
+            spacing=config.spacing * self.size,
+            spread=_SPREAD * self.size,
+            most_turn=_MOST_TURN,
+            end_fraction=_END_FRACTION,
+            goal=np.concatenate([point, normal]),
+        )
+        self.improver = PathImprover(
+            path_sweeper(self.near.world, self.interaction),
             np.ascontiguousarray(self.near.world.movables.poses),
             robot_mass=world.robot.mass,
             weight=config.push_weight,
-            numbers=np.array(numbers),
-            goal=np.concatenate([point, normal]),
+            problem=problem,
             ahead=ahead,
             stopped=self.stopped,
             free=self._free,
@@ -170,17 +194,17 @@ class ShipCall:
         if config.refinement and not self.stopped():
             self._refine(builder)
         # a path that touches nothing is not shortened: it would be until it grazes a floe
-        while self.repairs < config.repairs and self.improver.best.works[-1] > 0.0:
+        while self.shortcuts < config.shortcuts and self.improver.best.works[-1] > 0.0:
             if self.stopped():
                 return
-            self.improver.repair(self.rng)
-            self.repairs += 1
+            self.improver.shortcut(self.rng)
+            self.shortcuts += 1
             self.iterations += 1
             self.cost = self.improver.best.cost
 
     def _refine(self, builder: LatticeBuilder) -> None:
         """Optimise the best path in continuous space; it is kept if the sweep says it is better."""
-        from pushplan.planners.ship_lattice.continuous import price_field, refine
+        from pushplan.planners.ship_lattice.continuous import cost_field, refine
 
         assert self.improver is not None and self.improver.best is not None
         built, best = builder.build(), self.improver.best
@@ -189,14 +213,14 @@ class ShipCall:
         hull = max(1, round(2.0 * self.world.robot.inscribed_radius / cell))
         row, column, heading = built.start
         origin = lattice.corner + np.array([row, column]) * lattice.cells
-        field = price_field(
-            lattice.price_sums, lattice.stride, lattice.cells, cell, hull, origin.astype(np.float64)
+        field = cost_field(
+            lattice.cost_sums, lattice.stride, lattice.cells, cell, hull, origin.astype(np.float64)
         )
-        across = built.frame.inwards(best.poses[:, :2])[:, 1]
+        across = built.frame.from_world(best.poses[:, :2])[:, 1]
         reach = 2.0 * self.size
         arcs = refine(
             field,
-            np.column_stack([np.diff(best.lengths), best.bends[1:]]),
+            np.column_stack([np.diff(best.lengths), best.curvatures[1:]]),
             heading,
             radius=builder.radius,
             goal=(lattice.goal[1] - row) * lattice.step,
@@ -223,11 +247,5 @@ class ShipCall:
             missing = len(best.poses) - len(best.objects)
             objects = self.near.everything(self.world, best.objects, missing)
             works = np.concatenate([best.works, np.repeat(best.works[-1:], missing)])
-            path = Path(best.poses, best.bends, objects, best.lengths, works)
+            path = Path(best.poses, best.curvatures, objects, best.lengths, works)
         return timed_plan(self.world, path, self.config.turn_share)
-
-
-def bare_path(poses: FloatArray, curvatures: FloatArray) -> Path:
-    """A path about which nothing is predicted."""
-    works = np.zeros(len(poses))
-    return Path(poses, curvatures, None, arc_lengths(poses), works)  # type: ignore[arg-type]

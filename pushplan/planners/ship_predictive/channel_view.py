@@ -1,4 +1,4 @@
-"""The world as the predictive search sees it: in a frame that points ahead, near ice only."""
+"""`ChannelView`: a world in a frame that points ahead, with the near ice only."""
 
 from __future__ import annotations
 
@@ -8,20 +8,27 @@ from dataclasses import dataclass
 import numpy as np
 
 from pushplan.interaction.ice import IceInteraction
-from pushplan.interaction.ice_contacts import Crowd, Solver
+from pushplan.interaction.ice_bodies import IceBodies, IceSettings, select_bodies
 from pushplan.motion.speed_profile import check_turns
-from pushplan.planners.ship_predictive.cost_to_go import HEADINGS, Guide, fill_table, ice_field
+from pushplan.planners.ship_predictive.arc_kernels import Channel
+from pushplan.planners.ship_predictive.cost_to_go import (
+    HEADINGS,
+    CostToGo,
+    Floes,
+    fill_field,
+    fill_table,
+)
 from pushplan.planners.ship_predictive.predictive_config import PredictiveConfig
 from pushplan.world import GoalLine, InvalidInputError, World
 from pushplan.world.checks import FloatArray, IntArray
 from pushplan.world.outline import areas_and_centroids
 
 _MOST_PLACES = 20_000
-"""Rows times columns of the guide, about."""
+"""Rows times columns of the table of costs to go, about."""
 
 
 @dataclass(frozen=True)
-class Scene:
+class ChannelView:
     """What a search needs; all in the frame of the channel, y ahead, the ship's start at x = 0.
 
     Args:
@@ -29,34 +36,30 @@ class Scene:
         turn: angle by which the frame is turned against the world's [rad].
         start: (3,) pose of the ship.
         away: y of the goal line [m].
-        goal: y of the line to which the search goes: the goal line, or one on the way.
+        channel: where the ship's origin may be; its goal is the goal line, or one before it.
         near: numbers of the floes that may be met.
         floes: (K, 3) their poses.
-        crowd: their shapes and the hull's.
-        solver: settings for their motion.
-        guide: costs to go.
+        bodies: their shapes and the hull's.
+        settings: of their motion.
+        costs: costs to go.
         length: of the hull [m].
         radius: least turning radius [m].
-        bends: (B,) curvatures that the search uses [1/m].
-        low: (2,) least x, y, high: greatest, where the ship's origin may be [m].
-        high: see ``low``.
+        curvatures: (B,) that the search uses [1/m].
     """
 
     world: World
     turn: float
     start: FloatArray
     away: float
-    goal: float
+    channel: Channel
     near: IntArray
     floes: FloatArray
-    crowd: Crowd
-    solver: Solver
-    guide: Guide
+    bodies: IceBodies
+    settings: IceSettings
+    costs: CostToGo
     length: float
     radius: float
-    bends: FloatArray
-    low: FloatArray
-    high: FloatArray
+    curvatures: FloatArray
 
     def to_world(self, poses: FloatArray) -> FloatArray:
         """Carry (..., 3) poses from the frame of the channel to the world's."""
@@ -70,10 +73,10 @@ class Scene:
     def inside(self, poses: FloatArray) -> bool:
         """Whether the ship's origin is in the channel at all (N, 3) poses."""
         at = poses[:, :2]
-        return bool((at >= self.low).all() and (at <= self.high).all())
+        return bool((at >= self.channel.low).all() and (at <= self.channel.high).all())
 
 
-def make_scene(world: World, config: PredictiveConfig, model: IceInteraction) -> Scene:
+def channel_view(world: World, config: PredictiveConfig, model: IceInteraction) -> ChannelView:
     """Look at a world.
 
     Raises:
@@ -86,7 +89,7 @@ def make_scene(world: World, config: PredictiveConfig, model: IceInteraction) ->
             f"the predictive ship planners go to a GoalLine, got a {type(line).__name__}"
         )
     check_turns(world.robot)
-    full = model.crowd(world)
+    bodies = model.bodies(world)
     robot = world.robot
     length = float(np.ptp(robot.vertices[:, 0]))
     away = float((line.point - world.robot_pose[:2]) @ line.normal)
@@ -98,28 +101,25 @@ def make_scene(world: World, config: PredictiveConfig, model: IceInteraction) ->
     off = math.remainder(float(world.robot_pose[2]) - turn - 0.5 * math.pi, 2.0 * math.pi)
     radius = robot.turning_radius / config.turn_share
     margin = config.margin * 0.5 * float(np.ptp(robot.vertices[:, 1]))
-    low, high = _channel(world, turn, margin, (1.0 + 1e-6) * radius * (1.0 - math.cos(off)), off)
-    aside = 0.5 * max(goal, 0.0) + 5.0 * length  # no way leads farther from the straight one
+    low, high = _box(world, turn, margin, (1.0 + 1e-6) * radius * (1.0 - math.cos(off)), off)
+    aside = 0.5 * max(goal, 0.0) + 5.0 * length  # no path leads farther from the straight one
     low[0], high[0] = max(low[0], min(-aside, high[0])), min(high[0], max(aside, low[0]))
-    crowd = _only(full, near)
-    solver = model.solver(world)
-    guide = _guide(world, config, crowd, floes[near], max(goal, 0.0), low, high, length, radius)
-    return Scene(
+    channel = Channel(goal, low, high)
+    bodies, floes = select_bodies(bodies, near), np.ascontiguousarray(floes[near])
+    return ChannelView(
         world=world,
         turn=turn,
         start=np.array([0.0, 0.0, 0.5 * math.pi + off]),
         away=away,
-        goal=goal,
+        channel=channel,
         near=near,
-        floes=np.ascontiguousarray(floes[near]),
-        crowd=crowd,
-        solver=solver,
-        guide=guide,
+        floes=floes,
+        bodies=bodies,
+        settings=model.settings(world),
+        costs=_costs_to_go(world, config, bodies, floes, channel, radius),
         length=length,
         radius=radius,
-        bends=np.linspace(-1.0, 1.0, 2 * config.bends + 1) / radius,
-        low=low,
-        high=high,
+        curvatures=np.linspace(-1.0, 1.0, 2 * config.curvatures + 1) / radius,
     )
 
 
@@ -129,14 +129,14 @@ def _from_world(poses: FloatArray, origin: FloatArray, turn: float) -> FloatArra
     return np.column_stack([c * dx + s * dy, c * dy - s * dx, poses[:, 2] - turn])
 
 
-def _channel(
+def _box(
     world: World, turn: float, margin: float, bulge: float, off: float
 ) -> tuple[FloatArray, FloatArray]:
     """Box of places for the ship's origin: the bounds, and less a margin at the sides.
 
     Where the goal line is not parallel to a side of the bounds, the box around them turned. The
-    margin is given up as far as a ship needs the room to turn ahead: ``bulge`` [m] to the side to
-    which it heads (``off`` [rad], positive to the left).
+    margin is given up as far as a ship needs the clearance to turn ahead: ``bulge`` [m] to the side
+    to which it heads (``off`` [rad], positive to the left).
     """
     x0, y0, x1, y1 = world.static.bounds.tolist()
     corners = np.array([(x0, y0, 0.0), (x1, y0, 0.0), (x1, y1, 0.0), (x0, y1, 0.0)])
@@ -148,32 +148,17 @@ def _channel(
     return low, high
 
 
-def _only(crowd: Crowd, near: IntArray) -> Crowd:
-    """The crowd with some of its objects."""
-    counts = np.diff(crowd.offsets)[near]
-    offsets = np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
-    corners = np.repeat(crowd.offsets[near] - offsets[:-1], counts) + np.arange(offsets[-1])
-    return crowd._replace(
-        vertices=np.ascontiguousarray(crowd.vertices[corners]),
-        offsets=offsets,
-        radii=np.ascontiguousarray(crowd.radii[near]),
-        masses=np.ascontiguousarray(crowd.masses[near]),
-        inverse_gyration=np.ascontiguousarray(crowd.inverse_gyration[near]),
-    )
-
-
-def _guide(
+def _costs_to_go(
     world: World,
     config: PredictiveConfig,
-    crowd: Crowd,
+    bodies: IceBodies,
     floes: FloatArray,
-    away: float,
-    low: FloatArray,
-    high: FloatArray,
-    length: float,
+    channel: Channel,
     radius: float,
-) -> Guide:
-    width, ahead = float(high[0] - low[0]), away + length
+) -> CostToGo:
+    vertices = world.robot.vertices
+    length, away = float(np.ptp(vertices[:, 0])), max(channel.goal, 0.0)
+    width, ahead = float(channel.high[0] - channel.low[0]), away + length
     # a table over wide water is coarser, so that it is there in milliseconds
     places = (width / (config.column * length)) * (ahead / (config.row * length))
     coarser = length * max(1.0, math.sqrt(places / _MOST_PLACES))
@@ -181,15 +166,23 @@ def _guide(
     column = max(width / (columns - 1), 0.1 * config.column * length)
     cell = 0.5 * column
     rows = max(2, math.ceil(ahead / (config.row * coarser)) + 1)
-    row = ahead / (rows - 1)  # the table begins a hull length behind the ship
-    bow = 0.7 * float(world.robot.vertices[:, 0].max())
-    field = np.empty((math.ceil((away + 3.0 * length) / cell) + 1, 2 * columns - 1))
-    radii = np.sqrt(areas_and_centroids(crowd.vertices, crowd.offsets)[0] / np.pi)
-    half_beam = 0.5 * float(np.ptp(world.robot.vertices[:, 1]))
-    price = np.array([config.gain, config.crowding])
-    left = float(low[0])
-    ice_field(floes, radii, crowd.masses, half_beam, left, -length, cell, price, field)
-    table = np.empty((rows, columns, HEADINGS))
-    guide = Guide(table, field, left, -length, column, row, cell, -length, bow)
-    fill_table(guide, world.robot.mass, config.push_weight, radius)
-    return guide
+    costs = CostToGo(
+        table=np.empty((rows, columns, HEADINGS)),
+        field=np.empty((math.ceil((away + 3.0 * length) / cell) + 1, 2 * columns - 1)),
+        left=float(channel.low[0]),
+        low=-length,  # the table begins a hull length behind the ship
+        column=column,
+        row=ahead / (rows - 1),
+        cell=cell,
+        field_low=-length,
+        bow=0.7 * float(vertices[:, 0].max()),
+        mass=world.robot.mass,
+        weight=float(config.push_weight),
+        radius=radius,
+    )
+    radii = np.sqrt(areas_and_centroids(bodies.vertices, bodies.offsets)[0] / np.pi)
+    half_beam = 0.5 * float(np.ptp(vertices[:, 1]))
+    gain, crowding = float(config.gain), float(config.crowding)
+    fill_field(Floes(floes, radii, bodies.masses, half_beam, gain, crowding), costs)
+    fill_table(costs)
+    return costs

@@ -2,31 +2,37 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import dijkstra
-from test_lattice_ship import ship_world
+from test_ship_lattice import ship_world
 
 from pushplan.interaction.ice import IceInteraction
+from pushplan.interaction.path_sweepers import IceSweeper
 from pushplan.motion.speed_profile import turning_radius
-from pushplan.motion.state_lattice.heuristic import Window, place_costs
-from pushplan.motion.state_lattice.pose_lattice import PoseLattice, _successors, bound_at, reached
+from pushplan.motion.state_lattice.built_lattice import BuiltLattice
+from pushplan.motion.state_lattice.lattice_builder import LatticeBuilder
+from pushplan.motion.state_lattice.lattice_search import open_search
+from pushplan.motion.state_lattice.place_costs import Window, place_costs
+from pushplan.motion.state_lattice.pose_lattice import PoseLattice, bound_at, reached, successors
 from pushplan.planners.ship_lattice import ShipLattice, ShipLatticeConfig
-from pushplan.planners.ship_lattice.build import BuiltLattice, LatticeBuilder
-from pushplan.planners.ship_lattice.paths import open_search
-from pushplan.planners.ship_lattice.sweeper import IceSweeper
+from pushplan.planners.ship_lattice.floe_costs import floe_costs
 from pushplan.search.astar import FOUND
 from pushplan.world import GoalLine, World
 
-EXACT = {"guide": "bound", "inflation": 1.0}
+EXACT = {"heuristic": "bound", "inflation": 1.0}
 
 
 def builder_of(world: World, config: ShipLatticeConfig) -> LatticeBuilder:
     radius = turning_radius(world.robot, config.turn_share)
-    return LatticeBuilder(world, config, radius=radius, side=0.2)
+    return LatticeBuilder(
+        world, config, radius=radius, side=0.2, floe_costs=partial(floe_costs, config)
+    )
 
 
 def costs_to_go(built: BuiltLattice) -> np.ndarray:
@@ -39,7 +45,7 @@ def costs_to_go(built: BuiltLattice) -> np.ndarray:
         if reached(lattice, node):
             goals.append(node)
             continue
-        count = _successors(lattice, node, nodes, costs, edges)
+        count = successors(lattice, node, nodes, costs, edges)
         tails += [node] * count
         heads += nodes[:count].tolist()
         weights += costs[:count].tolist()
@@ -64,7 +70,7 @@ def small_world(seed: int, floes: int = 60) -> World:
 @pytest.mark.parametrize("seed", range(5))
 @pytest.mark.parametrize("price", ["displacement", "kinetic-energy"])
 def test_the_bound_is_never_above_the_least_cost(seed: int, price: str) -> None:
-    config = ShipLatticeConfig(headings=8, price=price, collision_weight=3.0, **EXACT)
+    config = ShipLatticeConfig(headings=8, floe_cost=price, collision_weight=3.0, **EXACT)
     built = builder_of(small_world(seed), config).build()
     exact = costs_to_go(built)
     bounds = np.array([bound_at(built.lattice, node) for node in range(built.size)])
@@ -80,10 +86,10 @@ def test_a_star_finds_the_cost_of_exhaustive_dijkstra(seed: int) -> None:
     rng = np.random.default_rng(seed)
     built = builder.build()
     # any prices, not only those of floes; nothing but the length bounds them
-    grid = rng.exponential(0.02, built.lattice.price_sums.shape)
+    grid = rng.exponential(0.02, built.lattice.cost_sums.shape)
     sums = np.cumsum(grid.reshape(-1, built.lattice.stride), axis=1).ravel()
     lattice = built.lattice._replace(
-        price_sums=sums, place_costs=np.zeros_like(built.lattice.place_costs)
+        cost_sums=sums, place_costs=np.zeros_like(built.lattice.place_costs)
     )
     built = BuiltLattice(lattice, built.frame, built.motions, built.start, built.arrives)
     star, curves = open_search(built, builder)
@@ -118,7 +124,9 @@ def test_an_inflated_bound_limits_the_cost(inflation: float) -> None:
         world = ship_world(seed, floes=150)
         best, found = (
             ShipLattice(
-                ShipLatticeConfig(guide="bound", inflation=factor, repairs=0, sweep_ahead=0.0)
+                ShipLatticeConfig(
+                    heuristic="bound", inflation=factor, shortcuts=0, sweep_horizon=0.0
+                )
             )
             .plan(world)
             .stats.detail["lattice_cost"]
@@ -130,7 +138,9 @@ def test_an_inflated_bound_limits_the_cost(inflation: float) -> None:
 def test_the_estimate_saves_most_nodes_and_costs_little_more() -> None:
     results = {}
     for guide, inflation in (("bound", 1.0), ("estimate", 1.2)):
-        config = ShipLatticeConfig(guide=guide, inflation=inflation, repairs=0, sweep_ahead=0.0)
+        config = ShipLatticeConfig(
+            heuristic=guide, inflation=inflation, shortcuts=0, sweep_horizon=0.0
+        )
         stats = [ShipLattice(config).plan(ship_world(seed, floes=150)).stats for seed in range(20)]
         results[guide] = (
             sum(one.nodes for one in stats),
