@@ -10,7 +10,7 @@ import numpy as np
 from pushplan.interaction import InteractionModel
 from pushplan.motion.coarse_path import reachable
 from pushplan.motion.collision import first_blocked, footprint, is_free, obstacles
-from pushplan.motion.shortcutting import Path
+from pushplan.motion.path_problem import SweptPath
 from pushplan.motion.speed_profile import check_turns, timed_plan, turning_radius
 from pushplan.planners.ship_lattice.build import BuiltLattice, LatticeBuilder
 from pushplan.planners.ship_lattice.improve import Improver
@@ -223,11 +223,11 @@ class ShipCall:
             missing = len(best.poses) - len(best.objects)
             objects = self.near.everything(self.world, best.objects, missing)
             works = np.concatenate([best.works, np.repeat(best.works[-1:], missing)])
-            path = Path(best.poses, best.bends, objects, best.lengths, works)
+            path = SweptPath(best.poses, best.bends, objects, best.lengths, works)
         return timed_plan(self.world, path, self.config.turn_share)
 
 
-def bare_path(poses: FloatArray, curvatures: FloatArray) -> Path:
+def bare_path(poses: FloatArray, curvatures: FloatArray) -> SweptPath:
     """A path about which nothing is predicted."""
     works = np.zeros(len(poses))
-    return Path(poses, curvatures, None, arc_lengths(poses), works)  # type: ignore[arg-type]
+    return SweptPath(poses, curvatures, None, arc_lengths(poses), works)  # type: ignore[arg-type]

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from pushplan.motion.dubins import along_arc, sample_pieces
-from pushplan.motion.shortcutting import goal_numbers, in_goal
+from pushplan.motion.goal_region import goal_numbers, in_goal
 from pushplan.motion.state_lattice.pose_lattice import bound_at, flat_runs, swath_sum, within
 from pushplan.motion.state_lattice.swaths import sweep_cells
 from pushplan.planners.ship_lattice.build import BuiltLattice, LatticeBuilder
