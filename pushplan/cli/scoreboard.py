@@ -28,7 +28,7 @@ class Scoreboard:
         self.manipulates = isinstance(start.goal, Receptacle | ClearanceArea)
         self._there = np.zeros(len(start.movables), dtype=bool)
         if self.manipulates:
-            self._there = manipulation.completed_objects(start)
+            self._there = start.completed
 
     def advance(self, world: World, robot_poses: FloatArray, object_poses: FloatArray) -> None:
         """Take in what moved since the last call.
@@ -49,7 +49,7 @@ class Scoreboard:
         done = np.ones(len(self._start.movables), dtype=bool)
         now = self._world.movables.ids
         rows = np.flatnonzero(np.isin(self._start.movables.ids, now))
-        done[rows] = manipulation.completed_objects(self._world)
+        done[rows] = self._world.completed
         return done
 
     def lines(self) -> list[str]:

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from pushplan.evaluation.pool import WorkerPool
     from pushplan.evaluation.push_plots import push_figure
     from pushplan.evaluation.results import Results, compare
-    from pushplan.evaluation.rows import COLUMNS, TIMING_COLUMNS, ResultRow, Status
+    from pushplan.evaluation.rows import TIMING_COLUMNS, ResultRow, Status, columns
     from pushplan.evaluation.statistics import Estimate, Proportion, bootstrap_interval, wilson
     from pushplan.evaluation.summary import PairedDifference, PolicySummary
 
@@ -34,14 +34,13 @@ _HOMES = {
     "pool": ("WorkerPool",),
     "push_plots": ("push_figure",),
     "results": ("Results", "compare"),
-    "rows": ("COLUMNS", "TIMING_COLUMNS", "ResultRow", "Status"),
+    "rows": ("TIMING_COLUMNS", "ResultRow", "Status", "columns"),
     "statistics": ("Estimate", "Proportion", "bootstrap_interval", "wilson"),
     "summary": ("PairedDifference", "PolicySummary"),
 }
 _LAZY = {name: module for module, names in _HOMES.items() for name in names}
 
 __all__ = [
-    "COLUMNS",
     "TIMING_COLUMNS",
     "Comparison",
     "Estimate",
@@ -62,6 +61,7 @@ __all__ = [
     "bench",
     "bench_paper",
     "bootstrap_interval",
+    "columns",
     "compare",
     "parse_policies",
     "parse_policy",

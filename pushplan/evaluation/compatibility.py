@@ -10,7 +10,7 @@ from pushplan.evaluation.episode import PolicyError, Recording, describe
 from pushplan.evaluation.jobs import Job, JobSettings
 from pushplan.evaluation.limits import EpisodeTimeout, soft_limit
 from pushplan.evaluation.policies import PolicySpec, parse_policies
-from pushplan.world import InvalidInputError, Policy, PushplanError
+from pushplan.world import ChecksScenario, InvalidInputError, Policy, PushplanError
 
 
 class UnusablePolicyError(InvalidInputError):
@@ -79,7 +79,7 @@ def incompatibility(spec: PolicySpec, scenario: Any, settings: JobSettings) -> s
     except (Exception, SystemExit) as error:
         said = str(error) if isinstance(error, PushplanError) else describe(error)
         raise UnusablePolicyError(f"policy {spec.label!r} cannot be made: {said}") from error
-    if (reason := _made_for(policy, scenario)) is not None:
+    if isinstance(policy, ChecksScenario) and (reason := policy.incompatibility(scenario)):
         return reason
     try:
         env = settings.environment(scenario, policy)
@@ -91,16 +91,6 @@ def incompatibility(spec: PolicySpec, scenario: Any, settings: JobSettings) -> s
             if reason is None and settings.dry_run:
                 spec.warm_up()  # what is compiled here, workers find in the cache
             return reason
-    return None
-
-
-def _made_for(policy: Policy, scenario: Any) -> str | None:
-    """What a network says that it was made for, if that is something else."""
-    specification = getattr(policy, "specification", None)
-    for kind in ("task", "preset"):
-        mine = getattr(specification, f"{kind}s", ())
-        if mine and getattr(scenario, kind) not in mine:
-            return f"made for {kind} {', '.join(mine)}"
     return None
 
 

@@ -4,14 +4,19 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from typing import Any
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
 import pushplan
 from pushplan.world import (
+    ChoosesActions,
+    ChoosesObservation,
     Episode,
+    HoldsDecisions,
     InvalidInputError,
+    LogsPlans,
+    PlansBesideDriving,
     Policy,
     PushplanError,
     Twist,
@@ -26,6 +31,15 @@ Clock = Callable[[], float]
 
 Observer = Callable[[int, World, Policy], None]
 """Called after the reset with 0 and after step i with i; sees the world and the policy."""
+
+
+@runtime_checkable
+class AdaptsActions(Protocol):
+    """An environment that can change to an action mode which takes velocities."""
+
+    def take_velocities(self) -> bool:
+        """Change to such a mode for the next reset; False where there is nothing to change."""
+        ...
 
 
 class PolicyError(PushplanError):
@@ -127,6 +141,9 @@ class Recording:
             begin = self._clock()
             action = self._ask(self.policy.act, world, observation)
             elapsed = self._clock() - begin
+            if not self._actions and self._changes_mode(env, action):
+                self.run(env, observer, limit=limit)
+                return
             command = checked_action(env, action)
             if self.latency_factor is None:
                 observation, reward, terminated, truncated, info = env.step(command)
@@ -174,6 +191,15 @@ class Recording:
             },
         )
 
+    def _changes_mode(self, env: Any, action: object) -> bool:
+        """Whether ``env`` begins again in an action mode that takes what the policy gives."""
+        return (
+            isinstance(action, Twist | WheelSpeeds)
+            and isinstance(env, AdaptsActions)
+            and not isinstance(self.policy, ChoosesActions)
+            and env.take_velocities()
+        )
+
     def _simulate_latency(self, env: Any) -> None:
         """Tell a policy that plans beside driving how time passes in this episode."""
         if self.latency_factor is None:
@@ -183,9 +209,8 @@ class Recording:
                 "latency-aware simulation needs an environment with step_late(action, lag), "
                 f"{type(env).__name__} has none"
             )
-        simulate_latency = getattr(self.policy, "simulate_latency", None)
-        if callable(simulate_latency):
-            self._ask(simulate_latency, self.latency_factor, self._clock)
+        if isinstance(self.policy, PlansBesideDriving):
+            self._ask(self.policy.simulate_latency, self.latency_factor, self._clock)
 
     def _begin(self, world: World) -> None:
         self.started = True
@@ -224,18 +249,16 @@ def blocking_time(policy: Policy, elapsed_s: float) -> float:
     """How long the robot waited for an action [s].
 
     Args:
-        policy: its attribute ``background_s``, if it has one, says how much of the call a robot
-            does beside driving, as `pushplan.planners.PlanFollower` plans.
+        policy: one that `PlansBesideDriving` does part of the call while the robot drives.
         elapsed_s: wall-clock time of the call [s].
     """
-    beside = float(getattr(policy, "background_s", 0.0))
+    beside = policy.background_s if isinstance(policy, PlansBesideDriving) else 0.0
     return max(elapsed_s - max(beside, 0.0), 0.0)
 
 
 def held_for(policy: Policy) -> int:
     """Steps for which a decision of the policy stands: more than 1 for some networks."""
-    action = getattr(getattr(policy, "specification", None), "action", None)
-    return int(getattr(action, "repeat", 1))
+    return policy.steps_per_decision if isinstance(policy, HoldsDecisions) else 1
 
 
 def observation_time(env: Any, policy: Policy, step: int) -> float:
@@ -243,12 +266,17 @@ def observation_time(env: Any, policy: Policy, step: int) -> float:
 
     Args:
         env: says it, if it can, as ``observation_time_s``.
-        policy: one without the attribute ``observation`` looks at the world alone.
+        policy: one that does not say what it observes looks at the world alone.
         step: number of the step, from 0.
     """
-    if getattr(policy, "observation", None) is None or step % held_for(policy):
+    if wanted_observation(policy) is None or step % held_for(policy):
         return 0.0
     return float(getattr(env, "observation_time_s", 0.0))
+
+
+def wanted_observation(policy: object) -> Any:
+    """The name or builder of what a policy observes; None if it looks at the world alone."""
+    return policy.observation if isinstance(policy, ChoosesObservation) else None
 
 
 def checked_action(env: Any, action: object) -> FloatArray:
@@ -271,16 +299,18 @@ def checked_action(env: Any, action: object) -> FloatArray:
         if not np.isfinite(values).all():
             raise InvalidActionError(f"an action must be finite, got {values.tolist()}")
         action = values
-    command: FloatArray = env.encode(action)
+    try:
+        command: FloatArray = env.encode(action)
+    except InvalidInputError as error:
+        raise InvalidActionError(str(error)) from error
     return command
 
 
 def plan_times(policy: Policy) -> list[float] | None:
     """Wall-clock time of each planning call since the reset [s]; None if no log is kept."""
-    log = getattr(policy, "plan_log", None)
-    if log is None:
+    if not isinstance(policy, LogsPlans):
         return None
-    return [float(result.stats.wall_time_s) for result in log]
+    return [float(result.stats.wall_time_s) for result in policy.plan_log]
 
 
 def describe(error: BaseException) -> str:

@@ -8,11 +8,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from pushplan.evaluation.episode import checked_latency_factor
+from pushplan.evaluation.episode import checked_latency_factor, wanted_observation
 from pushplan.evaluation.loading import load_object
 from pushplan.evaluation.policies import PolicySpec
 from pushplan.evaluation.rows import ResultRow, Status, blank_row
-from pushplan.world import Policy
+from pushplan.world import ChecksEnvironment, ChoosesActions, Policy
 from pushplan.world.checks import number
 
 DEFAULT_ENV = "pushplan.envs:make"
@@ -65,10 +65,10 @@ class JobSettings:
 
     Args:
         make_env: factory of environments, as a callable or as ``"module:function"``; called as
-            ``make_env(scenario, observation=...)``, and with ``action=...`` where the policy's
-            attribute ``actions`` names action modes in order of preference.
-        observation: kind of observation; ``"auto"`` takes what the policy's attribute
-            ``observation`` asks for, by name or as a builder, else ``"state"``.
+            ``make_env(scenario, observation=...)``, and with ``action=...`` where the policy
+            `ChoosesActions`.
+        observation: kind of observation; ``"auto"`` takes what a policy that
+            `ChoosesObservation` asks for, else ``"state"``.
         timeout_s: wall-clock limit of one job [s], None for none.
         grace_s: how much later a job is ended by force [s].
         dry_run: in each process, warm up a planner of ours before its first job, and run the
@@ -100,15 +100,14 @@ class JobSettings:
         """A fresh environment for one job; ``options`` go to its factory."""
         observation = self.observation
         if observation == "auto":
-            observation = getattr(policy, "observation", "state")
-        actions = getattr(policy, "actions", None)
-        if actions is not None:
-            options = {"action": actions, **options}
+            wanted = wanted_observation(policy)
+            observation = "state" if wanted is None else wanted
+        if isinstance(policy, ChoosesActions):
+            options = {"action": policy.actions, **options}
         make = load_object(self.make_env) if isinstance(self.make_env, str) else self.make_env
         env = make(scenario, observation=observation, **options)
-        check = getattr(policy, "check_environment", None)
-        if callable(check):  # a network is good for what it was trained on
-            check(env, scenario)
+        if isinstance(policy, ChecksEnvironment):
+            policy.check_environment(env, scenario)
         return env
 
 

@@ -12,11 +12,12 @@ from pathlib import Path
 import pushplan
 from pushplan.evaluation.published import ENOUGH, SETTINGS, PublishedRow, PublishedTable, Score
 from pushplan.evaluation.results import Results
-from pushplan.evaluation.rows import SCORES, ResultRow
+from pushplan.evaluation.rows import ResultRow
 from pushplan.evaluation.statistics import Estimate, estimate, wilson
 from pushplan.evaluation.summary import policies_of, values_of
 from pushplan.evaluation.tables import Table
 from pushplan.learned.onnx_policy import read_specification
+from pushplan.metrics import Role, metric_names
 from pushplan.world import InvalidInputError
 
 _POINT = "E_nav to goal point"
@@ -67,7 +68,11 @@ def overview(tables: Sequence[PublishedTable], rows: Sequence[Sequence[ResultRow
     """
     cells = []
     for table, ours in zip(tables, rows, strict=True):
-        best = {name: value for name in SCORES if (value := table.best(name)) is not None}
+        best = {
+            name: value
+            for name in metric_names(Role.SCORE)
+            if (value := table.best(name)) is not None
+        }
         if not best:
             continue
         winners = []
@@ -127,7 +132,7 @@ def paper_table(
 
 
 def _columns(table: PublishedTable, rows: Sequence[ResultRow]) -> list[str]:
-    names = [n for n in SCORES if values_of(rows, n) or table.best(n) is not None]
+    names = [n for n in metric_names(Role.SCORE) if values_of(rows, n) or table.best(n) is not None]
     if table.task == "maze":  # the goal is a disc: l0* has two conventions
         names.insert(names.index("E_nav") + 1, _POINT)
     return names

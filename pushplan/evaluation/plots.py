@@ -13,12 +13,13 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from pushplan.evaluation.jobs import file_stem
-from pushplan.evaluation.rows import SCORES, ResultRow
+from pushplan.evaluation.rows import ResultRow
 from pushplan.evaluation.run_record import RunRecord
 from pushplan.evaluation.statistics import estimate
 from pushplan.evaluation.store import write_atomic
 from pushplan.evaluation.summary import values_of
-from pushplan.evaluation.tables import HEADINGS
+from pushplan.evaluation.tables import heading
+from pushplan.metrics import Role, metric_names
 
 # Okabe and Ito's colours, told apart by colour-blind readers too
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000", "#8C6D31")
@@ -95,7 +96,7 @@ def _tradeoff(run: RunRecord) -> tuple[str, Figure] | None:
 
 def _spread(run: RunRecord) -> tuple[str, Figure] | None:
     """A box and all dots for each policy, one row of panels a metric."""
-    metrics = [name for name in (*SCORES, "interaction_work_kg_m") if values_of(run.rows, name)]
+    metrics = [name for name in metric_names(Role.SCORE, Role.DETAIL) if values_of(run.rows, name)]
     if not metrics:
         return None
     settings = list(run.titles)
@@ -110,7 +111,7 @@ def _spread(run: RunRecord) -> tuple[str, Figure] | None:
             if line == 0:
                 axes.set_title(run.titles[setting], fontsize=9)
             if column == 0:
-                axes.set_ylabel(HEADINGS[name])
+                axes.set_ylabel(heading(name))
             if line < len(metrics) - 1:
                 axes.tick_params(labelbottom=False)
     figure.tight_layout()

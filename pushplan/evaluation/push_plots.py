@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from pushplan.evaluation.plots import COLOURS
-from pushplan.planners.pushing.log import PushLog
+from pushplan.planners.pushing.push_log import PushLog
 from pushplan.world import InvalidInputError
 from pushplan.world.checks import FloatArray
 

@@ -8,21 +8,14 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from pushplan.evaluation.rows import SCORES
 from pushplan.evaluation.statistics import Estimate
 from pushplan.evaluation.summary import PairedDifference, PolicySummary
+from pushplan.metrics import METRICS, Role, metric_names
 
 if TYPE_CHECKING:
     from rich.table import Table as RichTable
 
-HEADINGS = {
-    "E_nav": "E_nav",
-    "I_nav": "I_nav",
-    "S_manip": "S_manip",
-    "E_manip": "E_manip",
-    "I_manip": "I_manip",
-    "interaction_work_kg_m": "work [kg m]",
-    "path_length_m": "path [m]",
+_TIMING_HEADINGS = {
     "plan_time_median_s": "plan [ms]",
     "decision_time_median_s": "step [ms]",
     "wall_time_s": "wall [s]",
@@ -62,8 +55,15 @@ MEASURED_NOTE = (
 )
 PAIR_NOTE = (
     "same scenarios, second policy minus first: mean with 95 % bootstrap interval; * where the "
-    "interval leaves out 0; wins are scenarios in which the second policy has the greater value"
+    "interval leaves out 0; wins are scenarios in which the second policy has the better value"
 )
+
+
+def heading(column: str) -> str:
+    """The heading of a column in tables, with its unit."""
+    if column in METRICS:
+        return METRICS[column].heading or column
+    return _TIMING_HEADINGS[column]
 
 
 def score_tables(
@@ -79,12 +79,10 @@ def score_tables(
     tables = []
     for setting in dict.fromkeys(s.setting for s in summaries):
         mine = [s for s in summaries if s.setting == setting]
-        metrics = [name for name in SCORES if any(name in s.metrics for s in mine)]
-        if wide:
-            more = ("interaction_work_kg_m", "path_length_m", "wall_time_s")
-            metrics += [name for name in more if any(name in s.metrics for s in mine)]
-        metrics += [name for name in _TIMES if any(name in s.metrics for s in mine)]
-        headings = ("policy", "runs", "success", *(HEADINGS[name] for name in metrics))
+        shown = metric_names(Role.SCORE, Role.DETAIL) if wide else metric_names(Role.SCORE)
+        shown = (*shown, *(("wall_time_s",) if wide else ()), *_TIMES)
+        metrics = [name for name in shown if any(name in s.metrics for s in mine)]
+        headings = ("policy", "runs", "success", *(heading(name) for name in metrics))
         cells = tuple(_policy_cells(summary, metrics, wide) for summary in mine)
         note = SCORE_NOTE + ("; med is the median" if wide else "")
         tables.append(Table(titles.get(setting, setting), headings, cells, note))
@@ -111,7 +109,12 @@ def measured_tables(
         for policy in policies:
             found = [estimates.get((setting, policy, name)) for name in metrics]
             if any(found):
-                cells.append((policy, *("" if e is None else _estimate(e) for e in found)))
+                cells.append(
+                    (
+                        policy,
+                        *(_estimate(e, _digits(n)) for n, e in zip(metrics, found, strict=True)),
+                    )
+                )
         tables.append(Table(title, ("policy", *metrics), tuple(cells), MEASURED_NOTE))
     return tables
 
@@ -122,14 +125,15 @@ def difference_tables(
     """One table a setting with a row for each pair of policies and metric."""
     tables = []
     if not wide:
-        pairs = [pair for pair in pairs if pair.metric in SCORES]
+        pairs = [pair for pair in pairs if METRICS[pair.metric].role is Role.SCORE]
     for setting in dict.fromkeys(pair.setting for pair in pairs):
         cells = tuple(
             (
-                HEADINGS[pair.metric],
+                heading(pair.metric),
                 f"{pair.second} - {pair.first}",
-                _number(pair.difference.mean, sign=True) + (" *" if pair.clear else ""),
-                _interval(pair.difference, sign=True),
+                _number(pair.difference.mean, _digits(pair.metric), sign=True)
+                + (" *" if pair.clear else ""),
+                _interval(pair.difference, _digits(pair.metric), sign=True),
                 f"{pair.wins} / {pair.losses} / {pair.difference.count}",
             )
             for pair in pairs
@@ -235,26 +239,34 @@ def _policy_cells(summary: PolicySummary, metrics: Sequence[str], wide: bool) ->
             cells.append("")
         elif name in _TIMES:
             worst = summary.metrics[_TIMES[name]].highest
-            cells.append(f"{_digits(1e3 * value.median)}\nmax {_digits(1e3 * worst)}")
+            cells.append(f"{_milliseconds(value.median)}\nmax {_milliseconds(worst)}")
         else:
-            cells.append(_estimate(value, wide=wide))
+            cells.append(_estimate(value, _digits(name), wide=wide))
     return tuple(cells)
 
 
-def _estimate(value: Estimate, *, wide: bool = True) -> str:
-    middle = f"\nmed {_number(value.median)}" if wide else ""
-    return f"{_number(value.mean)} ± {_number(value.sd)}\n{_interval(value)}{middle}"
+def _digits(column: str) -> int:
+    return METRICS[column].digits if column in METRICS else 3
 
 
-def _interval(value: Estimate, *, sign: bool = False) -> str:
-    return f"[{_number(value.low, sign=sign)}, {_number(value.high, sign=sign)}]"
+def _estimate(value: Estimate | None, digits: int, *, wide: bool = True) -> str:
+    if value is None:
+        return ""
+    middle = f"\nmed {_number(value.median, digits)}" if wide else ""
+    spread = f"{_number(value.mean, digits)} ± {_number(value.sd, digits)}"
+    return f"{spread}\n{_interval(value, digits)}{middle}"
 
 
-def _number(value: float, *, sign: bool = False) -> str:
-    return f"{value:+.3f}" if sign else f"{value:.3f}"
+def _interval(value: Estimate, digits: int, *, sign: bool = False) -> str:
+    return f"[{_number(value.low, digits, sign=sign)}, {_number(value.high, digits, sign=sign)}]"
 
 
-def _digits(value: float) -> str:
+def _number(value: float, digits: int, *, sign: bool = False) -> str:
+    return f"{value:+.{digits}f}" if sign else f"{value:.{digits}f}"
+
+
+def _milliseconds(seconds: float) -> str:
+    value = 1e3 * seconds
     return f"{value:.0f}" if value >= 100.0 else f"{value:.3g}"
 
 

@@ -25,6 +25,7 @@ from pushplan.world.outline import (
     convex_outlines,
     flatten,
     transform,
+    transform_outlines,
     well_formed,
 )
 
@@ -169,9 +170,7 @@ class Movables(ArrayRecord):
     @property
     def vertices_world(self) -> FloatArray:
         """(V, 2) `vertices` in the world frame [m]."""
-        x, y, theta = np.repeat(self.poses, np.diff(self.offsets), axis=0).T
-        c, s, (u, v) = np.cos(theta), np.sin(theta), self.vertices.T
-        return np.column_stack([x + c * u - s * v, y + s * u + c * v])
+        return transform_outlines(self.poses, self.vertices, self.offsets)
 
     def moved_to(self, poses: ArrayLike, twists: ArrayLike | None = None) -> Movables:
         """The same objects at other poses (K, 3); at rest unless twists (K, 3) are given.

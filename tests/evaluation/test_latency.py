@@ -272,7 +272,7 @@ class TestCommands:
             ]
         )
         assert code == 0
-        assert "latency-aware simulation x 1" in capsys.readouterr().out
+        assert "latency-aware x 1" in capsys.readouterr().out
 
     def test_run(self, capsys):
         assert main(["run", "maze-2d-3", "--policy", "straight", "--latency", "0.5"]) == 0

@@ -26,12 +26,14 @@ def rows_of(policy: str, shift: float, seeds: int = 20, setting: str = "maze-5")
             status="done",
             reason="goal",
             success=True,
-            E_nav=float(rng.uniform(0.5, 0.7) + shift),
-            I_nav=float(rng.uniform(0.8, 0.9)),
-            path_length_m=20.0,
-            interaction_work_kg_m=1.0,
-            steps=100,
-            sim_time_s=80.0,
+            metrics={
+                "E_nav": float(rng.uniform(0.5, 0.7) + shift),
+                "I_nav": float(rng.uniform(0.8, 0.9)),
+                "path_length_m": 20.0,
+                "interaction_work_kg_m": 1.0,
+                "steps": 100,
+                "sim_time_s": 80.0,
+            },
             wall_time_s=0.5,
             plan_calls=2,
             plan_time_median_s=0.01,
@@ -53,13 +55,13 @@ def results(tmp_path: Path) -> Results:
                 *rows_of("better", 0.1, 19, setting),
             ]:
                 store.add(row)
+        last = rows_of("better", 0.0)[-1]
         bad = replace(
-            rows_of("better", 0.0)[-1],
+            last,
             status="crashed",
             reason="ended by <SIGKILL>",
             success=False,
-            E_nav=0.0,
-            I_nav=None,
+            metrics={**{n: v for n, v in last.metrics.items() if n != "I_nav"}, "E_nav": 0.0},
         )
         store.add(bad, detail="what happened")
         store.write_csv()

@@ -11,7 +11,6 @@ import shapely
 
 from pushplan.envs.tasks.area_clearing_presets import LAYOUTS, PRESETS, AreaClearingPreset
 from pushplan.envs.tasks.base import StepOutcome
-from pushplan.envs.tasks.box_kernels import no_longer_touches
 from pushplan.envs.tasks.layout import Floor, rectangle, squares, walls_around
 from pushplan.envs.tasks.manipulation import (
     START_TRIES,
@@ -128,15 +127,8 @@ class AreaClearingTask(ManipulationTask):
         self._seen = (world, *self._measure(world))
         return world
 
-    def cleared(self, world: World) -> BoolArray:
-        """(K,) whether each box is clear of the area."""
-        boxes = world.movables
-        return np.asarray(
-            no_longer_touches(boxes.poses, boxes.vertices, boxes.offsets, self.goal.polygon)
-        )
-
     def _measure(self, world: World) -> tuple[FloatArray, BoolArray]:
-        return self.goal_distances(world.movables.poses), self.cleared(world)
+        return self.goal_distances(world.movables.poses), world.completed
 
     def _state(self, world: World) -> tuple[FloatArray, BoolArray]:
         """Distances and cleared flags, kept for the world that the last step ended in."""

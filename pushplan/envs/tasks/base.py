@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import ClassVar, Literal
 
 import numpy as np
 
@@ -51,6 +51,8 @@ class Task(ABC):
     """
 
     name: ClassVar[str]
+    goal_kind: ClassVar[Literal["robot", "objects"]] = "robot"
+    """Who has a goal: decides which metrics apply."""
     presets: ClassVar[tuple[str, ...]]
     """Sets of dimensions; the first is the default."""
     solid_presets: ClassVar[tuple[str, ...]]

@@ -11,7 +11,6 @@ import shapely
 
 from pushplan.envs.tasks.base import StepOutcome
 from pushplan.envs.tasks.box_delivery_presets import LAYOUTS, PRESETS, BoxDeliveryPreset
-from pushplan.envs.tasks.box_kernels import all_corners_inside
 from pushplan.envs.tasks.layout import rectangle, walls_around
 from pushplan.envs.tasks.manipulation import (
     START_TRIES,
@@ -20,6 +19,7 @@ from pushplan.envs.tasks.manipulation import (
 )
 from pushplan.world import InvalidInputError, Receptacle, StaticMap, UnknownNameError, World
 from pushplan.world.checks import FloatArray, IntArray
+from pushplan.world.outline import transform_outlines
 
 TOWARDS = 3.0
 """How much more a metre towards the receptacle counts than one away from it."""
@@ -80,7 +80,7 @@ class BoxDeliveryTask(ManipulationTask):
         self.goal: Receptacle = Receptacle(rectangle(x - side, y - side, x, y))
         # a box that leans on the wall overlaps it a little: the sides at the walls do not count
         reach = x + 0.5 * self.preset.wall, y + 0.5 * self.preset.wall
-        self._mouth = rectangle(x - side, y - side, *reach)
+        self._mouth = Receptacle(rectangle(x - side, y - side, *reach))
         self.reach = 2.0 * float(np.hypot(length, width))
         self._walls = [*walls_around(self.bounds, self.preset.wall), *self._corners()]
         self._empty = StaticMap.build(polygons=self._walls, bounds=self.bounds)
@@ -165,8 +165,8 @@ class BoxDeliveryTask(ManipulationTask):
             vertices, offsets = start.vertices, start.offsets
         else:  # boxes are alike
             vertices, offsets = start.vertices[: 4 * len(ids)], start.offsets[: len(ids) + 1]
-        poses = np.ascontiguousarray(poses)
-        gone: IntArray = ids[all_corners_inside(poses, vertices, offsets, self._mouth)]
+        corners = transform_outlines(poses, vertices, offsets)
+        gone: IntArray = ids[self._mouth.contains_each(corners, offsets)]
         return gone
 
     def _distances(self, world: World) -> FloatArray:

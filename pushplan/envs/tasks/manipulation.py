@@ -133,6 +133,7 @@ class ManipulationVariations(Variations):
 class ManipulationTask(Task):
     """Boxes that have to go somewhere. Subclasses say where, and what that is worth."""
 
+    goal_kind = "objects"
     actions: ClassVar[tuple[str, ...]] = ("heading", "waypoint", "velocity", "wheels")
     observations: ClassVar[tuple[str, ...]] = ("image", "spatial", "state")
     idle_limits: ClassVar[Mapping[str, int]]
