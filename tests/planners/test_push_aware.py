@@ -23,9 +23,9 @@ from pushplan.planners import make_planner, make_policy, policy_names
 from pushplan.planners.push_aware import PushAware, PushAwareConfig
 from pushplan.planners.push_aware.bound import lower_bound, turning_length
 from pushplan.planners.push_aware.cost_to_go import length_to_go
+from pushplan.planners.push_aware.cost_to_go_maker import CostToGoMaker
 from pushplan.planners.push_aware.push_tree import make_push_tree, plant, trace
 from pushplan.planners.push_aware.random_tree import DRAWS, grow
-from pushplan.planners.push_aware.cost_to_go_maker import CostToGoMaker
 from pushplan.planners.rrt import KinodynamicRRT, KinodynamicRRTConfig
 from pushplan.world import (
     Deadline,
@@ -457,7 +457,13 @@ def test_goals_for_objects_are_refused():
 
 @pytest.mark.parametrize(
     "options",
-    [{"push_weight": -1}, {"curvatures": 2}, {"nodes": 1}, {"heuristic_inflation": np.nan}, {"memory": 0}],
+    [
+        {"push_weight": -1},
+        {"curvatures": 2},
+        {"nodes": 1},
+        {"heuristic_inflation": np.nan},
+        {"memory": 0},
+    ],
 )
 def test_bad_parameters(options):
     with pytest.raises(InvalidInputError):

@@ -36,12 +36,12 @@ class PushAware:
     """Minimises m₀ l₀ + w Σ mᵢ lᵢ, with the objects carried along every branch of the search.
 
     The first plan follows the shortest path around the walls in Dubins curves, or is that of a
-    kinodynamic random tree. Then best-first searches over (x, y, heading), whose nodes hold where the objects
-    are by then, take turns with random trees, each under the cost of the best plan so far, and
-    what they find is shortcut at random with Dubins curves. A fraction of the iterations goes into
-    a random tree over poses and costs (AO-RRT; Hauser and Zhou, arXiv 1505.04098), which makes the
-    whole asymptotically optimal wherever that is. The cheapest path is returned when the stop
-    rule fires; waiting longer never costs more.
+    kinodynamic random tree. Then best-first searches over (x, y, heading), whose nodes hold where
+    the objects are by then, take turns with random trees, each under the cost of the best plan so
+    far, and what they find is shortcut at random with Dubins curves. A fraction of the iterations
+    goes into a random tree over poses and costs (AO-RRT; Hauser and Zhou, arXiv 1505.04098), which
+    makes the whole asymptotically optimal wherever that is. The cheapest path is returned when the
+    stop rule fires; waiting longer never costs more.
 
     Use it where a tenth of a second is worth a better path, and the world is two-dimensional with
     convex objects. ``stats.detail`` holds ``cost``, ``bound``, which no plan can undercut, and

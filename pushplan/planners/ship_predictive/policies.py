@@ -17,15 +17,11 @@ def ship_predictive(planner: Planner | None = None, stop: Stop | None = None) ->
     return RenewingFollower(planner or PredictiveShip(), stop=stop)
 
 
-def ship_predictive_network(
-    planner: Planner | None = None, stop: Stop | None = None
-) -> PlanFollower:
+def network(planner: Planner | None = None, stop: Stop | None = None) -> PlanFollower:
     """Predicts the occupancy with a network, and looks for a better path as often."""
     return RenewingFollower(planner or PredictiveShipNetwork(), stop=stop)
 
 
-def ship_predictive_published(
-    planner: Planner | None = None, stop: Stop | None = None
-) -> PlanFollower:
+def published(planner: Planner | None = None, stop: Stop | None = None) -> PlanFollower:
     """The published search by a network: a new plan every 5 m with a ship of 2 m, and taken."""
     return RenewingFollower(planner or PredictivePublished(), renewal=5.0, margin=None, stop=stop)
