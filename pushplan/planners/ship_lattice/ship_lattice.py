@@ -77,7 +77,7 @@ class ShipLattice:
         for all planners of this process. `ShipFollower` does it
         at the start of an episode.
         """
-        radius = turning_radius(world.robot, self.config.turn_share)
+        radius = turning_radius(world.robot, self.config.turn_fraction)
         LatticeBuilder(world, self.config, radius=radius, side=0.0).build()
 
 

@@ -36,7 +36,7 @@ class PublishedSearch:
 
     def __init__(self, view: ChannelView, network: IceNetwork, weight: float) -> None:
         world = view.world
-        radius = turning_radius(world.robot, LATTICE.turn_share)
+        radius = turning_radius(world.robot, LATTICE.turn_fraction)
         builder = LatticeBuilder(world, LATTICE, radius=radius, side=_clearance(world))
         self._view, self._weight = view, weight
         self._propagator = MapPropagator(view, network)
@@ -130,7 +130,7 @@ class PublishedSearch:
 
 def timed_path(world: World, poses: FloatArray, curvatures: FloatArray) -> Plan:
     """A plan at full speed about which nothing is predicted."""
-    return timed_plan(world, bare_path(poses, curvatures), LATTICE.turn_share)
+    return timed_plan(world, bare_path(poses, curvatures), LATTICE.turn_fraction)
 
 
 def _clearance(world: World) -> float:
