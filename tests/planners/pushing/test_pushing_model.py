@@ -13,8 +13,8 @@ from pushplan.planners.pushing import (
     PushModel,
     PushParameters,
     PushState,
+    contact_kernels,
     face_towards,
-    kernels,
     pressure_radius,
     spread_of,
     stable_curvature,
@@ -181,10 +181,10 @@ def test_forces_obey_coulomb_and_the_limit_surface(robot, friction, offset, angl
     contact = model.contact
     v, w = 0.2, 0.2 * 1.5 * bend / model.reach
     out = np.empty(6)
-    kernels.contact_velocity(contact, s, phi, v, w, 0.1 * model.reach / v, out)
+    contact_kernels.contact_velocity(contact, s, phi, v, w, 0.1 * model.reach / v, out)
     vn, vt, omega, y, mode, shear = out
     mode = ContactMode(int(mode))
-    low, high = kernels.line(contact, s)
+    low, high = contact_kernels.line(contact, s)
     assert vn >= -1e-9 and low - 1e-9 <= y <= high + 1e-9
     assert abs(shear) <= friction + 1e-9
     # the force that the limit surface asks for acts at the centre of pressure
@@ -193,7 +193,7 @@ def test_forces_obey_coulomb_and_the_limit_surface(robot, friction, offset, angl
     if mode in (ContactMode.SLIDE, ContactMode.CORNER_SLIDE):
         assert abs(shear) == pytest.approx(friction, abs=1e-9)
     if contact.curvature == 0.0 and mode in (ContactMode.STICK, ContactMode.SLIDE):
-        x = kernels.standoff(contact, s, phi)[0]
+        x = contact_kernels.standoff(contact, s, phi)[0]
         ut = math.cos(phi) * w * x - math.sin(phi) * (v - w * s)
         if mode is ContactMode.STICK:
             assert vt == pytest.approx(ut, abs=1e-9)
@@ -264,7 +264,7 @@ def test_nonlinear_expressions_are_those_of_the_kernels():
             v, w = 0.2, rng.uniform(-1.0, 1.0)
             found = np.asarray(made(row[:5], [v, w, 0.1])).ravel()
             for _ in range(2):
-                kernels.push_step(model.contact, row, v, w, 0.05, np.empty(6))
+                contact_kernels.push_step(model.contact, row, v, w, 0.05, np.empty(6))
             assert found == pytest.approx(row[:5], abs=1e-9)
 
 
