@@ -164,7 +164,7 @@ def assemble(
     here, place, speed = pose.copy(), along, twist[0]
     unit = tuning.size / tuning.max_speed  # T [s]
     _, index, fraction = locate(track, here[0], here[1], place, place)
-    bend = errors(track, here[0], here[1], here[2], index, fraction)[3]
+    curvature = errors(track, here[0], here[1], here[2], index, fraction)[3]
     for k in range(count):
         dt = steps[k]
         tau = dt / unit
@@ -173,20 +173,22 @@ def assemble(
             reach = tuning.max_acceleration * dt
             nominal[k, 0] = min(max(wanted, speed - reach), speed + reach)
         speed = nominal[k, 0]
-        turning = min(max(speed * bend, -tuning.max_turn_rate), tuning.max_turn_rate)
+        turning = min(max(speed * curvature, -tuning.max_turn_rate), tuning.max_turn_rate)
         if not np.isfinite(nominal[k, 1]):
             nominal[k, 1] = turning
         arc(here[0], here[1], here[2], speed, nominal[k, 1], dt, out)
         _differentiate(jacobian, k, count, out, dt, tuning)
         here[:] = out[:3]
         place, index, fraction = locate(track, here[0], here[1], place, place + 2.0 * speed * dt)
-        offset, error, heading, bend = errors(track, here[0], here[1], here[2], index, fraction)
+        offset, error, heading, curvature = errors(
+            track, here[0], here[1], here[2], index, fraction
+        )
         c, s = np.cos(heading), np.sin(heading)
-        away = 1.0 - bend * offset
+        away = 1.0 - curvature * offset
         for j in range(n):
             ahead = c * jacobian[0, j] + s * jacobian[1, j]
             rows[0, j] = (c * jacobian[1, j] - s * jacobian[0, j]) / tuning.size
-            rows[1, j] = jacobian[2, j] - bend * ahead / max(away, 0.2)
+            rows[1, j] = jacobian[2, j] - curvature * ahead / max(away, 0.2)
         factor = tau * (tuning.terminal if k == count - 1 else 1.0)
         _add(hessian, gradient, rows[0], offset / tuning.size, nominal, tuning, factor)
         _add(hessian, gradient, rows[1], error, nominal, tuning, factor * tuning.heading_weight)
