@@ -8,7 +8,7 @@ from typing import Any
 
 from pushplan.world import UnknownNameError
 
-TASKS: Mapping[str, str] = {
+TASKS: dict[str, str] = {
     "maze": "pushplan.envs.tasks.maze:MazeTask",
     "box_delivery": "pushplan.envs.tasks.box_delivery:BoxDeliveryTask",
     "area_clearing": "pushplan.envs.tasks.area_clearing:AreaClearingTask",

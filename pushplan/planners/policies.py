@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pushplan.control import PathFollower, PurePursuit
 from pushplan.planners.following.plan_follower import PlanFollower
+from pushplan.planners.following.renewing_follower import RenewingFollower
 from pushplan.planners.following.replanning import Replanning
 from pushplan.planners.push_aware import PushAware, cautious_model
 from pushplan.planners.rrt import GeometricRRT, KinodynamicRRT
@@ -12,7 +13,6 @@ from pushplan.planners.ship_predictive import (
     PredictiveShip,
     PredictiveShipNetwork,
 )
-from pushplan.planners.ship_predictive.renewing_follower import RenewingFollower
 from pushplan.planners.shortest_path import ShortestPath
 from pushplan.world import Planner, Stop
 
@@ -61,18 +61,26 @@ def push_aware_constant_speed(
 
 def ship_predictive(planner: Planner | None = None, stop: Stop | None = None) -> PlanFollower:
     """Predicts the floes along each path, and looks for a better one about every half hull."""
-    return RenewingFollower(planner or PredictiveShip(), stop=stop)
+    return _renewed(planner or PredictiveShip(), stop)
 
 
 def ship_predictive_network(
     planner: Planner | None = None, stop: Stop | None = None
 ) -> PlanFollower:
     """Predicts the occupancy with a network, and looks for a better path as often."""
-    return RenewingFollower(planner or PredictiveShipNetwork(), stop=stop)
+    return _renewed(planner or PredictiveShipNetwork(), stop)
+
+
+def _renewed(planner: Planner, stop: Stop | None) -> PlanFollower:
+    rule = Replanning(margin=0.01)
+    return RenewingFollower(planner, renewal=1.2, replanning=rule, stop=stop)
 
 
 def ship_predictive_published(
     planner: Planner | None = None, stop: Stop | None = None
 ) -> PlanFollower:
     """The published search by a network: a new plan every 5 m with a ship of 2 m, and taken."""
-    return RenewingFollower(planner or PredictivePublished(), renewal=5.0, margin=None, stop=stop)
+    rule = Replanning(margin=None)
+    return RenewingFollower(
+        planner or PredictivePublished(), renewal=5.0, replanning=rule, stop=stop
+    )

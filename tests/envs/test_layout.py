@@ -38,11 +38,11 @@ def test_dense_requests_are_met_and_impossible_ones_refused(random_yaw):
     poses = floor.place_squares(rng, 45, 1.0, random_yaw=random_yaw)
     shapes = shapely.polygons(squares(poses, 1.0))
     assert max(a.intersection(b).area for i, a in enumerate(shapes) for b in shapes[:i]) < 1e-9
-    begin = time.perf_counter()
+    begin = time.thread_time()
     for count in (70, 1000):
         with pytest.raises(ScenarioError, match=f"{count} boxes of 1 m do not fit"):
             floor.place_squares(rng, count, 1.0, random_yaw=random_yaw)
-    assert time.perf_counter() - begin < 2.0
+    assert time.thread_time() - begin < 2.0
 
 
 def test_overlap_of_squares_agrees_with_shapely():
