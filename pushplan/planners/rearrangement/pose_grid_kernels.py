@@ -16,7 +16,7 @@ from pushplan.compiled import kernel
 from pushplan.geometry import convex_penetration
 from pushplan.geometry.transforms import transform_points
 from pushplan.interaction.kernels import Bodies
-from pushplan.motion.collision import Footprint, Obstacles, is_free
+from pushplan.motion.collision import ConvexObstacles, Footprint, is_free
 from pushplan.world.checks import BoolArray, FloatArray, IntArray
 
 _QUARTER = ((1, 0), (2, 1), (1, 1), (1, 2))
@@ -57,7 +57,7 @@ class PoseGrid(NamedTuple):
 
 
 @kernel(allocates=True)
-def block_poses(grid: PoseGrid, shape: Footprint, among: Obstacles) -> None:
+def block_poses(grid: PoseGrid, shape: Footprint, among: ConvexObstacles) -> None:
     """Mark the poses at which the footprint touches an obstacle."""
     pose, scratch = np.empty(3), np.empty_like(shape.vertices)
     count, rows, cols = grid.blocked.shape
@@ -71,7 +71,7 @@ def block_poses(grid: PoseGrid, shape: Footprint, among: Obstacles) -> None:
 
 
 @kernel(allocates=True)
-def block_moves(grid: PoseGrid, shape: Footprint, among: Obstacles) -> None:
+def block_moves(grid: PoseGrid, shape: Footprint, among: ConvexObstacles) -> None:
     """Mark the moves between free poses on which the footprint touches an obstacle."""
     pose, scratch = np.empty(3), np.empty_like(shape.vertices)
     blocked, step = grid.blocked, grid.step
