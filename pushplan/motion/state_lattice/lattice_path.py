@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from pushplan.motion.dubins import along_arc, sample_pieces
-from pushplan.motion.shortcutting import Path, goal_numbers, in_goal
+from pushplan.motion.goal_region import goal_numbers, in_goal
+from pushplan.motion.path_problem import SweptPath
 from pushplan.motion.state_lattice.built_lattice import BuiltLattice
 from pushplan.motion.state_lattice.lattice_config import LatticeConfig
 from pushplan.world import GoalLine, World
@@ -65,7 +66,7 @@ def _cut_at_line(
     along_arc(before, high, curvature, out)
 
 
-def bare_path(poses: FloatArray, curvatures: FloatArray) -> Path:
+def bare_path(poses: FloatArray, curvatures: FloatArray) -> SweptPath:
     """A path about which nothing is predicted."""
     works = np.zeros(len(poses))
-    return Path(poses, curvatures, None, arc_lengths(poses), works)  # type: ignore[arg-type]
+    return SweptPath(poses, curvatures, None, arc_lengths(poses), works)  # type: ignore[arg-type]

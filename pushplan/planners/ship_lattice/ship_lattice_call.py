@@ -12,7 +12,7 @@ from pushplan.interaction import InteractionModel
 from pushplan.interaction.path_sweepers import path_sweeper
 from pushplan.motion.coarse_path import reachable
 from pushplan.motion.collision import first_blocked, footprint, is_free, obstacles
-from pushplan.motion.shortcutting import Path
+from pushplan.motion.path_problem import SweptPath
 from pushplan.motion.speed_profile import check_turns, timed_plan, turning_radius
 from pushplan.motion.state_lattice.built_lattice import BuiltLattice
 from pushplan.motion.state_lattice.lattice_builder import LatticeBuilder
@@ -247,5 +247,5 @@ class ShipLatticeCall:
             missing = len(best.poses) - len(best.objects)
             objects = self.near.everything(self.world, best.objects, missing)
             works = np.concatenate([best.works, np.repeat(best.works[-1:], missing)])
-            path = Path(best.poses, best.curvatures, objects, best.lengths, works)
+            path = SweptPath(best.poses, best.curvatures, objects, best.lengths, works)
         return timed_plan(self.world, path, self.config.turn_share)

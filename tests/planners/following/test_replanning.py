@@ -11,7 +11,13 @@ from conftest import make_boxes, make_robot, make_u_maze
 from pushplan.control import Progress
 from pushplan.interaction import QuasiStatic
 from pushplan.planners.following.plan_follower import PlanFollower
-from pushplan.planners.following.replanning import Reason, Replanning, price, rest_of, sweep_rest
+from pushplan.planners.following.replanning import (
+    Reason,
+    Replanning,
+    cost_of_rest,
+    rest_of,
+    sweep_rest,
+)
 from pushplan.planners.following.splicing import joined, passed, world_ahead
 from pushplan.world import (
     Drive,
@@ -124,7 +130,7 @@ class TestMargin:
         swept, path = sweep_rest(world, plan, 0, MODEL)
         to_go = world.goal.distance(6.0, 0.0)
         expected = 6.0 + 3.0 * swept.work + to_go
-        assert price(world, path, swept, 3.0) == pytest.approx(expected)
+        assert cost_of_rest(world, path, swept, 3.0) == pytest.approx(expected)
 
     def test_the_weight_is_that_of_the_planner(self):
         from pushplan.planners import KinodynamicRRT

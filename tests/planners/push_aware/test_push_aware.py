@@ -17,14 +17,15 @@ from pushplan.geometry import VisibilityGraph
 from pushplan.interaction import QuasiStatic
 from pushplan.motion.collision import footprint, obstacles
 from pushplan.motion.dubins import along_arc, dubins
-from pushplan.motion.shortcutting import Pricing, goal_numbers
+from pushplan.motion.goal_region import goal_numbers
+from pushplan.motion.path_problem import PathProblem
 from pushplan.planners import make_planner, make_policy, policy_names
 from pushplan.planners.push_aware import PushAware, PushAwareConfig
 from pushplan.planners.push_aware.bound import lower_bound, turning_length
 from pushplan.planners.push_aware.cost_to_go import length_to_go
-from pushplan.planners.push_aware.nodes import make_nodes, plant, trace
+from pushplan.planners.push_aware.cost_to_go_maker import CostToGoMaker
+from pushplan.planners.push_aware.push_tree import make_push_tree, plant, trace
 from pushplan.planners.push_aware.random_tree import DRAWS, grow
-from pushplan.planners.push_aware.tables import TableMaker
 from pushplan.planners.rrt import KinodynamicRRT, KinodynamicRRTConfig
 from pushplan.world import (
     Deadline,
@@ -130,7 +131,7 @@ def test_more_iterations_never_cost_more():
 
 def test_it_costs_no_more_than_the_random_tree():
     config = PushAwareConfig()
-    same = {key: getattr(config, key) for key in ("push_weight", "margin", "turn_share")}
+    same = {key: getattr(config, key) for key in ("push_weight", "margin", "turn_fraction")}
     planner = PushAware(config)
     tree = KinodynamicRRT(KinodynamicRRTConfig(**same), planner.interaction)
     ours, theirs = [], []
@@ -257,24 +258,24 @@ def test_the_random_tree_alone_gets_there_under_a_bound():
         robot_pose=[2, 5, 0],
         goal=GoalDisc([10, 5], 1.0),
     )
-    model, robot = QuasiStatic(), world.robot
-    pricing = Pricing(1.0, 2.0, 0.6, 0.12, 1e6, 1.0, goal_numbers(world.goal, 0.0))
-    nodes, rng, bound = make_nodes(20_000, 2, 8.0), generator(0), 14.0
+    problem = PathProblem(
+        robot_mass=1.0,
+        push_weight=2.0,
+        turning_radius=0.6,
+        spacing=0.12,
+        jam_length=1e6,
+        displacement=1.0,
+        goal=goal_numbers(world.goal, 0.0),
+        footprint=footprint(world.robot),
+        walls=obstacles(world.static),
+        contacts=QuasiStatic().compiled(world),
+    )
+    nodes, rng, bound = make_push_tree(20_000, 2, 8.0), generator(0), 14.0
     plant(nodes, world.robot_pose, world.movables.poses, 0.0)
     found = []
     for _ in range(150):
-        at = grow(
-            nodes,
-            rng.random((200, DRAWS)),
-            bound,
-            1.5,
-            np.array([1.5, np.pi, 1.5]),
-            pricing,
-            footprint(robot),
-            obstacles(world.static),
-            model.bodies(world),
-            model.settings(world),
-        )
+        draws = rng.random((200, DRAWS))
+        at = grow(nodes, draws, bound, 1.5, np.array([1.5, np.pi, 1.5]), problem)
         if at == -2:
             plant(nodes, world.robot_pose, world.movables.poses, 0.0)
         if at >= 0:
@@ -418,7 +419,7 @@ def test_a_deadline_is_kept_on_a_map_that_was_never_seen():
 def test_the_table_is_close_to_the_shortest_way():
     world = make_u_maze(robot=make_robot(max_turn_rate=0.3))
     radius = world.robot.turning_radius
-    table = TableMaker(world.robot, world.static, world.goal, radius, 0.0).make(lambda: False)
+    table = CostToGoMaker(world.robot, world.static, world.goal, radius, 0.0).make(lambda: False)
     graph = VisibilityGraph(world.static, world.robot.inscribed_radius)
     for pose in ([11.25, 3.75, np.pi / 2], [10.0, 9.0, 2.0], [4.0, 9.0, -np.pi / 2]):
         shortest = graph.to_goal(pose[:2], world.goal).length
@@ -456,7 +457,13 @@ def test_goals_for_objects_are_refused():
 
 @pytest.mark.parametrize(
     "options",
-    [{"push_weight": -1}, {"curvatures": 2}, {"nodes": 1}, {"greed": np.nan}, {"memory": 0}],
+    [
+        {"push_weight": -1},
+        {"curvatures": 2},
+        {"nodes": 1},
+        {"heuristic_inflation": np.nan},
+        {"memory": 0},
+    ],
 )
 def test_bad_parameters(options):
     with pytest.raises(InvalidInputError):

@@ -10,7 +10,7 @@ import numpy as np
 
 from pushplan.motion.collision import footprint, obstacles
 from pushplan.motion.dubins import along_arc
-from pushplan.motion.shortcutting import goal_numbers
+from pushplan.motion.goal_region import goal_numbers
 from pushplan.planners.push_aware.cost_to_go import CostToGo, flood, mark_free, sweep
 from pushplan.world import GoalDisc, NavigationGoal, RobotModel, StaticMap
 
@@ -31,7 +31,7 @@ _BLOCK = 60
 """Cells (x, y) that are worked on between two looks at the stop rule: under 2 ms."""
 
 
-class TableMaker:
+class CostToGoMaker:
     """Makes one table in small steps, so that a planning call can stop in between.
 
     What is done is kept for the next call. Thread-safe.
@@ -61,16 +61,16 @@ class TableMaker:
         self.useful = cell <= _COARSEST * size
         """Whether a table of bearable size resolves the robot."""
         cols, rows = (max(1, int(np.ceil(side / cell))) if self.useful else 1 for side in extent)
-        self._origin = static.bounds[:2].copy()
-        self._cell, self._length = cell, _ARC * cell
+        self._length = _ARC * cell
         self._center = np.array([-1, -1])
         if isinstance(goal, GoalDisc):
-            at = (goal.center - self._origin) / cell
+            at = (goal.center - static.bounds[:2]) / cell
             if (at >= 0.0).all() and at[0] < cols and at[1] < rows:
                 self._center = np.array([int(at[1]), int(at[0])])
         self._free = np.zeros((rows, cols, HEADINGS), np.bool_)
-        self._values = np.full((rows, cols, HEADINGS), np.inf)
-        self._floor, self._order = np.full((rows, cols), np.inf), np.zeros(0, np.int64)
+        self._order = np.zeros(0, np.int64)
+        values, far = np.full((rows, cols, HEADINGS), np.inf), np.full((rows, cols), np.inf)
+        self._table = CostToGo(values, far, static.bounds[:2].copy(), cell)
         self._ends = np.zeros((HEADINGS, 3, 3))
         for k in range(HEADINGS):
             for arc, side in enumerate((-1.0, 0.0, 1.0)):
@@ -90,36 +90,23 @@ class TableMaker:
             with self._lock:
                 if not self._done:
                     self._step()
-        if not self.useful:
-            return None
-        return CostToGo(self._values, self._floor, self._origin, self._cell)
+        return self._table if self.useful else None
 
     def _step(self) -> None:
         rows, cols, _ = self._free.shape
         if self._marked < rows * cols:
             last = min(self._marked + _BLOCK, rows * cols)
-            mark_free(
-                self._origin, self._cell, self._free, self._marked, last, self._shape, self._walls
-            )
+            mark_free(self._table, self._free, self._marked, last, self._shape, self._walls)
             self._marked = last
             if last == rows * cols:
                 some = np.asarray(self._free.any(axis=2))
-                self._floor, self._order = flood(
-                    self._origin, self._cell, some, self._goal, self._center
-                )
-                self._values[(self._floor == 0.0)[:, :, None] & self._free] = 0.0
+                floor, self._order = flood(self._table, some, self._goal, self._center)
+                self._table = self._table._replace(floor=floor)
+                self._table.values[(floor == 0.0)[:, :, None] & self._free] = 0.0
             return
         last = min(self._at + _BLOCK, len(self._order))
-        change = sweep(
-            self._values,
-            self._free,
-            self._order[self._at : last],
-            self._origin,
-            self._cell,
-            self._ends,
-            self._length,
-            self._floor,
-        )
+        order = self._order[self._at : last]
+        change = sweep(self._table, self._free, order, self._ends, self._length)
         self._change, self._at = max(self._change, change), last
         if last == len(self._order):
             self._sweeps += 1
@@ -128,8 +115,8 @@ class TableMaker:
 
 
 @functools.lru_cache(maxsize=8)
-def table_maker(
+def cost_to_go_maker(
     robot: RobotModel, static: StaticMap, goal: NavigationGoal, radius: float, inset: float
-) -> TableMaker:
+) -> CostToGoMaker:
     """The maker of a table, with what is done of it; cached."""
-    return TableMaker(robot, static, goal, radius, inset)
+    return CostToGoMaker(robot, static, goal, radius, inset)

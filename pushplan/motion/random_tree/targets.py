@@ -11,8 +11,8 @@ class Targets:
     """Draws the poses that a tree grows towards.
 
     Args:
-        guide: (N, 2) coarse path to the goal [m].
-        share: share of the targets that are near it; the others are uniform.
+        coarse: (N, 2) coarse path to the goal [m].
+        fraction: fraction of the targets that are near it; the others are uniform.
         spread: standard deviation of those about it [m].
         bounds: (4,) of the workspace.
         rng: source of chance.
@@ -20,18 +20,18 @@ class Targets:
 
     def __init__(
         self,
-        guide: FloatArray,
-        share: float,
+        coarse: FloatArray,
+        fraction: float,
         spread: float,
         bounds: FloatArray,
         rng: np.random.Generator,
     ) -> None:
-        self.guide, self.share, self.bounds, self.rng = guide, share, bounds, rng
+        self.coarse, self.fraction, self.bounds, self.rng = coarse, fraction, bounds, rng
         self.spread = spread
-        index = np.arange(len(guide))
+        index = np.arange(len(coarse))
         ahead, behind = (
-            guide[np.minimum(index + 3, len(guide) - 1)],
-            guide[np.maximum(index - 3, 0)],
+            coarse[np.minimum(index + 3, len(coarse) - 1)],
+            coarse[np.maximum(index - 3, 0)],
         )
         self.headings = np.arctan2(ahead[:, 1] - behind[:, 1], ahead[:, 0] - behind[:, 0])
         self.block = np.empty((0, 3))
@@ -47,11 +47,11 @@ class Targets:
 
     def _draw(self, count: int) -> FloatArray:
         rng, bounds = self.rng, self.bounds
-        near = rng.random(count) < self.share
-        index = rng.integers(len(self.guide), size=count)
+        near = rng.random(count) < self.fraction
+        index = rng.integers(len(self.coarse), size=count)
         offsets = rng.standard_normal((count, 3)) * [self.spread, self.spread, 0.4]
-        guided = np.column_stack([self.guide[index], self.headings[index]]) + offsets
+        coarsed = np.column_stack([self.coarse[index], self.headings[index]]) + offsets
         spread = rng.random((count, 3))
         low, high = [*bounds[:2], -np.pi], [*bounds[2:], np.pi]
         uniform = low + spread * (np.asarray(high) - low)
-        return np.where(near[:, None], guided, uniform)
+        return np.where(near[:, None], coarsed, uniform)

@@ -16,9 +16,9 @@ import numpy as np
 from ompl import base, control
 
 from pushplan.compiled import kernel
-from pushplan.motion.collision import Footprint, Obstacles, is_free
+from pushplan.motion.collision import ConvexObstacles, Footprint, is_free
 from pushplan.motion.dubins import along_arc, step_along
-from pushplan.planners.rrt.ompl_lock import own_state, seeded_ompl
+from pushplan.motion.random_tree.ompl_lock import own_state, seeded_ompl
 from pushplan.world import NavigationGoal
 from pushplan.world.checks import FloatArray
 
@@ -47,7 +47,7 @@ def steer(
     sampled: float,
     limits: tuple[float, float, float, float],
     shape: Footprint,
-    among: Obstacles,
+    among: ConvexObstacles,
     scratch: FloatArray,
     out: FloatArray,
 ) -> tuple[float, float]:
@@ -101,7 +101,7 @@ def grow_tree(
     targets: Callable[[], FloatArray],
     limits: TreeLimits,
     shape: Footprint,
-    among: Obstacles,
+    among: ConvexObstacles,
     seed: int,
     done: Callable[[], bool],
     stopped: Callable[[], bool],
@@ -138,7 +138,7 @@ class _Growth:
         targets: Callable[[], FloatArray],
         limits: TreeLimits,
         shape: Footprint,
-        among: Obstacles,
+        among: ConvexObstacles,
     ) -> None:
         self.start = np.array([start[0], start[1], _wrap(start[2])])
         self.goal = goal
