@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import time
 
 import numpy as np
 import pytest
@@ -193,13 +194,18 @@ def test_images_are_fast_enough_for_every_control_step() -> None:
     view = ImageObservation(names, (10.0, 10.0), (224, 224))
     world = scene(MAPS["columns"], (4.5, 4.5, 0.4), boxes=20)
     view.observe(world)
+
+    def ten_times() -> None:
+        for _ in range(10):
+            view.observe(world)
+
     # some 0.7 ms on a free machine
-    assert quickest(lambda: [view.observe(world) for _ in range(10)], 20) / 10 < 4e-3
+    assert quickest(ten_times, 20, time.thread_time) / 10 < 4e-3
     area = ClearanceArea(8.0 * SQUARE + 5.0, np.ones(4, dtype=bool))
     open_floor = StaticMap.build(bounds=[0, 0, 10, 10])
     world = World(world.robot, world.robot_pose, open_floor, world.movables, area)
     view.observe(world)
-    assert quickest(lambda: [view.observe(world) for _ in range(10)], 20) / 10 < 1e-3
+    assert quickest(ten_times, 20, time.thread_time) / 10 < 1e-3
 
 
 @pytest.mark.parametrize("shift", [1e12, -1e12])
