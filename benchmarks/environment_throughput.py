@@ -11,7 +11,8 @@ velocities, random headings for headings. A new episode starts where one ends, a
 where the robot has been held for 5 steps; resets are timed apart. Shares are measured by wrapping
 the simulator and the observation builder of the environment in timers. The first episode, in which
 kernels are loaded and distance fields are computed, is not counted; what it costs stands in the
-last columns. Reference and target are those of Bench-Push on a 2-core machine.
+last columns. Reference and target are rates of Bench-Push on another 2-core machine, so the ratio
+holds that of the two machines too.
 """
 
 from __future__ import annotations

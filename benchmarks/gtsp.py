@@ -80,7 +80,7 @@ def proofs(seeds: int) -> None:
     found, proven, late, missed = [], [], 0, 0
     for seed in range(FIRST_SEED, FIRST_SEED + max(seeds, 20)):
         costs, clusters = pushes(20, 16, seed)
-        config = GtspConfig(method="search", lower_bound=True, proof_share=1.0 - SEARCH_SHARE)
+        config = GtspConfig(method="search", lower_bound=True, proof_fraction=1.0 - SEARCH_SHARE)
         tour = solve_gtsp(costs, clusters, stop=Deadline(PROOF_SECONDS), config=config)
         if tour.status is not TourStatus.OPTIMAL:
             missed += 1

@@ -52,7 +52,7 @@ def main() -> None:
         return
     specs = [PolicySpec(name, name) for name in options.policies.split(",")]
     for price in options.prices.split(",") if options.prices else ():
-        specs.append(PolicySpec(f"gtsp-mpc-{price}", "gtsp-mpc", {"price": float(price)}))
+        specs.append(PolicySpec(f"gtsp-mpc-{price}", "gtsp-mpc", {"work_weight": float(price)}))
     policies = [spec.label for spec in specs]
     columns = "suite policy episodes done S E I E-first I-first decision,s".split()
     print(f"| {' | '.join(columns)} |\n|{'---|' * len(columns)}", flush=True)

@@ -40,7 +40,6 @@ from pushplan.planners.pushing import (
     spread_of,
     warm_up,
 )
-from pushplan.planners.pushing.mpc import steps_of
 from pushplan.world import (
     Controller,
     Episode,
@@ -207,7 +206,7 @@ def config_of(setting: Setting, noisy: bool, horizon: int = 20) -> PushingConfig
         parameters=setting.parameters,
         period=setting.period,
         delay=DELAY if noisy else 0.0,
-        trust=0.3 if noisy else 1.0,
+        observer_gain=0.3 if noisy else 1.0,
     )
 
 
@@ -265,8 +264,7 @@ class _Compared(NonlinearPushingMpc):
         found = PushingMpc._solve(self, robot, start)
         self._calls += 1
         if found is not None and self._calls % self.every == 2 % self.every:
-            assert self.model is not None
-            steps = steps_of(self.config, self.model.reach, robot.max_speed, self._held)
+            steps = self._steps(robot)
             self._nonlinear(robot)
             began = time.thread_time()
             self._refined(robot, start, steps, found)

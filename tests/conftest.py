@@ -1,14 +1,25 @@
-"""Worlds that many tests start from."""
+"""Worlds that many tests start from, and what the markers do."""
 
 from __future__ import annotations
 
+import os
+import shutil
+import tempfile
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from importlib.util import find_spec
+from pathlib import Path
 
 import numpy as np
 import pytest
+from turnstile import Turnstile
 
+import pushplan
 from pushplan.world import Drive, GoalDisc, Movables, RobotModel, StaticMap, World
+
+LEARN = ("torch", "stable_baselines3", "onnx", "minari", "h5py", "tensorboard")
+MISSING = [name for name in LEARN if find_spec(name) is None]
+TURNSTILE = pytest.StashKey[Turnstile]()
 
 SQUARE = np.array([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]])
 OCTAGON = np.array(
@@ -76,12 +87,36 @@ def scattered_boxes(count: int, seed: int) -> np.ndarray:
     return np.array(found).reshape(-1, 3)
 
 
-@pytest.fixture(scope="session")
-def warm() -> None:
-    """Compiled kernels, for tests that look at the clock."""
-    from pushplan.planners import warm_up
+def pytest_configure(config: pytest.Config) -> None:
+    """Share a folder of locks and one kernel cache with the workers and the tests' processes."""
+    if not hasattr(config, "workerinput"):  # of xdist
+        os.environ["PUSHPLAN_TEST_LOCKS"] = tempfile.mkdtemp(prefix="pushplan-tests-")
+        os.environ["PYTHONSAFEPATH"] = "1"  # else a checkout is found, and compiled, once more
+        first = [str(Path(pushplan.__file__).parents[1]), os.environ.get("PYTHONPATH", "")]
+        os.environ["PYTHONPATH"] = os.pathsep.join(filter(None, first))
+    config.stash[TURNSTILE] = Turnstile(Path(os.environ["PUSHPLAN_TEST_LOCKS"]))
 
-    warm_up()
+
+def pytest_unconfigure(config: pytest.Config) -> None:
+    if not hasattr(config, "workerinput"):
+        shutil.rmtree(os.environ.pop("PUSHPLAN_TEST_LOCKS"), ignore_errors=True)
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_protocol(item: pytest.Item) -> Iterator[object]:
+    """Keep the other workers out of a test of clocks."""
+    with item.config.stash[TURNSTILE].passed(alone="clock" in item.keywords):
+        return (yield)
+
+
+def pytest_runtest_setup(item: pytest.Item) -> None:
+    """Skip what needs the extra 'learn' where it is missing; load the planners of `warm`."""
+    if "learn" in item.keywords and MISSING:
+        pytest.skip(f"needs the extra 'learn' ({', '.join(MISSING)})")
+    for mark in item.iter_markers("warm"):
+        from pushplan.planners import warm_up
+
+        warm_up(*mark.args)
 
 
 def quickest(call: Callable[[], object], tries: int = 3) -> float:

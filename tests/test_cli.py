@@ -46,6 +46,7 @@ def test_help_has_examples(command: str, capsys: pytest.CaptureFixture[str]) -> 
     assert f"examples:\n  pushplan {command}" in capsys.readouterr().out
 
 
+@pytest.mark.clock
 def test_help_is_fast_and_loads_nothing_heavy() -> None:
     code = (
         "import sys; from pushplan.cli import main; main(['--help']);"

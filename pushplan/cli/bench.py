@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 from pushplan.cli import paper
 from pushplan.cli.common import (
     add_command,
-    add_honest_time,
+    add_latency,
     add_trust,
     batch_options,
     positive,
@@ -80,7 +80,7 @@ def add(commands: Any) -> None:
     parser.add_argument(
         "--memory", type=positive, metavar="MB", help="memory of a worker beyond which it fails"
     )
-    add_honest_time(parser)
+    add_latency(parser)
     add_trust(parser)
     parser.add_argument(
         "--retry-failed", action="store_true", help="run jobs again that raised, hung or crashed"
@@ -131,7 +131,7 @@ def _results(options: argparse.Namespace, out: str, progress: _Progress) -> Resu
         episodes=options.episodes,
         out=out,
         observation=options.observation,
-        honest_time=options.honest_time,
+        latency_factor=options.latency,
         progress=progress,
         **batch_options(options),
     )

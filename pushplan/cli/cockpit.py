@@ -114,13 +114,13 @@ class Cockpit:
         seconds = (world.time - self._time) / self._speed
         rows = np.flatnonzero(np.isin(self._ids, world.movables.ids))
         count = max(1, int(seconds / FRAME_TIME))
-        for share in (np.arange(count) + 1.0) / count:
-            robot, objects = self._between(trace, self._time + share * seconds * self._speed)
+        for fraction in (np.arange(count) + 1.0) / count:
+            robot, objects = self._between(trace, self._time + fraction * seconds * self._speed)
             scene = world
-            if share < 1.0:
+            if fraction < 1.0:
                 scene = world.moved(robot_pose=robot, movable_poses=objects[rows])
             self._show(scene, lines, robot[None, :2])
-            self._wait(begin + share * seconds)
+            self._wait(begin + fraction * seconds)
         self._trail.append(trace.robot_poses[:, :2])
         self._last = (trace.robot_poses[-1], trace.object_poses[-1])
         self._time = world.time
@@ -137,8 +137,10 @@ class Cockpit:
         if i > 0:
             robot, objects = trace.robot_poses[i - 1], trace.object_poses[i - 1]
             before = float(trace.times[i - 1])
-        share = min(1.0, (at - before) / (float(trace.times[i]) - before))
-        return _mix(robot, trace.robot_poses[i], share), _mix(objects, trace.object_poses[i], share)
+        fraction = min(1.0, (at - before) / (float(trace.times[i]) - before))
+        return _mix(robot, trace.robot_poses[i], fraction), _mix(
+            objects, trace.object_poses[i], fraction
+        )
 
     def farewell(self, episode: Episode) -> bool:
         """Show the final scores until the person has had enough.
@@ -187,11 +189,11 @@ class Cockpit:
             raise _Left(restart=True)
 
 
-def _mix(a: FloatArray, b: FloatArray, share: float) -> FloatArray:
+def _mix(a: FloatArray, b: FloatArray, fraction: float) -> FloatArray:
     """Poses between a and b (..., 3); headings turn the short way."""
     step = b - a
     step[..., 2] = np.remainder(step[..., 2] + np.pi, 2.0 * np.pi) - np.pi
-    return a + share * step
+    return a + fraction * step
 
 
 def drive(

@@ -34,10 +34,10 @@ def batch_options(options: argparse.Namespace) -> dict[str, Any]:
     }
 
 
-def add_honest_time(parser: argparse.ArgumentParser) -> None:
+def add_latency(parser: argparse.ArgumentParser) -> None:
     """Add the option that lets time pass while a policy computes."""
     parser.add_argument(
-        "--honest-time",
+        "--latency",
         type=positive,
         metavar="FACTOR",
         help="let the world go on while the policy computes, FACTOR seconds for each second "

@@ -12,7 +12,7 @@ from pushplan.cli.common import check_folder
 from pushplan.cli.scoreboard import Scoreboard, closing_lines
 from pushplan.drawing import draw_world, save_animation, save_image
 from pushplan.drawing.files import Frame
-from pushplan.world import Episode, InvalidInputError, Plan, Policy, World
+from pushplan.world import Episode, InvalidInputError, Plan, Policy, ShowsPlan, World
 
 ENDINGS = (".png", ".gif", ".mp4")
 FRAMES = 240
@@ -39,7 +39,9 @@ class Camera:
 
     def __call__(self, step: int, world: World, policy: Policy) -> None:
         """Note one step; what `run_episode` calls."""
-        self._steps.append((world, getattr(policy, "current_plan", None)))
+        if step == 0:
+            self._steps.clear()
+        self._steps.append((world, policy.current_plan if isinstance(policy, ShowsPlan) else None))
 
     def write(self, episode: Episode) -> None:
         """Draw what was seen, with the scores so far."""

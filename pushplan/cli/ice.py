@@ -24,7 +24,7 @@ def add(commands: Any) -> None:
     parser = add_command(
         commands, "ice", "generate a field of broken ice, or check one from a file", _EXAMPLES, run
     )
-    parser.add_argument("--concentration", type=float, metavar="C", help="share of ice, 0 to 1")
+    parser.add_argument("--concentration", type=float, metavar="C", help="fraction of ice, 0 to 1")
     parser.add_argument("--seed", type=whole(0), default=0, help="of the field (default 0)")
     parser.add_argument(
         *("--size", "-s"),

@@ -38,8 +38,8 @@ def check(options: argparse.Namespace) -> str | None:
                 return f"--{name} is for 'bench {SUITE}' only"
     elif options.markdown is not None and os.path.isdir(options.markdown):
         return f"--markdown takes a file, {options.markdown!r} is a folder"
-    elif options.honest_time is not None or options.observation != "auto":
-        return f"'bench {SUITE}' takes neither --honest-time nor --observation"
+    elif options.latency is not None or options.observation != "auto":
+        return f"'bench {SUITE}' takes neither --latency nor --observation"
     return None
 
 
@@ -64,10 +64,11 @@ def compare(options: argparse.Namespace, out: str, progress: Callable[..., None]
 
 def show(comparison: Comparison, out: str, markdown: str | None) -> None:
     """Print the tables, write the page of the run, say where everything is."""
+    from pushplan.evaluation import Results
     from pushplan.evaluation.store import write_atomic
 
     say(comparison.table())
-    say(f"page:     {comparison.results.report()}")
+    say(f"page:     {Results.load(out).report()}")
     say(f"document: {os.path.join(out, 'paper.md')}, with what the columns are and what compares")
     if markdown is not None:
         write_atomic(Path(markdown), comparison.markdown().encode())

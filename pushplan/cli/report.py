@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from pushplan.cli.common import add_command, say
 
 if TYPE_CHECKING:
-    from pushplan.evaluation.sheets import Sheet
+    from pushplan.evaluation.tables import Table
 
 _EXAMPLES = """\
   pushplan report runs/first
@@ -46,7 +46,7 @@ def run(options: argparse.Namespace) -> int:
 
 def show(results: Any) -> None:
     """Print the tables of a run, write its report, say where it is."""
-    _print(results.sheets())
+    _print(results.tables())
     page = results.report()
     for name in ("tradeoff.png", "scores.png", "planning_time.png"):
         if (page.parent / name).is_file():
@@ -54,16 +54,16 @@ def show(results: Any) -> None:
     say(f"page:    {page}")
 
 
-def _print(sheets: Sequence[Sheet]) -> None:
+def _print(tables: Sequence[Table]) -> None:
     """In colour and to the width of a terminal, or as plain text."""
     from rich.console import Console
 
-    from pushplan.evaluation.sheets import rich_table, text
+    from pushplan.evaluation.tables import rich_table, text
 
     if not sys.stdout.isatty():
-        say(text(sheets))
+        say(text(tables))
         return
     console = Console()
-    for sheet in sheets:
-        console.print(rich_table(sheet))
+    for table in tables:
+        console.print(rich_table(table))
         console.print()

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from pushplan.cli.common import (
     add_command,
-    add_honest_time,
+    add_latency,
     add_trust,
     check_folder,
     milliseconds,
@@ -39,7 +39,7 @@ def add(commands: Any) -> None:
         default="auto",
         help="of the task, such as image or state; by default what the policy asks for",
     )
-    add_honest_time(parser)
+    add_latency(parser)
     add_trust(parser)
     parser.add_argument("--render", metavar="FILE", help="picture or film: .png, .gif or .mp4")
     parser.add_argument("--live", action="store_true", help="show the episode in a window")
@@ -50,7 +50,7 @@ def run(options: argparse.Namespace) -> int:
     """Run the episode, print its scores, write files."""
     from pushplan.cli.film import Camera
     from pushplan.evaluation import Job, JobSettings, parse_policy, run_episode
-    from pushplan.evaluation.execute import rehearse
+    from pushplan.evaluation.execute import dry_run
 
     scenario = scenario_of(options)
     check_folder(options.out)
@@ -60,10 +60,10 @@ def run(options: argparse.Namespace) -> int:
     settings = JobSettings(observation=options.observation)
     mode = "human" if options.live else None
     env = settings.environment(scenario, policy, render_mode=mode)
-    rehearse(Job(spec, scenario), settings)  # so that no timing holds loading and compiling
+    dry_run(Job(spec, scenario), settings)  # so that no timing holds loading and compiling
     try:
         episode = run_episode(
-            env, policy, scenario, observer=camera, honest_time=options.honest_time
+            env, policy, scenario, observer=camera, latency_factor=options.latency
         )
     finally:
         env.close()
@@ -96,8 +96,8 @@ def _print(label: str, scenario: Scenario, episode: Episode) -> None:
             f"  planning: {len(times)} calls, median {milliseconds(np.median(times))}, "
             f"max {milliseconds(times.max())}"
         )
-    if (factor := episode.about.get("honest_time")) is not None:
-        say(f"  honest time: a second of computing was {factor:g} s for the robot")
+    if (factor := episode.about.get("latency_factor")) is not None:
+        say(f"  latency-aware simulation: a second of computing was {factor:g} s for the robot")
     if len(episode.act_times_s):
         times = episode.act_times_s
         say(

@@ -7,6 +7,7 @@ import numpy as np
 from pushplan.metrics import compute, manipulation, navigation
 from pushplan.world import ClearanceArea, Episode, Receptacle, World
 from pushplan.world.checks import BoolArray, FloatArray
+from pushplan.world.polyline import path_length, path_lengths
 
 
 class Scoreboard:
@@ -27,7 +28,7 @@ class Scoreboard:
         self.manipulates = isinstance(start.goal, Receptacle | ClearanceArea)
         self._there = np.zeros(len(start.movables), dtype=bool)
         if self.manipulates:
-            self._there = manipulation.completed_objects(start)
+            self._there = start.completed
 
     def advance(self, world: World, robot_poses: FloatArray, object_poses: FloatArray) -> None:
         """Take in what moved since the last call.
@@ -39,9 +40,8 @@ class Scoreboard:
         """
         robot = np.concatenate([self._robot, robot_poses[:, :2]])
         objects = np.concatenate([self._objects, object_poses[..., :2]])
-        self._driven += float(np.hypot(*np.diff(robot, axis=0).T).sum())
-        steps = np.diff(objects, axis=0)
-        self._lengths += np.hypot(steps[..., 0], steps[..., 1]).sum(axis=0)
+        self._driven += path_length(robot)
+        self._lengths += path_lengths(objects)
         self._robot, self._objects, self._world = robot[-1:], objects[-1:], world
 
     def completed(self) -> BoolArray:
@@ -49,7 +49,7 @@ class Scoreboard:
         done = np.ones(len(self._start.movables), dtype=bool)
         now = self._world.movables.ids
         rows = np.flatnonzero(np.isin(self._start.movables.ids, now))
-        done[rows] = manipulation.completed_objects(self._world)
+        done[rows] = self._world.completed
         return done
 
     def lines(self) -> list[str]:
@@ -63,8 +63,8 @@ class Scoreboard:
         tree, shortest = self._tree(done)
         efficiency = manipulation.efficiency(tree, self._driven, everything=bool(done.all()))
         effort = manipulation.effort(self._start, shortest, self._lengths, self._driven)
-        share = f"{int(done.sum())} of {len(done)} done"
-        return [first, f"{share}   E {efficiency:.2f}   I {effort:.2f}"]
+        fraction = f"{int(done.sum())} of {len(done)} done"
+        return [first, f"{fraction}   E {efficiency:.2f}   I {effort:.2f}"]
 
     def _tree(self, done: BoolArray) -> tuple[float, FloatArray]:
         key = done.tobytes()

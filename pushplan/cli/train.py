@@ -147,7 +147,7 @@ def score_on(suite: str, path: Path, episodes: int, workers: int) -> dict[str, A
 
     results = bench(suite, [f"policy=onnx:{path}"], episodes=episodes, workers=workers)
     rows = results.rows
-    share = wilson(sum(bool(row.success) for row in rows), len(rows))
+    success = wilson(sum(bool(row.success) for row in rows), len(rows))
     scores = {}
     for name in ("S_manip", "E_manip", "I_manip", "E_nav", "I_nav"):
         values = [float(v) for row in rows if (v := getattr(row, name)) is not None]
@@ -158,9 +158,9 @@ def score_on(suite: str, path: Path, episodes: int, workers: int) -> dict[str, A
     return {
         "suite": suite,
         "episodes": len(rows),
-        "success": share.share,
-        "success_low": share.low,
-        "success_high": share.high,
+        "success": success.fraction,
+        "success_low": success.low,
+        "success_high": success.high,
         "scores": scores,
         "failures": dict(Counter(row.reason for row in rows if not row.success)),
     }

@@ -25,6 +25,24 @@ def clamp_twist(robot: RobotModel, linear: float, angular: float) -> Twist:
     return Twist(linear, angular)
 
 
+def ramp_twist(
+    robot: RobotModel, last: Twist, linear: float, angular: float, period: float
+) -> Twist:
+    """The nearest twist that speeds and accelerations allow after the last one.
+
+    Args:
+        robot: gives the limits.
+        last: the twist before.
+        linear: wanted forward speed [m/s].
+        angular: wanted turn rate [rad/s].
+        period: time for which it is held [s].
+    """
+    dv, dw = robot.max_acceleration * period, robot.max_turn_acceleration * period
+    linear = min(max(linear, last.linear - dv), last.linear + dv)
+    angular = min(max(angular, last.angular - dw), last.angular + dw)
+    return clamp_twist(robot, linear, angular)
+
+
 class TwistLimiter:
     """Jerk-limited speed and turn rate, from one command to the next, by Ruckig.
 

@@ -26,8 +26,7 @@ class Progress:
         """Move on to the point of ``plan`` nearest to (x, y) [m]; returns `along`."""
         if plan is not self._plan:
             self._plan = plan
-            steps = np.diff(plan.poses[:, :2], axis=0)
-            self._lengths = np.concatenate([[0.0], np.cumsum(np.hypot(steps[:, 0], steps[:, 1]))])
+            self._lengths = plan.arc_lengths
             self.along = 0.0
         lengths, points = self._lengths, plan.poses[:, :2]
         first = max(0, int(np.searchsorted(lengths, self.along, side="right")) - 1)

@@ -8,6 +8,7 @@ import numpy as np
 from PIL import Image, ImageDraw
 
 from pushplan.world.checks import FloatArray
+from pushplan.world.polyline import arc_lengths
 
 SMOOTHING = 2
 """Everything is drawn this many times larger and then averaged."""
@@ -113,8 +114,7 @@ class Canvas:
 
 def _dashes(points: FloatArray, dash_m: float) -> list[FloatArray]:
     """Cut a line into dashes of this length with gaps as long."""
-    steps = np.diff(points, axis=0)
-    along = np.concatenate([[0.0], np.cumsum(np.hypot(steps[:, 0], steps[:, 1]))])
+    along = arc_lengths(points)
     pieces = []
     for start in np.arange(0.0, float(along[-1]), 2.0 * dash_m):
         inner = along[(along > start) & (along < start + dash_m)]

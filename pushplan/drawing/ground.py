@@ -74,8 +74,10 @@ def _clearance_area(canvas: Canvas, goal: ClearanceArea, palette: Palette, unit:
         length = float(np.hypot(*(b - a)))
         along: FloatArray = (b - a) / length
         out = np.array([along[1], -along[0]])
-        for share in np.arange(0.5, n := max(1, round(length / spacing))) / n:
-            _arrow(canvas, a + share * (b - a), 0.13 * spacing * along, 0.22 * spacing * out, edge)
+        for fraction in np.arange(0.5, n := max(1, round(length / spacing))) / n:
+            _arrow(
+                canvas, a + fraction * (b - a), 0.13 * spacing * along, 0.22 * spacing * out, edge
+            )
 
 
 def _arrow(

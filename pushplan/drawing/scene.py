@@ -116,10 +116,7 @@ def _with_walls(static: StaticMap) -> FloatArray:
 def _objects(canvas: Canvas, objects: Movables, palette: Palette, unit: float) -> None:
     if len(objects) == 0:
         return
-    turn = np.repeat(objects.poses[:, 2], np.diff(objects.offsets))
-    at = np.repeat(objects.poses[:, :2], np.diff(objects.offsets), axis=0)
-    c, s, (x, y) = np.cos(turn), np.sin(turn), objects.vertices.T
-    corners = at + np.stack([c * x - s * y, s * x + c * y], axis=1)
+    corners = objects.vertices_world
     reach, (middles, radii) = canvas.bounds, (objects.poses[:, :2], objects.radii[:, None])
     seen = ((middles + radii > reach[:2]) & (middles - radii < reach[2:])).all(axis=1)
     for k in np.flatnonzero(seen).tolist():

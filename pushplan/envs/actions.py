@@ -30,6 +30,8 @@ class ActionMode(ABC):
 
     size: ClassVar[int]
     """Number of elements of an action."""
+    takes_velocities: ClassVar[bool] = True
+    """Whether a `Twist` or `WheelSpeeds` can be encoded."""
 
     def __init__(self, task: Task) -> None:
         self.robot = task.robot

@@ -32,6 +32,7 @@ class HeadingAction(ActionMode):
     """
 
     size = 1
+    takes_velocities = False
 
     def __init__(self, task: Task) -> None:
         super().__init__(task)
@@ -49,7 +50,7 @@ class HeadingAction(ActionMode):
         return clamp_twist(self.robot, 0.0, 0.0)
 
     def _from_twist(self, twist: Twist) -> NoReturn:
-        raise InvalidInputError(f"action mode 'heading' takes no velocities, got {twist!r}")
+        raise _no_velocities("heading", twist)
 
 
 class WaypointAction(ActionMode):
@@ -62,6 +63,7 @@ class WaypointAction(ActionMode):
     """
 
     size = 2
+    takes_velocities = False
 
     def __init__(self, task: Task) -> None:
         super().__init__(task)
@@ -88,4 +90,11 @@ class WaypointAction(ActionMode):
         return clamp_twist(self.robot, 0.0, 0.0)
 
     def _from_twist(self, twist: Twist) -> NoReturn:
-        raise InvalidInputError(f"action mode 'waypoint' takes no velocities, got {twist!r}")
+        raise _no_velocities("waypoint", twist)
+
+
+def _no_velocities(mode: str, twist: Twist) -> InvalidInputError:
+    return InvalidInputError(
+        f"action mode {mode!r} takes no velocities, got {twist!r}: make the environment with "
+        "action='velocity', or give the policy the attribute actions = ('velocity',)"
+    )

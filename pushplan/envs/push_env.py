@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping, Sequence
+from functools import partial
 from typing import Any
 
 import gymnasium
@@ -16,7 +17,7 @@ from pushplan.envs.actions import ActionMode, Motion, waiting
 from pushplan.envs.registry import ACTIONS, SIMULATORS, TASKS, default_preset, look_up
 from pushplan.envs.roster import Roster
 from pushplan.envs.simulators.base import Simulator
-from pushplan.envs.tasks.base import Outcome, Task
+from pushplan.envs.tasks.base import StepOutcome, Task
 from pushplan.envs.trace import Trace
 from pushplan.envs.window import Window, has_display
 from pushplan.observation import ObservationBuilder
@@ -90,15 +91,16 @@ class PushEnv(gymnasium.Env[NDArray[Any], NDArray[Any]]):
     ) -> None:
         task_class: type[Task] = look_up("task", TASKS, task)
         engine: type[Simulator] = look_up("simulator", SIMULATORS, simulator)
+        self._may_adapt = action is None
         action = _chosen_action(task_class, action)
-        mode: type[ActionMode] = look_up("action", ACTIONS, action)
         preset = default_preset(task, simulator) if preset is None else preset
         if preset not in task_class.presets:
             raise UnknownNameError(f"preset of {task}", preset, task_class.presets)
         self.metadata = _metadata(engine)
         self.render_mode = _checked_render_mode(render_mode, engine)
         variations = {} if variations is None else variations
-        self.task = task_class(preset=preset, variations=variations, action=action)
+        self._make_task = partial(task_class, preset=preset, variations=variations)
+        self._use_action(action)
         if engine.needs_solids and self.task.materials.solids is None:
             raise ScenarioError(
                 f"{task}: simulator {simulator!r} needs a third dimension, which preset "
@@ -110,14 +112,34 @@ class PushEnv(gymnasium.Env[NDArray[Any], NDArray[Any]]):
             raise UnknownNameError(f"observation of {task}", observation, task_class.observations)
         self._builder: ObservationBuilder = observation
         self._simulator = engine()
-        self._mode = mode(self.task)
         self._window: Window | None = None
         self._first_seed = None if seed is None else integer("seed", seed, low=0)
         self._world: World | None = None
         self._trace: Trace | None = None
         self._over = "reset() has not been called"
-        self.action_space: Any = self._mode.space
         self.observation_space: Any = _space(self._builder, self.task.reach)
+
+    def _use_action(self, name: str) -> None:
+        mode: type[ActionMode] = look_up("action", ACTIONS, name)
+        self.task: Task = self._make_task(action=name)
+        self._mode = mode(self.task)
+        self.action_space: Any = self._mode.space
+
+    def take_velocities(self) -> bool:
+        """Change to the first action mode of the task that takes a `Twist`, for the next reset.
+
+        Returns:
+            Whether the mode has changed: it does not where it was asked for by name, or takes
+            velocities already.
+        """
+        if not self._may_adapt or self._mode.takes_velocities:
+            return False
+        for name in self.task.actions:
+            if look_up("action", ACTIONS, name).takes_velocities:
+                self._use_action(name)
+                self._over = "the action mode has changed"
+                return True
+        return False
 
     @property
     def world(self) -> World:
@@ -171,7 +193,7 @@ class PushEnv(gymnasium.Env[NDArray[Any], NDArray[Any]]):
         )
         self._over = ""
         self._show()
-        info = _info(Outcome(0.0, False, "", False, False), 0.0, False)
+        info = _info(StepOutcome(0.0, False, "", False, False), 0.0, False)
         if isinstance(world.goal, Receptacle | ClearanceArea):
             info["completed"] = np.zeros(len(world.movables), dtype=bool)
         return self._observe(world), info
@@ -371,7 +393,7 @@ def _picture(world: World) -> NDArray[np.uint8]:
     return draw_world(world)
 
 
-def _info(outcome: Outcome, work: float, held: bool) -> dict[str, Any]:
+def _info(outcome: StepOutcome, work: float, held: bool) -> dict[str, Any]:
     info = {"success": outcome.success, "reason": outcome.reason, "work": work, "held": held}
     return info if outcome.completed is None else {**info, "completed": outcome.completed}
 

@@ -8,7 +8,7 @@ from typing import Any
 
 from pushplan.world import UnknownNameError
 
-TASKS: Mapping[str, str] = {
+TASKS: dict[str, str] = {
     "maze": "pushplan.envs.tasks.maze:MazeTask",
     "box_delivery": "pushplan.envs.tasks.box_delivery:BoxDeliveryTask",
     "area_clearing": "pushplan.envs.tasks.area_clearing:AreaClearingTask",
@@ -26,11 +26,9 @@ ACTIONS: Mapping[str, str] = {
     "wheels": "pushplan.envs.actions:WheelsAction",
 }
 GYM_IDS: Mapping[str, str] = {
-    "pushplan/Maze-v0": "maze",
-    "pushplan/BoxDelivery-v0": "box_delivery",
-    "pushplan/AreaClearing-v0": "area_clearing",
-    "pushplan/ShipIce-v0": "ship_ice",
+    f"pushplan/{''.join(word.capitalize() for word in name.split('_'))}-v0": name for name in TASKS
 }
+"""Gymnasium id -> task."""
 
 
 def look_up(kind: str, table: Mapping[str, str], name: object) -> Any:
@@ -43,6 +41,12 @@ def look_up(kind: str, table: Mapping[str, str], name: object) -> Any:
         raise UnknownNameError(kind, name, table)
     module, _, attribute = table[name].partition(":")
     return getattr(import_module(module), attribute)
+
+
+def goal_kind(task: str) -> str | None:
+    """Who has the goal in a task, ``"robot"`` or ``"objects"``; None for an unknown task."""
+    kind: str | None = look_up("task", TASKS, task).goal_kind if task in TASKS else None
+    return kind
 
 
 def default_preset(task: str, simulator: str) -> str:

@@ -11,15 +11,15 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from pushplan.evaluation.batch import run_batch
     from pushplan.evaluation.benchmark import bench
+    from pushplan.evaluation.compatibility import UnusablePolicyError
     from pushplan.evaluation.episode import InvalidActionError, PolicyError, run_episode
-    from pushplan.evaluation.fitness import UnusablePolicyError
-    from pushplan.evaluation.jobs import Job, JobSettings, Outcome
+    from pushplan.evaluation.jobs import Job, JobResult, JobSettings
     from pushplan.evaluation.paper import Comparison, bench_paper
     from pushplan.evaluation.policies import PolicySpec, parse_policies, parse_policy
     from pushplan.evaluation.pool import WorkerPool
     from pushplan.evaluation.push_plots import push_figure
     from pushplan.evaluation.results import Results, compare
-    from pushplan.evaluation.rows import COLUMNS, TIMING_COLUMNS, ResultRow, Status
+    from pushplan.evaluation.rows import TIMING_COLUMNS, ResultRow, Status, columns
     from pushplan.evaluation.statistics import Estimate, Proportion, bootstrap_interval, wilson
     from pushplan.evaluation.summary import PairedDifference, PolicySummary
 
@@ -27,28 +27,27 @@ _HOMES = {
     "batch": ("run_batch",),
     "benchmark": ("bench",),
     "episode": ("InvalidActionError", "PolicyError", "run_episode"),
-    "fitness": ("UnusablePolicyError",),
-    "jobs": ("Job", "JobSettings", "Outcome"),
+    "compatibility": ("UnusablePolicyError",),
+    "jobs": ("Job", "JobSettings", "JobResult"),
     "paper": ("Comparison", "bench_paper"),
     "policies": ("PolicySpec", "parse_policies", "parse_policy"),
     "pool": ("WorkerPool",),
     "push_plots": ("push_figure",),
     "results": ("Results", "compare"),
-    "rows": ("COLUMNS", "TIMING_COLUMNS", "ResultRow", "Status"),
+    "rows": ("TIMING_COLUMNS", "ResultRow", "Status", "columns"),
     "statistics": ("Estimate", "Proportion", "bootstrap_interval", "wilson"),
     "summary": ("PairedDifference", "PolicySummary"),
 }
 _LAZY = {name: module for module, names in _HOMES.items() for name in names}
 
 __all__ = [
-    "COLUMNS",
     "TIMING_COLUMNS",
     "Comparison",
     "Estimate",
     "InvalidActionError",
     "Job",
+    "JobResult",
     "JobSettings",
-    "Outcome",
     "PairedDifference",
     "PolicyError",
     "PolicySpec",
@@ -62,6 +61,7 @@ __all__ = [
     "bench",
     "bench_paper",
     "bootstrap_interval",
+    "columns",
     "compare",
     "parse_policies",
     "parse_policy",

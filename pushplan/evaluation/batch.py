@@ -16,9 +16,9 @@ from pushplan.evaluation.execute import execute
 from pushplan.evaluation.jobs import (
     DEFAULT_ENV,
     Job,
+    JobResult,
     JobSettings,
-    Outcome,
-    failed_outcome,
+    failed_result,
     timeout_reason,
 )
 from pushplan.evaluation.pool import WorkerDiedError, WorkerOverranError, WorkerPool
@@ -129,7 +129,7 @@ def _configuration(
         "observation": settings.observation,
         "timeout_s": settings.timeout_s,
         "memory_limit_mb": memory_limit_mb,
-        **({} if settings.honest_time is None else {"honest_time": settings.honest_time}),
+        **({} if settings.latency_factor is None else {"latency_factor": settings.latency_factor}),
         **(about or {}),
     }
 
@@ -184,7 +184,7 @@ class _Batch:
 
     def _drain(self, executor: Executor, window: int, owner_pid: int | None) -> list[Job]:
         """Run jobs until there are none; those in flight when the executor broke otherwise."""
-        flying: dict[Future[Outcome], Job] = {}
+        flying: dict[Future[JobResult], Job] = {}
         suspects: list[Job] = []
         while (self._jobs or flying) and not suspects:
             while self._jobs and len(flying) < window:
@@ -204,17 +204,19 @@ class _Batch:
                     self._keep(outcome)
         return [*suspects, *flying.values()]
 
-    def _outcome(self, job: Job, future: Future[Outcome], owner_pid: int | None) -> Outcome | None:
+    def _outcome(
+        self, job: Job, future: Future[JobResult], owner_pid: int | None
+    ) -> JobResult | None:
         """What became of a job; None if its executor broke and it may be innocent."""
         try:
             return future.result()
         except WorkerOverranError as error:
             reason = timeout_reason(self._settings.timeout_s)
             detail = "The process did not react and was ended.\n" + error.log
-            return failed_outcome(job, Status.TIMEOUT, reason, detail)
+            return failed_result(job, Status.TIMEOUT, reason, detail)
         except WorkerDiedError as error:
             detail = f"{error}\n{error.log}"
-            return failed_outcome(job, Status.CRASHED, str(error), detail)
+            return failed_result(job, Status.CRASHED, str(error), detail)
         except BrokenExecutor as error:
             if owner_pid is None:
                 raise InvalidInputError(f"no worker process can be started: {error}") from error
@@ -229,7 +231,7 @@ class _Batch:
                 assert outcome is not None
                 self._keep(outcome)
 
-    def _keep(self, outcome: Outcome) -> None:
+    def _keep(self, outcome: JobResult) -> None:
         self._store.add(outcome.row, outcome.trace, outcome.detail)
         self._left -= 1
         if self._progress is not None:
@@ -254,7 +256,7 @@ class _Closing:
 
 def _submit(
     executor: Executor, job: Job, settings: JobSettings, owner_pid: int | None
-) -> Future[Outcome]:
+) -> Future[JobResult]:
     try:
         return executor.submit(execute, job, settings, owner_pid)
     except (pickle.PicklingError, AttributeError, TypeError) as error:

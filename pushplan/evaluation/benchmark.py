@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from pushplan.evaluation.batch import Progress, run_batch
-from pushplan.evaluation.fitness import usable_policies
+from pushplan.evaluation.compatibility import usable_policies
 from pushplan.evaluation.jobs import Job, JobSettings
 from pushplan.evaluation.policies import PolicySpec
 from pushplan.evaluation.results import Results
@@ -28,7 +28,7 @@ def bench(
     observation: str = "auto",
     memory_limit_mb: float | None = None,
     retry_failed: bool = False,
-    honest_time: float | None = None,
+    latency_factor: float | None = None,
     progress: Progress | None = None,
 ) -> Results:
     """Run every policy on every scenario of a suite.
@@ -52,7 +52,7 @@ def bench(
         observation: ``"auto"``, ``"image"`` or ``"state"``, see `JobSettings`.
         memory_limit_mb: private memory of a worker at which allocations fail [MB].
         retry_failed: run jobs again whose row says that they failed.
-        honest_time: seconds of the world's clock for each second that a policy computes; None
+        latency_factor: seconds of the world's clock for each second that a policy computes; None
             for a world that stands still meanwhile. See `run_episode`.
         progress: told of every row.
 
@@ -61,7 +61,9 @@ def bench(
         UnusablePolicyError: if a policy cannot be made, or for none of the scenarios.
         InvalidInputError: as `run_batch`.
     """
-    settings = JobSettings(observation=observation, timeout_s=timeout_s, honest_time=honest_time)
+    settings = JobSettings(
+        observation=observation, timeout_s=timeout_s, latency_factor=latency_factor
+    )
     name, version, scenarios = _scenarios(suite, episodes, seed)
     specs = usable_policies(policies, scenarios, settings)
     # all policies of a scenario close together: a run that is cut short still compares them

@@ -4,14 +4,19 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from typing import Any
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
 import pushplan
 from pushplan.world import (
+    ChoosesActions,
+    ChoosesObservation,
     Episode,
+    HoldsDecisions,
     InvalidInputError,
+    LogsPlans,
+    PlansBesideDriving,
     Policy,
     PushplanError,
     Twist,
@@ -28,6 +33,15 @@ Observer = Callable[[int, World, Policy], None]
 """Called after the reset with 0 and after step i with i; sees the world and the policy."""
 
 
+@runtime_checkable
+class AdaptsActions(Protocol):
+    """An environment that can change to an action mode which takes velocities."""
+
+    def take_velocities(self) -> bool:
+        """Change to such a mode for the next reset; False where there is nothing to change."""
+        ...
+
+
 class PolicyError(PushplanError):
     """A policy raised an exception; the cause is attached."""
 
@@ -42,7 +56,7 @@ def run_episode(
     scenario: Any,
     *,
     observer: Observer | None = None,
-    honest_time: float | None = None,
+    latency_factor: float | None = None,
     clock: Clock = time.perf_counter,
 ) -> Episode:
     """Run ``policy`` in ``env`` from the start of ``scenario`` to the end of the episode.
@@ -56,17 +70,17 @@ def run_episode(
         policy: chooses the actions.
         scenario: what ``env`` was made for; gives the seed.
         observer: sees each step; for pictures and windows.
-        honest_time: seconds of the world's clock for each second that the policy computes; until
+        latency_factor: seconds of the world's clock for each second that the policy computes; until
             its action is there, the robot goes on as it was commanded last. None: the world stands
             still while the policy computes.
         clock: measures how long the policy takes [s].
 
     Raises:
-        InvalidInputError: if ``honest_time`` is negative, or ``env`` cannot simulate that time.
+        InvalidInputError: if ``latency_factor`` is negative, or ``env`` cannot simulate that time.
         PolicyError: if the policy raises.
         InvalidActionError: if it returns an action that is not finite or has the wrong shape.
     """
-    recording = Recording(policy, scenario, honest_time=honest_time, clock=clock)
+    recording = Recording(policy, scenario, latency_factor=latency_factor, clock=clock)
     recording.run(env, observer)
     return recording.episode()
 
@@ -78,7 +92,7 @@ class Recording:
         policy: chooses the actions.
         scenario: what is run.
         label: what results call the policy.
-        honest_time: see `run_episode`.
+        latency_factor: see `run_episode`.
         clock: measures how long the policy takes [s].
     """
 
@@ -88,11 +102,11 @@ class Recording:
         scenario: Any,
         label: str = "",
         *,
-        honest_time: float | None = None,
+        latency_factor: float | None = None,
         clock: Clock = time.perf_counter,
     ) -> None:
         self.policy = policy
-        self.honest_time = checked_honest_time(honest_time)
+        self.latency_factor = checked_latency_factor(latency_factor)
         self._clock = clock
         self.scenario = scenario
         self.label = label or type(policy).__name__
@@ -118,7 +132,7 @@ class Recording:
         self._begin(world)
         rng = stream(self.scenario.seed, "policy")
         self._ask(self.policy.reset, world, rng)
-        self._keep_time(env)
+        self._simulate_latency(env)
         if observer is not None:
             observer(0, world, self.policy)
         ended = False
@@ -127,11 +141,14 @@ class Recording:
             begin = self._clock()
             action = self._ask(self.policy.act, world, observation)
             elapsed = self._clock() - begin
+            if not self._actions and self._changes_mode(env, action):
+                self.run(env, observer, limit=limit)
+                return
             command = checked_action(env, action)
-            if self.honest_time is None:
+            if self.latency_factor is None:
                 observation, reward, terminated, truncated, info = env.step(command)
             else:
-                lag = self.honest_time * (seeing + blocking_time(self.policy, elapsed))
+                lag = self.latency_factor * (seeing + blocking_time(self.policy, elapsed))
                 observation, reward, terminated, truncated, info = env.step_late(command, lag)
             elapsed += seeing
             world = env.world
@@ -169,23 +186,31 @@ class Recording:
                 "key": self.scenario.key,
                 "seed": self.scenario.seed,
                 "pushplan": pushplan.__version__,
-                **({} if self.honest_time is None else {"honest_time": self.honest_time}),
+                **({} if self.latency_factor is None else {"latency_factor": self.latency_factor}),
                 **({} if held_for(self.policy) == 1 else {"held_for": held_for(self.policy)}),
             },
         )
 
-    def _keep_time(self, env: Any) -> None:
+    def _changes_mode(self, env: Any, action: object) -> bool:
+        """Whether ``env`` begins again in an action mode that takes what the policy gives."""
+        return (
+            isinstance(action, Twist | WheelSpeeds)
+            and isinstance(env, AdaptsActions)
+            and not isinstance(self.policy, ChoosesActions)
+            and env.take_velocities()
+        )
+
+    def _simulate_latency(self, env: Any) -> None:
         """Tell a policy that plans beside driving how time passes in this episode."""
-        if self.honest_time is None:
+        if self.latency_factor is None:
             return
         if not callable(getattr(env, "step_late", None)):
             raise InvalidInputError(
-                f"honest time needs an environment with a method step_late(action, lag), "
+                "latency-aware simulation needs an environment with step_late(action, lag), "
                 f"{type(env).__name__} has none"
             )
-        keep_time = getattr(self.policy, "keep_time", None)
-        if callable(keep_time):
-            self._ask(keep_time, self.honest_time, self._clock)
+        if isinstance(self.policy, PlansBesideDriving):
+            self._ask(self.policy.simulate_latency, self.latency_factor, self._clock)
 
     def _begin(self, world: World) -> None:
         self.started = True
@@ -211,31 +236,29 @@ class Recording:
             raise PolicyError(describe(error)) from error
 
 
-def checked_honest_time(factor: float | None) -> float | None:
-    """The factor of honest time, None where the world stands still meanwhile.
+def checked_latency_factor(factor: float | None) -> float | None:
+    """The factor of latency-aware simulation, None where the world stands still meanwhile.
 
     Raises:
         InvalidInputError: if it is no number, negative or not finite.
     """
-    return None if factor is None else number("honest_time", factor, low=0.0)
+    return None if factor is None else number("latency_factor", factor, low=0.0)
 
 
 def blocking_time(policy: Policy, elapsed_s: float) -> float:
     """How long the robot waited for an action [s].
 
     Args:
-        policy: its attribute ``background_s``, if it has one, says how much of the call a robot
-            does beside driving, as `pushplan.planners.PlanFollower` plans.
+        policy: one that `PlansBesideDriving` does part of the call while the robot drives.
         elapsed_s: wall-clock time of the call [s].
     """
-    beside = float(getattr(policy, "background_s", 0.0))
+    beside = policy.background_s if isinstance(policy, PlansBesideDriving) else 0.0
     return max(elapsed_s - max(beside, 0.0), 0.0)
 
 
 def held_for(policy: Policy) -> int:
     """Steps for which a decision of the policy stands: more than 1 for some networks."""
-    action = getattr(getattr(policy, "specification", None), "action", None)
-    return int(getattr(action, "repeat", 1))
+    return policy.steps_per_decision if isinstance(policy, HoldsDecisions) else 1
 
 
 def observation_time(env: Any, policy: Policy, step: int) -> float:
@@ -243,12 +266,17 @@ def observation_time(env: Any, policy: Policy, step: int) -> float:
 
     Args:
         env: says it, if it can, as ``observation_time_s``.
-        policy: one without the attribute ``observation`` looks at the world alone.
+        policy: one that does not say what it observes looks at the world alone.
         step: number of the step, from 0.
     """
-    if getattr(policy, "observation", None) is None or step % held_for(policy):
+    if wanted_observation(policy) is None or step % held_for(policy):
         return 0.0
     return float(getattr(env, "observation_time_s", 0.0))
+
+
+def wanted_observation(policy: object) -> Any:
+    """The name or builder of what a policy observes; None if it looks at the world alone."""
+    return policy.observation if isinstance(policy, ChoosesObservation) else None
 
 
 def checked_action(env: Any, action: object) -> FloatArray:
@@ -271,16 +299,18 @@ def checked_action(env: Any, action: object) -> FloatArray:
         if not np.isfinite(values).all():
             raise InvalidActionError(f"an action must be finite, got {values.tolist()}")
         action = values
-    command: FloatArray = env.encode(action)
+    try:
+        command: FloatArray = env.encode(action)
+    except InvalidInputError as error:
+        raise InvalidActionError(str(error)) from error
     return command
 
 
 def plan_times(policy: Policy) -> list[float] | None:
     """Wall-clock time of each planning call since the reset [s]; None if no log is kept."""
-    log = getattr(policy, "plan_log", None)
-    if log is None:
+    if not isinstance(policy, LogsPlans):
         return None
-    return [float(result.stats.wall_time_s) for result in log]
+    return [float(result.stats.wall_time_s) for result in policy.plan_log]
 
 
 def describe(error: BaseException) -> str:

@@ -22,18 +22,18 @@ from pushplan.evaluation.episode import (
     describe,
     plan_times,
 )
-from pushplan.evaluation.jobs import Job, JobSettings, Outcome, failed_outcome, timeout_reason
+from pushplan.evaluation.jobs import Job, JobResult, JobSettings, failed_result, timeout_reason
 from pushplan.evaluation.limits import EpisodeTimeout, hard_limit, soft_limit
 from pushplan.evaluation.rows import Status, blank_row, scored_row
 
-REHEARSAL_STEPS = 2
-_rehearsed: set[tuple[str, str, str]] = set()
+DRY_RUN_STEPS = 2
+_dry_runs: set[tuple[str, str, str]] = set()
 
 REASON_LENGTH = 300
 """A reason in the results is cut to this many characters; the detail file has all of it."""
 
 
-def execute(job: Job, settings: JobSettings, owner_pid: int | None = None) -> Outcome:
+def execute(job: Job, settings: JobSettings, owner_pid: int | None = None) -> JobResult:
     """Run one job. Whatever goes wrong is in the outcome, unless it ends the process.
 
     Args:
@@ -48,16 +48,16 @@ def execute(job: Job, settings: JobSettings, owner_pid: int | None = None) -> Ou
             return _execute(job, settings)
     except EpisodeTimeout:
         reason = timeout_reason(settings.timeout_s)
-        return failed_outcome(job, Status.TIMEOUT, reason, traceback.format_exc())
+        return failed_result(job, Status.TIMEOUT, reason, traceback.format_exc())
     except MemoryError:
-        return failed_outcome(
+        return failed_result(
             job, Status.OUT_OF_MEMORY, "an allocation failed", traceback.format_exc()
         )
 
 
-def _execute(job: Job, settings: JobSettings) -> Outcome:
-    if settings.rehearse:
-        rehearse(job, settings)
+def _execute(job: Job, settings: JobSettings) -> JobResult:
+    if settings.dry_run:
+        dry_run(job, settings)
     # a policy that uses the global generators against our advice repeats all the same
     random.seed(job.scenario.seed)
     np.random.seed(job.scenario.seed % 2**32)  # noqa: NPY002
@@ -66,10 +66,12 @@ def _execute(job: Job, settings: JobSettings) -> Outcome:
     except MemoryError:
         raise
     except (Exception, SystemExit) as error:
-        return failed_outcome(
+        return failed_result(
             job, Status.POLICY_ERROR, _short(describe(error)), traceback.format_exc()
         )
-    recording = Recording(policy, job.scenario, job.policy.label, honest_time=settings.honest_time)
+    recording = Recording(
+        policy, job.scenario, job.policy.label, latency_factor=settings.latency_factor
+    )
     begin = time.perf_counter()
     status, reason, detail = Status.DONE, None, ""
     try:
@@ -87,26 +89,26 @@ def _execute(job: Job, settings: JobSettings) -> Outcome:
     row = blank_row(job.policy.label, job.scenario, status, _short(reason or recording.reason))
     row = replace(row, wall_time_s=time.perf_counter() - begin)
     if not recording.started:
-        return Outcome(row, detail=detail)
+        return JobResult(row, detail=detail)
     episode = recording.episode(reason)
     calls = plan_times(policy)
     row = scored_row(row, episode, None if calls is None else len(calls))
-    return Outcome(row, _as_bytes(episode.save), detail)
+    return JobResult(row, _as_bytes(episode.save), detail)
 
 
-def rehearse(job: Job, settings: JobSettings) -> None:
+def dry_run(job: Job, settings: JobSettings) -> None:
     """Load and compile what a job needs; what goes wrong here goes wrong again in the job."""
     what = (job.policy.label, job.policy.identity, job.title)
-    if what in _rehearsed:
+    if what in _dry_runs:
         return
-    _rehearsed.add(what)
+    _dry_runs.add(what)
     with contextlib.suppress(Exception):
         job.policy.warm_up()
     with contextlib.suppress(Exception, SystemExit):
         policy = job.policy.make()
         env = settings.environment(job.scenario, policy)
         try:
-            Recording(policy, job.scenario).run(env, limit=REHEARSAL_STEPS)
+            Recording(policy, job.scenario).run(env, limit=DRY_RUN_STEPS)
         finally:
             getattr(env, "close", _nothing)()
 

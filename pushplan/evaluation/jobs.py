@@ -8,11 +8,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from pushplan.evaluation.episode import checked_honest_time
+from pushplan.evaluation.episode import checked_latency_factor, wanted_observation
 from pushplan.evaluation.loading import load_object
 from pushplan.evaluation.policies import PolicySpec
 from pushplan.evaluation.rows import ResultRow, Status, blank_row
-from pushplan.world import Policy
+from pushplan.world import ChecksEnvironment, ChoosesActions, Policy
 from pushplan.world.checks import number
 
 DEFAULT_ENV = "pushplan.envs:make"
@@ -65,16 +65,16 @@ class JobSettings:
 
     Args:
         make_env: factory of environments, as a callable or as ``"module:function"``; called as
-            ``make_env(scenario, observation=...)``, and with ``action=...`` where the policy's
-            attribute ``actions`` names action modes in order of preference.
-        observation: kind of observation; ``"auto"`` takes what the policy's attribute
-            ``observation`` asks for, by name or as a builder, else ``"state"``.
+            ``make_env(scenario, observation=...)``, and with ``action=...`` where the policy
+            `ChoosesActions`.
+        observation: kind of observation; ``"auto"`` takes what a policy that
+            `ChoosesObservation` asks for, else ``"state"``.
         timeout_s: wall-clock limit of one job [s], None for none.
         grace_s: how much later a job is ended by force [s].
-        rehearse: in each process, warm up a planner of ours before its first job, and run the
+        dry_run: in each process, warm up a planner of ours before its first job, and run the
             first steps of a policy's first job once without recording them, so that loading and
             compiling are in nobody's planning times.
-        honest_time: seconds of the world's clock for each second that a policy computes; None
+        latency_factor: seconds of the world's clock for each second that a policy computes; None
             for a world that stands still meanwhile. See `run_episode`.
     """
 
@@ -82,14 +82,14 @@ class JobSettings:
     observation: str = "auto"
     timeout_s: float | None = 300.0
     grace_s: float = 2.0
-    rehearse: bool = True
-    honest_time: float | None = None
+    dry_run: bool = True
+    latency_factor: float | None = None
 
     def __post_init__(self) -> None:
         if self.timeout_s is not None:
             number("timeout_s", self.timeout_s, low=0.0, open_low=True)
         number("grace_s", self.grace_s, low=0.0)
-        checked_honest_time(self.honest_time)
+        checked_latency_factor(self.latency_factor)
 
     @property
     def force_after_s(self) -> float | None:
@@ -100,20 +100,19 @@ class JobSettings:
         """A fresh environment for one job; ``options`` go to its factory."""
         observation = self.observation
         if observation == "auto":
-            observation = getattr(policy, "observation", "state")
-        actions = getattr(policy, "actions", None)
-        if actions is not None:
-            options = {"action": actions, **options}
+            wanted = wanted_observation(policy)
+            observation = "state" if wanted is None else wanted
+        if isinstance(policy, ChoosesActions):
+            options = {"action": policy.actions, **options}
         make = load_object(self.make_env) if isinstance(self.make_env, str) else self.make_env
         env = make(scenario, observation=observation, **options)
-        check = getattr(policy, "check_environment", None)
-        if callable(check):  # a network is good for what it was trained on
-            check(env, scenario)
+        if isinstance(policy, ChecksEnvironment):
+            policy.check_environment(env, scenario)
         return env
 
 
 @dataclass(frozen=True)
-class Outcome:
+class JobResult:
     """What became of a job.
 
     Args:
@@ -132,9 +131,9 @@ class Outcome:
         return self.row.status in (Status.TIMEOUT, Status.OUT_OF_MEMORY)
 
 
-def failed_outcome(job: Job, status: Status, reason: str, detail: str = "") -> Outcome:
+def failed_result(job: Job, status: Status, reason: str, detail: str = "") -> JobResult:
     """The outcome of a job of which nothing was recorded."""
-    return Outcome(blank_row(job.policy.label, job.scenario, status, reason), detail=detail)
+    return JobResult(blank_row(job.policy.label, job.scenario, status, reason), detail=detail)
 
 
 def timeout_reason(timeout_s: float | None) -> str:

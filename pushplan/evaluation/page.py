@@ -8,10 +8,10 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from pushplan.evaluation.jobs import file_stem
-from pushplan.evaluation.results import Results
 from pushplan.evaluation.rows import ResultRow
-from pushplan.evaluation.sheets import Sheet
+from pushplan.evaluation.run_record import RunRecord
 from pushplan.evaluation.store import write_atomic
+from pushplan.evaluation.tables import Table
 
 LISTED = 200
 """At most so many rows are listed in full."""
@@ -35,26 +35,26 @@ code { font-size: .85em; }
 
 
 def write_page(
-    results: Results, sheets: Sequence[Sheet], plots: Mapping[str, Path], folder: Path
+    run: RunRecord, tables: Sequence[Table], plots: Mapping[str, Path], folder: Path
 ) -> Path:
     """Write ``report.html`` and return its path.
 
     Args:
-        results: of a run.
-        sheets: tables, scores first.
+        run: whose page it is.
+        tables: tables, scores first.
         plots: caption -> PNG file; the pictures are embedded.
         folder: where the page goes; links are relative to it.
     """
-    pairs = [sheet for sheet in sheets if sheet.title.startswith("Paired")]
-    scores = [sheet for sheet in sheets if sheet not in pairs]
+    pairs = [table for table in tables if table.title.startswith("Paired")]
+    scores = [table for table in tables if table not in pairs]
     parts = [
-        _head(results),
-        *(_table(sheet) for sheet in scores),
+        _head(run),
+        *(_table(table) for table in scores),
         *(_figure(caption, path) for caption, path in plots.items()),
-        *(_table(sheet) for sheet in pairs),
-        _listing(results),
+        *(_table(table) for table in pairs),
+        _listing(run),
     ]
-    title = html.escape(_title(results))
+    title = html.escape(_title(run))
     page = (
         f'<!doctype html>\n<html lang="en"><head><meta charset="utf-8"><title>{title}</title>\n'
         '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
@@ -65,32 +65,32 @@ def write_page(
     return path
 
 
-def _title(results: Results) -> str:
-    name = results.about.get("configuration", {}).get("suite")
+def _title(run: RunRecord) -> str:
+    name = run.about.get("configuration", {}).get("suite")
     return f"pushplan: {name}" if name else "pushplan: results"
 
 
-def _head(results: Results) -> str:
-    facts = {"episodes": len(results.rows), **results.about.get("configuration", {})}
+def _head(run: RunRecord) -> str:
+    facts = {"episodes": len(run.rows), **run.about.get("configuration", {})}
     text = ", ".join(f"{key} {value}" for key, value in facts.items() if value is not None)
     sources = "".join(
         f"<li><code>{html.escape(label)}</code>: {html.escape(str(source))}</li>"
-        for label, source in results.about.get("policies", {}).items()
+        for label, source in run.about.get("policies", {}).items()
         if label != source
     )
     return (
-        f"<h1>{html.escape(_title(results))}</h1>\n"
+        f"<h1>{html.escape(_title(run))}</h1>\n"
         f'<p class="about">{html.escape(text)}. All rows: <a href="results.csv">results.csv</a>.'
         f"</p>" + (f"<ul>{sources}</ul>" if sources else "")
     )
 
 
-def _table(sheet: Sheet) -> str:
-    head = "".join(f"<th>{html.escape(cell)}</th>" for cell in sheet.headings)
-    lines = ["<tr>" + "".join(f"<td>{_cell(c)}</td>" for c in row) + "</tr>" for row in sheet.cells]
-    note = f'<p class="note">{html.escape(sheet.note)}.</p>' if sheet.note else ""
+def _table(table: Table) -> str:
+    head = "".join(f"<th>{html.escape(cell)}</th>" for cell in table.headings)
+    lines = ["<tr>" + "".join(f"<td>{_cell(c)}</td>" for c in row) + "</tr>" for row in table.cells]
+    note = f'<p class="note">{html.escape(table.note)}.</p>' if table.note else ""
     return (
-        f"<h2>{html.escape(sheet.title)}</h2>\n"
+        f"<h2>{html.escape(table.title)}</h2>\n"
         f'<div class="scroll"><table><thead><tr>{head}</tr></thead>\n<tbody>'
         + "\n".join(lines)
         + f"</tbody></table></div>{note}"
@@ -111,14 +111,14 @@ def _figure(caption: str, path: Path) -> str:
     )
 
 
-def _listing(results: Results) -> str:
+def _listing(run: RunRecord) -> str:
     """Jobs that failed, then episodes without success."""
-    failed = [row for row in results.rows if row.failed]
-    missed = [row for row in results.rows if not row.failed and not row.success]
+    failed = [row for row in run.rows if row.failed]
+    missed = [row for row in run.rows if not row.failed and not row.success]
     if not failed and not missed:
         return "<h2>Failures</h2>\n<p>None: every episode ended in success.</p>"
     chosen = (failed + missed)[:LISTED]
-    rows = "\n".join(_row(row, results.path) for row in chosen)
+    rows = "\n".join(_row(row, run.path) for row in chosen)
     more = len(failed) + len(missed) - len(chosen)
     rest = f"<p>{more} more are in results.csv.</p>" if more else ""
     return (

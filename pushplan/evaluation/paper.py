@@ -10,15 +10,15 @@ from typing import Any
 
 from pushplan.evaluation.batch import Progress, run_batch
 from pushplan.evaluation.benchmark import Given
-from pushplan.evaluation.fitness import UnusablePolicyError, misfit, read_policies
+from pushplan.evaluation.compatibility import UnusablePolicyError, incompatibility, read_policies
 from pushplan.evaluation.jobs import Job, JobSettings, file_stem
-from pushplan.evaluation.paper_tables import overview, paper_sheet, preface, training_cost
+from pushplan.evaluation.paper_tables import overview, paper_table, preface, training_cost
 from pushplan.evaluation.policies import PolicySpec, policy_names
 from pushplan.evaluation.published import PublishedTable, chosen_tables
 from pushplan.evaluation.results import Results
 from pushplan.evaluation.rows import ResultRow, setting_of
-from pushplan.evaluation.sheets import Sheet, markdown, text
 from pushplan.evaluation.store import write_atomic
+from pushplan.evaluation.tables import Table, markdown, text
 from pushplan.metrics import compute
 from pushplan.world import Episode
 
@@ -32,38 +32,38 @@ class Comparison:
 
     Args:
         results: of all suites.
-        tables: what the paper says, one for each suite.
-        misfits: (suite, policy) -> why it was not run.
+        published: what the paper says, one for each suite.
+        incompatible: (suite, policy) -> why it was not run.
         to_goal_point: (policy, scenario, seed) -> E_nav in the convention of the paper.
         training: label of a network -> what its training took.
         command: what gives the same again, if known.
     """
 
     results: Results
-    tables: tuple[PublishedTable, ...]
-    misfits: Mapping[tuple[str, str], str]
+    published: tuple[PublishedTable, ...]
+    incompatible: Mapping[tuple[str, str], str]
     to_goal_point: Mapping[tuple[str, str, int], float]
     training: Mapping[str, str]
     command: str = ""
 
-    def sheets(self) -> list[Sheet]:
+    def tables(self) -> list[Table]:
         """An overview, then one table a suite: the paper's policies, then ours."""
-        rows = [self._rows(table) for table in self.tables]
-        return [overview(self.tables, rows), *(self._sheet(table) for table in self.tables)]
+        rows = [self._rows(table) for table in self.published]
+        return [overview(self.published, rows), *(self._table(table) for table in self.published)]
 
     def table(self, width: int = 160) -> str:
         """The tables as text."""
-        return text(self.sheets(), width)
+        return text(self.tables(), width)
 
     def markdown(self) -> str:
         """The tables as a Markdown document."""
-        return f"{preface(self.results, self.command)}\n{markdown(self.sheets())}"
+        return f"{preface(self.results, self.command)}\n{markdown(self.tables())}"
 
     def _rows(self, table: PublishedTable) -> list[ResultRow]:
         setting = _setting(table)
         return [row for row in self.results.rows if row.setting == setting]
 
-    def _sheet(self, table: PublishedTable) -> Sheet:
+    def _table(self, table: PublishedTable) -> Table:
         rows = self._rows(table)
         points = {
             policy: [
@@ -74,8 +74,10 @@ class Comparison:
             ]
             for policy in self.results.policies
         }
-        unfit = {name: why for (suite, name), why in self.misfits.items() if suite == table.suite}
-        return paper_sheet(table, rows, self.results.policies, points, self.training, unfit)
+        unfit = {
+            name: why for (suite, name), why in self.incompatible.items() if suite == table.suite
+        }
+        return paper_table(table, rows, self.results.policies, points, self.training, unfit)
 
 
 def bench_paper(
@@ -113,9 +115,9 @@ def bench_paper(
     settings = JobSettings(timeout_s=timeout_s)
     scenarios = {table.suite: _scenarios(table, episodes, seed) for table in tables}
     specs = read_policies(list(policy_names()) if policies is None else policies)
-    misfits = _misfits(specs, scenarios, settings)
+    incompatible = _incompatible(specs, scenarios, settings)
     for spec in specs if policies is not None else ():
-        reasons = [misfits.get((table.suite, spec.label)) for table in tables]
+        reasons = [incompatible.get((table.suite, spec.label)) for table in tables]
         if all(reasons):
             raise UnusablePolicyError(f"policy {spec.label!r} fits no chosen suite: {reasons[0]}")
     jobs = [
@@ -123,7 +125,7 @@ def bench_paper(
         for suite, starts in scenarios.items()
         for scenario in starts
         for spec in specs
-        if (suite, spec.label) not in misfits
+        if (suite, spec.label) not in incompatible
     ]
     with tempfile.TemporaryDirectory(prefix="pushplan-") as temporary:
         folder = Path(temporary if out is None else out)
@@ -140,7 +142,7 @@ def bench_paper(
         results = _chosen(Results.load(folder), jobs, None if out is None else folder)
         points = _to_goal_point(results.rows, folder)
     training = {spec.label: training_cost(spec.network) for spec in specs if spec.network}
-    comparison = Comparison(results, tables, misfits, points, training, command)
+    comparison = Comparison(results, tables, incompatible, points, training, command)
     if out is not None:
         write_atomic(folder / "paper.md", comparison.markdown().encode())
     return comparison
@@ -157,7 +159,7 @@ def _setting(table: PublishedTable) -> str:
     return setting_of(first.key, first.seed)
 
 
-def _misfits(
+def _incompatible(
     specs: Sequence[PolicySpec], scenarios: Mapping[str, Sequence[Any]], settings: JobSettings
 ) -> dict[tuple[str, str], str]:
     """(suite, label) -> why; suites of one task, preset and simulator differ in nothing here."""
@@ -168,7 +170,7 @@ def _misfits(
         for spec in specs:
             kind = (spec.label, first.task, first.preset, first.simulator)
             if kind not in known:
-                known[kind] = misfit(spec, first, settings)
+                known[kind] = incompatibility(spec, first, settings)
             reason = known[kind]
             if reason is not None:
                 found[suite, spec.label] = reason

@@ -12,11 +12,12 @@ from pathlib import Path
 import pushplan
 from pushplan.evaluation.published import ENOUGH, SETTINGS, PublishedRow, PublishedTable, Score
 from pushplan.evaluation.results import Results
-from pushplan.evaluation.rows import SCORES, ResultRow
-from pushplan.evaluation.sheets import Sheet
+from pushplan.evaluation.rows import ResultRow
 from pushplan.evaluation.statistics import Estimate, estimate, wilson
 from pushplan.evaluation.summary import policies_of, values_of
+from pushplan.evaluation.tables import Table
 from pushplan.learned.onnx_policy import read_specification
+from pushplan.metrics import Role, metric_names
 from pushplan.world import InvalidInputError
 
 _POINT = "E_nav to goal point"
@@ -58,7 +59,7 @@ nothing. The paper gives no success in navigation; E_nav is 0 without it.
 """
 
 
-def overview(tables: Sequence[PublishedTable], rows: Sequence[Sequence[ResultRow]]) -> Sheet:
+def overview(tables: Sequence[PublishedTable], rows: Sequence[Sequence[ResultRow]]) -> Table:
     """Who of ours is above the best of the paper in every score at once.
 
     Args:
@@ -67,7 +68,11 @@ def overview(tables: Sequence[PublishedTable], rows: Sequence[Sequence[ResultRow
     """
     cells = []
     for table, ours in zip(tables, rows, strict=True):
-        best = {name: value for name in SCORES if (value := table.best(name)) is not None}
+        best = {
+            name: value
+            for name in metric_names(Role.SCORE)
+            if (value := table.best(name)) is not None
+        }
         if not best:
             continue
         winners = []
@@ -81,17 +86,17 @@ def overview(tables: Sequence[PublishedTable], rows: Sequence[Sequence[ResultRow
         said = ", ".join(f"{name} {value:g}" for name, value in best.items())
         cells.append((table.suite, table.statistic, said, "\n".join(winners) or "none"))
     headings = ("suite", "of", "the paper's best of each score", "ours with ▲ in all of them")
-    return Sheet("In short", headings, tuple(cells), "With E_nav, not E_nav to goal point")
+    return Table("In short", headings, tuple(cells), "With E_nav, not E_nav to goal point")
 
 
-def paper_sheet(
+def paper_table(
     table: PublishedTable,
     rows: Sequence[ResultRow],
     policies: Sequence[str],
     points: Mapping[str, Sequence[float]],
     training: Mapping[str, str],
-    misfits: Mapping[str, str],
-) -> Sheet:
+    incompatible: Mapping[str, str],
+) -> Table:
     """One table.
 
     Args:
@@ -100,7 +105,7 @@ def paper_sheet(
         policies: labels in the order of the rows.
         points: label -> E_nav of each episode with l0* to the goal's centre.
         training: label of a network -> what its training took.
-        misfits: label -> why a policy was not run here.
+        incompatible: label -> why a policy was not run here.
     """
     names = _columns(table, rows)
     headings = ("policy", "runs", "success", *names, "time a step [ms]", "training")
@@ -112,22 +117,22 @@ def paper_sheet(
     # a network of this task and preset is looked for here; what is for others fits on a line
     near = {
         label: why
-        for label, why in misfits.items()
+        for label, why in incompatible.items()
         if label in training and not why.startswith(("made for task", "made for preset"))
     }
     blank = [""] * (len(headings) - 2)
     for label, why in near.items():
         cells.append((label, f"not run: {why}", *blank))
-    return Sheet(
+    return Table(
         f"{table.title} (`{table.suite}`)",
         headings,
         tuple(cells),
-        _note(table, [label for label in misfits if label not in near]),
+        _note(table, [label for label in incompatible if label not in near]),
     )
 
 
 def _columns(table: PublishedTable, rows: Sequence[ResultRow]) -> list[str]:
-    names = [n for n in SCORES if values_of(rows, n) or table.best(n) is not None]
+    names = [n for n in metric_names(Role.SCORE) if values_of(rows, n) or table.best(n) is not None]
     if table.task == "maze":  # the goal is a disc: l0* has two conventions
         names.insert(names.index("E_nav") + 1, _POINT)
     return names
@@ -171,7 +176,7 @@ def _counts(label: str, rows: Sequence[ResultRow]) -> tuple[str, str, str]:
     return (
         label,
         str(len(rows)) + (f"\n{failed} failed" if failed else ""),
-        f"{rate.share:.2f}\n[{rate.low:.2f}, {rate.high:.2f}]",
+        f"{rate.fraction:.2f}\n[{rate.low:.2f}, {rate.high:.2f}]",
     )
 
 

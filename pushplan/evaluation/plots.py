@@ -13,12 +13,13 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from pushplan.evaluation.jobs import file_stem
-from pushplan.evaluation.results import Results
-from pushplan.evaluation.rows import SCORES, ResultRow
-from pushplan.evaluation.sheets import HEADINGS
+from pushplan.evaluation.rows import ResultRow
+from pushplan.evaluation.run_record import RunRecord
 from pushplan.evaluation.statistics import estimate
 from pushplan.evaluation.store import write_atomic
 from pushplan.evaluation.summary import values_of
+from pushplan.evaluation.tables import heading
+from pushplan.metrics import Role, metric_names
 
 # Okabe and Ito's colours, told apart by colour-blind readers too
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000", "#8C6D31")
@@ -28,7 +29,7 @@ PANEL = (4.6, 3.9)
 _DPI = 130
 
 
-def write_plots(results: Results, folder: Path) -> dict[str, Path]:
+def write_plots(run: RunRecord, folder: Path) -> dict[str, Path]:
     """Draw everything that the rows allow.
 
     Returns:
@@ -36,9 +37,9 @@ def write_plots(results: Results, folder: Path) -> dict[str, Path]:
     """
     plots: dict[str, Path] = {}
     for kind, drawn in (
-        ("Efficiency against effort", _tradeoff(results)),
-        ("Scores of every episode", _spread(results)),
-        ("Time of a planning call", _planning_time(results)),
+        ("Efficiency against effort", _tradeoff(run)),
+        ("Scores of every episode", _spread(run)),
+        ("Time of a planning call", _planning_time(run)),
     ):
         if drawn is not None:
             name, figure = drawn
@@ -47,13 +48,13 @@ def write_plots(results: Results, folder: Path) -> dict[str, Path]:
     return plots
 
 
-def _tradeoff(results: Results) -> tuple[str, Figure] | None:
+def _tradeoff(run: RunRecord) -> tuple[str, Figure] | None:
     """E against I: one dot an episode, the mean with its intervals."""
 
     def draw(axes: Any, rows: Sequence[ResultRow]) -> None:
         kind = "nav" if values_of(rows, "E_nav") else "manip"
         names = (f"I_{kind}", f"E_{kind}")
-        for i, label in enumerate(results.policies):
+        for i, label in enumerate(run.policies):
             mine = [r for r in rows if r.policy == label]
             points = [
                 (x, y)
@@ -88,29 +89,29 @@ def _tradeoff(results: Results) -> tuple[str, Figure] | None:
         axes.set_xlim(right=1.02)
         axes.set_ylim(top=max(1.03, axes.get_ylim()[1]))
 
-    if not any(values_of(results.rows, name) for name in ("I_nav", "I_manip")):
+    if not any(values_of(run.rows, name) for name in ("I_nav", "I_manip")):
         return None
-    return "tradeoff.png", _panels(results, draw, legend=True)
+    return "tradeoff.png", _panels(run, draw, legend=True)
 
 
-def _spread(results: Results) -> tuple[str, Figure] | None:
+def _spread(run: RunRecord) -> tuple[str, Figure] | None:
     """A box and all dots for each policy, one row of panels a metric."""
-    metrics = [name for name in (*SCORES, "interaction_work_kg_m") if values_of(results.rows, name)]
+    metrics = [name for name in metric_names(Role.SCORE, Role.DETAIL) if values_of(run.rows, name)]
     if not metrics:
         return None
-    settings = list(results.titles)
+    settings = list(run.titles)
     figure = Figure(figsize=(PANEL[0] * len(settings), 2.6 * len(metrics) + 0.4))
     grid = figure.subplots(len(metrics), len(settings), squeeze=False)
     rng = np.random.default_rng(0)
     for column, setting in enumerate(settings):
-        rows = _rows_of(results, setting)
+        rows = run.rows_of(setting)
         for line, name in enumerate(metrics):
             axes = grid[line][column]
-            _boxes(axes, results.policies, rows, name, rng)
+            _boxes(axes, run.policies, rows, name, rng)
             if line == 0:
-                axes.set_title(results.titles[setting], fontsize=9)
+                axes.set_title(run.titles[setting], fontsize=9)
             if column == 0:
-                axes.set_ylabel(HEADINGS[name])
+                axes.set_ylabel(heading(name))
             if line < len(metrics) - 1:
                 axes.tick_params(labelbottom=False)
     figure.tight_layout()
@@ -150,43 +151,43 @@ def _boxes(
     _quiet(axes)
 
 
-def _planning_time(results: Results) -> tuple[str, Figure] | None:
+def _planning_time(run: RunRecord) -> tuple[str, Figure] | None:
     """Share of planning calls that took at most so long."""
-    if not values_of(results.rows, "plan_time_median_s"):
+    if not values_of(run.rows, "plan_time_median_s"):
         return None
 
     def draw(axes: Any, rows: Sequence[ResultRow]) -> None:
-        for i, label in enumerate(results.policies):
+        for i, label in enumerate(run.policies):
             mine = [r for r in rows if r.policy == label and r.plan_time_max_s is not None]
-            times = np.sort(np.concatenate([_calls(results, row) for row in mine] or [[]]))
+            times = np.sort(np.concatenate([_calls(run, row) for row in mine] or [[]]))
             if len(times) == 0:
                 continue
-            shares = np.arange(1, len(times) + 1) / len(times)
+            fractions = np.arange(1, len(times) + 1) / len(times)
             text = f"{label} ({len(times)} calls)"
-            axes.step(1e3 * times, shares, where="post", color=COLOURS[i % 8], label=text)
+            axes.step(1e3 * times, fractions, where="post", color=COLOURS[i % 8], label=text)
         axes.set_xscale("log")
         axes.xaxis.set_major_formatter("{x:g}")
         axes.set_ylim(0.0, 1.02)
         axes.set_xlabel("time of a planning call [ms]")
-        axes.set_ylabel("share of calls")
+        axes.set_ylabel("fraction of calls")
 
-    return "planning_time.png", _panels(results, draw, legend=True)
+    return "planning_time.png", _panels(run, draw, legend=True)
 
 
-def _calls(results: Results, row: ResultRow) -> Any:
+def _calls(run: RunRecord, row: ResultRow) -> Any:
     """Times of all planning calls of an episode [s], from its trace where there is one."""
     stem = file_stem(row.policy, row.scenario, row.seed)
-    if results.path is not None and (path := results.path / "episodes" / f"{stem}.npz").is_file():
+    if run.path is not None and (path := run.path / "episodes" / f"{stem}.npz").is_file():
         with np.load(path, allow_pickle=False) as data:
             return np.maximum(data["plan_times_s"], 1e-6)
     return np.array([row.plan_time_median_s, row.plan_time_max_s])
 
 
 def _panels(
-    results: Results, draw: Callable[[Any, Sequence[ResultRow]], None], *, legend: bool
+    run: RunRecord, draw: Callable[[Any, Sequence[ResultRow]], None], *, legend: bool
 ) -> Figure:
     """One panel a setting."""
-    settings = list(results.titles)
+    settings = list(run.titles)
     columns = min(3, len(settings))
     lines = math.ceil(len(settings) / columns)
     figure = Figure(figsize=(max(5.6, PANEL[0] * columns), PANEL[1] * lines + 0.5))
@@ -194,8 +195,8 @@ def _panels(
     for axes in grid[len(settings) :]:
         axes.set_visible(False)
     for axes, setting in zip(grid, settings, strict=False):
-        draw(axes, _rows_of(results, setting))
-        axes.set_title(results.titles[setting], fontsize=9)
+        draw(axes, run.rows_of(setting))
+        axes.set_title(run.titles[setting], fontsize=9)
         _quiet(axes)
     if legend:
         found = dict[str, Any]()
@@ -212,10 +213,6 @@ def _panels(
         )
         figure.set_layout_engine("constrained")
     return figure
-
-
-def _rows_of(results: Results, setting: str) -> list[ResultRow]:
-    return [row for row in results.rows if row.setting == setting]
 
 
 def _quiet(axes: Any) -> None:

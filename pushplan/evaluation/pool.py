@@ -52,7 +52,7 @@ class WorkerOverranError(WorkerDiedError):
 
 
 @dataclass
-class _Call:
+class _Submission:
     future: Future[Any]
     payload: bytes
 
@@ -63,7 +63,7 @@ class _Worker:
     connection: Connection
     log: Path | None
     ready: bool = False
-    call: _Call | None = None
+    call: _Submission | None = None
     since: float = 0.0
     log_start: int = 0
 
@@ -111,7 +111,7 @@ class WorkerPool(Executor):
             memory_limit_mb=memory_limit_mb,
             trace_after_s=limit_s,
         )
-        self._queue: deque[_Call] = deque()
+        self._queue: deque[_Submission] = deque()
         self._workers: list[_Worker] = []
         self._lock = threading.Lock()
         self._closing = False
@@ -125,7 +125,7 @@ class WorkerPool(Executor):
 
     def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
         """Queue one call. Arguments and result have to be picklable."""
-        call = _Call(Future(), pickle.dumps((fn, args, kwargs)))
+        call = _Submission(Future(), pickle.dumps((fn, args, kwargs)))
         with self._lock:
             if self._closing:
                 raise RuntimeError("cannot submit to a pool that has been shut down")

@@ -10,7 +10,7 @@ from typing import Any
 
 import yaml
 
-from pushplan.evaluation.rows import SCORES
+from pushplan.metrics import Role, metric_names
 from pushplan.world import InvalidInputError, UnknownNameError
 
 SETTINGS = {"paper": "paper", "robot": "paper, physical robot", "code": "the paper's code"}
@@ -131,7 +131,7 @@ def chosen_tables(only: str | Sequence[str] | None = None) -> tuple[PublishedTab
 
 def _row(data: Mapping[str, Any], episodes: Mapping[str, int]) -> PublishedRow:
     scores = {}
-    for name in ("success", *SCORES):
+    for name in ("success", *metric_names(Role.SCORE)):
         if name in data:
             given = data[name]
             scores[name] = Score(*given) if isinstance(given, list) else Score(float(given))

@@ -9,19 +9,19 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from pushplan.evaluation.plots import COLOURS
-from pushplan.planners.pushing.log import PushLog
+from pushplan.planners.pushing.push_log import PushLog
 from pushplan.world import InvalidInputError
 from pushplan.world.checks import FloatArray
 
 
 def push_figure(logs: PushLog | Mapping[str, PushLog], safe: float = 0.6) -> Figure:
-    """Offset on the bumper, angle against it, and unused share of the friction cone.
+    """Offset on the bumper, angle against it, and unused fraction of the friction cone.
 
     Save it with ``figure.savefig(path)``. Lines are interrupted while the box is not pushed.
 
     Args:
         logs: one push, or several by name.
-        safe: share of half the bumper that is shaded, see `PushingConfig.safe`.
+        safe: fraction of half the bumper that is shaded, see `PushingConfig.safe`.
 
     Raises:
         InvalidInputError: if there is no push to draw.

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import enum
 from collections.abc import Mapping
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
 import numpy as np
 
-from pushplan.metrics import compute, metric_names
+from pushplan.envs.registry import goal_kind
+from pushplan.metrics import METRICS, Role, compute, metric_names
 from pushplan.world import Episode
 
 
@@ -34,7 +35,10 @@ class Status(enum.StrEnum):
 
 @dataclass(frozen=True)
 class ResultRow:
-    """The columns of ``results.csv``, in order; None is an empty field.
+    """One line of ``results.csv``; None is an empty field.
+
+    Each registered metric (`pushplan.metrics.METRICS`) that is a column is an attribute, such as
+    ``row.E_nav``: its value, or None where it has none.
 
     Attributes:
         policy: label of the policy.
@@ -45,15 +49,7 @@ class ResultRow:
         status: a value of `Status`.
         reason: why the episode ended; for a failed job what went wrong.
         success: whether the task's goal was reached.
-        E_nav: efficiency of navigation; 0 for a job that failed.
-        I_nav: effort of navigation.
-        S_manip: success of manipulation; 0 for a job that failed.
-        E_manip: efficiency of manipulation; 0 for a job that failed.
-        I_manip: effort of manipulation.
-        path_length_m: length of the robot's path [m].
-        interaction_work_kg_m: sum of object mass times path length [kg m].
-        steps: actions sent to the environment.
-        sim_time_s: simulated time [s].
+        metrics: values by name; a metric without a value is left out.
         wall_time_s: time that the episode took [s].
         plan_calls: planning calls; empty for a policy that keeps no log of them.
         plan_time_median_s: of the planning calls [s].
@@ -74,15 +70,7 @@ class ResultRow:
     status: str
     reason: str
     success: bool
-    E_nav: float | None = None
-    I_nav: float | None = None
-    S_manip: float | None = None
-    E_manip: float | None = None
-    I_manip: float | None = None
-    path_length_m: float | None = None
-    interaction_work_kg_m: float | None = None
-    steps: int | None = None
-    sim_time_s: float | None = None
+    metrics: Mapping[str, float] = field(default_factory=dict, hash=False)
     wall_time_s: float | None = None
     plan_calls: int | None = None
     plan_time_median_s: float | None = None
@@ -91,6 +79,18 @@ class ResultRow:
     decision_time_median_s: float | None = None
     decision_time_mean_s: float | None = None
     decision_time_max_s: float | None = None
+
+    def __getattr__(self, name: str) -> float | None:
+        if name not in METRICS:
+            raise AttributeError(f"a ResultRow has no column {name!r}")
+        return self.metrics.get(name)
+
+    @classmethod
+    def from_columns(cls, values: Mapping[str, Any]) -> ResultRow:
+        """The row with these values by column."""
+        metrics = {n: v for n, v in values.items() if n in METRICS and n not in _OWN}
+        rest = {n: v for n, v in values.items() if n not in metrics}
+        return cls(**rest, metrics={n: v for n, v in metrics.items() if v is not None})
 
     @property
     def setting(self) -> str:
@@ -103,23 +103,18 @@ class ResultRow:
         return self.status != Status.DONE
 
 
-COLUMNS = tuple(field.name for field in fields(ResultRow))
+_OWN = tuple(item.name for item in fields(ResultRow))
 TIMING_COLUMNS = tuple(
-    name for name in COLUMNS if name.startswith(("wall_time", "plan_time", "decision_time"))
+    name for name in _OWN if name.startswith(("wall_time", "plan_time", "decision_time"))
 )
 """Columns that differ from run to run."""
 
-SCORES = ("E_nav", "I_nav", "S_manip", "E_manip", "I_manip")
-_SCORED = (*SCORES, "path_length_m", "interaction_work_kg_m", "steps", "sim_time_s")
-_SCORED_NAMES = tuple(name for name in _SCORED if name in metric_names())
-_COUNTED = ("steps", "sim_time_s")
-_ZEROED = {
-    "maze": ("E_nav",),
-    "ship_ice": ("E_nav",),
-    "box_delivery": ("S_manip", "E_manip"),
-    "area_clearing": ("S_manip", "E_manip"),
-}
-"""Scores that are 0, and not missing, for a job that failed; else failures would raise the mean."""
+
+def columns() -> tuple[str, ...]:
+    """Names of the columns of ``results.csv``, in order: each metric that is one among them."""
+    at = _OWN.index("metrics")
+    shown = metric_names(Role.SCORE, Role.DETAIL, Role.FACT)
+    return (*_OWN[:at], *shown, *_OWN[at + 1 :])
 
 
 def setting_of(scenario: str, seed: int) -> str:
@@ -129,7 +124,12 @@ def setting_of(scenario: str, seed: int) -> str:
 
 def blank_row(policy: str, scenario: Any, status: Status, reason: str) -> ResultRow:
     """The row of a job of which nothing was recorded."""
-    zeroed: dict[str, Any] = dict.fromkeys(_ZEROED.get(str(scenario.task), ()), 0.0)
+    kind = goal_kind(str(scenario.task))
+    zeroed = {
+        name: metric.if_failed
+        for name, metric in METRICS.items()
+        if metric.if_failed is not None and metric.goal in (kind, None)
+    }
     return ResultRow(
         policy=policy,
         task=str(scenario.task),
@@ -139,7 +139,7 @@ def blank_row(policy: str, scenario: Any, status: Status, reason: str) -> Result
         status=str(status),
         reason=reason,
         success=False,
-        **zeroed,
+        metrics=zeroed,
     )
 
 
@@ -152,13 +152,15 @@ def scored_row(row: ResultRow, episode: Episode, plan_calls: int | None) -> Resu
         plan_calls: how many planning calls the policy logged; None if it keeps no log.
     """
     # what a policy did until it failed says nothing about its scores
-    names = _COUNTED if row.failed else _SCORED_NAMES
-    values: dict[str, Any] = dict(compute(episode, names))
-    if "steps" in values:
-        values["steps"] = int(values["steps"])
+    shown = metric_names(Role.SCORE, Role.DETAIL, Role.FACT)
+    names = [name for name in shown if METRICS[name].until_failure or not row.failed]
+    found = {
+        name: int(value) if METRICS[name].whole else value
+        for name, value in compute(episode, names).items()
+    }
     success = episode.success and not row.failed
     times = {**_plan_times(episode, plan_calls), **_decision_times(episode)}
-    return replace(row, success=success, **values, **times)
+    return replace(row, success=success, metrics={**row.metrics, **found}, **times)
 
 
 def _plan_times(episode: Episode, plan_calls: int | None) -> Mapping[str, Any]:

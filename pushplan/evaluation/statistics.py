@@ -7,13 +7,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import ndtr, ndtri
 
 from pushplan.world import InvalidInputError, stream
 from pushplan.world.checks import FloatArray, array
 
 RESAMPLES = 9999
-_CHUNK = 2_000_000
+_BATCH = 2_000_000  # values drawn at a time
 
 
 @dataclass(frozen=True)
@@ -41,10 +40,10 @@ class Estimate:
 
 @dataclass(frozen=True)
 class Proportion:
-    """A share of successes with its Wilson 95 % interval."""
+    """A fraction of successes with its Wilson 95 % interval."""
 
     count: int
-    share: float
+    fraction: float
     low: float
     high: float
 
@@ -87,17 +86,18 @@ def bootstrap_interval(
     mean = float(sample.mean())
     if np.ptp(sample) <= 1e-12 * max(1.0, abs(mean)):
         return mean, mean
-    means = _resampled_means(sample, resamples)
-    below = (np.sum(means < mean) + 0.5 * np.sum(means == mean)) / resamples
-    bias = float(ndtri(np.clip(below, 1.0 / resamples, 1.0 - 1.0 / resamples)))
-    # jackknife: leaving value i out moves the mean by (mean - value i) / (n - 1)
-    gaps = sample - mean
-    acceleration = float((gaps**3).sum() / (6.0 * (gaps**2).sum() ** 1.5))
-    tails = ndtri(np.array([(1.0 - level) / 2.0, (1.0 + level) / 2.0]))
-    shifted = bias + tails
-    shares = ndtr(bias + shifted / (1.0 - acceleration * shifted))
-    low, high = np.quantile(means, shares)
-    return float(low), float(high)
+    from scipy import stats  # takes a second to import, and only tables need it
+
+    found = stats.bootstrap(
+        (sample,),
+        np.mean,
+        n_resamples=resamples,
+        confidence_level=level,
+        method="BCa",
+        batch=max(1, _BATCH // len(sample)),
+        random_state=stream(0, "bootstrap"),
+    )
+    return float(found.confidence_interval.low), float(found.confidence_interval.high)
 
 
 def wilson(successes: int, count: int, *, z: float = 1.959963984540054) -> Proportion:
@@ -108,21 +108,12 @@ def wilson(successes: int, count: int, *, z: float = 1.959963984540054) -> Propo
     """
     if not 0 <= successes <= count or count == 0:
         raise InvalidInputError(f"need 0 <= successes <= trials > 0, got {successes} of {count}")
-    share = successes / count
+    fraction = successes / count
     scale = 1.0 + z * z / count
-    centre = (share + z * z / (2.0 * count)) / scale
-    half = z / scale * math.sqrt(share * (1.0 - share) / count + z * z / (4.0 * count * count))
+    centre = (fraction + z * z / (2.0 * count)) / scale
+    half = (
+        z / scale * math.sqrt(fraction * (1.0 - fraction) / count + z * z / (4.0 * count * count))
+    )
     low = 0.0 if successes == 0 else centre - half
     high = 1.0 if successes == count else centre + half
-    return Proportion(count, share, low, high)
-
-
-def _resampled_means(sample: FloatArray, resamples: int) -> FloatArray:
-    rng = stream(0, "bootstrap")
-    step = max(1, _CHUNK // len(sample))
-    parts = [
-        sample[rng.integers(0, len(sample), (min(step, resamples - k), len(sample)))].mean(axis=1)
-        for k in range(0, resamples, step)
-    ]
-    means: FloatArray = np.concatenate(parts)
-    return means
+    return Proportion(count, fraction, low, high)

@@ -15,12 +15,19 @@ from types import TracebackType
 from typing import Any
 
 from pushplan.evaluation.jobs import file_stem
-from pushplan.evaluation.rows import COLUMNS, ResultRow, Status
+from pushplan.evaluation.rows import ResultRow, Status, columns
+from pushplan.metrics import METRICS
 from pushplan.world import InvalidInputError, SchemaError
 
 SCHEMA = "pushplan-run/1"
+DATABASE = "results.db"
+REPORT = (
+    *("report.html", "summary.md", "summary.csv", "differences.csv"),
+    *("tradeoff.png", "scores.png", "planning_time.png"),
+)
+"""Files that `Results.report` derives from the rows, beside ``results.csv``."""
 _TYPES = dict.fromkeys(("policy", "task", "simulator", "scenario", "status", "reason"), "TEXT")
-_TYPES |= dict.fromkeys(("seed", "success", "steps", "plan_calls"), "INTEGER")
+_TYPES |= dict.fromkeys(("seed", "success", "plan_calls"), "INTEGER")
 
 
 class RunDirectory:
@@ -49,17 +56,18 @@ class RunDirectory:
             raise InvalidInputError(f"another process is writing into {path}") from error
         for leftover in [*self.path.glob("*.tmp"), *self.episodes.glob("*.tmp")]:
             leftover.unlink()
-        self._db = _connect(self.path / "results.db")
-        columns = ", ".join(f'"{name}" {_TYPES.get(name, "REAL")}' for name in COLUMNS)
+        self._db = _connect(self.path / DATABASE)
+        names = columns()
+        kinds = ", ".join(f'"{name}" {_type(name)}' for name in names)
         with self._db:
             self._db.execute(
-                f"CREATE TABLE IF NOT EXISTS results ({columns}, "
+                f"CREATE TABLE IF NOT EXISTS results ({kinds}, "
                 "PRIMARY KEY (policy, scenario, seed)) WITHOUT ROWID"
             )
             self._db.execute("CREATE TABLE IF NOT EXISTS about (key TEXT PRIMARY KEY, value TEXT)")
-            for name in COLUMNS:  # a run that an earlier version began
+            for name in names:  # a run that an earlier version began
                 if name not in _columns(self._db):
-                    self._db.execute(f'ALTER TABLE results ADD COLUMN "{name}" REAL')
+                    self._db.execute(f'ALTER TABLE results ADD COLUMN "{name}" {_type(name)}')
 
     def __enter__(self) -> RunDirectory:
         return self
@@ -135,9 +143,9 @@ class RunDirectory:
             write_atomic(self.episodes / f"{stem}.npz", trace)
         if detail:
             write_atomic(self.failures / f"{stem}.txt", detail.encode(errors="replace"))
-        marks = ", ".join("?" * len(COLUMNS))
-        names = ", ".join(f'"{name}"' for name in COLUMNS)
-        values = [getattr(row, name) for name in COLUMNS]
+        marks = ", ".join("?" * len(columns()))
+        names = ", ".join(f'"{name}"' for name in columns())
+        values = [getattr(row, name) for name in columns()]
         with self._db:
             self._db.execute(f"INSERT OR REPLACE INTO results ({names}) VALUES ({marks})", values)
 
@@ -151,9 +159,13 @@ class RunDirectory:
         return read_rows(self._db)
 
     def write_csv(self) -> Path:
-        """Write ``results.csv`` from the database, sorted, all at once."""
+        """Write ``results.csv`` from the database; a report of other rows is removed."""
         path = self.path / "results.csv"
-        write_atomic(path, csv_text(self.rows()).encode())
+        text = csv_text(self.rows()).encode()
+        if not path.is_file() or path.read_bytes() != text:
+            for name in REPORT:
+                (self.path / name).unlink(missing_ok=True)
+            write_atomic(path, text)
         return path
 
     def close(self) -> None:
@@ -170,7 +182,7 @@ def open_results(path: str | Path) -> tuple[list[ResultRow], Mapping[str, Any]]:
     Raises:
         InvalidInputError: if there are no results.
     """
-    file = Path(path) / "results.db"
+    file = Path(path) / DATABASE
     if not file.is_file():
         raise InvalidInputError(f"{path} holds no results: there is no {file.name} in it")
     db = _connect(file)
@@ -184,15 +196,20 @@ def open_results(path: str | Path) -> tuple[list[ResultRow], Mapping[str, Any]]:
 
 def read_rows(db: sqlite3.Connection) -> list[ResultRow]:
     """All rows of a database, sorted; a column that it lacks is empty."""
-    there = [name for name in COLUMNS if name in _columns(db)]
+    there = [name for name in columns() if name in _columns(db)]
     names = ", ".join(f'"{name}"' for name in there)
     query = f"SELECT {names} FROM results ORDER BY policy, task, simulator, seed, scenario"
     rows = []
     for values in db.execute(query):
         data = dict(zip(there, values, strict=True))
         data["success"] = bool(data["success"])
-        rows.append(ResultRow(**data))
+        rows.append(ResultRow.from_columns(data))
     return rows
+
+
+def _type(column: str) -> str:
+    whole = column in METRICS and METRICS[column].whole
+    return _TYPES.get(column, "INTEGER" if whole else "REAL")
 
 
 def _columns(db: sqlite3.Connection) -> set[str]:
@@ -211,9 +228,9 @@ def csv_text(rows: Iterable[ResultRow]) -> str:
     """The rows as CSV with a header; floats are written so that they read back the same."""
     buffer = io.StringIO()
     writer = csv.writer(buffer, lineterminator="\n")
-    writer.writerow(COLUMNS)
+    writer.writerow(columns())
     for row in rows:
-        writer.writerow([_cell(getattr(row, name)) for name in COLUMNS])
+        writer.writerow([_cell(getattr(row, name)) for name in columns()])
     return buffer.getvalue()
 
 

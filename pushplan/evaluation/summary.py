@@ -8,10 +8,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pushplan.evaluation.rows import SCORES, ResultRow
+from pushplan.evaluation.rows import ResultRow
 from pushplan.evaluation.statistics import Estimate, Proportion, estimate, wilson
+from pushplan.metrics import METRICS, Role, metric_names
 
-METRICS = (*SCORES, "path_length_m", "interaction_work_kg_m", "sim_time_s")
 TIMINGS = (
     "plan_time_median_s",
     "plan_time_max_s",
@@ -20,7 +20,6 @@ TIMINGS = (
     "decision_time_max_s",
     "wall_time_s",
 )
-PAIRED = (*SCORES, "interaction_work_kg_m", "path_length_m")
 
 
 @dataclass(frozen=True)
@@ -32,7 +31,7 @@ class PolicySummary:
         policy: label.
         episodes: number of rows.
         failed: rows that did not end by the rules of the task.
-        success: share of successes; failed rows count as none.
+        success: fraction of successes; failed rows count as none.
         metrics: estimate of each column that has values.
     """
 
@@ -54,8 +53,9 @@ class PairedDifference:
         first: label of one policy.
         second: label of the other.
         difference: of second minus first, over the scenarios where both have a value.
-        wins: scenarios in which the second has the greater value.
-        losses: scenarios in which it has the smaller one.
+        wins: scenarios in which the second has the better value; the greater one of a metric of
+            which neither is better.
+        losses: scenarios in which it has the worse one.
     """
 
     setting: str
@@ -97,7 +97,7 @@ def paired_differences(
     found = [
         _pair(setting, metric, first, second, rows)
         for setting in settings_of(rows)
-        for metric in PAIRED
+        for metric in metric_names(Role.SCORE, Role.DETAIL)
         for first, second in pairs
     ]
     return [pair for pair in found if pair is not None]
@@ -115,7 +115,8 @@ def values_of(rows: Sequence[ResultRow], metric: str) -> list[float]:
 
 
 def _summary(setting: str, policy: str, rows: Sequence[ResultRow]) -> PolicySummary:
-    columns = {name: values_of(rows, name) for name in (*METRICS, *TIMINGS)}
+    shown = metric_names(Role.SCORE, Role.DETAIL, Role.FACT)
+    columns = {name: values_of(rows, name) for name in (*shown, *TIMINGS)}
     return PolicySummary(
         setting=setting,
         policy=policy,
@@ -141,6 +142,7 @@ def _pair(
     common = sorted(one.keys() & two.keys())
     if not common:
         return None
+    better = -1.0 if METRICS[metric].higher_is_better is False else 1.0
     gaps = np.array([two[key] - one[key] for key in common])
     return PairedDifference(
         setting=setting,
@@ -148,8 +150,8 @@ def _pair(
         first=first,
         second=second,
         difference=estimate(gaps),
-        wins=int((gaps > 0.0).sum()),
-        losses=int((gaps < 0.0).sum()),
+        wins=int((better * gaps > 0.0).sum()),
+        losses=int((better * gaps < 0.0).sum()),
     )
 
 

@@ -9,10 +9,10 @@ from pushplan.geometry.polygon import (
     polygon_area,
     polygon_centroid,
     polygon_inertia,
-    transform_points,
 )
 from pushplan.geometry.raster import fill_convex, fill_convex_parts
 from pushplan.geometry.shortest_path import GoalDistances, Path, VisibilityGraph, goal_distances
+from pushplan.geometry.transforms import transform_outlines, transform_points
 
 __all__ = [
     "GeodesicField",
@@ -35,5 +35,6 @@ __all__ = [
     "polygon_centroid",
     "polygon_inertia",
     "sample_values",
+    "transform_outlines",
     "transform_points",
 ]

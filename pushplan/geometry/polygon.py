@@ -1,8 +1,6 @@
-"""Compiled measures of simple polygons: area, centroid, inertia, point inside, rigid motion."""
+"""Compiled measures of simple polygons: area, centroid, inertia, point inside."""
 
 from __future__ import annotations
-
-import math
 
 from pushplan.compiled import kernel
 from pushplan.world.checks import FloatArray
@@ -88,23 +86,3 @@ def point_in_polygon(x: float, y: float, v: FloatArray) -> bool:
                 inside = not inside
         j = i
     return inside
-
-
-@kernel(allocates=True)
-def transform_points(
-    x: float, y: float, theta: float, points_body: FloatArray, out: FloatArray
-) -> None:
-    """Carry points from a body frame to the world, into ``out``.
-
-    Args:
-        x: position of the body [m], world frame.
-        y: as ``x``.
-        theta: heading of the body [rad].
-        points_body: (N, 2) points in the body frame [m].
-        out: (N, 2) receives the points in the world frame [m]; may be ``points_body`` itself.
-    """
-    c, s = math.cos(theta), math.sin(theta)
-    for i in range(points_body.shape[0]):
-        px, py = points_body[i, 0], points_body[i, 1]
-        out[i, 0] = x + c * px - s * py
-        out[i, 1] = y + s * px + c * py

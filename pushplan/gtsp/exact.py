@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from pushplan.gtsp.held_karp import fill_subsets, read_path
+from pushplan.gtsp.held_karp_kernels import fill_subsets, read_path
 from pushplan.gtsp.problem import Problem
 from pushplan.world.checks import IntArray
 

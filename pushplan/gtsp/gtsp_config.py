@@ -21,16 +21,16 @@ class GtspConfig:
         exact_clusters: clusters that ``"auto"`` takes to dynamic programming at most.
         memory_mb: of a table of dynamic programming at most [MB].
         lower_bound: whether to spend time on a lower bound and a proof.
-        proof_share: of a time budget that the proof may take.
+        proof_fraction: of a time budget that the proof may take.
         proof_states: paths that the proof keeps at once at most.
         neighbours: clusters on the list of each cluster; a third more where costs differ both ways.
         swap_neighbours: of these, how many a segment swap tries.
         max_removed: clusters that a round takes out at most.
-        removed_share: the same, as a share of all clusters (but at least 4).
-        blink: share of places that an insertion overlooks (Christiaens and Vanden Berghe 2020).
+        removed_fraction: the same, as a fraction of all clusters (but at least 4).
+        blink: fraction of places that an insertion overlooks (Christiaens and Vanden Berghe 2020).
         hot: temperature at the beginning of a run.
         cold: temperature at its end.
-        frozen: a run ends early at this share of the temperature at which its tour was cheapest.
+        frozen: a run ends early at this fraction of the temperature at which its tour was cheapest.
         restarts: runs from a random order that a budget is planned for at most; where they end
             early there are more.
         run_rounds: rounds that a run should have for each pair of clusters; fewer runs where they
@@ -45,12 +45,12 @@ class GtspConfig:
     exact_clusters: int = 16
     memory_mb: float = 1024.0
     lower_bound: bool = False
-    proof_share: float = 0.7
+    proof_fraction: float = 0.7
     proof_states: int = 2_000_000
     neighbours: int = 12
     swap_neighbours: int = 8
     max_removed: int = 20
-    removed_share: float = 0.3
+    removed_fraction: float = 0.3
     blink: float = 0.01
     hot: float = 2.0
     cold: float = 0.03
@@ -71,6 +71,6 @@ class GtspConfig:
         integer("proof_states", self.proof_states, low=1)
         for name in ("memory_mb", "hot", "cold", "run_rounds", "chunk_s"):
             number(name, getattr(self, name), low=0.0, open_low=True)
-        for name in ("proof_share", "removed_share", "frozen"):
+        for name in ("proof_fraction", "removed_fraction", "frozen"):
             number(name, getattr(self, name), low=0.0, high=1.0)
         number("blink", self.blink, low=0.0, high=0.5)

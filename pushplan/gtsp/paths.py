@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from pushplan.gtsp.walk_kernels import extend_paths
+from pushplan.gtsp.walk_kernels import PathProblem, Paths, extend_paths
 from pushplan.gtsp.walks import CHUNK_ARCS, Walks
 from pushplan.world.checks import FloatArray, IntArray
 
@@ -45,70 +45,49 @@ def cheaper_tour(walks: Walks, most: int) -> tuple[bool, IntArray | None, int]:
     return True, np.array([walks.node, *chosen[::-1]], dtype=np.int64), total
 
 
-class _Paths:
-    """Paths of one length.
-
-    Args:
-        size: room for so many.
-    """
-
-    def __init__(self, size: int) -> None:
-        self.sets = np.empty(size, dtype=np.int64)  # clusters, a bit mask
-        self.ends = np.empty(size, dtype=np.int64)  # last node, cluster * K + node
-        self.values = np.empty(size)  # cost
-        self.rests = np.empty(size)  # prices of the clusters that are missing
-        self.parents = np.empty(size, dtype=np.int64)
-
-    def only(self, which: slice | NDArray[np.bool_]) -> _Paths:
-        """A copy of some of them."""
-        result = _Paths(0)
-        for name, values in vars(self).items():
-            setattr(result, name, values[which].copy())
-        return result
+def _room_for(size: int) -> Paths:
+    """Memory for so many paths."""
+    whole = np.empty((3, size), dtype=np.int64)
+    real = np.empty((2, size))
+    return Paths(whole[0], whole[1], real[0], real[1], whole[2])
 
 
-def _first_paths(walks: Walks) -> _Paths:
+def _only(paths: Paths, which: slice | NDArray[np.bool_]) -> Paths:
+    """A copy of some of them."""
+    sets, ends, values, rests, parents = paths
+    return Paths(
+        sets[which].copy(),
+        ends[which].copy(),
+        values[which].copy(),
+        rests[which].copy(),
+        parents[which].copy(),
+    )
+
+
+def _first_paths(walks: Walks) -> Paths:
     """From the root to one node."""
     ends = np.flatnonzero(walks.names.ravel() >= 0)
     cluster = ends // walks.width
-    paths = _Paths(len(ends))
+    paths = _room_for(len(ends))
     paths.ends[:], paths.parents[:] = ends, 0
     paths.sets[:] = np.int64(1) << cluster
     paths.values[:] = walks.first.ravel()[ends]
     paths.rests[:] = walks.prices.sum() - walks.prices[cluster]
     hope = walks.walks[-1, :, -1].ravel()[ends]
-    return paths.only(paths.values + hope + paths.rests < walks.limit)
+    return _only(paths, paths.values + hope + paths.rests < walks.limit)
 
 
 def _longer(
-    walks: Walks, paths: _Paths, within: FloatArray, slots: IntArray, most: int
-) -> _Paths | None:
+    walks: Walks, paths: Paths, within: FloatArray, slots: IntArray, most: int
+) -> Paths | None:
     """All of them with one node more; None if they are too many."""
-    new, found = _Paths(most), 0
+    problem = PathProblem(within, walks.costs, walks.known, walks.prices, walks.sizes, walks.limit)
+    new, found = _room_for(most), 0
     step = max(1, CHUNK_ARCS // (4 * walks.count * walks.width))
     for low in range(0, len(paths.ends), step):
-        found = extend_paths(
-            paths.sets,
-            paths.ends,
-            paths.values,
-            paths.rests,
-            low,
-            min(low + step, len(paths.ends)),
-            within,
-            walks.costs,
-            walks.known,
-            walks.prices,
-            walks.sizes,
-            walks.limit,
-            slots,
-            new.sets,
-            new.ends,
-            new.values,
-            new.rests,
-            new.parents,
-            found,
-        )
+        high = min(low + step, len(paths.ends))
+        found = extend_paths(problem, paths, low, high, slots, new, found)
         walks.look()
         if found < 0:
             return None
-    return new.only(slice(found))
+    return _only(new, slice(found))

@@ -10,7 +10,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from pushplan.gtsp.kernels import SPARE
+from pushplan.gtsp.node_choice_kernels import SPARE
 from pushplan.world.checks import FloatArray, IntArray
 
 

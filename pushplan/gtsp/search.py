@@ -8,9 +8,9 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from pushplan.gtsp.gtsp_config import GtspConfig
-from pushplan.gtsp.kernels import best_nodes
+from pushplan.gtsp.node_choice_kernels import best_nodes
 from pushplan.gtsp.problem import Problem
-from pushplan.gtsp.ruin_recreate import search_tours
+from pushplan.gtsp.ruin_recreate_kernels import TourProblem, TourState, search_tours
 from pushplan.world.checks import FloatArray, IntArray
 from pushplan.world.stop import AnyOf, MaxIterations, Stop, StopCheck
 
@@ -62,7 +62,7 @@ class Budget:
             self.best_s = self.elapsed
 
     def gone(self) -> float:
-        """Share of the budget that is used."""
+        """Fraction of the budget that is used."""
         by_time = self.elapsed / self.seconds if self.seconds > 0.0 else 1.0
         return max(by_time, self.used / self.rounds if self.rounds > 0.0 else 1.0)
 
@@ -101,8 +101,8 @@ class AnytimeSearch:
             config.neighbours if problem.symmetric else config.neighbours * 4 // 3
         )
         self.offsets = problem.offsets
-        share = max(4, int(config.removed_share * problem.count))
-        self.most = max(1, min(config.max_removed, share, problem.count - 2))
+        fraction = max(4, int(config.removed_fraction * problem.count))
+        self.most = max(1, min(config.max_removed, fraction, problem.count - 2))
         self.best = np.concatenate(
             ([problem.root], np.delete(np.arange(problem.count), problem.root))
         )
@@ -115,8 +115,8 @@ class AnytimeSearch:
 
         Args:
             budget: of the call.
-            begin: share of it that is gone when the tour is hottest.
-            end: share that is gone when it is coldest, where the run ends at the latest.
+            begin: fraction of it that is gone when the tour is hottest.
+            end: fraction that is gone when it is coldest, where the run ends at the latest.
         """
         self._random_start(budget)
         config, lowest, frozen, first = self.config, np.inf, 0.0, True
@@ -133,14 +133,14 @@ class AnytimeSearch:
             elif heat < frozen:
                 break
 
-    def runs_in(self, budget: Budget, share: float) -> int:
-        """How many runs a share of the budget is good for."""
+    def runs_in(self, budget: Budget, fraction: float) -> int:
+        """How many runs a fraction of the budget is good for."""
         rounds = budget.rounds
         if rounds == np.inf:
             self.run(budget, 0.0, 1e-9)  # one piece, for the pace
             rounds = budget.seconds / self.pace
         wanted = self.config.run_rounds * self.problem.count**2
-        return int(min(max(share * rounds / wanted, 1.0), self.config.restarts))
+        return int(min(max(fraction * rounds / wanted, 1.0), self.config.restarts))
 
     @property
     def scale(self) -> float:
@@ -154,26 +154,22 @@ class AnytimeSearch:
         if budget.rounds < np.inf:  # the same pieces on every machine
             rounds = max(1, int(min(100, budget.rounds // 200, budget.rounds - budget.used)))
         began = time.perf_counter()
-        search_tours(
+        kernel_problem = TourProblem(
             problem.finite,
             problem.reverse,
             self.offsets,
             self.near,
             self.between,
-            self.order,
-            self.nodes,
-            self.best,
-            self.best_nodes,
-            self.values,
-            temperature,
             self.most,
             config.blink,
             min(config.swap_neighbours, self.near.shape[1]),
             problem.symmetric,
-            1e-12 * max(abs(self.values[1]), abs(self.values[0])),
-            rounds,
-            self.state,
         )
+        found = TourState(
+            self.order, self.nodes, self.best, self.best_nodes, self.values, self.state
+        )
+        tolerance = 1e-12 * max(abs(self.values[1]), abs(self.values[0]))
+        search_tours(kernel_problem, found, temperature, tolerance, rounds)
         self.pace = 0.5 * self.pace + 0.5 * (time.perf_counter() - began) / rounds
         budget.used += rounds
         if self.values[1] < budget.cost:
@@ -200,18 +196,18 @@ class AnytimeSearch:
 
 
 def search(
-    problem: Problem, config: GtspConfig, seed: IntArray, budget: Budget, share: float
+    problem: Problem, config: GtspConfig, seed: IntArray, budget: Budget, fraction: float
 ) -> IntArray:
-    """The best nodes in visiting order that a share of the budget allows.
+    """The best nodes in visiting order that a fraction of the budget allows.
 
     They use a forbidden arc only if no tour without one was found.
     """
     state = AnytimeSearch(problem, config, seed)
-    length = max(share - budget.gone(), 1e-9) / state.runs_in(budget, share)
-    left, first = share, True
+    length = max(fraction - budget.gone(), 1e-9) / state.runs_in(budget, fraction)
+    left, first = fraction, True
     while first or (left > 0.0 and not budget.stopped()):
-        begin = min(budget.gone(), share)
-        left = share - begin
+        begin = min(budget.gone(), fraction)
+        left = fraction - begin
         state.run(budget, begin, begin + left / max(1, round(left / length)))
-        left, first = share - budget.gone(), False
+        left, first = fraction - budget.gone(), False
     return state.best_nodes

@@ -23,8 +23,8 @@ from pushplan.world.stop import Stop, check_rules
 
 NODES_PER_ROOT_SECOND = 4000.0
 """A search holds no more nodes than this times the root of its seconds, so that it can begin."""
-EXACT_SHARE = 0.6
-"""Share of a time budget that ``"auto"`` gives to dynamic programming, which may not end."""
+EXACT_FRACTION = 0.6
+"""Fraction of a time budget that ``"auto"`` gives to dynamic programming, which may not end."""
 UNTIMED_S = 5.0
 """Dynamic programming that takes longer is left to the search where time has no limit [s]."""
 PROOF_SETUP_S = 6e-8
@@ -122,14 +122,14 @@ class _Call:
             return True
         fits = need <= config.memory_mb and problem.count - 1 <= config.exact_clusters
         timed = self.budget.seconds < math.inf
-        left = EXACT_SHARE * self.budget.seconds - self.budget.elapsed if timed else UNTIMED_S
+        left = EXACT_FRACTION * self.budget.seconds - self.budget.elapsed if timed else UNTIMED_S
         return config.method == "auto" and fits and expected_seconds(problem) < left
 
     def _exact(self, problem: Problem) -> Tour | None:
         """The optimum; None where a search has to go on."""
         self.method, budget = "exact", self.budget
         alone = self.config.method == "exact"
-        until = math.inf if alone else EXACT_SHARE * budget.seconds
+        until = math.inf if alone else EXACT_FRACTION * budget.seconds
         complete, nodes = solve_exactly(
             problem, lambda: budget.elapsed > until or budget.stopped(), self.config.chunk_s
         )
@@ -145,10 +145,10 @@ class _Call:
     def _search(self, problem: Problem) -> Tour:
         self.method = "search"
         config, budget = self.config, self.budget
-        share = 1.0 - config.proof_share if config.lower_bound else 1.0
+        fraction = 1.0 - config.proof_fraction if config.lower_bound else 1.0
         if budget.seconds == math.inf:
-            share = 1.0
-        nodes = search(problem, config, self.seed, budget, share)
+            fraction = 1.0
+        nodes = search(problem, config, self.seed, budget, fraction)
         cost = problem.path_cost(nodes)
         bound = problem.floor
         late = budget.elapsed + PROOF_SETUP_S * len(problem.names) ** 2 > budget.seconds

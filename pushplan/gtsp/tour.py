@@ -89,7 +89,7 @@ class Tour:
 
     @property
     def gap(self) -> float:
-        """How far the tour may be from the optimum, as a share of its cost; inf if unknown."""
+        """How far the tour may be from the optimum, as a fraction of its cost; inf if unknown."""
         if not self.nodes or self.lower_bound == -math.inf:
             return math.inf
         short = self.cost - self.lower_bound

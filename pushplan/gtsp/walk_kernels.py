@@ -6,6 +6,8 @@ memory M is a bit mask over the clusters that ``lists[d]`` names.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from pushplan.compiled import kernel
@@ -13,15 +15,10 @@ from pushplan.world.checks import FloatArray, IntArray
 
 
 @kernel(allocates=True)
-def memory_moves(lists: IntArray) -> IntArray:
-    """What a walk remembers when cluster d is put in front of a walk that begins in e.
-
-    Args:
-        lists: (n, b) the clusters that each cluster remembers.
-
-    Returns:
-        (n, n, 2^b) the new memory, -1 where the walk remembers d and must not visit it again.
-    """
+def memory_moves(
+    lists: IntArray,  # (n, b) the clusters that each cluster remembers
+) -> IntArray:
+    """(n, n, 2^b) new memory with cluster d before a walk from e, -1 where d is remembered."""
     count, bits = lists.shape
     moves = np.full((count, count, 1 << bits), -1, np.int64)
     kept = np.empty(bits, np.int64)  # what d remembers of each cluster that e remembers
@@ -52,27 +49,16 @@ def memory_moves(lists: IntArray) -> IntArray:
 
 @kernel(allocates=True)
 def extend_walks(
-    walks: FloatArray,
-    longer: FloatArray,
-    blocks: FloatArray,
-    moves: IntArray,
-    prices: FloatArray,
-    sizes: IntArray,
+    walks: FloatArray,  # (n, 2^b, K) cost of the cheapest walk of k arcs from a node to the root
+    longer: FloatArray,  # (n, 2^b, K) filled with that of k + 1 arcs
+    blocks: FloatArray,  # (n, K, n, K) ``blocks[e, j, d, i]``: cost from node i of d to node j of e
+    moves: IntArray,  # (n, n, 2^b)
+    prices: FloatArray,  # (n,) what a visit of each cluster earns
+    sizes: IntArray,  # (n,) nodes of each cluster
     low: int,
     high: int,
 ) -> None:
-    """Put a node of clusters ``low`` to ``high - 1`` in front of every walk to the root.
-
-    Args:
-        walks: (n, 2^b, K) cost of the cheapest walk of k arcs from a node to the root.
-        longer: (n, 2^b, K) filled with that of k + 1 arcs.
-        blocks: (n, K, n, K) ``blocks[e, j, d, i]`` is the cost from node i of d to node j of e.
-        moves: (n, n, 2^b).
-        prices: (n,) what a visit of each cluster earns.
-        sizes: (n,) nodes of each cluster.
-        low: first cluster.
-        high: end of the range.
-    """
+    """Put a node of clusters ``low`` to ``high - 1`` in front of every walk to the root."""
     count, memories, width = walks.shape
     for d in range(low, high):
         longer[d] = np.inf
@@ -92,28 +78,15 @@ def extend_walks(
 
 @kernel(allocates=True)
 def read_visits(
-    walks: FloatArray,
-    first: FloatArray,
-    blocks: FloatArray,
-    moves: IntArray,
-    prices: FloatArray,
-    sizes: IntArray,
-    visits: IntArray,
+    walks: FloatArray,  # (n, n, 2^b, K) by number of arcs less 1
+    first: FloatArray,  # (n, K) cost from the root to each node
+    blocks: FloatArray,  # (n, K, n, K)
+    moves: IntArray,  # (n, n, 2^b)
+    prices: FloatArray,  # (n,)
+    sizes: IntArray,  # (n,)
+    visits: IntArray,  # (n,) filled with how often it comes to each cluster
 ) -> float:
-    """The cheapest walk from the root through n nodes and back.
-
-    Args:
-        walks: (n, n, 2^b, K) by number of arcs less 1.
-        first: (n, K) cost from the root to each node.
-        blocks: (n, K, n, K).
-        moves: (n, n, 2^b).
-        prices: (n,).
-        sizes: (n,).
-        visits: (n,) filled with how often it comes to each cluster.
-
-    Returns:
-        Its cost less the prices, infinite if there is none.
-    """
+    """Cost less prices of the cheapest walk from the root through n nodes and back; its visits."""
     count, memories = walks.shape[1], walks.shape[2]
     visits[:] = 0
     best = np.inf
@@ -165,54 +138,52 @@ def allow_memories(walks: FloatArray) -> None:
             bit <<= 1
 
 
+class PathProblem(NamedTuple):
+    """What bounds the paths of one length."""
+
+    within: FloatArray
+    """(n, 2^b, K) walks to the root from the new node, by `allow_memories`."""
+    costs: FloatArray
+    """(n, K, n, K) from a node (first two) to a node."""
+    lists: IntArray
+    """(n, b) the clusters that each cluster remembers."""
+    prices: FloatArray
+    """(n,) what a visit of each cluster earns."""
+    sizes: IntArray
+    """(n,) nodes of each cluster."""
+    limit: float
+    """Paths that cannot stay below this are dropped."""
+
+
+class Paths(NamedTuple):
+    """Paths of one length."""
+
+    sets: IntArray
+    """(P,) clusters of each path as a bit mask."""
+    ends: IntArray
+    """(P,) its last node, ``d * K + i``."""
+    values: FloatArray
+    """(P,) its cost."""
+    rests: FloatArray
+    """(P,) sum of the prices of the clusters that it lacks."""
+    parents: IntArray
+    """(P,) the path that it comes from."""
+
+
 @kernel(allocates=True)
 def extend_paths(
-    sets: IntArray,
-    ends: IntArray,
-    values: FloatArray,
-    rests: FloatArray,
+    problem: PathProblem,
+    paths: Paths,
     low: int,
     high: int,
-    within: FloatArray,
-    costs: FloatArray,
-    lists: IntArray,
-    prices: FloatArray,
-    sizes: IntArray,
-    limit: float,
-    slots: IntArray,
-    new_sets: IntArray,
-    new_ends: IntArray,
-    new_values: FloatArray,
-    new_rests: FloatArray,
-    parents: IntArray,
-    found: int,
+    slots: IntArray,  # hash table, a power of two in size, -1 where empty
+    longer: Paths,  # filled, one for a set and an end
+    found: int,  # how many there are
 ) -> int:
-    """One more node for the paths ``low`` to ``high - 1``, where walks leave hope.
-
-    Args:
-        sets: clusters of each path as a bit mask.
-        ends: its last node, ``d * K + i``.
-        values: its cost.
-        rests: sum of the prices of the clusters that it lacks.
-        low: first path.
-        high: end of the range.
-        within: (n, 2^b, K) walks to the root from the new node, by `allow_memories`.
-        costs: (n, K, n, K) from a node (first two) to a node.
-        lists: (n, b).
-        prices: (n,).
-        sizes: (n,).
-        limit: paths that cannot stay below this are dropped.
-        slots: hash table, a power of two in size, -1 where empty.
-        new_sets: the paths that are kept, and so on; one for a set and an end.
-        new_ends: see above.
-        new_values: see above.
-        new_rests: see above.
-        parents: the path that each comes from.
-        found: how many there are.
-
-    Returns:
-        How many there are now, -1 if they do not fit.
-    """
+    """One more node for the paths ``low`` to ``high - 1``; how many there are then, -1 if many."""
+    within, costs, lists, prices, sizes, limit = problem
+    sets, ends, values, rests, _ = paths
+    new_sets, new_ends, new_values, new_rests, parents = longer
     count, memories, width = within.shape
     mask = len(slots) - 1
     for p in range(low, high):

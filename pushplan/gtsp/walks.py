@@ -21,7 +21,7 @@ from pushplan.gtsp.walk_kernels import (
 from pushplan.world.checks import FloatArray, IntArray
 
 MARGIN = 1e-10
-"""Share of the largest cost by which sums of floats may be off."""
+"""Fraction of the largest cost by which sums of floats may be off."""
 CHUNK_ARCS = 2_000_000
 """Arcs that are looked at between two looks at the stop rule."""
 

@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from pushplan.compiled import kernel
+from pushplan.geometry.transforms import transform_points
 from pushplan.world.checks import FloatArray, IntArray
 
 ROBOT = -1
@@ -88,15 +89,6 @@ def make_memory(crowd: Crowd) -> Memory:
         np.empty((room, 11)),
         np.empty((2, 5)),
     )
-
-
-@kernel(allocates=True)
-def place_corners(pose: FloatArray, points: FloatArray, out: FloatArray) -> None:
-    """Carry (N, 2) body-frame points to the world frame, into ``out``."""
-    c, s = np.cos(pose[2]), np.sin(pose[2])
-    for i in range(points.shape[0]):
-        out[i, 0] = pose[0] + c * points[i, 0] - s * points[i, 1]
-        out[i, 1] = pose[1] + s * points[i, 0] + c * points[i, 1]
 
 
 @kernel(allocates=True)
@@ -306,7 +298,7 @@ def advance_ice(
     """
     count = 0
     margin = solver.step
-    place_corners(here, crowd.hull, memory.hull)
+    transform_points(here, crowd.hull, memory.hull)
     memory.state[:] = 0
     any_near = False
     for k in range(poses.shape[0]):
@@ -342,7 +334,7 @@ def advance_ice(
                 poses[k, 2] += turn
                 work += crowd.masses[k] * np.sqrt(dx * dx + dy * dy)
                 a, b = crowd.offsets[k], crowd.offsets[k + 1]
-                place_corners(poses[k], crowd.vertices[a:b], memory.corners[a:b])
+                transform_points(poses[k], crowd.vertices[a:b], memory.corners[a:b])
     return work
 
 
@@ -371,7 +363,7 @@ def sweep_ice(
     work = 0.0
     for k in range(poses.shape[0]):
         a, b = crowd.offsets[k], crowd.offsets[k + 1]
-        place_corners(poses[k], crowd.vertices[a:b], memory.corners[a:b])
+        transform_points(poses[k], crowd.vertices[a:b], memory.corners[a:b])
     keep = out.shape[0] > 0
     if keep:
         out[0] = poses

@@ -15,8 +15,9 @@ from typing import NamedTuple
 import numpy as np
 
 from pushplan.compiled import copy_into, kernel
+from pushplan.geometry.transforms import transform_points
 from pushplan.interaction.contact import contacts, least_overlap
-from pushplan.interaction.separation import drag_along, place, separate
+from pushplan.interaction.separation import drag_along, separate
 from pushplan.world.checks import FloatArray, IntArray
 
 
@@ -147,7 +148,7 @@ def _against_robot(
     parts, points = bodies.robot_offsets, scratch.points
     first, end = bodies.offsets[k], bodies.offsets[k + 1]
     body, outline = bodies.vertices[first:end], scratch.outlines[first:end]
-    place(poses[k], body, outline)
+    transform_points(poses[k], body, outline)
     for part in range(parts.shape[0] - 1):
         corners = scratch.robot[parts[part] : parts[part + 1]]
         found = contacts(corners, outline, points)
@@ -159,7 +160,7 @@ def _against_robot(
         if settings.friction > 0.0:
             limit, before = settings.friction * pushed, scratch.before[k]
             drag_along(points, found, limit, robot_from, robot_to, before, poses[k], inv)
-        place(poses[k], body, outline)
+        transform_points(poses[k], body, outline)
     return deepest
 
 
@@ -174,7 +175,7 @@ def _against_static(
     x, y, r = poses[k, 0], poses[k, 1], bodies.radii[k]
     first, end = bodies.offsets[k], bodies.offsets[k + 1]
     body, outline = bodies.vertices[first:end], scratch.outlines[first:end]
-    place(poses[k], body, outline)
+    transform_points(poses[k], body, outline)
     for part in range(boxes.shape[0]):
         if x + r <= boxes[part, 0] or x - r >= boxes[part, 2]:
             continue
@@ -190,7 +191,7 @@ def _against_static(
         if settings.static_friction > 0.0:
             limit = settings.static_friction * pushed
             drag_along(points, found, limit, still, still, scratch.before[k], poses[k], inv)
-        place(poses[k], body, outline)
+        transform_points(poses[k], body, outline)
     return deepest
 
 
@@ -204,7 +205,7 @@ def _against_objects(
     k = scratch.active[i]
     first, end = bodies.offsets[k], bodies.offsets[k + 1]
     body, outline = bodies.vertices[first:end], scratch.outlines[first:end]
-    place(poses[k], body, outline)
+    transform_points(poses[k], body, outline)
     for other in range(poses.shape[0]):
         dx, dy = poses[other, 0] - poses[k, 0], poses[other, 1] - poses[k, 1]
         reach = bodies.radii[other] + bodies.radii[k]
@@ -212,7 +213,7 @@ def _against_objects(
             continue
         scratch.tests[0] += 1
         a, b = bodies.offsets[other], bodies.offsets[other + 1]
-        place(poses[other], bodies.vertices[a:b], scratch.outlines[a:b])
+        transform_points(poses[other], bodies.vertices[a:b], scratch.outlines[a:b])
         found = contacts(outline, scratch.outlines[a:b], points)
         if found == 0:
             continue
@@ -237,7 +238,7 @@ def _against_objects(
             masses[other],
             gyration[other],
         )
-        place(poses[k], body, outline)
+        transform_points(poses[k], body, outline)
     return deepest, count
 
 
@@ -251,7 +252,7 @@ def _resolve(
     scratch: Scratch,
 ) -> float:
     """One small robot step: move the objects out of the way; returns what overlap is left."""
-    place(robot_to, bodies.robot_vertices, scratch.robot)
+    transform_points(robot_to, bodies.robot_vertices, scratch.robot)
     count = _gather_near(
         bodies, poses, robot_to[0], robot_to[1], bodies.robot_radius, scratch.active, 0
     )
@@ -347,7 +348,7 @@ def robot_held(pose: FloatArray, bodies: Bodies, settings: Settings, scratch: Sc
         if y + r <= boxes[part, 1] or y - r >= boxes[part, 3]:
             continue
         if not placed:
-            place(pose, bodies.robot_vertices, scratch.robot)
+            transform_points(pose, bodies.robot_vertices, scratch.robot)
             placed = True
         wall = bodies.static_vertices[bodies.static_offsets[part] : bodies.static_offsets[part + 1]]
         for piece in range(bodies.robot_offsets.shape[0] - 1):

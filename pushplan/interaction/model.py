@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
-import numpy as np
 from numpy.typing import ArrayLike
 
 from pushplan.world import World
 from pushplan.world.checks import ArrayRecord, FloatArray, array, integer
+from pushplan.world.polyline import path_lengths
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,9 +39,7 @@ class Interaction(ArrayRecord):
     @property
     def lengths(self) -> FloatArray:
         """(K,) path length of each object's centre [m], not its displacement."""
-        steps = np.diff(self.object_poses[..., :2], axis=0)
-        lengths: FloatArray = np.hypot(steps[..., 0], steps[..., 1]).sum(axis=0)
-        return lengths
+        return path_lengths(self.object_poses)
 
     @property
     def work(self) -> float:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from pushplan.compiled import kernel
 from pushplan.geometry.raster import fill_convex
-from pushplan.interaction.separation import place
+from pushplan.geometry.transforms import transform_points
 from pushplan.world.checks import FloatArray, IntArray
 
 Patch = NDArray[np.float32]
@@ -65,7 +65,7 @@ def cover_objects(
     corners = np.empty_like(vertices)
     for k in range(poses.shape[0]):
         a, b = offsets[k], offsets[k + 1]
-        place(poses[k], vertices[a:b], corners[a:b])
+        transform_points(poses[k], vertices[a:b], corners[a:b])
         _to_pixels(corners[a:b], frame, scale, corners[a:b])
         fill_convex(fine, corners[a:b], 1)
     _average(fine, out)
@@ -111,7 +111,7 @@ def cover_sweep(
             if n > 0:
                 pose[:2] -= back * (path[n, :2] - path[n - 1, :2])
                 pose[2] -= back * turn
-            place(pose, vertices, corners)
+            transform_points(pose, vertices, corners)
             _to_pixels(corners, frame, scale, corners)
             for part in range(offsets.shape[0] - 1):
                 fill_convex(fine, corners[offsets[part] : offsets[part + 1]], 1)

@@ -2,19 +2,8 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from pushplan.compiled import kernel
 from pushplan.world.checks import FloatArray
-
-
-@kernel
-def place(pose: FloatArray, points: FloatArray, out: FloatArray) -> None:
-    """Carry (N, 2) body-frame points to the world frame, into ``out``."""
-    c, s = np.cos(pose[2]), np.sin(pose[2])
-    for i in range(points.shape[0]):
-        out[i, 0] = pose[0] + c * points[i, 0] - s * points[i, 1]
-        out[i, 1] = pose[1] + s * points[i, 0] + c * points[i, 1]
 
 
 @kernel

@@ -60,6 +60,19 @@ class NetworkPolicy:
         """The action mode that it needs."""
         return (self.specification.action.mode,)
 
+    @property
+    def steps_per_decision(self) -> int:
+        """Steps for which it holds an action."""
+        return self.specification.action.repeat
+
+    def incompatibility(self, scenario: Any) -> str | None:
+        """The task or preset that it was made for, if a scenario has another one."""
+        for kind in ("task", "preset"):
+            mine = getattr(self.specification, f"{kind}s")
+            if mine and getattr(scenario, kind) not in mine:
+                return f"made for {kind} {', '.join(mine)}"
+        return None
+
     def check_environment(self, env: Any, scenario: Any = None) -> None:
         """Refuse an environment that it was not made for.
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from pushplan.compiled import kernel
+from pushplan.geometry.transforms import transform_points
 from pushplan.world.checks import FloatArray, IntArray
 
 
@@ -74,10 +75,8 @@ def near_outlines(
     n = 0
     for i in range(bodies):
         k = keep[i]
-        c, s = np.cos(poses[k, 2]), np.sin(poses[k, 2])
-        for v in range(offsets[k], offsets[k + 1]):
-            out[n, 0] = poses[k, 0] + c * vertices[v, 0] - s * vertices[v, 1]
-            out[n, 1] = poses[k, 1] + s * vertices[v, 0] + c * vertices[v, 1]
-            n += 1
+        size = offsets[k + 1] - offsets[k]
+        transform_points(poses[k], vertices[offsets[k] : offsets[k + 1]], out[n : n + size])
+        n += size
         ends[i + 1] = n
     return out, ends

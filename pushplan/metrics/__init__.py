@@ -3,12 +3,14 @@
 from pushplan.metrics.lengths import interaction_work, object_path_lengths, path_length
 from pushplan.metrics.manipulation import ManipulationScores, manipulation_scores
 from pushplan.metrics.navigation import NavigationScores, navigation_scores
-from pushplan.metrics.registry import METRICS, compute, metric_names
+from pushplan.metrics.registry import METRICS, Metric, Role, compute, metric_names
 
 __all__ = [
     "METRICS",
     "ManipulationScores",
+    "Metric",
     "NavigationScores",
+    "Role",
     "compute",
     "interaction_work",
     "manipulation_scores",

@@ -7,14 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pushplan.geometry import VisibilityGraph, convex_overlap, goal_distances, point_in_polygon
+from pushplan.geometry import VisibilityGraph, goal_distances
 from pushplan.metrics.lengths import interaction_work, object_path_lengths, robot_path_length
 from pushplan.world import (
-    ClearanceArea,
     Episode,
-    InvalidInputError,
-    ManipulationGoal,
-    Receptacle,
     StaticMap,
     World,
 )
@@ -26,7 +22,7 @@ class ManipulationScores:
     """How well a robot brought objects to where they belong.
 
     Args:
-        success: S_manip in [0, 1]: the share of the objects whose sub-task was completed.
+        success: S_manip in [0, 1]: the fraction of the objects whose sub-task was completed.
         efficiency: E_manip: L*(O') over driven length. The tree is no strict lower bound, so it
             can pass 1; 0 if nothing was completed.
         effort: I_manip in [0, 1]: the least work for what was completed over all work.
@@ -66,32 +62,21 @@ def manipulation_scores(episode: Episode, *, straight: bool = False) -> Manipula
     Raises:
         InvalidInputError: if the goal is one for the robot.
     """
-    _goal(episode.world)
     done = _completed(episode)
-    share = float(done.mean()) if len(done) else 1.0
-    needed = done & ~completed_objects(episode.world)
+    fraction = s_manip(episode)
+    needed = done & ~episode.world.completed
     shortest = shortest_lengths(episode.world, needed, straight=straight)
     tree = tree_length(episode.world, needed, straight=straight)
     driven, work = robot_path_length(episode), interaction_work(episode)
     return ManipulationScores(
-        success=share,
-        efficiency=efficiency(tree, driven, everything=share == 1.0),
+        success=fraction,
+        efficiency=efficiency(tree, driven, everything=fraction == 1.0),
         effort=effort(episode.world, shortest, object_path_lengths(episode), driven),
         completed=int(done.sum()),
         path_length_m=driven,
         interaction_work_kg_m=work,
         tree_length_m=tree,
     )
-
-
-def completed_objects(world: World) -> BoolArray:
-    """(K,) whether each object is delivered, or off the area, in a scene."""
-    goal, movables = _goal(world), world.movables
-    outlines = [movables.outline_world(k) for k in range(len(movables))]
-    if isinstance(goal, Receptacle):
-        inside = [all(point_in_polygon(x, y, goal.polygon) for x, y in o) for o in outlines]
-        return np.array(inside, dtype=bool)
-    return np.array([not convex_overlap(o, goal.polygon) for o in outlines], dtype=bool)
 
 
 def shortest_lengths(start: World, chosen: BoolArray, *, straight: bool = False) -> FloatArray:
@@ -102,7 +87,7 @@ def shortest_lengths(start: World, chosen: BoolArray, *, straight: bool = False)
         chosen: (K,) flags.
         straight: as in `manipulation_scores`.
     """
-    distances = goal_distances(_floor(start, straight), _goal(start))
+    distances = goal_distances(_floor(start, straight), start.manipulation_goal)
     lengths = np.zeros(len(chosen))
     for k in np.flatnonzero(chosen):
         lengths[k] = distances.path_from(start.movables.poses[k, :2]).length
@@ -187,51 +172,34 @@ def _completed(episode: Episode) -> BoolArray:
     return episode.completed
 
 
-def _goal(world: World) -> ManipulationGoal:
-    if not isinstance(world.goal, Receptacle | ClearanceArea):
-        raise InvalidInputError(
-            "manipulation scores need a goal for the objects (Receptacle or ClearanceArea), "
-            f"got {type(world.goal).__name__}"
-        )
-    return world.goal
-
-
 def _floor(start: World, straight: bool) -> StaticMap:
     """The map, or one without obstacles that holds everything."""
     if not straight:
         return start.static
-    box, corners = start.static.bounds.reshape(2, 2), _goal(start).polygon
+    box, corners = start.static.bounds.reshape(2, 2), start.manipulation_goal.polygon
     everything = [box, corners, start.robot_pose[None, :2], start.movables.poses[:, :2]]
     points = np.concatenate(everything)
     return StaticMap.build(bounds=[*(points.min(axis=0) - 1.0), *(points.max(axis=0) + 1.0)])
 
 
-def _applies(episode: Episode) -> bool:
-    return isinstance(episode.world.goal, Receptacle | ClearanceArea)
-
-
-def s_manip(episode: Episode) -> float | None:
-    """S_manip; None where the goal is one for the robot."""
-    if not _applies(episode):
-        return None
+def s_manip(episode: Episode) -> float:
+    """S_manip of an episode."""
     done = _completed(episode)
     return float(done.mean()) if len(done) else 1.0
 
 
-def e_manip(episode: Episode) -> float | None:
-    """E_manip; None where the goal is one for the robot."""
-    return manipulation_scores(episode).efficiency if _applies(episode) else None
+def e_manip(episode: Episode) -> float:
+    """E_manip of an episode."""
+    return manipulation_scores(episode).efficiency
 
 
-def e_manip_straight(episode: Episode) -> float | None:
+def e_manip_straight(episode: Episode) -> float:
     """E_manip with straight lines, to be set beside the reference implementation's."""
-    return manipulation_scores(episode, straight=True).efficiency if _applies(episode) else None
+    return manipulation_scores(episode, straight=True).efficiency
 
 
-def i_manip(episode: Episode) -> float | None:
-    """I_manip; None where the goal is one for the robot."""
-    if not _applies(episode):
-        return None
-    needed = _completed(episode) & ~completed_objects(episode.world)
+def i_manip(episode: Episode) -> float:
+    """I_manip of an episode."""
+    needed = _completed(episode) & ~episode.world.completed
     shortest = shortest_lengths(episode.world, needed)
     return effort(episode.world, shortest, object_path_lengths(episode), robot_path_length(episode))

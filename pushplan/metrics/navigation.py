@@ -8,7 +8,7 @@ from typing import Literal
 
 from pushplan.geometry import VisibilityGraph
 from pushplan.metrics.lengths import interaction_work, robot_path_length
-from pushplan.world import Episode, GoalDisc, GoalLine
+from pushplan.world import Episode, GoalDisc
 from pushplan.world.checks import choice
 
 Clearance = Literal["robot", "point"]
@@ -100,29 +100,19 @@ def effort(robot_mass_kg: float, driven_m: float, work_kg_m: float) -> float:
     return own / (own + work_kg_m) if work_kg_m > 0.0 else 1.0
 
 
-def e_nav(episode: Episode) -> float | None:
-    """E_nav with the default conventions; None where the goal is one for the objects."""
-    if not _navigates(episode):
-        return None
+def e_nav(episode: Episode) -> float:
+    """E_nav with the default conventions."""
     if not episode.success:
         return 0.0  # saves the search for the shortest path
     return navigation_scores(episode).efficiency
 
 
-def e_nav_to_goal_point(episode: Episode) -> float | None:
+def e_nav_to_goal_point(episode: Episode) -> float:
     """E_nav with l_0* measured to the goal's centre, to be set beside the paper's tables."""
-    if not _navigates(episode):
-        return None
     return navigation_scores(episode, to_goal_point=True).efficiency if episode.success else 0.0
 
 
-def i_nav(episode: Episode) -> float | None:
-    """I_nav; None where the goal is one for the objects."""
-    if not _navigates(episode):
-        return None
+def i_nav(episode: Episode) -> float:
+    """I_nav of an episode."""
     length, work = robot_path_length(episode), interaction_work(episode)
     return effort(episode.world.robot.mass, length, work)
-
-
-def _navigates(episode: Episode) -> bool:
-    return isinstance(episode.world.goal, GoalDisc | GoalLine)

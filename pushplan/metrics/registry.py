@@ -1,35 +1,98 @@
-"""Metrics by name. An entry is imported when it is asked for."""
+"""Metrics by name. A function is imported when it is asked for."""
 
 from __future__ import annotations
 
+import enum
 import importlib
 import math
 from collections.abc import Iterable, Mapping
-from typing import Any
+from dataclasses import dataclass
+from typing import Any, Literal
 
-from pushplan.world import Episode, InvalidInputError, UnknownNameError
+from pushplan.world import ClearanceArea, Episode, InvalidInputError, Receptacle, UnknownNameError
 
-METRICS: dict[str, str] = {
-    "success": "pushplan.metrics.common:success",
-    "E_nav": "pushplan.metrics.navigation:e_nav",
-    "I_nav": "pushplan.metrics.navigation:i_nav",
-    "S_manip": "pushplan.metrics.manipulation:s_manip",
-    "E_manip": "pushplan.metrics.manipulation:e_manip",
-    "I_manip": "pushplan.metrics.manipulation:i_manip",
-    "E_nav_to_goal_point": "pushplan.metrics.navigation:e_nav_to_goal_point",
-    "E_manip_straight": "pushplan.metrics.manipulation:e_manip_straight",
-    "path_length_m": "pushplan.metrics.lengths:robot_path_length",
-    "interaction_work_kg_m": "pushplan.metrics.lengths:interaction_work",
-    "steps": "pushplan.metrics.common:steps",
-    "sim_time_s": "pushplan.metrics.common:sim_time_s",
+GoalKind = Literal["robot", "objects"]
+
+
+class Role(enum.Enum):
+    """Where results show a metric."""
+
+    SCORE = "score"
+    """Everywhere: a column, the tables, the plots, the page and the paired differences."""
+    DETAIL = "detail"
+    """As a score, but not in the tables of the terminal."""
+    FACT = "fact"
+    """A column and a line of the summary."""
+    ON_REQUEST = "on request"
+    """Nowhere, unless it is asked for by name."""
+
+
+@dataclass(frozen=True)
+class Metric:
+    """One metric: everything that rows, tables, pages and plots need to know about it.
+
+    Args:
+        function: ``"module:function"``; takes an `Episode` and gives a number, or None where the
+            metric does not apply.
+        role: where results show it.
+        heading: of its column in tables, with the unit; the name if empty.
+        higher_is_better: None where neither is.
+        goal: who has the goal in the tasks that it is for; None for all tasks.
+        digits: after the point, in tables.
+        if_failed: its value for a job that failed; None for no value. A score that cannot fall
+            below this has one, so that failures do not raise the mean.
+        until_failure: whether what was recorded before a job failed still counts.
+        whole: whether values are whole numbers.
+    """
+
+    function: str
+    role: Role = Role.SCORE
+    heading: str = ""
+    higher_is_better: bool | None = True
+    goal: GoalKind | None = None
+    digits: int = 3
+    if_failed: float | None = None
+    until_failure: bool = False
+    whole: bool = False
+
+
+_NAVIGATION = "pushplan.metrics.navigation"
+_MANIPULATION = "pushplan.metrics.manipulation"
+_LENGTHS = "pushplan.metrics.lengths"
+_COMMON = "pushplan.metrics.common"
+
+METRICS: dict[str, Metric] = {
+    "success": Metric(f"{_COMMON}:success", Role.ON_REQUEST),
+    "E_nav": Metric(f"{_NAVIGATION}:e_nav", goal="robot", if_failed=0.0),
+    "I_nav": Metric(f"{_NAVIGATION}:i_nav", goal="robot"),
+    "S_manip": Metric(f"{_MANIPULATION}:s_manip", goal="objects", if_failed=0.0),
+    "E_manip": Metric(f"{_MANIPULATION}:e_manip", goal="objects", if_failed=0.0),
+    "I_manip": Metric(f"{_MANIPULATION}:i_manip", goal="objects"),
+    "E_nav_to_goal_point": Metric(
+        f"{_NAVIGATION}:e_nav_to_goal_point", Role.ON_REQUEST, goal="robot"
+    ),
+    "E_manip_straight": Metric(
+        f"{_MANIPULATION}:e_manip_straight", Role.ON_REQUEST, goal="objects"
+    ),
+    "path_length_m": Metric(
+        f"{_LENGTHS}:robot_path_length", Role.DETAIL, "path [m]", higher_is_better=False
+    ),
+    "interaction_work_kg_m": Metric(
+        f"{_LENGTHS}:interaction_work", Role.DETAIL, "work [kg m]", higher_is_better=False
+    ),
+    "steps": Metric(
+        f"{_COMMON}:steps", Role.FACT, higher_is_better=None, until_failure=True, whole=True
+    ),
+    "sim_time_s": Metric(
+        f"{_COMMON}:sim_time_s", Role.FACT, "time [s]", higher_is_better=None, until_failure=True
+    ),
 }
-"""Name -> "module:function"; a function of an `Episode` that returns a number, or None where the
-metric does not apply to the task. Names that are columns of the results fill those columns."""
+"""All metrics, in the order of the columns. A line here is all that a new one needs."""
 
 
-def metric_names() -> tuple[str, ...]:
-    """The names that `compute` knows."""
-    return tuple(METRICS)
+def metric_names(*roles: Role) -> tuple[str, ...]:
+    """The names that `compute` knows, of some roles or of all."""
+    return tuple(name for name, metric in METRICS.items() if not roles or metric.role in roles)
 
 
 def compute(episode: Episode, names: Iterable[str] | None = None) -> Mapping[str, float]:
@@ -44,9 +107,13 @@ def compute(episode: Episode, names: Iterable[str] | None = None) -> Mapping[str
         UnknownNameError: if there is no such metric.
         InvalidInputError: if a metric returns something that is no number.
     """
+    kind = "objects" if isinstance(episode.world.goal, Receptacle | ClearanceArea) else "robot"
     values: dict[str, float] = {}
     for name in METRICS if names is None else names:
-        value = _load(name)(episode)
+        function = _load(name)
+        if name in METRICS and METRICS[name].goal not in (kind, None):
+            continue
+        value = function(episode)
         if value is None:
             continue
         try:
@@ -61,7 +128,7 @@ def compute(episode: Episode, names: Iterable[str] | None = None) -> Mapping[str
 
 
 def _load(name: str) -> Any:
-    target = METRICS.get(name, name)
+    target = METRICS[name].function if name in METRICS else name
     module, colon, attribute = target.partition(":")
     if not colon:
         raise UnknownNameError("metric", name, METRICS)

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import functools
-import heapq
 
 import numpy as np
 
 from pushplan.compiled import kernel
 from pushplan.geometry import core_distance
+from pushplan.search.grid_dijkstra import grid_dijkstra
 from pushplan.world import GoalDisc, StaticMap, World
-from pushplan.world.checks import BoolArray, FloatArray, IntArray, frozen
+from pushplan.world.checks import FloatArray, IntArray, frozen
 from pushplan.world.outline import flatten
 
 _SIDE = 96
@@ -49,50 +49,6 @@ def _prices(
                 if gap < far:
                     price[r, c] += weight[k] * (1.0 - gap / far)
     return price
-
-
-@kernel(allocates=True)
-def _search(price: FloatArray, start: int, goal: BoolArray, cell: float) -> FloatArray:
-    """Dijkstra over 8 neighbours from ``start``; returns the cells to the cheapest goal cell."""
-    rows, cols = price.shape
-    cost = np.full(rows * cols, np.inf)
-    parent = np.full(rows * cols, -1)
-    cost[start] = 0.0
-    queue = [(0.0, start)]
-    end = -1
-    while len(queue) > 0:
-        so_far, at = heapq.heappop(queue)
-        if so_far > cost[at]:
-            continue
-        r, c = at // cols, at % cols
-        if goal[r, c]:
-            end = at
-            break
-        for dr in range(-1, 2):
-            for dc in range(-1, 2):
-                nr, nc = r + dr, c + dc
-                if (dr == 0 and dc == 0) or nr < 0 or nc < 0 or nr >= rows or nc >= cols:
-                    continue
-                if np.isinf(price[nr, nc]):
-                    continue
-                length = cell * np.sqrt(float(dr * dr + dc * dc))
-                total = so_far + length * (1.0 + price[nr, nc])
-                there = nr * cols + nc
-                if total < cost[there]:
-                    cost[there] = total
-                    parent[there] = at
-                    heapq.heappush(queue, (total, there))
-    steps = 0
-    at = end
-    while at >= 0:
-        steps += 1
-        at = parent[at]
-    path = np.empty((steps, 2))
-    at = end
-    for i in range(steps - 1, -1, -1):
-        path[i, 0], path[i, 1] = float(at % cols), float(at // cols)
-        at = parent[at]
-    return path
 
 
 def _cell(world: World) -> float:
@@ -170,8 +126,17 @@ def _cheapest(world: World, price: FloatArray, cell: float) -> FloatArray:
     reached = goal.contains(np.stack(np.meshgrid(x, y), axis=-1))
     if isinstance(goal, GoalDisc):  # it may be smaller than a cell
         reached[_cell_of(goal.center, bounds, cell, rows, cols)] = True
-    cells = _search(price, row * cols + col, reached, cell)
-    return bounds[:2] + (cells + 0.5) * cell
+    start = np.array([row * cols + col])
+    _, parents, order = grid_dijkstra(1.0 + price, start, reached, cell)
+    at = int(order[-1])
+    if not reached[divmod(at, cols)]:
+        return np.empty((0, 2))
+    chain = []
+    while at >= 0:
+        chain.append(at)
+        at = int(parents[at])
+    cells = np.array(chain[::-1])
+    return bounds[:2] + (np.column_stack([cells % cols, cells // cols]) + 0.5) * cell
 
 
 def _cell_of(

@@ -11,7 +11,7 @@ from shapely import Polygon
 
 from pushplan.compiled import kernel
 from pushplan.geometry import convex_overlap
-from pushplan.interaction.separation import place
+from pushplan.geometry.transforms import transform_points
 from pushplan.world import RobotModel, StaticMap
 from pushplan.world.checks import FloatArray, IntArray
 from pushplan.world.outline import convex_outline, flatten
@@ -82,7 +82,7 @@ def is_free(pose: FloatArray, shape: Footprint, among: Obstacles, scratch: Float
         if x + r <= box[0] or x - r >= box[2] or y + r <= box[1] or y - r >= box[3]:
             continue
         if not placed:
-            place(pose, shape.vertices, scratch)
+            transform_points(pose, shape.vertices, scratch)
             placed = True
         obstacle = among.vertices[among.offsets[s] : among.offsets[s + 1]]
         for p in range(shape.offsets.shape[0] - 1):

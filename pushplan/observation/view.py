@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from pushplan.compiled import kernel
-from pushplan.geometry import fill_convex
+from pushplan.geometry import fill_convex, transform_points
 from pushplan.world import World
 from pushplan.world.checks import FloatArray, IntArray
 from pushplan.world.movables import Movables
@@ -115,10 +115,7 @@ def _fill_bodies(
         if (poses[k, 0] - view[0]) ** 2 + (poses[k, 1] - view[1]) ** 2 > far * far:
             continue
         a, b = offsets[k], offsets[k + 1]
-        c, s = np.cos(poses[k, 2]), np.sin(poses[k, 2])
-        for i in range(a, b):
-            corners[i, 0] = poses[k, 0] + c * vertices[i, 0] - s * vertices[i, 1]
-            corners[i, 1] = poses[k, 1] + s * vertices[i, 0] + c * vertices[i, 1]
+        transform_points(poses[k], vertices[a:b], corners[a:b])
         to_pixels(view, corners[a:b], spots[a:b])
         fill_convex(image, spots[a:b], value)
 

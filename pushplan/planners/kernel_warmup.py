@@ -9,7 +9,7 @@ import numpy as np
 
 from pushplan.control import MpcTracker
 from pushplan.planners.following.plan_follower import PlanFollower
-from pushplan.planners.rearrangement.kernel_warmup import warm_up_subtasks
+from pushplan.planners.rearrangement.kernel_warmup import warm_up_rearrangement
 from pushplan.planners.registry import OPEN_WATER, make_planner, planner_names
 from pushplan.world import (
     Drive,
@@ -48,7 +48,7 @@ def warm_up(*names: str) -> None:
     """
     wanted = dict.fromkeys(_PLANNER_OF.get(name, name) for name in names or planner_names())
     if not names or set(names) & set(_PUSHERS):
-        warm_up_subtasks()
+        warm_up_rearrangement()
     for name in wanted:
         if name not in (*_PUSHERS, *_NO_KERNELS):
             _warm_up_planner(name)

@@ -219,12 +219,9 @@ def _circumcentres(triangles: FloatArray) -> FloatArray:
 def _outlines(world: World) -> tuple[FloatArray, IntArray]:
     """(V, 2) corners of all objects, then of all obstacles [m], and how many each has."""
     floes, parts = world.movables, world.static.convex_parts
-    counts = np.diff(floes.offsets)
-    x, y, theta = np.repeat(floes.poses, counts, axis=0).T
-    c, s, (u, v) = np.cos(theta), np.sin(theta), floes.vertices.T
-    turned = np.column_stack([x + c * u - s * v, y + s * u + c * v])
     sizes = np.array([len(part) for part in parts], dtype=np.int64)
-    return np.concatenate([turned, *parts]), np.concatenate([counts, sizes])
+    counts = np.concatenate([np.diff(floes.offsets), sizes])
+    return np.concatenate([floes.vertices_world, *parts]), counts
 
 
 def skeleton(planner: Planner | None = None, stop: Stop | None = None) -> PlanFollower:

@@ -38,7 +38,7 @@ class PredictionScores:
 
     Args:
         passages: how many.
-        patch_mse: mean squared error of the covered share over the whole patch.
+        patch_mse: mean squared error of the covered fraction over the whole patch.
         swath_mse: over the cells within half a hull length of the swath.
         work_bias: mean predicted over mean true work; NaN where no work was done.
         work_error: mean absolute error of the work over its mean.
@@ -138,9 +138,9 @@ def table(rows: Mapping[tuple[float, str], PredictionScores]) -> str:
         "| ms a passage |",
         "|---|---|---|---|---|---|---|---|",
     ]
-    for (share, name), s in rows.items():
+    for (ice, name), s in rows.items():
         lines.append(
-            f"| {100 * share:.0f} % | {name} | {_in(1e3 * s.patch_mse)} | {_in(1e3 * s.swath_mse)} "
+            f"| {100 * ice:.0f} % | {name} | {_in(1e3 * s.patch_mse)} | {_in(1e3 * s.swath_mse)} "
             f"| {s.work_bias:.2f} | {100 * s.work_error:.0f} % | {_in(s.work_correlation)} "
             f"| {s.milliseconds:.2g} |"
         )
@@ -160,10 +160,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--voyages", type=int, default=6, help="for each concentration (default 6)")
     options = parser.parse_args(arguments)
     rows = {}
-    for share in (0.1, 0.2, 0.3, 0.4, 0.5):
-        batches = held_out(share, options.voyages)
+    for fraction in (0.1, 0.2, 0.3, 0.4, 0.5):
+        batches = held_out(fraction, options.voyages)
         for name, predictor in predictors(options.network).items():
-            rows[share, name] = score(batches, predictor)
+            rows[fraction, name] = score(batches, predictor)
     sys.stdout.write(table(rows))
     return 0
 

@@ -29,7 +29,7 @@ class PassageConfig:
 
     Args:
         greatest_concentration: of the ice, drawn from ``least_concentration`` to this.
-        least_concentration: share of ice.
+        least_concentration: fraction of ice.
         passages: drawn from each voyage along the channel.
         shortest: least length of a passage.
         longest: greatest length.
@@ -48,8 +48,8 @@ class PassageConfig:
     steepest: float = math.radians(75.0)
 
     def __post_init__(self) -> None:
-        share = number("greatest_concentration", self.greatest_concentration, low=0.0, high=0.5)
-        number("least_concentration", self.least_concentration, low=0.0, high=share)
+        fraction = number("greatest_concentration", self.greatest_concentration, low=0.0, high=0.5)
+        number("least_concentration", self.least_concentration, low=0.0, high=fraction)
         integer("passages", self.passages, low=1)
         number("spacing", self.spacing, low=0.0, high=0.2, open_low=True)
         number("shortest", self.shortest, low=self.spacing)
@@ -108,10 +108,10 @@ def voyage_passages(
     """
     config = PassageConfig() if config is None else config
     rng = stream(seed, f"ice passages {split}")
-    share = rng.uniform(config.least_concentration, config.greatest_concentration)
+    fraction = rng.uniform(config.least_concentration, config.greatest_concentration)
     task = ShipIceTask(
         variations={
-            "concentration": float(share),
+            "concentration": float(fraction),
             "clumping": float(rng.uniform()),
             "goal_distance": 39.0,
         }
@@ -140,7 +140,7 @@ def _choose(
     """Pieces of a voyage, from the poses with the first number to those with the second."""
     last = len(voyage) - 1 if moved.jammed_at < 0 else moved.jammed_at - 1
     shortest, longest = (
-        max(1, round(share / config.spacing)) for share in (config.shortest, config.longest)
+        max(1, round(fraction / config.spacing)) for fraction in (config.shortest, config.longest)
     )
     passages, ends = [], []
     for _ in range(config.passages):

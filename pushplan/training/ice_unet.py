@@ -62,7 +62,7 @@ class IceUNet(nn.Module):
         """Predict a batch.
 
         Args:
-            patches: (B, 3, 40, 40) shares: occupancy, footprint, swath.
+            patches: (B, 3, 40, 40) fractions: occupancy, footprint, swath.
 
         Returns:
             (B, 40, 40) occupancy after, not cut to [0, 1]; (B,) work on ice of unit density, in

@@ -22,6 +22,16 @@ from pushplan.world.goals import (
 )
 from pushplan.world.movables import Movables
 from pushplan.world.plan import Plan, PlanResult, PlanStats, PlanStatus, SubTask
+from pushplan.world.policy_abilities import (
+    ChecksEnvironment,
+    ChecksScenario,
+    ChoosesActions,
+    ChoosesObservation,
+    HoldsDecisions,
+    LogsPlans,
+    PlansBesideDriving,
+    ShowsPlan,
+)
 from pushplan.world.protocols import Controller, Planner, Policy
 from pushplan.world.robot import Drive, RobotModel
 from pushplan.world.robots import (
@@ -50,6 +60,10 @@ __all__ = [
     "Action",
     "AnyOf",
     "Cancellation",
+    "ChecksEnvironment",
+    "ChecksScenario",
+    "ChoosesActions",
+    "ChoosesObservation",
     "ClearanceArea",
     "Controller",
     "Deadline",
@@ -59,7 +73,9 @@ __all__ = [
     "Goal",
     "GoalDisc",
     "GoalLine",
+    "HoldsDecisions",
     "InvalidInputError",
+    "LogsPlans",
     "ManipulationGoal",
     "MaxIterations",
     "MissingDependencyError",
@@ -70,12 +86,14 @@ __all__ = [
     "PlanStats",
     "PlanStatus",
     "Planner",
+    "PlansBesideDriving",
     "Policy",
     "PushplanError",
     "Receptacle",
     "RobotModel",
     "ScenarioError",
     "SchemaError",
+    "ShowsPlan",
     "StaticMap",
     "Stop",
     "StopCheck",

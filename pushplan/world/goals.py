@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pushplan.world.checks import ArrayRecord, BoolArray, FloatArray, array, number
+from pushplan.world.checks import ArrayRecord, BoolArray, FloatArray, IntArray, array, number
 from pushplan.world.errors import InvalidInputError
-from pushplan.world.outline import convex_outline
+from pushplan.world.outline import convex_outline, next_corner
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,6 +85,25 @@ class Receptacle(ArrayRecord):
     def __post_init__(self) -> None:
         object.__setattr__(self, "polygon", convex_outline("goal.polygon", self.polygon))
 
+    def contains(self, outline: FloatArray) -> bool:
+        """Whether an object with this outline, (N, 2) corners [m], is delivered."""
+        return bool(self.contains_each(outline, np.array([0, len(outline)]))[0])
+
+    def contains_each(self, vertices: FloatArray, offsets: IntArray) -> BoolArray:
+        """(K,) which of several objects are delivered; a corner on the polygon's edge is inside.
+
+        Args:
+            vertices: (V, 2) outlines [m], world frame, flattened.
+            offsets: (K + 1,) where each outline starts.
+        """
+        if len(offsets) == 1:
+            return np.zeros(0, dtype=bool)
+        edge = np.roll(self.polygon, -1, axis=0) - self.polygon  # (N, 2)
+        x, y = (vertices[:, None] - self.polygon).transpose(2, 0, 1)  # (V, N)
+        inside = (edge[:, 0] * y - edge[:, 1] * x >= 0.0).all(axis=1)
+        all_inside: BoolArray = np.logical_and.reduceat(inside, offsets[:-1])
+        return all_inside
+
 
 @dataclass(frozen=True, eq=False)
 class ClearanceArea(ArrayRecord):
@@ -106,6 +125,35 @@ class ClearanceArea(ArrayRecord):
         object.__setattr__(self, "polygon", polygon)
         edges = array("goal.open_edges", self.open_edges, (len(polygon),), dtype=np.bool_)
         object.__setattr__(self, "open_edges", edges)
+
+    def contains(self, outline: FloatArray) -> bool:
+        """Whether an object with this convex outline, (N, 2) corners [m], is cleared."""
+        return bool(self.contains_each(outline, np.array([0, len(outline)]))[0])
+
+    def contains_each(self, vertices: FloatArray, offsets: IntArray) -> BoolArray:
+        """(K,) which of several objects are cleared: some edge's line separates them strictly.
+
+        Args:
+            vertices: (V, 2) convex counter-clockwise outlines [m], world frame, flattened.
+            offsets: (K + 1,) where each outline starts.
+        """
+        if len(offsets) == 1:
+            return np.zeros(0, dtype=bool)
+        starts, after = offsets[:-1], next_corner(offsets)
+        mine = _gaps(self.polygon, np.roll(self.polygon, -1, axis=0), vertices)  # (V, N)
+        from_area = np.minimum.reduceat(mine, starts).max(axis=1)  # (K,)
+        theirs = _gaps(vertices, vertices[after], self.polygon).min(axis=0)  # (V,)
+        cleared: BoolArray = np.maximum(from_area, np.maximum.reduceat(theirs, starts)) > 0.0
+        return cleared
+
+
+def _gaps(a: FloatArray, b: FloatArray, points: FloatArray) -> FloatArray:
+    """(P, E) distance [m] of each of (P, 2) points in front of each edge from (E, 2) a to b."""
+    nx, ny = b[:, 1] - a[:, 1], a[:, 0] - b[:, 0]
+    length = np.sqrt(nx * nx + ny * ny)
+    x, y = (points[:, None] - a).transpose(2, 0, 1)
+    gaps: FloatArray = x * (nx / length) + y * (ny / length)
+    return gaps
 
 
 NavigationGoal = GoalDisc | GoalLine

@@ -25,6 +25,7 @@ from pushplan.world.outline import (
     convex_outlines,
     flatten,
     transform,
+    transform_outlines,
     well_formed,
 )
 
@@ -165,6 +166,11 @@ class Movables(ArrayRecord):
     def outline_world(self, k: int) -> FloatArray:
         """(N, 2) corners of object ``k`` in the world frame [m]."""
         return transform(self.poses[k], self.outline(k))
+
+    @property
+    def vertices_world(self) -> FloatArray:
+        """(V, 2) `vertices` in the world frame [m]."""
+        return transform_outlines(self.poses, self.vertices, self.offsets)
 
     def moved_to(self, poses: ArrayLike, twists: ArrayLike | None = None) -> Movables:
         """The same objects at other poses (K, 3); at rest unless twists (K, 3) are given.

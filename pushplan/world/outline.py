@@ -93,7 +93,7 @@ def well_formed(vertices: FloatArray, offsets: IntArray) -> BoolArray:
     if not good.all() or len(good) == 0:
         return good
     starts = offsets[:-1]
-    after = _next_corner(offsets)
+    after = next_corner(offsets)
     size = np.maximum.reduceat(vertices, starts) - np.minimum.reduceat(vertices, starts)
     least = 1e-9 * size.max(axis=1)
     least_area = least * size.max(axis=1)
@@ -114,7 +114,7 @@ def areas_and_centroids(vertices: FloatArray, offsets: IntArray) -> tuple[FloatA
     """`signed_area` (K,) [m²] and `centroid` (K, 2) [m] of flattened outlines with an area."""
     if len(offsets) < 2:
         return np.zeros(0), np.zeros((0, 2))
-    starts, after = offsets[:-1], _next_corner(offsets)
+    starts, after = offsets[:-1], next_corner(offsets)
     shifted = vertices - np.repeat(vertices[starts], np.diff(offsets), axis=0)
     cross = shifted[:, 0] * shifted[after, 1] - shifted[after, 0] * shifted[:, 1]
     twice = np.add.reduceat(cross, starts)
@@ -122,7 +122,7 @@ def areas_and_centroids(vertices: FloatArray, offsets: IntArray) -> tuple[FloatA
     return 0.5 * twice, vertices[starts] + sums / (3.0 * twice[:, None])
 
 
-def _next_corner(offsets: IntArray) -> IntArray:
+def next_corner(offsets: IntArray) -> IntArray:
     """(V,) index of the corner that follows each corner of flattened outlines."""
     after = np.arange(1, offsets[-1] + 1)
     after[offsets[1:] - 1] = offsets[:-1]
@@ -154,3 +154,10 @@ def transform(pose: ArrayLike, points_body: FloatArray) -> FloatArray:
     rotation = np.array([[c, -s], [s, c]])
     points_world: FloatArray = points_body @ rotation.T + np.array([x, y])
     return points_world
+
+
+def transform_outlines(poses: FloatArray, vertices: FloatArray, offsets: IntArray) -> FloatArray:
+    """Carry flattened outlines (V, 2) [m] from the frames of K bodies at (K, 3) to the world."""
+    x, y, theta = np.repeat(poses, np.diff(offsets), axis=0).T
+    c, s, (u, v) = np.cos(theta), np.sin(theta), vertices.T
+    return np.column_stack([x + c * u - s * v, y + s * u + c * v])

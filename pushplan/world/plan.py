@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import enum
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pushplan.world.checks import ArrayRecord, FloatArray, array, number
+from pushplan.world.checks import ArrayRecord, FloatArray, array, frozen, number
 from pushplan.world.errors import InvalidInputError
+from pushplan.world.polyline import arc_lengths, path_length
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -124,8 +126,12 @@ class Plan(ArrayRecord):
     @property
     def length(self) -> float:
         """Path length of the robot [m]."""
-        steps = np.diff(self.poses[:, :2], axis=0)
-        return float(np.hypot(steps[:, 0], steps[:, 1]).sum())
+        return path_length(self.poses)
+
+    @cached_property
+    def arc_lengths(self) -> FloatArray:
+        """(N,) path length of the robot up to each pose [m]."""
+        return frozen(arc_lengths(self.poses))
 
 
 @dataclass(frozen=True)

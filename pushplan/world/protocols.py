@@ -52,7 +52,12 @@ class Controller(Protocol):
 
 @runtime_checkable
 class Policy(Protocol):
-    """Chooses what to do, step after step: a planner with a controller, a network, a person."""
+    """Chooses what to do, step after step: a planner with a controller, a network, a person.
+
+    These two methods are all that is needed. What a policy may have beside them (which actions it
+    gives, what it observes, which environments it fits, whether it plans beside driving, what it
+    planned) are the protocols of `pushplan.world.policy_abilities`.
+    """
 
     def reset(self, world: World, rng: np.random.Generator) -> None:
         """Forget the last episode; ``world`` is the start of the next one."""

@@ -163,14 +163,16 @@ def _bumper(
         return []
     if kind == "pusher":
         return [_trapezium(back, body_half, back + depth, half)]
-    share = np.linspace(-1.0, 1.0, _SEGMENTS + 1)  # parabolic edges: 3 mm off a circle at most
+    fraction = np.linspace(-1.0, 1.0, _SEGMENTS + 1)  # parabolic edges: 3 mm off a circle at most
     if kind == "navigation":
-        nose = back + 0.5 * depth + 1.5 * curve * (1.0 - share**2)
-        edge = np.column_stack([nose, half * share])
+        nose = back + 0.5 * depth + 1.5 * curve * (1.0 - fraction**2)
+        edge = np.column_stack([nose, half * fraction])
         return [np.concatenate([edge, [(back, body_half), (back, -body_half)]])]
-    mouth = back + depth + curve * (share**2 - 0.5)
-    rear = body_half * share
-    corners = zip(mouth, half * share, rear, mouth[1:], half * share[1:], rear[1:], strict=False)
+    mouth = back + depth + curve * (fraction**2 - 0.5)
+    rear = body_half * fraction
+    corners = zip(
+        mouth, half * fraction, rear, mouth[1:], half * fraction[1:], rear[1:], strict=False
+    )
     return [
         np.array([(back, r0), (m0, y0), (m1, y1), (back, r1)]) for m0, y0, r0, m1, y1, r1 in corners
     ]

@@ -8,9 +8,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pushplan.world.checks import ArrayRecord, FloatArray, array, number
+from pushplan.world.checks import ArrayRecord, BoolArray, FloatArray, array, number
 from pushplan.world.errors import InvalidInputError
-from pushplan.world.goals import ClearanceArea, Goal, GoalDisc, GoalLine, NavigationGoal, Receptacle
+from pushplan.world.goals import (
+    ClearanceArea,
+    Goal,
+    GoalDisc,
+    GoalLine,
+    ManipulationGoal,
+    NavigationGoal,
+    Receptacle,
+)
 from pushplan.world.movables import Movables
 from pushplan.world.outline import transform
 from pushplan.world.robot import RobotModel
@@ -75,6 +83,30 @@ class World(ArrayRecord):
                 f"got {type(self.goal).__name__}"
             )
         return self.goal
+
+    @property
+    def manipulation_goal(self) -> ManipulationGoal:
+        """The goal, where it is one for the objects.
+
+        Raises:
+            InvalidInputError: if it is a goal for the robot.
+        """
+        if not isinstance(self.goal, Receptacle | ClearanceArea):
+            raise InvalidInputError(
+                "this needs a goal for the objects (Receptacle or ClearanceArea), "
+                f"got {type(self.goal).__name__}"
+            )
+        return self.goal
+
+    @property
+    def completed(self) -> BoolArray:
+        """(K,) whether each object is where the goal wants it: delivered, or off the area.
+
+        Raises:
+            InvalidInputError: if the goal is one for the robot.
+        """
+        movables = self.movables
+        return self.manipulation_goal.contains_each(movables.vertices_world, movables.offsets)
 
     def robot_outline_world(self) -> tuple[FloatArray, ...]:
         """Footprint parts, each (N, 2) corners in the world frame [m]."""

@@ -23,7 +23,7 @@ def test_starts_are_valid(preset, layout):
         world = clearing.start(stream(seed, "layout"))
         check_start(world, clearing.preset.box_spacing)
         assert all(area.contains(box) for box in shapes(world))
-        assert not clearing.cleared(world).any()
+        assert not world.completed.any()
         x, y, theta = world.robot_pose
         assert y < clearing.goal.polygon[:, 1].min() + 2.0 * clearing.preset.start_margin
         assert theta == pytest.approx(np.pi / 2)
@@ -85,9 +85,9 @@ def test_distances_lead_to_open_edges_only():
     free = task(boxes=3)
     free.start(stream(0, "layout"))
     np.testing.assert_allclose(free.goal_distances(poses), (0.5, 1.0, 0.0), atol=0.02)
-    assert not clearing.cleared(placed(world, poses)).any()  # half of the last one is inside
+    assert not placed(world, poses).completed.any()  # half of the last one is inside
     out = placed(world, [(0.0, 5.51, 0.0), (0.0, 5.5, 0.0), (0.0, 5.6, np.pi / 4)])
-    assert clearing.cleared(out).tolist() == [True, False, False]
+    assert out.completed.tolist() == [True, False, False]
 
 
 def test_rewards_by_hand():

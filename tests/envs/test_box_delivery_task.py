@@ -7,9 +7,8 @@ from manipulation_checks import check_reach, check_start, shapes
 
 from pushplan.envs import PushEnv
 from pushplan.envs.tasks.box_delivery import LAYOUTS, PRESETS, BoxDeliveryTask
-from pushplan.envs.tasks.box_kernels import all_corners_inside, no_longer_touches, sample_at
+from pushplan.envs.tasks.box_kernels import sample_at
 from pushplan.world import (
-    Movables,
     ScenarioError,
     UnknownNameError,
     area_clearing_robot,
@@ -273,24 +272,6 @@ def test_a_pushed_box_leaves_the_floor_of_the_environment():
     assert info["completed"].tolist() == [True, False] and not (terminated or truncated)
     per_metre = 3.0 * 0.2 / 0.2845  # towards the receptacle, at the scale of the testbed
     assert sum(rewards) == pytest.approx(10.0 + per_metre * 0.15, abs=0.01)
-
-
-def test_kernels_agree_with_shapely():
-    rng = np.random.default_rng(0)
-    area = np.array([(-1.0, -1.0), (1.0, -0.8), (0.8, 1.0), (-0.6, 0.9)])
-    square = 0.3 * np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)])
-    triangle = 0.4 * np.array([(-1, -1), (2, -1), (-1, 2)])
-    outlines = [square if i % 2 else triangle for i in range(300)]
-    boxes = Movables.from_outlines(outlines, rng.uniform((-2, -2, -4), (2, 2, 4), (300, 3)))
-    polygons = [shapely.Polygon(boxes.outline_world(k)) for k in range(300)]
-    goal = shapely.Polygon(area)
-    arguments = (boxes.poses, boxes.vertices, boxes.offsets, area)
-    np.testing.assert_array_equal(
-        all_corners_inside(*arguments), [goal.covers(polygon) for polygon in polygons]
-    )
-    np.testing.assert_array_equal(
-        no_longer_touches(*arguments), [not goal.intersects(polygon) for polygon in polygons]
-    )
 
 
 def test_distances_where_there_is_no_way_are_the_farthest():

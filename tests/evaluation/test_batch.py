@@ -14,11 +14,11 @@ import pytest
 from evaluation_doubles import HERE, Ahead, LineScenario
 
 from pushplan.evaluation import (
-    COLUMNS,
     TIMING_COLUMNS,
     Job,
     JobSettings,
     ResultRow,
+    columns,
     parse_policies,
     run_batch,
 )
@@ -52,7 +52,7 @@ def test_a_run_directory_holds_rows_and_traces(tmp_path: Path) -> None:
         "plan_time_median_s,plan_time_p99_s,plan_time_max_s,"
         "decision_time_median_s,decision_time_mean_s,decision_time_max_s"
     )
-    assert header == ",".join(COLUMNS)
+    assert header == ",".join(columns())
     assert [(row.policy, row.seed) for row in rows] == [
         ("Ahead", 0), ("Ahead", 1), ("Logs", 0), ("Logs", 1),
     ]  # fmt: skip

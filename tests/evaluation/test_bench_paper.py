@@ -13,7 +13,7 @@ import pytest
 from pushplan.cli import main
 from pushplan.envs.registry import TASKS
 from pushplan.evaluation import JobSettings, Results, UnusablePolicyError, bench, bench_paper
-from pushplan.evaluation.fitness import misfit
+from pushplan.evaluation.compatibility import incompatibility
 from pushplan.evaluation.paper_tables import training_cost
 from pushplan.evaluation.policies import PolicySpec
 from pushplan.evaluation.published import chosen_tables, published_tables
@@ -89,11 +89,11 @@ def test_ours_beside_theirs(tmp_path: Path, capsys: pytest.CaptureFixture[str]) 
         only="maze-2d-3", policies="straight", episodes=1, workers=0, out=out, timeout_s=300.0
     )
     assert len(less.results.rows) == 1
-    short, sheet = less.sheets()
+    short, table = less.tables()
     assert short.cells == (("maze-2d-3", "mean", "E_nav 0.74, I_nav 0.946", "none"),)
     (value,) = less.to_goal_point.values()
     assert value == pytest.approx(1.066, abs=2e-3)  # docs/metrics.md
-    assert sheet.cells[-1][0] == "straight" and "1.066" in sheet.cells[-1][4]
+    assert table.cells[-1][0] == "straight" and "1.066" in table.cells[-1][4]
 
 
 def test_the_time_of_a_decision_holds_the_observation_and_no_simulation(tmp_path: Path) -> None:
@@ -163,7 +163,7 @@ def test_a_policy_has_to_suit_one_start_of_a_mixed_suite() -> None:
     assert len(results.rows) == 1
     starts = suite("smoke").scenarios
     spec = PolicySpec("gtsp", "gtsp")
-    fits = [misfit(spec, start, JobSettings()) is None for start in starts]
+    fits = [incompatibility(spec, start, JobSettings()) is None for start in starts]
     assert fits == [start.task in ("box_delivery", "area_clearing") for start in starts]
 
 
@@ -181,7 +181,7 @@ def test_bad_options_of_the_comparison(
         ([*paper, "--only", "box_delivery"], 2, "fits no chosen suite"),
         ([*paper, "--policies", "nope"], 2, "unknown policy 'nope'"),
         ([*paper, "--markdown", "."], 2, "is a folder"),
-        ([*paper, "--honest-time", "1"], 2, "honest-time"),
+        ([*paper, "--latency", "1"], 2, "latency"),
         ([*paper, "--only", "maze-2d-3", "--out", "file"], 1, "file"),
         ([*paper, "--only", "maze-2d-3", "--markdown", "gone/a.md"], 1, "no folder gone"),
     ):

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pushplan.evaluation import ResultRow, Results, compare
+from pushplan.evaluation import ResultRow, Results, bench, compare
 from pushplan.evaluation.store import RunDirectory
 from pushplan.world import InvalidInputError
 
@@ -26,12 +26,14 @@ def rows_of(policy: str, shift: float, seeds: int = 20, setting: str = "maze-5")
             status="done",
             reason="goal",
             success=True,
-            E_nav=float(rng.uniform(0.5, 0.7) + shift),
-            I_nav=float(rng.uniform(0.8, 0.9)),
-            path_length_m=20.0,
-            interaction_work_kg_m=1.0,
-            steps=100,
-            sim_time_s=80.0,
+            metrics={
+                "E_nav": float(rng.uniform(0.5, 0.7) + shift),
+                "I_nav": float(rng.uniform(0.8, 0.9)),
+                "path_length_m": 20.0,
+                "interaction_work_kg_m": 1.0,
+                "steps": 100,
+                "sim_time_s": 80.0,
+            },
             wall_time_s=0.5,
             plan_calls=2,
             plan_time_median_s=0.01,
@@ -53,13 +55,13 @@ def results(tmp_path: Path) -> Results:
                 *rows_of("better", 0.1, 19, setting),
             ]:
                 store.add(row)
+        last = rows_of("better", 0.0)[-1]
         bad = replace(
-            rows_of("better", 0.0)[-1],
+            last,
             status="crashed",
             reason="ended by <SIGKILL>",
             success=False,
-            E_nav=0.0,
-            I_nav=None,
+            metrics={**{n: v for n, v in last.metrics.items() if n != "I_nav"}, "E_nav": 0.0},
         )
         store.add(bad, detail="what happened")
         store.write_csv()
@@ -74,7 +76,7 @@ def test_policies_keep_their_order_and_settings_are_sorted_by_number(results: Re
 def test_a_failed_job_counts_against_its_policy(results: Results) -> None:
     better = next(s for s in results.summary() if s.policy == "better")
     assert (better.episodes, better.failed) == (20, 1)
-    assert better.success.share == 0.95
+    assert better.success.fraction == 0.95
     assert better.metrics["E_nav"].count == 20
     assert better.metrics["I_nav"].count == 19
 
@@ -150,3 +152,22 @@ def test_one_policy_and_one_episode_are_enough(tmp_path: Path) -> None:
 def test_no_results_is_an_error(tmp_path: Path) -> None:
     with pytest.raises(InvalidInputError, match="holds no results"):
         Results.load(tmp_path)
+
+
+def test_page_csv_and_database_of_a_folder_say_the_same(tmp_path: Path) -> None:
+    many = bench("smoke", ["straight", "random"], episodes=4, workers=0, out=tmp_path)
+    many.report()
+    few = bench("smoke", ["straight"], episodes=2, workers=0)
+    with pytest.raises(InvalidInputError, match=f"{tmp_path}.*another folder"):
+        few.report(tmp_path)
+    assert f"episodes {len(many.rows)}" in (tmp_path / "report.html").read_text()
+    assert len((tmp_path / "results.csv").read_text().splitlines()) == len(many.rows) + 1
+
+    few.report(tmp_path / "few")
+    assert len((tmp_path / "few" / "results.csv").read_text().splitlines()) == len(few.rows) + 1
+    longer = bench("smoke", ["straight"], episodes=3, workers=0, out=tmp_path / "few")
+    assert not (tmp_path / "few" / "report.html").exists()  # it was about other rows
+    with pytest.raises(InvalidInputError, match="another folder"):
+        few.report(tmp_path / "few")
+    longer.report()
+    Results.load(tmp_path / "few").report()

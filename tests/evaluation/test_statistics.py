@@ -44,7 +44,7 @@ def test_wilson_agrees_with_scipy(successes: int, count: int) -> None:
     theirs = scipy.stats.binomtest(successes, count).proportion_ci(method="wilson")
     ours = wilson(successes, count)
     assert (ours.low, ours.high) == pytest.approx(tuple(theirs), abs=1e-12)
-    assert ours.share == successes / count
+    assert ours.fraction == successes / count
 
 
 def test_nothing_cannot_be_estimated() -> None:

@@ -89,7 +89,7 @@ def test_point_in_polygon_handles_nonconvex_outlines() -> None:
 def test_transform_points_may_work_in_place() -> None:
     pose, points = np.array([1.0, -2.0, 0.7]), SQUARE.copy()
     expected = transform(pose, points)
-    transform_points(*pose, points, points)
+    transform_points(pose, points, points)
     np.testing.assert_allclose(points, expected, atol=1e-15)
 
 

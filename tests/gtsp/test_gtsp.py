@@ -19,9 +19,9 @@ from pushplan.gtsp import (
     solve_gtsp,
     warm_up_solver,
 )
-from pushplan.gtsp.kernels import SPARE, push_values
-from pushplan.gtsp.layers import build, close_gap, keep, link_in, make_layers, undo
-from pushplan.gtsp.segment_swap import improve_by_swaps
+from pushplan.gtsp.layer_kernels import build, close_gap, keep, link_in, make_layers, undo
+from pushplan.gtsp.node_choice_kernels import SPARE, push_values
+from pushplan.gtsp.segment_swap_kernels import improve_by_swaps
 from pushplan.world import Cancellation, Deadline, InvalidInputError, MaxIterations
 
 SEARCH = GtspConfig(method="search")
@@ -330,6 +330,7 @@ def test_iterations_are_counted_and_other_seeds_differ() -> None:
     assert tours[0].nodes != tours[1].nodes
 
 
+@pytest.mark.clock
 @pytest.mark.parametrize("config", [GtspConfig(), SEARCH, PROOF])
 def test_deadline_holds(config: GtspConfig) -> None:
     costs, clusters = pushes(16, 16, 0)
@@ -430,3 +431,14 @@ def test_a_table_that_does_not_fit_is_refused() -> None:
 def test_config_is_checked(changes: dict[str, object]) -> None:
     with pytest.raises(InvalidInputError):
         GtspConfig(**changes)  # type: ignore[arg-type]
+
+
+def test_the_solver_knows_no_robot() -> None:
+    code = (
+        "import sys\n"
+        "from pushplan.gtsp import read_gtsp, solve_gtsp\n"
+        "print(sorted(m for m in sys.modules if m.startswith('pushplan.') and m.split('.')[1]\n"
+        "             not in ('gtsp', 'world', 'compiled')))\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout == "[]\n"

@@ -27,7 +27,8 @@ from pushplan.learned.shipped import weights_of
 from pushplan.scenarios import Scenario
 from pushplan.world import InvalidInputError, UnknownNameError
 
-onnx = pytest.importorskip("onnx")
+pytestmark = pytest.mark.learn
+onnx = pytest.importorskip("onnx", reason="needs the extra 'learn' (onnx)")
 helper, TensorProto, numpy_helper = onnx.helper, onnx.TensorProto, onnx.numpy_helper
 
 
@@ -87,6 +88,7 @@ class TestGood:
         seen = rng.normal(size=106).astype(np.float32)
         assert OnnxPolicy(path).decide(seen) == OnnxPolicy(path).decide(seen)
 
+    @pytest.mark.clock
     def test_it_takes_little_time(self, tmp_path):
         import time
 

@@ -187,7 +187,8 @@ def test_lists_from_a_file_are_taken() -> None:
     assert hash(view) == hash(ImageObservation(("static",), (4.0, 4.0), (8, 8)))
 
 
-def test_images_are_fast_enough_for_every_control_step(warm: None) -> None:
+@pytest.mark.clock
+def test_images_are_fast_enough_for_every_control_step() -> None:
     names = ("occupancy", "footprint", "robot_distance", "goal_distance")
     view = ImageObservation(names, (10.0, 10.0), (224, 224))
     world = scene(MAPS["columns"], (4.5, 4.5, 0.4), boxes=20)

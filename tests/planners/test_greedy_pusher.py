@@ -7,7 +7,7 @@ from conftest import make_boxes, make_u_maze
 from pushplan.envs import PushEnv
 from pushplan.planners import make_policy
 from pushplan.planners.rearrangement.greedy import GreedyConfig, GreedyPusher
-from pushplan.planners.rearrangement.line_up import is_done, line_up, way_of
+from pushplan.planners.rearrangement.line_up import goal_heading, is_done, line_up
 from pushplan.world import (
     ClearanceArea,
     InvalidInputError,
@@ -41,7 +41,11 @@ def scene(boxes, goal=CORNER, extra=(), pose=(-3.0, -3.0, 0.0), **robot):
 
 def run(task, preset, seed, limit, **variations):
     env = PushEnv(
-        task=task, preset=preset, action="velocity", observation="state", variations=variations
+        task=task,
+        preset=preset,
+        action="velocity",
+        observation="state",
+        variations=variations,
     )
     policy = make_policy("greedy")
     env.reset(seed=seed)
@@ -56,7 +60,7 @@ def run(task, preset, seed, limit, **variations):
 
 def test_way_and_place_behind_a_box():
     world = scene([(0.0, 4.0, 0.0)])
-    assert way_of(world, 0) == pytest.approx(0.0, abs=0.15)
+    assert goal_heading(world, 0) == pytest.approx(0.0, abs=0.15)
     push = line_up(world, 0, 0.05)
     assert push.turn == 0.0 and push.shift == 0.0
     end = push.points[-1]
@@ -65,7 +69,7 @@ def test_way_and_place_behind_a_box():
     low = line_up(scene([(0.0, -4.49, 0.0)]), 0, 0.05)
     assert low.turn != 0.0 or low.shift != 0.0
     around = scene([(0.0, 0.0, 0.0)], extra=[[(1.0, -5.0), (1.5, -5.0), (1.5, 2.0), (1.0, 2.0)]])
-    assert way_of(around, 0) > 0.9  # up and over the wall
+    assert goal_heading(around, 0) > 0.9  # up and over the wall
 
 
 def test_which_boxes_are_done():
@@ -73,7 +77,7 @@ def test_which_boxes_are_done():
     area = ClearanceArea([(-2, -2), (2, -2), (2, 2), (-2, 2)], [True] * 4)
     world = scene([(2.4, 0.0, 0.0), (2.6, 0.0, 0.0)], goal=area)
     assert [is_done(world, k) for k in range(2)] == [False, True]
-    assert way_of(world, 0) == pytest.approx(0.0, abs=1e-6)
+    assert goal_heading(world, 0) == pytest.approx(0.0, abs=1e-6)
     done = scene([(2.6, 0.0, 0.0)], goal=area)
     assert GreedyPusher().act(done) == Twist(0.0, 0.0)
     assert GreedyPusher().act(scene([])) == Twist(0.0, 0.0)
@@ -81,7 +85,9 @@ def test_which_boxes_are_done():
 
 def test_closed_edges_are_not_pushed_through():
     area = ClearanceArea([(-2, -2), (2, -2), (2, 2), (-2, 2)], [False, False, True, False])
-    assert way_of(scene([(1.4, -1.4, 0.0)], goal=area), 0) == pytest.approx(np.pi / 2, abs=0.01)
+    assert goal_heading(scene([(1.4, -1.4, 0.0)], goal=area), 0) == pytest.approx(
+        np.pi / 2, abs=0.01
+    )
 
 
 @pytest.mark.parametrize("layout", ["clear", "walled"])
@@ -98,7 +104,9 @@ def test_it_delivers_most_boxes_and_the_same_each_time():
     )
 
 
-def test_commands_are_within_limits_and_quick(warm):
+@pytest.mark.clock
+@pytest.mark.warm("greedy")
+def test_commands_are_within_limits_and_quick():
     world = scene([(0.0, 0.0, 0.3), (2.0, -4.49, 0.0), (-4.49, 4.0, 0.0)])
     policy = GreedyPusher()
     times = []

@@ -12,7 +12,7 @@ from conftest import make_boxes, make_robot, make_u_maze
 from pushplan.drawing import draw_sequence
 from pushplan.envs import PushEnv
 from pushplan.planners import make_policy, policy_names
-from pushplan.planners.rearrangement import GtspMpc, SubTaskConfig
+from pushplan.planners.rearrangement import GtspMpc, RearrangementConfig
 from pushplan.world import (
     InvalidInputError,
     Receptacle,
@@ -127,11 +127,11 @@ def test_a_box_delivered_by_accident_is_dropped():
     policy = GtspMpc()
     world = room([(0.0, 0.0, 0.0), (-2.0, 2.0, 0.0)])
     policy.act(world)
-    first = policy.plan[0].led
-    assert {i for push in policy.plan for i in push.covers} == {0, 1}
+    first = policy.plan[0].target
+    assert {i for push in policy.plan for i in push.delivers} == {0, 1}
     left = replace(world, movables=world.movables.select(world.movables.ids != first), time=0.2)
     policy.act(left)
-    assert first not in {push.led for push in policy.plan}
+    assert first not in {push.target for push in policy.plan}
     assert policy.act(replace(left, movables=make_boxes([]), time=0.4)) == Twist(0.0, 0.0)
     assert policy.plan == () and policy.given_up == {}
 
@@ -177,11 +177,11 @@ def test_other_tasks_and_robots_are_refused(name):
 
 def test_settings_of_the_policies_are_checked():
     with pytest.raises(InvalidInputError):
-        GtspMpc(SubTaskConfig(), price=3.0)
+        GtspMpc(RearrangementConfig(), work_weight=3.0)
     with pytest.raises(InvalidInputError):
         make_policy("gtsp-mpc", config="fast")
     with pytest.raises(InvalidInputError):
-        make_policy("gtsp-mpc", price=-1.0)
+        make_policy("gtsp-mpc", work_weight=-1.0)
     with pytest.raises(UnknownNameError):
         make_policy("gtsp-mpc", prize=1.0)
 

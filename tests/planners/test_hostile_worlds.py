@@ -37,7 +37,7 @@ from pushplan.world import (
 )
 from pushplan.world.outline import transform
 
-pytestmark = pytest.mark.usefixtures("warm")
+pytestmark = pytest.mark.warm("kinodynamic-rrt", "push-aware")
 
 SOON = FirstSolution() | MaxIterations(20_000)
 SQUARE = 0.5 * np.array([[1, 1], [-1, 1], [-1, -1], [1, -1]])
@@ -107,6 +107,7 @@ def test_ships_that_hardly_turn(name):
             assert make_planner(name).plan(world, stop=SOON).status.has_plan
 
 
+@pytest.mark.clock
 def test_a_heap_of_boxes_does_not_stop_the_clock():
     rng = np.random.default_rng(7)
     heap = np.column_stack([rng.uniform(0, 10, (200, 2)), rng.uniform(-3, 3, 200)])
@@ -137,6 +138,7 @@ def test_masses_of_any_ratio(box_mass, robot_mass):
     assert result.plan.interaction_cost > box_mass
 
 
+@pytest.mark.clock
 def test_a_speck_does_not_stop_the_clock():
     speck = Movables.from_outlines([SQUARE, 1e-5 * SQUARE], [[10, 9, 0.0], [9, 9, 0]])
     world = make_u_maze(movables=speck)
@@ -145,6 +147,7 @@ def test_a_speck_does_not_stop_the_clock():
     assert quickest(lambda: planner.plan(world, stop=Deadline(0.3))) < 0.5
 
 
+@pytest.mark.clock
 def test_many_columns_do_not_stop_the_clock():
     columns = [
         SQUARE + np.array([x, y])
@@ -163,6 +166,7 @@ def test_many_columns_do_not_stop_the_clock():
     assert time.perf_counter() - began < 0.8
 
 
+@pytest.mark.clock
 def test_a_busy_thread_does_not_break_anothers_deadline():
     sealed = make_u_maze(
         static=StaticMap.build(

@@ -35,7 +35,7 @@ from pushplan.world import (
 )
 from pushplan.world.outline import transform
 
-pytestmark = pytest.mark.usefixtures("warm")
+pytestmark = pytest.mark.warm("geometric-rrt", "kinodynamic-rrt")
 
 BUDGET = MaxIterations(1200)
 QUICK = Deadline(5.0) | FirstSolution()
@@ -73,6 +73,7 @@ class TestEveryPlanner:
         assert result.status in (PlanStatus.GOAL_UNREACHABLE, PlanStatus.TIMED_OUT)
         assert result.plan is None
 
+    @pytest.mark.clock
     def test_it_keeps_its_deadline(self, name):
         world = make_u_maze(scattered_boxes(10, 1))
         planner = make_planner(name)
@@ -93,6 +94,7 @@ def test_a_start_inside_a_wall_is_reported(name):
     assert make_planner(name).plan(world, stop=BUDGET).status is PlanStatus.START_BLOCKED
 
 
+@pytest.mark.clock
 @pytest.mark.parametrize("name", ["geometric-rrt", "kinodynamic-rrt"])
 def test_cancelling_ends_the_call(name):
     token = Cancellation()
@@ -203,6 +205,7 @@ def test_a_robot_that_touches_a_box_and_one_near_a_wall_can_start():
         assert KinodynamicRRT().plan(world, stop=MaxIterations(3000)).status is PlanStatus.SOLVED
 
 
+@pytest.mark.clock
 @pytest.mark.slow
 def test_hundreds_of_boxes_do_not_break_the_stop_rule():
     spots = [[x, y, 0.1] for x in np.arange(1, 14.2, 0.75) for y in np.arange(5.5, 14.2, 0.75)]

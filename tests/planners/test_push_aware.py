@@ -42,7 +42,7 @@ from pushplan.world import (
 )
 from pushplan.world.outline import transform
 
-pytestmark = pytest.mark.usefixtures("warm")
+pytestmark = pytest.mark.warm("push-aware")
 
 
 def generator(seed: int) -> np.random.Generator:
@@ -326,6 +326,7 @@ def test_it_clears_the_only_door_and_drives_through():
     assert driven.work == pytest.approx(result.plan.interaction_cost, rel=0.5)
 
 
+@pytest.mark.clock
 def test_a_deadline_is_kept_among_many_columns_that_were_never_seen():
     planner, took = PushAware(), []
     for shift in (0.0, 0.01, 0.02):
@@ -401,6 +402,7 @@ def test_two_hundred_boxes_and_a_deadline():
     assert quickest(lambda: planner.plan(world, stop=Deadline(0.3))) < 0.3 + 1.0
 
 
+@pytest.mark.clock
 def test_a_deadline_is_kept_on_a_map_that_was_never_seen():
     planner = PushAware()
     took = []

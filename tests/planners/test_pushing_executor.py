@@ -104,7 +104,7 @@ def test_noise_delay_and_mujoco():
     world = make_world(robot, [-0.3, -0.3, 1.0], [[0.0, 0.0, 0.5]], 0.08, mass=0.075)
     path = PushPath.arcs([0.0, 0.0, 0.0], [(0.3, 0.0), (0.4, 1.0)])
     mpc = PushingConfig(
-        parameters=PushParameters(0.15), period=PERIOD, delay=0.1, trust=0.3, clearance=0.1
+        parameters=PushParameters(0.15), period=PERIOD, delay=0.1, observer_gain=0.3, clearance=0.1
     )
     executor, _, episode = carry_out(
         world,

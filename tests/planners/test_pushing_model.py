@@ -66,10 +66,10 @@ def test_fronts_of_the_robots():
         (maze_robot(), 0.7, 0.5),
     ):
         bumper = Bumper.of(robot)
-        assert (bumper.front, bumper.bend) == (front, 0.0)
+        assert (bumper.front, bumper.curvature) == (front, 0.0)
         assert bumper.half == pytest.approx(half, abs=0.01)
-    assert Bumper.of(turtlebot3_burger("collector")).bend == pytest.approx(4.0, rel=0.01)
-    assert Bumper.of(turtlebot3_burger("navigation")).bend == pytest.approx(-6.0, rel=0.01)
+    assert Bumper.of(turtlebot3_burger("collector")).curvature == pytest.approx(4.0, rel=0.01)
+    assert Bumper.of(turtlebot3_burger("navigation")).curvature == pytest.approx(-6.0, rel=0.01)
 
     def wedge(tip):
         outline = [(tip, 0.0), (0.5, 0.5), (-0.5, 0.5), (-0.5, -0.5), (0.5, -0.5)]
@@ -77,7 +77,7 @@ def test_fronts_of_the_robots():
             outline, mass=1.0, drive="differential", max_speed=1.0, max_turn_rate=1.0
         )
 
-    assert Bumper.of(wedge(0.7)).bend < -0.5
+    assert Bumper.of(wedge(0.7)).curvature < -0.5
     with pytest.raises(InvalidInputError, match="pointed"):
         Bumper.of(wedge(1.5))
     behind = RobotModel.from_outline(
@@ -192,7 +192,7 @@ def test_forces_obey_coulomb_and_the_limit_surface(robot, friction, offset, angl
     assert torque == pytest.approx(-contact.depth * vt - y * vn, abs=1e-9)
     if mode in (ContactMode.SLIDE, ContactMode.CORNER_SLIDE):
         assert abs(shear) == pytest.approx(friction, abs=1e-9)
-    if contact.bend == 0.0 and mode in (ContactMode.STICK, ContactMode.SLIDE):
+    if contact.curvature == 0.0 and mode in (ContactMode.STICK, ContactMode.SLIDE):
         x = kernels.standoff(contact, s, phi)[0]
         ut = math.cos(phi) * w * x - math.sin(phi) * (v - w * s)
         if mode is ContactMode.STICK:
@@ -214,7 +214,7 @@ def test_mirrored_and_scaled_pushes(robot, friction, offset, angle, bend, factor
     assert mirrored == pytest.approx(rows * [1, -1, -1, -1, -1, 1], abs=1e-6 * length + 1e-6)
     b = model.bumper
     large = PushModel(
-        replace(b, front=factor * b.front, half=factor * b.half, bend=b.bend / factor),
+        replace(b, front=factor * b.front, half=factor * b.half, curvature=b.curvature / factor),
         factor * model.outline,
         model.parameters,
     )

@@ -18,7 +18,7 @@ from pushplan.planners.pushing import (
     best_offset,
     warm_up,
 )
-from pushplan.planners.pushing.mpc import groups_of
+from pushplan.planners.pushing.problem import groups_of
 from pushplan.world import (
     Controller,
     InvalidInputError,
@@ -83,7 +83,9 @@ def test_it_follows_an_s_shape(friction):
 @pytest.mark.parametrize("name", ["pymunk", "mujoco"])
 def test_it_bears_noise_and_delay(name):
     friction = 0.4 if name == "pymunk" else 0.15
-    config = PushingConfig(parameters=PushParameters(friction), period=0.2, delay=0.1, trust=0.3)
+    config = PushingConfig(
+        parameters=PushParameters(friction), period=0.2, delay=0.1, observer_gain=0.3
+    )
     errors, offset, _, mpc = push(name, PUSHER, 0.08, S_SHAPE, 0.4, config, seed=3, mass=0.075)
     assert errors.max() < 0.25 and np.sqrt((errors**2).mean()) < 0.1
     assert abs(offset) < 0.8 and mpc.fallbacks == 0
@@ -98,7 +100,7 @@ def test_a_hollow_bumper(friction, bound):
 
 
 def test_the_same_again():
-    config = PushingConfig(period=0.2, delay=0.1, trust=0.3)
+    config = PushingConfig(period=0.2, delay=0.1, observer_gain=0.3)
     one = push("pymunk", AREA, 1.0, S_SHAPE[:2], 0.0, config, seed=1)[2]
     two = push("pymunk", AREA, 1.0, S_SHAPE[:2], 0.0, config, seed=1)[2]
     assert np.array_equal(one.robot_poses, two.robot_poses)
@@ -160,7 +162,7 @@ def test_commands_are_always_within_limits(x, y, theta, bx, by, turn, burger):
     side = 0.08 if burger else 0.3
     length = PushModel(robot, side * SQUARE).reach
     path, _ = shaped(robot, side, S_SHAPE)
-    config = PushingConfig(period=0.1, delay=0.1, trust=0.5)
+    config = PushingConfig(period=0.1, delay=0.1, observer_gain=0.5)
     mpc, plan = PushingMpc(config), path.plan(robot, 0)
     world = make_world(robot, np.zeros(3), [[0.0, 0.0, 0.0]], side)
     last = Twist(0.0, 0.0)
@@ -203,6 +205,7 @@ def test_steps_are_shared_out_among_commands():
         assert len(np.unique(groups_of(32, moves))) == moves
 
 
+@pytest.mark.clock
 def test_it_is_quick():
     warm_up()
     config = PushingConfig(period=0.2)
@@ -242,7 +245,7 @@ def test_what_it_cannot_do_is_refused():
     with pytest.raises(InvalidInputError, match="differential"):
         PushingMpc().command(replace(world, robot=car), plan)
     for changes in (
-        {"horizon": 1}, {"moves": 30}, {"margin": 0.0}, {"trust": 2.0}, {"delay": math.nan},
+        {"horizon": 1}, {"moves": 30}, {"margin": 0.0}, {"observer_gain": 2.0}, {"delay": math.nan},
         {"offset": -1.0}, {"parameters": 0.4}, {"tolerance": 0.0},
     ):  # fmt: skip
         with pytest.raises(InvalidInputError):

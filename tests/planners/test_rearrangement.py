@@ -1,4 +1,4 @@
-"""Candidate pushes, their graph, and covering as a GTSP."""
+"""Candidate pushes, their graph, and set covering as a GTSP."""
 
 import functools
 import itertools
@@ -12,23 +12,23 @@ from conftest import SQUARE, make_boxes
 
 from pushplan.gtsp import solve_gtsp
 from pushplan.planners.rearrangement import (
-    Scene,
-    SubTaskConfig,
-    build_graph,
-    lattice,
-    tour_of,
+    PushScene,
+    RearrangementConfig,
+    build_push_graph,
+    push_order,
 )
-from pushplan.planners.rearrangement.completions import completions
-from pushplan.planners.rearrangement.drive import PathTracer
-from pushplan.planners.rearrangement.extraction import maneuvers
-from pushplan.planners.rearrangement.graph import candidate_pushes
-from pushplan.planners.rearrangement.pose_grid import LENGTHS, MOVES, TURNS, near_poses
+from pushplan.planners.rearrangement.cost_to_go_kernels import cost_to_go
+from pushplan.planners.rearrangement.extraction import extraction_primitives
+from pushplan.planners.rearrangement.goal_kernels import all_done
+from pushplan.planners.rearrangement.gtsp_reduction import parts_of, reduce_to_gtsp
+from pushplan.planners.rearrangement.pose_follower import PoseFollower
+from pushplan.planners.rearrangement.pose_grid_kernels import LENGTHS, MOVES, TURNS, near_poses
+from pushplan.planners.rearrangement.pose_search_kernels import PoseSearchProblem, search_poses
 from pushplan.planners.rearrangement.push import signature
-from pushplan.planners.rearrangement.recovery import way_out
-from pushplan.planners.rearrangement.reduction import parts_of, reduce
-from pushplan.planners.rearrangement.rollout import all_done
-from pushplan.planners.rearrangement.rollout_cache import Recall
-from pushplan.planners.rearrangement.runner import Runner
+from pushplan.planners.rearrangement.push_graph import candidate_pushes
+from pushplan.planners.rearrangement.push_simulator import PushSimulator
+from pushplan.planners.rearrangement.recovery import recovery_path
+from pushplan.planners.rearrangement.rollout_cache import RolloutCache
 from pushplan.world import (
     ClearanceArea,
     InvalidInputError,
@@ -54,7 +54,7 @@ def scene(boxes, goal=CORNER, extra=(), pose=(-3.0, -3.0, 0.0), **config):
         movables=make_boxes(boxes),
         goal=goal,
     )
-    return Scene(world, SubTaskConfig(**config))
+    return PushScene(world, RearrangementConfig(**config))
 
 
 @functools.cache
@@ -65,13 +65,13 @@ def example(kind):
     else:
         area = ClearanceArea(AREA, [True, True, False, True])
         here = scene([(2.0, -1.0, 0.0), (1.0, 1.5, 0.5), (-2.0, 2.0, 1.0)], area, [COLUMN])
-    return here, build_graph(here)
+    return here, build_push_graph(here)
 
 
 @pytest.mark.parametrize("kind", ["delivery", "clearing"])
 def test_candidate_pushes_keep_clear_of_what_is_static(kind):
     here, graph = example(kind)
-    assert {i for push in graph.pushes for i in push.covers} == set(range(len(here.poses)))
+    assert {i for push in graph.pushes for i in push.delivers} == set(range(len(here.poses)))
     walls = shapely.Polygon(COLUMN)
     room = shapely.box(-5, -5, 5, 5)
     for push in graph.pushes:
@@ -91,9 +91,9 @@ def test_costs_are_no_less_than_the_straight_ways(kind):
     assert np.isinf(graph.costs[np.arange(count), np.arange(count)]).all()
     assert np.isfinite(graph.costs[-1]).all()
     assert not np.isnan(graph.costs).any()
-    slack = 1.5 * here.coarse.floor.step  # where a push begins between the lattice's poses
+    slack = 1.5 * here.coarse.grid.step  # where a push begins between the lattice's poses
     for n, push in enumerate(graph.pushes):
-        assert push.length > 0.0 and push.price >= push.length
+        assert push.length > 0.0 and push.cost >= push.length
         assert push.work > 0.0
         ends = [other.end for other in graph.pushes] + [here.world.robot_pose]
         for m, end in enumerate(ends):
@@ -103,48 +103,48 @@ def test_costs_are_no_less_than_the_straight_ways(kind):
 
 
 @pytest.mark.parametrize("kind", ["delivery", "clearing"])
-def test_what_a_push_covers_is_done_where_it_is_predicted_to_end(kind):
+def test_what_a_push_delivers_is_done_where_it_is_predicted_to_end(kind):
     here, graph = example(kind)
     for push in graph.pushes:
-        done = all_done(push.object_poses, here.bodies, here.task)
-        assert done[list(push.covers)].all()
+        done = all_done(push.object_poses, here.bodies, here.object_goal)
+        assert done[list(push.delivers)].all()
 
 
 def test_a_row_of_boxes_is_swept_by_one_push():
     goal = ClearanceArea(AREA, [False, True, False, False])
-    here = scene([(1.0, 0.2, 0.0), (2.2, -0.2, 0.0)], goal, price=0.5)
-    graph = build_graph(here)
-    assert any(set(push.covers) == {0, 1} for push in graph.pushes)
-    order, cost = tour_of(graph)
+    here = scene([(1.0, 0.2, 0.0), (2.2, -0.2, 0.0)], goal, work_weight=0.5)
+    graph = build_push_graph(here)
+    assert any(set(push.delivers) == {0, 1} for push in graph.pushes)
+    order, cost = push_order(graph)
     assert len(order) == 1 and cost == pytest.approx(graph.costs[-1, order[0]])
 
 
-def test_a_push_that_is_barred_is_left_out():
+def test_a_push_that_is_tabu_is_left_out():
     here, graph = example("delivery")
-    barred = signature(graph.pushes[0])
-    again = build_graph(here, {barred: math.inf})
-    assert again.pushes and barred not in {signature(push) for push in again.pushes}
+    tabu = signature(graph.pushes[0])
+    again = build_push_graph(here, {tabu: math.inf})
+    assert again.pushes and tabu not in {signature(push) for push in again.pushes}
 
 
 def brute_force(costs, masks, boxes):
-    """The cheapest sequence of pushes that covers everything, each adding something."""
+    """The cheapest sequence of pushes that delivers everything, each adding something."""
     every, best = (1 << boxes) - 1, math.inf
     for size in range(1, boxes + 1):
         for order in itertools.permutations(range(len(masks)), size):
-            covered, total, last = 0, 0.0, len(masks)
+            delivered, total, last = 0, 0.0, len(masks)
             for n in order:
-                if covered | masks[n] == covered:
+                if delivered | masks[n] == delivered:
                     break
-                covered |= masks[n]
+                delivered |= masks[n]
                 total += costs[last, n]
                 last = n
             else:
-                if covered == every:
+                if delivered == every:
                     best = min(best, total)
     return best
 
 
-def test_covering_is_solved_as_by_brute_force():
+def test_set_covering_is_solved_as_by_brute_force():
     rng = np.random.default_rng(3)
     for _ in range(40):
         boxes, count = int(rng.integers(1, 5)), int(rng.integers(2, 7))
@@ -155,9 +155,9 @@ def test_covering_is_solved_as_by_brute_force():
         costs[:, rng.random(count) < 0.15] = np.inf
         np.fill_diagonal(costs[:-1], np.inf)
         truth = brute_force(costs, masks.tolist(), boxes)
-        best, _ = completions(costs, masks, boxes)
+        best, _ = cost_to_go(costs, masks, boxes)
         assert best[0, count] == pytest.approx(truth)
-        reduced = reduce(costs, masks.tolist(), boxes)
+        reduced = reduce_to_gtsp(costs, masks.tolist(), boxes)
         if not all(reduced.clusters):
             assert math.isinf(truth)
             continue
@@ -178,10 +178,10 @@ def test_a_push_stands_for_its_parts():
 
 def test_more_objects_than_can_be_solved_exactly():
     boxes = [(x, y, 0.0) for x in (-2.2, -0.7, 0.8, 2.3) for y in (-2.2, -0.4, 1.4)]
-    graph = build_graph(scene(boxes, ClearanceArea(AREA, [True] * 4), per_box=2))
-    order, cost = tour_of(graph, iterations=30)
-    covered = {i for n in order for i in graph.pushes[n].covers}
-    assert covered == set(range(12)) and math.isfinite(cost)
+    graph = build_push_graph(scene(boxes, ClearanceArea(AREA, [True] * 4), per_object=2))
+    order, cost = push_order(graph, iterations=30)
+    delivered = {i for n in order for i in graph.pushes[n].delivers}
+    assert delivered == set(range(12)) and math.isfinite(cost)
     steps = zip([len(graph.pushes), *order[:-1]], order, strict=True)
     assert sum(graph.costs[a, b] for a, b in steps) == pytest.approx(cost)
 
@@ -193,21 +193,21 @@ def test_a_walled_in_box_is_infeasible():
         [(-2, -2), (-1.5, -2), (-1.5, 2), (-2, 2)],
         [(1.5, -2), (2, -2), (2, 2), (1.5, 2)],
     ]
-    graph = build_graph(scene([(0.0, 0.0, 0.0), (0.0, -3.5, 0.0)], extra=ring))
+    graph = build_push_graph(scene([(0.0, 0.0, 0.0), (0.0, -3.5, 0.0)], extra=ring))
     assert list(graph.infeasible) == [0]
-    assert {i for push in graph.pushes for i in push.covers} == {1}
+    assert {i for push in graph.pushes for i in push.delivers} == {1}
 
 
-def test_a_box_at_a_wall_is_freed():
+def test_a_box_at_a_wall_is_pre_relocated():
     here = scene([(0.0, -4.49, 0.0)])
-    graph = build_graph(here, freeing=1)
+    graph = build_push_graph(here, pre_relocations=1)
     assert graph.pushes and not graph.infeasible
 
 
 def small_box(pose, extra=(), robot=(-3.0, -3.0, 0.0)):
     room = scene([(0.0, 0.0, 0.0)], extra=extra, pose=robot)
     small = Movables.from_outlines([0.44 * SQUARE], [pose])
-    return Scene(replace(room.world, movables=small), room.config)
+    return PushScene(replace(room.world, movables=small), room.config)
 
 
 GAP = [
@@ -225,12 +225,12 @@ def test_a_box_in_a_tight_place_is_brought_out_of_it(pose, extra, drive_back):
     here = small_box(pose, extra)
     if not drive_back:
         ahead = replace(here.world.robot, min_speed=0.0)
-        here = Scene(replace(here.world, robot=ahead), here.config)
-    found = maneuvers(Runner(here), 0)
+        here = PushScene(replace(here.world, robot=ahead), here.config)
+    found = extraction_primitives(PushSimulator(here), 0)
     assert found or not drive_back
     walls = [shapely.Polygon(part).buffer(-0.01) for part in here.world.static.convex_parts]
     for push in found:
-        assert push.frees and push.traced and here.is_clear(push.start)
+        assert push.pre_relocates and push.is_primitive and here.is_clear(push.start)
         assert math.dist(push.object_poses[0, :2], pose[:2]) > 0.02
         assert np.abs(np.diff(push.poses, axis=0)).max() < 0.3 * here.size
         for robot_pose in push.poses:
@@ -240,24 +240,24 @@ def test_a_box_in_a_tight_place_is_brought_out_of_it(pose, extra, drive_back):
             moves = np.diff(push.poses[:, :2], axis=0)
             ahead = np.column_stack([np.cos(push.poses[:-1, 2]), np.sin(push.poses[:-1, 2])])
             assert ((moves * ahead).sum(axis=1) > -1e-9).all()
-        [again] = Runner(here).again(push, push.start)
+        [again] = PushSimulator(here).resimulate(push, push.start)
         assert np.array_equal(again.object_poses, push.object_poses)
 
 
-def test_the_way_out_of_a_gap_touches_nothing():
+def test_the_recovery_path_of_a_gap_touches_nothing():
     tight = small_box((0.0, 0.25, 0.0), GAP, robot=(0.0, -0.35, -0.5 * math.pi))
-    path = way_out(tight)
+    path = recovery_path(tight)
     assert path is not None and path[-1, 1] < -0.8
-    assert Runner(tight).trace(path, 0)[0].work == 0.0
-    assert way_out(small_box((0.0, 0.8, 0.0), GAP)) is None
+    assert PushSimulator(tight).simulate_primitive(path, 0)[0].work == 0.0
+    assert recovery_path(small_box((0.0, 0.8, 0.0), GAP)) is None
 
 
-def test_the_way_out_from_between_two_columns_is_to_and_fro():
+def test_the_recovery_path_from_between_two_columns_is_to_and_fro():
     """Neither straight on nor along one arc, and there is no room to turn about."""
     columns = [[(0.0, y), (1.0, y), (1.0, y + 1.0), (0.0, y + 1.0)] for y in (0.0, 2.0)]
     for pose in ((0.8, 1.47, -1.57), (0.4, 1.5, 1.4)):
         tight = scene([(4.0, -4.0, 0.0)], extra=columns, pose=pose)
-        path = way_out(tight)
+        path = recovery_path(tight)
         assert path is not None and len(path) > 20
         moves = np.diff(path, axis=0)
         assert np.abs(moves[:, 2]).max() < 0.1 and np.hypot(*moves[:, :2].T).max() < 0.1
@@ -270,14 +270,14 @@ def test_the_way_out_from_between_two_columns_is_to_and_fro():
         ]
         assert shapely.area(shapely.intersection(walls, bodies)).max() < 1e-3
         assert shapely.distance(walls, shapely.Point(path[-1, :2])) > tight.size
-        assert np.array_equal(path, way_out(tight))
+        assert np.array_equal(path, recovery_path(tight))
 
 
-def test_there_is_no_way_out_of_a_cell():
+def test_there_is_no_recovery_path_out_of_a_cell():
     sides = [[(-1, -1), (1, -1), (1, -0.9), (-1, -0.9)], [(-1, 0.9), (1, 0.9), (1, 1), (-1, 1)]]
     sides += [[(-1, -1), (-0.9, -1), (-0.9, 1), (-1, 1)], [(0.9, -1), (1, -1), (1, 1), (0.9, 1)]]
     cell = [1.4 * 0.45 * np.array(side) for side in sides]
-    assert way_out(scene([(4.0, -4.0, 0.0)], extra=cell, pose=(0.0, 0.0, 0.0))) is None
+    assert recovery_path(scene([(4.0, -4.0, 0.0)], extra=cell, pose=(0.0, 0.0, 0.0))) is None
 
 
 def test_an_object_that_cannot_be_got_to_later_does_not_keep_the_others_waiting():
@@ -291,7 +291,7 @@ def test_an_object_that_cannot_be_got_to_later_does_not_keep_the_others_waiting(
         ],
         pose=(3.85, -3.43, -2.61),
     )
-    graph = build_graph(here)
+    graph = build_push_graph(here)
     assert len(graph.pushes) > 1
     later = graph.costs[:-1][~np.eye(len(graph.pushes), dtype=bool)]
     assert np.isfinite(later).all() and later.max() > 30.0
@@ -300,7 +300,7 @@ def test_an_object_that_cannot_be_got_to_later_does_not_keep_the_others_waiting(
 def test_a_bumper_that_hooks_on_a_corner_is_driven_ahead():
     column = [(-0.75, 0.47), (0.25, 0.47), (0.25, 1.47), (-0.75, 1.47)]
     hooked = scene([(4.0, -4.0, 0.0)], extra=[column], pose=(0.0, 0.0, 0.0))
-    path = way_out(hooked)
+    path = recovery_path(hooked)
     assert path is not None and path[1, 0] > 0.0
     parts = [
         shapely.Polygon(transform(pose, part)) for pose in path for part in hooked.world.robot.parts
@@ -316,7 +316,7 @@ def test_a_path_is_traced_ahead_back_and_round():
         pose = pose + np.array([length * math.cos(middle), length * math.sin(middle), turn])
         steps.append(pose)
     path = np.array([[0.3, -0.2, 2.9], *steps])
-    at, tracer = np.array([0.31, -0.21, 2.95]), PathTracer(robot, path, 0.2)
+    at, tracer = np.array([0.31, -0.21, 2.95]), PoseFollower(robot, path, 0.2)
     for _ in range(60):
         twist = tracer.command(at)
         if twist is None:
@@ -329,20 +329,20 @@ def test_a_path_is_traced_ahead_back_and_round():
 
 
 def test_what_is_remembered_comes_to_the_same():
-    rng, recall = np.random.default_rng(4), Recall()
+    rng, cache = np.random.default_rng(4), RolloutCache()
     boxes = np.column_stack([rng.uniform(-2.5, 2.5, (6, 2)), rng.uniform(-3.0, 3.0, 6)])
     first = scene(boxes, ClearanceArea(AREA, [True] * 4))
     known = 0
     for _ in range(3):
-        fresh = Scene(first.world.moved(movable_poses=boxes), first.config)
-        kept = replace(fresh, recall=recall)
-        before = len(recall)
-        one, other = (candidate_pushes(here, Runner(here)) for here in (fresh, kept))
-        known += len(one) > len(recall) - before
+        fresh = PushScene(first.world.moved(movable_poses=boxes), first.config)
+        kept = replace(fresh, cache=cache)
+        before = len(cache)
+        one, other = (candidate_pushes(here, PushSimulator(here)) for here in (fresh, kept))
+        known += len(one) > len(cache) - before
         assert len(one) == len(other)
         for a, b in zip(one, other, strict=True):
             assert a == b
-        recall.age()
+        cache.age()
         boxes = boxes.copy()
         boxes[rng.integers(6)] += rng.uniform(-0.4, 0.4, 3)
     assert known
@@ -350,38 +350,38 @@ def test_what_is_remembered_comes_to_the_same():
 
 def test_the_search_is_that_of_dijkstra():
     here, _ = example("clearing")
-    ground = here.coarse
-    floor, (depths, touch) = ground.floor, ground.contacts()
-    starts, costs = near_poses(floor, here.world.robot_pose, 1.5)
-    table = (MOVES, LENGTHS, TURNS, 0.02, 0.5)
+    contact_grid = here.coarse
+    grid, (depths, touch) = contact_grid.grid, contact_grid.contacts()
+    starts, costs = near_poses(grid, here.world.robot_pose, 1.5)
     none = np.zeros(0, dtype=np.int64)
-    best, before = lattice.search_poses(starts, costs, floor, depths, touch, *table, none)
+    problem = PoseSearchProblem(starts, costs, grid, depths, touch, 0.02, 0.5, none)
+    best, before = search_poses(problem)
     assert np.isfinite(best).mean() > 0.3
     targets = np.argsort(best)[:50]
-    some, _ = lattice.search_poses(starts, costs, floor, depths, touch, *table, targets)
+    some, _ = search_poses(problem._replace(targets=targets))
     assert (some[targets] == best[targets]).all()
-    # every price is that of the pose before it and the step from there, and no step is cheaper
+    # every cost is that of the pose before it and the step from there, and no step is cheaper
     count, rows, cols = depths.shape
-    flat, near, shut = depths.ravel(), touch.ravel(), floor.blocked.ravel()
+    flat, near, shut = depths.ravel(), touch.ravel(), grid.blocked.ravel()
     for node in np.flatnonzero(np.isfinite(best))[::37].tolist():
         t, i, j = node // (rows * cols), node // cols % rows, node % cols
         steps = []
         for sign in (1, -1):
             y, x = i + sign * MOVES[t, 1], j + sign * MOVES[t, 0]
             if 0 <= y < rows and 0 <= x < cols:
-                length, at = LENGTHS[t] * floor.step, (i, j) if sign > 0 else (y, x)
-                if not floor.barred[0, t, *at]:
+                length, at = LENGTHS[t] * grid.step, (i, j) if sign > 0 else (y, x)
+                if not grid.blocked_moves[0, t, *at]:
                     steps.append(((t * rows + y) * cols + x, length, length))
         for to, turn, first in (
             ((t + 1) % count, TURNS[t], t),
             (t - 1, TURNS[t - 1], t - 1),
         ):
-            if not floor.barred[1, first, i, j]:
+            if not grid.blocked_moves[1, first, i, j]:
                 steps.append(((to % count * rows + i) * cols + j, 0.02 * turn, 0.5 * turn))
-        for other, price, motion in steps:
+        for other, step_cost, motion in steps:
             if not shut[node] and np.isfinite(best[other]):
                 touched = near[node] > 0.0 and flat[node] >= flat[other]
-                cost = best[other] + (price + motion * near[node] if touched else price)
+                cost = best[other] + (step_cost + motion * near[node] if touched else step_cost)
                 assert best[node] <= cost
                 assert before[node] != other or best[node] == pytest.approx(cost)
 
@@ -389,16 +389,16 @@ def test_the_search_is_that_of_dijkstra():
 @pytest.mark.parametrize(
     "changes",
     [
-        {"price": -1.0},
-        {"price": math.nan},
+        {"work_weight": -1.0},
+        {"work_weight": math.nan},
         {"cell": 0.0},
         {"slack": 2.0},
-        {"per_box": 0},
-        {"rehearsals": 2.5},
+        {"per_object": 0},
+        {"max_simulations": 2.5},
         {"period": "soon"},
         {"mpc": 1},
     ],
 )
 def test_settings_are_checked(changes):
     with pytest.raises(InvalidInputError):
-        SubTaskConfig(**changes)
+        RearrangementConfig(**changes)

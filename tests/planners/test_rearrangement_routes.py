@@ -1,4 +1,4 @@
-"""Ways to the start of a push, driven as the policy drives them: nothing static is touched."""
+"""Routes to the start of a push, driven as the policy drives them: nothing static is touched."""
 
 import math
 
@@ -7,10 +7,10 @@ import pytest
 import shapely
 from conftest import make_boxes
 
-from pushplan.planners.rearrangement import Scene, SubTaskConfig
-from pushplan.planners.rearrangement.approach import approach_from
-from pushplan.planners.rearrangement.drive import LegDriver
-from pushplan.planners.rearrangement.route import Router
+from pushplan.planners.rearrangement import PushScene, RearrangementConfig
+from pushplan.planners.rearrangement.approach import approach_tree
+from pushplan.planners.rearrangement.route import RoutePlanner
+from pushplan.planners.rearrangement.route_follower import RouteFollower
 from pushplan.world import Receptacle, StaticMap, World, box_delivery_robot
 from pushplan.world.outline import transform
 
@@ -36,13 +36,13 @@ def among_columns(pose):
         movables=make_boxes([(4.0, -1.0, 0.0)]),
         goal=CORNER,
     )
-    return Scene(world, SubTaskConfig())
+    return PushScene(world, RearrangementConfig())
 
 
 def driven(scene, route):
     """Poses of a robot that does exactly as it is told."""
     pose, period = np.array(scene.world.robot_pose), scene.config.period
-    driver, found = LegDriver(scene.world.robot, route, period), [pose.copy()]
+    driver, found = RouteFollower(scene.world.robot, route, period), [pose.copy()]
     for _ in range(1000):
         twist = driver.command(pose)
         if twist is None:
@@ -76,7 +76,7 @@ def test_ways_among_columns_touch_nothing():
         if not (scene.fits(pose) and scene.is_clear(pose) and scene.fits(target)):
             continue
         asked += 1
-        route = Router(scene).route(approach_from(scene), target)
+        route = RoutePlanner(scene).route(approach_tree(scene), target)
         if route is None:
             continue
         found += 1
@@ -93,7 +93,7 @@ def test_ways_among_columns_touch_nothing():
 def test_where_there_is_room_to_turn_one_way_only_it_is_taken(y, heading, to, turn):
     """Near a wall, or a column: its wide bumper cannot pass on the side that is near."""
     scene = among_columns((-0.1, y, heading))
-    route = Router(scene).route(approach_from(scene), np.array([-0.1, y, to]))
+    route = RoutePlanner(scene).route(approach_tree(scene), np.array([-0.1, y, to]))
     assert np.ptp(route.points, axis=0).max() < 0.1
     assert route.turns[-1] in (0, turn)
     poses = driven(scene, route)
@@ -103,8 +103,8 @@ def test_where_there_is_room_to_turn_one_way_only_it_is_taken(y, heading, to, tu
 
 def test_the_way_that_is_predicted_is_the_one_that_is_driven():
     scene = among_columns((-0.1, -1.94, 0.0))
-    router = Router(scene)
-    route = router.route(approach_from(scene), np.array([-0.1, -1.94, -3.0]))
+    router = RoutePlanner(scene)
+    route = router.route(approach_tree(scene), np.array([-0.1, -1.94, -3.0]))
     predicted, poses = router.poses_along(route), driven(scene, route)
     assert np.abs(predicted[-1] - poses[-1]).max() < 0.05
 
@@ -114,7 +114,7 @@ def test_out_of_a_wall_but_not_into_it():
     robot = box_delivery_robot()
     reach = float(robot.vertices[:, 0].max())
     scene = among_columns((-0.1, 0.5 + reach - 0.005, -0.5 * math.pi))
-    route = Router(scene).route(approach_from(scene), np.array([-0.1, 2.5, 0.0]))
+    route = RoutePlanner(scene).route(approach_tree(scene), np.array([-0.1, 2.5, 0.0]))
     poses = driven(scene, route)
     assert touched(scene, poses) <= touched(scene, poses[:1]) + 1e-9
     assert touched(scene, poses[-1:]) == 0.0

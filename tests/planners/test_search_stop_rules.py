@@ -60,8 +60,9 @@ def test_all_planners_are_here():
     assert {*MAZE, *SHIP} == set(PLANNERS)
 
 
-@pytest.mark.usefixtures("warm")
-@pytest.mark.parametrize("name", planner_names())
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=pytest.mark.warm(name)) for name in planner_names()]
+)
 class TestEveryPlanner:
     def test_the_same_iterations_give_the_same_bytes(self, name):
         assert digest(name) == digest(name)
@@ -77,6 +78,8 @@ class TestEveryPlanner:
         assert found == sorted(found)
         assert found[-1]
 
+    @pytest.mark.clock
+    @pytest.mark.clock
     def test_a_deadline_ends_the_call(self, name):
         busy = time.thread_time()
         result = make_planner(name).plan(start(name), stop=Deadline(0.05))

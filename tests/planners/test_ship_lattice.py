@@ -276,6 +276,7 @@ def test_far_goal_is_approached() -> None:
     assert 3.9 < result.plan.length < 5.0
 
 
+@pytest.mark.clock
 def test_deadline_is_kept() -> None:
     planner, world = ShipLattice(), ship_world(1, floes=400)
     planner.plan(world)

@@ -21,7 +21,7 @@ from pushplan.world import (
 )
 from pushplan.world.outline import transform
 
-pytestmark = pytest.mark.usefixtures("warm")
+pytestmark = pytest.mark.warm("push-aware", "kinodynamic-rrt")
 
 HULLS = {
     "octagon": OCTAGON,

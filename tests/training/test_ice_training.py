@@ -102,8 +102,10 @@ def test_the_table_compares_predictors():
     assert text.count("\n|") == 5
 
 
+@pytest.mark.learn
 def test_a_network_learns_and_is_exported(few, tmp_path):
-    torch = pytest.importorskip("torch", reason="training needs the extra 'learn' (PyTorch)")
+    import torch
+
     from pushplan.training.ice_network import TrainingConfig, export, train
 
     pairs = read_shards(few, "train")
@@ -115,7 +117,6 @@ def test_a_network_learns_and_is_exported(few, tmp_path):
     patches = pairs.patches[:5].astype(np.float32) / ice_data.LEVELS
     with torch.no_grad():
         after, work = network.eval()(torch.from_numpy(patches))
-    pytest.importorskip("onnx", reason="export needs the extra 'learn' (onnx)")
     export(network, tmp_path / "net.onnx")
     found, effort = IceNetwork(tmp_path / "net.onnx").predict_patches(patches)
     assert found == pytest.approx(after.clamp(0, 1).numpy(), abs=1e-4)

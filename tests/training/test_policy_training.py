@@ -121,10 +121,10 @@ def behaviour(path: Path) -> np.ndarray:
     return np.stack([policy.decide(one.astype(dtype)) for one in seen])
 
 
+@pytest.mark.learn
 class TestTraining:
     @pytest.mark.parametrize("algorithm", ["ppo", "sac", "sam", "bc"])
     def test_left_off_and_taken_up_it_ends_the_same(self, algorithm, tmp_path, data):
-        pytest.importorskip("stable_baselines3")
         config = tiny(algorithm)
         whole = trained(config, tmp_path / "whole", data)
         assert trained(config, tmp_path / "parts", data, until=lambda done: done == 2) is None
@@ -171,7 +171,6 @@ print(episode.actions.ravel().tolist())
             seen, *_ = env.step(decided)
 
     def test_images_and_the_file_of_the_library(self, tmp_path, monkeypatch):
-        pytest.importorskip("stable_baselines3")
         from pushplan.learned import load_policy
 
         config = tiny("ppo", observation=IMAGE, steps=32, validation=0)
@@ -185,7 +184,6 @@ print(episode.actions.ravel().tolist())
         assert model.decide(seen) == pytest.approx(exported.decide(seen), abs=1e-4)
 
     def test_a_process_for_each_environment_learns_the_same(self, tmp_path):
-        pytest.importorskip("stable_baselines3")
         config = tiny("ppo", steps=32, validation=0)
         one = train_policy(config, tmp_path / "one", device="cpu")
         two = train_policy(config, tmp_path / "two", device="cpu", processes=True)
@@ -377,9 +375,8 @@ class TestDataset:
         with pytest.raises(SchemaError, match=r"episode_00000\.npz"):
             list(episodes(tmp_path))
 
+    @pytest.mark.learn
     def test_minari_reads_it(self, data, tmp_path, monkeypatch):
-        pytest.importorskip("minari")
-        pytest.importorskip("h5py")
         monkeypatch.setenv("MINARI_DATASETS_PATH", str(tmp_path))
         made = to_minari(data, "pushplan/straight-v0")
         assert made.total_episodes == 3
@@ -417,9 +414,11 @@ class TestReplay:
         assert memory.discounts[:5].tolist() == [0.125, 0.125, *left]
 
 
+@pytest.mark.learn
 class TestSamLearner:
     def test_a_target_that_follows_is_the_average_and_the_policy(self):
-        torch = pytest.importorskip("torch")
+        import torch
+
         from pushplan.training.policies.sam import SamLearner
 
         options = {"batch": 4, "buffer": 8, "widths": [4, 8], "blocks": 1, "follow": 0.25}
@@ -433,7 +432,8 @@ class TestSamLearner:
             assert torch.allclose(slow, 0.75 * old + 0.25 * fast, atol=1e-6)
 
     def test_a_map_that_is_shrunk_has_a_value_for_each_pixel(self):
-        torch = pytest.importorskip("torch")
+        import torch
+
         from pushplan.training.policies.networks import SpatialActionNetwork
         from pushplan.training.policies.sam import SamLearner
 
@@ -443,7 +443,8 @@ class TestSamLearner:
             SamLearner(tiny("sam", options={"shrink": 2}), (4, 16, 20), "cpu")
 
     def test_it_starts_with_the_weights_of_an_exported_network(self, tmp_path, data):
-        torch = pytest.importorskip("torch")
+        import torch
+
         from pushplan.training.policies.sam import SamLearner, _explore
 
         first = trained(tiny("sam"), tmp_path / "first", data)
@@ -478,7 +479,6 @@ class TestSamLearner:
         ],
     )
     def test_weights_of_another_network_are_refused(self, start, said, tmp_path, data):
-        pytest.importorskip("torch")
         options = {**TINY["sam"], "start": start}
         if start == "area-clearing-sam":  # the same but for the number of blocks
             options |= {"widths": [16, 32], "blocks": 1}
@@ -487,7 +487,8 @@ class TestSamLearner:
         assert trained(tiny("sam"), tmp_path / "run", data) is not None  # the folder is free
 
     def test_weights_that_are_no_numbers_are_refused(self, tmp_path, data):
-        onnx = pytest.importorskip("onnx")
+        import onnx
+
         first = trained(tiny("sam"), tmp_path / "first", data)
         model = onnx.load(str(first))
         weights = np.full(tuple(model.graph.initializer[0].dims), np.nan, np.float32)
@@ -499,7 +500,6 @@ class TestSamLearner:
             trained(tiny("sam", options=options), tmp_path / "run", data)
 
     def test_it_learns_which_pixel_pays(self):
-        pytest.importorskip("torch")
         from pushplan.training.policies.sam import SamLearner
 
         options = {"rate": 0.01, "batch": 16, "buffer": 128, "widths": [8, 8], "blocks": 1}
@@ -523,6 +523,7 @@ class TestSamLearner:
         assert near >= 12
 
 
+@pytest.mark.learn
 class TestCard:
     def test_it_says_what_is_known(self, tmp_path, data):
         trained(tiny("bc"), tmp_path, data, command="pushplan train bc ...")
@@ -547,7 +548,6 @@ class TestCard:
             write_card(tmp_path / "nowhere", [], tmp_path / "x.md")
 
     def test_the_best_is_the_one_with_the_greatest_share(self, tmp_path):
-        pytest.importorskip("torch")
         run = TrainingRun(tmp_path, tiny("ppo"))
         point = CurvePoint(1, 1.0, 0, 0.0, 0.0, 5.0, 0.0, 0.5, 0.0)
         for i, share in enumerate((0.5, 0.9, 0.2)):
@@ -557,6 +557,7 @@ class TestCard:
 
 
 class TestCommands:
+    @pytest.mark.learn
     def test_from_nothing_to_a_card(self, tmp_path, capsys):
         config = tiny("bc", validation=0, steps=32)
         path = tmp_path / "tiny.yaml"

@@ -8,6 +8,7 @@ import sys
 
 import numpy as np
 import pytest
+import shapely
 from conftest import OCTAGON, SQUARE, make_boxes, make_robot, make_u_maze
 from hypothesis import given
 from hypothesis import strategies as st
@@ -207,3 +208,21 @@ def test_episode_shapes_are_checked(u_maze):
         Episode(u_maze, [0, 0], np.zeros((2, 3)), np.zeros((2, 3, 3)), True, "goal")
     with pytest.raises(InvalidInputError, match=r"\(1, 3, 3\)"):
         Episode(u_maze, [0], np.zeros((1, 3)), np.zeros((1, 2, 3)), True, "goal")
+
+
+def test_goals_of_objects_agree_with_shapely():
+    rng = np.random.default_rng(0)
+    area = np.array([(-1.0, -1.0), (1.0, -0.8), (0.8, 1.0), (-0.6, 0.9)])
+    square = 0.3 * np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)])
+    triangle = 0.4 * np.array([(-1, -1), (2, -1), (-1, 2)])
+    outlines = [square if i % 2 else triangle for i in range(300)]
+    boxes = Movables.from_outlines(outlines, rng.uniform((-2, -2, -4), (2, 2, 4), (300, 3)))
+    polygons = [shapely.Polygon(boxes.outline_world(k)) for k in range(300)]
+    goal = shapely.Polygon(area)
+    corners = (boxes.vertices_world, boxes.offsets)
+    inside = Receptacle(area), [goal.covers(polygon) for polygon in polygons]
+    outside = ClearanceArea(area, np.ones(4, bool)), [not goal.intersects(p) for p in polygons]
+    for mine, expected in (inside, outside):
+        np.testing.assert_array_equal(mine.contains_each(*corners), expected)
+        assert [mine.contains(boxes.outline_world(k)) for k in range(300)] == expected
+        assert mine.contains_each(*(Movables.empty().vertices, Movables.empty().offsets)).size == 0

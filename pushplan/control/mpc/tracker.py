@@ -9,10 +9,16 @@ from itertools import pairwise
 
 import numpy as np
 
-from pushplan.control.limits import clamp_twist
+from pushplan.control.limits import clamp_twist, ramp_twist
+from pushplan.control.mpc.horizon import (
+    RecedingHorizon,
+    driven_twist,
+    shifted_index,
+    time_grid,
+    track_of,
+)
 from pushplan.control.mpc.kernels import Track, Tuning, arc, assemble, errors, locate
 from pushplan.control.mpc.mpc_config import MpcConfig
-from pushplan.control.mpc.solver import QuadraticProgram
 from pushplan.control.pure_pursuit import PurePursuit
 from pushplan.world import Drive, Plan, RobotModel, Twist, World
 from pushplan.world.checks import FloatArray
@@ -73,11 +79,11 @@ class MpcTracker:
         error = errors(track, x, y, theta, index, share)[1]
         stops = robot.drive is Drive.DIFFERENTIAL
         if stops and along >= track.lengths[-1] - 1e-9:
-            return self._send(world, self._ramped(robot, 0.0, 0.0), None)
+            return self._send(world, self._ramped(world, 0.0, 0.0), None)
         if abs(error) > (math.pi / 4 if stops else math.pi / 2):
             # too far from the path's heading for a linear model: turn towards it first
             turn = math.copysign(robot.max_turn_rate, -error)
-            return self._send(world, self._ramped(robot, 0.0, turn), None)
+            return self._send(world, self._ramped(world, 0.0, turn), None)
         solution = self._solve(pose)
         if solution is None:
             self.fallbacks += 1
@@ -96,53 +102,40 @@ class MpcTracker:
             self._pursuit = PurePursuit()
             self._held, self._missed, self.fallbacks = config.period, 0, 0
             self._sent = deque()
-            assert world.robot_twist is not None
-            vx, vy, omega = (float(value) for value in world.robot_twist)
-            theta = float(world.robot_pose[2])
-            speed = vx * math.cos(theta) + vy * math.sin(theta)
-            self._last = clamp_twist(robot, speed, omega)
+            self._last = driven_twist(world)
         else:
             self._held = world.time - self._last_time
         self._last_time = world.time
-        self._steps = self._grid(robot)
+        span = config.reach * robot.circumscribed_radius / robot.max_speed
+        self._steps = time_grid(config.horizon, span, self._held)
         if plan is not self._plan:
             self._plan, self._along = plan, 0.0
-            self._track = _track(plan)
+            self._track = track_of(plan)
             self._solution = None
         elif self._solution is not None:
             self._shift()
 
-    def _grid(self, robot: RobotModel) -> FloatArray:
-        """(N,) how long each command is held [s]: the first until the next call."""
-        config = self.config
-        span = config.reach * robot.circumscribed_radius / robot.max_speed
-        steps = np.full(config.horizon, max(self._held, span / config.horizon))
-        steps[0] = self._held
-        return steps
-
     def _shift(self) -> None:
         """Move the last solution on by the time that has passed since."""
         assert self._solution is not None
-        ends = np.cumsum(self._solution_steps) - self._held
-        middles = np.cumsum(self._steps) - 0.5 * self._steps
-        index = np.searchsorted(ends, middles)
+        index = shifted_index(self._solution_steps, self._steps, self._held)
         shifted = np.full((len(self._steps), 2), np.nan)
-        known = index < len(ends)
+        known = index < len(self._solution_steps)
         shifted[known] = self._solution[index[known]]
         self._solution, self._solution_steps = shifted, self._steps
 
     def _solve(self, pose: FloatArray) -> FloatArray | None:
         """(N, 2) speeds [m/s] and turn rates [rad/s], or None."""
-        config, robot, program = self.config, self._robot, self._program
-        assert robot is not None
+        config, program = self.config, self._program
         count, n = config.horizon, program.count
         nominal = np.full((count, 2), np.nan) if self._solution is None else self._solution.copy()
         rounds = config.first_iterations if self._solution is None else config.iterations
         hessian, gradient = np.empty((n, n)), np.empty(n)
         last = np.array([self._last.linear, self._last.angular])
-        low, high = self._bounds(robot)
-        units = np.array([robot.max_speed, robot.max_turn_rate])
-        for _ in range(rounds):
+        low, high = program.bounds(self._steps, (self._last.linear, self._last.angular))
+        low[count:n] = 0.0  # a plan is driven forwards
+
+        def assemble_about(nominal: FloatArray) -> tuple[FloatArray, FloatArray]:
             assemble(
                 self._track,
                 self._tuning,
@@ -154,34 +147,9 @@ class MpcTracker:
                 hessian,
                 gradient,
             )
-            start = (nominal / units)[:, ::-1].T.ravel()[:n]
-            found = program.solve(hessian, gradient, low, high, np.ascontiguousarray(start))
-            if found is None:
-                return None
-            nominal[:, 1] = found[:count] * units[1]
-            if n > count:
-                nominal[:, 0] = found[count:] * units[0]
-        return nominal
+            return hessian, gradient
 
-    def _bounds(self, robot: RobotModel) -> tuple[FloatArray, FloatArray]:
-        """Bounds of the inputs and of their changes, in the units of the problem."""
-        count, n = self.config.horizon, self._program.count
-        low, high = -np.ones(self._program.rows), np.ones(self._program.rows)
-        low[count:n] = 0.0  # a plan is driven forwards
-        row = n
-        last = (self._last.angular / robot.max_turn_rate, self._last.linear / robot.max_speed)
-        limits = (
-            robot.max_turn_acceleration / robot.max_turn_rate,
-            robot.max_acceleration / robot.max_speed,
-        )
-        for block in range(n // count):
-            if math.isfinite(limits[block]):
-                reach = limits[block] * self._steps
-                low[row : row + count], high[row : row + count] = -reach, reach
-                low[row] += last[block]
-                high[row] += last[block]
-                row += count
-        return low, high
+        return program.solve(nominal, low, high, rounds, assemble_about)
 
     def _pose_at_effect(self, world: World) -> FloatArray:
         """(3,) where the robot will be when a command of now takes effect."""
@@ -201,13 +169,8 @@ class MpcTracker:
                 pose = out[:3].copy()
         return pose
 
-    def _ramped(self, robot: RobotModel, linear: float, angular: float) -> Twist:
-        """The nearest twist that the accelerations allow after the last one."""
-        dv = robot.max_acceleration * self._held
-        dw = robot.max_turn_acceleration * self._held
-        linear = min(max(linear, self._last.linear - dv), self._last.linear + dv)
-        angular = min(max(angular, self._last.angular - dw), self._last.angular + dw)
-        return clamp_twist(robot, linear, angular)
+    def _ramped(self, world: World, linear: float, angular: float) -> Twist:
+        return ramp_twist(world.robot, self._last, linear, angular, self._held)
 
     def _fall_back(self, world: World, plan: Plan) -> Twist:
         """The last solution, moved on; pure pursuit where it has run out."""
@@ -216,10 +179,10 @@ class MpcTracker:
         if known and self._missed < self.config.horizon:
             assert self._solution is not None
             speed, turn = (float(value) for value in self._solution[0])
-            twist = self._ramped(world.robot, speed, turn)
+            twist = self._ramped(world, speed, turn)
             return self._send(world, twist, self._solution)
         wanted = self._pursuit.command(world, plan)
-        return self._send(world, self._ramped(world.robot, wanted.linear, wanted.angular), None)
+        return self._send(world, self._ramped(world, wanted.linear, wanted.angular), None)
 
     def _send(self, world: World, twist: Twist, solution: FloatArray | None) -> Twist:
         """Remember what is sent."""
@@ -229,12 +192,6 @@ class MpcTracker:
             while len(self._sent) > 1 and self._sent[1][0] <= world.time - self.config.delay:
                 self._sent.popleft()
         return twist
-
-
-def _track(plan: Plan) -> Track:
-    moves = np.diff(plan.poses[:, :2], axis=0)
-    lengths = np.concatenate([[0.0], np.cumsum(np.hypot(moves[:, 0], moves[:, 1]))])
-    return Track(plan.poses, lengths, plan.speeds)
 
 
 def _optimises_speed(robot: RobotModel, config: MpcConfig) -> bool:
@@ -257,12 +214,11 @@ def _tuning(robot: RobotModel, config: MpcConfig) -> Tuning:
     )
 
 
-def _program(robot: RobotModel, config: MpcConfig) -> QuadraticProgram:
-    limited = (math.isfinite(robot.max_turn_acceleration), math.isfinite(robot.max_acceleration))
-    return QuadraticProgram(
-        2 if _optimises_speed(robot, config) else 1,
+def _program(robot: RobotModel, config: MpcConfig) -> RecedingHorizon:
+    return RecedingHorizon(
+        robot,
+        (1, 0) if _optimises_speed(robot, config) else (1,),
         config.horizon,
-        limited,
         tolerance=config.tolerance,
         iterations=config.solver_iterations,
     )

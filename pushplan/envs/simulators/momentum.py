@@ -95,8 +95,8 @@ def slow_down(velocities: FloatArray, keeps: FloatArray, drag: FloatArray, h: fl
         if keeps[i] == 0.0:
             continue
         speed = math.hypot(velocities[i, 0], velocities[i, 1])
-        share = _kept(speed, drag[i, 0], drag[i, 1], h)
-        out[i, 0], out[i, 1] = share * velocities[i, 0], share * velocities[i, 1]
+        fraction = _kept(speed, drag[i, 0], drag[i, 1], h)
+        out[i, 0], out[i, 1] = fraction * velocities[i, 0], fraction * velocities[i, 1]
         out[i, 2] = velocities[i, 2] * _kept(abs(velocities[i, 2]), drag[i, 2], drag[i, 3], h)
     return out
 

@@ -20,7 +20,7 @@ from pushplan.world.checks import FloatArray, integer
 _ELEVATION = -58.0
 _FIELD_OF_VIEW = 40.0
 _LONGEST = 2.0  # depth over width of what is shown
-_BEHIND = 0.2  # share of that which lies behind the robot
+_BEHIND = 0.2  # fraction of that which lies behind the robot
 _MOST_GEOMS = 20_000
 
 
@@ -101,7 +101,7 @@ class MujocoCamera:
         aspect = self.size[0] / self.size[1]
         half_view = math.tan(math.radians(0.5 * _FIELD_OF_VIEW))
         tilt = math.radians(-_ELEVATION)
-        # the near edge is closer to the camera than the middle by half the depth's share along it
+        # the near edge is closer to the camera than the middle by half the depth along it
         nearer = 0.5 * depth * math.cos(tilt)
         across = 0.5 * width / (half_view * aspect)
         along = 0.5 * depth * math.sin(tilt) / half_view

@@ -84,8 +84,12 @@ def _drive_leg(
     rate = turn / duration
     done, waited = 0.0, 0.0
     while done < duration:
-        share = done / duration
-        reference = float(a[0]) + share * dx, float(a[1]) + share * dy, float(a[2]) + share * turn
+        fraction = done / duration
+        reference = (
+            float(a[0]) + fraction * dx,
+            float(a[1]) + fraction * dy,
+            float(a[2]) + fraction * turn,
+        )
         error = _error(simulator.robot_pose, reference)
         late = math.hypot(error[0], error[1]) > _LATE * robot.circumscribed_radius
         late |= abs(error[2]) > _LATE

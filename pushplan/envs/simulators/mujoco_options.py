@@ -23,7 +23,7 @@ class MujocoOptions:
         contact_time: time constant with which an overlap of two bodies decays [s]; MuJoCo needs
             at least two steps.
         impedance: how much of a contact's relative motion the solver takes away in a step, in
-            (0, 1); bodies sink into each other by a share of ``1 - impedance``.
+            (0, 1); bodies sink into each other by a fraction of ``1 - impedance``.
         sleep_speed: objects that end a step slower than this rest until something touches them
             [m/s].
         motor_time: time constant of the motors' speed control on free ground [s].

@@ -8,7 +8,7 @@ import numpy as np
 
 from pushplan.compiled import kernel
 from pushplan.geometry.convex import convex_penetration
-from pushplan.interaction.separation import place
+from pushplan.geometry.transforms import transform_points
 from pushplan.world.checks import BoolArray, FloatArray, IntArray
 
 TILT = 1e-4
@@ -96,7 +96,8 @@ def rest_cycles(
     parent = np.arange(count)
     corners = np.empty_like(vertices)
     for k in range(count):
-        place(poses[k], vertices[offsets[k] : offsets[k + 1]], corners[offsets[k] : offsets[k + 1]])
+        a, b = offsets[k], offsets[k + 1]
+        transform_points(poses[k], vertices[a:b], corners[a:b])
     for a in range(count):
         for b in range(a + 1, count):
             reach = radii[a] + radii[b] + gap

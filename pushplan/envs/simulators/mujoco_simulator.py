@@ -22,10 +22,10 @@ from pushplan.world import InvalidInputError, Twist, World
 from pushplan.world.checks import FloatArray, array, frozen, number
 
 HELD_SHARE = 0.5
-"""A robot in contact that moves with less than this share of its command is held ..."""
+"""A robot in contact that moves with less than this fraction of its command is held ..."""
 GAIN_SHARE = 0.25
-"""... unless it gains more than this share of the speed that it could gain in the step."""
-_NEGLIGIBLE = 0.05  # commands below this share of the robot's limit hold nobody
+"""... unless it gains more than this fraction of the speed that it could gain in the step."""
+_NEGLIGIBLE = 0.05  # commands below this fraction of the robot's limit hold nobody
 
 
 class MujocoSimulator(Simulator):

@@ -247,7 +247,7 @@ class PymunkBodies:
     def advance(self, h: float) -> None:
         """One substep of ``h`` seconds."""
         self._contacts.robot_depth = 0.0
-        if h != self._h:  # the engine wants the share of an overlap that is left after a second
+        if h != self._h:  # the engine wants the fraction of an overlap that is left after a second
             self._h = h
             self.space.collision_bias = max((1.0 - CORRECTION) ** (1.0 / h), 1e-300)
         if self._carried is not None:

@@ -28,7 +28,7 @@ class PymunkOptions:
             ``travel``, because an object that is pushed out of contact in each substep is hit
             again in the next and chatters.
         tolerance: overlap at which the robot is held, when something static is involved.
-        decay: share of its speed that a rolling or floating object may lose in one substep.
+        decay: fraction of its speed that a rolling or floating object may lose in one substep.
         iterations: sweeps of the contact solver in each substep.
         samples: poses recorded in each call of `PymunkSimulator.step`, at even intervals.
     """
@@ -74,7 +74,7 @@ class PymunkDriver:
         bodies: the scene.
         robot: its limits.
         options: numerical settings.
-        size: length [m] of which the options' lengths are shares.
+        size: length [m] of which the options' lengths are fractions.
     """
 
     def __init__(

@@ -26,9 +26,9 @@ _GLIDE_SAMPLES = 4
 _SAMPLED = 24.0
 """Steps of fewer substeps than this are sampled more coarsely."""
 _LEAST_SIZE = 0.01
-"""Objects far smaller than this share of the robot or of the others do not refine the steps."""
+"""Objects far smaller than this fraction of the robot or of the others do not refine the steps."""
 _REST = 2e-4
-"""Objects that move slower than this share of their size per second stop."""
+"""Objects that move slower than this fraction of their size per second stop."""
 
 
 class PymunkSimulator(Simulator):

@@ -7,7 +7,8 @@ import math
 import numpy as np
 
 from pushplan.compiled import kernel
-from pushplan.geometry import convex_distance, convex_overlap, transform_points
+from pushplan.geometry import convex_distance, convex_overlap
+from pushplan.geometry.transforms import transform_points
 from pushplan.world.checks import BoolArray, FloatArray, IntArray
 
 
@@ -42,7 +43,7 @@ def within_reach(
     count = rows.shape[0]
     near, found = np.zeros(count, dtype=np.bool_), np.zeros(count, dtype=np.bool_)
     corners = np.empty_like(parts)
-    transform_points(robot[0], robot[1], robot[2], parts, corners)
+    transform_points(robot, parts, corners)
     size = 0.0
     for i in range(parts.shape[0]):
         size = max(size, math.hypot(parts[i, 0], parts[i, 1]))
@@ -53,7 +54,7 @@ def within_reach(
         gap = math.hypot(rows[k, 0] - robot[0], rows[k, 1] - robot[1]) - size - radii[k]
         if near[k] or gap > reach + speeds[k]:
             continue
-        transform_points(rows[k, 0], rows[k, 1], rows[k, 2], vertices[a:b], shapes[a:b])
+        transform_points(rows[k], vertices[a:b], shapes[a:b])
         for p in range(part_offsets.shape[0] - 1):
             part = corners[part_offsets[p] : part_offsets[p + 1]]
             if convex_distance(part, shapes[a:b]) <= reach:
@@ -91,7 +92,7 @@ def footprint_gap(
         radii: how far each obstacle reaches beyond its core [m].
     """
     corners = np.empty_like(parts)
-    transform_points(robot[0], robot[1], robot[2], parts, corners)
+    transform_points(robot, parts, corners)
     best = math.inf
     for k in range(radii.shape[0]):
         core = vertices[offsets[k] : offsets[k + 1]]
@@ -138,10 +139,10 @@ def struck(
             if gap > way:
                 continue
             c, d = offsets[j], offsets[j + 1]
-            transform_points(rows[j, 0], rows[j, 1], rows[j, 2], vertices[c:d], there[c:d])
+            transform_points(rows[j], vertices[c:d], there[c:d])
             for t in range(steps):
                 pose = paths[t, k]
-                transform_points(pose[0], pose[1], pose[2], vertices[a:b], here[a:b])
+                transform_points(pose, vertices[a:b], here[a:b])
                 if convex_overlap(here[a:b], there[c:d]):
                     found[j] = True
                     break

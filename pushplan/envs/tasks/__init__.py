@@ -1,5 +1,5 @@
 """Tasks: how an episode starts, what counts, when it ends. None of them names an engine."""
 
-from pushplan.envs.tasks.base import Outcome, Task
+from pushplan.envs.tasks.base import StepOutcome, Task
 
-__all__ = ["Outcome", "Task"]
+__all__ = ["StepOutcome", "Task"]

@@ -10,8 +10,7 @@ import numpy as np
 import shapely
 
 from pushplan.envs.tasks.area_clearing_presets import LAYOUTS, PRESETS, AreaClearingPreset
-from pushplan.envs.tasks.base import Outcome
-from pushplan.envs.tasks.box_kernels import no_longer_touches
+from pushplan.envs.tasks.base import StepOutcome
 from pushplan.envs.tasks.layout import Floor, rectangle, squares, walls_around
 from pushplan.envs.tasks.manipulation import (
     START_TRIES,
@@ -128,15 +127,8 @@ class AreaClearingTask(ManipulationTask):
         self._seen = (world, *self._measure(world))
         return world
 
-    def cleared(self, world: World) -> BoolArray:
-        """(K,) whether each box is clear of the area."""
-        boxes = world.movables
-        return np.asarray(
-            no_longer_touches(boxes.poses, boxes.vertices, boxes.offsets, self.goal.polygon)
-        )
-
     def _measure(self, world: World) -> tuple[FloatArray, BoolArray]:
-        return self.goal_distances(world.movables.poses), self.cleared(world)
+        return self.goal_distances(world.movables.poses), world.completed
 
     def _state(self, world: World) -> tuple[FloatArray, BoolArray]:
         """Distances and cleared flags, kept for the world that the last step ended in."""
@@ -144,7 +136,9 @@ class AreaClearingTask(ManipulationTask):
             self._seen = (world, *self._measure(world))
         return self._seen[1:]
 
-    def score(self, before: World, after: World, *, work: float, touched_static: bool) -> Outcome:
+    def score(
+        self, before: World, after: World, *, work: float, touched_static: bool
+    ) -> StepOutcome:
         """The reward above; over when every box is clear of the area."""
         if self._field is None:
             raise InvalidInputError("area_clearing: start() has to be called before score()")
@@ -157,8 +151,8 @@ class AreaClearingTask(ManipulationTask):
             reward += STATIC_REWARD
         idle = self._idle(after, gained > 0)
         if cleared.all():
-            return Outcome(reward + END_REWARD, True, "cleared", True, False, cleared)
-        return Outcome(reward, False, "no_progress" if idle else "", False, idle, cleared)
+            return StepOutcome(reward + END_REWARD, True, "cleared", True, False, cleared)
+        return StepOutcome(reward, False, "no_progress" if idle else "", False, idle, cleared)
 
 
 def open_edges(static: StaticMap, polygon: FloatArray, size: float) -> BoolArray:

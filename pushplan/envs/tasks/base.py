@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import ClassVar, Literal
 
 import numpy as np
 
@@ -16,7 +16,7 @@ from pushplan.world.checks import BoolArray, FloatArray, IntArray
 
 
 @dataclass(frozen=True)
-class Outcome:
+class StepOutcome:
     """What one step of an episode was worth.
 
     Args:
@@ -51,6 +51,8 @@ class Task(ABC):
     """
 
     name: ClassVar[str]
+    goal_kind: ClassVar[Literal["robot", "objects"]] = "robot"
+    """Who has a goal: decides which metrics apply."""
     presets: ClassVar[tuple[str, ...]]
     """Sets of dimensions; the first is the default."""
     solid_presets: ClassVar[tuple[str, ...]]
@@ -95,7 +97,9 @@ class Task(ABC):
         raise NotImplementedError(f"nothing ever leaves the floor in task {self.name!r}")
 
     @abstractmethod
-    def score(self, before: World, after: World, *, work: float, touched_static: bool) -> Outcome:
+    def score(
+        self, before: World, after: World, *, work: float, touched_static: bool
+    ) -> StepOutcome:
         """What the step from ``before`` to ``after`` was worth, and whether the episode ends.
 
         Args:

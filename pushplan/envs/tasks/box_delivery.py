@@ -9,9 +9,8 @@ from typing import Any, ClassVar
 import numpy as np
 import shapely
 
-from pushplan.envs.tasks.base import Outcome
+from pushplan.envs.tasks.base import StepOutcome
 from pushplan.envs.tasks.box_delivery_presets import LAYOUTS, PRESETS, BoxDeliveryPreset
-from pushplan.envs.tasks.box_kernels import all_corners_inside
 from pushplan.envs.tasks.layout import rectangle, walls_around
 from pushplan.envs.tasks.manipulation import (
     START_TRIES,
@@ -20,6 +19,7 @@ from pushplan.envs.tasks.manipulation import (
 )
 from pushplan.world import InvalidInputError, Receptacle, StaticMap, UnknownNameError, World
 from pushplan.world.checks import FloatArray, IntArray
+from pushplan.world.outline import transform_outlines
 
 TOWARDS = 3.0
 """How much more a metre towards the receptacle counts than one away from it."""
@@ -80,7 +80,7 @@ class BoxDeliveryTask(ManipulationTask):
         self.goal: Receptacle = Receptacle(rectangle(x - side, y - side, x, y))
         # a box that leans on the wall overlaps it a little: the sides at the walls do not count
         reach = x + 0.5 * self.preset.wall, y + 0.5 * self.preset.wall
-        self._mouth = rectangle(x - side, y - side, *reach)
+        self._mouth = Receptacle(rectangle(x - side, y - side, *reach))
         self.reach = 2.0 * float(np.hypot(length, width))
         self._walls = [*walls_around(self.bounds, self.preset.wall), *self._corners()]
         self._empty = StaticMap.build(polygons=self._walls, bounds=self.bounds)
@@ -125,13 +125,13 @@ class BoxDeliveryTask(ManipulationTask):
 
     def _divider(self, rng: np.random.Generator) -> list[FloatArray]:
         """A wall from +x that leaves a gap at -x, with triangles where it meets the wall."""
-        share, thickness = self.preset.divider
+        fraction, thickness = self.preset.divider
         x0, y0, x1, y1 = self.bounds
         margin, half, leg = self.preset.divider_margin, 0.5 * thickness, self.preset.corner
         y = float(rng.uniform(y0 + margin, y1 - margin))
         along = np.array([-leg, 0.0])
         return [
-            rectangle(x1 - share * (x1 - x0), y - half, x1, y + half),
+            rectangle(x1 - fraction * (x1 - x0), y - half, x1, y + half),
             _triangle(np.array([x1, y + half]), along, leg),
             _triangle(np.array([x1, y - half]), along, -leg),
         ]
@@ -165,8 +165,8 @@ class BoxDeliveryTask(ManipulationTask):
             vertices, offsets = start.vertices, start.offsets
         else:  # boxes are alike
             vertices, offsets = start.vertices[: 4 * len(ids)], start.offsets[: len(ids) + 1]
-        poses = np.ascontiguousarray(poses)
-        gone: IntArray = ids[all_corners_inside(poses, vertices, offsets, self._mouth)]
+        corners = transform_outlines(poses, vertices, offsets)
+        gone: IntArray = ids[self._mouth.contains_each(corners, offsets)]
         return gone
 
     def _distances(self, world: World) -> FloatArray:
@@ -177,7 +177,9 @@ class BoxDeliveryTask(ManipulationTask):
             self._seen = (world, distances)
         return self._seen[1]
 
-    def score(self, before: World, after: World, *, work: float, touched_static: bool) -> Outcome:
+    def score(
+        self, before: World, after: World, *, work: float, touched_static: bool
+    ) -> StepOutcome:
         """The reward above; over when every box has left the floor."""
         if self._field is None:
             raise InvalidInputError("box_delivery: start() has to be called before score()")
@@ -194,8 +196,8 @@ class BoxDeliveryTask(ManipulationTask):
         completed[after.movables.ids] = False
         idle = self._idle(after, delivered > 0)
         if completed.all():
-            return Outcome(reward, True, "delivered", True, False, completed)
-        return Outcome(reward, False, "no_progress" if idle else "", False, idle, completed)
+            return StepOutcome(reward, True, "delivered", True, False, completed)
+        return StepOutcome(reward, False, "no_progress" if idle else "", False, idle, completed)
 
     def _is_still(self, before: World, after: World) -> bool:
         dx, dy, turn = (after.robot_pose - before.robot_pose).tolist()

@@ -26,7 +26,7 @@ class BoxDeliveryPreset(ManipulationPreset):
         column: side of the square columns [m].
         column_spacing: least distance between the centres of two columns [m].
         column_margin: least way between a column and the walls [m].
-        divider: length, as a share of the room's, and thickness of the divider [m].
+        divider: length, as a fraction of the room's, and thickness of the divider [m].
         divider_margin: least distance of its centre line from the walls along it [m].
         start_margin: distance of a fixed start from the wall at -x [m].
         still: a robot that moves less than this in an action has not moved [m].

@@ -34,9 +34,9 @@ from pushplan.world.checks import FloatArray, choice, integer, number
 from pushplan.world.outline import transform
 
 LEAST_SIZE = 0.01
-"""Least size of boxes, as a share of the preset's."""
+"""Least size of boxes, as a fraction of the preset's."""
 GAP = 0.01
-"""Least distance between bodies at the start, as a share of the box size."""
+"""Least distance between bodies at the start, as a fraction of the box size."""
 STATE_OBJECTS = 20
 """Boxes that the state observation has room for; more if there are more."""
 _CHANNELS = ("occupancy", "footprint", "robot_distance", "goal_distance")
@@ -91,7 +91,7 @@ class ManipulationVariations(Variations):
         box_size: side of the boxes [m], at least 1 % of the preset's; their least spacing grows
             with it.
         box_yaw: headings of the boxes at the start, ``"aligned"`` or ``"random"``.
-        wheeled: share of the boxes that stand on casters, 0 to 1.
+        wheeled: fraction of the boxes that stand on casters, 0 to 1.
         robot: one of the preset's robots.
         bumper: one of `pushplan.world.BUMPERS`, where the robot's can be changed.
         bumper_friction: friction coefficient between robot and boxes.
@@ -133,6 +133,7 @@ class ManipulationVariations(Variations):
 class ManipulationTask(Task):
     """Boxes that have to go somewhere. Subclasses say where, and what that is worth."""
 
+    goal_kind = "objects"
     actions: ClassVar[tuple[str, ...]] = ("heading", "waypoint", "velocity", "wheels")
     observations: ClassVar[tuple[str, ...]] = ("image", "spatial", "state")
     idle_limits: ClassVar[Mapping[str, int]]

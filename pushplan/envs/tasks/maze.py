@@ -10,7 +10,7 @@ from typing import ClassVar
 import numpy as np
 import shapely
 
-from pushplan.envs.tasks.base import Outcome, Task, drive_of
+from pushplan.envs.tasks.base import StepOutcome, Task, drive_of
 from pushplan.envs.tasks.layout import Floor
 from pushplan.envs.tasks.maze_presets import PRESETS, MazePreset
 from pushplan.envs.tasks.variations import Variations
@@ -31,7 +31,7 @@ from pushplan.world.outline import transform
 WALL_REWARD = -50.0
 SUCCESS_REWARD = 200.0
 GAP = 0.01
-"""Least distance between bodies at the start, as a share of the box size."""
+"""Least distance between bodies at the start, as a fraction of the box size."""
 STATE_OBJECTS = 20
 """Boxes that the state observation has room for; more if there are more."""
 _IMAGE_CHANNELS = ("footprint", "movable", "static", "goal_distance")
@@ -47,7 +47,7 @@ class MazeVariations(Variations):
         boxes: number of boxes.
         box_size: side of the boxes [m].
         box_yaw: headings of the boxes at the start, ``"aligned"`` with the walls or ``"random"``.
-        wheeled: share of the boxes that stand on casters, 0 to 1.
+        wheeled: fraction of the boxes that stand on casters, 0 to 1.
         random_start: whether the robot starts anywhere instead of at the preset's start.
         bumper: what the testbed's robot carries in front, one of `pushplan.world.BUMPERS`.
         bumper_friction: friction coefficient between robot and boxes.
@@ -224,7 +224,9 @@ class MazeTask(Task):
                 return True
         return False
 
-    def score(self, before: World, after: World, *, work: float, touched_static: bool) -> Outcome:
+    def score(
+        self, before: World, after: World, *, work: float, touched_static: bool
+    ) -> StepOutcome:
         """The reward above; a wall is a failure even where the goal is reached at once."""
         self._steps += 1
         x0, y0, _ = before.robot_pose.tolist()
@@ -232,11 +234,11 @@ class MazeTask(Task):
         progress = (self.field.sample(x0, y0) - self.field.sample(x1, y1)) / self._farthest
         reward = self.preset.progress_reward * progress - self.preset.work_reward * work
         if touched_static:
-            return Outcome(reward + WALL_REWARD, False, "wall", True, False)
+            return StepOutcome(reward + WALL_REWARD, False, "wall", True, False)
         if self.goal.distance(x1, y1) == 0.0:
-            return Outcome(reward + SUCCESS_REWARD, True, "goal", True, False)
+            return StepOutcome(reward + SUCCESS_REWARD, True, "goal", True, False)
         late = self._steps >= self.preset.max_steps
-        return Outcome(reward, False, "time_limit" if late else "", False, late)
+        return StepOutcome(reward, False, "time_limit" if late else "", False, late)
 
     def observation(self, name: str) -> ObservationBuilder:
         """``"image"`` or ``"state"``."""

@@ -10,7 +10,7 @@ from typing import ClassVar
 import numpy as np
 import shapely
 
-from pushplan.envs.tasks.base import Outcome, Task
+from pushplan.envs.tasks.base import StepOutcome, Task
 from pushplan.envs.tasks.ship_presets import PRESETS, ShipPreset
 from pushplan.envs.tasks.variations import Variations
 from pushplan.observation import ImageObservation, ObservationBuilder, StateObservation
@@ -44,7 +44,7 @@ class ShipIceVariations(Variations):
     """What may depart from a preset; None leaves the preset's value.
 
     Args:
-        concentration: area of the floes as a share of that of the ice field, 0 to 0.5.
+        concentration: area of the floes as a fraction of that of the ice field, 0 to 0.5.
         clumping: 0 for ice that is equally likely everywhere, 1 for patches and open water.
         goal_distance: how far the goal line lies ahead of the start line [m].
         start_x: where on the start line the ship starts [m]; anywhere if None.
@@ -67,8 +67,8 @@ class ShipIceVariations(Variations):
         if self.ice_file is not None and not isinstance(self.ice_file, str):
             raise InvalidInputError(f"ice_file must be a path as text, got {self.ice_file!r}")
         if self.concentration is not None:
-            share = number("concentration", self.concentration, low=0.0, high=0.5)
-            put(self, "concentration", share)
+            fraction = number("concentration", self.concentration, low=0.0, high=0.5)
+            put(self, "concentration", fraction)
             if self.ice_file is not None:
                 raise InvalidInputError("concentration and ice_file exclude each other")
         put(self, "clumping", number("clumping", self.clumping, low=0.0, high=1.0))
@@ -183,12 +183,12 @@ class ShipIceTask(Task):
         )
 
     def _random_ice(self, rng: np.random.Generator, pose: FloatArray) -> IceField:
-        share = self.variations.concentration
+        fraction = self.variations.concentration
         around = np.asarray(self._berth(pose).exterior.coords)[:-1]
         return generate_ice(
             rng,
             bounds=self.preset.ice_bounds,
-            concentration=CONCENTRATION if share is None else share,
+            concentration=CONCENTRATION if fraction is None else fraction,
             sizes=self.preset.sizes,
             keep_off=[around],
             clumping=self.variations.clumping,
@@ -211,18 +211,20 @@ class ShipIceTask(Task):
         hull = shapely.Polygon(transform(pose, self.preset.footprint))
         return hull.buffer(self.preset.clearance, join_style="mitre").convex_hull
 
-    def score(self, before: World, after: World, *, work: float, touched_static: bool) -> Outcome:
+    def score(
+        self, before: World, after: World, *, work: float, touched_static: bool
+    ) -> StepOutcome:
         """The reward above; to leave the channel is a failure even beyond the goal line."""
         self._steps += 1
         x, y, heading = after.robot_pose.tolist()
         ahead = math.cos(heading) * self.goal.normal[0] + math.sin(heading) * self.goal.normal[1]
         reward = float(ahead) - self.preset.work_reward * work
         if x < 0.0 or x > self.preset.channel[0] or y < 0.0:
-            return Outcome(reward + OUTSIDE_REWARD, False, "left_channel", True, False)
+            return StepOutcome(reward + OUTSIDE_REWARD, False, "left_channel", True, False)
         if self.goal.distance(x, y) == 0.0:
-            return Outcome(reward + SUCCESS_REWARD, True, "goal", True, False)
+            return StepOutcome(reward + SUCCESS_REWARD, True, "goal", True, False)
         late = self._steps >= self.preset.max_steps
-        return Outcome(reward, False, "time_limit" if late else "", False, late)
+        return StepOutcome(reward, False, "time_limit" if late else "", False, late)
 
     def observation(self, name: str) -> ObservationBuilder:
         """``"image"`` or ``"state"``."""

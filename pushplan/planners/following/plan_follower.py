@@ -27,6 +27,7 @@ from pushplan.world import (
     World,
 )
 from pushplan.world.checks import number
+from pushplan.world.polyline import path_lengths
 
 _REMEMBERED = 5
 """Planning calls whose times say how long the next one will take."""
@@ -53,8 +54,8 @@ class PlanFollower:
     up, a new plan is made. If none is found the old one is kept. A differential drive that has no
     plan, or does not get on with its plans, backs off.
 
-    In honest time (`keep_time`) planning goes on beside driving: a plan is there only after the
-    time that it took, and the old one is driven until then.
+    In latency-aware simulation (`simulate_latency`) planning goes on beside driving: a plan is
+    there only after the time that it took, and the old one is driven until then.
 
     Args:
         planner: makes the plans.
@@ -84,11 +85,13 @@ class PlanFollower:
         self._forget(np.random.default_rng(0))
 
     def reset(self, world: World, rng: np.random.Generator) -> None:
-        """Forget the last episode; time stands still while it plans until `keep_time` is called."""
+        """Forget the last episode; planning takes no time until `simulate_latency` is called."""
         self._forget(rng)
         self._progress = Progress(window=2.0 * world.robot.circumscribed_radius)
 
-    def keep_time(self, factor: float, clock: Callable[[], float] = time.perf_counter) -> None:
+    def simulate_latency(
+        self, factor: float, clock: Callable[[], float] = time.perf_counter
+    ) -> None:
         """From now to the next reset a plan is there only after the time that it took.
 
         Args:
@@ -248,8 +251,7 @@ class PlanFollower:
         if now.jammed_at >= 0:
             at_once = now.jammed_at <= 3 and self._in_vain < 20
             return Reason.JAM if rested or at_once else None
-        steps = np.diff(predicted[part, :, :2], axis=0)
-        expected = float(np.hypot(steps[..., 0], steps[..., 1]).sum(axis=0) @ world.movables.masses)
+        expected = float(path_lengths(predicted[part]) @ world.movables.masses)
         allowed = surprise * world.robot.circumscribed_radius * world.robot.mass
         return Reason.SURPRISE if rested and now.work - expected > allowed else None
 

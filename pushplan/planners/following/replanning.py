@@ -11,6 +11,7 @@ import numpy as np
 from pushplan.interaction import Interaction, InteractionModel
 from pushplan.world import GoalDisc, GoalLine, InvalidInputError, Plan, World
 from pushplan.world.checks import FloatArray, number
+from pushplan.world.polyline import path_length
 
 
 class Reason(enum.Enum):
@@ -51,7 +52,8 @@ class Replanning:
         every_metres: plan again when the robot is this far from where it planned [m].
         latency: time for which a planning call takes [s]. A plan then starts where the robot will
             be after it, and is joined to the part of the old plan up to there. None stands for 0
-            where plans are there at once, and for what the last calls took in honest time.
+            where plans are there at once, and for what the last calls took in latency-aware
+            simulation.
     """
 
     offset: float = 0.3
@@ -98,16 +100,14 @@ def rest_of(plan: Plan, index: int, predicted: FloatArray | None) -> Plan:
     objects = plan.object_poses
     if predicted is None and objects is not None:
         predicted = objects[index:]
-    moves = np.diff(plan.poses[index:, :2], axis=0)
     length = plan.length
-    left = float(np.hypot(moves[:, 0], moves[:, 1]).sum())
     mass = plan.travel_cost / length if length > 0.0 else 0.0
     return Plan(
         times=plan.times[index:] - plan.times[index],
         poses=plan.poses[index:],
         speeds=plan.speeds[index:],
         turn_rates=plan.turn_rates[index:],
-        travel_cost=mass * left,
+        travel_cost=mass * path_length(plan.poses[index:]),
         interaction_cost=plan.interaction_cost if index == 0 else 0.0,
         object_poses=predicted,
     )
@@ -139,8 +139,7 @@ def price(world: World, path: FloatArray, swept: Interaction, weight: float) -> 
     """
     if swept.jammed_at >= 0:
         return math.inf
-    moves = np.diff(path[:, :2], axis=0)
-    length = float(np.hypot(moves[:, 0], moves[:, 1]).sum())
+    length = path_length(path)
     if isinstance(world.goal, GoalDisc | GoalLine):
         length += world.goal.distance(float(path[-1, 0]), float(path[-1, 1]))
     return world.robot.mass * length + weight * swept.work

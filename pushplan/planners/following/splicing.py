@@ -11,6 +11,7 @@ from pushplan.control import Progress
 from pushplan.interaction import InteractionModel
 from pushplan.world import Drive, Plan, World
 from pushplan.world.checks import FloatArray
+from pushplan.world.polyline import path_length
 
 _SPACING = 0.15
 """Distance between the poses of a stretch without a plan [R]."""
@@ -45,7 +46,6 @@ def world_ahead(
     swept = interaction.sweep(world, np.concatenate([world.robot_pose[None], poses[1:]]))
     if swept.jammed_at >= 0:
         return world, None
-    moves = np.diff(poses[:, :2], axis=0)
     speed, turn = twists[-1]
     theta = float(poses[-1, 2])
     ahead = world.moved(
@@ -59,7 +59,7 @@ def world_ahead(
         poses=poses,
         speeds=twists[:, 0],
         turn_rates=twists[:, 1],
-        travel_cost=world.robot.mass * float(np.hypot(moves[:, 0], moves[:, 1]).sum()),
+        travel_cost=world.robot.mass * path_length(poses),
         interaction_cost=swept.work,
         object_poses=swept.object_poses,
     )
@@ -128,9 +128,7 @@ def _stretch(
 
 def _on_plan(plan: Plan, along: float, latency: float) -> tuple[FloatArray, FloatArray, FloatArray]:
     """The part of a plan that is driven in the next ``latency`` seconds."""
-    moves = np.diff(plan.poses[:, :2], axis=0)
-    lengths = np.concatenate([[0.0], np.cumsum(np.hypot(moves[:, 0], moves[:, 1]))])
-    now = float(np.interp(along, lengths, plan.times))
+    now = float(np.interp(along, plan.arc_lengths, plan.times))
     end = min(now + latency, float(plan.times[-1]))
     inner = (plan.times > now + 1e-9) & (plan.times < end - 1e-9)
     times = np.concatenate([[now], plan.times[inner], [end] if end > now else []])

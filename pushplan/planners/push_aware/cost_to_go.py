@@ -10,7 +10,6 @@ call on a map.
 
 from __future__ import annotations
 
-import heapq
 from typing import NamedTuple
 
 import numpy as np
@@ -18,6 +17,7 @@ import numpy as np
 from pushplan.compiled import kernel
 from pushplan.motion.collision import Footprint, Obstacles, is_free
 from pushplan.motion.shortcutting import in_goal
+from pushplan.search.grid_dijkstra import grid_dijkstra
 from pushplan.world.checks import BoolArray, FloatArray, IntArray
 
 
@@ -70,40 +70,20 @@ def mark_free(
 def flood(
     origin: FloatArray, cell: float, open_cells: BoolArray, goal: FloatArray, center: IntArray
 ) -> tuple[FloatArray, IntArray]:
-    """Dijkstra over 8 neighbours from the goal: lengths (rows, columns), and cells by length."""
+    """Grid lengths (rows, columns) [m] to the goal, and the cells in the order of their lengths."""
     rows, cols = open_cells.shape
-    far = np.full((rows, cols), np.inf)
-    order = np.empty(rows * cols, np.int64)
-    queue = [(0.0, np.int64(-1))]
-    for r in range(rows):
-        for c in range(cols):
-            x, y = origin[0] + (c + 0.5) * cell, origin[1] + (r + 0.5) * cell
-            if open_cells[r, c] and in_goal(x, y, goal):
-                far[r, c] = 0.0
-                heapq.heappush(queue, (0.0, np.int64(r * cols + c)))
-    if center[0] >= 0 and far[center[0], center[1]] > 0.0:  # a disc may be smaller than a cell
-        far[center[0], center[1]] = 0.0
-        heapq.heappush(queue, (0.0, np.int64(center[0] * cols + center[1])))
-    count = 0
-    while len(queue) > 0:
-        length, at = heapq.heappop(queue)
-        if at < 0:
-            continue
+    starts, count = np.empty(rows * cols + 1, np.int64), 0
+    for at in range(rows * cols):
         r, c = at // cols, at % cols
-        if length > far[r, c]:
-            continue
-        order[count] = at
-        count += 1
-        for dr in range(-1, 2):
-            for dc in range(-1, 2):
-                nr, nc = r + dr, c + dc
-                if nr < 0 or nc < 0 or nr >= rows or nc >= cols or not open_cells[nr, nc]:
-                    continue
-                there = length + cell * np.sqrt(float(dr * dr + dc * dc))
-                if there < far[nr, nc]:
-                    far[nr, nc] = there
-                    heapq.heappush(queue, (there, nr * cols + nc))
-    return far, order[:count]
+        x, y = origin[0] + (c + 0.5) * cell, origin[1] + (r + 0.5) * cell
+        # a disc may be smaller than a cell
+        if (open_cells[r, c] and in_goal(x, y, goal)) or (r == center[0] and c == center[1]):
+            starts[count] = at
+            count += 1
+    weights = np.where(open_cells, 1.0, np.inf)
+    none = np.zeros((rows, cols), np.bool_)
+    lengths, _, order = grid_dijkstra(weights, starts[:count], none, cell)
+    return lengths, order
 
 
 @kernel(allocates=True)

@@ -4,33 +4,29 @@ The model is quasi-static pushing of a convex box by a bumper under Coulomb fric
 a predictive one that keeps the box on the bumper. See docs/pushing.md.
 """
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from pushplan.planners.pushing.approach import Approach, best_offset, find_approach
+from pushplan.planners.pushing.bumper import Bumper, Face, face_towards
+from pushplan.planners.pushing.executor import (
+    ExecutorConfig,
+    PushExecutor,
+    PushPhase,
+    PushStatus,
+    PushTask,
+)
+from pushplan.planners.pushing.kernel_warmup import warm_up
+from pushplan.planners.pushing.model import ContactMode, ContactReport, PushModel, PushState
+from pushplan.planners.pushing.mpc import PushingMpc
 from pushplan.planners.pushing.parameters import (
     PushParameters,
     pressure_radius,
     spread_of,
     stable_curvature,
 )
-
-if TYPE_CHECKING:
-    from pushplan.planners.pushing.approach import Approach, best_offset, find_approach
-    from pushplan.planners.pushing.bumper import Bumper, Face, face_towards
-    from pushplan.planners.pushing.executor import (
-        ExecutorConfig,
-        PushExecutor,
-        PushPhase,
-        PushStatus,
-        PushTask,
-    )
-    from pushplan.planners.pushing.fit import PushFit, fit_push_model, identify
-    from pushplan.planners.pushing.kernel_warmup import warm_up
-    from pushplan.planners.pushing.log import PushLog, push_log
-    from pushplan.planners.pushing.model import ContactMode, ContactReport, PushModel, PushState
-    from pushplan.planners.pushing.mpc import PushingMpc
-    from pushplan.planners.pushing.path import PushPath
-    from pushplan.planners.pushing.pushing_config import PushingConfig
-    from pushplan.planners.pushing.reference import NonlinearPushingMpc
+from pushplan.planners.pushing.path import PushPath
+from pushplan.planners.pushing.push_log import PushLog, push_log
+from pushplan.planners.pushing.pushing_config import PushingConfig
 
 __all__ = [
     "Approach",
@@ -39,9 +35,7 @@ __all__ = [
     "ContactReport",
     "ExecutorConfig",
     "Face",
-    "NonlinearPushingMpc",
     "PushExecutor",
-    "PushFit",
     "PushLog",
     "PushModel",
     "PushParameters",
@@ -55,8 +49,6 @@ __all__ = [
     "best_offset",
     "face_towards",
     "find_approach",
-    "fit_push_model",
-    "identify",
     "pressure_radius",
     "push_log",
     "spread_of",
@@ -65,25 +57,18 @@ __all__ = [
 ]
 
 _LAZY = {
-    "approach": ("Approach", "best_offset", "find_approach"),
-    "bumper": ("Bumper", "Face", "face_towards"),
-    "pushing_config": ("PushingConfig",),
-    "executor": ("ExecutorConfig", "PushExecutor", "PushPhase", "PushStatus", "PushTask"),
-    "fit": ("PushFit", "fit_push_model", "identify"),
-    "log": ("PushLog", "push_log"),
-    "model": ("ContactMode", "ContactReport", "PushModel", "PushState"),
-    "mpc": ("PushingMpc",),
-    "path": ("PushPath",),
-    "reference": ("NonlinearPushingMpc",),
-    "kernel_warmup": ("warm_up",),
+    "NonlinearPushingMpc": "reference",
+    "PushFit": "fit",
+    "fit_push_model": "fit",
+    "identify": "fit",
 }
-_HOMES = {name: module for module, names in _LAZY.items() for name in names}
+"""What needs CasADi or SciPy's optimisers, and the module of each."""
 
 
 def __getattr__(name: str) -> Any:
-    """Import compiled kernels and solvers when they are first asked for."""
-    if name not in _HOMES:
+    """Import what needs a large library when it is first asked for."""
+    if name not in _LAZY:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     import importlib
 
-    return getattr(importlib.import_module(f"{__name__}.{_HOMES[name]}"), name)
+    return getattr(importlib.import_module(f"{__name__}.{_LAZY[name]}"), name)

@@ -12,12 +12,12 @@ import shapely
 
 from pushplan.geometry import convex_overlap
 from pushplan.motion.collision import footprint, is_free, obstacles
-from pushplan.planners.pushing import kernels
+from pushplan.planners.pushing import contact_kernels
 from pushplan.planners.pushing.bumper import face_towards
 from pushplan.planners.pushing.model import PushModel
 from pushplan.planners.pushing.parameters import PushParameters
 from pushplan.planners.pushing.path import PushPath
-from pushplan.planners.pushing.ways import Ways
+from pushplan.planners.pushing.paths_from_start import PathsFromStart
 from pushplan.world import StaticMap, World
 from pushplan.world.checks import FloatArray, expect, integer, number
 from pushplan.world.outline import centroid
@@ -79,7 +79,9 @@ def best_offset(model: PushModel, path: PushPath, speed: float) -> float:
         if length < 1e-9:
             continue
         turn = math.remainder(float(path.poses[i, 2] - path.poses[i - 1, 2]), math.tau)
-        kernels.advance(model.contact, state, speed, turn * speed / length, length / speed, out)
+        contact_kernels.advance(
+            model.contact, state, speed, turn * speed / length, length / speed, out
+        )
         if max(high, state[3]) - min(low, state[3]) > _SPAN * half:
             break
         low, high = min(low, float(state[3])), max(high, float(state[3]))
@@ -109,7 +111,7 @@ def find_approach(
 
     Returns:
         None where the robot fits nowhere behind it, or cannot get there around static things and
-        the object. Ways around the other objects come first.
+        the object. PathsFromStart around the other objects come first.
 
     Raises:
         InvalidInputError: if there is no such object.
@@ -203,22 +205,22 @@ class _Scene:
                 and self._free(behind, heading + 0.5 * lean)
             ):
                 continue
-            way = self._ways.to(stop)
+            way = self._paths.to(stop)
             if way is None:
                 continue
-            bends = _simpler(way, _COARSE * size)
-            last = bends[-1] - bends[-2] if len(bends) > 1 else ahead
+            corners = _simpler(way, _COARSE * size)
+            last = corners[-1] - corners[-2] if len(corners) > 1 else ahead
             if self._turns(stop, math.atan2(last[1], last[0]), course):
-                points = np.concatenate([bends[1:-1], [stop, behind]])
+                points = np.concatenate([corners[1:-1], [stop, behind]])
                 return Approach(points, np.array([*behind, heading]), offset)
         return None
 
     @cached_property
-    def _ways(self) -> Ways:
+    def _paths(self) -> PathsFromStart:
         static = self._world.static
         shapes = (*static.polygons, *self._around)
         among = StaticMap(shapes, static.segments, static.radii, static.bounds)
-        return Ways(among, self._clearance, self._world.robot_pose[:2])
+        return PathsFromStart(among, self._clearance, self._world.robot_pose[:2])
 
     def _free(self, place: FloatArray, heading: float) -> bool:
         """Whether the robot overlaps nothing there."""

@@ -8,7 +8,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from pushplan.planners.pushing.kernels import Contact
+from pushplan.planners.pushing.contact_kernels import Contact
 from pushplan.planners.pushing.parameters import PushParameters, pressure_radius
 from pushplan.world import InvalidInputError, RobotModel
 from pushplan.world.checks import FloatArray, expect, number
@@ -18,30 +18,30 @@ _SAMPLES = 401
 _STEEP = 0.8
 """|dx/dy| from which an edge is a flank and no longer part of the front."""
 _FLAT = 0.02
-"""Depth of a front, as a share of its half width, below which it counts as straight."""
+"""Depth of a front, as a fraction of its half width, below which it counts as straight."""
 _BENT = 0.7
-"""Greatest bend times depth of a box: a box fits into the bumper's hollow."""
+"""Greatest curvature times depth of a box: a box fits into the bumper's hollow."""
 
 
 @dataclass(frozen=True)
 class Bumper:
-    """The front of a robot: x = front + bend y² / 2 for |y| <= half, body frame [m].
+    """The front of a robot: x = front + curvature y² / 2 for |y| <= half, body frame [m].
 
     Args:
         front: distance of its middle from the axle [m].
         half: half its width [m].
-        bend: curvature [1/m]: 0 straight, positive where the ends reach ahead and hold a box,
+        curvature: curvature [1/m]: 0 straight, positive where the ends reach ahead and hold a box,
             negative for a nose. A V-shaped front is replaced by the parabola nearest to it.
     """
 
     front: float
     half: float
-    bend: float
+    curvature: float
 
     def __post_init__(self) -> None:
         for name in ("front", "half"):
             number(f"bumper {name}", getattr(self, name), low=0.0, open_low=True)
-        number("bumper bend", self.bend)
+        number("bumper curvature", self.curvature)
 
     @classmethod
     def of(cls, robot: RobotModel) -> Bumper:
@@ -105,11 +105,11 @@ def contact_of(
         parameters: friction.
     """
     spread = parameters.spread * _radius(outline.tobytes())
-    bend = min(bumper.bend, _BENT / face.depth)
+    curvature = min(bumper.curvature, _BENT / face.depth)
     return Contact(
         bumper.front,
         bumper.half,
-        bend,
+        curvature,
         face.depth,
         face.low,
         face.high,
@@ -144,10 +144,10 @@ def _bumper(robot: RobotModel) -> Bumper:
         raise InvalidInputError(f"robot {robot.name!r} has a pointed front, which holds no box")
     inside = np.abs(ys) <= half
     square = 0.5 * ys[inside] ** 2
-    bend, ahead = np.polyfit(square, front[inside], 1)
-    if abs(bend) * 0.5 * half * half < _FLAT * half:
+    curvature, ahead = np.polyfit(square, front[inside], 1)
+    if abs(curvature) * 0.5 * half * half < _FLAT * half:
         return Bumper(float(front[inside].max()), half, 0.0)
-    return Bumper(float(ahead), half, float(bend))
+    return Bumper(float(ahead), half, float(curvature))
 
 
 def _foremost(part: FloatArray, ys: FloatArray) -> FloatArray:
@@ -158,6 +158,6 @@ def _foremost(part: FloatArray, ys: FloatArray) -> FloatArray:
         if high - low < 1e-12:
             continue
         at = (ys >= low) & (ys <= high)
-        share = (ys[at] - ay) / (by - ay)
-        found[at] = np.maximum(found[at], ax + share * (bx - ax))
+        fraction = (ys[at] - ay) / (by - ay)
+        found[at] = np.maximum(found[at], ax + fraction * (bx - ax))
     return found

@@ -9,22 +9,22 @@ from dataclasses import dataclass, field, fields
 import numpy as np
 
 from pushplan.control import clamp_twist
-from pushplan.planners.pushing import kernels
+from pushplan.planners.pushing import contact_kernels
 from pushplan.planners.pushing.approach import find_approach
 from pushplan.planners.pushing.clearance import Clearance
-from pushplan.planners.pushing.estimate import PoseEstimate
 from pushplan.planners.pushing.mpc import PushingMpc
+from pushplan.planners.pushing.observers import PoseObserver
 from pushplan.planners.pushing.path import PushPath
 from pushplan.planners.pushing.pushing_config import PushingConfig
-from pushplan.planners.pushing.walk import Walk
+from pushplan.planners.pushing.waypoint_follower import WaypointFollower
 from pushplan.world import Drive, InvalidInputError, Plan, StaticMap, Twist, World
 from pushplan.world.checks import FloatArray, expect, integer, number
 
-_NOWHERE = kernels.Contact(0.1, 0.1, 0.0, 0.1, -0.1, 0.1, 0.1, 0.0)
+_NOWHERE = contact_kernels.Contact(0.1, 0.1, 0.0, 0.1, -0.1, 0.1, 0.1, 0.0)
 """A box for a robot that pushes none."""
 _GAP = 1e9
 _ESCAPES = ((-1.0, 0.0), (-0.5, 1.0), (-0.5, -1.0), (0.0, 1.0), (0.0, -1.0), (0.5, 0.0))
-"""Speed and turn rate, as shares of the greatest, that are tried in turn to get away."""
+"""Speed and turn rate, as fractions of the greatest, that are tried in turn to get away."""
 _MOVED, _TWISTED = 0.2, 0.35
 """A box that was moved by more while the robot drove up to it [R, rad] is approached anew."""
 _DETOURS = 4
@@ -102,7 +102,7 @@ class ExecutorConfig:
         retreat: how far it backs off before it gets behind the box anew [R].
         attempts: pushes without progress after which it fails.
         progress: what counts as progress [R].
-        rim: share of the pushed face's half width that has to lie on the bumper beyond the box's
+        rim: fraction of the pushed face's half width that has to lie on the bumper beyond the box's
             centre, on either side.
         gap: distance of a lost box from the bumper [R].
         astray: distance of the box from its path at which the path is joined anew [R].
@@ -147,12 +147,12 @@ class PushExecutor:
         self._task: PushTask | None = None
         self._phase, self._reason = PushPhase.APPROACH, ""
         self._time = -math.inf
-        self._observer = PoseEstimate(self.config.mpc.trust, self.config.mpc.delay)
+        self._observer = PoseObserver(self.config.mpc.observer_gain, self.config.mpc.delay)
         self._forget()
 
     def _forget(self) -> None:
         self._attempts, self._left, self._left_then = 0, math.inf, math.inf
-        self._driver: Walk | None = None
+        self._driver: WaypointFollower | None = None
         self._stopped = False
         self._detours = self._failed_ways = 0
         self._box_then: FloatArray = np.zeros(3)
@@ -183,7 +183,7 @@ class PushExecutor:
             raise InvalidInputError("pushing along a path needs a differential drive")
         if task is not self._task or world.time <= self._time:
             if world.time <= self._time:
-                self._observer = PoseEstimate(self.config.mpc.trust, self.config.mpc.delay)
+                self._observer = PoseObserver(self.config.mpc.observer_gain, self.config.mpc.delay)
             self._forget()
             self._task = task
             self._phase, self._reason = PushPhase.APPROACH, ""
@@ -242,11 +242,11 @@ class PushExecutor:
                 self._failed_ways += 1
                 self._give_up(world, "no_approach", pose)
             return None
-        share = self._free(world, pose, command)
-        self._stopped = share < 0.05
-        return clamp_twist(world.robot, share * command.linear, share * command.angular)
+        fraction = self._free(world, pose, command)
+        self._stopped = fraction < 0.05
+        return clamp_twist(world.robot, fraction * command.linear, fraction * command.angular)
 
-    def _set_out(self, world: World, task: PushTask, k: int) -> Walk | None:
+    def _set_out(self, world: World, task: PushTask, k: int) -> WaypointFollower | None:
         """The way behind the box; None if there is nothing to do, or no way."""
         robot, config = world.robot, self.config
         size = robot.circumscribed_radius
@@ -265,8 +265,8 @@ class PushExecutor:
             self._end(PushPhase.FAILED, "no_approach")
             return None
         self._box_then = world.movables.poses[k]
-        noisy = config.mpc.trust < 1.0
-        return Walk(
+        noisy = config.mpc.observer_gain < 1.0
+        return WaypointFollower(
             robot,
             found.points,
             float(found.pose[2]),
@@ -298,7 +298,7 @@ class PushExecutor:
         if self._left < self._left_then - config.progress * size:
             self._left_then, self._attempts = self._left, 1
             self._failed_ways = 0
-        low, high = kernels.line(model.contact, state.offset)
+        low, high = contact_kernels.line(model.contact, state.offset)
         face = 0.5 * (model.face.high - model.face.low)
         if min(-low, high) < config.rim * face or state.gap > config.gap * size:
             self._give_up(world, "lost", pose)
@@ -328,10 +328,10 @@ class PushExecutor:
         while self._escapes:
             speed, turn = self._escapes[0]
             command = clamp_twist(robot, speed * robot.max_speed, turn * robot.max_turn_rate)
-            share = self._free(world, pose, command)
+            fraction = self._free(world, pose, command)
             stuck = self._is_stuck(world, pose)
-            if share >= 0.25 and not stuck and (command.linear or command.angular):
-                return clamp_twist(robot, share * command.linear, share * command.angular)
+            if fraction >= 0.25 and not stuck and (command.linear or command.angular):
+                return clamp_twist(robot, fraction * command.linear, fraction * command.angular)
             self._escapes = self._escapes[1:]
             self._rest = (pose, world.time)
         self._phase, self._driver = PushPhase.APPROACH, None
@@ -369,13 +369,15 @@ class PushExecutor:
             self._clearance = Clearance(robot, world.static, least)
         state = np.array([*pose, 0.0, 0.0, _GAP])
         look = 2.0 * self._held
-        return self._clearance.free_share(_NOWHERE, state, command.linear, command.angular, look)
+        return self._clearance.free_fraction(_NOWHERE, state, command.linear, command.angular, look)
 
     def _is_stuck(self, world: World, pose: FloatArray) -> bool:
         """Whether the robot has hardly moved for long."""
         then = self._rest[0]
         size = world.robot.circumscribed_radius
         moved = math.hypot(*(pose[:2] - then[:2]).tolist()) / size
-        if max(moved, abs(float(pose[2] - then[2]))) > 0.03 + 0.1 * (self.config.mpc.trust < 1.0):
+        if max(moved, abs(float(pose[2] - then[2]))) > 0.03 + 0.1 * (
+            self.config.mpc.observer_gain < 1.0
+        ):
             self._rest = (pose, world.time)
         return world.time - self._rest[1] >= self.config.patience

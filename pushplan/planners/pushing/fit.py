@@ -12,10 +12,9 @@ from itertools import product
 import numpy as np
 from scipy.optimize import least_squares
 
-from pushplan.compiled import kernel
-from pushplan.planners.pushing import kernels
+from pushplan.planners.pushing import contact_kernels
 from pushplan.planners.pushing.bumper import Bumper, contact_of, face_towards
-from pushplan.planners.pushing.kernels import Contact
+from pushplan.planners.pushing.contact_kernels import Contact
 from pushplan.planners.pushing.model import PushModel
 from pushplan.planners.pushing.parameters import PushParameters
 from pushplan.world import Episode, InvalidInputError, PushplanError
@@ -41,7 +40,7 @@ class PushFit:
         parameters: that predict the recordings best.
         friction_error: standard error of the friction; inf where the recordings say nothing.
         spread_error: standard error of the spread, likewise.
-        rms: of the predictions' errors, as shares of the distance from axle to box, and in rad.
+        rms: of the predictions' errors, as fractions of the distance from axle to box, and in rad.
         windows: pieces of pushes that were used.
     """
 
@@ -95,11 +94,11 @@ def identify(episodes: Iterable[Episode]) -> PushFit:
     def errors(values: FloatArray) -> FloatArray:
         return _errors(pieces, float(values[0]), float(values[1]))
 
-    def price(values: tuple[float, float]) -> float:
+    def cost(values: tuple[float, float]) -> float:
         scaled = (errors(np.array(values)) / _ROBUST) ** 2
         return float((np.sqrt(1.0 + scaled) - 1.0).sum())
 
-    start = min(product(_STARTS, _SPREADS), key=price)
+    start = min(product(_STARTS, _SPREADS), key=cost)
     found = least_squares(
         errors,
         np.array(start),
@@ -133,19 +132,9 @@ def _errors(pieces: Sequence[_Piece], friction: float, spread: float) -> FloatAr
     left = np.empty((len(pieces), 2))
     for row, piece in zip(left, pieces, strict=True):
         contact = piece.contact._replace(friction=friction, spread=spread * piece.uniform)
-        offset, angle = _predicted(contact, piece.start, piece.twists, piece.steps)
+        offset, angle = contact_kernels.predicted(contact, piece.start, piece.twists, piece.steps)
         row[:] = (offset - piece.end[0]) / piece.reach, angle - piece.end[1]
     return left.ravel()
-
-
-@kernel(allocates=True)
-def _predicted(
-    contact: Contact, start: FloatArray, twists: FloatArray, steps: FloatArray
-) -> tuple[float, float]:
-    state, detail = start.copy(), np.empty(6)
-    for k in range(steps.shape[0]):
-        kernels.advance(contact, state, twists[k, 0], twists[k, 1], steps[k], detail)
-    return state[3], state[4]
 
 
 def _pieces(episode: Episode) -> list[_Piece]:
@@ -173,7 +162,7 @@ def _pieces(episode: Episode) -> list[_Piece]:
                 travel += math.hypot(step[0], step[1]) + abs(step[2]) * model.reach
                 j += 1
             touch = all(abs(row.gap) < _TOUCH * face.depth for row in rows)
-            low, high = kernels.line(contact, rows[0].offset)
+            low, high = contact_kernels.line(contact, rows[0].offset)
             if touch and j > i and travel >= 0.5 * _WINDOW * model.reach and low < 0.0 < high:
                 twists, steps = _commands(episode.times[i : j + 1], robots[i : j + 1])
                 start = rows[0].row()

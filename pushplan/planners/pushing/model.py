@@ -9,9 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pushplan.planners.pushing import kernels
+from pushplan.planners.pushing import contact_kernels
 from pushplan.planners.pushing.bumper import Bumper, Face, contact_of, face_towards
-from pushplan.planners.pushing.kernels import Contact
+from pushplan.planners.pushing.contact_kernels import Contact
 from pushplan.planners.pushing.parameters import PushParameters, stable_curvature
 from pushplan.world import InvalidInputError, RobotModel, Twist
 from pushplan.world.checks import ArrayRecord, FloatArray, array, expect, number
@@ -21,15 +21,15 @@ from pushplan.world.outline import centroid, convex_outline
 class ContactMode(enum.Enum):
     """How bumper and box touch."""
 
-    FREE = kernels.FREE
+    FREE = contact_kernels.FREE
     """Not at all; the box stands."""
-    STICK = kernels.STICK
+    STICK = contact_kernels.STICK
     """Along a line, without sliding."""
-    SLIDE = kernels.SLIDE
+    SLIDE = contact_kernels.SLIDE
     """Along a line, and the box slides along the bumper."""
-    CORNER_STICK = kernels.CORNER_STICK
+    CORNER_STICK = contact_kernels.CORNER_STICK
     """At one point, about which the box turns."""
-    CORNER_SLIDE = kernels.CORNER_SLIDE
+    CORNER_SLIDE = contact_kernels.CORNER_SLIDE
     """At one point that slides."""
 
 
@@ -75,7 +75,7 @@ class ContactReport:
             frame of the pushed face.
         pressure: centre of pressure on the face, left of the box's centre [m].
         shear: tangential over normal force, beyond what the bumper's shape gives.
-        margin: 1 - |turn rate| / (the greatest with which the box sticks): share of the friction
+        margin: 1 - |turn rate| / (the greatest with which the box sticks): fraction of the friction
             cone and of the line of contact that is not used; negative where the box slips.
     """
 
@@ -126,7 +126,7 @@ class PushModel:
 
     def stable_curvature(self, offset: float = 0.0) -> float:
         """`stable_curvature` of a box at an offset [m] on this bumper, as if straight [1/m]."""
-        low, high = kernels.line(self.contact, number("offset", offset))
+        low, high = contact_kernels.line(self.contact, number("offset", offset))
         return stable_curvature(
             self.parameters.friction,
             reach=self.bumper.front,
@@ -140,7 +140,7 @@ class PushModel:
         robot: FloatArray = array("robot_pose", robot_pose, (3,))
         box: FloatArray = array("box_pose", box_pose, (3,))
         row = np.empty(6)
-        kernels.observe(self.contact, self.face.normal, robot, box, row)
+        contact_kernels.observe(self.contact, self.face.normal, robot, box, row)
         return PushState.from_row(row)
 
     def box_pose(self, state: PushState) -> FloatArray:
@@ -169,7 +169,7 @@ class PushModel:
             raise InvalidInputError(f"dt must be positive, got {steps.min()}")
         row = expect("state", state, PushState).row()
         states, details = np.empty((count + 1, 6)), np.empty((count, 6))
-        kernels.rollout(self.contact, row, commands, steps, states, details)
+        contact_kernels.rollout(self.contact, row, commands, steps, states, details)
         return states, details
 
     def report(self, state: PushState, twist: Twist) -> ContactReport:
@@ -179,7 +179,9 @@ class PushModel:
         out = np.zeros(6)
         if v > 0.0 or w != 0.0:
             length = 0.05 * self.reach / max(abs(v), abs(w) * self.reach)
-            kernels.contact_velocity(self.contact, state.offset, state.angle, v, w, length, out)
+            contact_kernels.contact_velocity(
+                self.contact, state.offset, state.angle, v, w, length, out
+            )
         bound = self.stable_curvature(state.offset) * max(v, 0.0)
         used = abs(w) / bound if bound > 0.0 else (0.0 if w == 0.0 else math.inf)
         return ContactReport(
@@ -192,6 +194,6 @@ class PushModel:
 
     def _box_of(self, row: FloatArray) -> FloatArray:
         pose = np.empty(3)
-        kernels.box_pose(self.contact, row, pose)
+        contact_kernels.box_pose(self.contact, row, pose)
         pose[2] -= self.face.normal
         return pose

@@ -7,30 +7,37 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from pushplan.control import clamp_twist
-from pushplan.control.mpc.kernels import Track, locate
-from pushplan.control.mpc.solver import QuadraticProgram
+from pushplan.control.limits import ramp_twist
+from pushplan.control.mpc.horizon import (
+    RecedingHorizon,
+    driven_twist,
+    shifted_index,
+    time_grid,
+    track_of,
+)
+from pushplan.control.mpc.kernels import locate
 from pushplan.planners.pushing.bumper import face_towards
 from pushplan.planners.pushing.clearance import Clearance
-from pushplan.planners.pushing.cost import ROWS, Weights
-from pushplan.planners.pushing.estimate import Estimate
-from pushplan.planners.pushing.kernels import box_pose, observe
+from pushplan.planners.pushing.contact_kernels import box_pose, observe
+from pushplan.planners.pushing.cost_kernels import ROWS, Memory, PushingProblem
 from pushplan.planners.pushing.model import PushModel, PushState
-from pushplan.planners.pushing.problem import assemble
+from pushplan.planners.pushing.observers import PushObserver
+from pushplan.planners.pushing.problem import groups_of, weights_of
+from pushplan.planners.pushing.problem_kernels import assemble
 from pushplan.planners.pushing.pushing_config import PushingConfig
 from pushplan.world import Drive, InvalidInputError, Plan, RobotModel, StaticMap, Twist, World
-from pushplan.world.checks import FloatArray, IntArray, expect
+from pushplan.world.checks import FloatArray, expect
 
 _BACK, _WINDOW = 0.5, 2.0
 """How far the box's place may move back or ahead from one call to the next [L]."""
 _LEAST = 0.4
-"""Least speed of a push that has not ended, as a share of the greatest."""
+"""Least speed of a push that has not ended, as a fraction of the greatest."""
 _LOOK = 4.0
 """Periods for which a command must stay clear of static things, or it is driven more slowly."""
 _BESIDE, _AHEAD = 1.5, 2.0
 """Greatest offset [half bumpers] and gap [L] that the problem is solved for."""
 _BLOCKED, _ASIDE = 0.5, (0.1, -0.1, 0.3, -0.3, 0.7, -0.7)
-"""Share of a command below which others are tried, and their turns [speed / L]."""
+"""Fraction of a command below which others are tried, and their turns [speed / L]."""
 _TURNED = math.radians(50.0)
 """Angle at which another face is taken to be the pushed one."""
 
@@ -58,10 +65,10 @@ class PushingMpc:
         self._robot: RobotModel | None = None
         self._plan: Plan | None = None
         self._last_time = -math.inf
-        self._last = (0.0, 0.0)
+        self._last = Twist(0.0, 0.0)
         self._missed = 0
         self._nominal: FloatArray | None = None
-        self._estimate = Estimate(self.config.trust, self.config.delay)
+        self._observer = PushObserver(self.config.observer_gain, self.config.delay)
         self.fallbacks = 0
         """Calls since the start of the episode in which the solver gave no solution."""
         self._row: FloatArray | None = None
@@ -72,7 +79,7 @@ class PushingMpc:
         self.lateral = 0.0
         """Distance of the box from its path, left positive [m]."""
         self.slowed = 1.0
-        """Share of the last command that was driven, for the sake of what is static."""
+        """Fraction of the last command that was driven, for the sake of what is static."""
         self.value = math.nan
         """Cost of the nominal commands of the last call, see `PushingConfig`."""
 
@@ -124,22 +131,18 @@ class PushingMpc:
             )
         afresh = world.time <= self._last_time
         if afresh:
-            self._estimate = Estimate(config.trust, config.delay)
+            self._observer = PushObserver(config.observer_gain, config.delay)
         if afresh or self._robot != robot:
             self._robot, self._plan = robot, None
             self._held, self.fallbacks = config.period, 0
-            limited = (
-                math.isfinite(robot.max_acceleration),
-                math.isfinite(robot.max_turn_acceleration),
-            )
-            self._program = QuadraticProgram(
-                2,
+            self._program = RecedingHorizon(
+                robot,
+                (0, 1),
                 config.moves,
-                limited,
                 tolerance=config.tolerance,
                 iterations=config.solver_iterations,
             )
-            self._last = _speed_of(world)
+            self._last = driven_twist(world)
         else:
             self._held = world.time - self._last_time
         self._last_time = world.time
@@ -155,15 +158,13 @@ class PushingMpc:
         """A new path: which face is pushed, and memory for the problem."""
         config = self.config
         self._plan = plan
-        moves = np.diff(plan.poses[:, :2], axis=0)
-        lengths = np.concatenate([[0.0], np.cumsum(np.hypot(moves[:, 0], moves[:, 1]))])
-        self._track = Track(plan.poses, lengths, plan.speeds)
+        self._track = track_of(plan)
         self._take_face(world, k)
-        self._estimate.forget()
+        self._observer.forget()
         self.along, self._missed = 0.0, 0
         self._nominal = None
         n = 2 * config.moves
-        self._memory = (
+        self._memory = Memory(
             np.empty((ROWS * config.horizon, n)),
             np.empty(ROWS * config.horizon),
             np.empty((n, n)),
@@ -191,11 +192,11 @@ class PushingMpc:
         observe(self.model.contact, self._guard_face, pose, box, seen)
         if abs(seen[4]) > _TURNED:
             self._take_face(world, k)
-            self._estimate.forget()
+            self._observer.forget()
             observe(self.model.contact, self._guard_face, pose, box, seen)
         contact, size = self.model.contact, self.model.reach
-        self._row = self._estimate.observe(contact, seen, world.time, size)
-        ahead = self._estimate.at_effect(contact)
+        self._row = self._observer.observe(contact, seen, world.time, size)
+        ahead = self._observer.at_effect(contact)
         box_pose(contact, ahead, at)
         low = max(self.along - _BACK * size, 0.0)
         found = locate(self._track, at[0], at[1], low, self.along + _WINDOW * size)
@@ -216,59 +217,60 @@ class PushingMpc:
 
     def _solve(self, robot: RobotModel, start: FloatArray) -> FloatArray | None:
         """(M, 2) speeds [m/s] and turn rates [rad/s], or None."""
-        config, program = self.config, self._program
-        assert self.model is not None
-        steps = steps_of(config, self.model.reach, robot.max_speed, self._held)
-        rounds = config.iterations
+        steps = self._steps(robot)
+        rounds = self.config.iterations
         nominal = self._shifted(steps)
         if nominal is None:
-            rounds = config.first_iterations
-            nominal = np.tile([robot.max_speed, 0.0], (config.moves, 1))
-        units = np.array([robot.max_speed, robot.max_turn_rate])
-        low, high = bounds_of(robot, program.rows, config.moves, steps, self._last)
-        for _ in range(rounds):
-            self.value = self._assemble(robot, start, steps, nominal)
-            guess = np.ascontiguousarray((nominal / units).T.ravel())
-            found = program.solve(self._memory[2], self._memory[3], low, high, guess)
-            if found is None:
-                return None
-            nominal = np.ascontiguousarray(found.reshape(2, -1).T * units)
-        self._solution_steps = steps
+            rounds = self.config.first_iterations
+            nominal = np.tile([robot.max_speed, 0.0], (self.config.moves, 1))
+        problem = self._problem(start, steps)
+
+        def assemble_about(nominal: FloatArray) -> tuple[FloatArray, FloatArray]:
+            self.value = float(assemble(problem, nominal, self._memory))
+            return self._memory.hessian, self._memory.gradient
+
+        nominal = self._program.solve(nominal, *self._bounds(robot, steps), rounds, assemble_about)
+        if nominal is not None:
+            self._solution_steps = steps
         return nominal
 
-    def _assemble(
-        self, robot: RobotModel, start: FloatArray, steps: FloatArray, nominal: FloatArray
-    ) -> float:
-        """Fill the memory for commands (M, 2) [m/s, rad/s]; returns what they cost."""
+    def _steps(self, robot: RobotModel) -> FloatArray:
+        """(N,) how long each step is [s]."""
         assert self.model is not None
-        jacobian, residual, hessian, gradient, states = self._memory
-        value = assemble(
+        span = self.config.reach * self.model.reach / robot.max_speed
+        return time_grid(self.config.horizon, span, self._held)
+
+    def _problem(self, start: FloatArray, steps: FloatArray) -> PushingProblem:
+        assert self.model is not None
+        return PushingProblem(
             self.model.contact,
             self._track,
             self._weights,
             start,
             self.along,
-            np.array(self._last),
-            np.array([robot.max_speed, robot.max_turn_rate]),
+            np.array([self._last.linear, self._last.angular]),
+            self._program.units,
             steps,
             self._groups,
-            nominal,
-            jacobian,
-            residual,
-            hessian,
-            gradient,
-            states,
         )
-        return float(value)
+
+    def _bounds(self, robot: RobotModel, steps: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Bounds of the commands and of their changes, in the units of the problem."""
+        spans = np.full(self.config.moves, float(steps.min()))
+        spans[0] = steps[0]
+        low, high = self._program.bounds(spans, (self._last.linear, self._last.angular))
+        # a push goes forwards; where the robot cannot be that fast yet it gets there as it can
+        reach = robot.max_acceleration / robot.max_speed * float(steps[0])
+        low[: self.config.moves] = min(_LEAST, self._last.linear / robot.max_speed + reach)
+        return low, high
 
     def _shifted(self, steps: FloatArray) -> FloatArray | None:
         """The last solution, moved on by the time since."""
         if self._nominal is None:
             return None
-        ends = np.cumsum(self._solution_steps) - self._held
-        middles = np.cumsum(steps) - 0.5 * steps
         first = np.searchsorted(self._groups, np.arange(self.config.moves))
-        at = np.minimum(np.searchsorted(ends, middles[first]), len(ends) - 1)
+        at = shifted_index(self._solution_steps, steps, self._held)[first]
+        at = np.minimum(at, len(self._solution_steps) - 1)
         return np.ascontiguousarray(self._nominal[self._groups[at]])
 
     def _guarded(self, world: World, start: FloatArray, v: float, w: float) -> Twist:
@@ -283,99 +285,24 @@ class PushingMpc:
             )
         brake = 2.0 * abs(v) / robot.max_acceleration
         look = max(_LOOK * self._held, brake)
-        contact, pace = self.model.contact, max(abs(v), abs(w) * self.model.reach)
-        self.slowed = self._clearance.free_share(contact, start, v, w, look)
+        contact, speed = self.model.contact, max(abs(v), abs(w) * self.model.reach)
+        self.slowed = self._clearance.free_fraction(contact, start, v, w, look)
         for turn in _ASIDE if self.slowed < _BLOCKED else ():
-            aside = w + turn * pace / self.model.reach
-            share = self._clearance.free_share(contact, start, v, aside, look)
-            if share > self.slowed + _BLOCKED * abs(turn):
-                self.slowed, w = share, aside
+            aside = w + turn * speed / self.model.reach
+            fraction = self._clearance.free_fraction(contact, start, v, aside, look)
+            if fraction > self.slowed + _BLOCKED * abs(turn):
+                self.slowed, w = fraction, aside
                 break
         v, w = self.slowed * v, self.slowed * w
         return self._send(world, v, w)
 
     def _send(self, world: World, v: float, w: float) -> Twist:
         """Within the accelerations, and remembered."""
-        robot = world.robot
-        dv, dw = robot.max_acceleration * self._held, robot.max_turn_acceleration * self._held
-        v = min(max(v, self._last[0] - dv), self._last[0] + dv)
-        w = min(max(w, self._last[1] - dw), self._last[1] + dw)
-        twist = clamp_twist(robot, v, w)
+        twist = ramp_twist(world.robot, self._last, v, w, self._held)
         self.note(world.time, twist)
         return twist
 
     def note(self, time: float, twist: Twist) -> None:
         """Remember a command that was sent at a time [s], by whomever."""
-        self._last, self._last_time = (twist.linear, twist.angular), time
-        self._estimate.send(time, twist)
-
-
-def _speed_of(world: World) -> tuple[float, float]:
-    assert world.robot_twist is not None
-    vx, vy, omega = (float(value) for value in world.robot_twist)
-    theta = float(world.robot_pose[2])
-    twist = clamp_twist(world.robot, vx * math.cos(theta) + vy * math.sin(theta), omega)
-    return twist.linear, twist.angular
-
-
-def groups_of(horizon: int, moves: int) -> IntArray:
-    """(N,) which command holds in each step: the first ones for one step, later ones for more."""
-    ends = horizon * (np.arange(1, moves + 1) / moves) ** (1.6 if moves < horizon else 1.0)
-    ends = np.maximum(np.round(ends), np.arange(1, moves + 1)).astype(np.int64)
-    ends = np.minimum(ends, horizon - np.arange(moves - 1, -1, -1))
-    return np.searchsorted(ends, np.arange(horizon), side="right").astype(np.int64)
-
-
-def steps_of(config: PushingConfig, reach: float, speed: float, held: float) -> FloatArray:
-    """(N,) how long each step is [s]: the first until the next call."""
-    span = config.reach * reach / speed
-    steps = np.full(config.horizon, max(held, span / config.horizon))
-    steps[0] = held
-    return steps
-
-
-def weights_of(config: PushingConfig, model: PushModel, robot: RobotModel) -> Weights:
-    """Prices and scales for one robot and box."""
-    stable = model.stable_curvature()
-    limit = config.margin * stable if stable * model.reach > 0.02 else -1.0
-    return Weights(
-        length=model.reach,
-        max_speed=robot.max_speed,
-        half=model.bumper.half,
-        curvature=limit,
-        heading=config.heading,
-        offset=config.offset,
-        rim=config.rim,
-        safe=config.safe,
-        angle=config.angle,
-        grip=config.grip,
-        turn=config.turn,
-        speed=config.speed,
-        smoothness=config.smoothness,
-        terminal=config.terminal,
-    )
-
-
-def bounds_of(
-    robot: RobotModel, rows: int, moves: int, steps: FloatArray, last: tuple[float, float]
-) -> tuple[FloatArray, FloatArray]:
-    """Bounds of the commands and of their changes, in the units of the problem."""
-    low, high = -np.ones(rows), np.ones(rows)
-    row = 2 * moves
-    limits = (
-        robot.max_acceleration / robot.max_speed,
-        robot.max_turn_acceleration / robot.max_turn_rate,
-    )
-    before = (last[0] / robot.max_speed, last[1] / robot.max_turn_rate)
-    reach = (limits[0] * steps[0], limits[1] * steps[0])
-    # a push goes forwards; where the robot cannot be that fast yet it gets there as it can
-    low[:moves] = min(_LEAST, before[0] + reach[0])
-    for kind in range(2):
-        if math.isfinite(limits[kind]):
-            change = np.full(moves, limits[kind] * float(steps[1:].min(initial=steps[0])))
-            change[0] = reach[kind]
-            low[row : row + moves], high[row : row + moves] = -change, change
-            low[row] += before[kind]
-            high[row] += before[kind]
-            row += moves
-    return low, high
+        self._last, self._last_time = twist, time
+        self._observer.send(time, twist)

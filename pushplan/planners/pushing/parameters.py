@@ -13,7 +13,7 @@ from pushplan.world.checks import choice, number
 from pushplan.world.outline import centroid, convex_outline
 
 SUPPORTS = ("uniform", "inertia", "corners")
-"""Ways in which a box may press on the ground, see `pressure_radius`."""
+"""PathsFromStart in which a box may press on the ground, see `pressure_radius`."""
 _RINGS = 64
 
 
@@ -44,7 +44,7 @@ def pressure_radius(outline: ArrayLike, support: str = "uniform") -> float:
         outline: (N, 2) convex corners [m].
         support: ``"uniform"`` pressure: mean distance from the centroid, 0.383 s of a square of
             side s and 2/3 R of a disc; ``"inertia"``: the root of inertia over mass, 0.408 s,
-            which is how a planar engine that takes away a share of every velocity behaves;
+            which is how a planar engine that takes away a fraction of every velocity behaves;
             ``"corners"``: all weight on the corners, 0.707 s.
 
     Raises:
@@ -63,8 +63,8 @@ def pressure_radius(outline: ArrayLike, support: str = "uniform") -> float:
         edge = a + 0.5 * (nodes[:, None] + 1.0) * (b - a)  # (64, 2)
         far = np.hypot(edge[:, 0], edge[:, 1])
         power = far if support == "uniform" else far**2
-        share = 1.0 / 3.0 if support == "uniform" else 0.25
-        total += share * cross * 0.5 * float(weights @ power)
+        fraction = 1.0 / 3.0 if support == "uniform" else 0.25
+        total += fraction * cross * 0.5 * float(weights @ power)
         weight += 0.5 * cross
     mean = total / weight
     return mean if support == "uniform" else math.sqrt(mean)

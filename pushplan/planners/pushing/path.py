@@ -12,10 +12,11 @@ from numpy.typing import ArrayLike
 from pushplan.motion.dubins import along_arc
 from pushplan.world import InvalidInputError, Plan, RobotModel, SubTask
 from pushplan.world.checks import ArrayRecord, FloatArray, array, expect, integer, number
+from pushplan.world.polyline import arc_lengths, step_lengths
 
 _PIECES = 24
 """Least number of poses along a path of one piece."""
-_BEND = 0.05
+_GREATEST_TURN = 0.05
 """Greatest turn between two poses [rad]."""
 
 
@@ -57,7 +58,7 @@ class PushPath(ArrayRecord):
         for i, (length, curvature) in enumerate(rows):
             length = number(f"pieces[{i}] length", length, low=0.0, open_low=True)
             turn = abs(curvature) * length
-            count = min(max(_PIECES, math.ceil(turn / _BEND)), 2000)
+            count = min(max(_PIECES, math.ceil(turn / _GREATEST_TURN)), 2000)
             for _ in range(count):
                 out = np.empty(3)
                 along_arc(here, length / count, curvature, out)
@@ -76,8 +77,7 @@ class PushPath(ArrayRecord):
         corners: FloatArray = array("points", points, (None, 2))
         radius = number("radius", radius, low=0.0)
         if len(corners) > 1:
-            steps = np.hypot(*np.diff(corners, axis=0).T)
-            corners = corners[np.concatenate([[True], steps > 1e-9])]
+            corners = corners[np.concatenate([[True], step_lengths(corners) > 1e-9])]
         if len(corners) < 2:
             raise InvalidInputError("a push path needs two different points or more")
         legs = np.diff(corners, axis=0)
@@ -96,16 +96,15 @@ class PushPath(ArrayRecord):
             poses += [np.array([*(corners[i] + x * ahead), heading]) for x in run]
             if cut[i + 1] > 0.0:
                 turn = float(turns[i])
-                bend = math.tan(0.5 * abs(turn)) / cut[i + 1]
-                arc = cls.arcs(poses[-1], [(abs(turn) / bend, math.copysign(bend, turn))])
+                curvature = math.tan(0.5 * abs(turn)) / cut[i + 1]
+                arc = cls.arcs(poses[-1], [(abs(turn) / curvature, math.copysign(curvature, turn))])
                 poses += list(arc.poses[1:-1])
         return cls(np.array(poses))
 
     @property
     def lengths(self) -> FloatArray:
         """(N,) length of the path up to each pose [m]."""
-        steps = np.diff(self.poses[:, :2], axis=0)
-        return np.concatenate([[0.0], np.cumsum(np.hypot(steps[:, 0], steps[:, 1]))])
+        return arc_lengths(self.poses)
 
     @property
     def length(self) -> float:
@@ -120,10 +119,10 @@ class PushPath(ArrayRecord):
         if along <= 0.0:
             return self
         i = int(np.searchsorted(lengths, along, side="right")) - 1
-        share = (along - lengths[i]) / (lengths[i + 1] - lengths[i])
+        fraction = (along - lengths[i]) / (lengths[i + 1] - lengths[i])
         a, b = self.poses[i], self.poses[i + 1]
         turn = math.remainder(float(b[2] - a[2]), math.tau)
-        first = np.array([*(a[:2] + share * (b[:2] - a[:2])), a[2] + share * turn])
+        first = np.array([*(a[:2] + fraction * (b[:2] - a[:2])), a[2] + fraction * turn])
         return PushPath(np.concatenate([first[None], self.poses[i + 1 :]]))
 
     def nearest(self, point: ArrayLike) -> tuple[float, float]:
@@ -132,10 +131,10 @@ class PushPath(ArrayRecord):
         a = self.poses[:-1, :2]
         edges = self.poses[1:, :2] - a
         square = np.maximum((edges**2).sum(axis=1), 1e-18)
-        share = np.clip(((at - a) * edges).sum(axis=1) / square, 0.0, 1.0)
-        away = np.hypot(*(a + share[:, None] * edges - at).T)
+        fraction = np.clip(((at - a) * edges).sum(axis=1) / square, 0.0, 1.0)
+        away = np.hypot(*(a + fraction[:, None] * edges - at).T)
         i = int(np.argmin(away))
-        return float(self.lengths[i] + share[i] * np.sqrt(square[i])), float(away[i])
+        return float(self.lengths[i] + fraction[i] * np.sqrt(square[i])), float(away[i])
 
     def plan(self, robot: RobotModel, box_id: int, speed: float | None = None) -> Plan:
         """The path as a `pushplan.world.Plan` for `PushingMpc`.

@@ -22,23 +22,24 @@ class PushingConfig:
             ``horizon``.
         reach: how far the steps reach at full speed [L]; they are equally long, but never shorter
             than the control period, and the first is the control period itself.
-        heading: price of a wrong direction of the push [1/rad²].
-        offset: price of the box's offset, per square of the share of half the bumper.
-        rim: price of an offset beyond ``safe``, the same.
-        safe: share of half the bumper within which an offset costs no more than ``offset``.
-        angle: price of a box that does not lie on the bumper [1/rad²].
-        grip: price of a curvature beyond ``margin`` times the stable one.
-        margin: share of the stable curvature that is used; light boxes in MuJoCo need 0.6 to 0.7.
-        turn: price of turning otherwise than the path does.
-        speed: price of another speed than the path's, per square of its share of ``max_speed``.
-        smoothness: price of changing speed and turn rate.
-        terminal: factor on the price of the last step.
+        heading: cost of a wrong direction of the push [1/rad²].
+        offset: cost of the box's offset, per square of the fraction of half the bumper.
+        rim: cost of an offset beyond ``safe``, the same.
+        safe: fraction of half the bumper within which an offset costs no more than ``offset``.
+        angle: cost of a box that does not lie on the bumper [1/rad²].
+        grip: cost of a curvature beyond ``margin`` times the stable one.
+        margin: fraction of the stable curvature that is used; light boxes in MuJoCo need 0.6
+            to 0.7.
+        turn: cost of turning otherwise than the path does.
+        speed: cost of another speed than the path's, per square, as a fraction of ``max_speed``.
+        smoothness: cost of changing speed and turn rate.
+        terminal: factor on the cost of the last step.
         parameters: friction.
         delay: known time between a command and its effect [s].
         period: time for which the first command is held [s]; later ones are held for as long as
             the clock of the world shows.
-        trust: share by which a new pose corrects the predicted one; 1 where poses are exact, about
-            0.3 where they are off by some percent of the box.
+        observer_gain: fraction by which a new pose corrects the predicted one; 1 where poses are
+            exact, about 0.3 where they are off by some percent of the box.
         clearance: least distance of robot and box from static things [R, the robot's
             circumscribed radius]; what is nearer comes no nearer.
         iterations: quadratic programs solved in each call; 1 is the real-time iteration.
@@ -64,7 +65,7 @@ class PushingConfig:
     parameters: PushParameters = field(default_factory=PushParameters)
     delay: float = 0.0
     period: float = 0.1
-    trust: float = 1.0
+    observer_gain: float = 1.0
     clearance: float = 0.02
     iterations: int = 1
     first_iterations: int = 4
@@ -81,7 +82,7 @@ class PushingConfig:
         number("safe", self.safe, low=0.0, high=1.0)
         number("margin", self.margin, low=0.0, high=1.0, open_low=True)
         number("terminal", self.terminal, low=1.0)
-        number("trust", self.trust, low=0.0, high=1.0, open_low=True)
+        number("observer_gain", self.observer_gain, low=0.0, high=1.0, open_low=True)
         expect("parameters", self.parameters, PushParameters)
         for name in ("iterations", "first_iterations", "solver_iterations"):
             integer(name, getattr(self, name), low=1)

@@ -12,9 +12,10 @@ import casadi
 import numpy as np
 
 from pushplan.control.mpc.kernels import errors, locate
-from pushplan.planners.pushing.cost import SPEED_CALM, Weights
-from pushplan.planners.pushing.kernels import FLUSH, Contact, box_pose
-from pushplan.planners.pushing.mpc import PushingMpc, bounds_of, steps_of
+from pushplan.planners.pushing.contact_kernels import FLUSH, Contact, box_pose
+from pushplan.planners.pushing.cost_kernels import SPEED_SMOOTHNESS, Weights
+from pushplan.planners.pushing.mpc import PushingMpc
+from pushplan.planners.pushing.problem_kernels import assemble
 from pushplan.world import RobotModel
 from pushplan.world.checks import FloatArray, IntArray
 
@@ -45,11 +46,10 @@ class NonlinearPushingMpc(PushingMpc):
     """Cost of the quadratic program's commands and of those found at the last call."""
 
     def _solve(self, robot: RobotModel, start: FloatArray) -> FloatArray | None:
-        assert self.model is not None
         quick = super()._solve(robot, start)
         if quick is None:
             quick = np.tile([robot.max_speed, 0.0], (self.config.moves, 1))
-        steps = steps_of(self.config, self.model.reach, robot.max_speed, self._held)
+        steps = self._steps(robot)
         best = self._refined(robot, start, steps, quick)
         self.value = self.gain[1]
         self._solution_steps = steps
@@ -60,20 +60,21 @@ class NonlinearPushingMpc(PushingMpc):
     ) -> FloatArray:
         """The best of commands (M, 2) and of what IPOPT makes of them."""
         config, nominal = self.config, commands
-        value = self._assemble(robot, start, steps, nominal)
+        problem = self._problem(start, steps)
+        value = float(assemble(problem, nominal, self._memory))
         self.gain = (value, value)
-        units = np.array([robot.max_speed, robot.max_turn_rate])
-        low, high = bounds_of(robot, self._program.rows, config.moves, steps, self._last)
+        units, last = self._program.units, np.array([self._last.linear, self._last.angular])
+        low, high = self._bounds(robot, steps)
         solver, changes = self._nonlinear(robot)
         n, count = 2 * config.moves, 5 * config.horizon
         best = nominal
         for _ in range(_ROUNDS):
-            self._assemble(robot, start, steps, nominal)
+            assemble(problem, nominal, self._memory)
             places = self._places(robot, steps, nominal)
-            states = self._memory[4]
+            states = self._memory.states
             found = solver(
                 x0=np.concatenate([(nominal / units).T.ravel(), states[1:, :5].ravel()]),
-                p=np.concatenate([states[0, :5], steps, self._last / units, places.ravel()]),
+                p=np.concatenate([states[0, :5], steps, last / units, places.ravel()]),
                 lbx=np.concatenate([low[:n], np.full(count, -np.inf)]),
                 ubx=np.concatenate([high[:n], np.full(count, np.inf)]),
                 lbg=np.concatenate([np.zeros(count), low[n : n + changes]]),
@@ -84,7 +85,7 @@ class NonlinearPushingMpc(PushingMpc):
                 break
             z = np.clip(z, low[:n], high[:n])
             nominal = np.ascontiguousarray(z.reshape(2, -1).T * units)
-            cost = self._assemble(robot, start, steps, nominal)
+            cost = float(assemble(problem, nominal, self._memory))
             if cost < self.gain[1]:
                 best, self.gain = nominal, (value, cost)
         return best
@@ -97,29 +98,29 @@ class NonlinearPushingMpc(PushingMpc):
             made = nonlinear_problem(
                 self.model.contact, self._weights, robot, self._groups, self.config.moves
             )
-            self._solver_of = (key, made, self._program.rows - 2 * self.config.moves)
+            self._solver_of = (key, made, self._program.changes)
         return self._solver_of[1], self._solver_of[2]
 
     def _places(self, robot: RobotModel, steps: FloatArray, nominal: FloatArray) -> FloatArray:
         """(N, 6) of each step: path x, y, heading, curvature; wanted speed and turn rate."""
         assert self.model is not None
-        track, weights, states = self._track, self._weights, self._memory[4]
+        track, weights, states = self._track, self._weights, self._memory.states
         rows, place = [], self.along
         contact = self.model.contact
         at = _box_of(contact, states[0])
-        _, index, share = locate(track, at[0], at[1], place, place)
-        bend = errors(track, at[0], at[1], states[0, 2], index, share)[3]
+        _, index, fraction = locate(track, at[0], at[1], place, place)
+        curvature = errors(track, at[0], at[1], states[0, 2], index, fraction)[3]
         for k, dt in enumerate(steps.tolist()):
             wanted = min(float(track.speeds[index]), weights.max_speed)
             wanted = min(wanted, max(float(track.lengths[-1]) - place, 0.0) / dt)
-            turn = min(max(wanted * bend, -robot.max_turn_rate), robot.max_turn_rate)
+            turn = min(max(wanted * curvature, -robot.max_turn_rate), robot.max_turn_rate)
             v = float(nominal[self._groups[k], 0])
             at = _box_of(contact, states[k + 1])
             theta = states[k + 1, 2] + states[k + 1, 4]
-            place, index, share = locate(track, at[0], at[1], place, place + 2.0 * v * dt + 1e-9)
-            lateral, _, heading, bend = errors(track, at[0], at[1], theta, index, share)
+            place, index, fraction = locate(track, at[0], at[1], place, place + 2.0 * v * dt + 1e-9)
+            lateral, _, heading, curvature = errors(track, at[0], at[1], theta, index, fraction)
             foot = [at[0] + lateral * np.sin(heading), at[1] - lateral * np.cos(heading)]
-            rows.append([*foot, heading, bend, wanted, turn])
+            rows.append([*foot, heading, curvature, wanted, turn])
         return np.array(rows)
 
 
@@ -132,7 +133,7 @@ def _box_of(contact: Contact, state: FloatArray) -> tuple[float, float]:
 def nonlinear_problem(
     contact: Contact, weights: Weights, robot: RobotModel, groups: IntArray, moves: int
 ) -> Any:
-    """The problem of `problem.assemble` with its states as variables, for CasADi's IPOPT."""
+    """The problem of `assemble` with its states as variables, for CasADi's IPOPT."""
     count = len(groups)
     z = casadi.SX.sym("z", 2 * moves)
     x = casadi.SX.sym("x", 5, count)
@@ -149,7 +150,7 @@ def nonlinear_problem(
         defects.append(x[:, k] - step(contact, before, v, w, steps[k]))
         tau = steps[k] * weights.max_speed / weights.length
         factor = tau * (weights.terminal if k == count - 1 else 1.0)
-        cost += 0.5 * factor * _price(contact, weights, x[:, k], places[:, k], v, w)
+        cost += 0.5 * factor * _step_cost(contact, weights, x[:, k], places[:, k], v, w)
         cost += 0.5 * tau * weights.speed * (z[g] - places[4, k] / units[0]) ** 2
         turn = places[5, k] / units[1]
         cost += 0.5 * tau * weights.turn * rate**2 * (z[moves + g] - turn) ** 2
@@ -157,7 +158,7 @@ def nonlinear_problem(
             old = (last[0], last[1]) if g == 0 else (z[g - 1], z[moves + g - 1])
             calm = 0.5 * weights.smoothness / casadi.fmax(tau, 0.05)
             cost += calm * (
-                SPEED_CALM * (z[g] - old[0]) ** 2 + rate**2 * (z[moves + g] - old[1]) ** 2
+                SPEED_SMOOTHNESS * (z[g] - old[0]) ** 2 + rate**2 * (z[moves + g] - old[1]) ** 2
             )
     changes = []
     for kind, limit in enumerate((robot.max_acceleration, robot.max_turn_acceleration)):
@@ -173,8 +174,8 @@ def nonlinear_problem(
     return casadi.nlpsol("push", "ipopt", problem, _SETTINGS)
 
 
-def _price(contact: Contact, weights: Weights, x: Any, place: Any, v: Any, w: Any) -> Any:
-    """Squares of the residuals of one step, see `problem.residuals`."""
+def _step_cost(contact: Contact, weights: Weights, x: Any, place: Any, v: Any, w: Any) -> Any:
+    """Squares of the residuals of one step, see `residuals`."""
     ahead = _standoff(contact, x[3], x[4])[0]
     c, s = casadi.cos(x[2]), casadi.sin(x[2])
     dx, dy = x[0] + c * ahead - s * x[3] - place[0], x[1] + s * ahead + c * x[3] - place[1]
@@ -184,10 +185,10 @@ def _price(contact: Contact, weights: Weights, x: Any, place: Any, v: Any, w: An
     error = x[2] + x[4] - place[2] - place[3] * along
     turns = casadi.floor((error + np.pi) / (2.0 * np.pi))
     error = error - 2.0 * np.pi * turns
-    share = x[3] / weights.half
-    beyond = casadi.fmax(casadi.fabs(share) - weights.safe, 0.0)
+    fraction = x[3] / weights.half
+    beyond = casadi.fmax(casadi.fabs(fraction) - weights.safe, 0.0)
     cost = (lateral / weights.length) ** 2 + weights.heading * error**2
-    cost += weights.offset * share**2 + weights.rim * beyond**2
+    cost += weights.offset * fraction**2 + weights.rim * beyond**2
     cost += weights.angle * (x[4] - _flush(contact, x[3])) ** 2
     if weights.curvature >= 0.0:
         over = casadi.fmax(casadi.fabs(w) - weights.curvature * v, 0.0)
@@ -196,7 +197,7 @@ def _price(contact: Contact, weights: Weights, x: Any, place: Any, v: Any, w: An
 
 
 def step(contact: Contact, x: Any, v: Any, w: Any, dt: Any) -> Any:
-    """`kernels.advance` of a box in contact, as an expression: (5,) state after ``dt``."""
+    """`advance` of a box in contact, as an expression: (5,) state after ``dt``."""
     h = dt / _SUBSTEPS
     for _ in range(_SUBSTEPS):
         offset, angle = x[3], x[4]
@@ -207,7 +208,7 @@ def step(contact: Contact, x: Any, v: Any, w: Any, dt: Any) -> Any:
         chord = v * h * (1.0 - half**2 / 6.0 + half**4 / 120.0)
         slid = offset + h * (vn * s + vt * c - w * ahead)
         turned = angle + h * (omega - w)
-        if contact.bend >= 0.0:  # lies on the bumper before the step is over
+        if contact.curvature >= 0.0:  # lies on the bumper before the step is over
             flush = _flush(contact, slid)
             before = angle - _flush(contact, offset)
             over = casadi.logic_and(casadi.fabs(before) > FLUSH, before * (turned - flush) < 0.0)
@@ -228,24 +229,28 @@ def _line(contact: Contact, offset: Any) -> tuple[Any, Any]:
 
 
 def _flush(contact: Contact, offset: Any) -> Any:
-    if contact.bend <= 0.0:
+    if contact.curvature <= 0.0:
         return 0.0
     low, high = _line(contact, offset)
-    return -contact.bend * (offset + 0.5 * (low + high)) / (1.0 - contact.bend * contact.depth)
+    return (
+        -contact.curvature
+        * (offset + 0.5 * (low + high))
+        / (1.0 - contact.curvature * contact.depth)
+    )
 
 
 def _standoff(contact: Contact, offset: Any, angle: Any) -> tuple[Any, Any]:
     c, s = casadi.cos(angle), casadi.sin(angle)
     low, high = _line(contact, offset)
     middle = 0.5 * (low + high)
-    if contact.bend < 0.0:
-        middle = (-s / (c * contact.bend) - offset + contact.depth * s) / c
+    if contact.curvature < 0.0:
+        middle = (-s / (c * contact.curvature) - offset + contact.depth * s) / c
         middle = casadi.fmin(casadi.fmax(middle, low), high)
     best: Any = None
     at: Any = None
     for y in (low, middle, high):
         lateral = offset - contact.depth * s + y * c
-        x = contact.front + 0.5 * contact.bend * lateral**2 + contact.depth * c + y * s
+        x = contact.front + 0.5 * contact.curvature * lateral**2 + contact.depth * c + y * s
         if best is None:
             best, at = x, y
         else:
@@ -281,24 +286,24 @@ def _corner(contact: Contact, y: Any, tilt: Any, un: Any, ut: Any, w: Any) -> tu
 def _velocity(
     contact: Contact, offset: Any, angle: Any, v: Any, w: Any, dt: Any
 ) -> tuple[Any, Any, Any]:
-    """`kernels.contact_velocity` as expressions."""
+    """`contact_kernels.contact_velocity` as expressions."""
     ahead, touch = _standoff(contact, offset, angle)
     c, s = casadi.cos(angle), casadi.sin(angle)
     ux, uy = v - w * offset, w * ahead
     un, ut = c * ux + s * uy, c * uy - s * ux
-    if contact.bend < 0.0:
+    if contact.curvature < 0.0:
         return _corner(contact, touch, 0.0, un, ut, w)
     low, high = _line(contact, offset)
-    bend, a, square = contact.bend, contact.depth, contact.spread**2
-    slope, grip = -bend / (1.0 - bend * a), 1.0 - bend * a
+    curvature, a, square = contact.curvature, contact.depth, contact.spread**2
+    slope, grip = -curvature / (1.0 - curvature * a), 1.0 - curvature * a
     closing = w - (angle - _flush(contact, offset)) / dt
     normal = un + (closing - w) * touch
     pressed = casadi.fmax(normal, 0.0)
-    shear = ut * grip - bend * square * closing
+    shear = ut * grip - curvature * square * closing
     slips = casadi.fabs(shear) > contact.friction * pressed
     ratio = contact.friction * casadi.if_else(shear > 0.0, 1.0, -1.0)
-    slid = (ratio * pressed + bend * square * (closing - slope * ut)) / (
-        grip - bend * square * slope
+    slid = (ratio * pressed + curvature * square * (closing - slope * ut)) / (
+        grip - curvature * square * slope
     )
     vt = casadi.if_else(slips, slid, ut)
     omega = casadi.if_else(slips, closing + slope * (slid - ut), closing)
@@ -308,7 +313,7 @@ def _velocity(
     y = casadi.if_else(above, high, low)
     end = casadi.if_else(above, contact.high, contact.low)
     lateral = offset - a * s + y * c
-    tilt = casadi.if_else(casadi.fabs(y - end) < 1e-12, -bend * lateral - angle, 0.0)
+    tilt = casadi.if_else(casadi.fabs(y - end) < 1e-12, -curvature * lateral - angle, 0.0)
     point = _corner(contact, y, tilt, un, ut, w)
     off_line = casadi.logic_or(above, below)
     line = (normal, vt, omega)

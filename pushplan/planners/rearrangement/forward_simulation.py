@@ -7,39 +7,41 @@ from dataclasses import dataclass
 import numpy as np
 
 from pushplan.interaction.kernels import sweep_path
-from pushplan.planners.rearrangement.places import length_of, lengths_of
 from pushplan.planners.rearrangement.push import Push
-from pushplan.planners.rearrangement.route import Route, Router
-from pushplan.planners.rearrangement.runner import Runner
+from pushplan.planners.rearrangement.push_simulator import PushSimulator
+from pushplan.planners.rearrangement.route import Route, RoutePlanner
+from pushplan.world.polyline import path_length, path_lengths
 
 
 @dataclass(frozen=True, eq=False)
-class Rehearsal:
-    """A push with the way to it.
+class SimulatedPush:
+    """A push with the route to it.
 
     Args:
-        price: of both [m]; inf where the push would not do what it is for.
-        route: the way to its start.
-        push: what it is predicted to do after that way.
+        cost: of both [m]; inf where the push would not do what it is for.
+        route: to its start.
+        push: what it is predicted to do after that route.
     """
 
-    price: float
+    cost: float
     route: Route
     push: Push
 
 
-def rehearse(router: Router, runner: Runner, route: Route, push: Push) -> Rehearsal:
-    """Drive the way and the push in the interaction model."""
-    scene = router.scene
-    path = router.poses_along(route)
+def simulate_push(
+    planner: RoutePlanner, simulator: PushSimulator, route: Route, push: Push
+) -> SimulatedPush:
+    """Drive the route and the push in the interaction model."""
+    scene = planner.scene
+    path = planner.poses_along(route)
     poses = scene.poses.copy()
     out = np.empty((len(path), len(poses), 3))
     jammed = sweep_path(path, poses, scene.bodies, scene.settings, out)
     if jammed >= 0:
-        return Rehearsal(np.inf, route, push)
-    length = length_of(path[:, :2])
-    ends = runner.again(push, path[-1], poses=poses, spent=lengths_of(out))
-    good = [end for end in ends if push.frees or set(push.covers) <= set(end.covers)]
+        return SimulatedPush(np.inf, route, push)
+    length = path_length(path[:, :2])
+    ends = simulator.resimulate(push, path[-1], poses=poses, spent=path_lengths(out))
+    good = [end for end in ends if push.pre_relocates or set(push.delivers) <= set(end.delivers)]
     if not good:
-        return Rehearsal(np.inf, route, push)
-    return Rehearsal(length + good[0].price, route, good[0])
+        return SimulatedPush(np.inf, route, push)
+    return SimulatedPush(length + good[0].cost, route, good[0])

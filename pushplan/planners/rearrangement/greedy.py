@@ -1,4 +1,4 @@
-"""`GreedyPusher`: the nearest box that is not done, pushed straight towards its goal. The floor."""
+"""`GreedyPusher`: the nearest box that is not done, pushed straight towards its goal. The grid."""
 
 from __future__ import annotations
 
@@ -13,18 +13,18 @@ from pushplan.planners.arguments import check_pusher
 from pushplan.planners.rearrangement.line_up import (
     LineUp,
     bumper_half,
+    goal_heading,
     is_done,
     line_up,
     unit,
-    way_of,
 )
 from pushplan.world import Twist, World
 from pushplan.world.checks import FloatArray, expect, number
 
 _RETREATS = ((-1.0, 0.0), (-0.5, 1.0), (-0.5, -1.0), (1.0, 0.0), (0.5, 1.0), (0.5, -1.0))
-"""Speed and turn rate, as shares of the greatest, that are tried in turn to get away."""
-_WAYS = 8
-"""How many ways to push a box are tried before the first comes again."""
+"""Speed and turn rate, as fractions of the greatest, that are tried in turn to get away."""
+_OPTIONS = 8
+"""How many directions to push a box are tried before the first comes again."""
 _MOVED = 0.03
 """Less than this is no motion [circumscribed radii]."""
 _ASTRAY = 0.8
@@ -37,10 +37,10 @@ class GreedyConfig:
 
     Args:
         period: time for which a command is held [s].
-        slack: room between bumper and box when the robot lines up.
+        slack: clearance between bumper and box when the robot lines up.
         retreat: how far it backs off after a push.
-        detour: how far it pushes in a direction other than that of the shortest way.
-        offset: distance from the line of push at which it lines up anew, as a share of half the
+        detour: how far it pushes in a direction other than that of the shortest path.
+        offset: distance from the line of push at which it lines up anew, as a fraction of half the
             bumper's width.
         patience: time without moving after which it gives up [s].
     """
@@ -58,7 +58,7 @@ class GreedyConfig:
 
 
 @dataclass
-class _Job:
+class _Attempt:
     """One push: of which box, how, and where it began (None before that)."""
 
     box: int
@@ -71,7 +71,7 @@ class _Job:
 class GreedyPusher:
     """Takes the nearest box that is not done, drives behind it and pushes until it is done.
 
-    Behind means opposite to the box's shortest way around static things to its goal; where the
+    Behind means opposite to the box's shortest path around static things to its goal; where the
     robot does not fit there it stands aside or pushes at an angle, along a wall for instance.
     Other boxes are not looked at. A box that cannot be got at or got on with is put off until the
     others have had their turn. No chance is involved.
@@ -87,7 +87,7 @@ class GreedyPusher:
         self._forget(0.0)
 
     def _forget(self, time: float) -> None:
-        self._job: _Job | None = None
+        self._attempt: _Attempt | None = None
         self._failures: dict[int, int] = {}
         self._retreats: list[tuple[float, float]] = []
         self._retreat_pose: FloatArray = np.zeros(3)
@@ -110,41 +110,41 @@ class GreedyPusher:
         if world.time <= self._last_time:
             self._forget(world.time)
         self._last_time = world.time
-        if self._job is not None and self._is_over(world, self._job):
-            self._job = None
+        if self._attempt is not None and self._is_over(world, self._attempt):
+            self._attempt = None
             self._back_off(world)
         command = self._retreat(world) or self._work(world)
         return command or self._retreat(world) or Twist(0.0, 0.0)
 
     def _work(self, world: World) -> Twist | None:
-        """The next command of the job in hand or of a new one; None where it has ended."""
-        if self._job is None and world.time >= self._wait_until:
-            self._job = self._choose(world)
+        """The next command of the attempt in hand or of a new one; None where it has ended."""
+        if self._attempt is None and world.time >= self._wait_until:
+            self._attempt = self._choose(world)
             self._note(world.robot_pose, world.time)
-            self._wait_until = world.time + (self.config.patience if self._job is None else 0.0)
-        job = self._job
-        if job is None:
+            self._wait_until = world.time + (self.config.patience if self._attempt is None else 0.0)
+        attempt = self._attempt
+        if attempt is None:
             return None
-        if job.begun_at is None:
-            command = job.driver.command(world.robot_pose)
+        if attempt.begun_at is None:
+            command = attempt.driver.command(world.robot_pose)
             if command is not None:
                 return command
-            if job.driver.arrived:
-                job.begun_at = world.robot_pose
-        sound = job.begun_at is not None and not self._is_stuck(world, self.config.patience)
-        command = self._push(world, job) if sound else None
+            if attempt.driver.arrived:
+                attempt.begun_at = world.robot_pose
+        sound = attempt.begun_at is not None and not self._is_stuck(world, self.config.patience)
+        command = self._push(world, attempt) if sound else None
         if command is None:
             if not sound:  # it is the box's fault, which comes last from now on
-                self._failures[job.box] = self._failures.get(job.box, 0) + 1
-            self._job = None
+                self._failures[attempt.box] = self._failures.get(attempt.box, 0) + 1
+            self._attempt = None
             self._back_off(world)
         return command
 
-    def _is_over(self, world: World, job: _Job) -> bool:
-        k = np.flatnonzero(world.movables.ids == job.box)
+    def _is_over(self, world: World, attempt: _Attempt) -> bool:
+        k = np.flatnonzero(world.movables.ids == attempt.box)
         return len(k) == 0 or is_done(world, int(k[0]))
 
-    def _choose(self, world: World) -> _Job | None:
+    def _choose(self, world: World) -> _Attempt | None:
         """The nearest box that the robot can get behind, of those that failed least often."""
         boxes = world.movables
         left = [k for k in range(len(boxes)) if not is_done(world, k)]
@@ -152,25 +152,25 @@ class GreedyPusher:
         ids = boxes.ids.tolist()
         slack = self.config.slack * world.robot.circumscribed_radius
         for k in sorted(left, key=lambda k: (self._failures.get(ids[k], 0), away[k], k)):
-            push = line_up(world, k, slack, skip=self._failures.get(ids[k], 0) % _WAYS)
+            push = line_up(world, k, slack, skip=self._failures.get(ids[k], 0) % _OPTIONS)
             if push is not None:
                 driver = DriveTo(world.robot, push.points, self.config.period)
-                return _Job(ids[k], push, driver, push.heading)
+                return _Attempt(ids[k], push, driver, push.heading)
             self._failures[ids[k]] = self._failures.get(ids[k], 0) + 1
         return None
 
-    def _push(self, world: World, job: _Job) -> Twist | None:
+    def _push(self, world: World, attempt: _Attempt) -> Twist | None:
         """Follow the line through the box towards its goal; None where the box has been lost."""
-        k = int(np.flatnonzero(world.movables.ids == job.box)[0])
-        robot, size, shift = world.robot, world.robot.circumscribed_radius, job.push.shift
-        if job.push.turn == 0.0:
-            way = way_of(world, k)
-            job.heading = job.heading if way is None else way
-        elif _distance(world.robot_pose, job.begun_at) > self.config.detour * size:
+        k = int(np.flatnonzero(world.movables.ids == attempt.box)[0])
+        robot, size, shift = world.robot, world.robot.circumscribed_radius, attempt.push.shift
+        if attempt.push.turn == 0.0:
+            heading = goal_heading(world, k)
+            attempt.heading = attempt.heading if heading is None else heading
+        elif _distance(world.robot_pose, attempt.begun_at) > self.config.detour * size:
             return None
-        u, half = unit(job.heading), bumper_half(robot)
+        u, half = unit(attempt.heading), bumper_half(robot)
         gap = world.movables.poses[k, :2] - world.robot_pose[:2]
-        error = math.remainder(job.heading - float(world.robot_pose[2]), 2.0 * math.pi)
+        error = math.remainder(attempt.heading - float(world.robot_pose[2]), 2.0 * math.pi)
         left = float(gap[0] * u[1] - gap[1] * u[0])  # robot left of the box [m]
         reach = float(robot.vertices[:, 0].max()) + world.movables.radii[k] + 0.3 * size
         lost = abs(left) > max(self.config.offset, abs(shift) + 0.25) * half
@@ -185,15 +185,15 @@ class GreedyPusher:
         self._note(world.robot_pose, world.time)
 
     def _retreat(self, world: World) -> Twist | None:
-        """Get away from where the last job ended: straight back, or however it goes."""
+        """Get away from where the last attempt ended: straight back, or however it goes."""
         robot = world.robot
         far = self.config.retreat * robot.circumscribed_radius
         turned = abs(float(world.robot_pose[2] - self._retreat_pose[2]))
         if _distance(world.robot_pose, self._retreat_pose) >= far or turned > 1.0:
             self._retreats = []
         if self._retreats and self._is_stuck(world, 2.5 * self.config.period):
-            freed = _moved(world, self._attempt_pose) > _MOVED and len(self._retreats) > 1
-            self._retreats = ([_RETREATS[0]] if freed else []) + self._retreats[1:]
+            got_away = _moved(world, self._attempt_pose) > _MOVED and len(self._retreats) > 1
+            self._retreats = ([_RETREATS[0]] if got_away else []) + self._retreats[1:]
             self._attempt_pose = world.robot_pose
             self._note(world.robot_pose, world.time)
         if not self._retreats:

@@ -8,12 +8,13 @@ import numpy as np
 
 from pushplan.gtsp import warm_up_solver
 from pushplan.planners.pushing import warm_up as warm_up_pushing
-from pushplan.planners.rearrangement.extraction import maneuvers
+from pushplan.planners.rearrangement.arc_kernels import arc_step
+from pushplan.planners.rearrangement.extraction import extraction_primitives
 from pushplan.planners.rearrangement.gtsp_mpc import GtspMpc
-from pushplan.planners.rearrangement.pre_relocation import freeing_pushes
-from pushplan.planners.rearrangement.recovery import stepped, way_out
-from pushplan.planners.rearrangement.runner import Runner
-from pushplan.planners.rearrangement.scene import Scene
+from pushplan.planners.rearrangement.pre_relocation import pre_relocation_pushes
+from pushplan.planners.rearrangement.push_scene import PushScene
+from pushplan.planners.rearrangement.push_simulator import PushSimulator
+from pushplan.planners.rearrangement.recovery import recovery_path
 from pushplan.world import (
     ClearanceArea,
     Movables,
@@ -31,11 +32,11 @@ _WEDGED = (-2.2, -0.985, 0.0)
 
 
 @functools.cache
-def warm_up_subtasks() -> None:
+def warm_up_rearrangement() -> None:
     """Plan and drive for boxes in each kind of task, so that every step of an episode is quick.
 
-    The robot starts between two columns that leave it no room to turn about, and its boxes do not
-    move: it has to get out, get to a box, push and plan again. A second call does nothing.
+    The robot starts between two columns that leave it no clearance to turn about, and its boxes do
+    not move: it has to get out, get to a box, push and plan again. A second call does nothing.
     """
     warm_up_solver()
     warm_up_pushing()
@@ -53,16 +54,16 @@ def warm_up_subtasks() -> None:
             goal=goal,
         )
         policy = GtspMpc()
-        scene = Scene(world, policy.config)
-        maneuvers(Runner(scene), 0)
-        freeing_pushes(Runner(scene), 0)
-        way_out(scene)
+        scene = PushScene(world, policy.config)
+        extraction_primitives(PushSimulator(scene), 0)
+        pre_relocation_pushes(PushSimulator(scene), 0)
+        recovery_path(scene)
         for _ in range(_STEPS):
             world = _driven(world, policy.act(world))
 
 
 def _driven(world: World, twist: Twist) -> World:
     """A step later, when nothing is in the robot's way."""
-    here = np.array(world.robot_pose)
-    pose = stepped(here, _PERIOD * twist.linear, _PERIOD * twist.angular)
+    pose = np.empty(3)
+    arc_step(np.array(world.robot_pose), _PERIOD * twist.linear, _PERIOD * twist.angular, pose)
     return world.moved(robot_pose=pose, time=world.time + _PERIOD)

@@ -1,4 +1,4 @@
-"""Getting behind an object: which way it has to go, and where a robot stands to push it there."""
+"""Getting behind an object: the heading to its goal, and where a robot stands to push it there."""
 
 from __future__ import annotations
 
@@ -29,8 +29,8 @@ _OPTIONS = sorted(
     ),
     key=lambda option: 2.0 * abs(option[0]) + abs(option[1]),
 )
-"""Ways to push, in order of preference: turn against the shortest way [rad], and how far the
-robot's middle is to the left of the object's, as a share of half the bumper's width."""
+"""Options to push, in order of preference: turn against the shortest path [rad], and how far the
+robot's middle is to the left of the object's, as a fraction of half the bumper's width."""
 _LEANS = tuple(math.radians(lean) for lean in (0, 20, -20, 40, -40))
 """Directions of the last leg against the heading of the push [rad]."""
 
@@ -41,7 +41,7 @@ class LineUp:
 
     Args:
         heading: of the push [rad].
-        turn: against the object's shortest way [rad].
+        turn: against the object's shortest path [rad].
         shift: of the robot's middle to the left of the object's, in half widths of the bumper.
         points: (N, 2) that lead there; driving to the last one turns the robot to the heading [m].
     """
@@ -56,7 +56,7 @@ def is_done(world: World, k: int) -> bool:
     """Whether nothing is left to do about object ``k``.
 
     An area is clear of it when its outline no longer touches the area. A receptacle takes objects
-    off the floor, so one that is still there is not done.
+    off the map, so one that is still there is not done.
 
     Raises:
         InvalidInputError: if the goal is one for the robot.
@@ -70,10 +70,10 @@ def is_done(world: World, k: int) -> bool:
     raise InvalidInputError(f"this needs a goal for the objects, got {type(goal).__name__}")
 
 
-def way_of(world: World, k: int) -> float | None:
-    """Heading [rad] of the shortest way of object ``k`` to its goal; None where it is there.
+def goal_heading(world: World, k: int) -> float | None:
+    """Heading [rad] of the shortest path of object ``k`` to its goal; None where it is there.
 
-    The way keeps about half the object's width from static things where it can.
+    The path keeps about half the object's width from static things where it can.
     """
     radius = float(world.movables.radii[k])
     here = world.movables.poses[k, :2]
@@ -91,13 +91,13 @@ def way_of(world: World, k: int) -> float | None:
 
 
 def line_up(world: World, k: int, slack: float, skip: int = 0) -> LineUp | None:
-    """A place behind object ``k``, for the best way to push it that allows one.
+    """A place behind object ``k``, for the best option to push it that allows one.
 
     Args:
         world: the snapshot.
         k: index of the object.
-        slack: room to leave between bumper and object [m].
-        skip: how many of the best ways to pass over, because they have failed before; it begins
+        slack: clearance to leave between bumper and object [m].
+        skip: how many of the best options to pass over, because they have failed before; it begins
             anew where there are no more.
 
     Returns:
@@ -105,7 +105,7 @@ def line_up(world: World, k: int, slack: float, skip: int = 0) -> LineUp | None:
         object itself; other objects are not looked at.
     """
     robot, box = world.robot, world.movables.poses[k, :2]
-    towards = way_of(world, k)
+    towards = goal_heading(world, k)
     if towards is None:  # all but there: farther in
         dx, dy = (_middle(world.goal) - box).tolist()
         towards = math.atan2(dy, dx)

@@ -1,4 +1,4 @@
-"""`Ways`: the shortest ways of objects to their goal on one map, worked out once."""
+"""`ObjectPaths`: the shortest paths of objects to their goal on one map, worked out once."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ _MOST = 20_000
 """How many lengths and paths are kept."""
 
 
-class Ways:
-    """Ways on one map to one goal for objects.
+class ObjectPaths:
+    """Paths on one map to one goal for objects.
 
     Args:
         static: walls and columns.
@@ -33,7 +33,7 @@ class Ways:
         self._distances: dict[tuple[float, float, bool], GoalDistances | None] = {}
 
     def length(self, x: float, y: float) -> float:
-        """Shortest way of a point to the goal [m]; inf if there is none."""
+        """Shortest path of a point to the goal [m]; inf if there is none."""
         length = self._lengths.get((x, y))
         if length is None:
             if len(self._lengths) >= _MOST:
@@ -44,7 +44,7 @@ class Ways:
     def path(
         self, point: FloatArray, radius: float, clearance: float, deep: bool = False
     ) -> FloatArray | None:
-        """(M, 2) way of an object to where it is done, and on; None if there is none.
+        """(M, 2) path of an object to where it is done, and on; None if there is none.
 
         Args:
             point: (2,) where its middle is [m].
@@ -100,6 +100,6 @@ class Ways:
 
 
 @functools.lru_cache(maxsize=8)
-def ways_of(static: StaticMap, goal: Goal) -> Ways:
-    """The ways on a map; kept for the maps used last."""
-    return Ways(static, goal)
+def object_paths(static: StaticMap, goal: Goal) -> ObjectPaths:
+    """The paths on a map; kept for the maps used last."""
+    return ObjectPaths(static, goal)

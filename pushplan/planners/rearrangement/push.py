@@ -1,4 +1,4 @@
-"""`Push`: one candidate sub-task, with what it is predicted to do."""
+"""`Push`: one candidate push, with what it is predicted to do."""
 
 from __future__ import annotations
 
@@ -15,40 +15,40 @@ class Push(ArrayRecord):
     """A push, from a place behind an object to where nothing is left to be done with it.
 
     Args:
-        covers: ids of the objects that are done by it.
-        led: id of the object that is led, or that a line push begins behind.
-        guided: whether the object is led along ``box_path``; else the robot drives straight ahead.
+        delivers: ids of the objects that are done by it.
+        target: id of the object that follows a path, or that a line push begins behind.
+        follows_path: whether it follows ``object_path``; else the robot drives straight ahead.
         poses: (N, 3) the robot's path, from the start of the push on.
         length: of that path [m].
         work: sum of mass times path length over all objects [kg m].
-        price: what it costs in metres of the robot's path, work and remaining ways included [m].
+        cost: what it costs in metres of the robot's path, work and remaining paths included [m].
         object_poses: (K, 3) where the objects are predicted to end.
-        box_path: (M, 2) of the led object [m].
-        shift: how far the robot's middle is to the left of the led object [m].
-        gain: of the pushing law, see `Law`.
-        frees: whether it only brings the object to where it can be pushed from.
-        traced: whether the robot follows ``poses`` themselves, ahead, back and on the spot, as in
-            a maneuver.
+        object_path: (M, 2) of the target object [m].
+        shift: how far the robot's middle is to the left of the target object [m].
+        gain: of the pushing controller, see `PushingController`.
+        pre_relocates: whether it only brings the object to where it can be pushed from.
+        is_primitive: whether it is an extraction primitive: the robot follows ``poses`` themselves,
+            ahead, back and on the spot.
     """
 
-    covers: tuple[int, ...]
-    led: int
-    guided: bool
+    delivers: tuple[int, ...]
+    target: int
+    follows_path: bool
     poses: FloatArray
     length: float
     work: float
-    price: float
+    cost: float
     object_poses: FloatArray
-    box_path: FloatArray = field(default_factory=lambda: np.zeros((0, 2)))
+    object_path: FloatArray = field(default_factory=lambda: np.zeros((0, 2)))
     shift: float = 0.0
     gain: float = 1.5
-    frees: bool = False
-    traced: bool = False
+    pre_relocates: bool = False
+    is_primitive: bool = False
 
     @property
     def serves(self) -> tuple[int, ...]:
-        """Ids of the objects that it does something for: those done, or the one that is freed."""
-        return self.covers or (self.led,)
+        """Ids of the objects that it does something for: those done, or its target."""
+        return self.delivers or (self.target,)
 
     @property
     def start(self) -> FloatArray:
@@ -66,6 +66,6 @@ class Push(ArrayRecord):
 def signature(push: Push) -> tuple[object, ...]:
     """What a push is known by when it has failed."""
     heading = math.remainder(float(push.start[2]), 2.0 * math.pi)
-    if push.traced:
-        return push.led, push.traced, round(heading / 0.6)
-    return push.led, push.guided, round(heading / 0.3), round(push.shift, 2), push.gain
+    if push.is_primitive:
+        return push.target, push.is_primitive, round(heading / 0.6)
+    return push.target, push.follows_path, round(heading / 0.3), round(push.shift, 2), push.gain

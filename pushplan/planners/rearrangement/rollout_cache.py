@@ -1,4 +1,4 @@
-"""`Recall`: what pushes came to, kept from plan to plan while nothing around them has moved."""
+"""`RolloutCache`: rollouts kept from plan to plan while nothing around them has moved."""
 
 from __future__ import annotations
 
@@ -6,21 +6,19 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pushplan.compiled import kernel
-from pushplan.planners.rearrangement.rollout import GONE, enclose
+from pushplan.planners.rearrangement.goal_kernels import REMOVED
 from pushplan.world import Movables
 from pushplan.world.checks import BoolArray, FloatArray, IntArray
 
 _OLD = 8
 """For how many plans what is not asked for is kept."""
 
-
-Drive = tuple[FloatArray, float]
-"""Poses (N, 3) of the robot in a maneuver, and what it leaves to be done [m]."""
+Primitive = tuple[FloatArray, float]
+"""Poses (N, 3) of the robot in an extraction primitive, and the cost of what it leaves [m]."""
 
 
 @dataclass(frozen=True, eq=False)
-class Run:
+class Rollout:
     """What a push came to.
 
     Args:
@@ -38,7 +36,7 @@ class Run:
 
 @dataclass(eq=False)
 class _Entry:
-    run: Run
+    rollout: Rollout
     box: FloatArray
     near: IntArray
     """Ids of the objects that took part, or might have."""
@@ -49,28 +47,28 @@ class _Entry:
     age: int = 0
 
 
-class Recall:
-    """Runs of the plan before, by what was run.
+class RolloutCache:
+    """Rollouts of the plans before, by what was rolled out.
 
-    A run counts again if the same objects lie in the same places wherever it came near one.
+    A rollout counts again if the same objects lie in the same places wherever it came near one.
 
     Attributes:
-        searches: how often maneuvers have been looked for since something was done.
+        searches: how often extraction primitives have been searched since something was done.
     """
 
     def __init__(self) -> None:
         self._entries: dict[object, _Entry] = {}
-        self._drives: dict[int, tuple[bytes, list[Drive]]] = {}
+        self._primitives: dict[int, tuple[bytes, list[Primitive]]] = {}
         self.searches = 0
 
-    def drives(self, led: int, around: bytes) -> list[Drive] | None:
-        """Maneuvers found for an object, if that was with the same around it."""
-        known = self._drives.get(led)
+    def primitives(self, target: int, around: bytes) -> list[Primitive] | None:
+        """Extraction primitives found for an object, if that was with the same around it."""
+        known = self._primitives.get(target)
         return known[1] if known is not None and known[0] == around else None
 
-    def keep_drives(self, led: int, around: bytes, found: list[Drive]) -> None:
-        """Keep the maneuvers found for an object."""
-        self._drives[led] = around, found
+    def keep_primitives(self, target: int, around: bytes, found: list[Primitive]) -> None:
+        """Keep the extraction primitives found for an object."""
+        self._primitives[target] = around, found
         self.searches += 1
 
     def __len__(self) -> int:
@@ -82,14 +80,8 @@ class Recall:
             entry.age += 1
         self._entries = {key: entry for key, entry in self._entries.items() if entry.age < _OLD}
 
-    def find(self, key: object, movables: Movables, poses: FloatArray) -> Run | None:
-        """The run with a key, if it would come to the same now.
-
-        Args:
-            key: what was run.
-            movables: the objects.
-            poses: (K, 3) where they are.
-        """
+    def find(self, key: object, movables: Movables, poses: FloatArray) -> Rollout | None:
+        """The rollout with a key of objects at poses (K, 3), if it would come to the same now."""
         entry = self._entries.get(key)
         if entry is None:
             return None
@@ -99,43 +91,43 @@ class Recall:
         if (poses[near] != entry.before).any():
             return None
         entry.age = 0
-        old, moved = entry.run, near[entry.moved]
+        old, moved = entry.rollout, near[entry.moved]
         after = np.repeat(poses[None], len(old.steps), axis=0)
         lengths = np.zeros(after.shape[:2])
         after[:, moved], lengths[:, moved] = old.poses, old.lengths
-        gone = after[:, :, 0] >= 0.5 * GONE
-        after[:, :, 0] = np.where(gone, GONE * (1.0 + np.arange(len(poses))), after[:, :, 0])
-        return Run(old.track, old.steps, after, lengths)
+        gone = after[:, :, 0] >= 0.5 * REMOVED
+        after[:, :, 0] = np.where(gone, REMOVED * (1.0 + np.arange(len(poses))), after[:, :, 0])
+        return Rollout(old.track, old.steps, after, lengths)
 
     def keep(
-        self, key: object, movables: Movables, poses: FloatArray, run: Run, box: FloatArray
+        self, key: object, movables: Movables, poses: FloatArray, rollout: Rollout, box: FloatArray
     ) -> None:
-        """Keep a run.
+        """Keep a rollout.
 
         Args:
-            key: what was run.
+            key: what was rolled out.
             movables: the objects.
             poses: (K, 3) where they were.
-            run: what it came to.
+            rollout: what it came to.
             box: (4,) of what moved, and its surroundings [m].
         """
+        box = box.copy()
         near = np.flatnonzero(_grown(box, poses, movables.radii))
-        moved = np.flatnonzero((run.poses[:, near] != poses[near]).any(axis=(0, 2)))
-        kept = Run(run.track, run.steps, run.poses[:, near[moved]], run.lengths[:, near[moved]])
-        self._entries[key] = _Entry(kept, box.copy(), movables.ids[near], poses[near], moved)
+        moved = np.flatnonzero((rollout.poses[:, near] != poses[near]).any(axis=(0, 2)))
+        which = near[moved]
+        kept = Rollout(
+            rollout.track, rollout.steps, rollout.poses[:, which], rollout.lengths[:, which]
+        )
+        self._entries[key] = _Entry(kept, box, movables.ids[near], poses[near], moved)
 
 
-@kernel(allocates=True)
 def _within(box: FloatArray, poses: FloatArray, radii: FloatArray) -> BoolArray:
     """(K,) which objects reach into a box."""
-    within = np.empty(len(poses), dtype=np.bool_)
-    for k in range(len(poses)):
-        x, y, r = poses[k, 0], poses[k, 1], radii[k]
-        within[k] = x + r > box[0] and x - r < box[2] and y + r > box[1] and y - r < box[3]
-    return within
+    places, reach = poses[:, :2], radii[:, None]
+    inside = (places + reach > box[:2]) & (places - reach < box[2:])  # (K, 2)
+    return inside[:, 0] & inside[:, 1]
 
 
-@kernel(allocates=True)
 def _grown(box: FloatArray, poses: FloatArray, radii: FloatArray) -> BoolArray:
     """Make a box big enough for what reaches into it: a jam may go on from object to object."""
     within = np.zeros(len(poses), dtype=np.bool_)
@@ -144,6 +136,6 @@ def _grown(box: FloatArray, poses: FloatArray, radii: FloatArray) -> BoolArray:
         if (now == within).all():
             return within
         within = now
-        for k in range(len(poses)):
-            if within[k]:
-                enclose(box, poses[k], 1.1 * radii[k])
+        places, reach = poses[within, :2], 1.1 * radii[within, None]
+        box[:2] = np.minimum(box[:2], (places - reach).min(axis=0))
+        box[2:] = np.maximum(box[2:], (places + reach).max(axis=0))

@@ -7,13 +7,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pushplan.geometry import transform_outlines
 from pushplan.motion.state_lattice.cost_map import add_floes, block, prefix_sums
 from pushplan.motion.state_lattice.frame import Frame
 from pushplan.motion.state_lattice.heuristic import LEAN, Window, place_costs, row_bounds
 from pushplan.motion.state_lattice.pose_lattice import PoseLattice, flat_runs
 from pushplan.motion.state_lattice.primitives import PrimitiveConfig, PrimitiveSet, primitives, ways
 from pushplan.motion.state_lattice.swaths import swaths
-from pushplan.planners.ship_lattice.floe_costs import floe_prices, world_outlines
+from pushplan.planners.ship_lattice.floe_costs import floe_prices
 from pushplan.planners.ship_lattice.ship_lattice_config import ShipLatticeConfig
 from pushplan.world import GoalDisc, World
 from pushplan.world.checks import FloatArray
@@ -232,7 +233,8 @@ class LatticeBuilder:
         grid, floes = np.zeros(shape), self.world.movables
         if not len(floes):
             return np.zeros((shape[1], shape[0] + 1))
-        corners = world_outlines(floes.vertices, floes.offsets, floes.poses)
+        corners = np.empty_like(floes.vertices)
+        transform_outlines(floes.poses, floes.vertices, floes.offsets, corners)
         outlines = np.ascontiguousarray(self._to_cells(corners, reach))
         centres = np.ascontiguousarray(self._to_cells(floes.poses[:, :2], reach))
         prices = floe_prices(self.world, self.config, self.cell)

@@ -20,6 +20,7 @@ from pushplan.planners.ship_lattice.sweeper import Near, make_sweeper
 from pushplan.search.astar import FOUND, PAUSED
 from pushplan.world import GoalLine, Plan, PlanStatus, StopCheck, World
 from pushplan.world.checks import FloatArray
+from pushplan.world.polyline import arc_lengths
 
 
 class ShipCall:
@@ -228,6 +229,5 @@ class ShipCall:
 
 def bare_path(poses: FloatArray, curvatures: FloatArray) -> Path:
     """A path about which nothing is predicted."""
-    moves = np.diff(poses[:, :2], axis=0)
-    lengths = np.concatenate([[0.0], np.cumsum(np.hypot(moves[:, 0], moves[:, 1]))])
-    return Path(poses, curvatures, None, lengths, np.zeros(len(poses)))  # type: ignore[arg-type]
+    works = np.zeros(len(poses))
+    return Path(poses, curvatures, None, arc_lengths(poses), works)  # type: ignore[arg-type]

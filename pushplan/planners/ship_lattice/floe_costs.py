@@ -6,10 +6,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pushplan.compiled import kernel
 from pushplan.planners.ship_lattice.ship_lattice_config import ShipLatticeConfig
 from pushplan.world import World
-from pushplan.world.checks import FloatArray, IntArray
+from pushplan.world.checks import FloatArray
 from pushplan.world.outline import areas_and_centroids
 
 
@@ -22,18 +21,6 @@ class FloePrices(NamedTuple):
     """(K,) [m²]"""
     soft: float
     """Softening of the profile, see `cost_map.add_floes`."""
-
-
-@kernel(allocates=True)
-def world_outlines(vertices: FloatArray, offsets: IntArray, poses: FloatArray) -> FloatArray:
-    """(V, 2) corners in the world frame [m] of flattened body outlines at (K, 3) poses."""
-    out = np.empty_like(vertices)
-    for k in range(poses.shape[0]):
-        c, s = np.cos(poses[k, 2]), np.sin(poses[k, 2])
-        for i in range(offsets[k], offsets[k + 1]):
-            out[i, 0] = poses[k, 0] + c * vertices[i, 0] - s * vertices[i, 1]
-            out[i, 1] = poses[k, 1] + s * vertices[i, 0] + c * vertices[i, 1]
-    return out
 
 
 def floe_prices(world: World, config: ShipLatticeConfig, cell: float) -> FloePrices:

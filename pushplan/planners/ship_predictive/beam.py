@@ -14,6 +14,7 @@ from pushplan.planners.ship_predictive.ice_scene import Scene
 from pushplan.planners.ship_predictive.predictive_config import PredictiveConfig
 from pushplan.world import StopCheck
 from pushplan.world.checks import FloatArray
+from pushplan.world.polyline import step_lengths
 
 SPACING = 0.05
 """Between the poses of a path, in hull lengths."""
@@ -261,7 +262,7 @@ class Beam(Generic[Ice]):
         """A path with one more piece (N, 4) at its end, predicted."""
         ice, work = self.carrier.advance([node.ice], [way[:, :3]])[0]
         self.iterations += 1
-        pieces = np.hypot(*np.diff(way[:, :2], axis=0).T)
+        pieces = step_lengths(way)
         return Partial(
             pose=way[-1, :3],
             way=way,

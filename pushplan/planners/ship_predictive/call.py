@@ -17,6 +17,7 @@ from pushplan.planners.ship_predictive.predictive_config import PredictiveConfig
 from pushplan.planners.ship_predictive.turning import knows, tight_turn, turned_start
 from pushplan.world import Plan, PlanResult, PlanStats, PlanStatus, Stop, World
 from pushplan.world.checks import FloatArray
+from pushplan.world.polyline import step_lengths
 
 _TIGHTEST = 0.999
 """Share of the turn rate that is used where there is no way with less."""
@@ -136,13 +137,12 @@ class _Call:
         headings = np.unwrap(poses[:, 2])
         poses[:, 2] = headings + (world.robot_pose[2] - headings[0])  # whole turns
         poses[0] = world.robot_pose
-        chords = np.hypot(*np.diff(way[:, :2], axis=0).T)
+        chords = step_lengths(way)
         half = np.clip(0.5 * np.abs(way[1:, 3]) * chords, 1e-9, 1.0)
         arcs = chords * np.arcsin(half) / half
         work, objects = self._best.work, None
         if self._objects is not None:
-            steps = np.diff(self._objects[..., :2], axis=0)
-            work = float((np.hypot(steps[..., 0], steps[..., 1]) @ scene.crowd.masses).sum())
+            work = float((step_lengths(self._objects) @ scene.crowd.masses).sum())
             objects = np.repeat(world.movables.poses[None], len(way), axis=0)
             objects[:, scene.near] = scene.to_world(self._objects)
         return Plan(

@@ -146,8 +146,8 @@ def _fit(
     network.train()
     size = min(config.chunk, config.steps - chunk * config.chunk)
     for shown in range(0, size, options.batch):
-        share = (chunk * config.chunk + shown) / config.steps
-        rate = options.rate * max(_LEAST_RATE, 0.5 * (1.0 + np.cos(np.pi * share)))
+        fraction = (chunk * config.chunk + shown) / config.steps
+        rate = options.rate * max(_LEAST_RATE, 0.5 * (1.0 + np.cos(np.pi * fraction)))
         for group in optimizer.param_groups:
             group["lr"] = float(rate)
         chosen = rng.integers(len(pairs[0]), size=options.batch)

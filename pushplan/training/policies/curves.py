@@ -25,16 +25,16 @@ def draw_curve(
 
     figure: Any = Figure(figsize=(8.0, 3.2), layout="constrained")
     FigureCanvasAgg(figure)
-    returns, shares = figure.subplots(1, 2)
+    returns, fractions = figure.subplots(1, 2)
     steps = [point.steps for point in points]
     returns.plot(steps, [p.train_return for p in points], ".-", label="training", lw=1)
     returns.plot(steps, [p.valid_return for p in points], "o-", label="validation", lw=1, ms=3)
     returns.set_ylabel("reward of an episode")
-    shares.plot(steps, [p.train_success for p in points], ".-", label="success, training", lw=1)
-    shares.plot(steps, [p.valid_success for p in points], "o-", label="success", lw=1, ms=3)
-    shares.plot(steps, [p.valid_share for p in points], "--", label="share of sub-tasks", lw=1)
-    shares.set_ylim(-0.02, 1.02)
-    for axes in (returns, shares):
+    fractions.plot(steps, [p.train_success for p in points], ".-", label="success, training", lw=1)
+    fractions.plot(steps, [p.valid_success for p in points], "o-", label="success", lw=1, ms=3)
+    fractions.plot(steps, [p.valid_share for p in points], "--", label="sub-tasks done", lw=1)
+    fractions.set_ylim(-0.02, 1.02)
+    for axes in (returns, fractions):
         axes.set_xlabel("pairs" if pairs else "decisions")
         axes.locator_params(axis="x", nbins=6)
         axes.grid(alpha=0.3)

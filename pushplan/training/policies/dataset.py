@@ -25,7 +25,13 @@ from pushplan.learned.specification import RobotSpec
 from pushplan.observation import ObservationBuilder
 from pushplan.training.policies.environment import TRAINING_SEEDS
 from pushplan.training.policies.libraries import need
-from pushplan.world import InvalidInputError, SchemaError, stream
+from pushplan.world import (
+    ChoosesActions,
+    ChoosesObservation,
+    InvalidInputError,
+    SchemaError,
+    stream,
+)
 from pushplan.world.checks import integer, known_keys, number
 
 SCHEMA = "pushplan-dataset/1"
@@ -103,7 +109,7 @@ def record(request: DatasetRequest, policy: Any, label: str, folder: str | Path)
     if folder.exists() and any(folder.iterdir()):
         raise InvalidInputError(f"{folder} is not empty")
     builder = builder_from_dict(request.observation)
-    wanted = getattr(policy, "observation", "state")
+    wanted = policy.observation if isinstance(policy, ChoosesObservation) else "state"
     envs = [_environment(request, dict(v), policy, wanted) for v in request.scenarios]
     (folder / "data").mkdir(parents=True, exist_ok=True)
     steps = successes = 0
@@ -146,7 +152,7 @@ def _environment(
         preset=request.preset,
         variations=variations,
         observation=observation,
-        action=getattr(policy, "actions", None),
+        action=policy.actions if isinstance(policy, ChoosesActions) else None,
     )
 
 

@@ -9,11 +9,15 @@ from pushplan.world.checks import integer, number
 
 
 def _check(
-    options: object, *, positive: tuple[str, ...], shares: tuple[str, ...], whole: tuple[str, ...]
+    options: object,
+    *,
+    positive: tuple[str, ...],
+    fractions: tuple[str, ...],
+    whole: tuple[str, ...],
 ) -> None:
     for name in positive:
         number(name, getattr(options, name), low=0.0, open_low=True)
-    for name in shares:
+    for name in fractions:
         number(name, getattr(options, name), low=0.0, high=1.0)
     for name in whole:
         integer(name, getattr(options, name), low=1)
@@ -56,7 +60,7 @@ class PpoOptions:
         _check(
             self,
             positive=("rate", "clip"),
-            shares=("discount", "trace"),
+            fractions=("discount", "trace"),
             whole=("rollout", "batch", "epochs"),
         )
         number("entropy", self.entropy, low=0.0)
@@ -75,7 +79,7 @@ class SacOptions:
         every: decisions of each environment between two rounds of updates.
         updates: gradient steps in such a round.
         discount: of a decision.
-        follow: share by which the target critics follow in each gradient step.
+        follow: fraction by which the target critics follow in each gradient step.
         widths: of the hidden layers.
     """
 
@@ -93,7 +97,7 @@ class SacOptions:
         _check(
             self,
             positive=("rate", "follow"),
-            shares=("discount", "follow"),
+            fractions=("discount", "follow"),
             whole=("buffer", "first", "batch", "every", "updates"),
         )
 
@@ -111,11 +115,11 @@ class SamOptions:
         discount: of a decision.
         lookahead: decisions whose rewards are added up before the value of what is seen then.
         target_every: gradient steps between two copies of the network to the target.
-        follow: share by which the target follows the network in each gradient step instead of
+        follow: fraction by which the target follows the network in each gradient step instead of
             being copied; it is then their running average, is validated and becomes the policy.
-        explore: share of the decisions over which exploration falls from 1 to ``explore_end``.
+        explore: fraction of the decisions over which exploration falls from 1 to ``explore_end``.
         explore_end: probability of a random pixel then.
-        at_objects: share of the random pixels that are drawn around movable objects.
+        at_objects: fraction of the random pixels that are drawn around movable objects.
         clip: greatest norm of the gradient.
         mirror: learn from mirrored maps as often as from others; both tasks are symmetric.
         widths: channels at half and at a quarter of the map's resolution.
@@ -149,7 +153,7 @@ class SamOptions:
         _check(
             self,
             positive=("rate", "clip"),
-            shares=("discount", "follow", "explore", "explore_end", "at_objects"),
+            fractions=("discount", "follow", "explore", "explore_end", "at_objects"),
             whole=(
                 *("buffer", "first", "batch", "every"),
                 *("lookahead", "target_every", "blocks", "shrink"),
@@ -170,7 +174,7 @@ class BcOptions:
     Args:
         rate: greatest learning rate of Adam, on a one-cycle schedule.
         batch: decisions in a gradient step.
-        held_out: share of the episodes that only measure the error.
+        held_out: fraction of the episodes that only measure the error.
         widths: of the hidden layers.
         decay: of the weights.
     """
@@ -182,7 +186,7 @@ class BcOptions:
     decay: float = 1e-5
 
     def __post_init__(self) -> None:
-        _check(self, positive=("rate",), shares=("held_out",), whole=("batch",))
+        _check(self, positive=("rate",), fractions=("held_out",), whole=("batch",))
         number("decay", self.decay, low=0.0)
 
 

@@ -34,10 +34,10 @@ class CurvePoint:
         seconds: wall-clock time of training so far, without validation [s].
         episodes: training episodes that ended in this chunk.
         train_return: mean unscaled reward of them; NaN where none ended.
-        train_success: share of them that reached the goal.
+        train_success: fraction of them that reached the goal.
         valid_return: mean unscaled reward of the validation episodes.
-        valid_success: share of them that reached the goal.
-        valid_share: mean share of their sub-tasks that were done.
+        valid_success: fraction of them that reached the goal.
+        valid_share: mean fraction of their sub-tasks that were done.
         loss: of the learner, in its own units.
     """
 
@@ -190,14 +190,14 @@ class Stopwatch:
 def validate(
     env: TrainingEnv, decide: Callable[[Any], Any], episodes: int
 ) -> tuple[float, float, float]:
-    """Mean unscaled return, share of successes, and mean share of sub-tasks, over fixed starts.
+    """Mean unscaled return, success rate and fraction of sub-tasks done, over fixed starts.
 
     Args:
         env: of the training; its episode is lost.
         decide: from observation to action.
         episodes: how many; NaN where there is none.
     """
-    returns, successes, shares = [], [], []
+    returns, successes, fractions = [], [], []
     for number in range(episodes):
         seen, _ = env.reset(options={"layout": number})
         total, over = 0.0, False
@@ -207,10 +207,10 @@ def validate(
             over = terminated or truncated
         returns.append(total)
         successes.append(info["is_success"])
-        shares.append(info["share"])
+        fractions.append(info["share"])
     if not episodes:
         return (float("nan"),) * 3
-    return float(np.mean(returns)), float(np.mean(successes)), float(np.mean(shares))
+    return float(np.mean(returns)), float(np.mean(successes)), float(np.mean(fractions))
 
 
 def _same(old: TrainingConfig, new: TrainingConfig, folder: Path) -> None:

@@ -193,7 +193,7 @@ def train_sam(
         run.save(learner.state(), point)
         logger.write(point)
         log.info(
-            "%d of %d decisions, %.0f s: share %.2f, success %.2f in validation",
+            "%d of %d decisions, %.0f s: fraction %.2f, success %.2f in validation",
             *(point.steps, config.steps, point.seconds, point.valid_share, point.valid_success),
         )
     logger.close()
@@ -229,17 +229,17 @@ def _chunk(
             following, totals[i] = envs[i].reset()[0], 0.0
         seen[i] = following
         if len(learner.memory) >= options.first and step % options.every == 0:
-            share = step / config.steps
-            learner.update(rng, options.rate * (1.0 - (1.0 - _LEAST_RATE) * share))
+            fraction = step / config.steps
+            learner.update(rng, options.rate * (1.0 - (1.0 - _LEAST_RATE) * fraction))
     return ended
 
 
 def _explore(
-    learner: SamLearner, seen: NDArray[Any], rng: np.random.Generator, share: float
+    learner: SamLearner, seen: NDArray[Any], rng: np.random.Generator, fraction: float
 ) -> int:
     """A pixel: the best, or with the probability of this part of the training a random one."""
     options = learner.options
-    fallen = 1.0 - (1.0 - options.explore_end) * min(1.0, share / max(options.explore, 1e-9))
+    fallen = 1.0 - (1.0 - options.explore_end) * min(1.0, fraction / max(options.explore, 1e-9))
     knows = bool(options.start) or len(learner.memory) >= options.first
     if rng.random() >= fallen and knows:
         return learner.best(seen)

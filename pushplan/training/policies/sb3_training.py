@@ -163,14 +163,14 @@ def make_model(
     )
 
 
-def _begin_chunk(model: Any, config: TrainingConfig, seed: int, share: float) -> None:
+def _begin_chunk(model: Any, config: TrainingConfig, seed: int, fraction: float) -> None:
     """Fresh episodes and generators, and the learning rate of this part of the training."""
     model.set_random_seed(seed)  # also of the environments, at their next reset
     model.env.seed(seed)
     model._last_obs = None
     options = config.options
     if isinstance(options, PpoOptions):
-        rate = options.rate * (1.0 - (1.0 - _LEAST_RATE) * share)
+        rate = options.rate * (1.0 - (1.0 - _LEAST_RATE) * fraction)
         model.learning_rate = rate
         model._setup_lr_schedule()
 

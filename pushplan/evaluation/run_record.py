@@ -1,0 +1,43 @@
+"""The rows of a run and what was noted about it, as page and plots read them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from pushplan.evaluation.rows import ResultRow
+from pushplan.evaluation.summary import policies_of, settings_of
+
+
+@dataclass(frozen=True)
+class RunRecord:
+    """Rows of a run and what was noted about it.
+
+    Args:
+        rows: sorted.
+        about: configuration, policies and titles of the settings.
+        path: the run directory; None for rows that come from elsewhere.
+    """
+
+    rows: tuple[ResultRow, ...]
+    about: Mapping[str, Any] = field(default_factory=dict)
+    path: Path | None = None
+
+    @property
+    def policies(self) -> list[str]:
+        """Labels, in the order in which they were given."""
+        return policies_of(self.rows, list(self.about.get("policies", {})))
+
+    @property
+    def titles(self) -> dict[str, str]:
+        """Words for each setting."""
+        known = self.about.get("settings", {})
+        factor = self.about.get("configuration", {}).get("latency_factor")
+        mode = "" if factor is None else f", latency-aware x {factor:g}"
+        return {setting: known.get(setting, setting) + mode for setting in settings_of(self.rows)}
+
+    def rows_of(self, setting: str) -> list[ResultRow]:
+        """The rows of one setting."""
+        return [row for row in self.rows if row.setting == setting]

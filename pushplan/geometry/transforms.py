@@ -1,0 +1,28 @@
+"""Rigid transforms of points, compiled; `pushplan.world.outline.transform` is the NumPy one."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pushplan.compiled import kernel
+from pushplan.world.checks import FloatArray, IntArray
+
+
+@kernel
+def transform_points(pose: FloatArray, points_body: FloatArray, out: FloatArray) -> None:
+    """Carry (N, 2) points from the frame of a body at ``pose`` (3,) to the world, into ``out``."""
+    c, s = np.cos(pose[2]), np.sin(pose[2])
+    for i in range(points_body.shape[0]):
+        x, y = points_body[i, 0], points_body[i, 1]  # ``out`` may be ``points_body`` itself
+        out[i, 0] = pose[0] + c * x - s * y
+        out[i, 1] = pose[1] + s * x + c * y
+
+
+@kernel
+def transform_outlines(
+    poses: FloatArray, vertices: FloatArray, offsets: IntArray, out: FloatArray
+) -> None:
+    """Carry flattened outlines (V, 2) of K bodies from their frames to the world, into ``out``."""
+    for k in range(poses.shape[0]):
+        a, b = offsets[k], offsets[k + 1]
+        transform_points(poses[k], vertices[a:b], out[a:b])

@@ -1,0 +1,234 @@
+"""Shortest paths through the layers of a tour, kept up to date while clusters come and go.
+
+``ahead[c, v]`` is the cost of the cheapest way from the root's node along the tour to node v of
+cluster c, ``behind[c, v]`` of that from there to the root. A change moves all values past it by
+what the tour costs more. That amount is carried by the cluster beside the change instead
+(both its values are lowered by ``carry[c]``), so that only a few values have to be renewed, up to
+where they agree with the old ones; and in every gap of the tour the cheapest way across costs 0.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from pushplan.compiled import kernel
+from pushplan.gtsp.node_choice_kernels import SPARE, push_values
+from pushplan.world.checks import FloatArray, IntArray
+
+
+class Layers(NamedTuple):
+    """A tour and its values; m clusters of at most K nodes."""
+
+    costs: FloatArray
+    """(N, N + SPARE)"""
+    reverse: FloatArray
+    """(N, N + SPARE) of the transpose."""
+    at: IntArray
+    """(m,) first node of each cluster; of the root, the node that counts."""
+    size: IntArray
+    """(m,) nodes of each cluster; 1 for the root."""
+    after: IntArray
+    """(m,) next cluster."""
+    before: IntArray
+    """(m,) previous cluster."""
+    ahead: FloatArray  # (m, K)
+    behind: FloatArray  # (m, K)
+    carry: FloatArray  # (m,)
+    old_links: IntArray
+    """(m, 2) what ``after`` and ``before`` were when the round began."""
+    old_ahead: FloatArray  # (m, K)
+    old_behind: FloatArray  # (m, K)
+    old_carry: FloatArray  # (m,)
+    stamp: IntArray
+    """(m,) round in which a cluster was touched last."""
+    touched: IntArray
+    """(m + 1,) how many clusters the round has touched, and which."""
+    out: FloatArray  # (K + SPARE,) working memory, as the next two
+    left: FloatArray
+    right: FloatArray
+
+
+@kernel(allocates=True)
+def make_layers(costs: FloatArray, reverse: FloatArray, offsets: IntArray, root: int) -> Layers:
+    """Memory for a search."""
+    count = len(offsets) - 1
+    size = offsets[1:] - offsets[:-1]
+    width = np.max(size)
+    size[root] = 1
+    return Layers(
+        costs,
+        reverse,
+        offsets[:-1].copy(),
+        size,
+        np.empty(count, np.int64),
+        np.empty(count, np.int64),
+        np.empty((count, width)),
+        np.empty((count, width)),
+        np.zeros(count),
+        np.empty((count, 2), np.int64),
+        np.empty((count, width)),
+        np.empty((count, width)),
+        np.empty(count),
+        np.full(count, -1, np.int64),
+        np.zeros(count + 1, np.int64),
+        np.empty(width + SPARE),
+        np.empty(width + SPARE),
+        np.empty(width + SPARE),
+    )
+
+
+@kernel(allocates=True)
+def build(tour: Layers, order: IntArray, root_node: int) -> float:
+    """Compute all values of a closed tour from scratch; returns its cost."""
+    count = len(order)
+    root = order[0]
+    tour.at[root] = root_node
+    tour.carry[:] = 0.0
+    for p in range(count):
+        c, d = order[p], order[p + 1 if p + 1 < count else 0]
+        tour.after[c], tour.before[d] = d, c
+    tour.ahead[root, 0] = 0.0
+    for p in range(1, count):
+        c = order[p]
+        _from(tour.costs, tour.ahead, tour, order[p - 1], c, tour.out)
+        tour.ahead[c, : tour.size[c]] = tour.out[: tour.size[c]]
+    _from(tour.costs, tour.ahead, tour, order[count - 1], root, tour.out)
+    total = tour.out[0]
+    tour.behind[root, 0] = -total
+    for p in range(count - 1, 0, -1):
+        c, d = order[p], order[p + 1 if p + 1 < count else 0]
+        _from(tour.reverse, tour.behind, tour, d, c, tour.out)
+        tour.behind[c, : tour.size[c]] = tour.out[: tour.size[c]]
+    return float(total)
+
+
+@kernel(inline=True)
+def _from(
+    costs: FloatArray, values: FloatArray, tour: Layers, a: int, b: int, out: FloatArray
+) -> None:
+    """Fill ``out`` with the values of cluster b from those of cluster a."""
+    push_values(costs, values, a, tour.at[a], tour.size[a], tour.at[b], tour.size[b], out)
+
+
+@kernel(inline=True)
+def keep(tour: Layers, c: int, now: int) -> None:
+    """Save a cluster as it is, once in a round."""
+    if tour.stamp[c] != now:
+        tour.stamp[c] = now
+        tour.touched[0] += 1
+        tour.touched[tour.touched[0]] = c
+        tour.old_links[c, 0], tour.old_links[c, 1] = tour.after[c], tour.before[c]
+        tour.old_carry[c] = tour.carry[c]
+        for v in range(tour.size[c]):
+            tour.old_ahead[c, v], tour.old_behind[c, v] = tour.ahead[c, v], tour.behind[c, v]
+
+
+@kernel(inline=True)
+def undo(tour: Layers) -> None:
+    """Put back what `keep` has saved in this round."""
+    for i in range(1, tour.touched[0] + 1):
+        c = tour.touched[i]
+        tour.after[c], tour.before[c] = tour.old_links[c, 0], tour.old_links[c, 1]
+        tour.carry[c] = tour.old_carry[c]
+        for v in range(tour.size[c]):
+            tour.ahead[c, v], tour.behind[c, v] = tour.old_ahead[c, v], tour.old_behind[c, v]
+
+
+@kernel(inline=True)
+def _renew(
+    tour: Layers,
+    costs: FloatArray,
+    values: FloatArray,
+    onward: IntArray,
+    c: int,
+    root: int,
+    now: int,
+    tolerance: float,
+) -> None:
+    """Renew ``values`` past cluster c in one direction, up to where they are as they were."""
+    p, c = c, onward[c]
+    out = tour.out
+    while c != root:
+        _from(costs, values, tour, p, c, out)
+        changed = False
+        for v in range(tour.size[c]):
+            out[v] -= tour.carry[c]
+            changed = changed or abs(out[v] - values[c, v]) > tolerance
+        if not changed:
+            return
+        keep(tour, c, now)
+        for v in range(tour.size[c]):
+            values[c, v] = out[v]
+        p, c = c, onward[c]
+
+
+@kernel(inline=True)
+def _renew_both(tour: Layers, c: int, root: int, now: int, tolerance: float) -> None:
+    """Renew the values on both sides of cluster c."""
+    _renew(tour, tour.costs, tour.ahead, tour.after, c, root, now, tolerance)
+    _renew(tour, tour.reverse, tour.behind, tour.before, c, root, now, tolerance)
+
+
+@kernel(inline=True)
+def close_gap(
+    tour: Layers,
+    a: int,
+    b: int,
+    carried: float,  # sum of ``carry`` of the clusters that were between them
+    root: int,
+    now: int,  # number of the round
+    tolerance: float,  # of values that count as equal
+) -> float:
+    """Link cluster a to b, what was between them being gone; returns the change of cost."""
+    keep(tour, a, now)
+    keep(tour, b, now)
+    tour.after[a], tour.before[b] = b, a
+    out = tour.out
+    _from(tour.costs, tour.ahead, tour, a, b, out)
+    cost = np.inf
+    for v in range(tour.size[b]):
+        cost = min(cost, out[v] + tour.behind[b, v])
+    if a != root:
+        tour.carry[a] += cost
+        _from(tour.reverse, tour.behind, tour, b, a, out)
+        for v in range(tour.size[a]):
+            tour.ahead[a, v] -= cost
+            tour.behind[a, v] = out[v] - tour.carry[a]
+        _renew_both(tour, a, root, now, tolerance)
+    else:
+        tour.carry[b] += cost
+        for v in range(tour.size[b]):
+            tour.ahead[b, v] = out[v] - tour.carry[b]
+            tour.behind[b, v] -= cost
+        _renew_both(tour, b, root, now, tolerance)
+    return float(cost - carried)
+
+
+@kernel(inline=True)
+def insertion_cost(tour: Layers, c: int, a: int, b: int) -> float:
+    """What the tour costs more by with cluster c between a and b."""
+    left, right = tour.left, tour.right
+    _from(tour.costs, tour.ahead, tour, a, c, left)
+    _from(tour.reverse, tour.behind, tour, b, c, right)
+    cost = np.inf
+    for v in range(tour.size[c]):
+        cost = min(cost, left[v] + right[v])
+    return float(cost)
+
+
+@kernel(inline=True)
+def link_in(tour: Layers, c: int, a: int, root: int, now: int, tolerance: float) -> float:
+    """Put cluster c behind cluster a; returns the change of the tour's cost."""
+    b = tour.after[a]
+    cost = insertion_cost(tour, c, a, b)
+    keep(tour, a, now)
+    keep(tour, b, now)
+    tour.after[a], tour.before[c], tour.after[c], tour.before[b] = c, a, b, c
+    tour.carry[c] = cost
+    for v in range(tour.size[c]):
+        tour.ahead[c, v] = tour.left[v] - cost
+        tour.behind[c, v] = tour.right[v] - cost
+    _renew_both(tour, c, root, now, tolerance)
+    return float(cost)

@@ -1,0 +1,127 @@
+"""Compiled parts that every search shares: random numbers and the best nodes for an order.
+
+Nodes are numbered so that those of a cluster follow one another: cluster c has the nodes
+``offsets[c]`` to ``offsets[c + 1]``. ``costs`` is (N, N + SPARE) float64, what is past the last
+node means nothing; ``reverse`` holds its transpose.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pushplan.compiled import kernel
+from pushplan.world.checks import FloatArray, IntArray
+
+SPARE = 3
+"""Columns that the matrices of a search have past the last node, see `push_values`."""
+
+
+@kernel(inline=True)
+def draw(state: IntArray) -> float:
+    """A number in [0, 1) from a xorshift64* generator (Vigna 2016); ``state`` is (1,) uint64."""
+    x = state[0]
+    x ^= x >> np.uint64(12)
+    x ^= x << np.uint64(25)
+    x ^= x >> np.uint64(27)
+    state[0] = x
+    high = (x * np.uint64(2685821657736338717)) >> np.uint64(11)
+    return float(high) * (1.0 / 9007199254740992.0)
+
+
+@kernel(inline=True)
+def below(state: IntArray, count: int) -> int:
+    """A whole number from 0 to ``count - 1``."""
+    return int(draw(state) * count)
+
+
+@kernel(inline=True)
+def push_layer(
+    costs: FloatArray, values: FloatArray, at: int, n_at: int, to: int, n_to: int, out: FloatArray
+) -> None:
+    """``out[w] = min_v values[v] + costs[at + v, to + w]``: one step of a layered shortest path."""
+    row = costs[at, to : to + n_to]
+    head = values[0]
+    for w in range(n_to):
+        out[w] = head + row[w]
+    v = 1
+    while v + 1 < n_at:
+        first, second = values[v], values[v + 1]
+        row, below_it = costs[at + v, to : to + n_to], costs[at + v + 1, to : to + n_to]
+        for w in range(n_to):
+            x = min(first + row[w], second + below_it[w])
+            out[w] = min(x, out[w])
+        v += 2
+    if v < n_at:
+        head = values[v]
+        row = costs[at + v, to : to + n_to]
+        for w in range(n_to):
+            out[w] = min(head + row[w], out[w])
+
+
+@kernel(inline=True)
+def push_values(
+    costs: FloatArray,  # (N, N + SPARE); up to `SPARE` columns past the cluster are read
+    values: FloatArray,  # (m, >= n_at)
+    a: int,  # row of ``values``
+    at: int,  # first node of the cluster that the path comes from
+    n_at: int,
+    to: int,  # first node of the cluster that it goes to
+    n_to: int,
+    out: FloatArray,  # (>= n_to + SPARE,) what is past ``n_to`` means nothing
+) -> None:
+    """Fill ``out[w] = min_v values[a, v] + costs[at + v, to + w]``, four columns at a time."""
+    for w in range(0, n_to, 4):
+        first = second = third = fourth = np.inf
+        j = to + w
+        for v in range(n_at):
+            x = values[a, v]
+            i = at + v
+            first = min(first, x + costs[i, j])
+            second = min(second, x + costs[i, j + 1])
+            third = min(third, x + costs[i, j + 2])
+            fourth = min(fourth, x + costs[i, j + 3])
+        out[w], out[w + 1], out[w + 2], out[w + 3] = first, second, third, fourth
+
+
+@kernel(allocates=True)
+def best_nodes(
+    costs: FloatArray,  # (N, >= N)
+    offsets: IntArray,  # (m + 1,)
+    order: IntArray,  # (>= count,) clusters in visiting order
+    count: int,  # how many of them, at least 2
+    nodes: IntArray,  # (>= count,) filled with the chosen nodes
+    layers: FloatArray,  # (>= count, K) working memory
+) -> float:
+    """Fill the cheapest nodes for a closed order of clusters; returns its cost (Fischetti 1997)."""
+    # a shortest path through the layers for every node of ``order[0]``, which should be small
+    root, last = order[0], order[count - 1]
+    a, z = offsets[last], offsets[last + 1]
+    best = np.inf
+    for node in range(offsets[root], offsets[root + 1]):
+        at = offsets[order[1]]
+        size = offsets[order[1] + 1] - at
+        layers[1, :size] = costs[node, at : at + size]
+        for i in range(2, count):
+            to = offsets[order[i]]
+            n_to = offsets[order[i] + 1] - to
+            push_layer(costs, layers[i - 1], at, size, to, n_to, layers[i])
+            at, size = to, n_to
+        cost, end = np.inf, -1
+        for v in range(a, z):
+            x = layers[count - 1, v - a] + costs[v, node]
+            if x < cost:
+                cost, end = x, v
+        if cost < best:
+            best = cost
+            nodes[0] = node
+            nodes[count - 1] = end
+            for i in range(count - 1, 1, -1):
+                to, before = nodes[i], offsets[order[i - 1]]
+                value = layers[i, to - offsets[order[i]]]
+                pick = before
+                for v in range(before, offsets[order[i - 1] + 1]):
+                    if layers[i - 1, v - before] + costs[v, to] == value:
+                        pick = v
+                        break
+                nodes[i - 1] = pick
+    return best

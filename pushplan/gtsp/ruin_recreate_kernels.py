@@ -1,0 +1,230 @@
+"""Ruin and recreate on orders of clusters; every insertion sees every choice of nodes."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from pushplan.compiled import kernel
+from pushplan.gtsp.layer_kernels import (
+    Layers,
+    build,
+    close_gap,
+    insertion_cost,
+    keep,
+    link_in,
+    make_layers,
+    undo,
+)
+from pushplan.gtsp.node_choice_kernels import below, best_nodes, draw
+from pushplan.gtsp.segment_swap_kernels import improve_by_swaps
+from pushplan.world.checks import FloatArray, IntArray
+
+FRESH_ROUNDS = 500
+"""Values are computed from scratch this often, so that rounding does not add up."""
+
+
+@kernel(inline=True)
+def _ruin(
+    tour: Layers,
+    near: IntArray,
+    removed: IntArray,
+    gone: IntArray,
+    target: int,
+    root: int,
+    now: int,
+    tolerance: float,
+    state: IntArray,
+) -> tuple[int, float]:
+    """Take out strings of clusters near a random one; how many, and the change of cost."""
+    # Christiaens and Vanden Berghe 2020
+    longest = 1 + below(state, target)
+    seed = below(state, len(gone))
+    found, change = 0, 0.0
+    for index in range(near.shape[1] + 1):
+        c = seed if index == 0 else near[seed, index - 1]
+        if found >= target:
+            break
+        if gone[c] or c == root:
+            continue
+        length = min(1 + below(state, longest), target - found)
+        for _ in range(below(state, length)):
+            if tour.before[c] != root:
+                c = tour.before[c]
+        a, carried = tour.before[c], 0.0
+        while length > 0 and c != root:
+            keep(tour, c, now)
+            carried += tour.carry[c]
+            gone[c] = 1
+            removed[found] = c
+            found += 1
+            length -= 1
+            c = tour.after[c]
+        change += close_gap(tour, a, c, carried, root, now, tolerance)
+    for i in range(found - 1, 0, -1):
+        j = below(state, i + 1)
+        removed[i], removed[j] = removed[j], removed[i]
+    return found, change
+
+
+@kernel(inline=True)
+def _bring_forward(
+    near: IntArray,
+    between: FloatArray,
+    removed: IntArray,
+    gone: IntArray,
+    low: int,
+    high: int,
+    farthest: bool,
+) -> None:
+    """Put the removed cluster that is farthest from the tour, or nearest to it, next in turn."""
+    best, pick = -1.0, low
+    for i in range(low, high):
+        c = removed[i]
+        away = np.inf
+        for index in range(near.shape[1]):
+            if not gone[near[c, index]]:
+                away = between[c, index]
+                break
+        if best < 0.0 or (away > best if farthest else away < best):
+            best, pick = away, i
+    removed[low], removed[pick] = removed[pick], removed[low]
+
+
+@kernel(inline=True)
+def _cheapest_place(
+    tour: Layers,
+    near: IntArray,
+    gone: IntArray,
+    seen: IntArray,
+    c: int,
+    root: int,
+    blink: float,
+    state: IntArray,
+) -> int:
+    """Behind which cluster c is cheapest, next to one of its neighbours; a few are overlooked."""
+    lowest, place = np.inf, root
+    interval = int(2.0 / blink) if blink > 0.0 else 0
+    skip = below(state, interval) if interval else -1
+    seen[-1] += 1
+    stamp = seen[-1]
+    for index in range(2 * near.shape[1]):
+        d = near[c, index >> 1]
+        if gone[d]:
+            continue
+        a = d if index & 1 else tour.before[d]
+        if seen[a] == stamp:
+            continue
+        seen[a] = stamp
+        if skip == 0:
+            skip = below(state, interval)
+            continue
+        skip -= 1
+        cost = insertion_cost(tour, c, a, tour.after[a])
+        if cost < lowest:
+            lowest, place = cost, a
+    return place
+
+
+@kernel(allocates=True)
+def _to_front(order: IntArray, root: int, scratch: IntArray) -> None:
+    """Rotate a closed order so that it begins with the root."""
+    p = 0
+    while order[p] != root:
+        p += 1
+    scratch[:] = order
+    for q in range(len(order)):
+        order[q] = scratch[(p + q) % len(order)]
+
+
+class TourProblem(NamedTuple):
+    """What a search works on."""
+
+    costs: FloatArray
+    """(N, N + SPARE) finite."""
+    reverse: FloatArray
+    """(N, N + SPARE) of the transpose."""
+    offsets: IntArray
+    """(m + 1,) with m at least 3."""
+    near: IntArray
+    """(m, k) clusters by distance."""
+    between: FloatArray
+    """(m, k) these distances."""
+    max_removed: int
+    """Clusters that a round removes at most, at most m - 2."""
+    blink: float
+    """Fraction of places that an insertion overlooks."""
+    reach: int
+    """Neighbours that a segment swap tries."""
+    symmetric: bool
+    """Whether a reversed segment costs the same."""
+
+
+class TourState(NamedTuple):
+    """What a search has found; all of it is changed."""
+
+    current: IntArray
+    """(m,) order, the root (a small cluster) first."""
+    current_nodes: IntArray
+    """(m,) its nodes."""
+    best: IntArray
+    """(m,) best order so far."""
+    best_nodes: IntArray
+    """(m,) its nodes."""
+    values: FloatArray
+    """(2,) costs of both."""
+    random: IntArray
+    """(1,) state of the random numbers."""
+
+
+@kernel(allocates=True)
+def search_tours(
+    problem: TourProblem, found: TourState, temperature: float, tolerance: float, rounds: int
+) -> None:
+    """Some rounds of simulated annealing; costs within the tolerance count as equal."""
+    costs, reverse, offsets, near, between, max_removed, blink, reach, symmetric = problem
+    current, current_nodes, best, best_choice, values, state = found
+    count, root = len(offsets) - 1, current[0]
+    tour = make_layers(costs, reverse, offsets, root)
+    layers = np.empty((count, tour.ahead.shape[1]))
+    order, nodes = np.empty(count, np.int64), np.empty(count, np.int64)
+    removed, gone = np.empty(count, np.int64), np.zeros(count, np.int64)
+    seen = np.zeros(count + 1, np.int64)
+    values[0] = build(tour, current, current_nodes[0])
+    for now in range(rounds):
+        tour.touched[0] = 0
+        target = 1 + below(state, max_removed)
+        taken, change = _ruin(tour, near, removed, gone, target, root, now, tolerance, state)
+        turn = below(state, 4)
+        for i in range(taken):
+            if turn >= 2:
+                _bring_forward(near, between, removed, gone, i, taken, turn == 2)
+            c = removed[i]
+            place = _cheapest_place(tour, near, gone, seen, c, root, blink, state)
+            gone[c] = 0
+            change += link_in(tour, c, place, root, now, tolerance)
+        if change >= -temperature * np.log(1.0 - draw(state)):
+            undo(tour)
+        else:
+            values[0] += change
+        fresh = now + 1 == rounds or (now + 1) % FRESH_ROUNDS == 0
+        if values[0] >= values[1] - tolerance and not fresh:
+            continue
+        c = root
+        for p in range(count):
+            order[p] = c
+            c = tour.after[c]
+        cost = best_nodes(costs, offsets, order, count, nodes, layers)
+        if cost < values[1] - tolerance and improve_by_swaps(
+            costs, near[:, :reach], order, nodes, symmetric, tolerance
+        ):
+            _to_front(order, root, removed)
+            cost = best_nodes(costs, offsets, order, count, nodes, layers)
+        if cost < values[1] - tolerance:
+            values[1] = cost
+            best[:] = order
+            best_choice[:] = nodes
+        current[:] = order
+        current_nodes[:] = nodes
+        values[0] = build(tour, order, nodes[0])

@@ -1,0 +1,299 @@
+"""Compiled quasi-static motion of one box in front of a bumper.
+
+All velocities are in the frame of the pushed face: n forward, into the box, t to the left. The
+ellipsoidal limit surface makes the box's velocity (v_n, v_t, ω) parallel to (f_n, f_t, τ/c²)
+(Goyal, Ruina and Papadopoulos, Wear 143, 1991; Howe and Cutkosky, IJRR 15(6), 1996). A pressed line
+of contact is a force at its centre of pressure y within the line, so τ = -a f_t - y f_n (Lynch and
+Mason, IJRR 15(6), 1996). Robots and boxes move as time stepping schemes do: what would close or
+hold the line of contact within the step happens if friction and pressure allow it, else the
+nearest that they allow.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from pushplan.compiled import kernel
+from pushplan.world.checks import FloatArray
+
+FREE, STICK, SLIDE, CORNER_STICK, CORNER_SLIDE = range(5)
+_SUBSTEP = 0.2
+"""Greatest motion of the bumper in one substep [distance from the axle to the box's centre]."""
+_SUBSTEPS = 6
+FLUSH = 1e-9
+"""Angle below which a box counts as lying on the bumper [rad]."""
+
+
+class Contact(NamedTuple):
+    """Bumper and pushed face, as the kernels read them."""
+
+    front: float
+    """x of the bumper in its middle, from the axle [m]."""
+    half: float
+    """Half the bumper's width [m]."""
+    curvature: float
+    """Curvature of the bumper's front [1/m]; positive where its ends reach ahead."""
+    depth: float
+    """a: from the pushed face to the box's centre [m]."""
+    low: float
+    """Right end of the face from the centre, along t [m], negative."""
+    high: float
+    """Left end of the face [m]."""
+    spread: float
+    """c = greatest torque / greatest force of the ground [m]."""
+    friction: float
+    """Between bumper and box."""
+
+
+@kernel(allocates=True)
+def line(contact: Contact, offset: float) -> tuple[float, float]:
+    """The part of the face that is in front of the bumper, along t [m]; empty if low >= high."""
+    low = max(contact.low, -contact.half - offset)
+    high = min(contact.high, contact.half - offset)
+    return low, high
+
+
+@kernel(allocates=True)
+def flush_angle(contact: Contact, offset: float) -> float:
+    """Angle of the face against the robot's heading when it lies on the bumper [rad]."""
+    low, high = line(contact, offset)
+    curvature = contact.curvature
+    if curvature <= 0.0 or low >= high:
+        return 0.0
+    return -curvature * (offset + 0.5 * (low + high)) / (1.0 - curvature * contact.depth)
+
+
+@kernel(allocates=True)
+def standoff(contact: Contact, offset: float, angle: float) -> tuple[float, float]:
+    """X of the box's centre when it touches the bumper [m], and where it does, along t [m]."""
+    c, s = np.cos(angle), np.sin(angle)
+    low, high = line(contact, offset)
+    if low >= high:
+        low = high = min(max(0.0, contact.low), contact.high)
+    best, at = -np.inf, 0.0
+    middle = 0.5 * (low + high)
+    if contact.curvature < 0.0 and c > 1e-3:
+        middle = (-s / (c * contact.curvature) - offset + contact.depth * s) / c
+        middle = min(max(middle, low), high)
+    for y in (low, middle, high):
+        lateral = offset - contact.depth * s + y * c
+        x = contact.front + 0.5 * contact.curvature * lateral * lateral + contact.depth * c + y * s
+        if x > best + 1e-12:
+            best, at = x, y
+    return best, at
+
+
+@kernel(allocates=True)
+def _corner(
+    contact: Contact, y: float, tilt: float, un: float, ut: float, w: float, out: FloatArray
+) -> None:
+    """The box pushed at one point (-a, y) whose normal has an angle ``tilt`` in the face frame."""
+    px, square = -contact.depth, contact.spread * contact.spread
+    cn, ct = un - w * y, ut + w * px  # velocity of the bumper at the point
+    total = square + px * px + y * y
+    vn = ((square + px * px) * cn + px * y * ct) / total
+    vt = (px * y * cn + (square + y * y) * ct) / total
+    nx, ny = np.cos(tilt), np.sin(tilt)
+    press, shear = vn * nx + vt * ny, vt * nx - vn * ny
+    out[3] = y
+    if cn * nx + ct * ny <= 0.0:
+        out[0] = out[1] = out[2] = 0.0
+        out[4], out[5] = float(FREE), 0.0
+        return
+    if press > 0.0 and abs(shear) <= contact.friction * press:
+        out[0], out[1], out[2] = vn, vt, (px * vt - y * vn) / square
+        out[4], out[5] = float(CORNER_STICK), shear / press
+        return
+    ratio = contact.friction if shear > 0.0 else -contact.friction
+    fx, fy = nx - ratio * ny, ny + ratio * nx
+    arm, lever = px * fy - y * fx, px * ny - y * nx
+    push = (cn * nx + ct * ny) / max(1.0 + arm * lever / square, 0.05)
+    out[0], out[1], out[2] = push * fx, push * fy, push * arm / square
+    out[4], out[5] = float(CORNER_SLIDE), ratio
+
+
+@kernel(allocates=True)
+def contact_velocity(
+    contact: Contact,
+    offset: float,  # of the box's centre to the left of the robot's x axis [m]
+    angle: float,  # of the face's normal against the robot's heading [rad]
+    v: float,
+    w: float,
+    dt: float,  # step in which an open line of contact should close [s]
+    out: FloatArray,  # (6,) of a box that touches the bumper
+) -> None:
+    """Fill v_n, v_t [m/s], ω [rad/s], pressure centre [m], mode, shear over normal force."""
+    x, touch = standoff(contact, offset, angle)
+    c, s = np.cos(angle), np.sin(angle)
+    ux, uy = v - w * offset, w * x
+    un, ut = c * ux + s * uy, c * uy - s * ux
+    low, high = line(contact, offset)
+    curvature, a, square = contact.curvature, contact.depth, contact.spread * contact.spread
+    if low >= high:
+        _corner(contact, touch, 0.0, un, ut, w, out)
+        return
+    if curvature < 0.0:  # a nose: one point that rolls along the face
+        _corner(contact, touch, 0.0, un, ut, w, out)
+        return
+    off = angle - flush_angle(contact, offset)
+    slope = -curvature / (1.0 - curvature * a)
+    closing = w - off / dt
+    normal = un + (closing - w) * touch
+    # held fast: no motion along the bumper
+    vt, omega = ut, closing
+    grip = 1.0 - curvature * a
+    shear = vt * grip - curvature * square * omega
+    mode = STICK
+    if abs(shear) > contact.friction * max(normal, 0.0):
+        mode = SLIDE
+        ratio = contact.friction if shear > 0.0 else -contact.friction
+        vt = (ratio * max(normal, 0.0) + curvature * square * (closing - slope * ut)) / (
+            grip - curvature * square * slope
+        )
+        omega = closing + slope * (vt - ut)
+        shear = ratio * normal
+    pressure = np.inf if omega < 0.0 else -np.inf
+    if normal > 1e-12:
+        pressure = -(square * omega + a * vt) / normal
+    if low <= pressure <= high:
+        out[0], out[1], out[2] = normal, vt, omega
+        out[3], out[4], out[5] = pressure, float(mode), shear / normal
+        return
+    y = high if pressure > high else low
+    tilt = 0.0
+    if (y == contact.high and y == high) or (y == contact.low and y == low):
+        lateral = offset - a * s + y * c
+        tilt = -curvature * lateral - angle  # the box's corner on the bumper, not the bumper's end
+    _corner(contact, y, tilt, un, ut, w, out)
+
+
+@kernel(allocates=True)
+def _drive(state: FloatArray, v: float, w: float, dt: float) -> None:
+    """Move the robot along an arc and leave the box where it is on the ground."""
+    theta, turn = state[2], w * dt
+    half = 0.5 * turn
+    chord = v * dt * (np.sin(half) / half if abs(half) > 1e-9 else 1.0)
+    state[0] += chord * np.cos(theta + half)
+    state[1] += chord * np.sin(theta + half)
+    state[2] = theta + turn
+
+
+@kernel(allocates=True)
+def _leave(contact: Contact, state: FloatArray, v: float, w: float, dt: float) -> float:
+    """Move the robot for ``dt`` while the box stands; the gap after it [m]."""
+    turn = w * dt
+    half = 0.5 * turn
+    chord = v * dt * (np.sin(half) / half if abs(half) > 1e-9 else 1.0)
+    x = standoff(contact, state[3], state[4])[0] + state[5]
+    dx, dy = x - chord * np.cos(half), state[3] - chord * np.sin(half)
+    c, s = np.cos(turn), np.sin(turn)
+    _drive(state, v, w, dt)
+    state[3], state[4] = c * dy - s * dx, state[4] - turn
+    state[5] = c * dx + s * dy - standoff(contact, state[3], state[4])[0]
+    gap: float = state[5]
+    return gap
+
+
+@kernel(allocates=True)
+def push_step(
+    contact: Contact, state: FloatArray, v: float, w: float, dt: float, out: FloatArray
+) -> None:
+    """One substep of a box that touches the bumper."""
+    contact_velocity(contact, state[3], state[4], v, w, dt, out)
+    x = standoff(contact, state[3], state[4])[0]
+    uy = w * x
+    c, s = np.cos(state[4]), np.sin(state[4])
+    before = state[4] - flush_angle(contact, state[3])
+    state[3] += dt * (out[0] * s + out[1] * c - uy)
+    state[4] += dt * (out[2] - w)
+    if contact.curvature >= 0.0 and abs(before) > FLUSH:
+        flush = flush_angle(contact, state[3])
+        if before * (state[4] - flush) < 0.0:
+            state[4] = flush  # the other end touches before the step is over
+    _drive(state, v, w, dt)
+
+
+@kernel(allocates=True)
+def advance(
+    contact: Contact,
+    state: FloatArray,  # (6,) robot pose, the box's offset, its face's angle, gap >= 0; changed
+    v: float,
+    w: float,
+    dt: float,
+    out: FloatArray,  # (6,) of the last substep; of mode `FREE` without contact
+) -> None:
+    """Move robot and box on by ``dt`` [s] under one command; ``out`` as in `contact_velocity`."""
+    reach = contact.front + contact.depth
+    travel = abs(v) * dt + abs(w) * dt * reach
+    count = max(1, min(_SUBSTEPS, int(np.ceil(travel / (_SUBSTEP * reach)))))
+    step = dt / count
+    trial = np.empty(6)
+    out[:] = 0.0
+    for _ in range(count):
+        trial[:] = state
+        gap = max(state[5], 0.0)
+        trial[5] = gap
+        after = _leave(contact, trial, v, w, step)
+        if after >= 1e-9:
+            state[:] = trial
+            out[:] = 0.0
+            continue
+        fraction = gap / (gap - after) if gap > 1e-9 and gap > after else 0.0
+        if fraction > 0.0:
+            _leave(contact, state, v, w, fraction * step)
+        state[5] = 0.0
+        if fraction < 1.0:
+            push_step(contact, state, v, w, (1.0 - fraction) * step, out)
+
+
+@kernel(allocates=True)
+def rollout(
+    contact: Contact,
+    state: FloatArray,
+    twists: FloatArray,
+    steps: FloatArray,
+    states: FloatArray,
+    details: FloatArray,
+) -> None:
+    """States (N + 1, 6) and details (N, 6) under twists (N, 2) held for steps (N,) [s]."""
+    states[0] = state
+    for k in range(steps.shape[0]):
+        states[k + 1] = states[k]
+        advance(contact, states[k + 1], twists[k, 0], twists[k, 1], steps[k], details[k])
+
+
+@kernel(allocates=True)
+def predicted(
+    contact: Contact, start: FloatArray, twists: FloatArray, steps: FloatArray
+) -> tuple[float, float]:
+    """Offset [m] and angle [rad] after twists (N, 2) held for steps (N,) [s]."""
+    state, detail = start.copy(), np.empty(6)
+    for k in range(steps.shape[0]):
+        advance(contact, state, twists[k, 0], twists[k, 1], steps[k], detail)
+    return state[3], state[4]
+
+
+@kernel(allocates=True)
+def observe(
+    contact: Contact, normal: float, robot: FloatArray, box: FloatArray, out: FloatArray
+) -> None:
+    """State (6,) of poses (3,) with the face's normal [rad]; the gap is negative in overlap."""
+    dx, dy = box[0] - robot[0], box[1] - robot[1]
+    c, s = np.cos(robot[2]), np.sin(robot[2])
+    out[:3] = robot
+    out[3] = c * dy - s * dx
+    angle = box[2] + normal - robot[2]
+    out[4] = angle - 2.0 * np.pi * np.round(angle / (2.0 * np.pi))
+    out[5] = c * dx + s * dy - standoff(contact, out[3], out[4])[0]
+
+
+@kernel(allocates=True)
+def box_pose(contact: Contact, state: FloatArray, out: FloatArray) -> None:
+    """x, y [m] of the box's centre and direction [rad] of the pushed face's normal, world."""
+    x = standoff(contact, state[3], state[4])[0] + state[5]
+    c, s = np.cos(state[2]), np.sin(state[2])
+    out[0] = state[0] + c * x - s * state[3]
+    out[1] = state[1] + s * x + c * state[3]
+    out[2] = state[2] + state[4]

@@ -1,0 +1,126 @@
+"""`Gtsp`: the paper's policy. One tour over straight pushes, planned once and then followed."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from pushplan.control import clamp_twist
+from pushplan.geometry import VisibilityGraph
+from pushplan.gtsp import solve_gtsp
+from pushplan.planners.rearrangement.push_poses import pose_behind
+from pushplan.planners.rearrangement.push_scene import PushScene, check_world
+from pushplan.planners.rearrangement.rearrangement_config import RearrangementConfig
+from pushplan.planners.rearrangement.route import Route
+from pushplan.planners.rearrangement.route_follower import RouteFollower
+from pushplan.world import ClearanceArea, MaxIterations, Receptacle, Twist, World
+from pushplan.world.checks import FloatArray, expect
+
+_PATIENCE = 5
+"""Commands without motion after which the rest of a leg is left out."""
+
+
+class Gtsp:
+    """Plans once and follows its path, as the policy of the Bench-Push paper does.
+
+    Every object is a cluster; a node is a straight push of it across one open edge of the area, or
+    into the receptacle. An arc costs the straight way from the end of one push to the start of the
+    next, and that push. Other objects are not looked at, and nothing is looked at afterwards. No
+    chance is involved.
+
+    Args:
+        config: settings; of the cost, nothing is used.
+    """
+
+    actions = ("velocity",)
+
+    def __init__(self, config: RearrangementConfig | None = None) -> None:
+        self.config = expect("config", config or RearrangementConfig(), RearrangementConfig)
+        self._forget()
+
+    def _forget(self) -> None:
+        self._route_follower: RouteFollower | None = None
+        self._last: FloatArray | None = None
+        self._still = 0
+        self._last_time = math.inf
+
+    def reset(self, world: World, rng: np.random.Generator) -> None:
+        """Forget the last episode."""
+        self._forget()
+
+    def act(self, world: World, observation: Any = None) -> Twist:
+        """The velocity for this step; stops at the end of the path.
+
+        Raises:
+            InvalidInputError: if the goal is one for the robot, or the robot cannot stop.
+        """
+        check_world(world)
+        if self._route_follower is None or world.time <= self._last_time != math.inf:
+            self._forget()
+            self._route_follower = RouteFollower(world.robot, self._path(world), self.config.period)
+        self._last_time = world.time
+        pose = world.robot_pose
+        if self._last is not None:
+            turned = abs(math.remainder(float(pose[2] - self._last[2]), 2.0 * math.pi))
+            moved = math.dist(pose[:2], self._last[:2]) / world.robot.circumscribed_radius + turned
+            self._still = self._still + 1 if moved < 1e-3 else 0
+        self._last = pose
+        if self._still >= _PATIENCE:
+            self._route_follower.skip()
+            self._still = 0
+        command = self._route_follower.command(pose)
+        return clamp_twist(world.robot, 0.0, 0.0) if command is None else command
+
+    def _path(self, world: World) -> Route:
+        """The whole path: for each object of the tour, behind it and then to the edge."""
+        scene = PushScene(world, self.config)
+        nodes = [node for k in np.flatnonzero(~scene.done) for node in _pushes(scene, int(k))]
+        heading = float(world.robot_pose[2])
+        if not nodes:
+            return Route(np.zeros((0, 2)), np.zeros(0), np.zeros(1), heading, 0.0)
+        count = len(nodes)
+        costs = np.full((count + 1, count + 1), np.inf)
+        for m, (_, start, end) in enumerate(nodes):
+            length = math.dist(start, end)
+            costs[-1, m] = math.dist(world.robot_pose[:2], start) + length
+            costs[m, -1] = 0.0
+            for n, (_, _, before) in enumerate(nodes):
+                costs[n, m] = math.dist(before, start) + length
+        boxes = sorted({k for k, _, _ in nodes})
+        clusters = [[n for n in range(count) if nodes[n][0] == k] for k in boxes]
+        tour = solve_gtsp(costs, [*clusters, [count]], stop=MaxIterations(300))
+        at = list(tour.nodes).index(count)
+        points = [world.robot_pose[:2]]
+        graph = VisibilityGraph(world.static, clearance=world.robot.inscribed_radius)
+        for n in [*tour.nodes[at + 1 :], *tour.nodes[:at]]:
+            _, start, end = nodes[int(n)]
+            way = graph.shortest_path(points[-1], start)
+            points += [*(way.points[1:] if len(way.points) > 1 else [start]), end]
+        legs = np.array(points[1:])
+        ahead, either = np.ones(len(legs)), np.zeros(len(legs) + 1)
+        return Route(legs, ahead, either, heading, float(tour.cost))
+
+
+def _pushes(scene: PushScene, k: int) -> list[tuple[int, FloatArray, FloatArray]]:
+    """The object, where the robot's middle begins and where it ends, for every straight push."""
+    goal, box = scene.world.goal, scene.poses[k, :2]
+    radius = float(scene.world.movables.radii[k])
+    if isinstance(goal, ClearanceArea):
+        found = []
+        ends = zip(goal.polygon, np.roll(goal.polygon, -1, axis=0), goal.open_edges, strict=True)
+        for a, b, is_open in ends:
+            along = (b - a) / np.hypot(*(b - a))
+            normal = np.array([along[1], -along[0]])
+            if is_open:
+                found.append(box + (float((a - box) @ normal) + radius) * normal)
+    else:
+        assert isinstance(goal, Receptacle)
+        found = [goal.polygon.mean(axis=0)]
+    pushes = []
+    for target in found:
+        way = target - box
+        start = pose_behind(scene, k, math.atan2(way[1], way[0]), 0.0)
+        pushes.append((k, start[:2], start[:2] + way))
+    return pushes

@@ -1,0 +1,50 @@
+"""`MpcFollower`: a push of one object along its path by predictive control."""
+
+from __future__ import annotations
+
+import math
+
+from pushplan.planners.pushing import PushingConfig, PushingMpc, PushParameters, PushPath
+from pushplan.planners.rearrangement.push import Push
+from pushplan.planners.rearrangement.push_poses import initial_heading
+from pushplan.planners.rearrangement.push_scene import PushScene
+from pushplan.world import Twist, World
+
+_ALIGNED = math.radians(20.0)
+"""A push that begins farther off the object's path is left to the geometric controller."""
+_BLOCKED = 0.2
+"""Share of a command that is driven, below which the push does not get on."""
+_PATIENCE = 4
+"""Commands for which it may be so."""
+
+
+def suits_mpc(scene: PushScene, push: Push) -> bool:
+    """Whether the contact model of `PushingMpc` describes a push: of one object, along its path."""
+    if not push.follows_path or push.pre_relocates or push.delivers != (push.target,):
+        return False
+    away = initial_heading(push.object_path, 0.5 * scene.size) - float(scene.world.robot_pose[2])
+    return abs(math.remainder(away, math.tau)) < _ALIGNED
+
+
+class MpcFollower:
+    """Drives one push by `PushingMpc`.
+
+    Args:
+        scene: in which the push begins.
+        push: a push that `suits`.
+    """
+
+    def __init__(self, scene: PushScene, push: Push) -> None:
+        config = PushingConfig(
+            parameters=PushParameters(scene.config.friction), period=scene.config.period
+        )
+        self._mpc = PushingMpc(config)
+        robot = scene.world.robot
+        self._plan = PushPath.through(push.object_path, radius=scene.size).plan(robot, push.target)
+        self._blocked = 0
+
+    def command(self, world: World) -> Twist | None:
+        """The velocity to drive now; None where something static is in the way for good."""
+        twist = self._mpc.command(world, self._plan)
+        self._blocked = self._blocked + 1 if self._mpc.slowed < _BLOCKED else 0
+        return None if self._blocked > _PATIENCE else twist

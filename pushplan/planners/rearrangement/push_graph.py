@@ -1,0 +1,156 @@
+"""`PushGraph`: candidate pushes, what they deliver, and what lies between them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from pushplan.planners.rearrangement.approach import (
+    ApproachTree,
+    approach_tree,
+    arrivals_at,
+    search_approaches,
+)
+from pushplan.planners.rearrangement.candidates import simple_pushes
+from pushplan.planners.rearrangement.extraction import extraction_primitives
+from pushplan.planners.rearrangement.pose_search_kernels import least_costs
+from pushplan.planners.rearrangement.pre_relocation import pre_relocation_pushes
+from pushplan.planners.rearrangement.push import Push, signature
+from pushplan.planners.rearrangement.push_scene import PushScene
+from pushplan.planners.rearrangement.push_simulator import PushSimulator
+from pushplan.world.checks import FloatArray
+
+PRE_RELOCATIONS = 2
+"""For how many objects, the nearest ones, pre-relocation pushes are looked for without others."""
+
+_FAR = 5.0
+"""Cost of getting to what cannot be got to later [diagonals of the map]."""
+
+
+@dataclass(frozen=True, eq=False)
+class PushGraph:
+    """The pushes of one scene with their costs.
+
+    Args:
+        pushes: N candidates.
+        costs: (N + 1, N) cost [m] of each push after each other, approach included; the last row
+            from where the robot is. inf where there is no path.
+        approach: from where the robot is.
+        infeasible: why there is no push for an object, by id.
+    """
+
+    pushes: tuple[Push, ...]
+    costs: FloatArray
+    approach: ApproachTree
+    infeasible: dict[int, str]
+
+
+def build_push_graph(
+    scene: PushScene,
+    penalties: dict[tuple[object, ...], float] | None = None,
+    *,
+    pre_relocations: int = 0,
+) -> PushGraph:
+    """Make the candidate pushes of a scene and their costs.
+
+    Args:
+        scene: the scene.
+        penalties: what to add to the cost of a push, by `signature` [m].
+        pre_relocations: for how many objects, the nearest ones first, pushes that only bring them
+            to where they can be pushed from are wanted too; without others they are in any case.
+    """
+    approach = approach_tree(scene)
+    simulator = PushSimulator(scene)
+    pushes = candidate_pushes(scene, simulator, pre_relocations)
+    row = least_costs(approach.costs, arrivals_at(scene.fine, pushes))
+    extra = np.array([(penalties or {}).get(signature(push), 0.0) for push in pushes])
+    pushes, keep = _best(scene, pushes, row + extra)
+    row = row[keep]
+    push_costs = np.array([push.cost for push in pushes]) + extra[keep]
+    costs = _between(scene, pushes)
+    costs = np.vstack([costs, row[None]]) + push_costs[None] if len(pushes) else np.zeros((1, 0))
+    delivered = {i for n, push in enumerate(pushes) if np.isfinite(row[n]) for i in push.serves}
+    infeasible = {
+        int(i): "no push for it was found that the robot can get to"
+        for i in scene.world.movables.ids[~scene.done].tolist()
+        if i not in delivered
+    }
+    return PushGraph(tuple(pushes), costs, approach, infeasible)
+
+
+def candidate_pushes(
+    scene: PushScene, simulator: PushSimulator, pre_relocations: int = 0
+) -> list[Push]:
+    """All candidates of a scene; ``pre_relocations`` see `build_push_graph`."""
+    pushes = simple_pushes(simulator)
+    if (
+        pre_relocations or not pushes
+    ):  # what is hard to get at is often freed by what is done before
+        relocated = 0
+        away = np.hypot(*(scene.poses[:, :2] - scene.world.robot_pose[:2]).T)
+        for k in sorted(simulator.left.tolist(), key=lambda k: (float(away[k]), k)):
+            found, frees = pre_relocation_pushes(simulator, k)
+            if not frees:  # an extraction primitive takes longer to find
+                found += extraction_primitives(simulator, k)
+            pushes += found
+            relocated += bool(found)
+            if relocated >= max(pre_relocations, PRE_RELOCATIONS):
+                break
+    return pushes
+
+
+def _best(
+    scene: PushScene, pushes: Sequence[Push], row: FloatArray
+) -> tuple[list[Push], list[int]]:
+    """The best few pushes for each object, of those that the robot can get to."""
+    keep: set[int] = set()
+    order = sorted(
+        (n for n in range(len(pushes)) if np.isfinite(row[n])),
+        key=lambda n: (pushes[n].cost / max(1, len(pushes[n].delivers)), n),
+    )
+    near = sorted(order, key=lambda n: (row[n] + pushes[n].cost) / max(1, len(pushes[n].delivers)))
+    ids = scene.world.movables.ids[~scene.done].tolist()
+    count = min(scene.config.per_object, max(2, scene.config.max_pushes // max(1, len(ids))))
+    for i in ids:
+        mine = [n for n in order if i in pushes[n].serves]
+        keep.update(mine[:count])
+        keep.update([n for n in near if i in pushes[n].serves][: count // 2])
+    index = sorted(keep)
+    return [pushes[n] for n in index], index
+
+
+def _between(scene: PushScene, pushes: Sequence[Push]) -> FloatArray:
+    """(N, N) cost of the approach from the end of each push to the start of each other [m].
+
+    What cannot be got to from there, as far as one can say now, is put off rather than ruled out:
+    otherwise one object would be enough for there to be no order at all.
+    """
+    contact_grid, ids = scene.coarse, scene.world.movables.ids
+    bounds = scene.world.static.bounds
+    far = _FAR * float(np.hypot(*(bounds[2:] - bounds[:2])))
+    arrivals = arrivals_at(contact_grid, pushes)
+    out = np.full((len(pushes), len(pushes)), np.inf)
+    known: dict[tuple[object, ...], FloatArray] = {}
+    step = 2.0 * contact_grid.grid.step
+    for n, push in enumerate(pushes):
+        key = (
+            push.delivers,
+            *np.round(push.end[:2] / step).tolist(),
+            round(float(push.end[2]) / 0.8),
+        )
+        if key not in known:
+            gone = np.flatnonzero(np.isin(ids, push.delivers))
+            found = search_approaches(
+                scene,
+                contact_grid,
+                push.end,
+                scene.config.later_fraction,
+                gone,
+                until=arrivals.nodes,
+            )
+            known[key] = least_costs(found.costs, arrivals)
+        out[n] = np.minimum(known[key], far)
+    np.fill_diagonal(out, np.inf)
+    return out

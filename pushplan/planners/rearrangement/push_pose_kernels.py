@@ -1,0 +1,50 @@
+"""Compiled poses of the robot behind an object."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from pushplan.compiled import kernel
+from pushplan.motion.collision import Footprint, Obstacles, is_free
+from pushplan.world.checks import FloatArray
+
+
+@kernel(allocates=True)
+def pose_behind_outline(
+    pose: FloatArray,  # (3,) of the object
+    outline: FloatArray,  # (N, 2) in its frame [m]
+    heading: float,
+    shift: float,  # of the robot's middle to the left [m]
+    distance: float,  # of the robot's middle from the outline [m]
+) -> FloatArray:
+    """(3,) pose of a robot that touches an outline from behind and faces along a heading."""
+    c, s = math.cos(heading), math.sin(heading)
+    cos, sin = math.cos(pose[2]), math.sin(pose[2])
+    depth = -np.inf
+    for i in range(outline.shape[0]):
+        x, y = outline[i, 0], outline[i, 1]
+        depth = max(depth, -((cos * x - sin * y) * c + (sin * x + cos * y) * s))
+    depth += distance
+    return np.array([pose[0] - depth * c - shift * s, pose[1] - depth * s + shift * c, heading])
+
+
+@kernel(allocates=True)
+def first_free(
+    start: FloatArray,
+    u: FloatArray,  # (2,) direction
+    step: float,
+    limit: float,
+    shape: Footprint,
+    among: Obstacles,
+    scratch: FloatArray,
+) -> float:
+    """How far along ``u`` a free pose is [m]; inf if there is none nearer than the limit."""
+    pose, n = start.copy(), 0
+    while n * step < limit:
+        pose[0], pose[1] = start[0] + n * step * u[0], start[1] + n * step * u[1]
+        if is_free(pose, shape, among, scratch):
+            return n * step
+        n += 1
+    return np.inf

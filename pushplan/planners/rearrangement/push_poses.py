@@ -1,0 +1,76 @@
+"""Poses from which pushes begin, and measures of paths and places."""
+
+from __future__ import annotations
+
+import functools
+import math
+
+import numpy as np
+import shapely
+
+from pushplan.planners.rearrangement.controller_kernels import along_path
+from pushplan.planners.rearrangement.push_pose_kernels import pose_behind_outline
+from pushplan.planners.rearrangement.push_scene import PushScene
+from pushplan.world import StaticMap
+from pushplan.world.checks import FloatArray
+
+SHIFTS = (0.0, 0.4, -0.4, 0.75, -0.75)
+"""Places of the robot's middle beside the object, in half widths of the bumper."""
+
+
+def heading_axes(heading: float) -> tuple[FloatArray, FloatArray]:
+    """Unit vectors (2,) along a heading [rad] and to the left of it."""
+    c, s = math.cos(heading), math.sin(heading)
+    return np.array([c, s]), np.array([-s, c])
+
+
+def pose_behind(
+    scene: PushScene, k: int, heading: float, shift: float, pose: FloatArray | None = None
+) -> FloatArray:
+    """(3,) a pose behind object ``k`` from which to push it along a heading.
+
+    Args:
+        scene: the scene.
+        k: index of the object.
+        heading: [rad].
+        shift: how far the robot's middle is to the left of the object [m].
+        pose: (3,) of the object, if it is not where it is now.
+    """
+    outline = scene.world.movables.outline(k)
+    distance = scene.front + scene.config.slack * scene.size
+    at = scene.poses[k] if pose is None else pose
+    return pose_behind_outline(at, outline, heading, shift, distance)
+
+
+def initial_heading(path: FloatArray, ahead: float) -> float:
+    """Heading [rad] from the start of a path to a point some distance along it [m]."""
+    x, y, _, _ = along_path(path[0, 0], path[0, 1], path, 0.0, ahead)
+    return math.atan2(y - path[0, 1], x - path[0, 0])
+
+
+def pose_distance(pose: FloatArray, other: FloatArray, size: float) -> float:
+    """How far two poses (3,) of an object are apart, turns included, in units of ``size``."""
+    turn = math.remainder(float(pose[2] - other[2]), 2.0 * math.pi)
+    return math.dist(pose[:2], other[:2]) / size + 0.2 * abs(turn)
+
+
+def distance_to_bounds(static: StaticMap, points: FloatArray) -> FloatArray:
+    """Distance of points (N, 2) from the bounds, negative beyond them [m]."""
+    out: FloatArray = np.minimum(points - static.bounds[:2], static.bounds[2:] - points).min(axis=1)
+    return out
+
+
+def distance_to_obstacles(static: StaticMap, points: FloatArray) -> FloatArray:
+    """Distance of points (..., 2) from what stands within the bounds [m]; inf if nothing does."""
+    if not len(static.convex_parts):
+        return np.full(points.shape[:-1], np.inf)
+    out: FloatArray = shapely.distance(_columns(static), shapely.points(points))
+    return out
+
+
+@functools.lru_cache(maxsize=8)
+def _columns(static: StaticMap) -> shapely.Geometry:
+    """All that is static within the bounds."""
+    columns = shapely.union_all([shapely.Polygon(part) for part in static.convex_parts])
+    shapely.prepare(columns)
+    return columns

@@ -1,0 +1,288 @@
+"""`PushScene`: a snapshot with all that candidate pushes and their costs are computed from."""
+
+from __future__ import annotations
+
+import functools
+import math
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from pushplan.geometry import convex_penetration
+from pushplan.interaction import QuasiStatic
+from pushplan.interaction.kernels import Bodies, Settings
+from pushplan.motion.collision import (
+    Footprint,
+    Obstacles,
+    footprint,
+    is_free,
+    obstacles,
+)
+from pushplan.planners.arguments import check_pusher
+from pushplan.planners.rearrangement.controller_kernels import PushingController
+from pushplan.planners.rearrangement.goal_kernels import ObjectGoal, all_done
+from pushplan.planners.rearrangement.line_up import bumper_half
+from pushplan.planners.rearrangement.object_paths import ObjectPaths, object_paths
+from pushplan.planners.rearrangement.pose_grid import make_pose_grid
+from pushplan.planners.rearrangement.pose_grid_kernels import (
+    Layers,
+    PoseGrid,
+    add_layers,
+    contact_depths,
+)
+from pushplan.planners.rearrangement.rearrangement_config import RearrangementConfig
+from pushplan.planners.rearrangement.rollout_cache import RolloutCache
+from pushplan.world import ClearanceArea, Goal, Receptacle, RobotModel, StaticMap, World
+from pushplan.world.checks import BoolArray, FloatArray, IntArray, frozen
+
+_STEP = 0.12
+"""Longest step between two commands of a push [circumscribed radii]."""
+_ARM = 0.8
+"""How far a turn by one radian carries an object along [circumscribed radii]."""
+_GOAL_SLACK = 0.012
+"""By how much an object has to be clear of its goal's edge [circumscribed radii]."""
+TARGET_COST = 5.0
+"""What is added to the cost of carrying along an object that is to be pushed afterwards."""
+
+
+@functools.lru_cache(maxsize=8)
+def _fit_of(
+    robot: RobotModel, static: StaticMap, margin: float
+) -> tuple[Footprint, Obstacles, FloatArray]:
+    shape = footprint(robot, margin)
+    return shape, obstacles(static), np.empty_like(shape.vertices)
+
+
+def check_world(world: World) -> None:
+    """Refuse what no push can be made for; see `check_pusher`."""
+    check_pusher(world, "pushing objects")
+
+
+def make_object_goal(goal: Goal, static: StaticMap, slack: float) -> ObjectGoal:
+    """The goal for kernels. Sides of a receptacle that lie on the bounds do not count."""
+    assert isinstance(goal, ClearanceArea | Receptacle)
+    polygon = goal.polygon
+    along = np.roll(polygon, -1, axis=0) - polygon
+    normals = np.stack([along[:, 1], -along[:, 0]], axis=1) / np.hypot(*along.T)[:, None]
+    offsets = (normals * polygon).sum(axis=1)
+    low, high = static.bounds[:2], static.bounds[2:]
+    corners = np.array([[low[0], low[1]], [high[0], low[1]], [high[0], high[1]], [low[0], high[1]]])
+    # the sides of a receptacle that stand at the walls
+    inner = (corners @ normals.T).max(axis=0) > offsets + 4.0 * slack
+    edges = np.column_stack([normals, offsets])[inner]
+    return ObjectGoal(
+        polygon, frozen(np.ascontiguousarray(edges)), isinstance(goal, Receptacle), slack
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class ContactGrid:
+    """A lattice with the objects on it.
+
+    Args:
+        grid: the lattice.
+        layers: (K, 16, rows, columns) depth in each object [m].
+        weights: (K,) cost of carrying each object along.
+    """
+
+    grid: PoseGrid
+    layers: Layers
+    weights: FloatArray
+
+    def contacts(
+        self, fraction: float = 1.0, without: IntArray | None = None, target: int = -1
+    ) -> tuple[FloatArray, FloatArray]:
+        """(16, rows, columns) depth in the objects [m] at each pose, and their weights.
+
+        Args:
+            fraction: factor on the weights.
+            without: indices of objects that are not there any more.
+            target: index of an object that is not to be moved; -1 if none.
+        """
+        weights = fraction * self.weights
+        if without is not None:
+            weights[without] = 0.0
+        if target >= 0:
+            weights[target] += TARGET_COST
+        return add_layers(self.layers, weights)
+
+
+@dataclass(frozen=True, eq=False)
+class PushScene:
+    """A world, and what the kernels need to know of it.
+
+    Args:
+        world: the snapshot; its goal is one for the objects.
+        config: settings.
+        cache: what is known from the last scene.
+    """
+
+    world: World
+    config: RearrangementConfig
+    cache: RolloutCache | None = None
+
+    def __post_init__(self) -> None:
+        check_world(self.world)
+
+    @property
+    def size(self) -> float:
+        """Circumscribed radius of the robot [m]."""
+        return self.world.robot.circumscribed_radius
+
+    @cached_property
+    def half(self) -> float:
+        """Half the width of the bumper [m]."""
+        return bumper_half(self.world.robot)
+
+    @cached_property
+    def front(self) -> float:
+        """How far the bumper is ahead of the robot's origin [m]."""
+        return float(self.world.robot.vertices[:, 0].max())
+
+    @cached_property
+    def poses(self) -> FloatArray:
+        """(K, 3) poses of the objects; a copy that kernels may read."""
+        return np.ascontiguousarray(self.world.movables.poses)
+
+    @cached_property
+    def _model(self) -> QuasiStatic:
+        config = self.config
+        return QuasiStatic(
+            config.friction,
+            config.gyration_scale,
+            step=0.25,
+            iterations=10,
+            static_friction=config.static_friction,
+        )
+
+    @cached_property
+    def bodies(self) -> Bodies:
+        """Shapes for the interaction kernels."""
+        return self._model.bodies(self.world)
+
+    @cached_property
+    def settings(self) -> Settings:
+        """Numerical settings of the interaction kernels."""
+        return self._model.settings(self.world)
+
+    @cached_property
+    def object_goal(self) -> ObjectGoal:
+        """When objects are done."""
+        return make_object_goal(self.world.goal, self.world.static, _GOAL_SLACK * self.size)
+
+    @cached_property
+    def controller(self) -> PushingController:
+        """Parameters of the pushing controller for this robot."""
+        robot, period = self.world.robot, self.config.period
+        return PushingController(
+            step=min(robot.max_speed * period, _STEP * self.size),
+            turn=robot.max_turn_rate * period,
+            size=self.size,
+            half=self.half,
+            front=self.front,
+            ahead=0.5 * self.size,
+            gain=1.5,
+        )
+
+    @cached_property
+    def done(self) -> BoolArray:
+        """(K,) whether each object is where it belongs."""
+        return all_done(self.poses, self.bodies, self.object_goal)
+
+    @property
+    def turn_cost(self) -> float:
+        """Cost of a turn on the spot [m/rad]."""
+        return self.config.turn_cost * self.size
+
+    @property
+    def arm(self) -> float:
+        """How far a turn carries an object along [m/rad]."""
+        return _ARM * self.size
+
+    @cached_property
+    def weights(self) -> FloatArray:
+        """(K,) metres of the robot's path that a metre of each object's path is worth."""
+        world = self.world
+        return self.config.work_weight * world.movables.masses / world.robot.mass
+
+    @cached_property
+    def contact_weights(self) -> FloatArray:
+        """(K,) cost of carrying each object a metre along on an approach.
+
+        However light it is, it will not be where it was expected.
+        """
+        return np.maximum(self.weights, self.config.contact_cost)
+
+    @cached_property
+    def fine(self) -> ContactGrid:
+        """The lattice on which the next approach is planned."""
+        return self._contact_grid(self.config.cell)
+
+    @cached_property
+    def coarse(self) -> ContactGrid:
+        """The lattice on which the cost of approaches between pushes is computed."""
+        return self._contact_grid(self.config.coarse_cell)
+
+    def _contact_grid(self, cell: float) -> ContactGrid:
+        world, size = self.world, self.size
+        sides = world.static.bounds[2:] - world.static.bounds[:2]
+        step = max(cell, 0.012 * float(sides.max()) / size) * size
+        grid = make_pose_grid(world.robot, world.static, step, self.config.margin * size)
+        shape = footprint(world.robot, self.config.margin * size)
+        layers = contact_depths(grid, shape, self.poses, self.bodies)
+        return ContactGrid(grid, layers, self.contact_weights)
+
+    def remaining(self, poses: FloatArray) -> FloatArray:
+        """(K,) shortest path [m] of each object's middle to the goal from poses (K, 3)."""
+        return np.array(
+            [self.object_paths.length(x, y) if x < 1e6 else 0.0 for x, y, _ in poses.tolist()]
+        )
+
+    @cached_property
+    def remaining_now(self) -> FloatArray:
+        """(K,) `remaining` now."""
+        return self.remaining(self.poses)
+
+    @cached_property
+    def object_paths(self) -> ObjectPaths:
+        """Shortest paths of the objects to their goal."""
+        return object_paths(self.world.static, self.world.goal)
+
+    def object_path(
+        self, k: int, clearance: float, deep: bool = False, pose: FloatArray | None = None
+    ) -> FloatArray | None:
+        """(M, 2) path of object ``k`` to where it is done, and on; None if there is none.
+
+        Args:
+            k: index of the object.
+            clearance: distance that its middle keeps from what is static [m].
+            deep: to the middle of a receptacle instead of its nearest place.
+            pose: (3,) where it is instead of where it is now.
+        """
+        point = (self.poses[k] if pose is None else pose)[:2]
+        return self.object_paths.path(point, float(self.world.movables.radii[k]), clearance, deep)
+
+    @cached_property
+    def fit(self) -> tuple[Footprint, Obstacles, FloatArray]:
+        """Footprint, obstacles and memory for `is_free`."""
+        margin = 0.3 * self.config.margin * self.size
+        return _fit_of(self.world.robot, self.world.static, margin)
+
+    def fits(self, pose: FloatArray) -> bool:
+        """Whether the robot fits at a pose (3,) among what is static."""
+        shape, among, scratch = self.fit
+        return bool(is_free(pose, shape, among, scratch))
+
+    def is_clear(self, pose: FloatArray) -> bool:
+        """Whether the robot at a pose (3,) overlaps no object."""
+        movables, robot = self.world.movables, self.world.robot
+        c, s = math.cos(pose[2]), math.sin(pose[2])
+        away = np.hypot(*(self.poses[:, :2] - pose[:2]).T)
+        for k in np.flatnonzero(away < self.size + movables.radii).tolist():
+            outline = np.ascontiguousarray(movables.outline_world(k))
+            for part in robot.parts:
+                body = np.ascontiguousarray(part @ np.array([[c, s], [-s, c]]) + pose[:2])
+                if convex_penetration(body, outline)[0] > 0.0:
+                    return False
+        return True

@@ -1,0 +1,100 @@
+"""Which push comes first: the order of the cheapest tour, with its first pushes simulated."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from pushplan.planners.rearrangement.approach import ApproachTree, approach_tree
+from pushplan.planners.rearrangement.forward_simulation import SimulatedPush, simulate_push
+from pushplan.planners.rearrangement.push import Push, signature
+from pushplan.planners.rearrangement.push_graph import PRE_RELOCATIONS, PushGraph, build_push_graph
+from pushplan.planners.rearrangement.push_scene import PushScene
+from pushplan.planners.rearrangement.push_simulator import PushSimulator
+from pushplan.planners.rearrangement.route import RoutePlanner
+from pushplan.planners.rearrangement.sequencing import sequence_pushes
+
+
+@dataclass(frozen=True, eq=False)
+class Selection:
+    """What is planned.
+
+    Args:
+        graph: the candidate pushes.
+        order: indices of those to be made, in order.
+        first: the first of them with the route to it; None if there is none.
+    """
+
+    graph: PushGraph
+    order: tuple[int, ...]
+    first: SimulatedPush | None
+
+    @property
+    def plan(self) -> tuple[Push, ...]:
+        """The pushes to be made, in order."""
+        return tuple(self.graph.pushes[n] for n in self.order)
+
+
+def select_push(scene: PushScene, penalties: dict[tuple[object, ...], float]) -> Selection:
+    """Sequence anew: the pushes to make, and the first of them with the route to it.
+
+    Where no push can be carried out, those that only free an object are looked at too: first those
+    for the nearest objects, then for all.
+
+    Args:
+        scene: the scene.
+        penalties: what to add to the cost of a push, by `signature` [m].
+    """
+    selection = _select(scene, build_push_graph(scene, penalties), penalties)
+    pre_relocates = any(push.pre_relocates for push in selection.graph.pushes)
+    for pre_relocations in (PRE_RELOCATIONS, int((~scene.done).sum())):
+        if selection.first is None and not (pre_relocates and pre_relocations <= PRE_RELOCATIONS):
+            selection = _select(
+                scene,
+                build_push_graph(scene, penalties, pre_relocations=pre_relocations),
+                penalties,
+            )
+    return selection
+
+
+def _select(
+    scene: PushScene, graph: PushGraph, penalties: dict[tuple[object, ...], float]
+) -> Selection:
+    known: dict[int, SimulatedPush] = {}
+    forward = _ForwardSimulator(scene, graph.approach)
+
+    def simulated_cost(n: int) -> tuple[float, tuple[int, ...]]:
+        push = graph.pushes[n]
+        found = forward.of(push)
+        if found is None:
+            return math.inf, ()
+        known[n] = found
+        return found.cost + penalties.get(signature(push), 0.0), found.push.delivers
+
+    order = sequence_pushes(graph, simulated_cost, scene.config.max_simulations)
+    return Selection(graph, tuple(order), known[order[0]] if order else None)
+
+
+class _ForwardSimulator:
+    """Simulates pushes: on the cheapest path, and if that spoils the push around its object."""
+
+    def __init__(self, scene: PushScene, approach: ApproachTree) -> None:
+        self._scene, self._approach = scene, approach
+        self._planner, self._simulator = RoutePlanner(scene), PushSimulator(scene)
+        self._around: dict[int, ApproachTree] = {}
+
+    def of(self, push: Push) -> SimulatedPush | None:
+        """The push with the cheapest route to it that was found; None if there is none."""
+        target = int(np.flatnonzero(self._scene.world.movables.ids == push.target)[0])
+        found = self._along(self._approach, push, target)
+        if found is None or not math.isfinite(found.cost):
+            if target not in self._around:
+                self._around[target] = approach_tree(self._scene, target)
+            found = self._along(self._around[target], push, target) or found
+        return found
+
+    def _along(self, approach: ApproachTree, push: Push, target: int) -> SimulatedPush | None:
+        route = self._planner.route(approach, push.start, target)
+        return None if route is None else simulate_push(self._planner, self._simulator, route, push)

@@ -1,0 +1,260 @@
+"""`PushSimulator`: candidate pushes rolled out in the interaction model, and what comes of them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from pushplan.interaction.kernels import sweep_path
+from pushplan.planners.rearrangement.goal_kernels import all_done
+from pushplan.planners.rearrangement.push import Push
+from pushplan.planners.rearrangement.push_poses import pose_distance
+from pushplan.planners.rearrangement.push_scene import PushScene
+from pushplan.planners.rearrangement.rollout_cache import Rollout
+from pushplan.planners.rearrangement.rollout_kernels import (
+    STAGES,
+    RolloutLog,
+    RolloutProblem,
+    roll_out,
+)
+from pushplan.world.checks import BoolArray, FloatArray
+from pushplan.world.polyline import path_length, path_lengths
+
+_ALIKE = 0.2
+"""By how much places of an object may differ that an extraction primitive gets it to
+[circumscribed radii]."""
+_NO_PATH = np.zeros((0, 2))
+
+
+class PushSimulator:
+    """Rolls out candidate pushes of one scene, and turns stages into pushes."""
+
+    def __init__(self, scene: PushScene) -> None:
+        self.scene = scene
+        count = len(scene.poses)
+        sides = scene.world.static.bounds[2:] - scene.world.static.bounds[:2]
+        self.longest = 2.0 * float(sides.sum())
+        steps = int(self.longest / scene.controller.step) + 2
+        self._log = RolloutLog(
+            np.empty((steps, 3)),
+            np.zeros(STAGES),
+            np.zeros((STAGES, count, 3)),
+            np.zeros((STAGES, count)),
+            np.zeros(4),
+        )
+        self.left = np.flatnonzero(~scene.done)
+
+    def simulate(
+        self,
+        start: FloatArray,
+        target: int,
+        *,
+        path: FloatArray | None = None,
+        shift: float = 0.0,
+        limit: float | None = None,
+        wanted: Sequence[int] = (),
+        gain: float = 1.5,
+        pre_relocates: bool = False,
+        poses: FloatArray | None = None,
+        spent: FloatArray | None = None,
+    ) -> list[Push]:
+        """The pushes that one start gives: one for each stage at which more objects are done.
+
+        Args:
+            start: (3,) pose.
+            target: index of the object that follows the path, or is pushed first.
+            path: (M, 2) of the target object; None for a line push [m].
+            shift: see `Push`.
+            limit: of the length [m].
+            wanted: indices of the objects after which to stop; ``target`` alone by default.
+            gain: of the pushing controller.
+            pre_relocates: whether to keep the end where nothing is done.
+            poses: (K, 3) where the objects are when the push begins; where they are now by default.
+            spent: (K,) path lengths that getting there has cost them [m].
+        """
+        scene = self.scene
+        flags = np.zeros(len(scene.poses), dtype=np.bool_)
+        flags[list(wanted) or [target]] = True
+        problem = RolloutProblem(
+            target=target if path is not None and len(path) else -1,
+            path=_NO_PATH if path is None else path,
+            shift=shift,
+            limit=self.longest if limit is None else limit,
+            wanted=flags,
+            controller=scene.controller._replace(gain=gain),
+            bodies=scene.bodies,
+            settings=scene.settings,
+            goal=scene.object_goal,
+        )
+        rollout = self._roll_out(start, target, problem, scene.poses if poses is None else poses)
+        stages = range(len(rollout.steps))
+        found = (
+            self._push_of(rollout, s, target, problem, pre_relocates, spent)
+            for s in (stages[-1:] if pre_relocates else stages)
+        )
+        return [push for push in found if push is not None]
+
+    def _roll_out(
+        self, start: FloatArray, target: int, problem: RolloutProblem, poses: FloatArray
+    ) -> Rollout:
+        """Roll out a push, unless it is known what comes of it."""
+        scene, log, wanted = self.scene, self._log, problem.wanted
+        movables, cache = scene.world.movables, scene.cache
+        key = (
+            start.tobytes(),
+            int(movables.ids[target]),
+            problem.path.tobytes(),
+            problem.shift,
+            problem.limit,
+            problem.controller.gain,
+            movables.ids[wanted].tobytes(),
+        )
+        if poses is not scene.poses or (wanted & scene.done).any():
+            cache = None
+        known = None if cache is None else cache.find(key, movables, poses)
+        if known is not None:
+            return known
+        # copies may be written to: one kernel for all
+        stages, used = roll_out(np.array(start), np.array(poses), problem, log)
+        rollout = Rollout(
+            log.track[:used].copy(),
+            log.steps[:stages].astype(np.int64),
+            log.poses[:stages].copy(),
+            log.lengths[:stages].copy(),
+        )
+        if cache is not None:
+            cache.keep(key, movables, poses, rollout, log.box)
+        return rollout
+
+    def _push_of(
+        self,
+        rollout: Rollout,
+        s: int,
+        target: int,
+        problem: RolloutProblem,
+        pre_relocates: bool,
+        spent: FloatArray | None,
+    ) -> Push | None:
+        """The push up to stage ``s`` of a rollout; None where nothing is won by it."""
+        scene, movables = self.scene, self.scene.world.movables
+        after, lengths = rollout.poses[s], rollout.lengths[s]
+        done = all_done(after, scene.bodies, scene.object_goal)
+        delivers = np.flatnonzero(done & ~scene.done)
+        follows_path = len(problem.path) > 0
+        if (scene.done & ~done).any():
+            return None  # something came back
+        if not pre_relocates and (not len(delivers) or (follows_path and target not in delivers)):
+            return None
+        track = rollout.track[: int(rollout.steps[s])]
+        length = (len(track) - 1) * scene.controller.step
+        lengths = lengths + (0.0 if spent is None else spent)
+        return Push(
+            delivers=tuple(movables.ids[delivers].tolist()),
+            target=int(movables.ids[target]),
+            follows_path=follows_path,
+            poses=track,
+            length=length,
+            work=float(movables.masses @ lengths),
+            cost=length + self._effort(after, lengths, done),
+            object_poses=after,
+            object_path=problem.path,
+            shift=problem.shift,
+            gain=problem.controller.gain,
+            pre_relocates=pre_relocates,
+        )
+
+    def simulate_primitive(
+        self,
+        path: FloatArray,
+        target: int,
+        poses: FloatArray | None = None,
+        spent: FloatArray | None = None,
+    ) -> list[Push]:
+        """A drive that moves an object with whatever part of the robot meets it, if it can be made.
+
+        Args:
+            path: (N, 3) poses of the robot, near each other.
+            target: index of the object.
+            poses: see `simulate`.
+            spent: see `simulate`.
+        """
+        scene = self.scene
+        after = np.array(scene.poses if poses is None else poses)
+        out = np.empty((len(path), len(after), 3))
+        if sweep_path(path, after, scene.bodies, scene.settings, out) >= 0:
+            return []
+        lengths = path_lengths(out) + (0.0 if spent is None else spent)
+        done = all_done(after, scene.bodies, scene.object_goal)
+        if (scene.done & ~done).any():
+            return []
+        ids, masses = scene.world.movables.ids, scene.world.movables.masses
+        length = path_length(path)
+        cost = length + scene.turn_cost * float(np.abs(np.diff(path[:, 2])).sum())
+        return [
+            Push(
+                delivers=tuple(ids[np.flatnonzero(done & ~scene.done)].tolist()),
+                target=int(ids[target]),
+                follows_path=False,
+                poses=path,
+                length=length,
+                work=float(masses @ lengths),
+                cost=cost + self._effort(after, lengths, done),
+                object_poses=after,
+                pre_relocates=True,
+                is_primitive=True,
+            )
+        ]
+
+    def resimulate(
+        self,
+        push: Push,
+        start: FloatArray,
+        *,
+        poses: FloatArray | None = None,
+        spent: FloatArray | None = None,
+    ) -> list[Push]:
+        """What a push would come to from another start, or after something has been moved.
+
+        Args:
+            push: the push.
+            start: (3,) where it begins now.
+            poses: see `simulate`.
+            spent: see `simulate`.
+        """
+        scene = self.scene
+        ids = scene.world.movables.ids
+        target = int(np.flatnonzero(ids == push.target)[0])
+        if push.is_primitive:
+            path = np.vstack([start, push.poses[1:]])
+            path[:, 2] = np.unwrap(path[:, 2])
+            ends = self.simulate_primitive(path, target, poses, spent)
+            there, size = push.object_poses[target], scene.size
+            return [
+                end for end in ends if pose_distance(end.object_poses[target], there, size) < _ALIKE
+            ]
+        return self.simulate(
+            start,
+            target,
+            path=push.object_path if push.follows_path else None,
+            shift=push.shift,
+            limit=push.length if push.pre_relocates else None,
+            wanted=np.flatnonzero(np.isin(ids, push.delivers) & ~scene.done).tolist(),
+            gain=push.gain,
+            pre_relocates=push.pre_relocates,
+            poses=poses,
+            spent=spent,
+        )
+
+    def _effort(self, poses: FloatArray, lengths: FloatArray, done: BoolArray) -> float:
+        """Work, and what the objects that are left behind have farther or less far to go [m]."""
+        scene = self.scene
+        cost = float(scene.weights @ lengths)
+        moved = np.flatnonzero((lengths > 1e-9) & ~done)
+        if len(moved):
+            now, then = scene.remaining_now[moved], scene.remaining(poses[moved])
+            known = np.isfinite(now) & np.isfinite(then)
+            change = np.full(len(moved), self.longest)
+            change[known] = then[known] - now[known]
+            cost += float(scene.weights[moved] @ change) + float(np.maximum(change, 0.0).sum())
+        return max(cost, 0.0)

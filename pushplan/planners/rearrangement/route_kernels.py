@@ -1,0 +1,185 @@
+"""Compiled costs of the legs and turns of a `Route`."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from pushplan.compiled import kernel
+from pushplan.geometry import convex_penetration
+from pushplan.geometry.angles import wrap_angle
+from pushplan.geometry.transforms import transform_points
+from pushplan.interaction.kernels import Bodies
+from pushplan.motion.collision import Footprint, Obstacles, is_free
+from pushplan.world.checks import FloatArray, IntArray
+
+SURE_TURN = math.radians(170.0)
+"""Up to here a turn is made the shorter way if nothing is said."""
+LITTLE_TURN = 0.6
+"""A turn by less is not made the longer way [rad]."""
+_TIGHT_COST = 25.0
+"""Cost of driving on, where the robot begins nearer to something static than it should be."""
+
+
+class RouteProblem(NamedTuple):
+    """What motions cost."""
+
+    step: float
+    """Distance of the poses that are looked at [m]."""
+    turn_cost: float
+    """Of a turn [m/rad]."""
+    arm: float
+    """How far a turn carries an object along [m/rad]."""
+    shape: Footprint
+    """With the margin that objects cost from."""
+    tight: Footprint
+    """With the margin that walls are kept from."""
+    among: Obstacles
+    poses: FloatArray
+    """(K, 3) of the objects."""
+    bodies: Bodies
+    weights: FloatArray
+    """(K,) cost of carrying each object along."""
+
+
+@kernel(allocates=True)
+def _object_depth(pose: FloatArray, problem: RouteProblem, body: FloatArray) -> tuple[float, float]:
+    """How deep the footprint is in the objects [m], and the weights of those it is in."""
+    shape, poses, bodies = problem.shape, problem.poses, problem.bodies
+    total, touch, placed = 0.0, 0.0, False
+    for k in range(poses.shape[0]):
+        dx, dy = poses[k, 0] - pose[0], poses[k, 1] - pose[1]
+        reach = shape.radius + bodies.radii[k]
+        if problem.weights[k] == 0.0 or dx * dx + dy * dy >= reach * reach:
+            continue
+        if not placed:
+            transform_points(pose, shape.vertices, body)
+            placed = True
+        a, b = bodies.offsets[k], bodies.offsets[k + 1]
+        outline = np.empty((b - a, 2))
+        transform_points(poses[k], bodies.vertices[a:b], outline)
+        deepest = 0.0
+        for p in range(shape.offsets.shape[0] - 1):
+            part = body[shape.offsets[p] : shape.offsets[p + 1]]
+            deepest = max(deepest, convex_penetration(part, outline)[0])
+        if deepest > 0.0:
+            total += deepest
+            touch += problem.weights[k]
+    return total, touch
+
+
+@kernel(allocates=True)
+def static_depth(
+    pose: FloatArray, shape: Footprint, among: Obstacles, scratch: FloatArray
+) -> float:
+    """How deep the footprint is in what is static [m]; 0 where it is free."""
+    deepest = 0.0
+    if is_free(pose, shape, among, scratch):
+        return deepest
+    transform_points(pose, shape.vertices, scratch)
+    for s in range(among.boxes.shape[0]):
+        obstacle = among.vertices[among.offsets[s] : among.offsets[s + 1]]
+        for p in range(shape.offsets.shape[0] - 1):
+            part = scratch[shape.offsets[p] : shape.offsets[p + 1]]
+            deepest = max(deepest, convex_penetration(part, obstacle)[0])
+    return deepest
+
+
+@kernel(allocates=True)
+def _turn(
+    x: float, y: float, heading: float, to: float, problem: RouteProblem
+) -> tuple[float, float]:
+    """Cost of a turn on the spot from one heading to another, and how to make it; see `Route`."""
+    here, there = np.array([x, y, heading]), np.array([x, y, to])
+    turn = wrap_angle(to - heading)
+    other = turn - math.copysign(2.0 * math.pi, turn)
+    cost = _motion(here, there, turn, problem)
+    if abs(turn) > LITTLE_TURN and problem.turn_cost * abs(other) < cost:
+        longer = _motion(here, there, other, problem)
+        if longer < cost:
+            cost, turn = longer, other
+    return cost, math.copysign(1.0, turn) if abs(turn) > SURE_TURN else 0.0
+
+
+@kernel(allocates=True)
+def _motion(here: FloatArray, there: FloatArray, turn: float, problem: RouteProblem) -> float:
+    """Cost of a straight motion between two poses, or of a turn on the spot; inf at a wall."""
+    body = np.empty_like(problem.shape.vertices)
+    scratch = np.empty_like(problem.tight.vertices)
+    length = math.hypot(there[0] - here[0], there[1] - here[1])
+    steps = max(1, math.ceil((length + abs(turn) * problem.shape.radius) / problem.step))
+    pose = here.copy()
+    depth, _ = _object_depth(pose, problem, body)
+    inside = static_depth(pose, problem.tight, problem.among, scratch)
+    motion = (length + problem.arm * abs(turn)) / steps
+    cost = length + problem.turn_cost * abs(turn)
+    for n in range(1, steps + 1):
+        part = n / steps
+        pose[0] = here[0] + part * (there[0] - here[0])
+        pose[1] = here[1] + part * (there[1] - here[1])
+        pose[2] = here[2] + part * turn
+        if inside > 0.0:  # out of it, but no deeper into it
+            before, inside = inside, static_depth(pose, problem.tight, problem.among, scratch)
+            if inside > before:
+                return np.inf
+            cost += _TIGHT_COST * (length + problem.shape.radius * abs(turn)) / steps
+        elif not is_free(pose, problem.tight, problem.among, scratch):
+            return np.inf
+        now, touch = _object_depth(pose, problem, body)
+        if touch > 0.0 and now >= depth:
+            cost += motion * touch
+        depth = now
+    total: float = cost
+    return total
+
+
+@kernel(allocates=True)
+def _leg(
+    x: float, y: float, heading: float, point: FloatArray, sign: float, problem: RouteProblem
+) -> tuple[float, float, float]:
+    """Cost of turning to a point (2,) and driving there, the heading then, and how to turn."""
+    dx, dy = point[0] - x, point[1] - y
+    if math.hypot(dx, dy) < 1e-9:
+        return 0.0, heading, 0.0
+    ahead = math.atan2(sign * dy, sign * dx)
+    cost, turn = _turn(x, y, heading, ahead, problem)
+    if cost < np.inf:
+        here, there = np.array([x, y, ahead]), np.array([point[0], point[1], ahead])
+        cost += _motion(here, there, 0.0, problem)
+    return cost, ahead, turn
+
+
+@kernel(allocates=True)
+def cheapest_legs(
+    points: FloatArray,  # (N, 2), the first is where the robot is
+    heading: float,  # of the robot there [rad]
+    end: float,  # heading to turn to at the last [rad]
+    first: int,  # how many of the first points a leg to any other may begin at
+    longest: int,  # how many points further on a leg from another may end
+    problem: RouteProblem,
+) -> tuple[FloatArray, IntArray, FloatArray]:
+    """Costs of ending ahead and back; the row before each row (2 i, 2 i + 1); turns (2 N, 2)."""
+    count = points.shape[0]
+    best, came = np.full(2 * count, np.inf), np.full(2 * count, -1, dtype=np.int64)
+    headings, turns = np.full(2 * count, heading), np.zeros((2 * count, 2))
+    best[0] = 0.0
+    for to in range(2, 2 * count):
+        j, sign = to // 2, 1.0 - 2.0 * (to % 2)
+        for at in range(2 * j):
+            i = at // 2
+            if i >= first and i < j - longest:
+                continue
+            x, y = points[i, 0], points[i, 1]
+            if best[at] + math.hypot(x - points[j, 0], y - points[j, 1]) >= best[to]:
+                continue
+            cost, ahead, turn = _leg(x, y, headings[at], points[j], sign, problem)
+            cost, last = best[at] + cost, 0.0
+            if j == count - 1 and cost < best[to]:
+                more, last = _turn(points[j, 0], points[j, 1], ahead, end, problem)
+                cost += more
+            if cost < best[to]:
+                best[to], came[to], headings[to] = cost, at, ahead
+                turns[to, 0], turns[to, 1] = turn, last
+    return best[-2:], came, turns

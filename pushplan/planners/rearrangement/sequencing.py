@@ -1,0 +1,126 @@
+"""From a push graph to an order of pushes."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from pushplan.gtsp import solve_gtsp
+from pushplan.planners.rearrangement.cost_to_go_kernels import MAX_EXACT, MAX_OBJECTS, cost_to_go
+from pushplan.planners.rearrangement.gtsp_reduction import reduce_to_gtsp
+from pushplan.planners.rearrangement.push_graph import PushGraph
+from pushplan.world import MaxIterations
+from pushplan.world.checks import FloatArray, IntArray
+
+
+@dataclass(frozen=True, eq=False)
+class DeliverySets:
+    """What the pushes of a graph deliver, as sets in machine words.
+
+    Args:
+        objects: ids of the objects, in the order of the bits.
+        masks: (N,) sets.
+    """
+
+    objects: tuple[int, ...]
+    masks: IntArray
+
+    def mask(self, ids: tuple[int, ...]) -> int:
+        """The set of some objects; those that nothing delivers are left out."""
+        return sum(1 << b for b, i in enumerate(self.objects) if i in ids)
+
+
+def delivery_sets(graph: PushGraph) -> DeliverySets:
+    """The sets of a graph; an object that can only be pre-relocated counts as delivered by that."""
+    reachable = [n for n in range(len(graph.pushes)) if np.isfinite(graph.costs[-1, n])]
+    objects = tuple(sorted({i for n in reachable for i in graph.pushes[n].serves})[:MAX_OBJECTS])
+    sets = DeliverySets(objects, np.zeros(0, dtype=np.int64))
+    masks = np.array([sets.mask(push.serves) for push in graph.pushes], dtype=np.int64)
+    return DeliverySets(objects, masks)
+
+
+def _order_after(
+    following: IntArray, masks: IntArray, mask: int, last: int, order: list[int]
+) -> list[int]:
+    """An order, gone on with the cheapest pushes after what is delivered and the last push."""
+    while following[mask, last] >= 0:
+        last = int(following[mask, last])
+        mask |= int(masks[last])
+        order.append(last)
+    return order
+
+
+def push_order(graph: PushGraph, iterations: int = 300) -> tuple[list[int], float]:
+    """The cheapest order of pushes that is found: their indices, and its cost [m].
+
+    Objects without a push are left out. Up to `MAX_EXACT` objects the order is the cheapest there
+    is; beyond, `solve_gtsp` searches for one on the reduced problem.
+    """
+    sets = delivery_sets(graph)
+    count = len(sets.objects)
+    if not count:
+        return [], 0.0
+    if count <= MAX_EXACT:
+        best, following = cost_to_go(graph.costs, sets.masks, count)
+        start = len(graph.pushes)
+        return _order_after(following, sets.masks, 0, start, []), float(best[0, start])
+    reduced = reduce_to_gtsp(graph.costs, sets.masks.tolist(), count)
+    tour = solve_gtsp(reduced.costs, reduced.clusters, stop=MaxIterations(iterations))
+    if not tour.status.has_tour:
+        return [], math.inf
+    return reduced.order([int(node) for node in tour.nodes]), float(tour.cost)
+
+
+def sequence_pushes(
+    graph: PushGraph, simulated_cost: Callable[[int], tuple[float, tuple[int, ...]]], most: int
+) -> list[int]:
+    """The order of pushes, with the first one simulated.
+
+    The graph knows approaches roughly. The push that the cheapest order begins with is
+    simulated, until no other order could be cheaper.
+
+    Args:
+        graph: the pushes and their costs.
+        simulated_cost: from the index of a push to its cost from where the robot is now [m], and
+            what it then delivers.
+        most: how many pushes are simulated at most.
+    """
+    sets = delivery_sets(graph)
+    count = len(sets.objects)
+    if not count:
+        return []
+    if count > MAX_EXACT:
+        return _by_tours(graph, simulated_cost, most)
+    best, following = cost_to_go(graph.costs, sets.masks, count)
+    rest = np.array([best[sets.masks[n], n] for n in range(len(sets.masks))])
+    guess = graph.costs[-1] + rest
+    chosen, value, mask = -1, math.inf, 0
+    for n in np.argsort(guess, kind="stable").tolist()[:most]:
+        if guess[n] >= value:
+            break
+        cost, delivers = simulated_cost(n)
+        after = sets.mask(delivers) | int(sets.masks[n])
+        total = cost + float(best[after, n])
+        if total < value:
+            chosen, value, mask = n, total, after
+    return _order_after(following, sets.masks, mask, chosen, [chosen]) if chosen >= 0 else []
+
+
+def _by_tours(
+    graph: PushGraph, simulated_cost: Callable[[int], tuple[float, tuple[int, ...]]], most: int
+) -> list[int]:
+    """As `sequence_pushes`, with a tour anew for every push that is simulated."""
+    costs: FloatArray = graph.costs.copy()
+    known: dict[int, float] = {}
+    for _ in range(most):
+        order, total = push_order(PushGraph(graph.pushes, costs, graph.approach, {}))
+        if not order or not math.isfinite(total):
+            break
+        if order[0] in known:
+            return order
+        known[order[0]] = costs[-1, order[0]] = simulated_cost(order[0])[0]
+    rest = [n for n in known if math.isfinite(known[n])]
+    return [min(rest, key=lambda n: (known[n] / len(graph.pushes[n].serves), n))] if rest else []

@@ -1,0 +1,111 @@
+"""What a `Policy` may have beside ``reset`` and ``act``: small contracts, all of them optional.
+
+Whoever runs a policy asks ``isinstance(policy, LogsPlans)``; a policy has an ability by having the
+attributes, without inheriting anything. ``docs/extending.md`` shows each.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any, Protocol, runtime_checkable
+
+from pushplan.world.plan import Plan, PlanResult
+
+
+@runtime_checkable
+class ChoosesActions(Protocol):
+    """Names the action modes that it can drive in.
+
+    A policy without it gets the first mode of the task; if the first action is then a `Twist` or
+    `WheelSpeeds`, which that mode does not take, the first mode that does.
+    """
+
+    @property
+    def actions(self) -> Sequence[str]:
+        """Names of action modes, the preferred one first; the first that the task has is taken."""
+        ...
+
+
+@runtime_checkable
+class ChoosesObservation(Protocol):
+    """Decides on what the environment observes; a policy without it looks at the `World` alone."""
+
+    @property
+    def observation(self) -> Any:
+        """Name of an observation of the task, or a `pushplan.observation.ObservationBuilder`."""
+        ...
+
+
+@runtime_checkable
+class ChecksEnvironment(Protocol):
+    """Is made for some environments only, as a trained network is."""
+
+    def check_environment(self, env: Any, scenario: Any = None) -> None:
+        """Refuse an environment.
+
+        Args:
+            env: a `pushplan.envs.PushEnv`, before its first reset.
+            scenario: what it was made for, if known.
+
+        Raises:
+            InvalidInputError: naming what the policy needs and what the environment has.
+        """
+        ...
+
+
+@runtime_checkable
+class ChecksScenario(Protocol):
+    """Knows without an environment which scenarios it is made for."""
+
+    def incompatibility(self, scenario: Any) -> str | None:
+        """The reason why it cannot run a scenario; None if it may."""
+        ...
+
+
+@runtime_checkable
+class HoldsDecisions(Protocol):
+    """Decides every few steps and gives the same action in between."""
+
+    @property
+    def steps_per_decision(self) -> int:
+        """Steps for which a decision stands, at least 1."""
+        ...
+
+
+@runtime_checkable
+class PlansBesideDriving(Protocol):
+    """Plans while the robot drives on, in latency-aware simulation."""
+
+    @property
+    def background_s(self) -> float:
+        """The part of the last call of ``act`` that went on beside driving [s]."""
+        ...
+
+    def simulate_latency(self, factor: float, clock: Callable[[], float]) -> None:
+        """Let a plan be there only after the time that it took, until the next ``reset``.
+
+        Args:
+            factor: seconds of the world's clock for one of ``clock``.
+            clock: returns seconds.
+        """
+        ...
+
+
+@runtime_checkable
+class LogsPlans(Protocol):
+    """Keeps what its planner returned."""
+
+    @property
+    def plan_log(self) -> Sequence[PlanResult]:
+        """Every planning call since the last ``reset``."""
+        ...
+
+
+@runtime_checkable
+class ShowsPlan(Protocol):
+    """Has a plan that a picture can show."""
+
+    @property
+    def current_plan(self) -> Plan | None:
+        """The plan that is being driven; None while there is none."""
+        ...
