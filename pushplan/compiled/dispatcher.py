@@ -19,7 +19,7 @@ _WATCHERS: list[Watcher] = []
 
 @contextmanager
 def watching(watcher: Watcher) -> Iterator[None]:
-    """Be told of each kernel that becomes ready, one that calls others after those."""
+    """Be told of each kernel that becomes ready to be called from Python."""
     _WATCHERS.append(watcher)
     try:
         yield
@@ -43,9 +43,10 @@ class _CachedDispatcher(CPUDispatcher):
             entry = super().compile(sig)
         finally:
             self._cache.release()
-        loaded = sum(self._cache_hits.values()) > hits
-        for watcher in _WATCHERS:
-            watcher(f"{self.py_func.__module__}.{self.py_func.__qualname__}", loaded)
+        if self.form == KernelDispatcher.form:
+            loaded = sum(self._cache_hits.values()) > hits
+            for watcher in _WATCHERS:
+                watcher(f"{self.py_func.__module__}.{self.py_func.__qualname__}", loaded)
         return entry
 
 

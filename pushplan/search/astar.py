@@ -61,7 +61,6 @@ def register(kind: type, successors: Any, bound: Any, reached: Any) -> None:
         bound: compiled function for `estimate`.
         reached: compiled function for `is_goal`.
     """
-
     add_type_kernels(kind, successors, bound, reached)
 
     def handles(lattice: Any) -> bool:

@@ -44,7 +44,7 @@ def _run(path: Path, cache: Path | str) -> tuple[str, str]:
     return done.stdout.strip(), done.stderr
 
 
-_COMPILED = "[('half', False), ('twice', False)]"
+_COMPILED = "[('twice', False)]"
 _LOADED = "[('twice', True)]"
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass, field
+from typing import ClassVar
 
 import numpy as np
 
@@ -50,6 +51,9 @@ class PushAware:
         config: parameters.
         interaction: the quasi-static model that prices contacts; `cautious_model` by default.
     """
+
+    warm_up_iterations: ClassVar[int] = 6000
+    """After which it has used all of its kernels."""
 
     config: PushAwareConfig = field(default_factory=PushAwareConfig)
     interaction: QuasiStatic = field(default_factory=cautious_model)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass, field
+from typing import ClassVar
 
 import numpy as np
 
@@ -37,6 +38,9 @@ class PredictiveShip:
         config: parameters.
         interaction: predicts the floes.
     """
+
+    warm_up_iterations: ClassVar[int] = 30
+    """After which it has used all of its kernels."""
 
     config: PredictiveConfig = field(default_factory=PredictiveConfig)
     interaction: IceInteraction = field(default_factory=IceInteraction)
@@ -72,6 +76,9 @@ class PredictiveShipNetwork:
         interaction: sweeps the plan that is returned, for its prediction; the search does not
             use it.
     """
+
+    warm_up_iterations: ClassVar[int] = 30
+    """After which it has used all of its kernels."""
 
     config: PredictiveConfig = field(default_factory=lambda: PredictiveConfig(widest=24, sparse=0))
     network: IceNetwork = field(default_factory=IceNetwork)
