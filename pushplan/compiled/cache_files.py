@@ -83,7 +83,7 @@ def _folders(package: str, chosen: str) -> Folders:
     if chosen:
         candidates = [Path(chosen) / inside]
     else:
-        user = Path(UserWideCacheLocator(_folders, source).get_cache_path())
+        user = Path(UserWideCacheLocator(read, source).get_cache_path())
         candidates = [Path(package) / "__pycache__", user]
     for folder in candidates:
         try:

@@ -113,3 +113,13 @@ def test_an_exception_of_a_called_kernel_reaches_python_from_the_cache(tmp_path:
     )
     for _ in range(2):
         assert _run(module, tmp_path / "cache") == ("('negative', 3)", "")
+
+
+def test_without_a_chosen_folder_kernels_lie_beside_their_source(
+    module: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.delenv("NUMBA_CACHE_DIR", raising=False)
+    for expected in (_COMPILED, _LOADED):
+        done = subprocess.run([sys.executable, module], capture_output=True, text=True, check=True)
+        assert done.stdout.strip() == expected
+    assert (module.parent / "__pycache__").is_dir()
