@@ -24,8 +24,8 @@ from matplotlib import pyplot as plt
 
 from pushplan.evaluation import PolicySpec, bench, bootstrap_interval
 from pushplan.planners.following.plan_follower import PlanFollower
-from pushplan.planners.policies import push_aware_constant_speed
 from pushplan.planners.push_aware import PushAware, PushAwareConfig, cautious_model
+from pushplan.planners.push_aware.policies import push_aware_constant_speed
 from pushplan.planners.rrt import KinodynamicRRT, KinodynamicRRTConfig
 
 NAMES = {"push-aware-constant-speed": "o-", "kinodynamic-rrt": "s--"}

@@ -18,6 +18,7 @@ from __future__ import annotations
 import argparse
 import time
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -26,10 +27,11 @@ from pushplan.envs.tasks.ship_ice import ShipIceTask
 from pushplan.evaluation import ResultRow, bench
 from pushplan.evaluation.statistics import estimate
 from pushplan.motion.speed_profile import turning_radius
+from pushplan.motion.state_lattice.lattice_builder import LatticeBuilder
+from pushplan.motion.state_lattice.lattice_search import open_search
 from pushplan.planners import make_planner, warm_up
 from pushplan.planners.ship_lattice import ShipLattice, ShipLatticeConfig
-from pushplan.planners.ship_lattice.build import LatticeBuilder
-from pushplan.planners.ship_lattice.paths import open_search
+from pushplan.planners.ship_lattice.floe_costs import floe_costs
 from pushplan.scenarios import Scenario
 from pushplan.world import World, stream
 
@@ -157,7 +159,7 @@ def times(shares: Sequence[int], fields: int, seed: int) -> None:
     print("|---|---|---|---|---|")
     worlds = starts(fields, seed, 30, {}, "full_scale")
     for title, refinement in (("searches only", 0), ("searches and refinement", 30)):
-        planner = ShipLattice(ShipLatticeConfig(repairs=0, refinement=refinement))
+        planner = ShipLattice(ShipLatticeConfig(shortcuts=0, refinement=refinement))
         print(f"| {title} | {row(planner, worlds)} |", flush=True)
 
 
@@ -193,7 +195,9 @@ def rate(worlds: list[World], config: ShipLatticeConfig) -> str:
     total, seconds = 0, 0.0
     for world in worlds:
         radius = turning_radius(world.robot, config.turn_share)
-        builder = LatticeBuilder(world, config, radius=radius, side=0.0)
+        builder = LatticeBuilder(
+            world, config, radius=radius, side=0.0, floe_costs=partial(floe_costs, config)
+        )
         star, _ = open_search(builder.build(), builder)
         star.lattice = star.lattice._replace(inflation=0.0)
         began = time.process_time()

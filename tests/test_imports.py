@@ -21,7 +21,7 @@ HEAVY = ("pymunk", "mujoco", "gymnasium", "torch", "matplotlib")
         "drawing",
         "planners",
         "planners.kinodynamic",
-        "planners.policies",
+        "planners.push_aware.policies",
     ],
 )
 def test_no_simulator_and_no_learning_library(module):

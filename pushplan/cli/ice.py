@@ -72,7 +72,9 @@ def run(options: argparse.Namespace) -> int:
         radii = field.radii
         say(f"  radii {radii.min():.3g} to {radii.max():.3g} m, mean {radii.mean():.3g} m")
     if options.out:
-        field.save(options.out)
+        from pushplan.scenarios import save_ice
+
+        save_ice(field, options.out)
         say(f"wrote {options.out}")
     if options.picture:
         _draw(field, options.picture)

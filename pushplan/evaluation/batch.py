@@ -34,7 +34,9 @@ Progress = Callable[[int, int, ResultRow | None], None]
 _log = logging.getLogger(__name__)
 PRELOAD = (
     "pushplan.evaluation.execute",
-    "pushplan.planners.policies",
+    "pushplan.planners.push_aware.policies",
+    "pushplan.planners.rrt.policies",
+    "pushplan.planners.ship_predictive.policies",
     "pushplan.envs.push_env",
     "pushplan.envs.simulators.pymunk_simulator",
 )

@@ -8,7 +8,7 @@ from pushplan.compiled import kernel
 from pushplan.world.checks import FloatArray
 
 
-@kernel(allocates=True)
+@kernel
 def _best_edge(a: FloatArray, b: FloatArray) -> tuple[float, float, float]:
     """Outward edge normal of ``a`` along which ``b`` is farthest away: gap [m] and normal."""
     best, bx, by = -math.inf, 1.0, 0.0
@@ -30,7 +30,7 @@ def _best_edge(a: FloatArray, b: FloatArray) -> tuple[float, float, float]:
     return best, bx, by
 
 
-@kernel(allocates=True)
+@kernel
 def convex_penetration(a: FloatArray, b: FloatArray) -> tuple[float, float, float]:
     """Least translation that separates two convex polygons (separating axis theorem).
 
@@ -50,7 +50,7 @@ def convex_penetration(a: FloatArray, b: FloatArray) -> tuple[float, float, floa
     return -gap_b, -bx, -by
 
 
-@kernel(allocates=True)
+@kernel
 def _is_separated_by_edge(a: FloatArray, b: FloatArray) -> bool:
     n = a.shape[0]
     for i in range(n):
@@ -68,7 +68,7 @@ def _is_separated_by_edge(a: FloatArray, b: FloatArray) -> bool:
     return False
 
 
-@kernel(allocates=True)
+@kernel
 def convex_overlap(a: FloatArray, b: FloatArray) -> bool:
     """Whether the interiors of two convex counter-clockwise polygons meet; touching is no overlap.
 
@@ -79,7 +79,7 @@ def convex_overlap(a: FloatArray, b: FloatArray) -> bool:
     return not (_is_separated_by_edge(a, b) or _is_separated_by_edge(b, a))
 
 
-@kernel(allocates=True)
+@kernel
 def point_segment_distance_sq(
     x: float, y: float, ax: float, ay: float, bx: float, by: float
 ) -> float:
@@ -94,7 +94,7 @@ def point_segment_distance_sq(
     return ex * ex + ey * ey
 
 
-@kernel(allocates=True)
+@kernel
 def _least_corner_distance_sq(a: FloatArray, b: FloatArray) -> float:
     best = math.inf
     n = a.shape[0]
@@ -106,7 +106,7 @@ def _least_corner_distance_sq(a: FloatArray, b: FloatArray) -> float:
     return best
 
 
-@kernel(allocates=True)
+@kernel
 def convex_distance(a: FloatArray, b: FloatArray) -> float:
     """Euclidean distance [m] between two convex counter-clockwise polygons, 0 if they overlap.
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from pushplan.compiled import kernel
@@ -64,9 +66,27 @@ def contacts(a: FloatArray, b: FloatArray, out: FloatArray) -> int:
     return _clipped(a, edge_a, b, 1.0, out)
 
 
+class FacingEdges(NamedTuple):
+    """An edge of a polygon, and the edge of another one that faces it most."""
+
+    px: float
+    """Where the first edge begins [m]."""
+    py: float
+    tx: float
+    """Unit vector along it; its outward normal is (ty, -tx)."""
+    ty: float
+    length: float
+    su: float
+    """Ends of the other edge along the first [m]."""
+    sw: float
+    du: float
+    """The same ends along the normal [m]."""
+    dw: float
+
+
 @kernel
-def _clipped(ref: FloatArray, edge: int, inc: FloatArray, sign: float, out: FloatArray) -> int:
-    """Clip the edge that faces the reference edge against it; returns the number of points."""
+def facing_edges(ref: FloatArray, edge: int, inc: FloatArray) -> FacingEdges:
+    """The edge of ``ref`` that begins at corner ``edge``, and the edge of ``inc`` that faces it."""
     after = edge + 1 if edge + 1 < ref.shape[0] else 0
     px, py = ref[edge, 0], ref[edge, 1]
     tx, ty = ref[after, 0] - px, ref[after, 1] - py
@@ -83,20 +103,34 @@ def _clipped(ref: FloatArray, edge: int, inc: FloatArray, sign: float, out: Floa
     ux, uy, wx, wy = inc[side, 0] - px, inc[side, 1] - py, inc[other, 0] - px, inc[other, 1] - py
     su, sw = ux * tx + uy * ty, wx * tx + wy * ty
     du, dw = ux * nx + uy * ny, wx * nx + wy * ny
+    return FacingEdges(px, py, tx, ty, length, su, sw, du, dw)
+
+
+@kernel
+def write_point(edges: FacingEdges, s: float, d: float, sign: float, out: FloatArray) -> None:
+    """Write the point at ``s`` along and ``d`` across an edge, and its normal times ``sign``."""
+    nx, ny = edges.ty, -edges.tx
+    out[0] = edges.px + s * edges.tx + d * nx
+    out[1] = edges.py + s * edges.ty + d * ny
+    out[2] = sign * nx
+    out[3] = sign * ny
+
+
+@kernel
+def _clipped(ref: FloatArray, edge: int, inc: FloatArray, sign: float, out: FloatArray) -> int:
+    """Clip the edge that faces the reference edge against it; returns the number of points."""
+    edges = facing_edges(ref, edge, inc)
     found = 0
-    span = sw - su
+    span = edges.sw - edges.su
     for end in range(2):
-        s, d = (su, du) if end == 0 else (sw, dw)
-        clipped = min(max(s, 0.0), length)
+        s, d = (edges.su, edges.du) if end == 0 else (edges.sw, edges.dw)
+        clipped = min(max(s, 0.0), edges.length)
         if clipped != s:
-            if abs(span) < 1e-12 * length:
+            if abs(span) < 1e-12 * edges.length:
                 continue
-            d = du + (clipped - su) / span * (dw - du)
+            d = edges.du + (clipped - edges.su) / span * (edges.dw - edges.du)
         if d < 0.0:
-            out[found, 0] = px + clipped * tx + d * nx
-            out[found, 1] = py + clipped * ty + d * ny
-            out[found, 2] = sign * nx
-            out[found, 3] = sign * ny
+            write_point(edges, clipped, d, sign, out[found])
             out[found, 4] = -d
             found += 1
     return found

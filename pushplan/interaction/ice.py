@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pushplan.interaction.ice_contacts import Crowd, Solver, make_memory, sweep_ice
+from pushplan.interaction.ice_bodies import IceBodies, IceProblem, IceSettings, ice_problem
+from pushplan.interaction.ice_contacts import sweep_ice
 from pushplan.interaction.model import Interaction
 from pushplan.interaction.quasi_static import QuasiStatic
 from pushplan.world import World
@@ -15,7 +16,7 @@ from pushplan.world.checks import FloatArray, array, integer, number
 from pushplan.world.errors import InvalidInputError
 
 STILL = 0.03
-"""Share of a step's motion that a body may be moved without a look at its neighbours."""
+"""Fraction of a step's motion that a body may be moved without a look at its neighbours."""
 
 
 @dataclass(frozen=True)
@@ -48,7 +49,7 @@ class IceInteraction:
         number("step", self.step, low=0.0, high=1.0, open_low=True)
         integer("iterations", self.iterations, low=1)
 
-    def crowd(self, world: World) -> Crowd:
+    def bodies(self, world: World) -> IceBodies:
         """The world's shapes and masses as the kernels read them.
 
         Raises:
@@ -60,7 +61,7 @@ class IceInteraction:
                 f"{len(world.static.convex_parts)} static obstacles: use QuasiStatic"
             )
         bodies = QuasiStatic().bodies(world)
-        return Crowd(
+        return IceBodies(
             bodies.robot_vertices,
             bodies.robot_offsets,
             bodies.robot_radius,
@@ -71,20 +72,28 @@ class IceInteraction:
             bodies.inverse_gyration,
         )
 
-    def solver(self, world: World) -> Solver:
+    def settings(self, world: World) -> IceSettings:
         """The numerical settings for the sizes in this world."""
         radii = world.movables.radii
         size = float(np.median(radii)) if len(radii) else world.robot.circumscribed_radius
         step = self.step * size
-        return Solver(step, self.iterations, self.hull_friction, self.friction, STILL * step)
+        return IceSettings(step, self.iterations, self.hull_friction, self.friction, STILL * step)
+
+    def problem(self, world: World) -> IceProblem:
+        """Bodies and settings as `sweep_ice` reads them; for one thread.
+
+        Raises:
+            InvalidInputError: if there is something static in the world.
+        """
+        problem: IceProblem = ice_problem(self.bodies(world), self.settings(world))
+        return problem
 
     def sweep(self, world: World, path: ArrayLike) -> Interaction:
         """Predict the motion of every object; see `InteractionModel.sweep`."""
         robot_path: FloatArray = array("path", path, (None, 3))
         if len(robot_path) == 0:
             raise InvalidInputError("path must hold at least one pose, got none")
-        crowd = self.crowd(world)
         poses = world.movables.poses.copy()
         out = np.empty((len(robot_path), len(poses), 3))
-        sweep_ice(robot_path, poses, crowd, self.solver(world), make_memory(crowd), out)
+        sweep_ice(robot_path, poses, self.problem(world), out)
         return Interaction(out, world.movables.masses)

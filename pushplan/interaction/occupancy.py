@@ -3,7 +3,7 @@
 After Zhong et al., "Autonomous Navigation in Ice-Covered Waters with Learned Predictions on
 Ship-Ice Interactions" (2025, arXiv 2409.11326): a patch of 40 x 40 cells about the ship with the
 channels occupancy, footprint and swath goes in, the occupancy after passing comes out. Here cells
-hold the covered share, not a bit, and a forecast also holds the work on the ice.
+hold the covered fraction, not a bit, and a forecast also holds the work on the ice.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ CHANNELS = ("occupancy", "footprint", "swath")
 
 @dataclass(frozen=True, eq=False)
 class Passage(ArrayRecord):
-    """One way through the objects: a scene, and the poses that the robot sweeps through.
+    """A path through the objects: a world, and the poses that the robot sweeps through.
 
     Args:
         world: the snapshot; of the robot only the footprint is used.
@@ -55,16 +55,16 @@ class PassageBatch:
     """Passages as a predictor reads them.
 
     Args:
-        patches: (B, 3, 40, 40) covered share of each cell: occupancy, footprint at the start,
+        patches: (B, 3, 40, 40) covered fraction of each cell: occupancy, footprint at the start,
             swath. Rows count up ahead (towards the goal), columns to the right.
         cell: side of a cell [m].
         density: mass over area of the objects [kg/m²].
-        frames: (B, 3) where each patch lies, as in `occupancy_kernels.cover_objects`; None where
+        frames: (B, 3) where each patch lies, as in `occupancy_kernels`; None where
             the patches come from a map and predictors that need none are asked.
-        passages: the scenes, for predictors that follow single objects; () where there are none.
+        passages: the worlds, for predictors that follow single objects; () where there are none.
 
     Raises:
-        InvalidInputError: if a shape is wrong or a value is not a share.
+        InvalidInputError: if a shape is wrong or a value is not a fraction.
     """
 
     patches: Patch
@@ -79,7 +79,7 @@ class PassageBatch:
         patches = array("batch.patches", self.patches, shape, dtype=np.float32)
         put(self, "patches", patches)
         if patches.size and (patches.min() < 0.0 or patches.max() > 1.0):
-            raise InvalidInputError("batch.patches must hold shares of cells, from 0 to 1")
+            raise InvalidInputError("batch.patches must hold fractions of cells, from 0 to 1")
         put(self, "cell", number("batch.cell", self.cell, low=0.0, open_low=True))
         put(self, "density", number("batch.density", self.density, low=0.0, open_low=True))
         if self.frames is not None:
@@ -99,7 +99,7 @@ class OccupancyForecast:
     """What a predictor expects of each passage of a batch.
 
     Args:
-        after: (B, 40, 40) covered share of each cell once the robot has passed.
+        after: (B, 40, 40) covered fraction of each cell once the robot has passed.
         work: (B,) sum of mass times path length over the objects [kg m].
     """
 
@@ -118,7 +118,7 @@ class OccupancyPredictor(Protocol):
     """Predicts the occupancy that the robot leaves behind."""
 
     def predict(self, batch: PassageBatch) -> OccupancyForecast:
-        """The occupancy after each passage, and the work done on the way.
+        """The occupancy after each passage, and the work on it.
 
         Raises:
             InvalidInputError: if the batch lacks what this predictor needs.
@@ -160,8 +160,8 @@ def patch_frame(path: FloatArray, ahead: float, cell: float) -> FloatArray:
         cell: side of a cell [m].
 
     Returns:
-        (3,) as `occupancy_kernels.cover_objects` wants it. The corner lies on a grid of cells
-        about the world's origin, so that patches of one scene share their cells.
+        (3,) as in `occupancy_kernels`. The corner lies on a grid of cells
+        about the world's origin, so that patches of one world share their cells.
     """
     right = ahead - 0.5 * math.pi
     c, s = math.cos(right), math.sin(right)

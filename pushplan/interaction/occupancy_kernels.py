@@ -1,4 +1,8 @@
-"""Compiled rasters of floes and hulls: how much of each cell is covered."""
+"""Compiled rasters of floes and hulls: how much of each cell is covered.
+
+The frame (3,) of a raster is the world position [m] of the outer corner of cell (0, 0) and the
+heading [rad] in which columns count up; rows count up to the left of it.
+"""
 
 from __future__ import annotations
 
@@ -8,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pushplan.compiled import kernel
+from pushplan.geometry.angles import wrap_angle
 from pushplan.geometry.raster import fill_convex
 from pushplan.geometry.transforms import transform_points
 from pushplan.world.checks import FloatArray, IntArray
@@ -18,9 +23,9 @@ SUBCELLS = 4
 """Samples along each side of a cell: coverage comes in steps of 1/16."""
 
 
-@kernel(allocates=True)
+@kernel
 def _to_pixels(points: FloatArray, frame: FloatArray, scale: float, out: FloatArray) -> None:
-    """Carry (N, 2) world points [m] into samples of a raster; see `cover_objects` for the frame."""
+    """Carry (N, 2) world points [m] into samples of a raster."""
     c, s = math.cos(frame[2]), math.sin(frame[2])
     for i in range(points.shape[0]):
         dx, dy = points[i, 0] - frame[0], points[i, 1] - frame[1]
@@ -28,8 +33,9 @@ def _to_pixels(points: FloatArray, frame: FloatArray, scale: float, out: FloatAr
         out[i, 1] = scale * (c * dy - s * dx)
 
 
-@kernel(allocates=True)
+@kernel
 def _average(fine: NDArray[np.uint8], out: Patch) -> None:
+    """Write the mean of the samples of each cell."""
     for r in range(out.shape[0]):
         for col in range(out.shape[1]):
             total = 0
@@ -41,24 +47,14 @@ def _average(fine: NDArray[np.uint8], out: Patch) -> None:
 
 @kernel(allocates=True)
 def cover_objects(
-    poses: FloatArray,
-    vertices: FloatArray,
-    offsets: IntArray,
-    frame: FloatArray,
-    cell: float,
-    out: Patch,
+    poses: FloatArray,  # (K, 3) of the objects, world frame
+    vertices: FloatArray,  # (V, 2) outlines in body frames [m]
+    offsets: IntArray,  # (K + 1,) where each outline starts
+    frame: FloatArray,  # (3,) see the module
+    cell: float,  # side of a cell [m]
+    out: Patch,  # (H, W) receives values from 0 to 1
 ) -> None:
-    """Share of each cell that lies under an object.
-
-    Args:
-        poses: (K, 3) poses of the objects, world frame.
-        vertices: (V, 2) outlines in body frames [m].
-        offsets: (K + 1,) where each outline starts.
-        frame: (3,) world position [m] of the outer corner of cell (0, 0) and heading [rad] of the
-            direction in which columns count up; rows count up to the left of it.
-        cell: side of a cell [m].
-        out: (H, W) receives values from 0 to 1.
-    """
+    """Write the fraction of each cell that lies under an object."""
     height, width = out.shape
     fine = np.zeros((SUBCELLS * height, SUBCELLS * width), np.uint8)
     scale = SUBCELLS / cell
@@ -73,23 +69,14 @@ def cover_objects(
 
 @kernel(allocates=True)
 def cover_sweep(
-    path: FloatArray,
-    vertices: FloatArray,
-    offsets: IntArray,
-    frame: FloatArray,
-    cell: float,
-    out: Patch,
+    path: FloatArray,  # (N, 3) poses of the robot; between two of them it goes straight
+    vertices: FloatArray,  # (V, 2) convex parts of the robot in its body frame [m]
+    offsets: IntArray,  # (P + 1,) where each part starts
+    frame: FloatArray,  # (3,) see the module
+    cell: float,  # side of a cell [m]
+    out: Patch,  # (H, W) receives values from 0 to 1
 ) -> None:
-    """Share of each cell that a robot passes over on a path; of one pose, its footprint.
-
-    Args:
-        path: (N, 3) poses of the robot; between two of them it goes straight.
-        vertices: (V, 2) convex parts of the robot in its body frame [m].
-        offsets: (P + 1,) where each part starts.
-        frame: as in `cover_objects`.
-        cell: side of a cell [m].
-        out: (H, W) receives values from 0 to 1.
-    """
+    """Write the fraction of each cell that a robot passes over; of one pose, its footprint."""
     height, width = out.shape
     fine = np.zeros((SUBCELLS * height, SUBCELLS * width), np.uint8)
     scale = SUBCELLS / cell
@@ -101,10 +88,9 @@ def cover_sweep(
         steps = 1
         turn = 0.0
         if n > 0:
-            turn = path[n, 2] - path[n - 1, 2]
-            turn -= 2.0 * math.pi * np.round(turn / (2.0 * math.pi))
-            way = math.hypot(path[n, 0] - path[n - 1, 0], path[n, 1] - path[n - 1, 1])
-            steps = max(1, math.ceil((way + abs(turn) * reach) / (0.5 * cell)))
+            turn = wrap_angle(path[n, 2] - path[n - 1, 2])
+            length = math.hypot(path[n, 0] - path[n - 1, 0], path[n, 1] - path[n - 1, 1])
+            steps = max(1, math.ceil((length + abs(turn) * reach) / (0.5 * cell)))
         for step in range(steps):
             back = step / steps
             pose = path[n].copy()

@@ -10,8 +10,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pushplan.geometry import polygon_inertia
-from pushplan.interaction.kernels import Bodies, Settings, sweep_path
+from pushplan.interaction.kernels import Bodies, Settings, make_scratch, sweep_path
 from pushplan.interaction.model import Interaction
+from pushplan.interaction.quasi_static_step import QuasiStaticContacts
 from pushplan.world import Movables, RobotModel, StaticMap, World
 from pushplan.world.checks import FloatArray, array, integer, number
 from pushplan.world.errors import InvalidInputError
@@ -69,6 +70,19 @@ class QuasiStatic:
             iterations=self.iterations,
             friction=float(self.friction),
             static_friction=float(self.static_friction),
+        )
+
+    def compiled(self, world: World) -> QuasiStaticContacts:
+        """The model as `pushplan.interaction.advance.advance_objects` takes it."""
+        bodies = self.bodies(world)
+        scratch = make_scratch(bodies)
+        return QuasiStaticContacts(
+            bodies.inverse_masses,
+            bodies.radii,
+            scratch.tests,
+            bodies,
+            self.settings(world),
+            scratch,
         )
 
     def sweep(self, world: World, path: ArrayLike) -> Interaction:

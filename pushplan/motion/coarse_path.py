@@ -1,4 +1,4 @@
-"""A coarse shortest path that trades length against boxes: where sampling is worth while."""
+"""A coarse shortest path that trades length against pushing: where sampling is worth while."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _MOST = 400
 
 
 @kernel(allocates=True)
-def _prices(
+def _cell_weights(
     origin: FloatArray,
     cell: float,
     rows: int,
@@ -30,11 +30,11 @@ def _prices(
     reach: FloatArray,
     weight: FloatArray,
 ) -> FloatArray:
-    """Price per metre of each cell: the sum over polygons of weight where they are near.
+    """Extra cost per metre of each cell: the sum over polygons of weight where they are near.
 
     The weight applies in full on the polygon and fades to nothing at its reach.
     """
-    price = np.zeros((rows, cols))
+    extra = np.zeros((rows, cols))
     for k in range(offsets.shape[0] - 1):
         corners = vertices[offsets[k] : offsets[k + 1]]
         far = reach[k]
@@ -47,8 +47,8 @@ def _prices(
                 x, y = origin[0] + (c + 0.5) * cell, origin[1] + (r + 0.5) * cell
                 gap = max(core_distance(x, y, vertices, offsets[k], offsets[k + 1]), 0.0)
                 if gap < far:
-                    price[r, c] += weight[k] * (1.0 - gap / far)
-    return price
+                    extra[r, c] += weight[k] * (1.0 - gap / far)
+    return extra
 
 
 def _cell(world: World) -> float:
@@ -57,12 +57,12 @@ def _cell(world: World) -> float:
     return max(min(extent / _SIDE, world.robot.inscribed_radius or np.inf), extent / _MOST)
 
 
-def guide_path(world: World, push_weight: float) -> FloatArray:
+def coarse_path(world: World, push_weight: float) -> FloatArray:
     """A path of the robot's centre from its pose to the goal, coarse and cheap.
 
     Args:
         world: the snapshot, with a goal for the robot.
-        push_weight: price of a unit of pushing work against a unit of travel; infinite treats
+        push_weight: weight of a unit of pushing work against a unit of travel; infinite treats
             objects as obstacles.
 
     Returns:
@@ -72,13 +72,13 @@ def guide_path(world: World, push_weight: float) -> FloatArray:
     inner, outer = robot.inscribed_radius, robot.circumscribed_radius
     cell = _cell(world)
     # walls hold the inscribed disc for certain; the rest of the footprint is a matter of heading
-    walls = _wall_prices(world.static, cell, ((inner, np.inf), (1.3 * outer, 2.0)))
+    walls = _wall_weights(world.static, cell, ((inner, np.inf), (1.3 * outer, 2.0)))
     # passing through the middle of a box pushes it for about a robot's width
     per_metre = push_weight * objects.masses / robot.mass
     boxes = [objects.outline_world(k) for k in range(len(objects))]
     reach = np.full(len(boxes), outer)
-    price = walls + _grid_prices(world.static.bounds, cell, boxes, reach, per_metre)
-    return _cheapest(world, price, cell)
+    extra = walls + _grid_weights(world.static.bounds, cell, boxes, reach, per_metre)
+    return _cheapest(world, extra, cell)
 
 
 def reachable(world: World) -> bool:
@@ -91,35 +91,35 @@ def reachable(world: World) -> bool:
     if cell > inner:
         return True  # too coarse to tell
     # a cell less than the disc: a narrow gap is left for the search to find out about
-    price = _wall_prices(world.static, cell, ((inner - cell, np.inf),))
-    return len(_cheapest(world, price, cell)) > 0
+    extra = _wall_weights(world.static, cell, ((inner - cell, np.inf),))
+    return len(_cheapest(world, extra, cell)) > 0
 
 
 @functools.lru_cache(maxsize=16)
-def _wall_prices(
+def _wall_weights(
     static: StaticMap, cell: float, terms: tuple[tuple[float, float], ...]
 ) -> FloatArray:
-    """Price per metre of each cell from walls alone, one term for each reach and weight."""
+    """Extra cost per metre of each cell from walls alone, one term for each reach and weight."""
     parts = list(static.convex_parts)
     count = len(parts)
-    prices = [
-        _grid_prices(static.bounds, cell, parts, np.full(count, reach), np.full(count, weight))
+    weights = [
+        _grid_weights(static.bounds, cell, parts, np.full(count, reach), np.full(count, weight))
         for reach, weight in terms
     ]
-    return frozen(np.sum(prices, axis=0))
+    return frozen(np.sum(weights, axis=0))
 
 
-def _grid_prices(
+def _grid_weights(
     bounds: FloatArray, cell: float, shapes: list[FloatArray], reach: FloatArray, weight: FloatArray
 ) -> FloatArray:
     cols, rows = (int(np.ceil(side / cell)) for side in bounds[2:] - bounds[:2])
-    return _prices(bounds[:2], cell, rows, cols, *flatten(shapes), reach, weight)
+    return _cell_weights(bounds[:2], cell, rows, cols, *flatten(shapes), reach, weight)
 
 
-def _cheapest(world: World, price: FloatArray, cell: float) -> FloatArray:
-    """The cheapest path from the robot to the goal over a grid of prices."""
+def _cheapest(world: World, extra: FloatArray, cell: float) -> FloatArray:
+    """The cheapest path from the robot to the goal over a grid of weights."""
     bounds, goal = world.static.bounds, world.navigation_goal
-    rows, cols = price.shape
+    rows, cols = extra.shape
     x = bounds[0] + (np.arange(cols) + 0.5) * cell
     y = bounds[1] + (np.arange(rows) + 0.5) * cell
     row, col = _cell_of(world.robot_pose[:2], bounds, cell, rows, cols)
@@ -127,7 +127,7 @@ def _cheapest(world: World, price: FloatArray, cell: float) -> FloatArray:
     if isinstance(goal, GoalDisc):  # it may be smaller than a cell
         reached[_cell_of(goal.center, bounds, cell, rows, cols)] = True
     start = np.array([row * cols + col])
-    _, parents, order = grid_dijkstra(1.0 + price, start, reached, cell)
+    _, parents, order = grid_dijkstra(1.0 + extra, start, reached, cell)
     at = int(order[-1])
     if not reached[divmod(at, cols)]:
         return np.empty((0, 2))

@@ -28,7 +28,7 @@ class Footprint(NamedTuple):
     """Circumscribed radius [m]."""
 
 
-class Obstacles(NamedTuple):
+class ConvexObstacles(NamedTuple):
     """Convex polygons in the world frame."""
 
     vertices: FloatArray
@@ -54,24 +54,22 @@ def footprint(robot: RobotModel, margin: float = 0.0) -> Footprint:
     return Footprint(vertices, offsets, float(np.hypot(vertices[:, 0], vertices[:, 1]).max()))
 
 
-def obstacles(static: StaticMap, outlines: Sequence[FloatArray] = ()) -> Obstacles:
+def obstacles(static: StaticMap, outlines: Sequence[FloatArray] = ()) -> ConvexObstacles:
     """Everything static, and further convex outlines in the world frame."""
     parts = (*static.convex_parts, *outlines)
     vertices, offsets = flatten(parts)
     boxes = [np.concatenate([part.min(axis=0), part.max(axis=0)]) for part in parts]
-    return Obstacles(vertices, offsets, np.array(boxes).reshape(-1, 4), static.bounds)
+    return ConvexObstacles(vertices, offsets, np.array(boxes).reshape(-1, 4), static.bounds)
 
 
-@kernel(allocates=True)
-def is_free(pose: FloatArray, shape: Footprint, among: Obstacles, scratch: FloatArray) -> bool:
-    """Whether the footprint at ``pose`` (3,) overlaps nothing and its origin is in bounds.
-
-    Args:
-        pose: x, y [m], theta [rad].
-        shape: the footprint.
-        among: the obstacles.
-        scratch: (V, 2) memory for the corners.
-    """
+@kernel
+def is_free(
+    pose: FloatArray,
+    shape: Footprint,
+    among: ConvexObstacles,
+    scratch: FloatArray,  # (V, 2) memory for the corners
+) -> bool:
+    """Whether a footprint at ``pose`` (3,) overlaps nothing and its origin is in bounds."""
     x, y, r = pose[0], pose[1], shape.radius
     bounds = among.bounds
     if not (bounds[0] <= x <= bounds[2] and bounds[1] <= y <= bounds[3]):
@@ -91,9 +89,9 @@ def is_free(pose: FloatArray, shape: Footprint, among: Obstacles, scratch: Float
     return True
 
 
-@kernel(allocates=True)
+@kernel
 def first_blocked(
-    poses: FloatArray, count: int, shape: Footprint, among: Obstacles, scratch: FloatArray
+    poses: FloatArray, count: int, shape: Footprint, among: ConvexObstacles, scratch: FloatArray
 ) -> int:
     """Index of the first of the first ``count`` poses that is not free, or ``count``."""
     for i in range(count):

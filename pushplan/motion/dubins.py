@@ -16,14 +16,14 @@ MAX_TURN = 0.15
 """Greatest change of heading between two poses of a path [rad]."""
 
 
-@kernel(allocates=True)
+@kernel
 def _turn(angle: float) -> float:
     """Angle in [0, 2π); a turn that is full but for rounding is none."""
     angle = angle % _TWO_PI
     return 0.0 if angle > _TWO_PI - 1e-9 else angle
 
 
-@kernel(allocates=True)
+@kernel
 def dubins(start: FloatArray, end: FloatArray, radius: float, out: FloatArray) -> float:
     """Shortest forward path between two poses under a curvature bound.
 
@@ -92,7 +92,7 @@ def dubins(start: FloatArray, end: FloatArray, radius: float, out: FloatArray) -
     return best * radius
 
 
-@kernel(allocates=True)
+@kernel
 def along_arc(pose: FloatArray, length: float, curvature: float, out: FloatArray) -> None:
     """Drive ``length`` [m] along an arc of constant curvature [1/m] from ``pose`` (3,)."""
     turn = length * curvature
@@ -105,7 +105,7 @@ def along_arc(pose: FloatArray, length: float, curvature: float, out: FloatArray
     out[2] = pose[2] + turn
 
 
-@kernel(allocates=True)
+@kernel
 def step_along(curvature: float, spacing: float) -> float:
     """Distance between poses on an arc [m]: ``spacing``, less where that would turn too far."""
     return min(spacing, MAX_TURN / max(abs(curvature), 1e-12))

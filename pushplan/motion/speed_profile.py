@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from pushplan.motion.collision import footprint, is_free, obstacles
-from pushplan.motion.shortcutting import Path
+from pushplan.motion.path_problem import SweptPath
 from pushplan.world import Drive, InvalidInputError, Plan, RobotModel, World
 
 TIGHTEST = 0.1
@@ -15,7 +15,7 @@ _WIDEST = 1e5
 """Greatest turning radius of vehicles that lattices are made for, in circumscribed radii."""
 
 
-def turning_radius(robot: RobotModel, turn_share: float) -> float:
+def turning_radius(robot: RobotModel, turn_fraction: float) -> float:
     """Least turning radius that plans use at first [m].
 
     A constant-speed robot cannot turn tighter than v / ω. A differential drive can, by slowing
@@ -24,7 +24,7 @@ def turning_radius(robot: RobotModel, turn_share: float) -> float:
     """
     if robot.drive is Drive.DIFFERENTIAL:
         return robot.circumscribed_radius
-    return max(robot.turning_radius / turn_share, TIGHTEST * robot.circumscribed_radius)
+    return max(robot.turning_radius / turn_fraction, TIGHTEST * robot.circumscribed_radius)
 
 
 def check_turns(robot: RobotModel) -> None:
@@ -47,26 +47,26 @@ def start_margin(world: World, margin: float) -> float | None:
     A robot that starts nearer to a wall than ``margin`` keeps what it has.
     """
     walls = obstacles(world.static)
-    for share in (1.0, 0.5, 0.25, 0.1, 0.0):
-        shape = footprint(world.robot, share * margin)
+    for fraction in (1.0, 0.5, 0.25, 0.1, 0.0):
+        shape = footprint(world.robot, fraction * margin)
         if is_free(world.robot_pose, shape, walls, np.empty_like(shape.vertices)):
-            return share * margin
+            return fraction * margin
     return None
 
 
-def timed_plan(world: World, path: Path, turn_share: float) -> Plan:
+def timed_plan(world: World, path: SweptPath, turn_fraction: float) -> Plan:
     """Give a path speeds and times: full speed, slower where the curvature asks for it.
 
     Args:
         world: the snapshot that the path starts from.
         path: poses, curvatures, predicted objects, lengths and works.
-        turn_share: share of the greatest turn rate that is used.
+        turn_fraction: fraction of the greatest turn rate that is used.
     """
     robot = world.robot
     count = len(path.poses)
     ahead = np.append(path.curvatures[1:], 0.0)  # curvature from each pose on
-    bend = np.maximum(np.abs(ahead), 1e-12)
-    fastest = turn_share * robot.max_turn_rate / bend
+    curvature = np.maximum(np.abs(ahead), 1e-12)
+    fastest = turn_fraction * robot.max_turn_rate / curvature
     speeds = np.minimum(robot.max_speed, fastest)
     if robot.drive is Drive.CONSTANT_SPEED:
         speeds = np.full(count, robot.max_speed)

@@ -70,11 +70,12 @@ def _plan_and_follow(policy: PlanFollower, world: World) -> None:
     planner = policy.planner
     enough = planner.warm_up_iterations if isinstance(planner, CountsIterations) else _ITERATIONS
     planner.plan(world, stop=MaxIterations(enough))
-    policy.stop = MaxIterations(_ITERATIONS)
+    fewer = MaxIterations(min(enough, _ITERATIONS))
+    policy.stop = fewer
     policy.reset(world, np.random.default_rng(0))
     for step, pose in enumerate(_POSES):
         moved = world.moved(robot_pose=pose, time=0.1 * step)
-        planner.plan(moved, stop=MaxIterations(min(enough, _ITERATIONS)))
+        planner.plan(moved, stop=fewer)
         policy.act(moved)
 
 

@@ -7,11 +7,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pushplan.control import PurePursuit
 from pushplan.geometry import VisibilityGraph
 from pushplan.motion.polyline import polyline_plan
 from pushplan.motion.speed_profile import start_margin
 from pushplan.planners.arguments import check_call
-from pushplan.world import PlanResult, PlanStats, PlanStatus, Stop, World
+from pushplan.planners.following.plan_follower import PlanFollower
+from pushplan.world import Planner, PlanResult, PlanStats, PlanStatus, Stop, World
 from pushplan.world.checks import number
 
 
@@ -55,3 +57,8 @@ class ShortestPath:
         blocked = start_margin(world, 0.0) is None
         status = PlanStatus.START_BLOCKED if blocked else PlanStatus.GOAL_UNREACHABLE
         return PlanResult(status, None, PlanStats(time.perf_counter() - began))
+
+
+def straight(planner: Planner | None = None) -> PlanFollower:
+    """Follows the shortest path around the walls through whatever is in the way."""
+    return PlanFollower(planner or ShortestPath(), PurePursuit())

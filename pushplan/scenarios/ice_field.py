@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from pathlib import Path
 
 import numpy as np
 
@@ -53,18 +52,8 @@ class IceField(ArrayRecord):
 
     @property
     def concentration(self) -> float:
-        """Area of the floes as a share of the area within the bounds."""
+        """Area of the floes over the area within the bounds."""
         return float(self.areas.sum() / np.prod(self.bounds[2:] - self.bounds[:2]))
-
-    def save(self, path: str | Path) -> None:
-        """Write the field to a ``.json`` or ``.npz`` file; `load_ice` gives it back equal.
-
-        Raises:
-            InvalidInputError: if the ending is another one, or the file cannot be written.
-        """
-        from pushplan.scenarios.ice_files import save_ice
-
-        save_ice(self, path)
 
 
 def checked_bounds(bounds: object) -> FloatArray:

@@ -21,7 +21,7 @@ SCHEMA = "pushplan-ice/1"
 """Name and version of the JSON form; files of another version are refused."""
 ENDINGS = (".json", ".npz", ".npy")
 _OVERLAP = 1e-6
-"""Floes may overlap by this share of the smaller one: rounding, where they touch."""
+"""Floes may overlap by this fraction of the smaller one: rounding, where they touch."""
 _MAX_BYTES = 10**8
 _READ_ERRORS = (
     *(OSError, ValueError, EOFError, KeyError, MemoryError, RecursionError, RuntimeError),

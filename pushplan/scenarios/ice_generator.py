@@ -3,82 +3,30 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.spatial import cKDTree
 
 from pushplan.geometry import polygon_area
+from pushplan.scenarios.disc_kernels import place_discs
+from pushplan.scenarios.floe_kernels import Discs, Outlines, cut_cells, fit_floes
+from pushplan.scenarios.floe_sizes import MARGIN, FloeSizes
 from pushplan.scenarios.ice_field import IceField, checked_bounds
-from pushplan.scenarios.ice_kernels import cut_cells, fit_floes, throw_discs
+from pushplan.scenarios.ice_water import IceWater
 from pushplan.world import InvalidInputError, ScenarioError
 from pushplan.world.checks import FloatArray, IntArray, number
 from pushplan.world.outline import convex_outline, flatten, unflatten
 
 MOST_FLOES = 20_000
 """More than this is refused: a typing error rather than a wish."""
-_THROWS = 200
+_DRAWS = 200
 _CORES = (0.85, 0.7, 0.55, 0.4)
 _CORNERS = (5, 10)
 _SLENDER = 1.7
 _WAVES = 48
+_STRETCH = 1.8
 _ROUNDS = 12
-_MARGIN = 0.003
-"""Floes are grown this much too large [share of the area], and in the end shrunk to measure."""
-
-
-@dataclass(frozen=True)
-class FloeSizes:
-    """Log-normal floe sizes. The radius of a floe is that of the disc with its area.
-
-    Args:
-        mean_radius: mean of the log-normal distribution before it is cut off [m].
-        spread: standard deviation of the logarithm of the radius.
-        least: floes are no smaller [m].
-        greatest: nor larger [m].
-
-    Raises:
-        InvalidInputError: if they make no sense together.
-    """
-
-    mean_radius: float = 0.33
-    spread: float = 0.28
-    least: float = 0.2
-    greatest: float = 0.6
-
-    def __post_init__(self) -> None:
-        put = object.__setattr__
-        for key in ("mean_radius", "least", "greatest"):
-            put(self, key, number(f"ice {key}", getattr(self, key), low=0.0, open_low=True))
-        put(self, "spread", number("ice spread", self.spread, low=0.0, high=2.0))
-        if not self.least <= self.mean_radius <= self.greatest or self.least == self.greatest:
-            raise InvalidInputError(
-                "ice radii must have least <= mean_radius <= greatest and least < greatest, got "
-                f"{self.least:g}, {self.mean_radius:g}, {self.greatest:g} m"
-            )
-
-    def draw(self, rng: np.random.Generator, total_area: float) -> FloatArray:
-        """Areas [m²], largest first, whose sum is ``total_area`` [m²] where that is possible.
-
-        It is not where the sum is less than one floe, or the range of sizes is narrow and the
-        floes are few.
-        """
-        high = np.pi * self.greatest**2 / (1.0 + _MARGIN)
-        low = min(high, np.pi * self.least**2 * (1.0 + 2.0 * _MARGIN))
-        typical = np.pi * self.mean_radius**2
-        count = int(1.5 * total_area / typical) + 32
-        middle = np.log(self.mean_radius) - 0.5 * self.spread**2
-        radii = np.exp(middle + self.spread * rng.standard_normal(4 * count))
-        inside = radii[(radii >= self.least) & (radii <= self.greatest)]
-        if len(inside) < count:
-            inside = np.clip(radii, self.least, self.greatest)
-        sums = np.cumsum(np.pi * inside**2)
-        number_of = int(np.argmin(np.abs(sums - total_area))) + 1
-        areas = np.pi * inside[:number_of] ** 2
-        for _ in range(50):  # the last few per mille, within the range of sizes
-            areas = np.clip(areas * (total_area / areas.sum()), low, high)
-        return np.sort(areas)[::-1].copy()
 
 
 def generate_ice(
@@ -93,8 +41,8 @@ def generate_ice(
 ) -> IceField:
     """A random field of convex floes.
 
-    Sizes are drawn until their areas add up to the wanted share. Discs of most of those sizes
-    are thrown at random places, more often where a smooth random field is high, until none
+    Sizes are drawn until their areas add up to what is wanted. Discs of most of those sizes
+    are placed at random, more often where a smooth random field is high, until none
     touches another. The power diagram (Laguerre tessellation) of the discs gives each floe a cell
     of its own; a random convex shape grows within it to the floe's area. In open water a floe has
     a shape of its own, in a crowd its edges run along those of its neighbours, as in ice that
@@ -103,13 +51,13 @@ def generate_ice(
     Args:
         rng: the only source of randomness.
         bounds: x_min, y_min, x_max, y_max of the water [m]; floes stay inside.
-        concentration: wanted area of the floes as a share of the area of the bounds.
+        concentration: wanted area of the floes over the area of the bounds.
         sizes: of the floes; those of the 2D benchmark by default.
         keep_off: convex outlines, each (N, 2) [m], that must stay free.
         gap: least distance between floes, and from floes to ``keep_off`` [m]; by default 3 % of
             the mean radius.
         clumping: 0 for floes that are as likely everywhere, 1 for dense patches and open water.
-            The denser the ice, the less room there is for it.
+            The denser the ice, the less space there is for it.
 
     Raises:
         InvalidInputError: if a value is out of range.
@@ -119,67 +67,63 @@ def generate_ice(
     if not isinstance(sizes, FloeSizes):
         raise InvalidInputError(f"ice sizes must be a FloeSizes, got {type(sizes).__name__}")
     box = checked_bounds(bounds)
-    share = number("ice concentration", concentration, low=0.0, high=1.0)
+    concentration = number("ice concentration", concentration, low=0.0, high=1.0)
     clumping = number("ice clumping", clumping, low=0.0, high=1.0)
     gap = 0.03 * sizes.mean_radius if gap is None else gap
     gap = number("ice gap", gap, low=0.0, high=sizes.least, open_low=True)
     if isinstance(keep_off, str) or not isinstance(keep_off, Sequence):
         raise InvalidInputError(f"keep_off must be a list of outlines, got {keep_off!r:.60}")
     blocks = flatten([convex_outline(f"keep_off[{i}]", b) for i, b in enumerate(keep_off)])
-    wanted = share * float(np.prod(box[2:] - box[:2]))
+    water = IceWater(box, *blocks, gap)
+    wanted = concentration * float(np.prod(box[2:] - box[:2]))
     if wanted == 0.0:
         return IceField((), box)
-    _check_possible(wanted, share, sizes, box)
-    return _pack(rng, wanted, share, sizes, box, blocks, gap, clumping)
+    _check_possible(wanted, concentration, sizes, box)
+    return _pack(rng, wanted, sizes, water, clumping)
 
 
 def _pack(
-    rng: np.random.Generator,
-    wanted: float,
-    share: float,
-    sizes: FloeSizes,
-    box: FloatArray,
-    blocks: tuple[FloatArray, IntArray],
-    gap: float,
-    clumping: float,
+    rng: np.random.Generator, wanted: float, sizes: FloeSizes, water: IceWater, clumping: float
 ) -> IceField:
     """Floes of a total area [m²]: with large discs first, then with smaller ones."""
+    box = water.box
+    concentration = wanted / float(np.prod(box[2:] - box[:2]))
     areas = sizes.draw(rng, wanted)
     if abs(areas.sum() - wanted) > 0.01 * wanted:
         raise ScenarioError(
-            f"a concentration of {share:.4g} is {wanted:.3g} m² of ice, which floes of "
+            f"a concentration of {concentration:.4g} is {wanted:.3g} m² of ice, which floes of "
             f"{sizes.least:g} to {sizes.greatest:g} m radius cannot add up to"
         )
-    favour = _favour(rng, box, sizes.mean_radius, clumping)
+    density = _density(rng, box, sizes.mean_radius, clumping)
     best = 0.0
     for core in _CORES:
-        throws = rng.random((len(areas), _THROWS, 3))
+        draws = rng.random((len(areas), _DRAWS, 3))
         radii = core * np.sqrt(areas / np.pi)
-        centres = throw_discs(radii, throws, box, favour, *blocks, gap)
+        centres = place_discs(radii, draws, density, water)
         if len(centres) < len(areas):
             continue
         shapes = _random_shapes(rng, len(areas))
-        floes = _grow(areas, wanted, sizes, shapes, centres, radii, box, blocks, gap)
+        floes = _grow(areas, wanted, sizes, shapes, centres, radii, water)
         reached = sum(polygon_area(floe) for floe in floes)
         if reached >= wanted:
             return IceField(_shrunk(floes, wanted / reached), box)
         best = max(best, reached)
     raise ScenarioError(
-        f"a concentration of {share:.3g} cannot be packed with floes of {sizes.least:g} to "
-        f"{sizes.greatest:g} m radius and gaps of {gap:g} m"
-        + (f": {share * best / wanted:.3g} was reached" if best else "")
+        f"a concentration of {concentration:.3g} cannot be packed with floes of {sizes.least:g} to "
+        f"{sizes.greatest:g} m radius and gaps of {water.gap:g} m"
+        + (f": {concentration * best / wanted:.3g} was reached" if best else "")
         + "; ask for less ice, smaller gaps or a wider range of sizes"
     )
 
 
-def _check_possible(wanted: float, share: float, sizes: FloeSizes, box: FloatArray) -> None:
+def _check_possible(wanted: float, concentration: float, sizes: FloeSizes, box: FloatArray) -> None:
     """Refuse what needs no trying."""
     smallest = np.pi * sizes.least**2
     side = float((box[2:] - box[:2]).min())
     if wanted < 0.99 * smallest:
         raise ScenarioError(
-            f"a concentration of {share:.3g} is {wanted:.3g} m² of ice, less than the smallest "
-            f"floe of {smallest:.3g} m²"
+            f"a concentration of {concentration:.3g} is {wanted:.3g} m² of ice, less than the "
+            f"smallest floe of {smallest:.3g} m²"
         )
     if 2.0 * sizes.greatest > side:
         raise ScenarioError(
@@ -192,10 +136,10 @@ def _check_possible(wanted: float, share: float, sizes: FloeSizes, box: FloatArr
         )
 
 
-def _favour(
+def _density(
     rng: np.random.Generator, box: FloatArray, mean_radius: float, clumping: float
 ) -> FloatArray:
-    """(R, C) how much each place is liked: the ranks of a smooth Gaussian random field."""
+    """(R, C) chance that each place is taken: the ranks of a smooth Gaussian random field."""
     width, height = (float(side) for side in box[2:] - box[:2])
     step = max(mean_radius, max(width, height) / 1024.0)
     shape = max(2, round(height / step)), max(2, round(width / step))
@@ -211,8 +155,8 @@ def _favour(
     return np.ascontiguousarray(1.0 - clumping + clumping * level**3)
 
 
-def _random_shapes(rng: np.random.Generator, count: int) -> tuple[FloatArray, IntArray]:
-    """Convex outlines of area 1 about their centroids: (K, N, 2), and (K,) corner counts.
+def _random_shapes(rng: np.random.Generator, count: int) -> Outlines:
+    """Convex outlines of area 1 about their centroids.
 
     Corners lie on an ellipse at uneven angles, so that they are always in convex position.
     """
@@ -234,39 +178,37 @@ def _random_shapes(rng: np.random.Generator, count: int) -> tuple[FloatArray, In
     area = 0.5 * cross.sum(axis=1)
     middle = ((points + after) * cross[..., None]).sum(axis=1) / (6.0 * area[:, None])
     points = (points - middle[:, None]) / np.sqrt(area)[:, None, None]
-    return np.ascontiguousarray(points), numbers.astype(np.int64)
+    return Outlines(np.ascontiguousarray(points), numbers.astype(np.int64))
 
 
 def _grow(
     areas: FloatArray,
     wanted: float,
     sizes: FloeSizes,
-    shapes: tuple[FloatArray, IntArray],
+    shapes: Outlines,
     centres: FloatArray,
     radii: FloatArray,
-    box: FloatArray,
-    blocks: tuple[FloatArray, IntArray],
-    gap: float,
+    water: IceWater,
 ) -> list[FloatArray]:
-    """Floes in their cells, together of at least the wanted area if there is room for it."""
-    stretch = 1.8
-    furthest = np.hypot(shapes[0][..., 0], shapes[0][..., 1]).max(axis=1)
-    reaches = 1.15 * stretch * furthest * np.sqrt(areas)
-    cells = cut_cells(centres, radii, reaches, *_neighbours(centres, reaches), box, *blocks, gap)
-    targets = (1.0 + _MARGIN) * areas
-    least = np.pi * sizes.least**2 * (1.0 + _MARGIN)
+    """Floes in their cells, together of at least the wanted area if there is space for it."""
+    furthest = np.hypot(shapes.corners[..., 0], shapes.corners[..., 1]).max(axis=1)
+    reaches = 1.15 * _STRETCH * furthest * np.sqrt(areas)
+    discs = Discs(centres, radii, reaches, *_neighbours(centres, reaches))
+    cells = cut_cells(discs, water)
+    targets = (1.0 + MARGIN) * areas
+    least = np.pi * sizes.least**2 * (1.0 + MARGIN)
     greatest = np.pi * sizes.greatest**2
     for _ in range(_ROUNDS):
-        corners, counts = fit_floes(*shapes, centres, *cells, targets, stretch)
+        corners, counts = fit_floes(shapes, centres, cells, targets, _STRETCH)
         grown = [corners[k, :n] for k, n in enumerate(counts.tolist()) if n]
         found = [polygon_area(floe) for floe in grown]
         floes = [floe for floe, area in zip(grown, found, strict=True) if area >= least]
         reached = sum(area for area in found if area >= least)
         if reached >= wanted:
             break
-        # what the crowded ones lack falls to those that have room
+        # what the crowded ones lack falls to those that have space
         targets = np.minimum(
-            targets * min(1.3, (1.0 + _MARGIN) * wanted / max(reached, 0.1 * wanted)), greatest
+            targets * min(1.3, (1.0 + MARGIN) * wanted / max(reached, 0.1 * wanted)), greatest
         )
     return floes
 
@@ -284,10 +226,10 @@ def _neighbours(centres: FloatArray, reaches: FloatArray) -> tuple[IntArray, Int
     return np.ascontiguousarray(both[:, 1]).astype(np.int64), offsets.astype(np.int64)
 
 
-def _shrunk(floes: list[FloatArray], share: float) -> tuple[FloatArray, ...]:
-    """Floes drawn in about a point inside, so that this share of their area is left."""
+def _shrunk(floes: list[FloatArray], fraction: float) -> tuple[FloatArray, ...]:
+    """Floes drawn in about a point inside, so that this fraction of their area is left."""
     vertices, offsets = flatten(floes)
     counts = np.diff(offsets)
     middles = np.add.reduceat(vertices, offsets[:-1]) / counts[:, None]
     middles = np.repeat(middles, counts, axis=0)
-    return unflatten(middles + np.sqrt(share) * (vertices - middles), offsets)
+    return unflatten(middles + np.sqrt(fraction) * (vertices - middles), offsets)

@@ -27,7 +27,7 @@ class GraphLattice(NamedTuple):
     goals: BoolArray
 
 
-@kernel(allocates=True)
+@kernel
 def _successors(
     lattice: GraphLattice, node: int, nodes: IntArray, costs: FloatArray, edges: IntArray
 ) -> int:
@@ -38,13 +38,13 @@ def _successors(
     return count
 
 
-@kernel(allocates=True)
+@kernel
 def _bound(lattice: GraphLattice, node: int) -> float:
     bound: float = lattice.bounds[node]
     return bound
 
 
-@kernel(allocates=True)
+@kernel
 def _reached(lattice: GraphLattice, node: int) -> bool:
     reached: bool = lattice.goals[node]
     return reached

@@ -9,12 +9,12 @@ from pushplan.compiled import kernel
 from pushplan.world.checks import FloatArray, IntArray
 
 
-@kernel(allocates=True, inline=True)
+@kernel(inline=True)
 def _before(key_a: float, node_a: int, key_b: float, node_b: int) -> bool:
     return key_a < key_b or (key_a == key_b and node_a < node_b)
 
 
-@kernel(allocates=True)
+@kernel
 def push_or_lift(
     keys: FloatArray, heap: IntArray, places: IntArray, size: IntArray, node: int, key: float
 ) -> None:
@@ -46,7 +46,7 @@ def push_or_lift(
     places[node] = at
 
 
-@kernel(allocates=True)
+@kernel
 def _sink(
     keys: FloatArray, heap: IntArray, places: IntArray, size: int, at: int, node: int, key: float
 ) -> None:
@@ -67,7 +67,7 @@ def _sink(
     places[node] = at
 
 
-@kernel(allocates=True)
+@kernel
 def pop_least(keys: FloatArray, heap: IntArray, places: IntArray, size: IntArray) -> int:
     """Take out the node of the least key; the heap must not be empty. Arguments as above."""
     least: int = heap[0]

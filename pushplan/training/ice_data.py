@@ -10,9 +10,10 @@ import argparse
 import logging
 import multiprocessing
 import os
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
+from itertools import starmap
 from pathlib import Path
 
 import numpy as np
@@ -89,22 +90,20 @@ def write_shards(folder: str | Path, *, split: str, shards: int, workers: int = 
     integer("shards", shards, low=1)
     integer("workers", workers, low=1)
     Path(folder).mkdir(parents=True, exist_ok=True)
+    jobs = [(folder, split, i) for i in range(shards)]
     if workers == 1:
-        return [_reported(folder, split, i, shards) for i in range(shards)]
+        return _logged(starmap(write_shard, jobs), split, shards)
     context = multiprocessing.get_context("spawn")
     with ProcessPoolExecutor(workers, mp_context=context) as pool:
-        work = [pool.submit(write_shard, folder, split, i) for i in range(shards)]
-        paths = []
-        for i, future in enumerate(work):
-            paths.append(future.result())
-            log.info("%s: shard %d of %d", split, i + 1, shards)
-        return paths
+        return _logged(pool.map(write_shard, *zip(*jobs, strict=True)), split, shards)
 
 
-def _reported(folder: str | Path, split: str, index: int, shards: int) -> Path:
-    path = write_shard(folder, split, index)
-    log.info("%s: shard %d of %d", split, index + 1, shards)
-    return path
+def _logged(paths: Iterable[Path], split: str, shards: int) -> list[Path]:
+    found = []
+    for path in paths:
+        found.append(path)
+        log.info("%s: shard %d of %d", split, len(found), shards)
+    return found
 
 
 def read_shards(folder: str | Path, split: str, limit: int | None = None) -> IcePairs:

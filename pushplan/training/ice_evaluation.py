@@ -10,7 +10,7 @@ import argparse
 import sys
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.ndimage import binary_dilation
@@ -108,14 +108,10 @@ def held_out(
         config: of the passages; its concentrations are replaced.
     """
     integer("voyages", voyages, low=1)
-    given = config or PassageConfig()
-    fixed = PassageConfig(
-        greatest_concentration=concentration,
+    fixed = replace(
+        config or PassageConfig(),
         least_concentration=concentration,
-        passages=given.passages,
-        shortest=given.shortest,
-        longest=given.longest,
-        steepest=given.steepest,
+        greatest_concentration=concentration,
     )
     first = round(1e4 * concentration)
     return [voyage_passages(first + i, "held-out", fixed) for i in range(voyages)]

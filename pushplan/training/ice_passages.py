@@ -59,7 +59,7 @@ class PassageConfig:
 
 
 def random_voyage(world: World, config: PassageConfig, rng: np.random.Generator) -> FloatArray:
-    """A way along the channel in arcs of random length and curvature.
+    """A path along the channel in arcs of random length and curvature.
 
     Args:
         world: the ship at its start, heading up the channel.
@@ -78,18 +78,18 @@ def random_voyage(world: World, config: PassageConfig, rng: np.random.Generator)
     poses = [(x, y, theta)]
     while y < y_high - 1.5 * length and len(poses) < 4000:
         straight = rng.random() < 0.25
-        bend = 0.0 if straight else rng.choice([-1.0, 1.0]) * tightest * rng.uniform(0.1, 1.0)
+        curvature = 0.0 if straight else rng.choice([-1.0, 1.0]) * tightest * rng.uniform(0.1, 1.0)
         off = theta - 0.5 * math.pi
         if abs(off) > config.steepest or x < x_low + length or x > x_high - length:
             wanted = math.copysign(1.0, 0.5 * (x_low + x_high) - x) if abs(off) < 0.3 else off
-            bend = -math.copysign(tightest, wanted)
+            curvature = -math.copysign(tightest, wanted)
         for _ in range(max(1, round(rng.uniform(*config.arcs) * length / step))):
-            middle = theta + 0.5 * bend * step
+            middle = theta + 0.5 * curvature * step
             x += step * math.cos(middle)
             y += step * math.sin(middle)
-            theta += bend * step
+            theta += curvature * step
             poses.append((x, y, theta))
-            if abs(theta - 0.5 * math.pi) > config.steepest and bend * (theta - 1.57) > 0.0:
+            if abs(theta - 0.5 * math.pi) > config.steepest and curvature * (theta - 1.57) > 0.0:
                 break
     return np.array(poses)
 
@@ -146,12 +146,12 @@ def _choose(
     for _ in range(config.passages):
         count = int(rng.integers(shortest, longest + 1))
         first = int(rng.integers(0, max(1, last - count + 1)))
-        scene = replace(
+        there = replace(
             world,
             robot_pose=voyage[first],
             movables=world.movables.moved_to(moved.object_poses[first]),
         )
         end = min(first + count, last)
-        passages.append(Passage(scene, voyage[first : end + 1]))
+        passages.append(Passage(there, voyage[first : end + 1]))
         ends.append((first, end))
     return passages, ends

@@ -95,6 +95,17 @@ class MaxIterations(Stop):
 
 
 @dataclass(frozen=True)
+class DefaultBudget(Stop):
+    """A number of iterations, and three times as many while there is no plan."""
+
+    iterations: int
+
+    def start(self) -> StopCheck:
+        """Arm the rule for one call."""
+        return lambda done, cost: done >= self.iterations * (3 if cost == math.inf else 1)
+
+
+@dataclass(frozen=True)
 class FirstSolution(Stop):
     """Return as soon as there is a plan."""
 

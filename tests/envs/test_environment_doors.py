@@ -10,7 +10,7 @@ from pushplan.control import DriveTo
 from pushplan.envs import PushEnv
 from pushplan.envs.simulators.base import Materials
 from pushplan.envs.simulators.pymunk_simulator import PymunkSimulator
-from pushplan.scenarios import IceField
+from pushplan.scenarios import IceField, save_ice
 from pushplan.world import (
     GoalDisc,
     InvalidInputError,
@@ -90,7 +90,7 @@ def test_a_speck_of_ice_does_not_stop_the_clock(tmp_path):
     floe = [[5.0, 5.0], [5.6, 5.0], [5.6, 5.6], [5.0, 5.6]]
     dust = [[6.0, 2.2], [6.0 + speck, 2.2], [6.0, 2.2 + speck]]
     path = tmp_path / "ice.json"
-    IceField([floe, dust], (0.0, 0.0, 12.0, 40.0)).save(path)
+    save_ice(IceField([floe, dust], (0.0, 0.0, 12.0, 40.0)), path)
     env = PushEnv(task="ship_ice", variations={"ice_file": str(path), "start_x": 6.0})
     env.reset(seed=0)
     for _ in range(5):

@@ -14,7 +14,7 @@ from gymnasium.utils.env_checker import check_env
 from pushplan.envs import PushEnv, make
 from pushplan.envs.tasks.ship_ice import ShipIceTask
 from pushplan.envs.tasks.ship_presets import BENCHMARK, FULL_SCALE
-from pushplan.scenarios import Scenario, generate_ice
+from pushplan.scenarios import Scenario, generate_ice, save_ice
 from pushplan.world import ScenarioError, UnknownNameError, stream
 from pushplan.world.outline import signed_area
 
@@ -180,7 +180,7 @@ def test_bad_variations_are_refused(bad, error, text):
 def test_ice_from_a_file(tmp_path):
     path = tmp_path / "ice.json"
     field = generate_ice(stream(1, "ice"), bounds=(0.0, 0.0, 12.0, 40.0), concentration=0.2)
-    field.save(path)
+    save_ice(field, path)
     ship = task(ice_file=str(path))
     starts = []
     for seed in range(5):

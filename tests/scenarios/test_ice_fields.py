@@ -14,7 +14,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from pushplan.scenarios import FloeSizes, generate_ice
-from pushplan.scenarios.ice_kernels import cut_cells, fit_floes
+from pushplan.scenarios.floe_kernels import Discs, Outlines, cut_cells, fit_floes
+from pushplan.scenarios.ice_water import IceWater
 from pushplan.world import InvalidInputError, ScenarioError, stream
 from pushplan.world.outline import convex_outline
 
@@ -212,13 +213,13 @@ def test_cells_and_floes_agree_with_shapely():
         weights = 0.4 * near.min(axis=1)
         block = np.array([[2.6, 2.7], [3.5, 2.7], [3.3, 3.4], [2.6, 3.2]])
         pairs = np.concatenate([np.delete(np.arange(count), k) for k in range(count)])
-        cells, sizes = cut_cells(
-            *(centres, weights, np.full(count, reach), pairs, np.arange(count + 1) * (count - 1)),
-            *(np.array([0.0, 0.0, 6.0, 6.0]), block, np.array([0, 4]), gap),
-        )
+        offsets = np.arange(count + 1) * (count - 1)
+        discs = Discs(centres, weights, np.full(count, reach), pairs, offsets)
+        water = IceWater(np.array([0.0, 0.0, 6.0, 6.0]), block, np.array([0, 4]), gap)
+        cells, sizes = cut_cells(discs, water)
+        shapes = Outlines(np.repeat(octagon[None], count, axis=0), np.full(count, 8))
         floes, corners = fit_floes(
-            *(np.repeat(octagon[None], count, axis=0), np.full(count, 8), centres),
-            *(cells, sizes, np.full(count, 0.8), 1.8),
+            shapes, centres, Outlines(cells, sizes), np.full(count, 0.8), 1.8
         )
         for k in range(count):
             cell = shapely.Polygon(cells[k, : sizes[k]])

@@ -12,12 +12,8 @@ from scipy.sparse.csgraph import dijkstra
 from pushplan.motion.dubins import along_arc
 from pushplan.motion.state_lattice.generate import SHIPPED, main
 from pushplan.motion.state_lattice.heuristic import dubins_to_line
-from pushplan.motion.state_lattice.primitives import (
-    PrimitiveConfig,
-    PrimitiveSet,
-    generate,
-    primitives,
-)
+from pushplan.motion.state_lattice.primitive_set import PrimitiveConfig, PrimitiveSet
+from pushplan.motion.state_lattice.primitives import generate, primitives
 from pushplan.search.astar import EXHAUSTED, FOUND, PAUSED, AStar, offer, take
 from pushplan.search.graph_lattice import GraphLattice
 from pushplan.world import InvalidInputError, SchemaError

@@ -2,58 +2,70 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from pushplan.compiled import kernel
-from pushplan.motion.state_lattice.swaths import row_span
+from pushplan.motion.state_lattice.swath_kernels import row_span
 from pushplan.world.checks import FloatArray, IntArray
 
 
-@kernel(allocates=True)
-def add_floes(
-    outlines: FloatArray,
-    offsets: IntArray,
-    centres: FloatArray,
-    radii: FloatArray,
-    prices: FloatArray,
-    exponent: float,
-    soft: float,
-    grid: FloatArray,
-) -> None:
-    """Spread the price of each floe over the cells whose centres it covers.
+class FloeCosts(NamedTuple):
+    """Costs of covering K floes.
 
-    The price is spread in proportion to (1 + ``soft`` - q²)^exponent, where q is the distance from
-    the centre over the radius of the disc of the same area, at most 1. An exponent of -1/2 makes
-    every strip of a disc, of whatever direction, cost the same; 1 weighs the middle most.
-
-    Args:
-        outlines: (V, 2) corners of the floes [cells], row and column; flattened.
-        offsets: (K + 1,) where each floe starts.
-        centres: (K, 2) [cells].
-        radii: (K,) radius of the disc of the same area [cells].
-        prices: (K,) what it costs to cover the whole floe.
-        exponent: see above.
-        soft: see above; positive where the exponent is negative.
-        grid: (rows, columns) added to in place.
+    The cost of a floe is spread over its cells in proportion to (1 + ``soft`` - q²)^``exponent``,
+    where q is the distance from its centre over the radius of the disc of the same area, at most 1.
+    An exponent of -1/2 makes every strip of a disc, of whatever direction, cost the same; 1 weighs
+    the middle most.
     """
+
+    totals: FloatArray
+    """(K,) of covering the whole floe, in metres of travel."""
+    areas: FloatArray
+    """(K,) [m²]"""
+    exponent: float
+    soft: float
+    """Positive where the exponent is negative."""
+
+
+class PlacedFloes(NamedTuple):
+    """K floes as they lie on a map; row and column in cells."""
+
+    outlines: FloatArray
+    """(V, 2) corners, flattened."""
+    offsets: IntArray
+    """(K + 1,) where each floe starts."""
+    centres: FloatArray
+    """(K, 2)"""
+    radii: FloatArray
+    """(K,) radius of the disc of the same area [cells]."""
+    costs: FloeCosts
+
+
+@kernel
+def add_floes(floes: PlacedFloes, grid: FloatArray) -> None:
+    """Add the cost of each floe to the cells (rows, columns) whose centres it covers."""
     rows, columns = grid.shape
-    for k in range(radii.shape[0]):
-        outline = outlines[offsets[k] : offsets[k + 1]]
+    exponent, soft = floes.costs.exponent, floes.costs.soft
+    for k in range(floes.radii.shape[0]):
+        outline = floes.outlines[floes.offsets[k] : floes.offsets[k + 1]]
         top, bottom = outline[:, 0].min(), outline[:, 0].max()
-        if prices[k] == 0.0 or bottom < 0.0 or top > rows - 1:
+        cost = floes.costs.totals[k]
+        if cost == 0.0 or bottom < 0.0 or top > rows - 1:
             continue
         first_row, last_row = int(np.ceil(top)), int(np.floor(bottom))
         total = 0.0
-        square = 1.0 / max(radii[k] * radii[k], 1e-12)
+        square = 1.0 / max(floes.radii[k] * floes.radii[k], 1e-12)
         for fill in range(2):  # weigh all cells of the floe, then fill those on the map
-            share = prices[k] / total if fill == 1 else 0.0
+            scale = cost / total if fill == 1 else 0.0
             for row in range(first_row, last_row + 1):
                 if fill == 1 and (row < 0 or row >= rows):
                     continue
                 low, high = row_span(outline, float(row))
-                dr = (row - centres[k, 0]) ** 2
+                dr = (row - floes.centres[k, 0]) ** 2
                 for column in range(int(np.ceil(low)), int(np.floor(high)) + 1):
-                    q = min((dr + (column - centres[k, 1]) ** 2) * square, 1.0)
+                    q = min((dr + (column - floes.centres[k, 1]) ** 2) * square, 1.0)
                     base = 1.0 + soft - q
                     if exponent == -0.5:  # a power takes ten times as long
                         weight = 1.0 / np.sqrt(base)
@@ -64,24 +76,22 @@ def add_floes(
                     if fill == 0:
                         total += weight
                     elif 0 <= column < columns:
-                        grid[row, column] += share * weight
+                        grid[row, column] += scale * weight
             if total == 0.0:  # a sliver between the centres of cells
-                row, column = int(np.round(centres[k, 0])), int(np.round(centres[k, 1]))
+                row, column = int(np.round(floes.centres[k, 0])), int(np.round(floes.centres[k, 1]))
                 if 0 <= row < rows and 0 <= column < columns:
-                    grid[row, column] += prices[k]
+                    grid[row, column] += cost
                 break
 
 
-@kernel(allocates=True)
-def block(outlines: FloatArray, offsets: IntArray, margin: float, grid: FloatArray) -> None:
-    """Set to 1 every cell within ``margin`` [cells] of one of some convex outlines.
-
-    Args:
-        outlines: (V, 2) corners [cells], flattened, in order around each outline.
-        offsets: (S + 1,) where each outline starts.
-        margin: at least half the diagonal of a cell, so that no overlap is missed.
-        grid: (rows, columns) changed in place.
-    """
+@kernel
+def block(
+    outlines: FloatArray,  # (V, 2) corners of convex outlines [cells], counter-clockwise
+    offsets: IntArray,  # (S + 1,) where each outline starts
+    margin: float,  # at least half the diagonal of a cell, so that no overlap is missed
+    grid: FloatArray,  # (rows, columns)
+) -> None:
+    """Set to 1 every cell within ``margin`` [cells] of one of some convex outlines."""
     rows, columns = grid.shape
     for s in range(offsets.shape[0] - 1):
         outline = outlines[offsets[s] : offsets[s + 1]]

@@ -1,4 +1,4 @@
-"""The frame of a lattice: origin at the robot, first axis along the way to the goal."""
+"""The frame of a lattice: origin at the robot, first axis towards the goal."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ class Frame:
         c, s = np.cos(self.angle), np.sin(self.angle)
         return np.array([[c, -s], [s, c]])
 
-    def inwards(self, points_world: FloatArray) -> FloatArray:
+    def from_world(self, points_world: FloatArray) -> FloatArray:
         """(N, 2) points of the world in this frame [m]."""
         points: FloatArray = (points_world - np.array([self.x, self.y])) @ self.rotation
         return points

@@ -7,7 +7,8 @@ import json
 import sys
 from pathlib import Path
 
-from pushplan.motion.state_lattice.primitives import PrimitiveConfig, generate
+from pushplan.motion.state_lattice.primitive_set import PrimitiveConfig
+from pushplan.motion.state_lattice.primitives import generate
 from pushplan.world.errors import InvalidInputError
 
 SHIPPED = (PrimitiveConfig(8, 6.0, 1, 0), PrimitiveConfig(16, 6.0), PrimitiveConfig(16, 19.0))

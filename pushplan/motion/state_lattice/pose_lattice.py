@@ -1,4 +1,4 @@
-"""`PoseLattice`: places and headings joined by motion primitives, priced by what they cover."""
+"""`PoseLattice`: places and headings joined by motion primitives, which cost what they cover."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from pushplan.world.checks import FloatArray, IntArray
 
 
 class PoseLattice(NamedTuple):
-    """A lattice of H headings over rows along the way and columns across it.
+    """A lattice of H headings over rows ahead and columns across it.
 
     Node (h, u, v) has the number (h * rows + u) * columns + v. Lengths are in metres and places in
     steps, unless stated otherwise; costs are in metres of travel.
@@ -39,8 +39,8 @@ class PoseLattice(NamedTuple):
     runs: IntArray
     """(R, 2) first cell and last cell + 1 of the cells that it newly covers, in columns, as offsets
     in the flattened sums below; the map is so large that no swath leaves it."""
-    price_sums: FloatArray
-    """(map columns * (map rows + 1),) sums of the prices of each column before each row [m]."""
+    cost_sums: FloatArray
+    """(map columns * (map rows + 1),) sums of the costs of each column before each row [m]."""
     blocked_sums: FloatArray
     """The same for cells that must not be covered; (0,) where there are none."""
     stride: int
@@ -50,37 +50,23 @@ class PoseLattice(NamedTuple):
     goal: FloatArray
     """(4,) 0 and the row of the goal line; or 1, row, column and radius of the goal disc."""
     row_bounds: FloatArray
-    """(H, rows) length of the way from each row and heading to the line [m]."""
+    """(H, rows) length of the path from each row and heading to the line [m]."""
     place_costs: FloatArray
     """(rows, columns) bound or estimate of the cost from each place to the line [m]."""
     inflation: float
     """Factor on both."""
 
 
-@kernel(allocates=True)
+@kernel
 def swath_sum(sums: FloatArray, runs: IntArray, begin: int, end: int, at: int) -> float:
-    """Sum of a map over the runs ``begin`` to ``end`` around a cell.
-
-    Args:
-        sums: flattened sums of each column before each row.
-        runs: (R, 2) as in `PoseLattice`.
-        begin: first run.
-        end: the run after the last.
-        at: the cell, as an offset in ``sums``.
-    """
+    """Sum of a map over the runs ``begin`` to ``end`` - 1 around the cell at the offset ``at``."""
     total = 0.0
     for r in range(begin, end):
         total += sums[at + runs[r, 1]] - sums[at + runs[r, 0]]
     return total
 
 
-def flat_runs(runs: IntArray, stride: int) -> IntArray:
-    """(R, 2) runs of `Swaths` as offsets in flattened sums with ``stride`` entries a column."""
-    flat: IntArray = runs[:, :1] * stride + runs[:, 1:]
-    return flat
-
-
-@kernel(allocates=True)
+@kernel
 def within(planes: FloatArray, u: int, v: int, box: FloatArray) -> bool:
     """Whether a path whose origin stays in ``box`` around (u, v) keeps to all half planes."""
     for i in range(planes.shape[0]):
@@ -92,24 +78,25 @@ def within(planes: FloatArray, u: int, v: int, box: FloatArray) -> bool:
     return True
 
 
-@kernel(allocates=True)
+@kernel
 def edge_cost(lattice: PoseLattice, u: int, v: int, p: int) -> float:
-    """Length plus price of primitive ``p`` from place (u, v) [m]; infinite where it is closed."""
+    """Length plus cost of primitive ``p`` from place (u, v) [m]; infinite where it is closed."""
     at = (lattice.corner[1] + v * lattice.cells) * lattice.stride
     at += lattice.corner[0] + u * lattice.cells
     begin, end = lattice.run_first[p], lattice.run_first[p + 1]
     if lattice.blocked_sums.shape[0] > 0:
         if swath_sum(lattice.blocked_sums, lattice.runs, begin, end, at) > 0.5:
             return np.inf
-    price = swath_sum(lattice.price_sums, lattice.runs, begin, end, at)
-    cost: float = lattice.lengths[p] + price
+    covered = swath_sum(lattice.cost_sums, lattice.runs, begin, end, at)
+    cost: float = lattice.lengths[p] + covered
     return cost
 
 
-@kernel(allocates=True)
-def _successors(
+@kernel
+def successors(
     lattice: PoseLattice, node: int, nodes: IntArray, costs: FloatArray, edges: IntArray
 ) -> int:
+    """List the successors of a node; see `astar.expand`."""
     v = node % lattice.columns
     rest = node // lattice.columns
     u = rest % lattice.rows
@@ -140,7 +127,7 @@ def _successors(
     return count
 
 
-@kernel(allocates=True)
+@kernel
 def bound_at(lattice: PoseLattice, node: int) -> float:
     """Bound or estimate of the cost from a node to the goal [m], times the inflation."""
     v = node % lattice.columns
@@ -155,7 +142,7 @@ def bound_at(lattice: PoseLattice, node: int) -> float:
     return away
 
 
-@kernel(allocates=True)
+@kernel
 def reached(lattice: PoseLattice, node: int) -> bool:
     """Whether a node lies in the goal."""
     v = node % lattice.columns
@@ -168,4 +155,4 @@ def reached(lattice: PoseLattice, node: int) -> bool:
     return arrived
 
 
-register(PoseLattice, _successors, bound_at, reached)
+register(PoseLattice, successors, bound_at, reached)

@@ -13,8 +13,14 @@ import numpy as np
 from pushplan.control import PathFollower, clamp_twist
 from pushplan.control.tracking import Progress
 from pushplan.interaction import InteractionModel, QuasiStatic
-from pushplan.planners.following.recovery import back_off
-from pushplan.planners.following.replanning import Reason, Replanning, price, rest_of, sweep_rest
+from pushplan.planners.following.recovery import recovery_twist
+from pushplan.planners.following.replanning import (
+    Reason,
+    Replanning,
+    cost_of_rest,
+    rest_of,
+    sweep_rest,
+)
 from pushplan.planners.following.splicing import joined, passed, world_ahead
 from pushplan.world import (
     Controller,
@@ -34,7 +40,7 @@ _REMEMBERED = 5
 
 
 @dataclass(frozen=True)
-class _Order:
+class _PendingPlan:
     """A planning call whose plan may not be there yet."""
 
     result: PlanResult
@@ -52,7 +58,7 @@ class PlanFollower:
     At every step the rest of the plan is swept again from where everything is now; where that
     costs more than was predicted, or jams, or the robot has left the path, or the plan is used
     up, a new plan is made. If none is found the old one is kept. A differential drive that has no
-    plan, or does not get on with its plans, backs off.
+    plan, or makes no progress with its plans, shows a recovery behaviour.
 
     In latency-aware simulation (`simulate_latency`) planning goes on beside driving: a plan is
     there only after the time that it took, and the old one is driven until then.
@@ -108,13 +114,13 @@ class PlanFollower:
         """How much of the last call of `act` a robot would do beside driving [s]."""
         self._factor, self._clock = 0.0, time.perf_counter
         self._took: deque[float] = deque(maxlen=_REMEMBERED)
-        self._order: _Order | None = None
+        self._pending: _PendingPlan | None = None
         self._rng = rng
         self._planned_at = -np.inf
         self._planned_from = np.full(2, np.nan)
         self._planned_ids = np.zeros(0, dtype=np.int64)
         self._tight = False
-        self._in_vain = 0
+        self._no_progress = 0
 
     def act(self, world: World, observation: Any = None) -> Twist:
         """The twist for this step; plans first where that is necessary."""
@@ -122,15 +128,15 @@ class PlanFollower:
             self.reset(world, self._rng)
         self.background_s = 0.0
         self._receive(world)
-        if self._order is None:
+        if self._pending is None:
             reason = self._needs_plan(world)
             if reason is not None:
                 self._ask(world, reason)
                 self._receive(world)
-        if self.current_plan is None and self._order is not None:
+        if self.current_plan is None and self._pending is not None:
             return clamp_twist(world.robot, 0.0, 0.0)
-        if self.current_plan is None or self._in_vain > 3:
-            away = back_off(world)
+        if self.current_plan is None or self._no_progress > 3:
+            away = recovery_twist(world)
             if away is not None:
                 return away
         if self.current_plan is None:
@@ -152,11 +158,11 @@ class PlanFollower:
             self._took.append(took)
         moved = float(np.hypot(*(world.robot_pose[:2] - self._planned_from)))
         stuck = moved < 0.05 * world.robot.circumscribed_radius and reason is not Reason.PERIOD
-        self._in_vain = self._in_vain + 1 if stuck or result.plan is None else 0
+        self._no_progress = self._no_progress + 1 if stuck or result.plan is None else 0
         self._planned_at, self._planned_from = world.time, world.robot_pose[:2]
         self._planned_ids = world.movables.ids
         ready = world.time + self._factor * took
-        self._order = _Order(result, stretch, reason, world.time, ready)
+        self._pending = _PendingPlan(result, stretch, reason, world.time, ready)
 
     def _latency(self) -> float:
         """How long the next planning call is expected to take, by the clock of the world [s]."""
@@ -171,19 +177,19 @@ class PlanFollower:
 
     def _receive(self, world: World) -> None:
         """Take up a plan that has been waited for long enough."""
-        order = self._order
-        if order is None or world.time < order.ready - 1e-9:
+        pending = self._pending
+        if pending is None or world.time < pending.ready - 1e-9:
             return
-        self._order = None
-        if order.result.plan is None:
+        self._pending = None
+        if pending.result.plan is None:
             return
-        new = joined(order.stretch, order.result.plan)
-        if world.time > order.made:
-            new = rest_of(new, passed(world, new, world.time - order.made), None)
-        if self._keeps_old(world, new, order.reason):
+        new = joined(pending.stretch, pending.result.plan)
+        if world.time > pending.made:
+            new = rest_of(new, passed(world, new, world.time - pending.made), None)
+        if self._keeps_old(world, new, pending.reason):
             return
         self.current_plan = new
-        self._tight = order.result.stats.detail.get("tight", 0.0) > 0.0
+        self._tight = pending.result.stats.detail.get("tight", 0.0) > 0.0
 
     def _keeps_old(self, world: World, new: Plan, reason: Reason) -> bool:
         """Whether the new plan is not enough better than what is left of the old one."""
@@ -194,13 +200,13 @@ class PlanFollower:
         index = self._progress.index(self._progress.along)
         weight = self.replanning.weight(self.planner)
         swept, path = sweep_rest(world, old, index, self.interaction)
-        old_price = price(world, path, swept, weight)
+        old_cost = cost_of_rest(world, path, swept, weight)
         swept_new, path = sweep_rest(world, new, 0, self.interaction)
-        new_price = price(world, path, swept_new, weight)
+        new_cost = cost_of_rest(world, path, swept_new, weight)
         robot = world.robot
-        if new_price < old_price - margin * robot.circumscribed_radius * robot.mass:
+        if new_cost < old_cost - margin * robot.circumscribed_radius * robot.mass:
             return False
-        if np.isinf(old_price):
+        if np.isinf(old_cost):
             return False
         # what is expected of it from now on
         self.current_plan = rest_of(old, index, swept.object_poses)
@@ -212,7 +218,7 @@ class PlanFollower:
         size = world.robot.circumscribed_radius
         waited = world.time - self._planned_at
         # a robot that stays stuck thinks less and less often, so that the episode ends in time
-        patience: float = rule.interval * 2 ** min(max(self._in_vain - 20, 0), 6)
+        patience: float = rule.interval * 2 ** min(max(self._no_progress - 20, 0), 6)
         rested = waited >= patience * size / world.robot.max_speed - 1e-9
         if plan is None:
             return Reason.NO_PLAN if rested else None
@@ -249,7 +255,7 @@ class PlanFollower:
             return None
         now, _ = sweep_rest(world, plan, part.start, self.interaction, part.stop)
         if now.jammed_at >= 0:
-            at_once = now.jammed_at <= 3 and self._in_vain < 20
+            at_once = now.jammed_at <= 3 and self._no_progress < 20
             return Reason.JAM if rested or at_once else None
         expected = float(path_lengths(predicted[part]) @ world.movables.masses)
         allowed = surprise * world.robot.circumscribed_radius * world.robot.mass

@@ -1,4 +1,4 @@
-"""Getting out of a place from which there is no plan forward."""
+"""The recovery behaviour: out of a place from which there is no plan forward."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ _REACH = 0.5
 """How far behind the robot has to be free of walls for it to back up [circumscribed radii]."""
 
 
-def back_off(world: World) -> Twist | None:
+def recovery_twist(world: World) -> Twist | None:
     """A twist that takes a differential drive out of a corner, or None if it has to stay.
 
     It reverses where there is room behind, else it turns on the spot where its footprint allows.

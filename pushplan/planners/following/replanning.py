@@ -80,7 +80,7 @@ class Replanning:
             raise InvalidInputError(f"never must be True or False, got {self.never!r}")
 
     def weight(self, planner: object) -> float:
-        """The price w of interaction in comparisons of this planner's plans."""
+        """The weight w of interaction in comparisons of this planner's plans."""
         if self.push_weight is not None:
             return self.push_weight
         return float(getattr(getattr(planner, "config", None), "push_weight", 1.0))
@@ -132,7 +132,7 @@ def sweep_rest(
     return interaction.sweep(world, path), path
 
 
-def price(world: World, path: FloatArray, swept: Interaction, weight: float) -> float:
+def cost_of_rest(world: World, path: FloatArray, swept: Interaction, weight: float) -> float:
     """Travel, plus ``weight`` times interaction, plus the straight way to the goal [kg m].
 
     Infinite for a path on which the robot jams.

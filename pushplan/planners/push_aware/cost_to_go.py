@@ -15,8 +15,8 @@ from typing import NamedTuple
 import numpy as np
 
 from pushplan.compiled import kernel
-from pushplan.motion.collision import Footprint, Obstacles, is_free
-from pushplan.motion.shortcutting import in_goal
+from pushplan.motion.collision import ConvexObstacles, Footprint, is_free
+from pushplan.motion.goal_region import in_goal
 from pushplan.search.grid_dijkstra import grid_dijkstra
 from pushplan.world.checks import BoolArray, FloatArray, IntArray
 
@@ -36,41 +36,35 @@ class CostToGo(NamedTuple):
 
 @kernel(allocates=True)
 def mark_free(
-    origin: FloatArray,
-    cell: float,
-    free: BoolArray,
-    first: int,
+    table: CostToGo,
+    free: BoolArray,  # (rows, columns, headings), changed in place
+    first: int,  # cells, counted row by row
     last: int,
     shape: Footprint,
-    among: Obstacles,
+    walls: ConvexObstacles,
 ) -> None:
-    """Mark which of the cells from ``first`` to ``last`` (exclusive) hold the footprint.
-
-    Args:
-        origin: (2,) least x, y of the grid [m].
-        cell: side of a cell [m].
-        free: (rows, columns, headings), changed in place.
-        first: index of a cell, counted row by row.
-        last: likewise.
-        shape: the footprint.
-        among: the walls.
-    """
+    """Mark which of the cells from ``first`` to ``last`` (exclusive) hold the footprint."""
     scratch = np.empty_like(shape.vertices)
     pose = np.empty(3)
     cols, headings = free.shape[1], free.shape[2]
     for at in range(first, last):
         r, c = at // cols, at % cols
-        pose[0], pose[1] = origin[0] + (c + 0.5) * cell, origin[1] + (r + 0.5) * cell
+        pose[0] = table.origin[0] + (c + 0.5) * table.cell
+        pose[1] = table.origin[1] + (r + 0.5) * table.cell
         for k in range(headings):
             pose[2] = 2.0 * np.pi * k / headings
-            free[r, c, k] = is_free(pose, shape, among, scratch)
+            free[r, c, k] = is_free(pose, shape, walls, scratch)
 
 
 @kernel(allocates=True)
 def flood(
-    origin: FloatArray, cell: float, open_cells: BoolArray, goal: FloatArray, center: IntArray
+    table: CostToGo,
+    open_cells: BoolArray,  # (rows, columns)
+    goal: FloatArray,  # (5,) from `goal_numbers`
+    center: IntArray,  # (2,) row and column of the goal's middle, negative for none
 ) -> tuple[FloatArray, IntArray]:
     """Grid lengths (rows, columns) [m] to the goal, and the cells in the order of their lengths."""
+    origin, cell = table.origin, table.cell
     rows, cols = open_cells.shape
     starts, count = np.empty(rows * cols + 1, np.int64), 0
     for at in range(rows * cols):
@@ -86,7 +80,7 @@ def flood(
     return lengths, order
 
 
-@kernel(allocates=True)
+@kernel
 def _between(
     values: FloatArray, ox: float, oy: float, cell: float, x: float, y: float, theta: float
 ) -> float:
@@ -117,36 +111,23 @@ def _between(
     return total / weight if weight > 0.25 else np.inf
 
 
-@kernel(allocates=True)
+@kernel
 def sweep(
-    values: FloatArray,
-    free: BoolArray,
-    order: IntArray,
-    origin: FloatArray,
-    cell: float,
-    ends: FloatArray,
-    length: float,
-    floor: FloatArray,
+    table: CostToGo,  # its values are changed in place
+    free: BoolArray,  # (rows, columns, headings)
+    order: IntArray,  # (N,) cells by their distance from the goal
+    ends: FloatArray,  # (headings, arcs, 3) displacement at the end of each arc
+    length: float,  # of the arcs [m]
 ) -> float:
-    """One Gauss-Seidel sweep over the cells; returns the greatest change [m].
-
-    Args:
-        values: (rows, columns, headings), changed in place.
-        free: (rows, columns, headings).
-        order: (N,) cells by their distance from the goal.
-        origin: of the grid.
-        cell: of the grid [m].
-        ends: (headings, arcs, 3) displacement at the end of each arc.
-        length: of the arcs [m].
-        floor: (rows, columns) 0 in the goal.
-    """
+    """One Gauss-Seidel sweep over the cells; returns the greatest change [m]."""
+    values, cell = table.values, table.cell
     cols, headings = values.shape[1], values.shape[2]
     change = 0.0
-    ox, oy = origin[0], origin[1]
+    ox, oy = table.origin[0], table.origin[1]
     for n in range(order.shape[0]):
         r, c = order[n] // cols, order[n] % cols
         x, y = ox + (c + 0.5) * cell, oy + (r + 0.5) * cell
-        if floor[r, c] == 0.0:
+        if table.floor[r, c] == 0.0:
             continue
         for k in range(headings):
             if not free[r, c, k]:
@@ -163,7 +144,7 @@ def sweep(
     return change
 
 
-@kernel(allocates=True)
+@kernel
 def length_to_go(table: CostToGo, x: float, y: float, theta: float) -> float:
     """Length to the goal [m] from a pose: the table's, or its floor where it has none."""
     value = _between(table.values, table.origin[0], table.origin[1], table.cell, x, y, theta)

@@ -1,4 +1,4 @@
-"""A first guess without a search: the taut path around the walls, as Dubins curves.
+"""A warm start without a search: Dubins curves along the shortest path around the walls.
 
 The shortest path of a disc around the walls bends at a few places. The robot is sent along the
 tangents there, and from place to place on the shortest curve of bounded curvature (Dubins 1957).
@@ -20,15 +20,15 @@ _SHARP = 0.8
 """Turn beyond which a bend is driven through its ends, not only through its middle [rad]."""
 
 
-def taut_arcs(
+def warm_start_arcs(
     world: World, goal: NavigationGoal, clearance: float, radius: float, depth: float
 ) -> FloatArray | None:
-    """Arcs along the taut path; they may touch walls and objects.
+    """Arcs along the shortest homotopic path; they may touch walls and objects.
 
     Args:
         world: gives the start and the walls.
         goal: where to.
-        clearance: of the taut path [m].
+        clearance: of the shortest path [m].
         radius: least turning radius [m].
         depth: how far into the goal the arcs end [m].
 

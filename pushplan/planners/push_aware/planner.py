@@ -8,14 +8,16 @@ from typing import ClassVar
 
 import numpy as np
 
-from pushplan.interaction import QuasiStatic
+from pushplan.interaction import InteractionModel, QuasiStatic
+from pushplan.motion.path_improver import PathImprover
+from pushplan.motion.speed_profile import turning_radius
 from pushplan.planners.arguments import check_call
 from pushplan.planners.push_aware.bound import lower_bound
 from pushplan.planners.push_aware.push_aware_config import PushAwareConfig
 from pushplan.planners.push_aware.search import PushAwareSearch
-from pushplan.planners.rrt.kinodynamic import DefaultBudget
-from pushplan.world import PlanResult, PlanStats, PlanStatus, Stop, World
+from pushplan.world import Drive, PlanResult, PlanStats, PlanStatus, RobotModel, Stop, World
 from pushplan.world.checks import expect
+from pushplan.world.stop import DefaultBudget
 
 
 def cautious_model(friction: float = 0.1, static_friction: float = 0.5) -> QuasiStatic:
@@ -34,13 +36,13 @@ def cautious_model(friction: float = 0.1, static_friction: float = 0.5) -> Quasi
 class PushAware:
     """Minimises m₀ l₀ + w Σ mᵢ lᵢ, with the objects carried along every branch of the search.
 
-    The first plan is the taut path around the walls, as Dubins curves, or that of a kinodynamic
-    random tree. Then best-first searches over (x, y, heading), whose nodes hold where the objects
-    are by then, take turns with random trees, each under the cost of the best plan so far, and
-    what they find is repaired at random with Dubins curves. A share of the iterations goes into a
-    random tree over poses and costs (AO-RRT; Hauser and Zhou, arXiv 1505.04098), which makes the
-    whole asymptotically optimal wherever that is. The cheapest path is returned when the stop
-    rule fires; waiting longer never costs more.
+    The first plan follows the shortest path around the walls in Dubins curves, or is that of a
+    kinodynamic random tree. Then best-first searches over (x, y, heading), whose nodes hold where
+    the objects are by then, take turns with random trees, each under the cost of the best plan so
+    far, and what they find is shortcut at random with Dubins curves. A fraction of the iterations
+    goes into a random tree over poses and costs (AO-RRT; Hauser and Zhou, arXiv 1505.04098), which
+    makes the whole asymptotically optimal wherever that is. The cheapest path is returned when the
+    stop rule fires; waiting longer never costs more.
 
     Use it where a tenth of a second is worth a better path, and the world is two-dimensional with
     convex objects. ``stats.detail`` holds ``cost``, ``bound``, which no plan can undercut, and
@@ -49,18 +51,19 @@ class PushAware:
 
     Args:
         config: parameters.
-        interaction: the quasi-static model that prices contacts; `cautious_model` by default.
+        interaction: predicts the objects, `cautious_model` by default; a model without a compiled
+            form is slow here.
     """
 
     warm_up_iterations: ClassVar[int] = 6000
     """After which it has used all of its kernels."""
 
     config: PushAwareConfig = field(default_factory=PushAwareConfig)
-    interaction: QuasiStatic = field(default_factory=cautious_model)
+    interaction: InteractionModel = field(default_factory=cautious_model)
 
     def __post_init__(self) -> None:
         expect("config", self.config, PushAwareConfig)
-        expect("interaction", self.interaction, QuasiStatic)
+        expect("interaction", self.interaction, InteractionModel)  # type: ignore[type-abstract]
 
     def plan(
         self,
@@ -71,7 +74,7 @@ class PushAware:
     ) -> PlanResult:
         """Plan from ``world``; see `pushplan.world.Planner`.
 
-        One iteration is an edge of a tree, an expanded node or a repair.
+        One iteration is an edge of a tree, an expanded node or a shortcut.
 
         Raises:
             InvalidInputError: if the world's goal is not one for the robot.
@@ -80,33 +83,44 @@ class PushAware:
         check_call(world, stop, rng)
         stop = DefaultBudget(self.config.default_iterations) if stop is None else stop
         rng = np.random.default_rng(0) if rng is None else rng
-        search = PushAwareSearch(world, self.config, self.interaction, stop.start(), rng, began)
+        radius = _least_radius(world.robot, self.config)
+        improver = PathImprover(
+            world, self.config, self.interaction, radius, stop.start(), rng, began
+        )
+        search = PushAwareSearch(improver, self.config)
         bound = lower_bound(world)  # before the search, so that it is within the time given
         status = search.run()
         if status is None:
             status = PlanStatus.CANCELLED if stop.cancelled else PlanStatus.TIMED_OUT
         detail = {
-            "trees": float(search.trees),
-            "tight": float(search.tight),
+            "trees": float(search.trees.trees),
+            "tight": float(improver.tight),
             "searches": float(search.searches),
             "expansions": float(search.expansions),
             "random_arcs": float(search.random_arcs),
         }
         if status.has_plan:
-            detail["cost"], detail["bound"] = float(search.best_cost), bound
-            detail["gap"] = _gap(float(search.best_cost), bound)
+            detail["cost"], detail["bound"] = float(improver.best_cost), bound
+            detail["gap"] = _gap(float(improver.best_cost), bound)
         stats = PlanStats(
             wall_time_s=time.perf_counter() - began,
-            first_solution_s=search.first_solution_s,
-            iterations=search.iterations,
-            nodes=search.nodes,
+            first_solution_s=improver.first_solution_s,
+            iterations=improver.iterations,
+            nodes=improver.nodes,
             detail=detail,
         )
-        return PlanResult(status, search.plan() if status.has_plan else None, stats)
+        return PlanResult(status, improver.plan() if status.has_plan else None, stats)
+
+
+def _least_radius(robot: RobotModel, config: PushAwareConfig) -> float:
+    """Least turning radius of plans [m], as long as there is a way with it."""
+    if robot.drive is Drive.DIFFERENTIAL:
+        return config.differential_radius * robot.circumscribed_radius
+    return turning_radius(robot, config.turn_fraction)
 
 
 def _gap(cost: float, bound: float) -> float:
-    """By what share a cost exceeds a bound; infinite where the bound says nothing."""
+    """By what fraction a cost exceeds a bound; infinite where the bound says nothing."""
     if cost <= bound:
         return 0.0
     return cost / bound - 1.0 if bound > 0.0 else float("inf")

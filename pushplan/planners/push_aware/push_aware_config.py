@@ -4,24 +4,23 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from pushplan.motion.path_search_config import PathSearchConfig
 from pushplan.motion.speed_profile import TIGHTEST
-from pushplan.planners.rrt import KinodynamicRRTConfig
 from pushplan.world.checks import integer, number
 
 
 @dataclass(frozen=True)
-class PushAwareConfig(KinodynamicRRTConfig):
-    """Parameters of `PushAware`: those of its first plan and its repairs, and of the search.
+class PushAwareConfig(PathSearchConfig):
+    """Parameters of `PushAware`: those of its trees and its shortcutting, and of the search.
 
     Lengths are in units of the robot's circumscribed radius R. Those that are not listed are
-    described in `KinodynamicRRTConfig`.
+    described in `PathSearchConfig`.
 
     Args:
-        push_weight: w, the price of a unit of interaction work against a unit of travel work: the
-            user's trade between E_nav and I_nav.
-        greed: factor on the length that is still to go, in the order of the first search.
-        trust: factor on that length where a path is given up because it will cost too much: the
-            table is up to a tenth too long.
+        heuristic_inflation: factor on the length that is still to go, in the order of the first
+            search.
+        pruning_factor: factor on that length where a path is given up because it will cost too
+            much: the table is up to a tenth too long.
         edge: longest edge of the first random tree [R].
         differential_radius: least turning radius of a differential drive [R]; less where there is
             no way with it.
@@ -34,20 +33,20 @@ class PushAwareConfig(KinodynamicRRTConfig):
         first_search: arcs driven in a search at most; a quarter more after each that took them
             all.
         slack: how much more than the best plan so far a path of the search may cost before it is
-            repaired, as a share.
-        doubt: spread of the prices of the objects from one search to the next, as the standard
-            deviation of their logarithm; plans are always priced by the true ones.
-        random_share: share of the iterations that go into a random tree over poses and costs,
+            shortcut, as a fraction.
+        cost_sigma: perturbation of the costs of the objects from one search to the next, as the
+            standard deviation of their logarithm; plans always have the true ones.
+        random_fraction: fraction of the iterations that go into a random tree over poses and costs,
             which finds, in the end, what the search cannot represent.
     """
 
     push_weight: float = 2.5
-    turn_share: float = 0.98
+    turn_fraction: float = 0.98
     margin: float = 0.08
     default_iterations: int = 20_000
     differential_radius: float = 1.0
-    greed: float = 1.05
-    trust: float = 0.92
+    heuristic_inflation: float = 1.05
+    pruning_factor: float = 0.92
     arc: float = 2.0
     curvatures: int = 5
     nodes: int = 100_000
@@ -55,12 +54,18 @@ class PushAwareConfig(KinodynamicRRTConfig):
     expansions: int = 30
     first_search: int = 1000
     slack: float = 0.05
-    doubt: float = 0.7
-    random_share: float = 0.03
+    cost_sigma: float = 0.7
+    random_fraction: float = 0.03
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        for name in ("greed", "trust", "slack", "doubt", "random_share"):
+        for name in (
+            "heuristic_inflation",
+            "pruning_factor",
+            "slack",
+            "cost_sigma",
+            "random_fraction",
+        ):
             number(name, getattr(self, name), low=0.0)
         for name in ("arc", "memory"):
             number(name, getattr(self, name), low=0.0, open_low=True)

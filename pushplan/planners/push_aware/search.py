@@ -6,21 +6,17 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pushplan.interaction import QuasiStatic
-from pushplan.motion.collision import first_blocked
-from pushplan.motion.dubins import step_along
-from pushplan.motion.shortcutting import lay_out, make_path
-from pushplan.motion.speed_profile import turning_radius
+from pushplan.motion.path_improver import Candidate, PathImprover
+from pushplan.motion.random_tree.tree_paths import TreePaths
 from pushplan.planners.push_aware.best_first import Branching, make_search
 from pushplan.planners.push_aware.cost_to_go import CostToGo, length_to_go
-from pushplan.planners.push_aware.dubins_warm_start import taut_arcs
-from pushplan.planners.push_aware.nodes import Nodes, make_nodes, plant, trace
+from pushplan.planners.push_aware.cost_to_go_maker import cost_to_go_maker
+from pushplan.planners.push_aware.dubins_warm_start import warm_start_arcs
 from pushplan.planners.push_aware.push_aware_config import PushAwareConfig
+from pushplan.planners.push_aware.push_tree import PushTree, make_push_tree, plant, trace
 from pushplan.planners.push_aware.random_tree import DRAWS, grow
-from pushplan.planners.push_aware.tables import table_maker
-from pushplan.planners.rrt.kinodynamic_search import Search, _Candidate
 from pushplan.search.astar import EXHAUSTED, FOUND
-from pushplan.world import Drive, GoalDisc, PlanStatus, StopCheck, World
+from pushplan.world import GoalDisc, PlanStatus
 from pushplan.world.checks import FloatArray
 
 _RANDOM_NODES = 20_000
@@ -32,220 +28,192 @@ _LONGEST_ARC = 2.0
 
 
 @dataclass(frozen=True)
-class _Style:
+class _SearchVariant:
     """How one search of the lattice differs from another."""
 
     arc: float
     curvatures: int
-    greed: float
+    inflation: float
     signatures: int
     masses: FloatArray
 
 
-class PushAwareSearch(Search):
+class PushAwareSearch:
     """A first plan, then searches over poses and pushed objects, each under the best cost so far.
 
-    Trees and repairs are those of the kinodynamic planner.
+    Args:
+        improver: keeps the best path.
+        config: parameters.
     """
 
-    config: PushAwareConfig
-
-    def __init__(
-        self,
-        world: World,
-        config: PushAwareConfig,
-        interaction: QuasiStatic,
-        check: StopCheck,
-        rng: np.random.Generator,
-        began: float,
-    ) -> None:
-        super().__init__(world, config, interaction, check, rng, began)
-        radius = self._radius()
-        self.pricing = self.pricing._replace(radius=radius)
-        self.limits = replace(self.limits, max_curvature=1.0 / radius)
+    def __init__(self, improver: PathImprover, config: PushAwareConfig) -> None:
+        self.improver, self.config, self.trees = improver, config, TreePaths(improver)
+        self.world, self.rng, self.size = improver.world, improver.rng, improver.size
         self.expansions = self.searches = self.random_arcs = 0
+        self._radius = improver.problem.turning_radius
         self._patience = float(config.first_search)
-        self._nodes: Nodes | None = None
-        self._tree: Nodes | None = None
+        self._nodes: PushTree | None = None
+        self._tree: PushTree | None = None
 
     def run(self) -> PlanStatus | None:
         """Search until the stop rule fires; None where there is no plan by then."""
+        improver = self.improver
         status = self._first_plan()
         if status is not None:
             return status
         table = self._table()
         if table is not None:
-            self._search(table, self._first_style(table))
-        while not self.stopped():
-            begun = self.iterations
+            self._search(table, self._first_variant(table))
+        while not improver.stopped():
+            begun = improver.iterations
             if table is not None:
-                self._search(table, self._random_style(table))
+                self._search(table, self._random_variant(table))
             for _ in range(2):
                 self._one_round()
-            self._grow_at_random(self.config.random_share * (self.iterations - begun))
-        return PlanStatus.SOLVED if self._solved(self.best_cost) else None
+            self._grow_at_random(self.config.random_fraction * (improver.iterations - begun))
+        return PlanStatus.SOLVED if improver.solved else None
 
     def _first_plan(self) -> PlanStatus | None:
-        """Drive along the taut path or, where that fails, grow trees until one gets to the goal.
+        """Drive along the shortest path or, where that fails, grow trees until one has a plan.
 
         Returns:
             A status where the call ends here: the start is blocked, the robot is there already,
             or no way leads to the goal.
         """
-        status = self._begin()
+        improver, trees = self.improver, self.trees
+        status = improver.begin()
         if status is not None:
             return status
-        self._shoot()
-        while not self.stopped():
+        self._warm_start()
+        while not improver.stopped():
             self._one_round()
-            if self._solved(self.best_cost):
+            if improver.solved:
                 return None
-            if self.sealed:
+            if trees.sealed:
                 return PlanStatus.GOAL_UNREACHABLE
-            self._relax()
-            self._relax()  # where a first tree fails, the start is most often a tight one
-            self._shoot()
+            trees.relax()
+            trees.relax()  # where a first tree fails, the start is most often a tight one
+            self._warm_start()
             table = self._table()
             if table is not None:
-                self._search(table, replace(self._first_style(table), greed=1.3))
+                self._search(table, replace(self._first_variant(table), inflation=1.3))
         return None
 
-    def _shoot(self) -> None:
-        """Try to drive along the taut path, objects or not."""
+    def _warm_start(self) -> None:
+        """Try to drive along the shortest homotopic path, objects or not."""
+        improver, problem = self.improver, self.improver.problem
         depth = 1.01 * self.config.inset * self.size
-        if isinstance(self.goal, GoalDisc):
-            depth = self.goal.radius - 0.99 * float(self.pricing.goal[3])
-        radius = self.pricing.radius
+        if isinstance(improver.goal, GoalDisc):
+            depth = improver.goal.radius - 0.99 * float(problem.goal[3])
+        radius = problem.turning_radius
         for clearance in (max(1.25 * self.size, 1.02 * radius), 1.1 * self.size):
-            arcs = taut_arcs(self.world, self.goal, clearance, radius, depth)
+            arcs = warm_start_arcs(self.world, improver.goal, clearance, radius, depth)
             if arcs is None:
                 continue
-            if self._candidate(arcs, free=False) is not None:
+            if improver.candidate(arcs, improver.jam_cost, free=False) is not None:
                 return
 
     def _table(self) -> CostToGo | None:
         """Lengths to the goal without objects; the same for every call on this map."""
         robot, static = self.world.robot, self.world.static
         inset = self.config.inset * self.size
-        maker = table_maker(robot, static, self.goal, self._radius(), inset)
-        return maker.make(self.stopped)
+        maker = cost_to_go_maker(robot, static, self.improver.goal, self._radius, inset)
+        return maker.make(self.improver.stopped)
 
-    def _radius(self) -> float:
-        """Least turning radius of plans [m], as long as there is a way with it."""
-        if self.world.robot.drive is Drive.DIFFERENTIAL:
-            return self.config.differential_radius * self.size
-        return turning_radius(self.world.robot, self.config.turn_share)
-
-    def _first_style(self, table: CostToGo) -> _Style:
+    def _first_variant(self, table: CostToGo) -> _SearchVariant:
         config = self.config
-        greed = max(config.greed, 0.5 * (1.0 + self._dearness(table)))
-        return _Style(config.arc, config.curvatures, greed, 1, self.world.movables.masses)
+        inflation = max(config.heuristic_inflation, 0.5 * (1.0 + self._cost_ratio(table)))
+        masses = self.world.movables.masses
+        return _SearchVariant(config.arc, config.curvatures, inflation, 1, masses)
 
-    def _random_style(self, table: CostToGo) -> _Style:
-        """Other edges, another greed and other prices: what one search misses another finds."""
+    def _random_variant(self, table: CostToGo) -> _SearchVariant:
+        """Other edges, another inflation and other costs: what one search misses another finds."""
         config, rng = self.config, self.rng
         masses = self.world.movables.masses
-        most = max(1.03 * config.greed, self._dearness(table))
-        return _Style(
+        most = max(1.03 * config.heuristic_inflation, self._cost_ratio(table))
+        return _SearchVariant(
             arc=config.arc * float(rng.uniform(0.7, 1.5)),
             curvatures=int(rng.integers(1, 4)) * 2 + 1,
-            greed=float(rng.uniform(0.98 * config.greed, most)),
+            inflation=float(rng.uniform(0.98 * config.heuristic_inflation, most)),
             signatures=_SIGNATURES if rng.random() < 0.1 else 1,
-            masses=masses * np.exp(config.doubt * rng.standard_normal(len(masses))),
+            masses=masses * np.exp(config.cost_sigma * rng.standard_normal(len(masses))),
         )
 
-    def _dearness(self, table: CostToGo) -> float:
-        """What the best plan costs, over what its way would cost without objects, at most 2.
+    def _cost_ratio(self, table: CostToGo) -> float:
+        """What the best plan costs, over what its path would cost without objects, at most 2.
 
-        Among many objects the way that is left costs so much more than its length, too, and a
+        Among many objects the rest of a path costs so much more than its length, too, and a
         search that knows wastes no time on what only looks cheap.
         """
         x, y, theta = (float(value) for value in self.world.robot_pose)
         alone = self.world.robot.mass * float(length_to_go(table, x, y, theta))
-        if not self._solved(self.best_cost) or not 0.0 < alone < np.inf:
+        if not self.improver.solved or not 0.0 < alone < np.inf:
             return 1.3
-        return min(max(self.best_cost / alone, 1.0), 2.0)
+        return min(max(self.improver.best_cost / alone, 1.0), 2.0)
 
-    def _memory(self, table: CostToGo, signatures: int) -> Nodes:
+    def _memory(self, table: CostToGo, signatures: int) -> PushTree:
         """Memory for one search; kept for the next where it fits."""
         rows, cols, headings = table.values.shape
         cells = (rows, cols, headings, signatures)
         if self._nodes is None:
             config = self.config
             count = len(self.world.movables)
-            self._nodes = make_nodes(config.nodes, count, config.memory, cells)
+            self._nodes = make_push_tree(config.nodes, count, config.memory, cells)
         if self._nodes.best.shape != cells:
             self._nodes = self._nodes._replace(best=np.empty(cells))
         return self._nodes
 
-    def _search(self, table: CostToGo, style: _Style) -> None:
-        """One best-first search under the best cost so far, and repairs of what it finds."""
-        nodes = self._memory(table, style.signatures)
-        bends = np.linspace(-1.0, 1.0, style.curvatures) / self.pricing.radius
+    def _search(self, table: CostToGo, variant: _SearchVariant) -> None:
+        """One best-first search under the best cost so far, and shortcutting of what it finds."""
+        improver = self.improver
+        nodes = self._memory(table, variant.signatures)
         branching = Branching(
-            bends, style.arc * table.cell, style.greed, self.config.trust, style.masses
+            np.linspace(-1.0, 1.0, variant.curvatures) / improver.problem.turning_radius,
+            variant.arc * table.cell,
+            variant.inflation,
+            self.config.pruning_factor,
+            variant.masses,
         )
         plant(nodes, self.world.robot_pose, self.world.movables.poses, 0.0)
         self.searches += 1
-        star = make_search(
-            nodes,
-            table,
-            branching,
-            self._bound(1.0 + self.config.slack),
-            self.pricing,
-            self.shape,
-            self.walls,
-            self.bodies,
-            self.settings,
-        )
-        while not self.stopped():
+        bound = (1.0 + self.config.slack) * improver.plan_cost
+        star = make_search(nodes, table, branching, bound, improver.problem)
+        while not improver.stopped():
             before = int(nodes.counts[3])
             if before >= self._patience:
                 self._patience *= 1.25  # the trees may know better; then this takes longer
                 return
             outcome = star.run(2 * self._few())
             driven = int(nodes.counts[3]) - before
-            self.iterations += max(1, driven)
+            improver.iterations += max(1, driven)
             self.expansions += driven
             if outcome == FOUND:
-                candidate = self._candidate(trace(nodes, star.goal // 2))
-                if candidate is not None:
-                    self._finish(candidate)
+                self._try(trace(nodes, star.goal // 2))
                 return
             if outcome == EXHAUSTED or nodes.counts[2]:
                 return
 
     def _grow_at_random(self, arcs: float) -> None:
-        """Add arcs to the random tree, and repair what gets to the goal with it."""
-        world, few = self.world, self._few()
+        """Add arcs to the random tree, and shortcut what gets to the goal with it."""
+        improver, world, few = self.improver, self.world, self._few()
         if self._tree is None:
             config = self.config
             count = min(config.nodes, _RANDOM_NODES)
-            self._tree = make_nodes(count, len(world.movables), config.memory)
+            self._tree = make_push_tree(count, len(world.movables), config.memory)
             plant(self._tree, world.robot_pose, world.movables.poses, 0.0)
-        last = self.iterations + arcs
-        while self.iterations < last and not self.stopped():
-            bound = self._bound(1.0)
+        scales = np.array([2.0 * self.size, np.pi, 2.0 * self.size * world.robot.mass])
+        last = improver.iterations + arcs
+        while improver.iterations < last and not improver.stopped():
+            bound = improver.plan_cost
             if not np.isfinite(bound):
                 return
-            node = grow(
-                self._tree,
-                self.rng.random((few, DRAWS)),
-                bound,
-                _LONGEST_ARC * self.size,
-                np.array([2.0 * self.size, np.pi, 2.0 * self.size * world.robot.mass]),
-                self.pricing,
-                self.shape,
-                self.walls,
-                self.bodies,
-                self.settings,
-            )
-            self.iterations += few
+            draws = self.rng.random((few, DRAWS))
+            longest = _LONGEST_ARC * self.size
+            node = grow(self._tree, draws, bound, longest, scales, improver.problem)
+            improver.iterations += few
             self.random_arcs += few
             if node >= 0:
-                candidate = self._candidate(trace(self._tree, node))
-                if candidate is not None:
-                    self._finish(candidate)
+                self._try(trace(self._tree, node))
             if node == -2:
                 plant(self._tree, world.robot_pose, world.movables.poses, 0.0)
 
@@ -253,55 +221,33 @@ class PushAwareSearch(Search):
         """Arcs to drive between two looks at the stop rule."""
         return max(1, 10 * self.config.expansions // (10 + len(self.world.movables)))
 
-    def _bound(self, factor: float) -> float:
-        """``factor`` times the best cost so far [kg m], infinite while there is no plan."""
-        return factor * self._best_plan_cost()
-
-    def _candidate(self, arcs: FloatArray, *, free: bool = True) -> _Candidate | None:
-        """The path along some arcs, priced; None if it is not one that could be a plan.
-
-        Args:
-            arcs: (E, 2) length [m] and curvature [1/m].
-            free: whether it is known to touch no wall.
-        """
-        world = self.world
-        steps = [length / step_along(bend, self.pricing.spacing) for length, bend in arcs.tolist()]
-        capacity = 3 * int(sum(steps) + len(arcs)) + 200
-        path = make_path(capacity, len(world.movables))
-        count = lay_out(world.robot_pose, arcs, path, self.pricing)
-        if not free:
-            corners = np.empty_like(self.shape.vertices)
-            blocked = first_blocked(path.poses, count, self.shape, self.walls, corners) < count
-            x, y = path.poses[count - 1, :2]
-            if blocked or self.goal.distance(float(x), float(y)) > 0.0:
-                return None
-        cost = self._price(path, count, self._jam_cost)
-        if cost is None:
-            return None
-        self._keep(path, count, cost)
-        return _Candidate(path, make_path(capacity, len(world.movables)), count, cost)
+    def _try(self, arcs: FloatArray) -> None:
+        """Shortcut the path along some arcs, where it could be a plan."""
+        candidate = self.improver.candidate(arcs, self.improver.jam_cost)
+        if candidate is not None:
+            self._finish(candidate)
 
     def _one_round(self) -> None:
-        """Paths of two trees: around the objects, and among them at a price that varies."""
-        config = self.config
-        doubt = float(np.exp(config.doubt * self.rng.standard_normal())) if self.trees else 1.0
+        """Paths of two trees: around the objects, and among them at a weight that varies."""
+        config, sigma = self.config, self.config.cost_sigma
+        factor = float(np.exp(sigma * self.rng.standard_normal())) if self.trees.trees else 1.0
         for weight, budget in (
             (np.inf, config.avoid_iterations),
-            (config.push_weight * doubt, config.tree_iterations),
+            (config.push_weight * factor, config.tree_iterations),
         ):
-            if self.stopped():
+            if self.improver.stopped():
                 return
-            candidate = self._grow(weight, budget)
+            candidate = self.trees.grow(weight, budget)
             if candidate is not None:
                 self._finish(candidate)
 
-    def _finish(self, candidate: _Candidate) -> None:
-        """Repair a path for as long as that pays, and it may still become the best."""
-        config = self.config
-        while not self.stopped():
+    def _finish(self, candidate: Candidate) -> None:
+        """Shortcut a path for as long as that pays, and it may still become the best."""
+        improver, config = self.improver, self.config
+        while not improver.stopped():
             before = candidate.cost
-            self._repair(candidate, config.repairs)
+            improver.shortcut(candidate)
             gain = before - candidate.cost
-            behind = candidate.cost - self.best_cost
+            behind = candidate.cost - improver.best_cost
             if gain <= config.least_gain * before or behind > 5.0 * gain:
                 return

@@ -16,7 +16,7 @@ from pushplan.compiled import kernel
 from pushplan.geometry import convex_penetration
 from pushplan.geometry.transforms import transform_points
 from pushplan.interaction.kernels import Bodies
-from pushplan.motion.collision import Footprint, Obstacles, is_free
+from pushplan.motion.collision import ConvexObstacles, Footprint, is_free
 from pushplan.world.checks import BoolArray, FloatArray, IntArray
 
 _QUARTER = ((1, 0), (2, 1), (1, 1), (1, 2))
@@ -27,7 +27,7 @@ MOVES: IntArray = np.array(
     + [(y, -x) for x, y in _QUARTER],
     dtype=np.int64,
 )
-"""(16, 2) cells along x and y that a straight move along each heading covers."""
+"""(16, 2) cells along x and y that a straight move along each heading crosses."""
 HEADINGS: FloatArray = np.arctan2(MOVES[:, 1], MOVES[:, 0])
 """(16,) the headings [rad]."""
 LENGTHS: FloatArray = np.hypot(MOVES[:, 0], MOVES[:, 1])
@@ -57,7 +57,7 @@ class PoseGrid(NamedTuple):
 
 
 @kernel(allocates=True)
-def block_poses(grid: PoseGrid, shape: Footprint, among: Obstacles) -> None:
+def block_poses(grid: PoseGrid, shape: Footprint, among: ConvexObstacles) -> None:
     """Mark the poses at which the footprint touches an obstacle."""
     pose, scratch = np.empty(3), np.empty_like(shape.vertices)
     count, rows, cols = grid.blocked.shape
@@ -71,7 +71,7 @@ def block_poses(grid: PoseGrid, shape: Footprint, among: Obstacles) -> None:
 
 
 @kernel(allocates=True)
-def block_moves(grid: PoseGrid, shape: Footprint, among: Obstacles) -> None:
+def block_moves(grid: PoseGrid, shape: Footprint, among: ConvexObstacles) -> None:
     """Mark the moves between free poses on which the footprint touches an obstacle."""
     pose, scratch = np.empty(3), np.empty_like(shape.vertices)
     blocked, step = grid.blocked, grid.step

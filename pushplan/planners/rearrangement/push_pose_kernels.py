@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from pushplan.compiled import kernel
-from pushplan.motion.collision import Footprint, Obstacles, is_free
+from pushplan.motion.collision import ConvexObstacles, Footprint, is_free
 from pushplan.world.checks import FloatArray
 
 
@@ -37,7 +37,7 @@ def first_free(
     step: float,
     limit: float,
     shape: Footprint,
-    among: Obstacles,
+    among: ConvexObstacles,
     scratch: FloatArray,
 ) -> float:
     """How far along ``u`` a free pose is [m]; inf if there is none nearer than the limit."""

@@ -13,8 +13,8 @@ from pushplan.geometry import convex_penetration
 from pushplan.interaction import QuasiStatic
 from pushplan.interaction.kernels import Bodies, Settings
 from pushplan.motion.collision import (
+    ConvexObstacles,
     Footprint,
-    Obstacles,
     footprint,
     is_free,
     obstacles,
@@ -49,7 +49,7 @@ TARGET_COST = 5.0
 @functools.lru_cache(maxsize=8)
 def _fit_of(
     robot: RobotModel, static: StaticMap, margin: float
-) -> tuple[Footprint, Obstacles, FloatArray]:
+) -> tuple[Footprint, ConvexObstacles, FloatArray]:
     shape = footprint(robot, margin)
     return shape, obstacles(static), np.empty_like(shape.vertices)
 
@@ -264,7 +264,7 @@ class PushScene:
         return self.object_paths.path(point, float(self.world.movables.radii[k]), clearance, deep)
 
     @cached_property
-    def fit(self) -> tuple[Footprint, Obstacles, FloatArray]:
+    def fit(self) -> tuple[Footprint, ConvexObstacles, FloatArray]:
         """Footprint, obstacles and memory for `is_free`."""
         margin = 0.3 * self.config.margin * self.size
         return _fit_of(self.world.robot, self.world.static, margin)

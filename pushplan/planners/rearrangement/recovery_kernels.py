@@ -9,7 +9,7 @@ import numpy as np
 
 from pushplan.compiled import kernel
 from pushplan.geometry import core_distance
-from pushplan.motion.collision import Footprint, Obstacles
+from pushplan.motion.collision import ConvexObstacles, Footprint
 from pushplan.planners.rearrangement.arc_kernels import arc_step
 from pushplan.planners.rearrangement.route_kernels import static_depth
 from pushplan.world.checks import FloatArray, IntArray
@@ -36,13 +36,13 @@ class RecoveryProblem(NamedTuple):
     steps: FloatArray
     """(A, 2) distance [m] and turn [rad] of each step that it may take."""
     shape: Footprint
-    among: Obstacles
+    among: ConvexObstacles
     size: float
     """Circumscribed radius of the robot [m]."""
 
 
 @kernel(allocates=True)
-def can_turn(pose: FloatArray, size: float, among: Obstacles) -> bool:
+def can_turn(pose: FloatArray, size: float, among: ConvexObstacles) -> bool:
     """Whether the disc that the robot needs to turn about is within the bounds and free."""
     x, y, bounds, radius = pose[0], pose[1], among.bounds, _CLEARANCE * size
     if min(x - bounds[0], bounds[2] - x, y - bounds[1], bounds[3] - y) < radius:

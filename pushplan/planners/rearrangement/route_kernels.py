@@ -12,7 +12,7 @@ from pushplan.geometry import convex_penetration
 from pushplan.geometry.angles import wrap_angle
 from pushplan.geometry.transforms import transform_points
 from pushplan.interaction.kernels import Bodies
-from pushplan.motion.collision import Footprint, Obstacles, is_free
+from pushplan.motion.collision import ConvexObstacles, Footprint, is_free
 from pushplan.world.checks import FloatArray, IntArray
 
 SURE_TURN = math.radians(170.0)
@@ -36,7 +36,7 @@ class RouteProblem(NamedTuple):
     """With the margin that objects cost from."""
     tight: Footprint
     """With the margin that walls are kept from."""
-    among: Obstacles
+    among: ConvexObstacles
     poses: FloatArray
     """(K, 3) of the objects."""
     bodies: Bodies
@@ -72,7 +72,7 @@ def _object_depth(pose: FloatArray, problem: RouteProblem, body: FloatArray) -> 
 
 @kernel(allocates=True)
 def static_depth(
-    pose: FloatArray, shape: Footprint, among: Obstacles, scratch: FloatArray
+    pose: FloatArray, shape: Footprint, among: ConvexObstacles, scratch: FloatArray
 ) -> float:
     """How deep the footprint is in what is static [m]; 0 where it is free."""
     deepest = 0.0

@@ -10,11 +10,11 @@ from ompl import base, geometric
 
 from pushplan.compiled import kernel
 from pushplan.geometry import core_distance
-from pushplan.motion.collision import Obstacles, obstacles
+from pushplan.motion.collision import ConvexObstacles, obstacles
 from pushplan.motion.polyline import polyline_plan
+from pushplan.motion.random_tree.ompl_lock import own_state, seeded_ompl
 from pushplan.motion.speed_profile import start_margin
 from pushplan.planners.arguments import check_call
-from pushplan.planners.rrt.ompl_lock import own_state, seeded_ompl
 from pushplan.world import (
     MaxIterations,
     NavigationGoal,
@@ -37,7 +37,7 @@ class GeometricRRTConfig:
         clearance: distance kept between the robot's centre and obstacles [R], as far as there is
             room; the reference grows its robot by about as much.
         step: longest edge of the tree [R].
-        goal_bias: share of samples drawn from the goal.
+        goal_bias: fraction of samples drawn from the goal.
         resolution: distance between collision checks along an edge [R].
         pass_iterations: samples in each pass.
         spacing: distance between the poses of the plan [R].
@@ -119,7 +119,7 @@ class GeometricRRT:
     def _grow(
         self,
         world: World,
-        among: Obstacles,
+        among: ConvexObstacles,
         radius: float,
         check: StopCheck,
         before: int,
@@ -208,7 +208,7 @@ class _GoalRegion(base.GoalSampleableRegion):
 
 
 @kernel(allocates=True)
-def _near(point: FloatArray, among: Obstacles, radius: float) -> bool:
+def _near(point: FloatArray, among: ConvexObstacles, radius: float) -> bool:
     """Whether a disc about ``point`` (2,) touches an obstacle."""
     x, y = point[0], point[1]
     for s in range(among.boxes.shape[0]):

@@ -7,12 +7,20 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from pushplan.interaction import QuasiStatic
+from pushplan.interaction import InteractionModel, QuasiStatic
+from pushplan.motion.path_improver import PathImprover
+from pushplan.motion.path_search_config import PathSearchConfig
+from pushplan.motion.speed_profile import turning_radius
 from pushplan.planners.arguments import check_call
-from pushplan.planners.rrt.kinodynamic_config import KinodynamicRRTConfig
-from pushplan.planners.rrt.kinodynamic_search import Search
-from pushplan.world import PlanResult, PlanStats, PlanStatus, Stop, StopCheck, World
+from pushplan.planners.rrt.kinodynamic_search import KinodynamicSearch
+from pushplan.world import PlanResult, PlanStats, PlanStatus, Stop, World
 from pushplan.world.checks import expect
+from pushplan.world.stop import DefaultBudget
+
+
+@dataclass(frozen=True)
+class KinodynamicRRTConfig(PathSearchConfig):
+    """Parameters of `KinodynamicRRT`, all of them described in `PathSearchConfig`."""
 
 
 @dataclass(frozen=True)
@@ -21,8 +29,8 @@ class KinodynamicRRT:
 
     A tree of arcs grows from the robot, first with the objects as obstacles, then with only what
     is static (LaValle and Kuffner 2001, on OMPL); targets are drawn mostly around a coarse path
-    that already trades length for pushing. The first path is repaired at random with Dubins
-    curves, each candidate priced by m₀ l₀ + w Σ mᵢ lᵢ as the interaction model predicts it; the
+    that already trades length for pushing. The first path is shortcut at random with Dubins
+    curves, each candidate at the cost m₀ l₀ + w Σ mᵢ lᵢ that the interaction model predicts; the
     cheapest path over all trees is returned when the stop rule fires. Constant-speed robots turn
     no tighter than v / ω; differential drives slow down in tight turns.
 
@@ -32,15 +40,15 @@ class KinodynamicRRT:
 
     Args:
         config: parameters.
-        interaction: the quasi-static model that prices contacts.
+        interaction: predicts the objects; a model without a compiled form is slow here.
     """
 
     config: KinodynamicRRTConfig = field(default_factory=KinodynamicRRTConfig)
-    interaction: QuasiStatic = field(default_factory=QuasiStatic)
+    interaction: InteractionModel = field(default_factory=QuasiStatic)
 
     def __post_init__(self) -> None:
         expect("config", self.config, KinodynamicRRTConfig)
-        expect("interaction", self.interaction, QuasiStatic)
+        expect("interaction", self.interaction, InteractionModel)  # type: ignore[type-abstract]
 
     def plan(
         self,
@@ -49,7 +57,9 @@ class KinodynamicRRT:
         stop: Stop | None = None,
         rng: np.random.Generator | None = None,
     ) -> PlanResult:
-        """Plan from ``world``; see `pushplan.world.Planner`. One iteration is an edge or a repair.
+        """Plan from ``world``; see `pushplan.world.Planner`.
+
+        One iteration is an edge or a shortcut.
 
         Raises:
             InvalidInputError: if the world's goal is not one for the robot.
@@ -58,26 +68,19 @@ class KinodynamicRRT:
         check_call(world, stop, rng)
         stop = DefaultBudget(self.config.default_iterations) if stop is None else stop
         rng = np.random.default_rng(0) if rng is None else rng
-        search = Search(world, self.config, self.interaction, stop.start(), rng, began)
+        radius = turning_radius(world.robot, self.config.turn_fraction)
+        improver = PathImprover(
+            world, self.config, self.interaction, radius, stop.start(), rng, began
+        )
+        search = KinodynamicSearch(improver)
         status = search.run()
         if status is None:
             status = PlanStatus.CANCELLED if stop.cancelled else PlanStatus.TIMED_OUT
         stats = PlanStats(
             wall_time_s=time.perf_counter() - began,
-            first_solution_s=search.first_solution_s,
-            iterations=search.iterations,
-            nodes=search.nodes,
-            detail={"trees": float(search.trees), "tight": float(search.tight)},
+            first_solution_s=improver.first_solution_s,
+            iterations=improver.iterations,
+            nodes=improver.nodes,
+            detail={"trees": float(search.trees.trees), "tight": float(improver.tight)},
         )
-        return PlanResult(status, search.plan() if status.has_plan else None, stats)
-
-
-@dataclass(frozen=True)
-class DefaultBudget(Stop):
-    """A number of iterations, and three times as many while there is no plan."""
-
-    iterations: int
-
-    def start(self) -> StopCheck:
-        """Arm the rule for one call."""
-        return lambda done, cost: done >= self.iterations * (3 if cost == np.inf else 1)
+        return PlanResult(status, improver.plan() if status.has_plan else None, stats)

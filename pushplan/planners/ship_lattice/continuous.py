@@ -1,7 +1,7 @@
 """Optimising a path in continuous space under the turn limit, with CasADi and IPOPT.
 
 After the optimisation stage of AUTO-IceNav (arXiv 2411.17155): states x, y, heading, control
-curvature, free total length; length plus a smooth price field plus a price on changes of curvature.
+curvature, free total length; length plus a smooth cost field plus a cost of changes of curvature.
 """
 
 from __future__ import annotations
@@ -14,12 +14,12 @@ import numpy as np
 from pushplan.motion.dubins import along_arc
 from pushplan.world.checks import FloatArray
 
-_BENDING = 0.05
-"""Price of a change of curvature by that of the tightest turn [entries of the field]."""
+_CURVATURE_WEIGHT = 0.05
+"""Cost of a change of curvature by that of the tightest turn [entries of the field]."""
 
 
-class PriceField(NamedTuple):
-    """Price of driving a metre through a place, on a grid in the frame of a lattice.
+class CostField(NamedTuple):
+    """Cost of driving a metre through a place, on a grid in the frame of a lattice.
 
     Args:
         first: (2,) place of entry (0, 0) [m].
@@ -32,10 +32,10 @@ class PriceField(NamedTuple):
     values: FloatArray
 
 
-def price_field(
+def cost_field(
     sums: FloatArray, stride: int, cells: int, cell: float, hull: int, origin: FloatArray
-) -> PriceField:
-    """The price of a metre with the hull's beam, smoothed, from the sums of a `PoseLattice`.
+) -> CostField:
+    """The cost of a metre with the hull's beam, smoothed, from the sums of a `PoseLattice`.
 
     Args:
         sums: flattened sums of each column of the map before each row.
@@ -56,18 +56,18 @@ def price_field(
     values = np.apply_along_axis(np.convolve, 1, density, kernel, mode="same")
     values = np.apply_along_axis(np.convolve, 0, values, along, mode="same")
     first = ((cells - 1) / 2.0 - origin) * cell
-    return PriceField(first, cells * cell, np.ascontiguousarray(values))
+    return CostField(first, cells * cell, np.ascontiguousarray(values))
 
 
-def _solver(field: PriceField, start: FloatArray, radius: float, count: int, limit: int) -> Any:
+def _solver(field: CostField, start: FloatArray, radius: float, count: int, limit: int) -> Any:
     """IPOPT for paths of ``count`` arcs, in units of the field's grid.
 
-    The price is the cubic B-spline whose coefficients are the values of the field, which smooths
+    The cost is the cubic B-spline whose coefficients are the values of the field, which smooths
     them once more and takes no time to make.
     """
     rows, columns = field.values.shape
     knots = [list(np.arange(-2.0, n + 2.0)) for n in (rows, columns)]
-    price = casadi.Function.bspline("price", knots, field.values.ravel(order="F").tolist(), [3, 3])
+    cost = casadi.Function.bspline("cost", knots, field.values.ravel(order="F").tolist(), [3, 3])
     curvature, length = casadi.SX.sym("curvature", count), casadi.SX.sym("length")
     step = length / count
     state: Any = casadi.DM(start)
@@ -83,11 +83,11 @@ def _solver(field: PriceField, start: FloatArray, radius: float, count: int, lim
     drive = casadi.Function("drive", [casadi.vertcat(curvature, length)], [casadi.horzcat(*states)])
     chosen = casadi.MX.sym("chosen", count + 1)
     driven = drive(chosen)
-    values = price.map(count)(driven[:2, :])
-    bending = _BENDING * radius**2 * casadi.sumsqr(casadi.diff(chosen[:count]))
+    values = cost.map(count)(driven[:2, :])
+    changes = _CURVATURE_WEIGHT * radius**2 * casadi.sumsqr(casadi.diff(chosen[:count]))
     problem: Any = {
         "x": chosen,
-        "f": chosen[count] * (1.0 + casadi.sum2(values) / count) + bending,
+        "f": chosen[count] * (1.0 + casadi.sum2(values) / count) + changes,
         "g": casadi.vertcat(driven[0, count - 1], driven[1, :].T),
     }
     quiet: dict[str, Any] = {"print_level": 0, "max_iter": limit, "tol": 1e-3, "sb": "yes"}
@@ -97,7 +97,7 @@ def _solver(field: PriceField, start: FloatArray, radius: float, count: int, lim
 
 
 def refine(
-    field: PriceField,
+    field: CostField,
     arcs: FloatArray,
     heading: float,
     *,
@@ -125,7 +125,7 @@ def refine(
     count = int(np.clip(np.ceil(total / (0.35 * radius)), 8, 60))
     ends = np.cumsum(arcs[:, 0])
     middles = (np.arange(count) + 0.5) * total / count
-    bends = arcs[np.minimum(np.searchsorted(ends, middles), len(arcs) - 1), 1]
+    curvatures = arcs[np.minimum(np.searchsorted(ends, middles), len(arcs) - 1), 1]
     start = -field.first / unit
     most = unit / radius
     at = np.concatenate([start, [heading]])
@@ -136,7 +136,7 @@ def refine(
     try:
         solver = _solver(field, at, radius / unit, count, iterations)
         answer = solver(
-            x0=np.concatenate([bends * unit, [total / unit]]),
+            x0=np.concatenate([curvatures * unit, [total / unit]]),
             lbx=low,
             ubx=high,
             lbg=np.concatenate([[line], np.full(count, side[0])]),
@@ -158,7 +158,7 @@ def refine(
     made = np.column_stack([lengths, curvature])
     # rounding and an early end may leave it short of the line: drive straight on
     pose = np.array([0.0, 0.0, heading])
-    for length, bend in made:
-        along_arc(pose.copy(), length, bend, pose)
+    for length, turn in made:
+        along_arc(pose.copy(), length, turn, pose)
     short = max(goal - pose[0], 0.0) / max(np.cos(pose[2]), 0.2)
     return np.concatenate([made, [[short + 0.1 * unit, 0.0]]])

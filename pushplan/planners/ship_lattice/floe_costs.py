@@ -1,41 +1,30 @@
-"""What it costs to run over a floe, before anything is known about the way."""
+"""What it costs to run over a floe, before anything is known about the path."""
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
+from pushplan.motion.state_lattice.cost_map import FloeCosts
 from pushplan.planners.ship_lattice.ship_lattice_config import ShipLatticeConfig
 from pushplan.world import World
-from pushplan.world.checks import FloatArray
 from pushplan.world.outline import areas_and_centroids
 
-
-class FloePrices(NamedTuple):
-    """Prices of K floes."""
-
-    totals: FloatArray
-    """(K,) of covering the whole floe, in metres of travel."""
-    areas: FloatArray
-    """(K,) [m²]"""
-    soft: float
-    """Softening of the profile, see `cost_map.add_floes`."""
+_SOFT = 0.05
 
 
-def floe_prices(world: World, config: ShipLatticeConfig, cell: float) -> FloePrices:
-    """Prices of all floes of a world.
+def floe_costs(config: ShipLatticeConfig, world: World, cell: float) -> FloeCosts:
+    """Costs of all floes of a world.
 
     Args:
+        config: says what a floe costs.
         world: the snapshot.
-        config: says how floes are priced.
         cell: side of a cell of the map [m].
     """
     floes, robot = world.movables, world.robot
     half = max(robot.inscribed_radius, 0.1 * robot.circumscribed_radius)
     areas = areas_and_centroids(floes.vertices, floes.offsets)[0]
     radii = np.sqrt(areas / np.pi)
-    if config.price == "kinetic-energy":
+    if config.floe_cost == "kinetic-energy":
         ship = robot.mass
         masses = floes.masses
         energy = ship * masses * (masses + 2.0 * ship) / (2.0 * (ship + masses) ** 2)
@@ -45,7 +34,7 @@ def floe_prices(world: World, config: ShipLatticeConfig, cell: float) -> FloePri
         mean = 1.0 - 0.5 * (cells / (cells + 0.5)) ** 2
         middle = config.collision_weight * energy / (0.5 * ship) * cell / half
         soft = float(np.mean((1.0 + 0.5 / np.maximum(cells, 0.1)) ** 2 - 1.0))
-        return FloePrices(middle * mean * areas / cell**2, areas, soft)
+        return FloeCosts(middle * mean * areas / cell**2, areas, config.exponent, soft)
     pushed = config.displacement * (half + radii)
     weight = config.push_weight / robot.mass
-    return FloePrices(weight * floes.masses * pushed, areas, 0.05)
+    return FloeCosts(weight * floes.masses * pushed, areas, config.exponent, _SOFT)

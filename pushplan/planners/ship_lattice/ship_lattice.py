@@ -9,9 +9,9 @@ import numpy as np
 
 from pushplan.interaction import InteractionModel
 from pushplan.motion.speed_profile import turning_radius
+from pushplan.motion.state_lattice.lattice_builder import LatticeBuilder
 from pushplan.planners.arguments import check_call
-from pushplan.planners.ship_lattice.build import LatticeBuilder
-from pushplan.planners.ship_lattice.call import ShipCall
+from pushplan.planners.ship_lattice.ship_lattice_call import ShipLatticeCall
 from pushplan.planners.ship_lattice.ship_lattice_config import ShipLatticeConfig
 from pushplan.world import PlanResult, PlanStats, PlanStatus, Stop, World
 from pushplan.world.checks import expect
@@ -22,9 +22,9 @@ class ShipLattice:
     """State lattice for a vehicle of bounded turn rate in a field of things that it may push.
 
     After de Schaetzen et al., "Real-time navigation for autonomous surface vehicles in ice-covered
-    waters" (2023), and AUTO-IceNav (arXiv 2411.17155). Use it on the way to a goal line through
+    waters" (2023), and AUTO-IceNav (arXiv 2411.17155). Use it to reach a goal line through
     many small objects; a goal disc and walls are understood too. The robot's origin stays within
-    the bounds. One iteration is a batch of expanded nodes or one repair.
+    the bounds. One iteration is a batch of expanded nodes or one shortcut.
 
     Args:
         config: parameters.
@@ -56,7 +56,7 @@ class ShipLattice:
         check_call(world, stop, rng)
         check = None if stop is None else stop.start()
         rng = np.random.default_rng(0) if rng is None else rng
-        call = ShipCall(world, self.config, self.interaction, check, rng, began)
+        call = ShipLatticeCall(world, self.config, self.interaction, check, rng, began)
         status = call.run()
         if status is None:
             cancelled = stop is not None and stop.cancelled
@@ -66,7 +66,7 @@ class ShipLattice:
             first_solution_s=call.first_solution_s,
             iterations=call.iterations,
             nodes=call.expanded,
-            detail={"lattice_cost": call.lattice_cost, "repairs": float(call.repairs)},
+            detail={"lattice_cost": call.lattice_cost, "shortcuts": float(call.shortcuts)},
         )
         return PlanResult(status, call.plan() if status.has_plan else None, stats)
 

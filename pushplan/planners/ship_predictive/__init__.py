@@ -1,7 +1,8 @@
-"""Ship planners that price a path by the ice as it will be once the path is driven."""
+"""Ship planners whose costs are those of the ice as it will be once a path is driven."""
 
-from pushplan.planners.ship_predictive.planner import PredictiveShip, PredictiveShipNetwork
 from pushplan.planners.ship_predictive.predictive_config import PredictiveConfig
-from pushplan.planners.ship_predictive.published import PredictivePublished
+from pushplan.planners.ship_predictive.predictive_published import PredictivePublished
+from pushplan.planners.ship_predictive.predictive_ship import PredictiveShip
+from pushplan.planners.ship_predictive.predictive_ship_network import PredictiveShipNetwork
 
 __all__ = ["PredictiveConfig", "PredictivePublished", "PredictiveShip", "PredictiveShipNetwork"]

@@ -12,29 +12,29 @@ class PredictiveConfig:
     """Parameters of `PredictiveShip` and `PredictiveShipNetwork`. Lengths in hull lengths.
 
     Args:
-        push_weight: w, the price of a unit of work on the ice against a unit of the ship's own.
-        turn_share: share of the greatest turn rate that plans use; the rest is for tracking.
+        push_weight: w, the cost of a unit of work on the ice against a unit of the ship's own.
+        turn_share: fraction of the greatest turn rate that plans use; the rest is for tracking.
         arc: length of the pieces that the search puts together.
-        bends: curvatures to each side of straight ahead.
+        curvatures: to each side of straight ahead.
         width: partial paths kept from piece to piece.
         sparse: with fewer floes than this in reach the beam is wider in proportion, up to twice;
             predictions are cheap then.
         widest: with a stop rule the search is repeated with twice the width up to this.
         tries: pieces that are predicted exactly for each path kept; the others are left out by
             their estimate.
-        horizon: way ahead for which the ice is predicted; from there on the guide counts.
+        horizon: length of path for which the ice is predicted; from there on the costs to go count.
         farthest: goal lines that are farther away are approached, with a line at this distance.
         margin: least distance of the ship's origin from the sides of the channel, in half beams.
-        row: distance between the rows of the guide.
+        row: distance between the rows of the table of costs to go.
         column: distance between its columns.
-        gain: work of a metre per mass in the way, in the guide.
-        crowding: how much more that is for each typical floe in the way.
+        gain: work of a metre per mass ahead of the bow, in that table.
+        crowding: how much more that is for each typical floe there.
     """
 
     push_weight: float = 1.5
     turn_share: float = 0.9
     arc: float = 0.4
-    bends: int = 2
+    curvatures: int = 2
     width: int = 6
     sparse: int = 150
     widest: int = 48
@@ -54,12 +54,12 @@ class PredictiveConfig:
             number(name, getattr(self, name), low=0.0, open_low=True)
         number("turn_share", self.turn_share, low=0.0, high=1.0, open_low=True)
         number("tries", self.tries, low=1.0)
-        integer("bends", self.bends, low=1)
+        integer("curvatures", self.curvatures, low=1)
         integer("width", self.width, low=1)
         integer("sparse", self.sparse, low=0)
         integer("widest", self.widest, low=self.width)
 
     def beam_width(self, floes: int) -> int:
         """Paths kept from piece to piece among so many floes in reach."""
-        share = self.sparse / max(floes, 1)
-        return round(self.width * min(max(share, 1.0), 2.0))
+        ratio = self.sparse / max(floes, 1)
+        return round(self.width * min(max(ratio, 1.0), 2.0))

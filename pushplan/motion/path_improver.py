@@ -1,0 +1,233 @@
+"""`PathImprover`: the best path so far of one planning call, and how paths get better."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+
+from pushplan.interaction import InteractionModel
+from pushplan.interaction.swept_step import SweptContacts, compile_interaction
+from pushplan.motion.arc_rollout import lay_out, sweep_cost
+from pushplan.motion.collision import first_blocked, footprint, obstacles
+from pushplan.motion.dubins import step_along
+from pushplan.motion.goal_region import goal_numbers
+from pushplan.motion.path_problem import PathProblem, SweptPath, make_swept_path
+from pushplan.motion.path_search_config import PathSearchConfig
+from pushplan.motion.shortcutting import shortcut
+from pushplan.motion.speed_profile import TIGHTEST, start_margin, timed_plan
+from pushplan.motion.time_slicing import Pace
+from pushplan.world import Drive, Plan, PlanStatus, StopCheck, World
+from pushplan.world.checks import FloatArray
+
+_THIN_MARGIN = 0.05
+"""Margin below which a post could hide between two poses of the usual spacing [R]."""
+_LEAST_SPACING = 0.02
+"""Least spacing for that reason [R]."""
+_ENDLESS = 2**62
+
+
+@dataclass
+class Candidate:
+    """A path that is being shortcut, with the memory for it."""
+
+    path: SweptPath
+    trial: SweptPath
+    count: int
+    cost: float
+
+
+class PathImprover:
+    """What the searches of one planning call share: the problem, its clock, and the best path.
+
+    Args:
+        world: the snapshot.
+        config: parameters.
+        interaction: predicts the objects.
+        turning_radius: least one of plans at first [m].
+        check: the armed stop rule.
+        rng: source of chance.
+        began: when the call began, by `time.perf_counter` [s].
+    """
+
+    def __init__(
+        self,
+        world: World,
+        config: PathSearchConfig,
+        interaction: InteractionModel,
+        turning_radius: float,
+        check: StopCheck,
+        rng: np.random.Generator,
+        began: float,
+    ) -> None:
+        self.world, self.config, self.rng, self.goal = world, config, rng, world.navigation_goal
+        self.size = world.robot.circumscribed_radius
+        self.iterations = self.nodes = self.relaxed = 0
+        self.tight = False
+        self.best_cost, self.first_solution_s = np.inf, float("nan")
+        self.problem = PathProblem(
+            robot_mass=world.robot.mass,
+            push_weight=float(config.push_weight),
+            turning_radius=turning_radius,
+            spacing=config.spacing * self.size,
+            jam_length=self._jam_length(),
+            displacement=1.5 * self.size,
+            goal=goal_numbers(self.goal, config.inset * self.size),
+            footprint=footprint(world.robot),
+            walls=obstacles(world.static),
+            contacts=compile_interaction(interaction, world),
+        )
+        # crowded worlds are slow to sweep: look at the stop rule more often
+        self._batch = max(1, 10 * config.batch // (10 + len(world.movables)))
+        self._check, self._began, self._margin = check, began, 0.0
+        self._shortcut_pace, self._sweep_pace = Pace(), Pace()
+        self._best: SweptPath | None = None
+
+    def begin(self) -> PlanStatus | None:
+        """Find the margin that can be kept; a status where the call ends here already."""
+        margin = start_margin(self.world, self.config.margin * self.size)
+        if margin is None:
+            return PlanStatus.START_BLOCKED
+        self._set_margin(margin)
+        if self.goal.distance(*self.world.robot_pose[:2]) <= 0.0:
+            here = make_swept_path(1, len(self.world.movables))
+            here.poses[0] = self.world.robot_pose
+            here.objects[0] = self.world.movables.poses
+            self._keep(here, 1, 0.0)
+            return PlanStatus.SOLVED
+        return None
+
+    def relax(self) -> None:
+        """Allow tighter turns and less margin, from the second time on.
+
+        That helps where the robot starts in a tight place or has to turn round first. A
+        constant-speed robot may then use its whole turn rate; one that can slow down turns on half
+        the radius, to a tenth of its size.
+        """
+        self.relaxed += 1
+        if self.relaxed < 2:
+            return
+        self._set_margin(0.4 * self._margin if self._margin > 0.01 * self.size else 0.0)
+        radius = self.world.robot.turning_radius
+        if self.world.robot.drive is Drive.DIFFERENTIAL:
+            radius = 0.5 * self.problem.turning_radius
+        radius = max(radius, TIGHTEST * self.size)
+        self.problem = self.problem._replace(turning_radius=radius)
+
+    def _set_margin(self, margin: float) -> None:
+        """Keep ``margin`` [m] from walls; with little of it poses lie closer, for what is thin."""
+        self._margin = margin
+        spacing = self.config.spacing * self.size
+        if margin < _THIN_MARGIN * self.size:
+            spacing = min(spacing, max(2.0 * margin, _LEAST_SPACING * self.size))
+        shape = footprint(self.world.robot, margin)
+        self.problem = self.problem._replace(spacing=spacing, footprint=shape)
+
+    def _jam_length(self) -> float:
+        """A length [m] that no path without a jam comes near."""
+        world = self.world
+        extent = float((world.static.bounds[2:] - world.static.bounds[:2]).sum())
+        load = self.config.push_weight * float(world.movables.masses.sum()) / world.robot.mass
+        return 1e4 * (extent + self.size) * (1.0 + load)
+
+    @property
+    def jam_cost(self) -> float:
+        """A cost [kg m] that no path without a jam comes near."""
+        return self.problem.jam_length * self.problem.robot_mass
+
+    @property
+    def plan_cost(self) -> float:
+        """The cost of the best plan [kg m], infinite while there is none."""
+        return self.best_cost if self.solved else np.inf
+
+    @property
+    def solved(self) -> bool:
+        """Whether the best path is free of jams."""
+        return self.best_cost < self.jam_cost
+
+    def stopped(self) -> bool:
+        """Whether the stop rule fires now."""
+        if isinstance(self.problem.contacts, SweptContacts):
+            self.problem.contacts.call.raise_error()
+        return self._check(self.iterations, self.plan_cost)
+
+    def candidate(
+        self, arcs: FloatArray, limit: float = np.inf, *, free: bool = True
+    ) -> Candidate | None:
+        """The path along some arcs with its cost; None if it is not one that could be a plan.
+
+        Args:
+            arcs: (E, 2) length [m] and curvature [1/m].
+            limit: cost that it must stay below [kg m].
+            free: whether it is known to touch no wall and to reach the goal.
+        """
+        problem, count = self.problem, len(self.world.movables)
+        steps = [length / step_along(bend, problem.spacing) for length, bend in arcs.tolist()]
+        capacity = 3 * int(sum(steps) + len(arcs)) + 200
+        path = make_swept_path(capacity, count)
+        used = lay_out(self.world.robot_pose, arcs, path, problem)
+        assert used > 0  # there is room for three times as many poses
+        if not free:
+            shape = problem.footprint
+            corners = np.empty_like(shape.vertices)
+            blocked = first_blocked(path.poses, used, shape, problem.walls, corners) < used
+            x, y = path.poses[used - 1, :2]
+            if blocked or self.goal.distance(float(x), float(y)) > 0.0:
+                return None
+        cost = self._cost_of(path, used, limit)
+        if cost is None:
+            return None
+        self._keep(path, used, cost)
+        return Candidate(path, make_swept_path(capacity, count), used, cost)
+
+    def _cost_of(self, path: SweptPath, count: int, limit: float) -> float | None:
+        """Sweep the objects along a path; its cost [kg m], None where it passes the limit.
+
+        Sweeping through a crowd takes its time: None too where the stop rule fires meanwhile.
+        """
+        path.objects[0] = self.world.movables.poses
+        cost, swept = 0.0, 1
+        for first, last in self._sweep_pace.pieces(count - 1, self.stopped):
+            swept = last + 1
+            cost = sweep_cost(path, first, swept, limit, _ENDLESS, self.problem)
+            if not cost < limit:
+                return None
+        return cost if swept == count else None
+
+    def shortcut(self, candidate: Candidate) -> None:
+        """Try ``config.shortcuts`` shortcuts, as long as the stop rule allows."""
+        for _ in range(0, self.config.shortcuts, self._batch):
+            if self.stopped():
+                return
+            draws = self.rng.random((self._batch, 4))
+            normals = self.rng.standard_normal((self._batch, 2))
+            # between pieces only the clock counts: what else may fire has been looked at
+            late = partial(self._check, self.iterations, self.plan_cost)
+            for first, last in self._shortcut_pace.pieces(self._batch, late):
+                candidate.count, candidate.cost = shortcut(
+                    candidate.path,
+                    candidate.count,
+                    candidate.cost,
+                    draws[first:last],
+                    normals[first:last],
+                    candidate.trial,
+                    self.problem,
+                )
+                self._keep(candidate.path, candidate.count, candidate.cost)
+            self.iterations += self._batch
+
+    def _keep(self, path: SweptPath, count: int, cost: float) -> None:
+        if cost >= self.best_cost:
+            return
+        if np.isnan(self.first_solution_s) and cost < self.jam_cost:
+            self.first_solution_s = time.perf_counter() - self._began
+        self.best_cost = cost
+        self.tight = self.relaxed > 1
+        self._best = SweptPath(*(part[:count].copy() for part in path))
+
+    def plan(self) -> Plan:
+        """The best path so far as a plan."""
+        assert self._best is not None
+        return timed_plan(self.world, self._best, self.config.turn_fraction)

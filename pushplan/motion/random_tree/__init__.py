@@ -1,0 +1,1 @@
+"""Random trees of drivable arcs, grown by OMPL."""

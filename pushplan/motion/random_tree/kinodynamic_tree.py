@@ -1,0 +1,269 @@
+"""One kinodynamic random tree, grown by OMPL's control-space RRT (LaValle and Kuffner 2001).
+
+OMPL owns the tree, the nearest-neighbour search and the loop; it calls back for targets, for the
+motion towards them, and for the goal. Its Python binding offers no constructor for a directed
+control sampler, so the sampling of several controls, of which the one that gets nearest to the
+target is kept, happens inside the propagator: OMPL's own sample is one of them, and the edges are
+written down here, because the control that OMPL stores is only the sample.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from ompl import base, control
+
+from pushplan.compiled import kernel
+from pushplan.motion.collision import ConvexObstacles, Footprint, is_free
+from pushplan.motion.dubins import along_arc, step_along
+from pushplan.motion.random_tree.ompl_lock import own_state, seeded_ompl
+from pushplan.world import NavigationGoal
+from pushplan.world.checks import FloatArray
+
+
+@dataclass(frozen=True)
+class TreeLimits:
+    """How the tree may grow.
+
+    Args:
+        max_curvature: greatest |curvature| of an edge [1/m].
+        edge_length: longest edge [m].
+        spacing: distance between collision checks [m].
+        turn_weight: what a radian of heading error is worth in metres.
+    """
+
+    max_curvature: float
+    edge_length: float
+    spacing: float
+    turn_weight: float
+
+
+@kernel(allocates=True)
+def steer(
+    start: FloatArray,
+    target: FloatArray,
+    sampled: float,
+    limits: tuple[float, float, float, float],
+    shape: Footprint,
+    among: ConvexObstacles,
+    scratch: FloatArray,
+    out: FloatArray,
+) -> tuple[float, float]:
+    """The free arc from ``start`` that comes nearest to ``target``, among seven curvatures.
+
+    Args:
+        start: (3,) pose.
+        target: (3,) pose.
+        sampled: a curvature that was drawn at random [1/m]; the other six are spread evenly or
+            aim at the target.
+        limits: max_curvature, edge_length, spacing, turn_weight, as in `TreeLimits`.
+        shape: the footprint.
+        among: what it must not touch.
+        scratch: memory for the footprint's corners.
+        out: (3,) receives the end of the arc.
+
+    Returns:
+        Curvature [1/m] and length [m] of the arc; length 0 if every arc is blocked at once.
+    """
+    bound, longest, spacing, turn_weight = limits
+    dx, dy = target[0] - start[0], target[1] - start[1]
+    side = -np.sin(start[2]) * dx + np.cos(start[2]) * dy
+    aimed = 2.0 * side / max(dx * dx + dy * dy, 1e-12)  # the circle through both, tangent here
+    best, best_curvature, best_length = np.inf, 0.0, 0.0
+    pose = np.empty(3)
+    for i in range(7):
+        if i == 0:
+            curvature = sampled
+        elif i == 1:
+            curvature = min(max(aimed, -bound), bound)
+        else:
+            curvature = bound * (0.5 * (i - 2) - 1.0)
+        steps = int(np.ceil(longest / step_along(curvature, spacing)))
+        for step in range(1, steps + 1):
+            length = longest * step / steps
+            along_arc(start, length, curvature, pose)
+            if not is_free(pose, shape, among, scratch):
+                break
+            turn = abs((pose[2] - target[2] + np.pi) % (2.0 * np.pi) - np.pi)
+            miss = np.sqrt((pose[0] - target[0]) ** 2 + (pose[1] - target[1]) ** 2)
+            miss += turn_weight * turn
+            if miss < best:
+                best, best_curvature, best_length = miss, curvature, length
+                out[:] = pose
+    return best_curvature, best_length
+
+
+def grow_tree(
+    start: FloatArray,
+    goal: NavigationGoal,
+    targets: Callable[[], FloatArray],
+    limits: TreeLimits,
+    shape: Footprint,
+    among: ConvexObstacles,
+    seed: int,
+    done: Callable[[], bool],
+    stopped: Callable[[], bool],
+) -> FloatArray | None:
+    """Grow a tree from ``start`` until it reaches ``goal`` or ``done()`` says so.
+
+    Args:
+        start: (3,) pose.
+        goal: where to.
+        targets: gives the next (3,) pose to grow towards.
+        limits: of the edges.
+        shape: footprint of the robot.
+        among: what it must not touch.
+        seed: of OMPL's generator, positive.
+        done: asked once per iteration.
+        stopped: asked while another thread uses OMPL.
+
+    Returns:
+        (E, 2) length [m] and curvature [1/m] of the arcs from start to goal, or None.
+    """
+    with seeded_ompl(seed, stopped) as ready:
+        if not ready:
+            return None
+        return _Growth(start, goal, targets, limits, shape, among).run(done)
+
+
+class _Growth:
+    """The state behind OMPL's callbacks for one tree."""
+
+    def __init__(
+        self,
+        start: FloatArray,
+        goal: NavigationGoal,
+        targets: Callable[[], FloatArray],
+        limits: TreeLimits,
+        shape: Footprint,
+        among: ConvexObstacles,
+    ) -> None:
+        self.start = np.array([start[0], start[1], _wrap(start[2])])
+        self.goal = goal
+        self.targets = targets
+        self.limits = (
+            limits.max_curvature,
+            limits.edge_length,
+            limits.spacing,
+            limits.turn_weight,
+        )
+        self.shape, self.among = shape, among
+        self.scratch = np.empty_like(shape.vertices)
+        self.here, self.end, self.target = np.empty(3), np.empty(3), np.empty(3)
+        self.moved = True  # OMPL asks whether the start is valid before anything moves
+        self.reached: tuple[float, float, float] | None = None
+        # end of each edge -> its start, length and curvature
+        self.edges: dict[
+            tuple[float, float, float], tuple[tuple[float, float, float], float, float]
+        ] = {}
+
+    def run(self, done: Callable[[], bool]) -> FloatArray | None:
+        space = base.SE2StateSpace()
+        bounds = base.RealVectorBounds(2)
+        for axis in range(2):
+            bounds.setLow(axis, float(self.among.bounds[axis]))
+            bounds.setHigh(axis, float(self.among.bounds[axis + 2]))
+        space.setBounds(bounds)
+        controls = control.RealVectorControlSpace(space, 1)
+        curvatures = base.RealVectorBounds(1)
+        curvatures.setLow(-self.limits[0])
+        curvatures.setHigh(self.limits[0])
+        controls.setBounds(curvatures)
+        info = control.SpaceInformation(space, controls)
+        info.setStatePropagator(self._propagate)
+        info.setStateValidityChecker(self._is_valid)
+        info.setPropagationStepSize(1.0)
+        info.setMinMaxControlDuration(1, 1)
+        info.setup()
+        problem = base.ProblemDefinition(info)
+        state = own_state(base.SE2StateSpace)
+        state.setX(float(self.start[0]))
+        state.setY(float(self.start[1]))
+        state.setYaw(float(self.start[2]))
+        problem.addStartState(state)
+        region = _Region(info, self)
+        problem.setGoal(region)
+        planner = control.RRT(info)
+        planner.setGoalBias(1.0)  # every target comes from `targets`
+        planner.setProblemDefinition(problem)
+        planner.setup()
+        finished = base.PlannerTerminationCondition(lambda: self.reached is not None or done())
+        planner.solve(finished)
+        return self._trace() if self.reached is not None else None
+
+    def sample(self) -> FloatArray:
+        """The next target, remembered for the propagation that follows."""
+        self.target[:] = self.targets()
+        return self.target
+
+    def satisfied(self, x: float, y: float, yaw: float) -> bool:
+        if self.goal.distance(x, y) > 0.0:
+            return False
+        if (x, y, yaw) in self.edges:
+            self.reached = (x, y, yaw)
+        return True
+
+    def _propagate(
+        self, state: base.State, action: control.Control, duration: float, result: base.State
+    ) -> None:
+        self.here[0], self.here[1], self.here[2] = state.getX(), state.getY(), state.getYaw()
+        curvature, length = steer(
+            self.here,
+            self.target,
+            action[0],
+            self.limits,
+            self.shape,
+            self.among,
+            self.scratch,
+            self.end,
+        )
+        self.moved = length > 0.0
+        if not self.moved:
+            return
+        self.end[2] = _wrap(self.end[2])
+        x, y, yaw = float(self.end[0]), float(self.end[1]), float(self.end[2])
+        result.setX(x)
+        result.setY(y)
+        result.setYaw(yaw)
+        origin = (float(self.here[0]), float(self.here[1]), float(self.here[2]))
+        if (x, y, yaw) not in self.edges and (x, y, yaw) != origin:
+            self.edges[x, y, yaw] = (origin, length, curvature)
+
+    def _is_valid(self, state: base.State) -> bool:
+        return self.moved
+
+    def _trace(self) -> FloatArray:
+        arcs: list[tuple[float, float]] = []
+        at = self.reached
+        root = (float(self.start[0]), float(self.start[1]), float(self.start[2]))
+        while at is not None and at != root:
+            at, length, curvature = self.edges[at]
+            arcs.append((length, curvature))
+        return np.array(arcs[::-1]).reshape(-1, 2)
+
+
+class _Region(base.GoalSampleableRegion):
+    """Hands OMPL our targets, and tells it when a state is in the goal."""
+
+    def __init__(self, info: control.SpaceInformation, growth: _Growth) -> None:
+        super().__init__(info)
+        self.growth = growth
+
+    def sampleGoal(self, state: base.State) -> None:
+        target = self.growth.sample()
+        state.setX(float(target[0]))
+        state.setY(float(target[1]))
+        state.setYaw(float(target[2]))
+
+    def maxSampleCount(self) -> int:
+        return 1_000_000_000
+
+    def distanceGoal(self, state: base.State) -> float:
+        inside = self.growth.satisfied(state.getX(), state.getY(), state.getYaw())
+        return 0.0 if inside else self.growth.goal.distance(state.getX(), state.getY())
+
+
+def _wrap(angle: float) -> float:
+    return float((angle + np.pi) % (2.0 * np.pi) - np.pi)

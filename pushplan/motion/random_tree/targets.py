@@ -1,0 +1,57 @@
+"""Where a tree grows: mostly near a coarse path, sometimes anywhere."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pushplan.world.checks import FloatArray
+
+
+class Targets:
+    """Draws the poses that a tree grows towards.
+
+    Args:
+        coarse: (N, 2) coarse path to the goal [m].
+        fraction: fraction of the targets that are near it; the others are uniform.
+        spread: standard deviation of those about it [m].
+        bounds: (4,) of the workspace.
+        rng: source of chance.
+    """
+
+    def __init__(
+        self,
+        coarse: FloatArray,
+        fraction: float,
+        spread: float,
+        bounds: FloatArray,
+        rng: np.random.Generator,
+    ) -> None:
+        self.coarse, self.fraction, self.bounds, self.rng = coarse, fraction, bounds, rng
+        self.spread = spread
+        index = np.arange(len(coarse))
+        ahead, behind = (
+            coarse[np.minimum(index + 3, len(coarse) - 1)],
+            coarse[np.maximum(index - 3, 0)],
+        )
+        self.headings = np.arctan2(ahead[:, 1] - behind[:, 1], ahead[:, 0] - behind[:, 0])
+        self.block = np.empty((0, 3))
+        self.used = 0
+
+    def __call__(self) -> FloatArray:
+        """The next target (3,)."""
+        if self.used == len(self.block):
+            self.block, self.used = self._draw(128), 0
+        self.used += 1
+        target: FloatArray = self.block[self.used - 1]
+        return target
+
+    def _draw(self, count: int) -> FloatArray:
+        rng, bounds = self.rng, self.bounds
+        near = rng.random(count) < self.fraction
+        index = rng.integers(len(self.coarse), size=count)
+        offsets = rng.standard_normal((count, 3)) * [self.spread, self.spread, 0.4]
+        coarsed = np.column_stack([self.coarse[index], self.headings[index]]) + offsets
+        spread = rng.random((count, 3))
+        low, high = [*bounds[:2], -np.pi], [*bounds[2:], np.pi]
+        uniform = low + spread * (np.asarray(high) - low)
+        return np.where(near[:, None], coarsed, uniform)

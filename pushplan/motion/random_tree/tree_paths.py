@@ -1,0 +1,99 @@
+"""`TreePaths`: paths of random trees around a coarse path, one tree after the other."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pushplan.geometry import VisibilityGraph
+from pushplan.motion.coarse_path import coarse_path, reachable
+from pushplan.motion.collision import is_free, obstacles
+from pushplan.motion.path_improver import Candidate, PathImprover
+from pushplan.motion.polyline import polyline_plan
+from pushplan.motion.random_tree.kinodynamic_tree import TreeLimits, grow_tree
+from pushplan.motion.random_tree.targets import Targets
+from pushplan.world.checks import FloatArray
+
+
+class TreePaths:
+    """Grows trees for a `PathImprover`, which keeps the clock and the best path.
+
+    Args:
+        improver: of this planning call.
+    """
+
+    def __init__(self, improver: PathImprover) -> None:
+        self._improver, self._fraction = improver, improver.config.coarse_path_fraction
+        self._exact: FloatArray | None = None
+        self.trees = 0
+        self.sealed = False
+        """Whether certainly no path leads to the goal."""
+
+    def relax(self) -> None:
+        """Look farther from the coarse path, as the way out may be the other way."""
+        self._fraction *= 0.5
+        self._improver.relax()
+
+    def grow(self, push_weight: float, budget: int) -> Candidate | None:
+        """The path of a new tree.
+
+        Args:
+            push_weight: of the coarse path; infinite treats objects as obstacles.
+            budget: iterations.
+        """
+        improver, world, problem = self._improver, self._improver.world, self._improver.problem
+        config, size = improver.config, improver.size
+        self.trees += 1
+        improver.iterations += 1
+        among, shape = problem.walls, problem.footprint
+        if np.isinf(push_weight):
+            boxes = [world.movables.outline_world(k) for k in range(len(world.movables))]
+            among = obstacles(world.static, boxes)
+            if not is_free(world.robot_pose, shape, among, np.empty_like(shape.vertices)):
+                return None  # the robot touches an object already: only pushing helps
+        coarse = coarse_path(world, push_weight)
+        if improver.stopped():
+            return None
+        if len(coarse) == 0:
+            if self._exact is None:
+                self.sealed = not reachable(world)
+                if self.sealed or improver.stopped():
+                    return None
+                self._exact = self._around_walls()
+            coarse = self._exact
+        last = improver.iterations + budget
+
+        def done() -> bool:
+            improver.iterations += 1
+            return improver.iterations >= last or improver.stopped()
+
+        limits = TreeLimits(
+            max_curvature=1.0 / problem.turning_radius,
+            edge_length=config.edge * size,
+            spacing=problem.spacing,
+            turn_weight=0.5 * size,
+        )
+        spread = config.coarse_path_spread * size
+        arcs = grow_tree(
+            world.robot_pose,
+            improver.goal,
+            Targets(coarse, self._fraction, spread, world.static.bounds, improver.rng),
+            limits,
+            shape,
+            among,
+            int(improver.rng.integers(1, 2**31)),
+            done,
+            improver.stopped,
+        )
+        if arcs is None:
+            return None
+        improver.nodes += len(arcs)
+        return improver.candidate(arcs)
+
+    def _around_walls(self) -> FloatArray:
+        """A path around the walls alone, where the coarse grid misses a narrow passage."""
+        world = self._improver.world
+        graph = VisibilityGraph(world.static, world.robot.inscribed_radius)
+        corners = graph.to_goal(world.robot_pose[:2], self._improver.goal).points
+        if len(corners) == 0:
+            return world.robot_pose[None, :2]
+        return polyline_plan(world, corners, self._improver.size).poses[:, :2]

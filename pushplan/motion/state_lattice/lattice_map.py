@@ -1,0 +1,84 @@
+"""`LatticeMap`: the cells under a lattice, with floes and obstacles put on them."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from pushplan.geometry import transform_outlines
+from pushplan.motion.state_lattice.cost_map import (
+    FloeCosts,
+    PlacedFloes,
+    add_floes,
+    block,
+    prefix_sums,
+)
+from pushplan.motion.state_lattice.frame import Frame
+from pushplan.world import Movables, StaticMap
+from pushplan.world.checks import FloatArray, IntArray
+from pushplan.world.outline import flatten
+
+_BLOCKED_MARGIN = 0.8
+"""Cells nearer to an obstacle than this are blocked [cells]: more than half their diagonal."""
+
+
+@dataclass(frozen=True)
+class LatticeMap:
+    """A grid of cells that is aligned with a lattice.
+
+    Args:
+        frame: of the lattice.
+        cell: side of a cell [m].
+        origin: (2,) row and column of the frame's origin.
+        shape: rows and columns.
+    """
+
+    frame: Frame
+    cell: float
+    origin: IntArray
+    shape: tuple[int, int]
+
+    def to_cells(self, points_world: FloatArray) -> FloatArray:
+        """(N, 2) points of the world as rows and columns of the map."""
+        points: FloatArray = self.frame.from_world(points_world) / self.cell + self.origin
+        return points
+
+    def cost_sums(self, floes: Movables, costs: FloeCosts) -> FloatArray:
+        """(columns, rows + 1) sums of the costs of each column before each row [m]."""
+        corners = np.empty_like(floes.vertices)
+        transform_outlines(floes.poses, floes.vertices, floes.offsets, corners)
+        placed = PlacedFloes(
+            np.ascontiguousarray(self.to_cells(corners)),
+            floes.offsets,
+            np.ascontiguousarray(self.to_cells(floes.poses[:, :2])),
+            np.sqrt(costs.areas / np.pi) / self.cell,
+            costs,
+        )
+        grid = np.zeros(self.shape)
+        add_floes(placed, grid)
+        return prefix_sums(grid)
+
+    def no_costs(self) -> FloatArray:
+        """`cost_sums` where there is nothing."""
+        return np.zeros((self.shape[1], self.shape[0] + 1))
+
+    def blocked_sums(self, static: StaticMap) -> FloatArray:
+        """Flattened sums of the blocked cells of each column before each row; (0,) without any."""
+        if not static.convex_parts:
+            return np.zeros(0)
+        vertices, offsets = flatten(static.convex_parts)
+        grid = np.zeros(self.shape)
+        block(np.ascontiguousarray(self.to_cells(vertices)), offsets, _BLOCKED_MARGIN, grid)
+        return prefix_sums(grid).ravel()
+
+    def columns_between(
+        self, static: StaticMap, side: float, low: int, high: int
+    ) -> tuple[int, int]:
+        """First and last column from ``low`` to ``high`` that lie ``side`` [m] within bounds."""
+        bounds = static.bounds + side * np.array([1.0, 1.0, -1.0, -1.0])
+        finite = np.clip(bounds, -1e12, 1e12)
+        corners = self.to_cells(finite[[[0, 1], [2, 1], [2, 3], [0, 3]]])[:, 1]
+        first = min(max(math.ceil(float(corners.min()) - 1e-9), low), high)
+        return first, max(min(math.floor(float(corners.max()) + 1e-9), high), first)

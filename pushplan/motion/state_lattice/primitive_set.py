@@ -1,0 +1,153 @@
+"""A set of motion primitives of a state lattice, and what it is made from."""
+
+from __future__ import annotations
+
+import functools
+from dataclasses import asdict, dataclass
+
+import numpy as np
+
+from pushplan.motion.dubins import sample_pieces
+from pushplan.world.checks import ArrayRecord, FloatArray, IntArray, frozen, integer, known_keys
+from pushplan.world.checks import number as checked_number
+from pushplan.world.errors import InvalidInputError, SchemaError
+
+DIRECTIONS: dict[int, tuple[tuple[int, int], ...]] = {
+    8: ((1, 0), (1, 1)),
+    16: ((1, 0), (2, 1), (1, 1), (1, 2)),
+    32: ((1, 0), (4, 1), (2, 1), (4, 3), (1, 1), (3, 4), (1, 2), (1, 4)),
+}
+"""Headings in the first quarter turn, by their number in the whole turn."""
+
+
+@dataclass(frozen=True)
+class PrimitiveConfig:
+    """What a set of primitives is made from; a set is stored and cached under this.
+
+    Args:
+        headings: 8, 16 or 32 in the whole turn.
+        radius: least turning radius in lattice steps.
+        variants: primitives from one heading to another one.
+        shifts: primitives that change lane and keep the heading, to each side.
+    """
+
+    headings: int = 16
+    radius: float = 6.0
+    variants: int = 2
+    shifts: int = 3
+
+    def __post_init__(self) -> None:
+        if self.headings not in DIRECTIONS:
+            raise InvalidInputError(
+                f"headings must be one of {sorted(DIRECTIONS)}, got {self.headings!r}"
+            )
+        radius = checked_number("radius", self.radius, low=0.5, high=40.0)
+        object.__setattr__(self, "radius", radius)
+        integer("variants", self.variants, low=1)
+        integer("shifts", self.shifts, low=0)
+
+    @property
+    def key(self) -> str:
+        """Name of the set, as in its file."""
+        return f"h{self.headings}_r{self.radius:g}_v{self.variants}_s{self.shifts}"
+
+
+@dataclass(frozen=True, eq=False)
+class PrimitiveSet(ArrayRecord):
+    """H headings and P primitives, those of one heading after those of the one before.
+
+    Args:
+        config: what it was made from.
+        angles: (H,) headings [rad], increasing from 0.
+        first: (H + 1,) where the primitives of each heading start.
+        ends: (P, 3) steps along x and y, and the heading at the end.
+        pieces: (P, 3, 2) length [steps] and curvature [1/steps] of the three arcs.
+    """
+
+    config: PrimitiveConfig
+    angles: FloatArray
+    first: IntArray
+    ends: IntArray
+    pieces: FloatArray
+
+    @functools.cached_property
+    def lengths(self) -> FloatArray:
+        """(P,) [steps]."""
+        return frozen(np.ascontiguousarray(self.pieces[:, :, 0].sum(axis=1)))
+
+    @functools.cached_property
+    def boxes(self) -> FloatArray:
+        """(P, 4) least and greatest x and y along each primitive [steps]."""
+        boxes = np.empty((len(self), 4))
+        poses, curvatures = np.empty((1000, 3)), np.empty(1000)
+        for p in range(len(self)):
+            start = np.array([0.0, 0.0, self.angles[self.heading_of(p)]])
+            count = sample_pieces(start, self.pieces[p], 0.02 * self.lengths[p], poses, curvatures)
+            path = np.concatenate([np.zeros((1, 2)), poses[:count, :2]])
+            boxes[p] = path[:, 0].min(), path[:, 0].max(), path[:, 1].min(), path[:, 1].max()
+        return frozen(boxes)
+
+    @functools.cached_property
+    def bulge(self) -> int:
+        """How far a primitive may pass beyond the box of its two ends at most [steps]."""
+        ends = self.ends[:, [0, 0, 1, 1]].astype(np.float64)
+        box = np.where([False, True, False, True], np.maximum(ends, 0), np.minimum(ends, 0))
+        return int(np.ceil(np.abs(self.boxes - box).max() - 1e-9))
+
+    def __len__(self) -> int:
+        return len(self.ends)
+
+    def heading_of(self, primitive: int) -> int:
+        """Index of the heading at the start of a primitive."""
+        return int(np.searchsorted(self.first, primitive, side="right")) - 1
+
+    def to_json(self) -> dict[str, object]:
+        """Plain values, as in the file."""
+        return {
+            "config": asdict(self.config),
+            "first": self.first.tolist(),
+            "ends": self.ends.tolist(),
+            "pieces": [[[float(f"{v:.17g}") for v in arc] for arc in p] for p in self.pieces],
+        }
+
+    @classmethod
+    def from_json(cls, data: object) -> PrimitiveSet:
+        """The inverse of `to_json`.
+
+        Raises:
+            SchemaError: if a key is missing or unknown, or shapes disagree.
+        """
+        keys = ("config", "first", "ends", "pieces")
+        known_keys("primitives", data, keys, keys)
+        assert isinstance(data, dict)
+        config = PrimitiveConfig(**data["config"])
+        first = np.array(data["first"], dtype=np.int64)
+        ends = np.array(data["ends"], dtype=np.int64)
+        pieces = np.array(data["pieces"], dtype=np.float64)
+        if len(first) != config.headings + 1 or ends.shape != (first[-1], 3):
+            raise SchemaError("primitives: the numbers of headings and ends do not fit together")
+        if pieces.shape != (len(ends), 3, 2):
+            raise SchemaError("primitives: every primitive needs three pieces")
+        arrays = (
+            frozen(lattice_angles(config.headings)),
+            frozen(first),
+            frozen(ends),
+            frozen(pieces),
+        )
+        return cls(config, *arrays)
+
+
+def directions(headings: int) -> IntArray:
+    """(H, 2) whole vectors along the headings of a lattice."""
+    quarter = np.array(DIRECTIONS[headings], dtype=np.int64)
+    turns = [quarter]
+    for _ in range(3):
+        turns.append(np.column_stack([-turns[-1][:, 1], turns[-1][:, 0]]))
+    return np.concatenate(turns)
+
+
+def lattice_angles(headings: int) -> FloatArray:
+    """(H,) headings of a lattice [rad], increasing from 0."""
+    vectors = directions(headings)
+    angles = np.arctan2(vectors[:, 1], vectors[:, 0]) % (2.0 * np.pi)
+    return angles.astype(np.float64)

@@ -1,0 +1,122 @@
+"""Making and keeping the tables of lengths to the goal, a little at a time."""
+
+from __future__ import annotations
+
+import functools
+import threading
+from collections.abc import Callable
+
+import numpy as np
+
+from pushplan.motion.collision import footprint, obstacles
+from pushplan.motion.dubins import along_arc
+from pushplan.motion.goal_region import goal_numbers
+from pushplan.planners.push_aware.cost_to_go import CostToGo, flood, mark_free, sweep
+from pushplan.world import GoalDisc, NavigationGoal, RobotModel, StaticMap
+
+HEADINGS = 32
+"""Headings of the grid."""
+_CELL = 0.33
+"""Side of a cell [R]."""
+_COARSEST = 0.8
+"""Side of a cell beyond which a table would not resolve the robot [R]."""
+_MOST_CELLS = 16_000
+"""Cells (x, y) at most; larger maps get larger cells."""
+_ARC = 2.0
+"""Length of the arcs that carry values from cell to cell [cells]."""
+_SETTLED = 0.02
+"""Change of a value below which the table is done [R]."""
+_MOST_SWEEPS = 60
+_BLOCK = 60
+"""Cells (x, y) that are worked on between two looks at the stop rule: under 2 ms."""
+
+
+class CostToGoMaker:
+    """Makes one table in small steps, so that a planning call can stop in between.
+
+    What is done is kept for the next call. Thread-safe.
+
+    Args:
+        robot: gives footprint and size.
+        static: the map.
+        goal: where to.
+        radius: least turning radius [m].
+        inset: how far into the goal paths end [m].
+    """
+
+    def __init__(
+        self,
+        robot: RobotModel,
+        static: StaticMap,
+        goal: NavigationGoal,
+        radius: float,
+        inset: float,
+    ) -> None:
+        size = robot.circumscribed_radius
+        self._goal = goal_numbers(goal, inset)
+        self._shape, self._walls = footprint(robot), obstacles(static)
+        extent = static.bounds[2:] - static.bounds[:2]
+        least = float(np.sqrt(extent[0] * extent[1] / _MOST_CELLS))
+        cell = max(_CELL * size, least, float(extent.max()) / _MOST_CELLS)
+        self.useful = cell <= _COARSEST * size
+        """Whether a table of bearable size resolves the robot."""
+        cols, rows = (max(1, int(np.ceil(side / cell))) if self.useful else 1 for side in extent)
+        self._length = _ARC * cell
+        self._center = np.array([-1, -1])
+        if isinstance(goal, GoalDisc):
+            at = (goal.center - static.bounds[:2]) / cell
+            if (at >= 0.0).all() and at[0] < cols and at[1] < rows:
+                self._center = np.array([int(at[1]), int(at[0])])
+        self._free = np.zeros((rows, cols, HEADINGS), np.bool_)
+        self._order = np.zeros(0, np.int64)
+        values, far = np.full((rows, cols, HEADINGS), np.inf), np.full((rows, cols), np.inf)
+        self._table = CostToGo(values, far, static.bounds[:2].copy(), cell)
+        self._ends = np.zeros((HEADINGS, 3, 3))
+        for k in range(HEADINGS):
+            for arc, side in enumerate((-1.0, 0.0, 1.0)):
+                start = np.array([0.0, 0.0, 2.0 * np.pi * k / HEADINGS])
+                along_arc(start, self._length, side / radius, self._ends[k, arc])
+        self._marked = self._at = self._sweeps = 0
+        self._change = 0.0
+        self._settled = _SETTLED * size
+        self._lock = threading.Lock()
+        self._done = not self.useful
+
+    def make(self, stopped: Callable[[], bool]) -> CostToGo | None:
+        """Work until the table is done; None if the stop rule fires before, or it is of no use."""
+        while not self._done:
+            if stopped():
+                return None
+            with self._lock:
+                if not self._done:
+                    self._step()
+        return self._table if self.useful else None
+
+    def _step(self) -> None:
+        rows, cols, _ = self._free.shape
+        if self._marked < rows * cols:
+            last = min(self._marked + _BLOCK, rows * cols)
+            mark_free(self._table, self._free, self._marked, last, self._shape, self._walls)
+            self._marked = last
+            if last == rows * cols:
+                some = np.asarray(self._free.any(axis=2))
+                floor, self._order = flood(self._table, some, self._goal, self._center)
+                self._table = self._table._replace(floor=floor)
+                self._table.values[(floor == 0.0)[:, :, None] & self._free] = 0.0
+            return
+        last = min(self._at + _BLOCK, len(self._order))
+        order = self._order[self._at : last]
+        change = sweep(self._table, self._free, order, self._ends, self._length)
+        self._change, self._at = max(self._change, change), last
+        if last == len(self._order):
+            self._sweeps += 1
+            self._done = self._change < self._settled or self._sweeps >= _MOST_SWEEPS
+            self._at, self._change = 0, 0.0
+
+
+@functools.lru_cache(maxsize=8)
+def cost_to_go_maker(
+    robot: RobotModel, static: StaticMap, goal: NavigationGoal, radius: float, inset: float
+) -> CostToGoMaker:
+    """The maker of a table, with what is done of it; cached."""
+    return CostToGoMaker(robot, static, goal, radius, inset)

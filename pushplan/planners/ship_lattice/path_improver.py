@@ -1,0 +1,146 @@
+"""Making a path cheaper against the predicted interaction, until the stop rule fires."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from pushplan.interaction.path_sweepers import PathSweeper
+from pushplan.planners.ship_lattice.shortcut_proposals import ShortcutProblem, propose
+from pushplan.world.checks import FloatArray
+
+_PORTION = 8
+"""Poses that are swept between two looks at the stop rule."""
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A path and what is predicted along it.
+
+    Args:
+        poses: (N, 3) [m, m, rad].
+        curvatures: (N,) that lead to them [1/m].
+        lengths: (N,) path length so far [m].
+        objects: (M, K, 3) poses of the objects at the first M poses of the path.
+        works: (M,) work so far [kg m].
+        cost: travel plus weighted work [kg m], as far as it is predicted.
+    """
+
+    poses: FloatArray
+    curvatures: FloatArray
+    lengths: FloatArray
+    objects: FloatArray
+    works: FloatArray
+    cost: float
+
+
+class PathImprover:
+    """Finds the costs of paths by sweeps and changes paths at random.
+
+    Args:
+        sweeper: carries the objects.
+        start: (K, 3) poses of the objects now.
+        robot_mass: [kg]
+        weight: w, cost of work.
+        problem: what changed paths have to keep to.
+        ahead: how far along a path it is swept [m].
+        stopped: whether to return now.
+        free: whether poses (N, 3) keep clear of walls and within the bounds.
+    """
+
+    def __init__(
+        self,
+        sweeper: PathSweeper,
+        start: FloatArray,
+        *,
+        robot_mass: float,
+        weight: float,
+        problem: ShortcutProblem,
+        ahead: float,
+        stopped: Callable[[], bool],
+        free: Callable[[FloatArray], bool],
+    ) -> None:
+        self.sweeper, self.start = sweeper, start
+        self.robot_mass, self.weight, self.ahead = robot_mass, weight, ahead
+        self.problem, self.stopped, self.free = problem, stopped, free
+        self.best: Candidate | None = None
+
+    def consider(
+        self,
+        poses: FloatArray,
+        curvatures: FloatArray,
+        first: int = 0,
+        base: Candidate | None = None,
+    ) -> bool:
+        """Find the cost of a path and keep it if it is the cheapest so far.
+
+        Args:
+            poses: (N, 3) the path.
+            curvatures: (N,) that lead to its poses [1/m].
+            first: last pose that it shares with ``base``.
+            base: a candidate whose prediction holds up to there.
+
+        Returns:
+            Whether it was kept; also False where the call was stopped in between.
+        """
+        moves = np.diff(poses[:, :2], axis=0)
+        lengths = np.concatenate([[0.0], np.cumsum(np.sqrt((moves * moves).sum(axis=1)))])
+        limit = np.inf if self.best is None else self.best.cost
+        own = self.robot_mass * float(lengths[-1])
+        if own >= limit:
+            return False
+        last = int(np.searchsorted(lengths, self.ahead)) + 1
+        last = max(min(last, len(poses)), first + 1)
+        objects = np.empty((last, len(self.start), 3))
+        works = np.zeros(last)
+        if base is None or first >= len(base.objects):
+            first = 0
+            objects[0] = self.start
+        else:
+            objects[: first + 1] = base.objects[: first + 1]
+            works[: first + 1] = base.works[: first + 1]
+        here = objects[first].copy()
+        at = first
+        while at < last - 1:
+            if self.stopped():
+                return False
+            end = min(at + _PORTION, last - 1)
+            added = works[at + 1 : end + 1]
+            if not self.sweeper.run(poses[at : end + 1], here, objects[at : end + 1], added):
+                return False
+            added[:] = works[at] + np.cumsum(added)
+            at = end
+            if own + self.weight * works[at] >= limit:
+                return False
+        self.best = Candidate(
+            poses, curvatures, lengths, objects, works, own + self.weight * float(works[-1])
+        )
+        return True
+
+    def shortcut(self, rng: np.random.Generator) -> bool:
+        """Try one random change of the best path; whether it was kept."""
+        assert self.best is not None
+        best = self.best
+        count = len(best.poses)
+        part = count if len(best.objects) >= count else len(best.objects)
+        out, curvatures = np.empty((2 * part + 60, 3)), np.zeros(2 * part + 60)
+        # where only a part is swept, its end is not the end of the path
+        problem = self.problem if part == count else self.problem._replace(end_fraction=0.0)
+        first, new, size = propose(
+            best.poses[:part],
+            best.curvatures[:part],
+            rng.random(4),
+            rng.standard_normal(2),
+            problem,
+            out,
+            curvatures,
+        )
+        if size == 0 or not self.free(out[first + 1 : new]):
+            return False
+        turns = 2.0 * np.pi * round((out[size - 1, 2] - best.poses[part - 1, 2]) / (2 * np.pi))
+        rest = best.poses[part:] + np.array([0.0, 0.0, turns])
+        poses = np.concatenate([out[:size], rest])
+        curvatures = np.concatenate([curvatures[:size], best.curvatures[part:]])
+        return self.consider(poses, curvatures, first, best)

@@ -1,0 +1,251 @@
+"""One call of the ship lattice planner."""
+
+from __future__ import annotations
+
+import math
+import time
+from functools import partial
+
+import numpy as np
+
+from pushplan.interaction import InteractionModel
+from pushplan.interaction.path_sweepers import path_sweeper
+from pushplan.motion.coarse_path import reachable
+from pushplan.motion.collision import first_blocked, footprint, is_free, obstacles
+from pushplan.motion.path_problem import SweptPath
+from pushplan.motion.speed_profile import check_turns, timed_plan, turning_radius
+from pushplan.motion.state_lattice.built_lattice import BuiltLattice
+from pushplan.motion.state_lattice.lattice_builder import LatticeBuilder
+from pushplan.motion.state_lattice.lattice_path import bare_path, lay_path
+from pushplan.motion.state_lattice.lattice_search import open_search, path_arcs
+from pushplan.planners.ship_lattice.floe_costs import floe_costs
+from pushplan.planners.ship_lattice.nearby_objects import NearbyObjects
+from pushplan.planners.ship_lattice.path_improver import PathImprover
+from pushplan.planners.ship_lattice.ship_lattice_config import ShipLatticeConfig
+from pushplan.planners.ship_lattice.shortcut_proposals import ShortcutProblem
+from pushplan.search.astar import FOUND, PAUSED
+from pushplan.world import GoalLine, Plan, PlanStatus, StopCheck, World
+from pushplan.world.checks import FloatArray
+
+_SPREAD = 0.6
+"""Typical sideways displacement of a shortcut [R]."""
+_MOST_TURN = 2.5
+"""Greatest turn of one of its curves [rad]."""
+_END_FRACTION = 0.15
+"""Fraction of the shortcuts that move the end."""
+
+
+class ShipLatticeCall:
+    """Lattice, search and improvement of one planning call.
+
+    Args:
+        world: the snapshot.
+        config: parameters.
+        interaction: predicts what a path does.
+        check: armed stop rule, None for the planner's own budget.
+        rng: for the shortcuts.
+        began: when the call began, on the clock of `time.perf_counter`.
+    """
+
+    def __init__(
+        self,
+        world: World,
+        config: ShipLatticeConfig,
+        interaction: InteractionModel | None,
+        check: StopCheck | None,
+        rng: np.random.Generator,
+        began: float,
+    ) -> None:
+        check_turns(world.robot)
+        self.world, self.config, self.interaction = world, config, interaction
+        self.check, self.rng, self.began = check, rng, began
+        self.goal = world.navigation_goal
+        self.size = world.robot.circumscribed_radius
+        self.iterations = self.expanded = self.shortcuts = 0
+        self.lattice_cost = math.inf
+        self.first_solution_s = float("nan")
+        self.built: BuiltLattice | None = None
+        self.side = 0.0
+        self.near: NearbyObjects | None = None
+        self.improver: PathImprover | None = None
+        self.cost = math.inf
+        self.poses: FloatArray = np.zeros((0, 3))
+        self.curvatures: FloatArray = np.zeros(0)
+
+    def run(self) -> PlanStatus | None:
+        """Plan until done or stopped; None where there is no plan by then."""
+        world = self.world
+        shape, walls = footprint(world.robot), obstacles(world.static)
+        if not is_free(world.robot_pose, shape, walls, np.empty_like(shape.vertices)):
+            return PlanStatus.START_BLOCKED
+        if self.goal.distance(*(float(v) for v in world.robot_pose[:2])) <= 0.0:
+            self.poses, self.curvatures = world.robot_pose[None].copy(), np.zeros(1)
+            self.first_solution_s = time.perf_counter() - self.began
+            return PlanStatus.SOLVED
+        for fraction, side in self._limits():
+            if self.stopped():
+                return None
+            radius = turning_radius(world.robot, fraction)
+            builder = LatticeBuilder(
+                world,
+                self.config,
+                radius=radius,
+                side=side,
+                floe_costs=partial(floe_costs, self.config),
+            )
+            self.side = side
+            found = self._search(builder, self.config.searches[0])
+            if found is None:
+                return None
+            if found:
+                if self.config.sweep_horizon > 0.0:
+                    self._improve(builder)
+                assert self.built is not None
+                return PlanStatus.SOLVED if self.built.arrives else PlanStatus.APPROXIMATE
+        # the lattice is coarse: where it leads nowhere there may be a path nevertheless
+        return None if reachable(world) else PlanStatus.GOAL_UNREACHABLE
+
+    def _limits(self) -> list[tuple[float, float]]:
+        """Fractions of the turn rate and distances from the bounds [m] to try in turn."""
+        fraction = self.config.turn_share
+        side = self.config.side * 2.0 * self.world.robot.inscribed_radius
+        nearer = [(fraction, part * side) for part in (1.0, 0.8, 0.6, 0.4, 0.2, 0.0)]
+        return [*nearer, (1.0, 0.0)]
+
+    def stopped(self) -> bool:
+        """Whether the stop rule fires now."""
+        return self.check is not None and self.check(self.iterations, self.cost)
+
+    def _search(self, builder: LatticeBuilder, factor: float) -> bool | None:
+        """Whether a path was found; None if stopped before."""
+        built = builder.build(factor)
+        star, curves = open_search(built, builder)
+        while not self.stopped():
+            result = star.run(self.config.batch)
+            self.iterations += 1
+            if result != PAUSED:
+                break
+        else:
+            return None
+        self.expanded += star.expanded
+        if result != FOUND:
+            return None if builder.clipped else False  # there may be a path elsewhere
+        arcs = path_arcs(built, star, curves)
+        poses, curvatures = lay_path(built, arcs, self.world, self.config)
+        if not self._free(poses):
+            return False
+        if self.built is None:
+            self.built, self.lattice_cost = built, star.cost
+            self.first_solution_s = time.perf_counter() - self.began
+            self.poses, self.curvatures = poses, curvatures
+            self.cost = self.world.robot.mass * star.cost
+        else:
+            self._consider(poses, curvatures)
+        return True
+
+    def _free(self, poses: FloatArray) -> bool:
+        """Whether a path keeps clear of walls, and its origin from the bounds but those ahead."""
+        world = self.world
+        low, high = world.static.bounds[:2] + self.side, world.static.bounds[2:] - self.side
+        if isinstance(self.goal, GoalLine):
+            high = np.where(self.goal.normal > 0.7, world.static.bounds[2:], high)
+            low = np.where(self.goal.normal < -0.7, world.static.bounds[:2], low)
+        start = world.robot_pose[:2]
+        low, high = np.minimum(low, start), np.maximum(high, start)
+        shape, walls = footprint(world.robot), obstacles(world.static)
+        walls = walls._replace(
+            bounds=np.concatenate([low - 1e-6 * self.size, high + 1e-6 * self.size])
+        )
+        scratch = np.empty_like(shape.vertices)
+        return bool(first_blocked(poses, len(poses), shape, walls, scratch) == len(poses))
+
+    def _improve(self, builder: LatticeBuilder) -> None:
+        """Sweep the path, look at others, and change the best at random."""
+        config, world = self.config, self.world
+        assert self.built is not None
+        point, normal = self.built.finish(world)
+        ahead = config.sweep_horizon * self.size
+        self.near = NearbyObjects.around(world, normal, ahead)
+        problem = ShortcutProblem(
+            radius=builder.radius,
+            spacing=config.spacing * self.size,
+            spread=_SPREAD * self.size,
+            most_turn=_MOST_TURN,
+            end_fraction=_END_FRACTION,
+            goal=np.concatenate([point, normal]),
+        )
+        self.improver = PathImprover(
+            path_sweeper(self.near.world, self.interaction),
+            np.ascontiguousarray(self.near.world.movables.poses),
+            robot_mass=world.robot.mass,
+            weight=config.push_weight,
+            problem=problem,
+            ahead=ahead,
+            stopped=self.stopped,
+            free=self._free,
+        )
+        self._consider(self.poses, self.curvatures)
+        for factor in config.searches[1:]:
+            if self.stopped():
+                return
+            self._search(builder, factor)
+        if self.improver.best is None or not isinstance(self.goal, GoalLine):
+            return
+        if config.refinement and not self.stopped():
+            self._refine(builder)
+        # a path that touches nothing is not shortened: it would be until it grazes a floe
+        while self.shortcuts < config.shortcuts and self.improver.best.works[-1] > 0.0:
+            if self.stopped():
+                return
+            self.improver.shortcut(self.rng)
+            self.shortcuts += 1
+            self.iterations += 1
+            self.cost = self.improver.best.cost
+
+    def _refine(self, builder: LatticeBuilder) -> None:
+        """Optimise the best path in continuous space; it is kept if the sweep says it is better."""
+        from pushplan.planners.ship_lattice.continuous import cost_field, refine
+
+        assert self.improver is not None and self.improver.best is not None
+        built, best = builder.build(), self.improver.best
+        lattice = built.lattice
+        cell = lattice.step / lattice.cells
+        hull = max(1, round(2.0 * self.world.robot.inscribed_radius / cell))
+        row, column, heading = built.start
+        origin = lattice.corner + np.array([row, column]) * lattice.cells
+        field = cost_field(
+            lattice.cost_sums, lattice.stride, lattice.cells, cell, hull, origin.astype(np.float64)
+        )
+        across = built.frame.from_world(best.poses[:, :2])[:, 1]
+        reach = 2.0 * self.size
+        arcs = refine(
+            field,
+            np.column_stack([np.diff(best.lengths), best.curvatures[1:]]),
+            heading,
+            radius=builder.radius,
+            goal=(lattice.goal[1] - row) * lattice.step,
+            sides=(float(across.min()) - reach, float(across.max()) + reach),
+            iterations=self.config.refinement,
+        )
+        self.iterations += 1
+        if arcs is not None:
+            poses, curvatures = lay_path(built, arcs, self.world, self.config)
+            if self._free(poses):
+                self._consider(poses, curvatures)
+
+    def _consider(self, poses: FloatArray, curvatures: FloatArray) -> None:
+        assert self.improver is not None
+        if self.improver.consider(poses, curvatures) and self.improver.best is not None:
+            self.cost = self.improver.best.cost
+
+    def plan(self) -> Plan:
+        """The best path as a plan, with the prediction of what it does as far as there is one."""
+        best = None if self.improver is None else self.improver.best
+        if best is None or self.near is None:
+            path = bare_path(self.poses, self.curvatures)
+        else:
+            missing = len(best.poses) - len(best.objects)
+            objects = self.near.everything(self.world, best.objects, missing)
+            works = np.concatenate([best.works, np.repeat(best.works[-1:], missing)])
+            path = SweptPath(best.poses, best.curvatures, objects, best.lengths, works)
+        return timed_plan(self.world, path, self.config.turn_share)

@@ -1,0 +1,32 @@
+"""Ship policies: the lattice planner, a path follower, and plans renewed while it drives."""
+
+from __future__ import annotations
+
+from pushplan.planners.following.plan_follower import PlanFollower
+from pushplan.planners.following.renewing_follower import RenewingFollower
+from pushplan.planners.following.replanning import Replanning
+from pushplan.planners.ship_lattice.ship_lattice import ShipLattice, published, quick
+from pushplan.world import Planner, Stop
+
+RENEWAL = 2.0
+"""A new plan is made when the robot has gone this far [R]."""
+MARGIN = 0.05
+"""It is followed if it is cheaper than the rest of the old one by this much travel [R]."""
+
+
+def ship_lattice(planner: Planner | None = None, stop: Stop | None = None) -> PlanFollower:
+    """The ship lattice with plans renewed while it drives, compared by their predicted cost."""
+    rule = Replanning(surprise=1e9, margin=MARGIN)
+    return RenewingFollower(planner or ShipLattice(), renewal=RENEWAL, replanning=rule, stop=stop)
+
+
+def ship_lattice_quick(planner: Planner | None = None, stop: Stop | None = None) -> PlanFollower:
+    """`ship_lattice` with plans that are there after milliseconds."""
+    return ship_lattice(planner or quick(), stop)
+
+
+def ship_lattice_published(
+    planner: Planner | None = None, stop: Stop | None = None
+) -> PlanFollower:
+    """The lattice as published, which plans once in Ship-Ice; the reference."""
+    return PlanFollower(planner or published(), replanning=Replanning(never=True), stop=stop)

@@ -1,0 +1,218 @@
+"""A beam search over arcs whose costs depend on what was pushed before."""
+
+from __future__ import annotations
+
+import math
+from typing import Generic
+
+import numpy as np
+
+from pushplan.planners.ship_predictive.arc_kernels import arc_ahead, steer_on
+from pushplan.planners.ship_predictive.beam_node import BeamNode, Ice, StatePropagator
+from pushplan.planners.ship_predictive.channel_view import ChannelView
+from pushplan.planners.ship_predictive.cost_to_go import cost_ahead
+from pushplan.planners.ship_predictive.predictive_config import PredictiveConfig
+from pushplan.world import StopCheck
+from pushplan.world.checks import FloatArray
+from pushplan.world.polyline import step_lengths
+
+SPACING = 0.05
+"""Between the poses of a path, in hull lengths."""
+
+
+class BeamSearch(Generic[Ice]):
+    """Builds paths piece by piece and keeps the most promising ones.
+
+    Each piece of each path is first judged by the costs to go; the best are predicted with the ice
+    as the path has left it. Among paths that end at nearly the same place and heading only the
+    cheapest is kept (as Zhong et al. 2025 do at lattice nodes).
+
+    Args:
+        view: what is searched.
+        config: parameters.
+        propagator: predicts.
+        check: an armed stop rule.
+        iterations: predictions that the call has made before.
+    """
+
+    def __init__(
+        self,
+        view: ChannelView,
+        config: PredictiveConfig,
+        propagator: StatePropagator[Ice],
+        check: StopCheck,
+        iterations: int = 0,
+    ) -> None:
+        self.view, self.config, self.propagator, self.check = view, config, propagator, check
+        self.iterations, self.nodes = iterations, 0
+        self.best_cost = math.inf
+        self.stopped = False
+
+    def root(self) -> BeamNode[Ice]:
+        """The path that has not begun."""
+        pose = self.view.start
+        arc = np.array([[*pose, 0.0]])
+        return BeamNode(pose, arc, 0.0, 0.0, 0.0, self.propagator.start(), None)
+
+    def search(self, root: BeamNode[Ice], width: int, horizon: float) -> BeamNode[Ice] | None:
+        """The most promising path of a beam.
+
+        Args:
+            root: where to begin.
+            width: paths kept from piece to piece.
+            horizon: how far ahead to look [m].
+
+        Returns:
+            None where no piece fits, or the stop rule fired before the horizon.
+        """
+        layer, finished = [root], None
+        for _ in range(max(1, math.ceil(horizon / (self.config.arc * self.view.length)))):
+            children = self._predict(self._candidates(layer, width))
+            if self.stopped:
+                return finished
+            ended = [child for child in children if child.done]
+            for child in ended:
+                if finished is None or child.total < finished.total:
+                    finished = child
+            layer = self._thinned([c for c in children if not c.done], width)
+            self.nodes += len(layer)
+            if not layer or (finished is not None and finished.total <= layer[0].total):
+                break
+        if finished is not None and (not layer or finished.total <= layer[0].total):
+            return finished
+        return layer[0] if layer else None
+
+    def _candidates(
+        self, layer: list[BeamNode[Ice]], width: int
+    ) -> list[tuple[float, BeamNode[Ice], FloatArray]]:
+        """Pieces that go on from a layer: those whose estimates are best."""
+        found = []
+        for node in layer:
+            if self.check(self.iterations, self.best_cost):
+                self.stopped = True
+                return []
+            for curvature in self.view.curvatures:
+                arc = self._arc(node.pose, float(curvature))
+                if len(arc) < 2:
+                    continue
+                found.append((self._cost(node.length, node.work, arc, None), node, arc))
+        found.sort(key=lambda item: item[0])
+        return found[: math.ceil(self.config.tries * width)]
+
+    def _arc(self, pose: FloatArray, curvature: float) -> FloatArray:
+        """(N, 4) an arc, cut off at the goal; empty where it leaves the channel."""
+        view = self.view
+        count = max(1, round(self.config.arc / SPACING))
+        step = SPACING * view.length
+        arc: FloatArray = arc_ahead(view.channel, pose, curvature, step, count)
+        return arc
+
+    def _cost(self, length: float, work: float, arc: FloatArray, done: float | None) -> float:
+        """Cost up to the end of a piece plus what the costs to go expect of the rest."""
+        view, w = self.view, self.config.push_weight
+        step = SPACING * view.length
+        ahead = step * (len(arc) - 1)
+        mass = view.world.robot.mass
+        expected, rest = cost_ahead(view.costs, arc, step)
+        done = expected if done is None else done
+        return mass * (length + ahead) + w * (work + done) + rest
+
+    def _predict(
+        self, candidates: list[tuple[float, BeamNode[Ice], FloatArray]]
+    ) -> list[BeamNode[Ice]]:
+        """The candidates as paths, with the ice that they leave."""
+        found: list[BeamNode[Ice]] = []
+        step = SPACING * self.view.length
+        for i in range(0, len(candidates), self.propagator.batch):
+            if self.check(self.iterations, self.best_cost):
+                self.stopped = True
+                return found
+            chosen = candidates[i : i + self.propagator.batch]
+            ices = [node.ice for _, node, _ in chosen]
+            ahead = self.propagator.advance(ices, [arc[:, :3] for _, _, arc in chosen])
+            self.iterations += len(chosen)
+            for (_, node, arc), (ice, work) in zip(chosen, ahead, strict=True):
+                total = self._cost(node.length, node.work, arc, work)
+                found.append(
+                    BeamNode(
+                        pose=arc[-1, :3],
+                        arc=arc,
+                        length=node.length + step * (len(arc) - 1),
+                        work=node.work + work,
+                        total=total,
+                        ice=ice,
+                        parent=node,
+                        done=bool(arc[-1, 1] >= self.view.channel.goal),
+                    )
+                )
+        return found
+
+    def _thinned(self, layer: list[BeamNode[Ice]], width: int) -> list[BeamNode[Ice]]:
+        """The best of a layer, one for each place and heading."""
+        layer.sort(key=lambda node: node.total)
+        cell = 0.08 * self.view.length
+        kept, seen = [], set()
+        for node in layer:
+            place = (
+                round(node.pose[0] / cell),
+                round(node.pose[1] / cell),
+                round(node.pose[2] / 0.2),
+            )
+            if place not in seen:
+                seen.add(place)
+                kept.append(node)
+            if len(kept) == width:
+                break
+        return kept
+
+    def finish(self, node: BeamNode[Ice]) -> BeamNode[Ice] | None:
+        """Go on from a path to the goal as the costs to go say, and predict that too.
+
+        Returns:
+            None where that leaves the channel, or the stop rule fired on it.
+        """
+        view, w = self.view, self.config.push_weight
+        step = SPACING * view.length
+        turning = 2.0 * math.pi * view.radius
+        most = math.ceil((4.0 * max(view.channel.goal - node.pose[1], 0.0) + turning) / step)
+        mass = view.world.robot.mass
+        if node.pose[1] < view.channel.goal:
+            out = np.empty((most, 4))
+            count = steer_on(view.costs, node.pose, view.curvatures, step, out)
+            if count == 0 or not view.inside(out[:count]):
+                return None
+            followed = self.follow(node, np.concatenate([[[*node.pose, 0.0]], out[:count]]))
+            if followed is None:
+                return None
+            node = followed
+        node.done = True
+        node.total = mass * node.length + w * node.work
+        return node
+
+    def follow(self, node: BeamNode[Ice], path: FloatArray) -> BeamNode[Ice] | None:
+        """A path with another (N, 4) at its end, predicted; None if the stop rule fires on it.
+
+        The first pose of the other one is that where the path ends.
+        """
+        each = max(1, round(self.config.arc / SPACING))
+        for i in range(0, len(path) - 1, each):
+            if self.check(self.iterations, self.best_cost):
+                self.stopped = True
+                return None
+            node = self.extend(node, path[i : i + each + 1])
+        return node
+
+    def extend(self, node: BeamNode[Ice], arc: FloatArray) -> BeamNode[Ice]:
+        """A path with one more piece (N, 4) at its end, predicted."""
+        ice, work = self.propagator.advance([node.ice], [arc[:, :3]])[0]
+        self.iterations += 1
+        pieces = step_lengths(arc)
+        return BeamNode(
+            pose=arc[-1, :3],
+            arc=arc,
+            length=node.length + float(pieces.sum()),
+            work=node.work + work,
+            total=math.inf,
+            ice=ice,
+            parent=node,
+        )

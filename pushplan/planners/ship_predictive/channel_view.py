@@ -1,0 +1,188 @@
+"""`ChannelView`: a world in a frame that points ahead, with the near ice only."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from pushplan.interaction.ice import IceInteraction
+from pushplan.interaction.ice_bodies import IceBodies, IceSettings, select_bodies
+from pushplan.motion.speed_profile import check_turns
+from pushplan.planners.ship_predictive.arc_kernels import Channel
+from pushplan.planners.ship_predictive.cost_to_go import (
+    HEADINGS,
+    CostToGo,
+    Floes,
+    fill_field,
+    fill_table,
+)
+from pushplan.planners.ship_predictive.predictive_config import PredictiveConfig
+from pushplan.world import GoalLine, InvalidInputError, World
+from pushplan.world.checks import FloatArray, IntArray
+from pushplan.world.outline import areas_and_centroids
+
+_MOST_PLACES = 20_000
+"""Rows times columns of the table of costs to go, about."""
+
+
+@dataclass(frozen=True)
+class ChannelView:
+    """What a search needs; all in the frame of the channel, y ahead, the ship's start at x = 0.
+
+    Args:
+        world: the snapshot, in the world frame.
+        turn: angle by which the frame is turned against the world's [rad].
+        start: (3,) pose of the ship.
+        away: y of the goal line [m].
+        channel: where the ship's origin may be; its goal is the goal line, or one before it.
+        near: numbers of the floes that may be met.
+        floes: (K, 3) their poses.
+        bodies: their shapes and the hull's.
+        settings: of their motion.
+        costs: costs to go.
+        length: of the hull [m].
+        radius: least turning radius [m].
+        curvatures: (B,) that the search uses [1/m].
+    """
+
+    world: World
+    turn: float
+    start: FloatArray
+    away: float
+    channel: Channel
+    near: IntArray
+    floes: FloatArray
+    bodies: IceBodies
+    settings: IceSettings
+    costs: CostToGo
+    length: float
+    radius: float
+    curvatures: FloatArray
+
+    def to_world(self, poses: FloatArray) -> FloatArray:
+        """Carry (..., 3) poses from the frame of the channel to the world's."""
+        c, s = math.cos(self.turn), math.sin(self.turn)
+        x, y = poses[..., 0], poses[..., 1]
+        x0, y0 = self.world.robot_pose[:2]
+        return np.stack(
+            [x0 + c * x - s * y, y0 + s * x + c * y, poses[..., 2] + self.turn], axis=-1
+        )
+
+    def inside(self, poses: FloatArray) -> bool:
+        """Whether the ship's origin is in the channel at all (N, 3) poses."""
+        at = poses[:, :2]
+        return bool((at >= self.channel.low).all() and (at <= self.channel.high).all())
+
+
+def channel_view(world: World, config: PredictiveConfig, model: IceInteraction) -> ChannelView:
+    """Look at a world.
+
+    Raises:
+        InvalidInputError: if the goal is no line, something static is in the water, or the robot
+            hardly turns.
+    """
+    line = world.goal
+    if not isinstance(line, GoalLine):
+        raise InvalidInputError(
+            f"the predictive ship planners go to a GoalLine, got a {type(line).__name__}"
+        )
+    check_turns(world.robot)
+    bodies = model.bodies(world)
+    robot = world.robot
+    length = float(np.ptp(robot.vertices[:, 0]))
+    away = float((line.point - world.robot_pose[:2]) @ line.normal)
+    turn = math.atan2(line.normal[1], line.normal[0]) - 0.5 * math.pi
+    floes = _from_world(world.movables.poses, world.robot_pose, turn)
+    reach = world.movables.radii + length
+    goal = min(away, config.farthest * length)
+    near = np.flatnonzero((floes[:, 1] > -reach) & (floes[:, 1] < goal + reach))
+    off = math.remainder(float(world.robot_pose[2]) - turn - 0.5 * math.pi, 2.0 * math.pi)
+    radius = robot.turning_radius / config.turn_share
+    margin = config.margin * 0.5 * float(np.ptp(robot.vertices[:, 1]))
+    low, high = _box(world, turn, margin, (1.0 + 1e-6) * radius * (1.0 - math.cos(off)), off)
+    aside = 0.5 * max(goal, 0.0) + 5.0 * length  # no path leads farther from the straight one
+    low[0], high[0] = max(low[0], min(-aside, high[0])), min(high[0], max(aside, low[0]))
+    channel = Channel(goal, low, high)
+    bodies, floes = select_bodies(bodies, near), np.ascontiguousarray(floes[near])
+    return ChannelView(
+        world=world,
+        turn=turn,
+        start=np.array([0.0, 0.0, 0.5 * math.pi + off]),
+        away=away,
+        channel=channel,
+        near=near,
+        floes=floes,
+        bodies=bodies,
+        settings=model.settings(world),
+        costs=_costs_to_go(world, config, bodies, floes, channel, radius),
+        length=length,
+        radius=radius,
+        curvatures=np.linspace(-1.0, 1.0, 2 * config.curvatures + 1) / radius,
+    )
+
+
+def _from_world(poses: FloatArray, origin: FloatArray, turn: float) -> FloatArray:
+    c, s = math.cos(turn), math.sin(turn)
+    dx, dy = poses[:, 0] - origin[0], poses[:, 1] - origin[1]
+    return np.column_stack([c * dx + s * dy, c * dy - s * dx, poses[:, 2] - turn])
+
+
+def _box(
+    world: World, turn: float, margin: float, bulge: float, off: float
+) -> tuple[FloatArray, FloatArray]:
+    """Box of places for the ship's origin: the bounds, and less a margin at the sides.
+
+    Where the goal line is not parallel to a side of the bounds, the box around them turned. The
+    margin is given up as far as a ship needs the clearance to turn ahead: ``bulge`` [m] to the side
+    to which it heads (``off`` [rad], positive to the left).
+    """
+    x0, y0, x1, y1 = world.static.bounds.tolist()
+    corners = np.array([(x0, y0, 0.0), (x1, y0, 0.0), (x1, y1, 0.0), (x0, y1, 0.0)])
+    box = _from_world(corners, world.robot_pose, turn)[:, :2]
+    low, high = box.min(axis=0), box.max(axis=0)
+    margin = min(margin, 0.25 * float(high[0] - low[0]))
+    low[0] = min(low[0] + margin, max(low[0], -bulge if off > 0.0 else 0.0))
+    high[0] = max(high[0] - margin, min(high[0], bulge if off < 0.0 else 0.0))
+    return low, high
+
+
+def _costs_to_go(
+    world: World,
+    config: PredictiveConfig,
+    bodies: IceBodies,
+    floes: FloatArray,
+    channel: Channel,
+    radius: float,
+) -> CostToGo:
+    vertices = world.robot.vertices
+    length, away = float(np.ptp(vertices[:, 0])), max(channel.goal, 0.0)
+    width, ahead = float(channel.high[0] - channel.low[0]), away + length
+    # a table over wide water is coarser, so that it is there in milliseconds
+    places = (width / (config.column * length)) * (ahead / (config.row * length))
+    coarser = length * max(1.0, math.sqrt(places / _MOST_PLACES))
+    columns = max(2, math.ceil(width / (config.column * coarser)) + 1)
+    column = max(width / (columns - 1), 0.1 * config.column * length)
+    cell = 0.5 * column
+    rows = max(2, math.ceil(ahead / (config.row * coarser)) + 1)
+    costs = CostToGo(
+        table=np.empty((rows, columns, HEADINGS)),
+        field=np.empty((math.ceil((away + 3.0 * length) / cell) + 1, 2 * columns - 1)),
+        left=float(channel.low[0]),
+        low=-length,  # the table begins a hull length behind the ship
+        column=column,
+        row=ahead / (rows - 1),
+        cell=cell,
+        field_low=-length,
+        bow=0.7 * float(vertices[:, 0].max()),
+        mass=world.robot.mass,
+        weight=float(config.push_weight),
+        radius=radius,
+    )
+    radii = np.sqrt(areas_and_centroids(bodies.vertices, bodies.offsets)[0] / np.pi)
+    half_beam = 0.5 * float(np.ptp(vertices[:, 1]))
+    gain, crowding = float(config.gain), float(config.crowding)
+    fill_field(Floes(floes, radii, bodies.masses, half_beam, gain, crowding), costs)
+    fill_table(costs)
+    return costs

@@ -1,0 +1,95 @@
+"""`MapPropagator`: an occupancy map along a path, changed by the network."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from pushplan.interaction.network import IceNetwork
+from pushplan.interaction.occupancy import CHANNELS, PATCH_CELLS, cell_size, ice_density
+from pushplan.interaction.occupancy_kernels import Patch, cover_objects, cover_sweep
+from pushplan.planners.ship_predictive.beam_node import BeamNode
+from pushplan.planners.ship_predictive.channel_view import ChannelView
+from pushplan.planners.ship_predictive.floe_propagator import FloePropagator
+from pushplan.world.checks import FloatArray
+
+_TRACED = 10
+"""Poses that are swept between two looks at the stop rule."""
+
+
+class MapPropagator:
+    """The ice as a map (H, W) of covered fractions; a patch of it changes with each piece of path.
+
+    Args:
+        view: what is searched.
+        network: predicts the patches.
+    """
+
+    batch = 8
+
+    def __init__(self, view: ChannelView, network: IceNetwork) -> None:
+        self._view, self._network = view, network
+        self._cell = cell_size(view.world)
+        self._scale = ice_density(view.world) * self._cell**3
+        half, channel = PATCH_CELLS // 2, view.channel
+        reach = half * self._cell
+        low = np.array([channel.low[0] - reach, -view.length - reach])
+        high = np.array([channel.high[0] + reach, max(channel.goal, 0.0) + view.length + reach])
+        self._corner = self._cell * np.floor(low / self._cell)
+        columns, rows = np.ceil((high - self._corner) / self._cell).astype(int)
+        self._start = np.zeros((max(rows, PATCH_CELLS), max(columns, PATCH_CELLS)), np.float32)
+        bodies = view.bodies
+        frame = np.array([*self._corner, 0.0])
+        cover_objects(view.floes, bodies.vertices, bodies.offsets, frame, self._cell, self._start)
+
+    def start(self) -> Patch:
+        """The map now."""
+        return self._start
+
+    def advance(
+        self, ices: Sequence[Patch], paths: Sequence[FloatArray]
+    ) -> list[tuple[Patch, float]]:
+        """The maps after each piece of path, and the work on the ice [kg m]; one network call."""
+        bodies = self._view.bodies
+        patches = np.empty((len(ices), len(CHANNELS), PATCH_CELLS, PATCH_CELLS), np.float32)
+        places = [self._place(path) for path in paths]
+        for i, (ice, path, (row, column)) in enumerate(zip(ices, paths, places, strict=True)):
+            patches[i, 0] = ice[row : row + PATCH_CELLS, column : column + PATCH_CELLS]
+            corner = self._corner + self._cell * np.array([column, row])
+            frame = np.array([*corner, 0.0])
+            poses = np.ascontiguousarray(path)
+            hull = (bodies.hull, bodies.hull_offsets, frame, self._cell)
+            cover_sweep(poses[:1], *hull, patches[i, 1])
+            cover_sweep(poses, *hull, patches[i, 2])
+        after, work = self._network.predict_patches(patches)
+        found = []
+        for i, (ice, (row, column)) in enumerate(zip(ices, places, strict=True)):
+            changed = ice.copy()
+            changed[row : row + PATCH_CELLS, column : column + PATCH_CELLS] = after[i]
+            found.append((changed, float(work[i]) * self._scale))
+        return found
+
+    def trace(self, node: BeamNode[Patch], stopped: Callable[[], bool]) -> FloatArray | None:
+        """(N, K, 3) poses of the floes at each pose of a path, by the contact model."""
+        floes, path = FloePropagator(self._view), node.path()[:, :3]
+        out = self._view.floes[None]
+        parts = [out]
+        for i in range(0, len(path) - 1, _TRACED):
+            if stopped():
+                return None
+            out = floes.sweep(out[-1], path[i : i + _TRACED + 1])[0]
+            parts.append(out[1:])
+        return np.concatenate(parts)
+
+    def _place(self, path: FloatArray) -> tuple[int, int]:
+        """First row and column of the patch about the middle between a piece's two ends."""
+        middle = 0.5 * (path[0, :2] + path[-1, :2])
+        column, row = (middle - self._corner) / self._cell
+        rows, columns = self._start.shape
+        half = PATCH_CELLS // 2
+        return (
+            min(max(math.floor(row + 0.5) - half, 0), rows - PATCH_CELLS),
+            min(max(math.floor(column + 0.5) - half, 0), columns - PATCH_CELLS),
+        )

@@ -1,0 +1,157 @@
+"""One call of a predictive ship planner."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from pushplan.interaction.ice import IceInteraction
+from pushplan.planners.ship_predictive.beam_node import BeamNode, StatePropagator
+from pushplan.planners.ship_predictive.beam_search import BeamSearch
+from pushplan.planners.ship_predictive.channel_view import ChannelView, channel_view
+from pushplan.planners.ship_predictive.predictive_config import PredictiveConfig
+from pushplan.planners.ship_predictive.turning import in_table, tight_turn, turned_start
+from pushplan.world import Plan, PlanResult, PlanStats, PlanStatus, Stop, World
+from pushplan.world.checks import FloatArray
+from pushplan.world.polyline import step_lengths
+
+_TIGHTEST = 0.999
+"""Fraction of the turn rate that is used where there is no path with less."""
+
+
+def plan_call(
+    world: World,
+    config: PredictiveConfig,
+    interaction: IceInteraction,
+    make_propagator: Callable[[ChannelView], StatePropagator[Any]],
+    stop: Stop | None,
+    began: float,
+) -> PlanResult:
+    """Plan with the usual turn rate, or with all of it where there is no path otherwise.
+
+    Args:
+        world: the snapshot.
+        config: parameters.
+        interaction: predicts the floes.
+        make_propagator: makes what keeps the ice along a path.
+        stop: ends the call.
+        began: when it began, on the clock of `time.perf_counter`.
+    """
+    check = (lambda iterations, cost: False) if stop is None else stop.start()
+    iterations = nodes = 0
+    for fraction in dict.fromkeys((config.turn_share, max(config.turn_share, _TIGHTEST))):
+        view = channel_view(world, replace(config, turn_share=fraction), interaction)
+        beam: BeamSearch[Any] = BeamSearch(view, config, make_propagator(view), check, iterations)
+        call = PredictiveCall(beam, widening=stop is not None)
+        status = call.run()
+        iterations, nodes = beam.iterations, nodes + beam.nodes
+        if status is not PlanStatus.GOAL_UNREACHABLE:
+            break
+    if status is PlanStatus.TIMED_OUT and stop is not None and stop.cancelled:
+        status = PlanStatus.CANCELLED
+    stats = PlanStats(
+        wall_time_s=time.perf_counter() - began,
+        first_solution_s=call.first - began,
+        iterations=iterations,
+        nodes=nodes,
+        detail={"cost": beam.best_cost, "tight": float(fraction > config.turn_share)},
+    )
+    return PlanResult(status, call.plan(), stats)
+
+
+class PredictiveCall:
+    """Beams of growing width, and the best path of all.
+
+    Args:
+        beam: searches.
+        widening: whether to go on with wider beams.
+    """
+
+    def __init__(self, beam: BeamSearch[Any], widening: bool) -> None:
+        self._beam, self._widening = beam, widening
+        self._best: BeamNode[Any] | None = None
+        self._objects: FloatArray | None = None
+        self.first = math.nan
+        """When there was a plan, on the clock of `time.perf_counter`."""
+
+    def run(self) -> PlanStatus:
+        """Search until done or stopped."""
+        beam, view = self._beam, self._beam.view
+        if not view.inside(view.start[None]):
+            return PlanStatus.START_BLOCKED
+        if view.away > view.channel.high[1]:
+            return PlanStatus.GOAL_UNREACHABLE
+        if view.channel.goal <= 0.0:
+            self._consider(beam.root())
+            return PlanStatus.SOLVED
+        turn = tight_turn(view)
+        root: BeamNode[Any] | None = beam.root()
+        if not in_table(view.start[2]):
+            root = None if turn is None else beam.follow(beam.root(), turned_start(turn))
+        if root is not None:
+            self._consider(beam.finish(root))
+        if self._best is None and turn is not None and not beam.stopped:
+            ahead = beam.follow(beam.root(), turn)  # out of where the costs to go hold
+            self._consider(None if ahead is None else beam.finish(ahead))
+        if root is not None:
+            self._widen(root)
+        if self._best is None:
+            return PlanStatus.TIMED_OUT if beam.stopped else PlanStatus.GOAL_UNREACHABLE
+        return PlanStatus.SOLVED if view.channel.goal == view.away else PlanStatus.APPROXIMATE
+
+    def _widen(self, root: BeamNode[Any]) -> None:
+        beam, config = self._beam, self._beam.config
+        width = config.beam_width(len(beam.view.near))
+        while not beam.stopped:
+            node = beam.search(root, width, config.horizon * beam.view.length)
+            if node is not None:
+                self._consider(beam.finish(node))
+            width *= 2
+            if not self._widening or width > config.widest:
+                return
+
+    def _consider(self, node: BeamNode[Any] | None) -> None:
+        """Take up a path that is cheaper than the best, if there is time to say what it does."""
+        beam = self._beam
+        if node is None or not node.total < beam.best_cost:
+            return
+        objects = beam.propagator.trace(node, lambda: beam.check(beam.iterations, beam.best_cost))
+        if objects is None and self._best is not None:
+            return
+        self._best, self._objects, beam.best_cost = node, objects, node.total
+        if math.isnan(self.first):
+            self.first = time.perf_counter()
+
+    def plan(self) -> Plan | None:
+        """The best path at full speed, with what it does to the floes."""
+        if self._best is None:
+            return None
+        view, path = self._beam.view, self._best.path()
+        world = view.world
+        robot = world.robot
+        poses = view.to_world(path[:, :3])
+        headings = np.unwrap(poses[:, 2])
+        poses[:, 2] = headings + (world.robot_pose[2] - headings[0])  # whole turns
+        poses[0] = world.robot_pose
+        chords = step_lengths(path)
+        half = np.clip(0.5 * np.abs(path[1:, 3]) * chords, 1e-9, 1.0)
+        arcs = chords * np.arcsin(half) / half
+        work, objects = self._best.work, None
+        if self._objects is not None:
+            work = float((step_lengths(self._objects) @ view.bodies.masses).sum())
+            objects = np.repeat(world.movables.poses[None], len(path), axis=0)
+            objects[:, view.near] = view.to_world(self._objects)
+        return Plan(
+            times=np.concatenate([[0.0], np.cumsum(arcs / robot.max_speed)]),
+            poses=poses,
+            speeds=np.full(len(path), robot.max_speed),
+            turn_rates=robot.max_speed * np.append(path[1:, 3], 0.0),
+            travel_cost=robot.mass * float(arcs.sum()),
+            interaction_cost=work,
+            object_poses=objects,
+        )

@@ -1,0 +1,90 @@
+"""The predictive ship planner as published: the reference that ours is measured against."""
+
+from __future__ import annotations
+
+import math
+import time
+from dataclasses import dataclass, field
+from typing import ClassVar
+
+import numpy as np
+
+from pushplan.interaction.ice import IceInteraction
+from pushplan.interaction.network import IceNetwork
+from pushplan.planners.arguments import check_call
+from pushplan.planners.ship_predictive.channel_view import channel_view
+from pushplan.planners.ship_predictive.predictive_config import PredictiveConfig
+from pushplan.planners.ship_predictive.published_search import PublishedSearch, timed_path
+from pushplan.world import PlanResult, PlanStats, PlanStatus, Stop, World
+from pushplan.world.checks import expect, number
+
+
+@dataclass(frozen=True)
+class PredictivePublished:
+    """A* over a state lattice whose edges cost what a network says they do to the ice.
+
+    After Zhong et al. 2025 (arXiv 2409.11326): an edge costs 1000 times the mean squared change of
+    the patch of occupancy around it, plus its length [m for a ship of 2 m]; the predicted map is
+    carried at each node, and all edges from a node are predicted in one call. The heuristic is the
+    length of the Dubins path to the line. Networks, weights and data of the paper are not public:
+    the network is ours, the lattice that of `LatticeConfig.published`. A path is
+    there only when the search ends, so that a deadline that comes before ends without a plan.
+
+    Args:
+        change_weight: factor on the mean squared change.
+        network: predicts.
+    """
+
+    warm_up_iterations: ClassVar[int] = 30
+    """After which it has used all of its kernels."""
+
+    change_weight: float = 1000.0
+    network: IceNetwork = field(default_factory=IceNetwork)
+
+    def __post_init__(self) -> None:
+        number("change_weight", self.change_weight, low=0.0)
+        expect("network", self.network, IceNetwork)
+
+    def plan(
+        self, world: World, *, stop: Stop | None = None, rng: np.random.Generator | None = None
+    ) -> PlanResult:
+        """Plan from ``world``; an iteration is an expanded node. There is no chance in it.
+
+        Raises:
+            InvalidInputError: if the goal is no line, something static is in the water, or the
+                network cannot be read.
+        """
+        began = time.perf_counter()
+        check_call(world, stop, rng)
+        self.network.load()
+        check = (lambda iterations, cost: False) if stop is None else stop.start()
+        view = channel_view(world, PredictiveConfig(margin=0.0), IceInteraction())
+        plan, expanded, first = None, 0, math.nan
+        if not view.inside(view.start[None]):
+            status = PlanStatus.START_BLOCKED
+        elif view.away > view.channel.high[1]:
+            status = PlanStatus.GOAL_UNREACHABLE
+        elif view.away <= 0.0:
+            status, first = PlanStatus.SOLVED, time.perf_counter() - began
+            plan = timed_path(world, world.robot_pose[None], np.zeros(1))
+        else:
+            search = PublishedSearch(view, self.network, self.change_weight)
+            status = PlanStatus.SOLVED
+            while not search.arrived:
+                if check(expanded, math.inf):
+                    cancelled = stop is not None and stop.cancelled
+                    status = PlanStatus.CANCELLED if cancelled else PlanStatus.TIMED_OUT
+                    break
+                if not search.expand():
+                    status = PlanStatus.GOAL_UNREACHABLE
+                    break
+                expanded += 1
+            if search.arrived:
+                plan, first = search.plan(), time.perf_counter() - began
+        stats = PlanStats(
+            wall_time_s=time.perf_counter() - began,
+            first_solution_s=first,
+            iterations=expanded,
+            nodes=expanded,
+        )
+        return PlanResult(status, plan, stats)

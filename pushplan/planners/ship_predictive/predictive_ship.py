@@ -1,0 +1,59 @@
+"""`PredictiveShip`: through ice by predicting what each path does to it."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass, field
+from typing import ClassVar
+
+import numpy as np
+
+from pushplan.interaction.ice import IceInteraction
+from pushplan.planners.arguments import check_call
+from pushplan.planners.ship_predictive.floe_propagator import FloePropagator
+from pushplan.planners.ship_predictive.predictive_call import plan_call
+from pushplan.planners.ship_predictive.predictive_config import PredictiveConfig
+from pushplan.world import PlanResult, Stop, World
+from pushplan.world.checks import expect
+
+
+@dataclass(frozen=True)
+class PredictiveShip:
+    """Minimises m₀ l₀ + w Σ mᵢ lᵢ, with the floes pushed along each path that it looks at.
+
+    After Zhong et al. 2025 (arXiv 2409.11326), whose edge costs come from the predicted change of
+    the ice, carried along the path; here the prediction is that of a contact model, and the cost is
+    what the metrics measure. A table of costs to go over the ice as it lies guides a beam of
+    arcs (see `BeamSearch`). Use it where the positions of the floes are known.
+
+    Plans keep the ship's origin half a beam inside the sides of the channel, nearer only as far as
+    a turn from where it starts needs the space. A goal line that is very far away is approached
+    (`PredictiveConfig.farthest`). Without a stop rule the effort is fixed; with one the beam is
+    widened until the rule fires. An iteration is one predicted piece of path.
+
+    Args:
+        config: parameters.
+        interaction: predicts the floes.
+    """
+
+    warm_up_iterations: ClassVar[int] = 30
+    """After which it has used all of its kernels."""
+
+    config: PredictiveConfig = field(default_factory=PredictiveConfig)
+    interaction: IceInteraction = field(default_factory=IceInteraction)
+
+    def __post_init__(self) -> None:
+        expect("config", self.config, PredictiveConfig)
+        expect("interaction", self.interaction, IceInteraction)
+
+    def plan(
+        self, world: World, *, stop: Stop | None = None, rng: np.random.Generator | None = None
+    ) -> PlanResult:
+        """Plan from ``world``; see `pushplan.world.Planner`. There is no chance in it.
+
+        Raises:
+            InvalidInputError: if the goal is no line, or something static is in the water.
+        """
+        began = time.perf_counter()
+        check_call(world, stop, rng)
+        return plan_call(world, self.config, self.interaction, FloePropagator, stop, began)

@@ -1,0 +1,65 @@
+"""`PredictiveShipNetwork`: through ice by a network that predicts what each path does to it."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass, field
+from typing import ClassVar
+
+import numpy as np
+
+from pushplan.interaction.ice import IceInteraction
+from pushplan.interaction.network import IceNetwork
+from pushplan.planners.arguments import check_call
+from pushplan.planners.ship_predictive.channel_view import ChannelView
+from pushplan.planners.ship_predictive.map_propagator import MapPropagator
+from pushplan.planners.ship_predictive.predictive_call import plan_call
+from pushplan.planners.ship_predictive.predictive_config import PredictiveConfig
+from pushplan.world import PlanResult, Stop, World
+from pushplan.world.checks import expect
+
+
+@dataclass(frozen=True)
+class PredictiveShipNetwork:
+    """`PredictiveShip` with a network that predicts occupancy and work from occupancy.
+
+    The ice is carried as a map, which the network changes piece by piece; the pieces of a layer
+    of the beam are predicted eight in a call. Use it where only an occupancy map is known, or to
+    compare.
+
+    Args:
+        config: parameters.
+        network: predicts; the shipped weights by default.
+        interaction: sweeps the plan that is returned, for its prediction; the search does not
+            use it.
+    """
+
+    warm_up_iterations: ClassVar[int] = 30
+    """After which it has used all of its kernels."""
+
+    config: PredictiveConfig = field(default_factory=lambda: PredictiveConfig(widest=24, sparse=0))
+    network: IceNetwork = field(default_factory=IceNetwork)
+    interaction: IceInteraction = field(default_factory=IceInteraction)
+
+    def __post_init__(self) -> None:
+        expect("config", self.config, PredictiveConfig)
+        expect("network", self.network, IceNetwork)
+        expect("interaction", self.interaction, IceInteraction)
+
+    def plan(
+        self, world: World, *, stop: Stop | None = None, rng: np.random.Generator | None = None
+    ) -> PlanResult:
+        """Plan from ``world``; see `pushplan.world.Planner`. There is no chance in it.
+
+        Raises:
+            InvalidInputError: if the goal is no line, something static is in the water, or the
+                network cannot be read.
+        """
+        began = time.perf_counter()
+        check_call(world, stop, rng)
+        self.network.load()
+
+        def propagator(view: ChannelView) -> MapPropagator:
+            return MapPropagator(view, self.network)
+
+        return plan_call(world, self.config, self.interaction, propagator, stop, began)

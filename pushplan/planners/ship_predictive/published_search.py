@@ -1,0 +1,140 @@
+"""A* over a state lattice with a map of the ice at every node."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from pushplan.interaction.network import IceNetwork
+from pushplan.interaction.occupancy import PATCH_CELLS
+from pushplan.interaction.occupancy_kernels import Patch
+from pushplan.motion.speed_profile import timed_plan, turning_radius
+from pushplan.motion.state_lattice.lattice_builder import LatticeBuilder
+from pushplan.motion.state_lattice.lattice_config import LatticeConfig
+from pushplan.motion.state_lattice.lattice_path import bare_path, lay_path, sample_arcs
+from pushplan.motion.state_lattice.lattice_search import open_search, path_arcs
+from pushplan.motion.state_lattice.pose_lattice import bound_at, reached, successors
+from pushplan.planners.ship_predictive.beam_search import SPACING
+from pushplan.planners.ship_predictive.channel_view import ChannelView
+from pushplan.planners.ship_predictive.map_propagator import MapPropagator
+from pushplan.search.astar import SIZE, AStar, SearchState, offer, take
+from pushplan.world import Plan, World
+from pushplan.world.checks import FloatArray, IntArray
+
+LATTICE = LatticeConfig.published()
+
+
+class PublishedSearch:
+    """A* with a map of the ice at every node, driven through `take` and `offer`.
+
+    Args:
+        view: what is searched.
+        network: predicts.
+        weight: factor on the mean squared change.
+    """
+
+    def __init__(self, view: ChannelView, network: IceNetwork, weight: float) -> None:
+        world = view.world
+        radius = turning_radius(world.robot, LATTICE.turn_share)
+        builder = LatticeBuilder(world, LATTICE, radius=radius, side=_clearance(world))
+        self._view, self._weight = view, weight
+        self._propagator = MapPropagator(view, network)
+        self._built = builder.build()
+        # in half hull lengths, so that lengths count the same against changes for every ship
+        self._unit = 0.5 * view.length
+        opened, self._curves = open_search(self._built, builder)
+        branching = int(np.diff(self._built.motions.first).max())
+        self._star = AStar(self._built.lattice, self._built.size, branching)
+        self._successors = (
+            np.empty(branching, np.int64),
+            np.empty(branching),
+            np.empty(branching, np.int64),
+        )
+        self._maps: dict[int, Patch] = {}
+        self._open(opened.state)
+
+    def _open(self, state: SearchState) -> None:
+        """Begin at the robot's node, or where the short curves from the robot lead to."""
+        nodes = state.heap[: state.counters[SIZE]].copy()
+        if not self._curves:
+            self._maps[int(nodes[0])] = self._propagator.start()
+            self._star.start(int(nodes[0]))
+            return
+        edges = state.edges[nodes]
+        arcs = [self._curves[-2 - edge] for edge in edges.tolist()]
+        paths = [self._path(self._view.start, arc) for arc in arcs]
+        self._offer(-1, nodes, state.costs[nodes], edges, paths, self._propagator.start())
+
+    @property
+    def arrived(self) -> bool:
+        """Whether the cheapest open node lies beyond the line."""
+        state = self._star.state
+        return bool(state.counters[SIZE] and reached(self._built.lattice, state.heap[0]))
+
+    def expand(self) -> bool:
+        """Predict all edges from the most promising node; False where none is open."""
+        lattice, motions = self._built.lattice, self._built.motions
+        node = int(take(self._star.state))
+        if node < 0:
+            return False
+        nodes, costs, edges = self._successors
+        count = int(successors(lattice, node, nodes, costs, edges))
+        ice = self._maps.pop(node)
+        if count:
+            start = self._pose(node)
+            paths = [self._path(start, motions.pieces[edge]) for edge in edges[:count]]
+            self._offer(node, nodes[:count], costs[:count], edges[:count], paths, ice)
+        return True
+
+    def _offer(
+        self,
+        parent: int,
+        nodes: IntArray,
+        lengths: FloatArray,
+        edges: IntArray,
+        paths: list[FloatArray],
+        ice: Patch,
+    ) -> None:
+        """Open the ends of edges from a node; what they do to its ice takes one network call."""
+        state, lattice = self._star.state, self._built.lattice
+        before = 0.0 if parent < 0 else float(state.costs[parent])
+        made = self._propagator.advance([ice] * len(paths), paths)
+        for node, length, edge, (after, _) in zip(nodes, lengths, edges, made, strict=True):
+            change = float(np.square(after - ice).sum()) / PATCH_CELLS**2
+            cost = before + self._weight * change + length / self._unit
+            if not state.known[node] or cost < state.costs[node]:
+                self._maps[int(node)] = after
+                offer(state, node, cost, bound_at(lattice, node) / self._unit, parent, edge)
+
+    def _pose(self, node: int) -> FloatArray:
+        """(3,) a node's pose in the frame of the channel."""
+        lattice, (row, column, _) = self._built.lattice, self._built.start
+        rest, v = divmod(node, lattice.columns)
+        h, u = divmod(rest, lattice.rows)
+        ahead, left = lattice.step * (u - row), lattice.step * (v - column)
+        return np.array([-left, ahead, self._built.motions.angles[h] + 0.5 * math.pi])
+
+    def _path(self, start: FloatArray, pieces: FloatArray) -> FloatArray:
+        """(N, 3) poses along the arcs [steps] of an edge from a pose on."""
+        step = self._built.lattice.step
+        arcs = pieces * np.array([step, 1.0 / step])
+        return sample_arcs(start, arcs, SPACING * self._view.length)[0]
+
+    def plan(self) -> Plan:
+        """Along the path to the goal; of the floes it predicts nothing but the map."""
+        world, goal = self._view.world, int(self._star.state.heap[0])
+        arcs = path_arcs(self._built, self._star, self._curves, goal)
+        return timed_path(world, *lay_path(self._built, arcs, world, LATTICE))
+
+
+def timed_path(world: World, poses: FloatArray, curvatures: FloatArray) -> Plan:
+    """A plan at full speed about which nothing is predicted."""
+    return timed_plan(world, bare_path(poses, curvatures), LATTICE.turn_share)
+
+
+def _clearance(world: World) -> float:
+    """Distance from the bounds [m] that the ship's origin keeps: half a beam, if it has that."""
+    x, y = world.robot_pose[:2]
+    x0, y0, x1, y1 = world.static.bounds
+    return float(max(min(world.robot.inscribed_radius, x - x0, x1 - x, y - y0, y1 - y), 0.0))

@@ -1,0 +1,192 @@
+"""Compiled steps of the ice generator: cutting cells, and fitting floes into them."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from pushplan.compiled import copy_into, kernel
+from pushplan.geometry import polygon_area
+from pushplan.scenarios.ice_water import IceWater, nearest_point
+from pushplan.world.checks import FloatArray, IntArray
+
+CAPACITY = 48
+"""Corners that a buffer holds; a floe has far fewer."""
+
+
+class Discs(NamedTuple):
+    """Discs that a power diagram is of, and which of them may be neighbours."""
+
+    centres: FloatArray
+    """(K, 2) [m]"""
+    radii: FloatArray
+    """(K,) [m]; a disc that overlaps no other lies in its own cell."""
+    reaches: FloatArray
+    """(K,) half side of the square that a cell cannot leave [m]."""
+    neighbours: IntArray
+    """Discs whose squares may meet, those of one disc after those of the one before."""
+    neighbour_offsets: IntArray
+    """(K + 1,) where those of each disc start."""
+
+
+class Outlines(NamedTuple):
+    """Convex outlines, counter-clockwise, in buffers of equal length."""
+
+    corners: FloatArray
+    """(K, N, 2)"""
+    counts: IntArray
+    """(K,) corners in use."""
+
+
+@kernel(allocates=True)
+def cut_cells(discs: Discs, water: IceWater) -> Outlines:
+    """Cells of a power diagram (Laguerre tessellation), half a gap smaller on every side [m]."""
+    box, centres, radii = water.box, discs.centres, discs.radii
+    count = centres.shape[0]
+    cells = Outlines(np.empty((count, CAPACITY, 2)), np.zeros(count, np.int64))
+    spare = np.empty((CAPACITY, 2))
+    for k in range(count):
+        x, y, r = centres[k, 0], centres[k, 1], discs.reaches[k]
+        cell = cells.corners[k]
+        x0, y0 = max(box[0], x - r), max(box[1], y - r)
+        x1, y1 = min(box[2], x + r), min(box[3], y + r)
+        cell[0, 0], cell[0, 1], cell[1, 0], cell[1, 1] = x0, y0, x1, y0
+        cell[2, 0], cell[2, 1], cell[3, 0], cell[3, 1] = x1, y1, x0, y1
+        n = 4
+        for q in range(discs.neighbour_offsets[k], discs.neighbour_offsets[k + 1]):
+            other = discs.neighbours[q]
+            dx, dy = centres[other, 0] - x, centres[other, 1] - y
+            far = math.hypot(dx, dy)
+            away = 0.5 * (far + (radii[k] ** 2 - radii[other] ** 2) / far - water.gap)
+            ux, uy = dx / far, dy / far
+            n = _clip(cell, n, ux, uy, ux * x + uy * y + away, spare)
+        for b in range(water.block_offsets.shape[0] - 1):
+            block = water.blocks[water.block_offsets[b] : water.block_offsets[b + 1]]
+            far, bx, by = nearest_point(x, y, block)
+            if far == 0.0:
+                n = 0
+                break
+            ux, uy = (bx - x) / far, (by - y) / far
+            n = _clip(cell, n, ux, uy, ux * bx + uy * by - water.gap, spare)
+        cells.counts[k] = n
+    return cells
+
+
+@kernel
+def _clip(
+    corners: FloatArray, n: int, ux: float, uy: float, bound: float, spare: FloatArray
+) -> int:
+    """Cut a convex polygon by the half-plane u · p <= bound, in place; its number of corners."""
+    cuts = False
+    for i in range(n):
+        if ux * corners[i, 0] + uy * corners[i, 1] > bound:
+            cuts = True
+            break
+    if not cuts:
+        return n
+    m = 0
+    for i in range(n):
+        j = i + 1 if i + 1 < n else 0
+        a = ux * corners[i, 0] + uy * corners[i, 1] - bound
+        b = ux * corners[j, 0] + uy * corners[j, 1] - bound
+        if a <= 0.0 and m < spare.shape[0]:
+            spare[m, 0], spare[m, 1] = corners[i, 0], corners[i, 1]
+            m += 1
+        if (a < 0.0 < b or b < 0.0 < a) and m < spare.shape[0]:
+            t = a / (a - b)
+            spare[m, 0] = corners[i, 0] + t * (corners[j, 0] - corners[i, 0])
+            spare[m, 1] = corners[i, 1] + t * (corners[j, 1] - corners[i, 1])
+            m += 1
+    copy_into(corners[:m], spare[:m])
+    return int(m) if m > 2 else 0
+
+
+@kernel
+def _cut_out(
+    shape: FloatArray,  # (N, 2) about the origin
+    scale: float,
+    centre: FloatArray,  # (2,) [m]
+    cell: FloatArray,  # (M, 2) convex [m]
+    out: FloatArray,
+    spare: FloatArray,
+) -> int:
+    """A scaled shape about a place within a convex cell; its number of corners."""
+    n: int = shape.shape[0]
+    for i in range(n):
+        out[i, 0], out[i, 1] = centre[0] + scale * shape[i, 0], centre[1] + scale * shape[i, 1]
+    for i in range(cell.shape[0]):
+        j = i + 1 if i + 1 < cell.shape[0] else 0
+        ux, uy = cell[j, 1] - cell[i, 1], cell[i, 0] - cell[j, 0]
+        long = math.hypot(ux, uy)
+        if long == 0.0:
+            continue
+        ux, uy = ux / long, uy / long
+        n = _clip(out, n, ux, uy, ux * cell[i, 0] + uy * cell[i, 1], spare)
+    return n
+
+
+@kernel(allocates=True)
+def fit_floes(
+    shapes: Outlines,  # of area 1 about the origin
+    centres: FloatArray,  # (K, 2) [m]
+    cells: Outlines,  # from `cut_cells` [m]
+    targets: FloatArray,  # (K,) areas [m²]
+    stretch: float,  # greatest scale of a shape, in units of the root of its target area
+) -> Outlines:
+    """Grow each shape within its cell until it has its area, or cannot grow further [m]."""
+    count = centres.shape[0]
+    floes = Outlines(np.empty((count, CAPACITY, 2)), np.zeros(count, np.int64))
+    spare = np.empty((CAPACITY, 2))
+    for k in range(count):
+        if cells.counts[k] == 0:
+            continue
+        at, shape = centres[k], shapes.corners[k, : shapes.counts[k]]
+        cell, floe = cells.corners[k, : cells.counts[k]], floes.corners[k]
+        unit = math.sqrt(targets[k])
+        low, high = unit, unit
+        n = _cut_out(shape, unit, at, cell, floe, spare)
+        if n == 0 or polygon_area(floe[:n]) < targets[k]:
+            high = stretch * unit
+        for _ in range(24 if high > low else 0):
+            middle = 0.5 * (low + high)
+            n = _cut_out(shape, middle, at, cell, floe, spare)
+            if n > 0 and polygon_area(floe[:n]) >= targets[k]:
+                high = middle
+            else:
+                low = middle
+        n = _cut_out(shape, high, at, cell, floe, spare)
+        floes.counts[k] = _simplify(floe, n, 0.08 * unit)
+    return floes
+
+
+@kernel
+def _simplify(corners: FloatArray, n: int, shortest: float) -> int:
+    """Leave out corners, in place, while an edge is shorter than ``shortest`` [m]; their number."""
+    while n > 3:
+        best, at = shortest, -1
+        for i in range(n):
+            j = i + 1 if i + 1 < n else 0
+            d = math.hypot(corners[j, 0] - corners[i, 0], corners[j, 1] - corners[i, 1])
+            if d < best:
+                best, at = d, i
+        if at < 0:
+            break
+        # of its two ends the one whose loss costs the smaller triangle
+        after = at + 1 if at + 1 < n else 0
+        if _loss(corners, n, after) < _loss(corners, n, at):
+            at = after
+        for i in range(at, n - 1):
+            corners[i, 0], corners[i, 1] = corners[i + 1, 0], corners[i + 1, 1]
+        n -= 1
+    return n
+
+
+@kernel
+def _loss(corners: FloatArray, n: int, i: int) -> float:
+    """Area [m²] that a polygon loses with corner ``i``."""
+    a, b = (i - 1) % n, (i + 1) % n
+    ux, uy = corners[i, 0] - corners[a, 0], corners[i, 1] - corners[a, 1]
+    vx, vy = corners[b, 0] - corners[a, 0], corners[b, 1] - corners[a, 1]
+    return float(0.5 * abs(ux * vy - uy * vx))

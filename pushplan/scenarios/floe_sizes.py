@@ -1,0 +1,66 @@
+"""`FloeSizes`: how large floes are."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pushplan.world import InvalidInputError
+from pushplan.world.checks import FloatArray, number
+
+MARGIN = 0.003
+"""Floes are grown this much too large [fraction of the area], and in the end shrunk to measure."""
+
+
+@dataclass(frozen=True)
+class FloeSizes:
+    """Log-normal floe sizes. The radius of a floe is that of the disc with its area.
+
+    Args:
+        mean_radius: mean of the log-normal distribution before it is cut off [m].
+        spread: standard deviation of the logarithm of the radius.
+        least: floes are no smaller [m].
+        greatest: nor larger [m].
+
+    Raises:
+        InvalidInputError: if they make no sense together.
+    """
+
+    mean_radius: float = 0.33
+    spread: float = 0.28
+    least: float = 0.2
+    greatest: float = 0.6
+
+    def __post_init__(self) -> None:
+        put = object.__setattr__
+        for key in ("mean_radius", "least", "greatest"):
+            put(self, key, number(f"ice {key}", getattr(self, key), low=0.0, open_low=True))
+        put(self, "spread", number("ice spread", self.spread, low=0.0, high=2.0))
+        if not self.least <= self.mean_radius <= self.greatest or self.least == self.greatest:
+            raise InvalidInputError(
+                "ice radii must have least <= mean_radius <= greatest and least < greatest, got "
+                f"{self.least:g}, {self.mean_radius:g}, {self.greatest:g} m"
+            )
+
+    def draw(self, rng: np.random.Generator, total_area: float) -> FloatArray:
+        """Areas [m²], largest first, whose sum is ``total_area`` [m²] where that is possible.
+
+        It is not where the sum is less than one floe, or the range of sizes is narrow and the
+        floes are few.
+        """
+        high = np.pi * self.greatest**2 / (1.0 + MARGIN)
+        low = min(high, np.pi * self.least**2 * (1.0 + 2.0 * MARGIN))
+        typical = np.pi * self.mean_radius**2
+        count = int(1.5 * total_area / typical) + 32
+        middle = np.log(self.mean_radius) - 0.5 * self.spread**2
+        radii = np.exp(middle + self.spread * rng.standard_normal(4 * count))
+        inside = radii[(radii >= self.least) & (radii <= self.greatest)]
+        if len(inside) < count:
+            inside = np.clip(radii, self.least, self.greatest)
+        sums = np.cumsum(np.pi * inside**2)
+        number_of = int(np.argmin(np.abs(sums - total_area))) + 1
+        areas = np.pi * inside[:number_of] ** 2
+        for _ in range(50):  # the last few per mille, within the range of sizes
+            areas = np.clip(areas * (total_area / areas.sum()), low, high)
+        return np.sort(areas)[::-1].copy()
