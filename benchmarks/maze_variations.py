@@ -17,6 +17,7 @@ from pushplan.evaluation import run_episode
 from pushplan.metrics import navigation_scores
 from pushplan.planners import make_policy
 from pushplan.scenarios import Scenario
+from pushplan.world import LogsPlans
 
 CASES: tuple[tuple[str, str, dict[str, object]], ...] = (
     ("benchmark", "turn_rate", {"shape": "z", "boxes": 10}),
@@ -42,7 +43,7 @@ def main() -> None:
             policy = make_policy(name)
             episode = run_episode(env, policy, scenario)
             scores = navigation_scores(episode)
-            plans = len(getattr(policy, "plan_log", ()))
+            plans = len(policy.plan_log) if isinstance(policy, LogsPlans) else 0
             rows.append((scores.success, scores.efficiency, scores.effort, plans))
             if not episode.success:
                 failures.append(f"{seed}: {episode.reason}")

@@ -24,7 +24,7 @@ import numpy as np
 from pushplan.control import PurePursuit
 from pushplan.envs.registry import SIMULATORS, look_up
 from pushplan.envs.simulators.base import Materials, Simulator
-from pushplan.envs.tasks.testbed import SOLIDS
+from pushplan.envs.tasks.materials import SOLIDS
 from pushplan.evaluation import push_figure
 from pushplan.planners.pushing import (
     NonlinearPushingMpc,

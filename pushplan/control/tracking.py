@@ -36,11 +36,11 @@ class Progress:
         a, b = points[first:last], points[first + 1 : last + 1]
         edge = b - a
         square = np.maximum((edge * edge).sum(axis=1), 1e-18)
-        share = np.clip((([x, y] - a) * edge).sum(axis=1) / square, 0.0, 1.0)
-        foot = a + share[:, None] * edge
+        fraction = np.clip((([x, y] - a) * edge).sum(axis=1) / square, 0.0, 1.0)
+        foot = a + fraction[:, None] * edge
         gaps = np.hypot(foot[:, 0] - x, foot[:, 1] - y)
         best = int(np.argmin(gaps))
-        here = lengths[first + best] + share[best] * (
+        here = lengths[first + best] + fraction[best] * (
             lengths[first + best + 1] - lengths[first + best]
         )
         self.along = max(self.along, float(here))
@@ -65,8 +65,8 @@ class Progress:
             last: FloatArray = poses[i]
             return last
         length = self._lengths[i + 1] - self._lengths[i]
-        share = (along - self._lengths[i]) / length if length > 0.0 else 0.0
+        fraction = (along - self._lengths[i]) / length if length > 0.0 else 0.0
         turn = (poses[i + 1, 2] - poses[i, 2] + np.pi) % (2.0 * np.pi) - np.pi
         change = np.array([*(poses[i + 1, :2] - poses[i, :2]), turn])
-        pose: FloatArray = poses[i] + min(share, 1.0) * change
+        pose: FloatArray = poses[i] + min(fraction, 1.0) * change
         return pose

@@ -41,35 +41,12 @@ _HOMES = {
 _LAZY = {name: module for module, names in _HOMES.items() for name in names}
 
 __all__ = [
-    "TIMING_COLUMNS",
-    "Comparison",
-    "Estimate",
-    "InvalidActionError",
-    "Job",
-    "JobResult",
-    "JobSettings",
-    "PairedDifference",
-    "PolicyError",
-    "PolicySpec",
-    "PolicySummary",
-    "Proportion",
-    "ResultRow",
-    "Results",
-    "Status",
-    "UnusablePolicyError",
-    "WorkerPool",
-    "bench",
-    "bench_paper",
-    "bootstrap_interval",
-    "columns",
-    "compare",
-    "parse_policies",
-    "parse_policy",
-    "push_figure",
-    "run_batch",
-    "run_episode",
-    "wilson",
-]
+    "TIMING_COLUMNS", "Comparison", "Estimate", "InvalidActionError", "Job", "JobResult",
+    "JobSettings", "PairedDifference", "PolicyError", "PolicySpec", "PolicySummary", "Proportion",
+    "ResultRow", "Results", "Status", "UnusablePolicyError", "WorkerPool", "bench", "bench_paper",
+    "bootstrap_interval", "columns", "compare", "parse_policies", "parse_policy", "push_figure",
+    "run_batch", "run_episode", "wilson",
+]  # fmt: skip
 
 
 def __getattr__(name: str) -> Any:

@@ -102,7 +102,6 @@ class WorkerPool(Executor):
         self._max_workers = workers
         self._limit_s = limit_s
         self._end_after_s = math.inf if limit_s is None else limit_s + _TRACE_S
-        self._end_after_s = math.inf if limit_s is None else limit_s + _TRACE_S
         self._log_dir = log_dir
         main = getattr(sys.modules.get("__main__"), "__file__", None)
         self._setup = WorkerSetup(

@@ -1,10 +1,10 @@
 """Shortest paths through the layers of a tour, kept up to date while clusters come and go.
 
-``ahead[c, v]`` is the cost of the cheapest way from the root's node along the tour to node v of
+``ahead[c, v]`` is the cost of the cheapest path from the root's node along the tour to node v of
 cluster c, ``behind[c, v]`` of that from there to the root. A change moves all values past it by
 what the tour costs more. That amount is carried by the cluster beside the change instead
 (both its values are lowered by ``carry[c]``), so that only a few values have to be renewed, up to
-where they agree with the old ones; and in every gap of the tour the cheapest way across costs 0.
+where they agree with the old ones; and in every gap of the tour the cheapest path across costs 0.
 """
 
 from __future__ import annotations

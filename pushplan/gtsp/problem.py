@@ -69,12 +69,12 @@ class Problem:
 
     @cached_property
     def finite(self) -> FloatArray:
-        """(N, N + SPARE) costs; forbidden arcs at a price that no tour over finite arcs reaches."""
+        """(N, N + SPARE) costs; forbidden arcs at a cost that no tour over finite arcs reaches."""
         inside = self.outer[np.isfinite(self.outer)]
         low, high = (inside.min(), inside.max()) if inside.size else (0.0, 1.0)
-        price = high + (self.count + 1) * (high - low) + (abs(high) or 1.0)
-        wide = np.full((len(self.costs), len(self.costs) + SPARE), price)
-        wide[:, :-SPARE] = np.where(np.isfinite(self.costs), self.costs, price)
+        forbidden = high + (self.count + 1) * (high - low) + (abs(high) or 1.0)
+        wide = np.full((len(self.costs), len(self.costs) + SPARE), forbidden)
+        wide[:, :-SPARE] = np.where(np.isfinite(self.costs), self.costs, forbidden)
         return wide
 
     @cached_property
@@ -102,7 +102,7 @@ class Problem:
     def nearest(self, most: int) -> tuple[IntArray, FloatArray]:
         """(m, k) nearest clusters of each and their distances: reduced costs, the cheaper way.
 
-        The column minima, then the row minima are taken off, as a price of its own that every arc
+        The column minima, then the row minima are taken off, as a cost of its own that every arc
         into a node has says nothing about which cluster is near.
         """
         reduced = self.outer - _known(self.outer.min(axis=0))

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from typing import Any, Protocol, cast, runtime_checkable
 
-from numba.core import types
+from numba import types
 from numba.extending import overload
 
 from pushplan.interaction.model import InteractionModel

@@ -34,18 +34,9 @@ _HOMES = {
 _LAZY = {name: module for module, names in _HOMES.items() for name in names}
 
 __all__ = [
-    "LEARNED_PREFIXES",
-    "ActionSpec",
-    "FeatureObservation",
-    "NetworkPolicy",
-    "ObjectPolicy",
-    "OnnxPolicy",
-    "RobotSpec",
-    "Sb3Policy",
-    "Specification",
-    "learned_names",
-    "load_policy",
-]
+    "LEARNED_PREFIXES", "ActionSpec", "FeatureObservation", "NetworkPolicy", "ObjectPolicy",
+    "OnnxPolicy", "RobotSpec", "Sb3Policy", "Specification", "learned_names", "load_policy",
+]  # fmt: skip
 
 
 def __getattr__(name: str) -> Any:

@@ -11,23 +11,14 @@ from pushplan.world.checks import FloatArray, IntArray
 
 @kernel(allocates=True)
 def cast_rays(
-    out: FloatArray,
-    x: float,
-    y: float,
-    heading: float,
-    vertices: FloatArray,
-    offsets: IntArray,
+    out: FloatArray,  # (N,) lengths [m], ray i at heading + 2 pi i / N; shortened
+    x: float,  # where they start [m]
+    y: float,  # [m]
+    heading: float,  # of the first [rad]
+    vertices: FloatArray,  # (V, 2) corners of closed outlines, world frame [m]
+    offsets: IntArray,  # (P + 1,) where each outline starts
 ) -> None:
-    """Shorten rays to where they first cross an outline.
-
-    Args:
-        out: (N,) lengths of the rays [m], the i-th at ``heading + 2 pi i / N``; shortened.
-        x: where they start [m].
-        y: [m].
-        heading: of the first [rad].
-        vertices: (V, 2) corners of closed outlines, world frame [m].
-        offsets: (P + 1,) where each outline starts.
-    """
+    """Shorten rays to where they first cross an outline."""
     count = out.shape[0]
     step = 2.0 * np.pi / count
     for k in range(offsets.shape[0] - 1):

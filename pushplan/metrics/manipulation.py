@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+import networkx as nx
 import numpy as np
 
 from pushplan.geometry import VisibilityGraph, goal_distances
@@ -110,23 +111,16 @@ def tree_length(start: World, chosen: BoolArray, *, straight: bool = False) -> f
 def spanning_tree_length(static: StaticMap, points: list[FloatArray]) -> float:
     """Length [m] of the minimum spanning tree over points (2,) [m], inf if one is cut off.
 
-    Edges are shortest paths of a point around what is static. Prim's algorithm.
+    Edges are shortest paths of a point around what is static.
     """
-    reached = np.full(len(points), np.inf)
-    open_points, newest, total = set(range(1, len(points))), 0, 0.0
-    graph = VisibilityGraph(static)
-    is_free = not len(static.polygons) and not len(static.segments)
-    while open_points:
-        for k in open_points:
-            length = math.dist(points[k], points[newest])
-            if length < reached[k]:  # a path around obstacles is no shorter
-                if not is_free:
-                    length = graph.shortest_path(points[k], points[newest]).length
-                reached[k] = min(reached[k], length)
-        newest = min(open_points, key=lambda k: (reached[k], k))
-        open_points.remove(newest)
-        total += float(reached[newest])
-    return total
+    paths, is_free = VisibilityGraph(static), not len(static.polygons) and not len(static.segments)
+    graph: nx.Graph[int] = nx.Graph()
+    for k, a in enumerate(points):
+        for j, b in enumerate(points[:k]):
+            length = math.dist(a, b) if is_free else paths.shortest_path(a, b).length
+            graph.add_edge(j, k, weight=length)
+    edges = nx.minimum_spanning_edges(graph, algorithm="prim")
+    return float(sum(data["weight"] for *_, data in edges))
 
 
 def efficiency(tree_m: float, driven_m: float, *, everything: bool) -> float:

@@ -3,25 +3,27 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
 from pushplan.compiled import kernel
 from pushplan.geometry.shadows import BendDistances, Table, fill_shadows
-from pushplan.observation.view import Image, View, to_pixels
+from pushplan.observation.view import View
+from pushplan.observation.view_kernels import Image, to_pixels
 from pushplan.world.checks import FloatArray, IntArray
 
 
 @kernel(allocates=True)
-def draw_ray(image: Image, x: float, y: float, dx: float, dy: float, value: int) -> None:
-    """A line one pixel wide from a point to the edge of the image.
-
-    Args:
-        image: (H, W), changed in place.
-        x, y: where it starts [px], also outside the image.
-        dx, dy: its direction, not zero.
-        value: what the pixels are set to.
-    """
+def draw_ray(
+    image: Image,  # (H, W), changed in place
+    x: float,  # where it starts [px], also outside the image
+    y: float,  # where it starts [px], also outside the image
+    dx: float,  # its direction, not zero
+    dy: float,  # its direction, not zero
+    value: int,  # what the pixels are set to
+) -> None:
+    """A line one pixel wide from a point to the edge of the image."""
     rows, cols = image.shape
     if abs(dx) >= abs(dy):
         step = 1 if dx > 0.0 else -1
@@ -57,41 +59,39 @@ def fill_hidden(image: Image, view: View, source: BendDistances, per_metre: floa
     """
     pose = view.world.robot_pose
     bends, lengths = source.in_sight(float(pose[0]), float(pose[1]))
-    _fill_hidden(
-        image,
-        view.numbers,
-        pose[None, :2],
-        source.loops,
-        source.offsets,
-        source.table,
-        source.grid.origin,
-        source.grid.resolution,
-        bends,
-        lengths,
-        per_metre,
-    )
+    origin, step = source.grid.origin, source.grid.resolution
+    sight = _Sight(source.loops, source.offsets, source.table, origin, step, bends, lengths)
+    _fill_hidden(image, view.numbers, pose[None, :2], sight, per_metre)
+
+
+class _Sight(NamedTuple):
+    """What the robot sees of the corners that shortest paths bend at."""
+
+    loops: FloatArray  # (V, 2) outlines that cast shadows [m]
+    offsets: IntArray  # where each begins
+    table: Table  # (rows, columns, corners) distances from the corners [m]
+    origin: FloatArray  # (2,) of the table [m]
+    step: float  # side of its cells [m]
+    bends: IntArray  # corners in sight
+    lengths: FloatArray  # paths to them [m]
 
 
 @kernel(allocates=True)
 def _fill_hidden(
     image: Image,
     view: FloatArray,
-    eye: FloatArray,
-    loops: FloatArray,
-    offsets: IntArray,
-    table: Table,
-    origin: FloatArray,
-    step: float,
-    bends: IntArray,
-    lengths: FloatArray,
+    eye: FloatArray,  # (1, 2) the robot [m]
+    sight: _Sight,
     per_metre: float,
 ) -> None:
-    spots, at = np.empty_like(loops), np.empty((1, 2))
-    to_pixels(view, loops, spots)
+    """Overwrite the pixels in the shadow of the loops by the length of the path to them."""
+    spots, at = np.empty_like(sight.loops), np.empty((1, 2))
+    to_pixels(view, sight.loops, spots)
     to_pixels(view, eye, at)
     hidden = np.zeros(image.shape, dtype=np.uint8)
-    fill_shadows(hidden, at[0, 0], at[0, 1], spots, offsets, 1)
+    fill_shadows(hidden, at[0, 0], at[0, 1], spots, sight.offsets, 1)
     c, s = math.cos(view[2]), math.sin(view[2])
+    table, origin, step = sight.table, sight.origin, sight.step
     rows, cols = table.shape[0], table.shape[1]
     for r in range(image.shape[0]):
         up = (0.5 * view[3] - r - 0.5) * view[5]
@@ -104,6 +104,6 @@ def _fill_hidden(
             best = math.inf
             if 0.0 <= u < cols and 0.0 <= v < rows:  # ways stay inside the bounds
                 i, j = int(v), int(u)
-                for k in range(bends.shape[0]):
-                    best = min(best, lengths[k] + table[i, j, bends[k]])
+                for k in range(sight.bends.shape[0]):
+                    best = min(best, sight.lengths[k] + table[i, j, sight.bends[k]])
             image[r, q] = int(min(255.0, per_metre * best + 0.5))

@@ -30,7 +30,7 @@ OPSET = 17
 
 
 @dataclass(frozen=True)
-class TrainingConfig:
+class IceTrainingConfig:
     """Parameters of the training.
 
     Args:
@@ -62,7 +62,7 @@ class TrainingConfig:
         number("decay", self.decay, low=0.0)
 
 
-def train(pairs: IcePairs, config: TrainingConfig | None = None) -> tuple[IceUNet, list[float]]:
+def train(pairs: IcePairs, config: IceTrainingConfig | None = None) -> tuple[IceUNet, list[float]]:
     """Train a network from scratch.
 
     Returns:
@@ -74,7 +74,7 @@ def train(pairs: IcePairs, config: TrainingConfig | None = None) -> tuple[IceUNe
     torch = _torch()
     from pushplan.training.ice_unet import IceUNet, parameter_count, seeded
 
-    config = config or TrainingConfig()
+    config = config or IceTrainingConfig()
     torch.set_num_threads(config.threads)
     generator = seeded(config.seed)
     network: Any = IceUNet()
@@ -159,7 +159,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(
         prog="python -m pushplan.training.ice_network", description=__doc__
     )
-    default = TrainingConfig()
+    default = IceTrainingConfig()
     parser.add_argument("--data", required=True, metavar="DIR", help="shards of ice_data")
     parser.add_argument("--out", required=True, metavar="FILE.onnx", help="the network")
     parser.add_argument("--epochs", type=int, default=default.epochs)
@@ -168,7 +168,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--shards", type=int, default=None, help="use only so many")
     options = parser.parse_args(arguments)
     logging.basicConfig(level=logging.INFO, format="%(message)s")
-    config = TrainingConfig(epochs=options.epochs, seed=options.seed, threads=options.threads)
+    config = IceTrainingConfig(epochs=options.epochs, seed=options.seed, threads=options.threads)
     pairs = read_shards(options.data, "train", options.shards)
     began = time.perf_counter()
     network, losses = train(pairs, config)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import shapely
 
-from pushplan.envs.tasks.layout import Floor, squares, squares_overlap
+from pushplan.envs.tasks.layout import FreeSpace, squares, squares_overlap
 from pushplan.world import ScenarioError, StaticMap
 
 
@@ -19,7 +19,7 @@ def test_placed_squares_overlap_nothing(random_yaw):
     static, hole = room(10.0), shapely.Point(3.0, 3.0)
     for seed in range(10):
         rng = np.random.default_rng(seed)
-        poses = Floor(static).place_squares(
+        poses = FreeSpace(static).place_squares(
             rng, 12, 1.0, keep_off=[(hole, 1.5)], gap=0.01, random_yaw=random_yaw
         )
         shapes = shapely.polygons(squares(poses, 1.0))
@@ -33,15 +33,15 @@ def test_placed_squares_overlap_nothing(random_yaw):
 @pytest.mark.clock
 @pytest.mark.parametrize("random_yaw", [False, True])
 def test_dense_requests_are_met_and_impossible_ones_refused(random_yaw):
-    floor = Floor(room(9.0))  # 8 x 8 m of free floor
+    free_space = FreeSpace(room(9.0))  # 8 x 8 m of free floor
     rng = np.random.default_rng(0)
-    poses = floor.place_squares(rng, 45, 1.0, random_yaw=random_yaw)
+    poses = free_space.place_squares(rng, 45, 1.0, random_yaw=random_yaw)
     shapes = shapely.polygons(squares(poses, 1.0))
     assert max(a.intersection(b).area for i, a in enumerate(shapes) for b in shapes[:i]) < 1e-9
     begin = time.thread_time()
     for count in (70, 1000):
         with pytest.raises(ScenarioError, match=f"{count} boxes of 1 m do not fit"):
-            floor.place_squares(rng, count, 1.0, random_yaw=random_yaw)
+            free_space.place_squares(rng, count, 1.0, random_yaw=random_yaw)
     assert time.thread_time() - begin < 2.0
 
 

@@ -106,11 +106,11 @@ def test_the_table_compares_predictors():
 def test_a_network_learns_and_is_exported(few, tmp_path):
     import torch
 
-    from pushplan.training.ice_network import TrainingConfig, export, train
+    from pushplan.training.ice_network import IceTrainingConfig, export, train
 
     pairs = read_shards(few, "train")
     pairs = IcePairs(pairs.patches[:64], pairs.after[:64], pairs.work[:64])
-    config = TrainingConfig(epochs=3, batch=16)
+    config = IceTrainingConfig(epochs=3, batch=16)
     network, losses = train(pairs, config)
     assert losses[-1] < losses[0]
     assert train(pairs, config)[1] == losses

@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from pushplan.compiled import kernel
+from pushplan.geometry.angles import wrap_angle
 from pushplan.world.checks import FloatArray
 
 
@@ -48,15 +49,11 @@ class Tuning(NamedTuple):
 
 @kernel(allocates=True)
 def locate(track: Track, x: float, y: float, low: float, high: float) -> tuple[float, int, float]:
-    """Nearest point of the path between path lengths ``low`` and ``high`` [m].
-
-    Returns:
-        Its path length [m], the index of its segment and the share of the segment before it;
-        past the last pose the path goes on straight.
-    """
+    """Path length [m], segment and fraction of it of the nearest point between two lengths [m]."""
+    # past the last pose the path goes on straight
     poses, lengths = track.poses, track.lengths
     last = poses.shape[0] - 1
-    best, along, index, share = np.inf, lengths[last], last, 0.0
+    best, along, index, fraction = np.inf, lengths[last], last, 0.0
     i = max(0, int(np.searchsorted(lengths, low, side="right")) - 1)
     while i < last and lengths[i] <= high:
         ax, ay = poses[i, 0], poses[i, 1]
@@ -68,25 +65,23 @@ def locate(track: Track, x: float, y: float, low: float, high: float) -> tuple[f
         dx, dy = x - ax - t * ex, y - ay - t * ey
         gap = dx * dx + dy * dy
         if gap < best:
-            best, index, share = gap, i, t
+            best, index, fraction = gap, i, t
             along = lengths[i] + t * (lengths[i + 1] - lengths[i])
         i += 1
-    if index >= last - 1 and (index == last or share >= 1.0):
+    if index >= last - 1 and (index == last or fraction >= 1.0):
         cx, sy = np.cos(poses[last, 2]), np.sin(poses[last, 2])
         over = (x - poses[last, 0]) * cx + (y - poses[last, 1]) * sy
         along = lengths[last] + max(over, 0.0)
-        index, share = last, 0.0
-    return along, index, share
+        index, fraction = last, 0.0
+    return along, index, fraction
 
 
 @kernel(allocates=True)
 def errors(
-    track: Track, x: float, y: float, theta: float, index: int, share: float
+    track: Track, x: float, y: float, theta: float, index: int, fraction: float
 ) -> tuple[float, float, float, float]:
-    """Offset [m, left positive], heading error [rad], path heading [rad] and curvature [1/m].
-
-    Between two poses the path is the arc that their headings ask for, not its chord.
-    """
+    """Offset [m, left positive], heading error, path heading [rad] and curvature [1/m]."""
+    # between two poses the path is the arc that their headings ask for, not its chord
     poses = track.poses
     last = poses.shape[0] - 1
     i = min(index, last)
@@ -96,21 +91,17 @@ def errors(
     if i < last:
         ex, ey = poses[i + 1, 0] - ax, poses[i + 1, 1] - ay
         length = np.sqrt(ex * ex + ey * ey)
-        turn = poses[i + 1, 2] - heading
-        turn -= 2.0 * np.pi * np.round(turn / (2.0 * np.pi))
+        turn = wrap_angle(poses[i + 1, 2] - heading)
         if length > 1e-9:
             nx, ny = -ey / length, ex / length
-            slip = np.arctan2(ey, ex) - heading - 0.5 * turn
-            slip -= 2.0 * np.pi * np.round(slip / (2.0 * np.pi))
+            slip = wrap_angle(np.arctan2(ey, ex) - heading - 0.5 * turn)
             if abs(slip) < 0.1 * abs(turn):  # an arc; else the corner of a polyline
                 curvature = turn / length
-                bulge = -0.5 * turn * length * share * (1.0 - share)
-            ax, ay = ax + share * ex, ay + share * ey
-        heading += share * turn
+                bulge = -0.5 * turn * length * fraction * (1.0 - fraction)
+            ax, ay = ax + fraction * ex, ay + fraction * ey
+        heading += fraction * turn
     offset = (x - ax) * nx + (y - ay) * ny - bulge
-    error = theta - heading
-    error -= 2.0 * np.pi * np.round(error / (2.0 * np.pi))
-    return offset, error, heading, curvature
+    return offset, wrap_angle(theta - heading), heading, curvature
 
 
 @kernel(allocates=True)
@@ -126,16 +117,16 @@ def _speed_at(track: Track, along: float, index: int, tuning: Tuning, dt: float)
 
 
 @kernel(allocates=True)
-def arc(x: float, y: float, theta: float, v: float, w: float, dt: float, out: FloatArray) -> None:
-    """Motion under a constant twist: the change of pose, and its derivatives.
-
-    Args:
-        x, y, theta: pose [m, m, rad].
-        v: [m/s].
-        w: [rad/s].
-        dt: [s].
-        out: (9,) receives x, y, theta after it; dx, dy of the motion; d(x, y)/dw; d(x, y)/dv.
-    """
+def arc(
+    x: float,
+    y: float,
+    theta: float,
+    v: float,
+    w: float,
+    dt: float,
+    out: FloatArray,  # (9,)
+) -> None:
+    """Fill the pose after a constant twist, its dx, dy, d(x, y)/dw and d(x, y)/dv."""
     half = 0.5 * w * dt
     if abs(half) > 1e-4:
         sinc, slope = np.sin(half) / half, (np.cos(half) * half - np.sin(half)) / (half * half)
@@ -155,30 +146,15 @@ def arc(x: float, y: float, theta: float, v: float, w: float, dt: float, out: Fl
 def assemble(
     track: Track,
     tuning: Tuning,
-    pose: FloatArray,
-    along: float,
-    twist: FloatArray,
-    steps: FloatArray,
-    nominal: FloatArray,
-    hessian: FloatArray,
-    gradient: FloatArray,
+    pose: FloatArray,  # (3,) where the robot is when the first command takes effect
+    along: float,  # path length of its place on the path [m]
+    twist: FloatArray,  # (2,) speed [m/s] and turn rate [rad/s] of the command before the first
+    steps: FloatArray,  # (N,) how long each command is held [s]
+    nominal: FloatArray,  # (N, 2) to linearise about; NaN is filled with what the path asks for
+    hessian: FloatArray,  # (n, n) P; n = N, or 2 N where the speed is optimised
+    gradient: FloatArray,  # (n,) q
 ) -> None:
-    """Fill P and q of min 1/2 zᵀPz + qᵀz over z = (w_0 .. w_N-1 [, v_0 .. v_N-1]).
-
-    Turn rates are in units of ``max_turn_rate``, speeds in units of ``max_speed``.
-
-    Args:
-        track: the path.
-        tuning: limits and weights.
-        pose: (3,) where the robot is when the first command takes effect.
-        along: path length of its place on the path [m].
-        twist: (2,) speed [m/s] and turn rate [rad/s] of the command before the first.
-        steps: (N,) how long each command is held [s].
-        nominal: (N, 2) speed [m/s] and turn rate [rad/s] to linearise about; NaN where nothing is
-            known, which is then what the path asks for. Filled in place with what was used.
-        hessian: (n, n) receives P; n = N, or 2 N where the speed is optimised.
-        gradient: (n,) receives q.
-    """
+    """Fill P and q of min 1/2 zᵀPz + qᵀz over z = (w_0 .. w_N-1 [, v_0 .. v_N-1]), as fractions."""
     count, n = steps.shape[0], gradient.shape[0]
     hessian[:] = 0.0
     gradient[:] = 0.0
@@ -187,8 +163,8 @@ def assemble(
     out = np.empty(9)
     here, place, speed = pose.copy(), along, twist[0]
     unit = tuning.size / tuning.max_speed  # T [s]
-    _, index, share = locate(track, here[0], here[1], place, place)
-    bend = errors(track, here[0], here[1], here[2], index, share)[3]
+    _, index, fraction = locate(track, here[0], here[1], place, place)
+    curvature = errors(track, here[0], here[1], here[2], index, fraction)[3]
     for k in range(count):
         dt = steps[k]
         tau = dt / unit
@@ -197,26 +173,28 @@ def assemble(
             reach = tuning.max_acceleration * dt
             nominal[k, 0] = min(max(wanted, speed - reach), speed + reach)
         speed = nominal[k, 0]
-        turning = min(max(speed * bend, -tuning.max_turn_rate), tuning.max_turn_rate)
+        turning = min(max(speed * curvature, -tuning.max_turn_rate), tuning.max_turn_rate)
         if not np.isfinite(nominal[k, 1]):
             nominal[k, 1] = turning
         arc(here[0], here[1], here[2], speed, nominal[k, 1], dt, out)
         _differentiate(jacobian, k, count, out, dt, tuning)
         here[:] = out[:3]
-        place, index, share = locate(track, here[0], here[1], place, place + 2.0 * speed * dt)
-        offset, error, heading, bend = errors(track, here[0], here[1], here[2], index, share)
+        place, index, fraction = locate(track, here[0], here[1], place, place + 2.0 * speed * dt)
+        offset, error, heading, curvature = errors(
+            track, here[0], here[1], here[2], index, fraction
+        )
         c, s = np.cos(heading), np.sin(heading)
-        away = 1.0 - bend * offset
+        away = 1.0 - curvature * offset
         for j in range(n):
             ahead = c * jacobian[0, j] + s * jacobian[1, j]
             rows[0, j] = (c * jacobian[1, j] - s * jacobian[0, j]) / tuning.size
-            rows[1, j] = jacobian[2, j] - bend * ahead / max(away, 0.2)
+            rows[1, j] = jacobian[2, j] - curvature * ahead / max(away, 0.2)
         factor = tau * (tuning.terminal if k == count - 1 else 1.0)
         _add(hessian, gradient, rows[0], offset / tuning.size, nominal, tuning, factor)
         _add(hessian, gradient, rows[1], error, nominal, tuning, factor * tuning.heading_weight)
         asked = (wanted / tuning.max_speed, turning / tuning.max_turn_rate)
         before = twist[1] / tuning.max_turn_rate
-        _price_inputs(hessian, gradient, k, count, asked, before, tau, tuning)
+        _add_input_costs(hessian, gradient, k, count, asked, before, tau, tuning)
 
 
 @kernel(allocates=True)
@@ -236,40 +214,29 @@ def _differentiate(
 
 
 @kernel(allocates=True)
-def _price_inputs(
+def _add_input_costs(
     hessian: FloatArray,
     gradient: FloatArray,
     k: int,
     count: int,
-    asked: tuple[float, float],
-    before: float,
-    tau: float,
+    asked: tuple[float, float],  # speed and turn rate of the path, in the units of the problem
+    before: float,  # turn rate of the command before the first
+    tau: float,  # length of the step [T]
     tuning: Tuning,
 ) -> None:
-    """Price the inputs of step ``k``: departing from what is asked for, and changing the turn.
-
-    Args:
-        hessian: P.
-        gradient: q.
-        k: the step.
-        count: N.
-        asked: speed and turn rate of the path, in the units of the problem.
-        before: turn rate of the command before the first.
-        tau: length of the step [T].
-        tuning: limits and weights.
-    """
+    """Add the cost of the inputs of step ``k``: departing from what is asked, changing the turn."""
     scale = (tuning.max_turn_rate * tuning.size / tuning.max_speed) ** 2
     _diagonal(hessian, gradient, k, asked[1], tau * tuning.turn_weight * scale)
     if tuning.optimise_speed:
         _diagonal(hessian, gradient, count + k, asked[0], tau * tuning.speed_weight)
-    calm = tuning.smoothness * scale / tau
-    hessian[k, k] += calm
+    smoothness = tuning.smoothness * scale / tau
+    hessian[k, k] += smoothness
     if k == 0:
-        gradient[0] -= calm * before
+        gradient[0] -= smoothness * before
     else:
-        hessian[k - 1, k - 1] += calm
-        hessian[k - 1, k] -= calm
-        hessian[k, k - 1] -= calm
+        hessian[k - 1, k - 1] += smoothness
+        hessian[k - 1, k] -= smoothness
+        hessian[k, k - 1] -= smoothness
 
 
 @kernel(allocates=True)

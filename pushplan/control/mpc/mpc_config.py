@@ -20,13 +20,13 @@ class MpcConfig:
         horizon: N, steps that are looked ahead.
         reach: how far they reach at full speed [R]; the steps are equally long, but never shorter
             than the control period, and the first is the control period itself.
-        heading_weight: price of a heading error [1/rad²].
-        turn_weight: price of turning otherwise than the path does.
-        smoothness: price of changing the turn rate; more is calmer under noise and slower to
+        heading_weight: cost of a heading error [1/rad²].
+        turn_weight: cost of turning otherwise than the path does.
+        smoothness: cost of changing the turn rate; more is calmer under noise and slower to
             return to the path.
-        terminal: factor on the price of the last step's errors, for what comes after it.
+        terminal: factor on the cost of the last step's errors, for what comes after it.
         optimise_speed: let a differential drive depart from the plan's speed.
-        speed_weight: price of doing so, per square of the share of ``max_speed``.
+        speed_weight: cost of doing so, per square of the fraction of ``max_speed``.
         iterations: quadratic programs solved in each call; 1 is the real-time iteration.
         first_iterations: those of the first call on a plan, which has no solution to start from.
         delay: known time between a command and its effect [s]; the pose is predicted over it.

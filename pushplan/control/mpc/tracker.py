@@ -74,9 +74,9 @@ class MpcTracker:
         size = robot.circumscribed_radius
         x, y, theta = (float(value) for value in pose)
         low = max(self._along - _BACK * size, 0.0)
-        along, index, share = locate(track, x, y, low, self._along + _WINDOW * size)
+        along, index, fraction = locate(track, x, y, low, self._along + _WINDOW * size)
         self._along = min(along, float(track.lengths[-1]))
-        error = errors(track, x, y, theta, index, share)[1]
+        error = errors(track, x, y, theta, index, fraction)[1]
         stops = robot.drive is Drive.DIFFERENTIAL
         if stops and along >= track.lengths[-1] - 1e-9:
             return self._send(world, self._ramped(world, 0.0, 0.0), None)

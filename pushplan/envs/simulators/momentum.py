@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
 
-from pushplan.compiled import kernel
 from pushplan.envs.simulators.base import Materials
+from pushplan.envs.simulators.momentum_kernels import slow_down
 from pushplan.geometry import polygon_inertia
 from pushplan.world import World
 from pushplan.world.checks import FloatArray, IntArray
@@ -78,33 +77,3 @@ class Momentum:
         out[:, :2] = velocities[:, :2] * (self.inertia[:, :1] / h)
         out[:, 2] = velocities[:, 2] * (self.inertia[:, 1] / h)
         return out
-
-
-@kernel(allocates=True)
-def slow_down(velocities: FloatArray, keeps: FloatArray, drag: FloatArray, h: float) -> FloatArray:
-    """Solve ``v' = -(b + c |v|) v`` over ``h`` [s] for each body, and for its rotation.
-
-    Args:
-        velocities: (N, 3) vx, vy [m/s], omega [rad/s].
-        keeps: (N,) 0 for a body that stops at once, else 1.
-        drag: (N, 4) b and c of the translation, b and c of the rotation, over the inertia.
-        h: [s].
-    """
-    out = np.zeros((velocities.shape[0], 3))
-    for i in range(velocities.shape[0]):
-        if keeps[i] == 0.0:
-            continue
-        speed = math.hypot(velocities[i, 0], velocities[i, 1])
-        fraction = _kept(speed, drag[i, 0], drag[i, 1], h)
-        out[i, 0], out[i, 1] = fraction * velocities[i, 0], fraction * velocities[i, 1]
-        out[i, 2] = velocities[i, 2] * _kept(abs(velocities[i, 2]), drag[i, 2], drag[i, 3], h)
-    return out
-
-
-@kernel(allocates=True)
-def _kept(speed: float, b: float, c: float, h: float) -> float:
-    """Share of the speed that is left after ``h``."""
-    decay = math.exp(-b * h)
-    # (1 - exp(-b h)) / b, which tends to h
-    reach = -math.expm1(-b * h) / b if b * h > 1e-12 else h
-    return decay / (1.0 + c * speed * reach)

@@ -12,14 +12,12 @@ ASLEEP, AWAKE, STATIC = 0, 1, -1
 
 
 @kernel(allocates=True)
-def planar_rows(qpos: FloatArray, first: int, out: FloatArray) -> None:
-    """Planar poses of free bodies.
-
-    Args:
-        qpos: (N, nq) positions: one free body (x, y, z, quaternion w x y z), joints, free bodies.
-        first: where the second free body begins.
-        out: (N, B, 3) receives x, y [m] and theta [rad] of each free body.
-    """
+def planar_rows(
+    qpos: FloatArray,  # (N, nq) one free body (x, y, z, quaternion w x y z), joints, free bodies
+    first: int,  # where the second free body begins
+    out: FloatArray,  # (N, B, 3) receives x, y [m] and theta [rad] of each free body
+) -> None:
+    """Planar poses of free bodies."""
     for n in range(len(qpos)):
         for b in range(out.shape[1]):
             at = first + 7 * (b - 1) if b else 0
@@ -31,32 +29,17 @@ def planar_rows(qpos: FloatArray, first: int, out: FloatArray) -> None:
 
 @kernel(allocates=True)
 def sleep_lists(
-    asleep: FloatArray,
-    tree_of_body: FloatArray,
-    parent: FloatArray,
-    tree_of_dof: FloatArray,
-    tree_awake: FloatArray,
-    body_awake: FloatArray,
-    bodies: FloatArray,
-    parents: FloatArray,
-    dofs: FloatArray,
+    asleep: FloatArray,  # (T,) negative where a tree is awake
+    tree_of_body: FloatArray,  # (B,) tree of each body, -1 where it is static
+    parent: FloatArray,  # (B,) parent of each body
+    tree_of_dof: FloatArray,  # (V,) tree of each degree of freedom
+    tree_awake: FloatArray,  # (T,) receives whether a tree is awake
+    body_awake: FloatArray,  # (B,) receives the state of each body
+    bodies: FloatArray,  # (B,) receives the indices of the bodies that are awake or static
+    parents: FloatArray,  # (B,) receives the indices of the bodies whose parent is awake or static
+    dofs: FloatArray,  # (V,) receives the indices of the degrees of freedom that are awake
 ) -> tuple[int, int, int, int]:
-    """What MuJoCo derives from which trees sleep, before its next step.
-
-    Args:
-        asleep: (T,) negative where a tree is awake.
-        tree_of_body: (B,) tree of each body, -1 where it is static.
-        parent: (B,) parent of each body.
-        tree_of_dof: (V,) tree of each degree of freedom.
-        tree_awake: (T,) receives whether a tree is awake.
-        body_awake: (B,) receives the state of each body.
-        bodies: (B,) receives the indices of the bodies that are awake or static.
-        parents: (B,) receives the indices of the bodies whose parent is awake or static.
-        dofs: (V,) receives the indices of the degrees of freedom that are awake.
-
-    Returns:
-        How many trees, bodies, children and degrees of freedom are in the lists.
-    """
+    """Derive MuJoCo's lists of what is awake; the numbers of trees, bodies, children and dofs."""
     trees = 0
     for t in range(len(asleep)):
         tree_awake[t] = 1 if asleep[t] < 0 else 0
@@ -79,14 +62,12 @@ def sleep_lists(
 
 
 @kernel(allocates=True)
-def drag_damping(velocities: FloatArray, drag: FloatArray, damping: FloatArray) -> None:
-    """Linear damping that equals combined linear and quadratic drag at the velocities now.
-
-    Args:
-        velocities: (B, 3) of floating bodies [m/s, m/s, rad/s].
-        drag: (B, 4) linear and quadratic coefficients of translation, then of rotation.
-        damping: (B, 3) receives b + c |v|, [N s/m] and [N m s].
-    """
+def drag_damping(
+    velocities: FloatArray,  # (B, 3) of floating bodies [m/s, m/s, rad/s]
+    drag: FloatArray,  # (B, 4) linear and quadratic coefficients of translation, then of rotation
+    damping: FloatArray,  # (B, 3) receives b + c |v|, [N s/m] and [N m s]
+) -> None:
+    """Linear damping that equals combined linear and quadratic drag at the velocities now."""
     for i in range(len(velocities)):
         vx, vy, w = velocities[i, 0], velocities[i, 1], velocities[i, 2]
         along = drag[i, 0] + drag[i, 1] * math.sqrt(vx * vx + vy * vy)

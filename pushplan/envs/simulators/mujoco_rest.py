@@ -17,25 +17,15 @@ TILT = 1e-4
 
 @kernel(allocates=True)
 def quiet_objects(
-    velocities: FloatArray,
-    positions: FloatArray,
-    before: FloatArray,
-    radii: FloatArray,
-    speed: float,
-    interval: float,
-    quiet: BoolArray,
+    velocities: FloatArray,  # (K, 3) of floating bodies, or (K, 6) of free ones, turning last
+    positions: FloatArray,  # (K, 3) x, y, theta, or (K, 7) x, y, z and a quaternion w x y z
+    before: FloatArray,  # the same, one sample earlier
+    radii: FloatArray,  # (K,) of the objects [m]; they turn a rate of rotation into a speed
+    speed: float,  # below which an object counts as quiet [m/s]
+    interval: float,  # since the sample before [s]
+    quiet: BoolArray,  # (K,) receives the answer
 ) -> None:
-    """Which objects have hardly moved of late, and do not stand tilted.
-
-    Args:
-        velocities: (K, 3) x, y, yaw of floating bodies, or (K, 6) of free ones, turning last.
-        positions: (K, 3) x, y, theta, or (K, 7) x, y, z and a quaternion w x y z.
-        before: the same, one sample earlier.
-        radii: (K,) of the objects [m]; they turn a rate of rotation into a speed.
-        speed: below which an object counts as quiet [m/s].
-        interval: since the sample before [s].
-        quiet: (K,) receives the answer.
-    """
+    """Which objects have hardly moved of late, and do not stand tilted."""
     free = velocities.shape[1] == 6
     linear = 3 if free else 2
     for k in range(len(velocities)):
@@ -60,6 +50,7 @@ def quiet_objects(
 
 @kernel(allocates=True)
 def _root(parent: IntArray, k: int) -> int:
+    """The representative of the set that ``k`` is in (union-find)."""
     while parent[k] != k:
         parent[k] = parent[parent[k]]
         k = parent[k]
@@ -68,30 +59,17 @@ def _root(parent: IntArray, k: int) -> int:
 
 @kernel(allocates=True)
 def rest_cycles(
-    poses: FloatArray,
-    vertices: FloatArray,
-    offsets: IntArray,
-    radii: FloatArray,
-    quiet: BoolArray,
-    gap: float,
-    asleep: IntArray,
+    poses: FloatArray,  # (K, 3) x, y [m], theta [rad]
+    vertices: FloatArray,  # (V, 2) outlines in body frames, flattened [m]
+    offsets: IntArray,  # (K + 1,) where each begins
+    radii: FloatArray,  # (K,) of the discs that hold them [m]
+    quiet: BoolArray,  # (K,) which may sleep
+    gap: float,  # nearer objects form a group [m]
+    asleep: IntArray,  # (1 + K,) receives the next tree of each sleeper's group, the robot's first
 ) -> None:
-    """Let quiet objects sleep, together with all that they may touch.
-
-    MuJoCo wakes bodies that sleep together at once, and expects that no two bodies touch that
-    sleep apart. So objects closer than ``gap`` form a group, and a group with one restless
-    member stays awake.
-
-    Args:
-        poses: (K, 3) x, y [m], theta [rad].
-        vertices: (V, 2) outlines in body frames, flattened [m].
-        offsets: (K + 1,) where each begins.
-        radii: (K,) of the discs that hold them [m].
-        quiet: (K,) which may sleep.
-        gap: nearer objects form a group [m].
-        asleep: (1 + K,) trees of the engine, the robot's first: receives, of each object that
-            sleeps, the tree after it in its group; the others stay as they are.
-    """
+    """Let quiet objects sleep, together with all that they may touch."""
+    # MuJoCo wakes bodies that sleep together at once, and expects that no two bodies touch that
+    # sleep apart: objects closer than gap form a group, one restless member keeps it awake
     count = len(poses)
     parent = np.arange(count)
     corners = np.empty_like(vertices)

@@ -14,32 +14,17 @@ from pushplan.world.checks import BoolArray, FloatArray, IntArray
 
 @kernel(allocates=True)
 def within_reach(
-    robot: FloatArray,
-    reach: float,
-    parts: FloatArray,
-    part_offsets: IntArray,
-    rows: FloatArray,
-    speeds: FloatArray,
-    vertices: FloatArray,
-    offsets: IntArray,
-    radii: FloatArray,
+    robot: FloatArray,  # (3,) pose of the robot
+    reach: float,  # how far any of its points moves in the step [m]
+    parts: FloatArray,  # corners of its footprint, body frame
+    part_offsets: IntArray,  # where each part starts
+    rows: FloatArray,  # (K, 3) poses of the objects
+    speeds: FloatArray,  # (K,) how far each object would move by itself in the step [m]
+    vertices: FloatArray,  # corners of the objects, body frames
+    offsets: IntArray,  # where each object starts
+    radii: FloatArray,  # (K,) their circumscribed radii [m]
 ) -> BoolArray:
-    """Objects that the robot, or an object that is moving or near it, can get to.
-
-    Args:
-        robot: (3,) pose of the robot.
-        reach: how far any of its points moves in the step [m].
-        parts: corners of its footprint, body frame.
-        part_offsets: where each part starts.
-        rows: (K, 3) poses of the objects.
-        speeds: (K,) how far each object would move by itself in the step [m].
-        vertices: corners of the objects, body frames.
-        offsets: where each object starts.
-        radii: (K,) their circumscribed radii [m].
-
-    Returns:
-        (K,) flags: the objects in reach, those in motion, and those in reach of either.
-    """
+    """(K,) objects in reach of the robot, those in motion, and those in reach of either."""
     count = rows.shape[0]
     near, found = np.zeros(count, dtype=np.bool_), np.zeros(count, dtype=np.bool_)
     corners = np.empty_like(parts)
@@ -74,23 +59,14 @@ def within_reach(
 
 @kernel(allocates=True)
 def footprint_gap(
-    robot: FloatArray,
-    parts: FloatArray,
-    part_offsets: IntArray,
-    vertices: FloatArray,
-    offsets: IntArray,
-    radii: FloatArray,
+    robot: FloatArray,  # (3,) pose of the robot
+    parts: FloatArray,  # corners of its footprint, body frame
+    part_offsets: IntArray,  # where each part starts
+    vertices: FloatArray,  # corners of the cores of the obstacles, world frame
+    offsets: IntArray,  # where each core starts
+    radii: FloatArray,  # how far each obstacle reaches beyond its core [m]
 ) -> float:
-    """Distance [m] between the robot's footprint and what is static, 0 or less where they touch.
-
-    Args:
-        robot: (3,) pose of the robot.
-        parts: corners of its footprint, body frame.
-        part_offsets: where each part starts.
-        vertices: corners of the cores of the obstacles, world frame.
-        offsets: where each core starts.
-        radii: how far each obstacle reaches beyond its core [m].
-    """
+    """Distance [m] between the robot's footprint and what is static, 0 or less where they touch."""
     corners = np.empty_like(parts)
     transform_points(robot, parts, corners)
     best = math.inf
@@ -104,23 +80,14 @@ def footprint_gap(
 
 @kernel(allocates=True)
 def struck(
-    loaded: BoolArray,
-    paths: FloatArray,
-    rows: FloatArray,
-    vertices: FloatArray,
-    offsets: IntArray,
-    radii: FloatArray,
+    loaded: BoolArray,  # (K,) which objects were simulated
+    paths: FloatArray,  # (T, K, 3) their poses; those of the others do not change
+    rows: FloatArray,  # (K, 3) poses before the step
+    vertices: FloatArray,  # corners of the objects, body frames
+    offsets: IntArray,  # where each object starts
+    radii: FloatArray,  # (K,) their circumscribed radii [m]
 ) -> BoolArray:
-    """Objects that were left out although something that moved came to overlap them.
-
-    Args:
-        loaded: (K,) which objects were simulated.
-        paths: (T, K, 3) their poses; those of the others do not change.
-        rows: (K, 3) poses before the step.
-        vertices: corners of the objects, body frames.
-        offsets: where each object starts.
-        radii: (K,) their circumscribed radii [m].
-    """
+    """Objects that were left out although something that moved came to overlap them."""
     steps, count = paths.shape[0], rows.shape[0]
     found = np.zeros(count, dtype=np.bool_)
     here, there = np.empty_like(vertices), np.empty_like(vertices)

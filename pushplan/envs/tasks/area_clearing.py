@@ -11,9 +11,10 @@ import shapely
 
 from pushplan.envs.tasks.area_clearing_presets import LAYOUTS, PRESETS, AreaClearingPreset
 from pushplan.envs.tasks.base import StepOutcome
-from pushplan.envs.tasks.layout import Floor, rectangle, squares, walls_around
+from pushplan.envs.tasks.layout import FreeSpace, rectangle, squares, walls_around
 from pushplan.envs.tasks.manipulation import (
     START_TRIES,
+    ManipulationPreset,
     ManipulationTask,
     ManipulationVariations,
 )
@@ -22,7 +23,6 @@ from pushplan.world import (
     InvalidInputError,
     ScenarioError,
     StaticMap,
-    UnknownNameError,
     World,
 )
 from pushplan.world.checks import BoolArray, FloatArray
@@ -59,21 +59,11 @@ class AreaClearingTask(ManipulationTask):
     solid_presets = ("testbed",)
     idle_limits: ClassVar[Mapping[str, int]] = {"heading": 200, "waypoint": 200}
 
-    def __init__(
-        self,
-        *,
-        preset: str = "benchmark",
-        variations: Mapping[str, object] | None = None,
-        action: str = "heading",
-    ) -> None:
-        if preset not in PRESETS:
-            raise UnknownNameError("preset of area_clearing", preset, PRESETS)
-        self.preset: AreaClearingPreset = PRESETS[preset]
-        super().__init__(
-            self.preset,
-            AreaClearingVariations.read({} if variations is None else variations),
-            action,
-        )
+    preset: AreaClearingPreset
+    preset_table: ClassVar[Mapping[str, ManipulationPreset]] = PRESETS
+    variation_class = AreaClearingVariations
+
+    def _furnish_room(self) -> None:
         self._room = self.preset.layouts[self.variations.layout]
         self.static = self._static()
         half_x, half_y = self._room.area
@@ -169,7 +159,7 @@ def open_edges(static: StaticMap, polygon: FloatArray, size: float) -> BoolArray
     Returns:
         (N,) flags for the edges from corner i to i + 1.
     """
-    floor, bounds = Floor(static), static.bounds
+    free_space, bounds = FreeSpace(static), static.bounds
     found = np.zeros(len(polygon), dtype=bool)
     for i, (a, b) in enumerate(zip(polygon, np.roll(polygon, -1, axis=0), strict=True)):
         length = float(np.hypot(*(b - a)))
@@ -181,5 +171,5 @@ def open_edges(static: StaticMap, polygon: FloatArray, size: float) -> BoolArray
         corners = squares(np.column_stack([centres, heading]), size)
         inside = ((corners >= bounds[:2]) & (corners <= bounds[2:])).all(axis=(1, 2))
         shapes = shapely.polygons(corners)
-        found[i] = bool((floor.is_free(shapes, 1e-9) & inside).any())
+        found[i] = bool((free_space.is_free(shapes, 1e-9) & inside).any())
     return found

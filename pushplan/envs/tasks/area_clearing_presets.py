@@ -6,9 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 
-from pushplan.envs.simulators.base import Materials
 from pushplan.envs.tasks.manipulation import ManipulationPreset
-from pushplan.envs.tasks.testbed import SOLIDS
+from pushplan.envs.tasks.materials import BENCHMARK_MATERIALS, TESTBED_MATERIALS
 from pushplan.world import area_clearing_robot, turtlebot3_burger
 
 
@@ -76,8 +75,7 @@ BENCHMARK = AreaClearingPreset(
     box_mass=None,
     box_spacing=1.5,
     wall=18.0,  # as far as observations reach
-    # those of the 2D benchmark: boxes 1.0, walls 0.5, and no grip at the bumper
-    materials=Materials(robot_object=0.0, object_object=1.0, object_static=0.5, rolling_time=2.0),
+    materials=BENCHMARK_MATERIALS,
     control_step=0.2,
     heading_step=1.5,
     windows=_WINDOWS,
@@ -101,13 +99,7 @@ TESTBED = replace(
     box_mass=0.075,
     box_spacing=1.5 * SCALE,
     wall=18.0 * SCALE,
-    materials=Materials(
-        robot_object=0.4,
-        object_object=0.4,
-        object_static=0.4,
-        rolling_time=0.5,
-        solids=SOLIDS["turtlebot3"],
-    ),
+    materials=TESTBED_MATERIALS,
     heading_step=1.5 * SCALE,
     windows={name: side * SCALE for name, side in _WINDOWS.items()},
     field_resolution=0.01,

@@ -14,10 +14,11 @@ from pushplan.envs.tasks.box_delivery_presets import LAYOUTS, PRESETS, BoxDelive
 from pushplan.envs.tasks.layout import rectangle, walls_around
 from pushplan.envs.tasks.manipulation import (
     START_TRIES,
+    ManipulationPreset,
     ManipulationTask,
     ManipulationVariations,
 )
-from pushplan.world import InvalidInputError, Receptacle, StaticMap, UnknownNameError, World
+from pushplan.world import InvalidInputError, Receptacle, StaticMap, World
 from pushplan.world.checks import FloatArray, IntArray
 from pushplan.world.outline import transform_outlines
 
@@ -58,21 +59,11 @@ class BoxDeliveryTask(ManipulationTask):
     objects_leave = True
     idle_limits: ClassVar[Mapping[str, int]] = {"heading": 200, "waypoint": 100}
 
-    def __init__(
-        self,
-        *,
-        preset: str = "benchmark",
-        variations: Mapping[str, object] | None = None,
-        action: str = "heading",
-    ) -> None:
-        if preset not in PRESETS:
-            raise UnknownNameError("preset of box_delivery", preset, PRESETS)
-        self.preset: BoxDeliveryPreset = PRESETS[preset]
-        super().__init__(
-            self.preset,
-            BoxDeliveryVariations.read({} if variations is None else variations),
-            action,
-        )
+    preset: BoxDeliveryPreset
+    preset_table: ClassVar[Mapping[str, ManipulationPreset]] = PRESETS
+    variation_class = BoxDeliveryVariations
+
+    def _furnish_room(self) -> None:
         length, width = self.preset.rooms[self.variations.layout]
         self.bounds = (-0.5 * length, -0.5 * width, 0.5 * length, 0.5 * width)
         side = self.preset.receptacle

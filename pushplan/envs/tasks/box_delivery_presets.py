@@ -6,9 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import partial
 
-from pushplan.envs.simulators.base import Materials
 from pushplan.envs.tasks.manipulation import ManipulationPreset
-from pushplan.envs.tasks.testbed import SOLIDS
+from pushplan.envs.tasks.materials import BENCHMARK_MATERIALS, TESTBED_MATERIALS
 from pushplan.world import box_delivery_robot, jackal, turtlebot3_burger
 
 LAYOUTS = ("small_empty", "small_columns", "large_columns", "large_divider")
@@ -53,8 +52,7 @@ BENCHMARK = BoxDeliveryPreset(
     box_mass=None,
     box_spacing=0.62,
     wall=7.5,  # as far as observations reach
-    # those of the 2D benchmark: boxes 1.0, walls 0.5, and no grip at the bumper
-    materials=Materials(robot_object=0.0, object_object=1.0, object_static=0.5, rolling_time=2.0),
+    materials=BENCHMARK_MATERIALS,
     control_step=0.2,
     heading_step=1.75,
     windows=dict.fromkeys(LAYOUTS, 10.0),
@@ -89,13 +87,7 @@ TESTBED = BoxDeliveryPreset(
     box_mass=0.075,
     box_spacing=0.62 / 0.44 * 0.08,
     wall=2.1,
-    materials=Materials(
-        robot_object=0.4,
-        object_object=0.4,
-        object_static=0.4,
-        rolling_time=0.5,
-        solids=SOLIDS["turtlebot3"],
-    ),
+    materials=TESTBED_MATERIALS,
     control_step=0.2,
     heading_step=0.4,
     windows=dict.fromkeys(LAYOUTS, 2.845),

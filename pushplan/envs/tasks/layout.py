@@ -22,7 +22,7 @@ _CORNERS = np.array([(-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5)])
 
 
 @dataclass(frozen=True)
-class Floor:
+class FreeSpace:
     """The free floor among static obstacles.
 
     Args:

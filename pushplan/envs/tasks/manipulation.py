@@ -13,10 +13,10 @@ import shapely
 from pushplan.envs.simulators.base import Materials
 from pushplan.envs.tasks.base import Task, drive_of
 from pushplan.envs.tasks.box_kernels import sample_at
-from pushplan.envs.tasks.layout import Floor
+from pushplan.envs.tasks.layout import FreeSpace
+from pushplan.envs.tasks.materials import SOLIDS
 from pushplan.envs.tasks.reach import Reach
-from pushplan.envs.tasks.testbed import SOLIDS
-from pushplan.envs.tasks.variations import Variations
+from pushplan.envs.tasks.variations import TaskVariations
 from pushplan.geometry import GeodesicField, geodesic_field
 from pushplan.observation import ImageObservation, ObservationBuilder, StateObservation
 from pushplan.world import (
@@ -82,7 +82,7 @@ class ManipulationPreset:
 
 
 @dataclass(frozen=True, kw_only=True)
-class ManipulationVariations(Variations):
+class ManipulationVariations(TaskVariations):
     """What may depart from a preset; None leaves the preset's value.
 
     Args:
@@ -141,34 +141,50 @@ class ManipulationTask(Task):
     are cut off after as much simulated time as that many heading actions take to drive."""
 
     goal: ManipulationGoal
+    preset: ManipulationPreset
+    preset_table: ClassVar[Mapping[str, ManipulationPreset]]
+    variation_class: ClassVar[type[ManipulationVariations]]
 
     def __init__(
-        self, preset: ManipulationPreset, variations: ManipulationVariations, action: str
+        self,
+        *,
+        preset: str = "benchmark",
+        variations: Mapping[str, object] | None = None,
+        action: str = "heading",
     ) -> None:
+        if preset not in self.preset_table:
+            raise UnknownNameError(f"preset of {self.name}", preset, self.preset_table)
+        self.preset = dimensions = self.preset_table[preset]
+        self.variations = wanted = self.variation_class.read(
+            {} if variations is None else variations
+        )
         if action not in self.actions:
             raise UnknownNameError(f"action of task {self.name!r}", action, self.actions)
-        self.variations = variations
         self.action = action
-        self._dimensions = preset
         self.robot = self._make_robot()
         self.materials = self._make_materials()
-        self.control_step = preset.control_step
-        self.heading_step = preset.heading_step
-        self.waypoint_window = preset.windows[variations.layout]
+        self.control_step = dimensions.control_step
+        self.heading_step = dimensions.heading_step
+        self.waypoint_window = dimensions.windows[wanted.layout]
         self.idle_time = self.idle_limits["heading"] * self.heading_step / self.robot.max_speed
-        self.box_size = variations.box_size or preset.box_size
-        least = LEAST_SIZE * preset.box_size
+        self.box_size = wanted.box_size or dimensions.box_size
+        least = LEAST_SIZE * dimensions.box_size
         if self.box_size < least:
             raise ScenarioError(
                 f"{self.name}: box_size must be at least {least:g} m in this preset, "
                 f"got {self.box_size:g}"
             )
-        self.box_count = variations.boxes or preset.boxes[variations.layout]
+        self.box_count = wanted.boxes or dimensions.boxes[wanted.layout]
         self._field: GeodesicField | None = None
         self._idle_actions, self._idle_since = 0, 0.0
+        self._furnish_room()
+
+    @abstractmethod
+    def _furnish_room(self) -> None:
+        """Set `goal`, `reach` and whatever is the same in every start."""
 
     def _make_robot(self) -> RobotModel:
-        preset, wanted = self._dimensions, self.variations
+        preset, wanted = self.preset, self.variations
         first = next(iter(preset.robots))
         self.robot_name = first if wanted.robot is None else wanted.robot
         try:
@@ -184,7 +200,7 @@ class ManipulationTask(Task):
         return preset.robots[self.robot_name](drive=drive_of(self.action), **options)
 
     def _make_materials(self) -> Materials:
-        materials = self._dimensions.materials
+        materials = self.preset.materials
         if self.variations.bumper_friction is not None:
             materials = replace(materials, robot_object=self.variations.bumper_friction)
         if materials.solids is not None:
@@ -208,7 +224,7 @@ class ManipulationTask(Task):
             except ScenarioError:  # another draw of what is static may leave more room
                 if not random or not left:
                     raise
-        resolution = self._dimensions.field_resolution
+        resolution = self.preset.field_resolution
         field = geodesic_field(static, self.goal, resolution=resolution)
         self._field = field
         self._farthest = float(field.values[np.isfinite(field.values)].max())
@@ -230,20 +246,20 @@ class ManipulationTask(Task):
     def _furnish(self, rng: np.random.Generator, static: StaticMap) -> World:
         """Robot and boxes among static obstacles; every box within the robot's reach."""
         size, wanted = self.box_size, self.variations
-        floor = Floor(static)
+        free_space = FreeSpace(static)
         radius = self.robot.circumscribed_radius
-        resolution = self._dimensions.field_resolution
+        resolution = self.preset.field_resolution
         middle = self.goal.polygon.mean(axis=0)
         reach = Reach.around(static, middle, radius=radius, resolution=resolution)
         extent = 0.5 * float(np.ptp(self.goal.polygon, axis=0).max())
         candidates = self._robot_poses(rng, static)
         if not reach.within(middle[None], radius + extent).all():
             candidates = candidates[:0]
-        pose = self._free_pose(candidates, floor, reach)
+        pose = self._free_pose(candidates, free_space, reach)
         footprint = [shapely.Polygon(transform(pose, part)) for part in self.robot.parts]
         region, keep_off = self._box_region()
-        preset = self._dimensions
-        poses = floor.place_squares(
+        preset = self.preset
+        poses = free_space.place_squares(
             rng,
             self.box_count,
             size,
@@ -262,13 +278,13 @@ class ManipulationTask(Task):
             goal=self.goal,
         )
 
-    def _free_pose(self, candidates: FloatArray, floor: Floor, reach: Reach) -> FloatArray:
+    def _free_pose(self, candidates: FloatArray, free_space: FreeSpace, reach: Reach) -> FloatArray:
         """The first pose that overlaps nothing and from which the robot gets around."""
         near = reach.within(candidates[:, :2], self.robot.circumscribed_radius)
         for candidate in candidates[near]:
             pose: FloatArray = candidate
             parts = [shapely.Polygon(transform(pose, part)) for part in self.robot.parts]
-            if floor.is_free(np.array(parts), GAP * self.box_size).all():
+            if free_space.is_free(np.array(parts), GAP * self.box_size).all():
                 return pose
         raise ScenarioError(
             f"{self.name}: there is no free start for robot {self.robot.name!r} in layout "
@@ -280,7 +296,7 @@ class ManipulationTask(Task):
         wheeled = np.zeros(count, dtype=bool)
         wheeled[rng.permutation(count)[: round(self.variations.wheeled * count)]] = True
         outline = np.array([(-half, -half), (half, -half), (half, half), (-half, half)])
-        mass = self._dimensions.box_mass
+        mass = self.preset.box_mass
         return Movables.from_outlines(
             [outline] * count,
             poses,
@@ -306,7 +322,7 @@ class ManipulationTask(Task):
     def observation(self, name: str) -> ObservationBuilder:
         """``"image"``, ``"spatial"`` (the same at fewer pixels) or ``"state"``."""
         if name in _PIXELS:
-            window = self._dimensions.windows[self.variations.layout]
+            window = self.preset.windows[self.variations.layout]
             pixels = _PIXELS[name]
             return ImageObservation(
                 channels=_CHANNELS, window=(window, window), pixels=(pixels, pixels)

@@ -11,9 +11,9 @@ import numpy as np
 import shapely
 
 from pushplan.envs.tasks.base import StepOutcome, Task, drive_of
-from pushplan.envs.tasks.layout import Floor
+from pushplan.envs.tasks.layout import FreeSpace
 from pushplan.envs.tasks.maze_presets import PRESETS, MazePreset
-from pushplan.envs.tasks.variations import Variations
+from pushplan.envs.tasks.variations import TaskVariations
 from pushplan.geometry.distance_field import GeodesicField, geodesic_field
 from pushplan.observation import ImageObservation, ObservationBuilder, StateObservation
 from pushplan.world import (
@@ -39,7 +39,7 @@ _START_TRIES = 2000
 
 
 @dataclass(frozen=True)
-class MazeVariations(Variations):
+class MazeVariations(TaskVariations):
     """What may depart from a preset; None leaves the preset's value.
 
     Args:
@@ -124,7 +124,7 @@ class MazeTask(Task):
         self.goal = GoalDisc(
             np.array(self.preset.goals[shape]), self.preset.goal_radius + self.preset.robot_radius
         )
-        self._floor = Floor(self.static)
+        self._free_space = FreeSpace(self.static)
         room = self.static.bounds[2:] - self.static.bounds[:2]
         self.reach = 2.0 * float(np.hypot(*room))
         self._steps = 0
@@ -159,7 +159,7 @@ class MazeTask(Task):
     def _boxes(self, rng: np.random.Generator, robot_pose: FloatArray) -> Movables:
         wanted, size = self.variations, self.box_size
         footprint = [shapely.Polygon(transform(robot_pose, p)) for p in self.robot.parts]
-        poses = self._floor.place_squares(
+        poses = self._free_space.place_squares(
             rng,
             wanted.boxes,
             size,
@@ -220,7 +220,7 @@ class MazeTask(Task):
             places = np.column_stack([center + radius * around, headings])
             outlines = [transform(place, part) for place in places for part in self.robot.parts]
             shapes = np.array([shapely.Polygon(outline) for outline in outlines])
-            if self._floor.is_free(shapes, GAP * self.box_size).all():
+            if self._free_space.is_free(shapes, GAP * self.box_size).all():
                 return True
         return False
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from pushplan.envs.simulators.base import Materials
 from pushplan.envs.tasks.layout import rectangle, walls_around
-from pushplan.envs.tasks.testbed import SOLIDS
+from pushplan.envs.tasks.materials import BENCHMARK_MATERIALS, TESTBED_MATERIALS
 from pushplan.world import (
     BUMPERS,
     Drive,
@@ -134,8 +134,7 @@ BENCHMARK = MazePreset(
     max_turn_rate=0.105,
     box_size=1.0,
     box_mass=None,
-    # those of the 2D benchmark: boxes 1.0, walls 0.5, and no grip at the bumper
-    materials=Materials(robot_object=0.0, object_object=1.0, object_static=0.5, rolling_time=2.0),
+    materials=BENCHMARK_MATERIALS,
     control_step=0.8,
     max_steps=400,
     progress_reward=150.0,
@@ -157,13 +156,7 @@ TESTBED = MazePreset(
     max_turn_rate=0.785,
     box_size=0.08,
     box_mass=0.1,
-    materials=Materials(
-        robot_object=0.4,
-        object_object=0.4,
-        object_static=0.4,
-        rolling_time=0.5,
-        solids=SOLIDS["turtlebot3"],
-    ),
+    materials=TESTBED_MATERIALS,
     control_step=0.15,
     max_steps=2000,
     progress_reward=300.0,

@@ -12,7 +12,7 @@ import shapely
 
 from pushplan.envs.tasks.base import StepOutcome, Task
 from pushplan.envs.tasks.ship_presets import PRESETS, ShipPreset
-from pushplan.envs.tasks.variations import Variations
+from pushplan.envs.tasks.variations import TaskVariations
 from pushplan.observation import ImageObservation, ObservationBuilder, StateObservation
 from pushplan.scenarios.ice import IceField, generate_ice, load_ice
 from pushplan.world import (
@@ -40,7 +40,7 @@ _UP = 0.5 * math.pi
 
 
 @dataclass(frozen=True)
-class ShipIceVariations(Variations):
+class ShipIceVariations(TaskVariations):
     """What may depart from a preset; None leaves the preset's value.
 
     Args:

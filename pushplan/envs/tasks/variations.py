@@ -9,7 +9,7 @@ from typing import Any, ClassVar, Self
 from pushplan.world import InvalidInputError, ScenarioError, UnknownNameError
 
 
-class Variations:
+class TaskVariations:
     """Base of the frozen dataclasses that say what may depart from a task's presets."""
 
     task: ClassVar[str]
@@ -17,7 +17,7 @@ class Variations:
 
     @classmethod
     def read(cls, values: Mapping[str, Any]) -> Self:
-        """Variations from a mapping.
+        """Read variations from a mapping.
 
         Raises:
             UnknownNameError: if a name is none of the fields.

@@ -27,7 +27,7 @@ _HARD = [(t, s) for t in (0, 12, -12, 30, -30) for s in (0.0, 0.4, -0.4, 0.65, -
 """Headings of the robot against the direction of the path [degrees] and further offsets of the box
 from the best one [half bumpers], in order of preference."""
 _COARSE = 0.02
-"""How far the way to a box may be from the shortest one [circumscribed radii]."""
+"""How far the path to a box may be from the shortest one [circumscribed radii]."""
 _LEANS = tuple(math.radians(lean) for lean in (0, 20, -20, 40, -40))
 """Directions of the last leg against the robot's heading at its end."""
 _LEGS = (1.05, 0.6)
@@ -37,7 +37,7 @@ _STEP = 0.3
 _SPAN = 1.2
 """Sliding that one push should make do with [half bumpers]."""
 _FARTHEST, _RIM = 0.6, 0.8
-"""Greatest offsets at the beginning, where there is room and where there is not [half bumpers]."""
+"""Greatest offsets at the beginning, with and without clearance beside the box [half bumpers]."""
 
 
 @dataclass(frozen=True)
@@ -105,7 +105,7 @@ def find_approach(
         k: index of the object.
         path: that the object is to take.
         parameters: friction.
-        slack: room to leave between bumper and object [m].
+        slack: clearance to leave between bumper and object [m].
         skip: how many of the best places to pass over, because they have failed before; the last
             one where there are no more.
 
@@ -185,7 +185,7 @@ class _Scene:
         self._scratch = np.empty_like(self._shape.vertices)
 
     def line_up(self, heading: float, offset: float, slack: float) -> Approach | None:
-        """The way to one place behind the object, None if there is none."""
+        """The path to one place behind the object, None if there is none."""
         robot, middle = self._world.robot, self._middle
         ahead = np.array([math.cos(heading), math.sin(heading)])
         left = np.array([-ahead[1], ahead[0]])
@@ -205,10 +205,10 @@ class _Scene:
                 and self._free(behind, heading + 0.5 * lean)
             ):
                 continue
-            way = self._paths.to(stop)
-            if way is None:
+            path = self._paths.to(stop)
+            if path is None:
                 continue
-            corners = _simpler(way, _COARSE * size)
+            corners = _simpler(path, _COARSE * size)
             last = corners[-1] - corners[-2] if len(corners) > 1 else ahead
             if self._turns(stop, math.atan2(last[1], last[0]), course):
                 points = np.concatenate([corners[1:-1], [stop, behind]])

@@ -13,7 +13,7 @@ from pushplan.planners.pushing.contact_kernels import Contact, advance, box_pose
 from pushplan.world.checks import FloatArray, IntArray
 
 SAMPLES = 4
-"""Poses checked along the way of one command."""
+"""Poses checked along one command."""
 HALVINGS = 4
 """How often the piece in which it comes too near is halved."""
 GRAZE = 0.1
@@ -97,17 +97,17 @@ def free_fraction(
     now = gaps(contact, here, problem)
     robot = min(problem.least, now[0] - problem.slack)
     box = min(problem.least, now[1] - problem.slack)
-    pace = (abs(v) + abs(w) * (contact.front + contact.depth)) * duration
+    travel_ahead = (abs(v) + abs(w) * (contact.front + contact.depth)) * duration
     for i in range(SAMPLES):
         before[:] = here
         advance(contact, here, v, w, duration / SAMPLES, detail)
-        if _clear(contact, here, problem, robot, box, pace * (i + 1) / SAMPLES):
+        if _clear(contact, here, problem, robot, box, travel_ahead * (i + 1) / SAMPLES):
             continue
         free, step = i / SAMPLES, 0.5 / SAMPLES
         for _ in range(HALVINGS):
             here[:] = before
             advance(contact, here, v, w, step * duration, detail)
-            if _clear(contact, here, problem, robot, box, pace * (free + step)):
+            if _clear(contact, here, problem, robot, box, travel_ahead * (free + step)):
                 before[:] = here
                 free += step
             step *= 0.5

@@ -16,6 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from pushplan.compiled import kernel
+from pushplan.geometry.angles import wrap_angle
 from pushplan.world.checks import FloatArray
 
 FREE, STICK, SLIDE, CORNER_STICK, CORNER_SLIDE = range(5)
@@ -284,8 +285,7 @@ def observe(
     c, s = np.cos(robot[2]), np.sin(robot[2])
     out[:3] = robot
     out[3] = c * dy - s * dx
-    angle = box[2] + normal - robot[2]
-    out[4] = angle - 2.0 * np.pi * np.round(angle / (2.0 * np.pi))
+    out[4] = wrap_angle(box[2] + normal - robot[2])
     out[5] = c * dx + s * dy - standoff(contact, out[3], out[4])[0]
 
 

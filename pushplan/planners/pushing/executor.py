@@ -78,7 +78,7 @@ class PushStatus:
     Args:
         phase: what is being done.
         reason: why the last attempt, or the push, ended: ``"end"`` (the box is at the end of its
-            path), ``"gone"`` (it has been taken off the floor), ``"lost"`` (it slid off),
+            path), ``"gone"`` (it has been taken off the map), ``"lost"`` (it slid off),
             ``"astray"`` (too far from its path), ``"stuck"`` (the robot does not move),
             ``"blocked"`` (something static is in the way), ``"no_approach"`` (the robot cannot get
             behind it); empty until then.
@@ -98,7 +98,7 @@ class ExecutorConfig:
 
     Args:
         mpc: of the push.
-        slack: room between bumper and box when the push begins [R].
+        slack: clearance between bumper and box when the push begins [R].
         retreat: how far it backs off before it gets behind the box anew [R].
         attempts: pushes without progress after which it fails.
         progress: what counts as progress [R].
@@ -247,7 +247,7 @@ class PushExecutor:
         return clamp_twist(world.robot, fraction * command.linear, fraction * command.angular)
 
     def _set_out(self, world: World, task: PushTask, k: int) -> WaypointFollower | None:
-        """The way behind the box; None if there is nothing to do, or no way."""
+        """The path behind the box; None if there is nothing to do, or no path."""
         robot, config = world.robot, self.config
         size = robot.circumscribed_radius
         path = self._rest_of(world, task, k)

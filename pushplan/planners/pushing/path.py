@@ -1,4 +1,4 @@
-"""`PushPath`: the way that a box is to be pushed along."""
+"""`PushPath`: the path that a box is to be pushed along."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _GREATEST_TURN = 0.05
 
 @dataclass(frozen=True, eq=False)
 class PushPath(ArrayRecord):
-    """The way of a box's centre.
+    """The path of a box's centre.
 
     Args:
         poses: (N, 3) x, y [m] and direction of travel [rad], at least two; what way round the box
@@ -87,8 +87,8 @@ class PushPath(ArrayRecord):
         turns = np.array([math.remainder(t, math.tau) for t in np.diff(headings).tolist()])
         for i, turn in enumerate(turns.tolist(), start=1):
             if radius > 0.0 and 1e-6 < abs(turn) < math.pi - 1e-6:
-                room = 0.5 * min(lengths[i - 1], lengths[i])
-                cut[i] = min(radius * math.tan(0.5 * abs(turn)), room)
+                most = 0.5 * min(lengths[i - 1], lengths[i])
+                cut[i] = min(radius * math.tan(0.5 * abs(turn)), most)
         poses: list[FloatArray] = []
         for i, (length, heading) in enumerate(zip(lengths, headings, strict=True)):
             ahead = np.array([math.cos(heading), math.sin(heading)])
@@ -147,17 +147,19 @@ class PushPath(ArrayRecord):
             speed: of the robot [m/s]; its greatest if None.
         """
         expect("robot", robot, RobotModel)
-        pace = robot.max_speed if speed is None else number("speed", speed, low=0.0, open_low=True)
-        pace = min(pace, robot.max_speed)
+        speed_limit = (
+            robot.max_speed if speed is None else number("speed", speed, low=0.0, open_low=True)
+        )
+        speed_limit = min(speed_limit, robot.max_speed)
         count = len(self.poses)
         lengths = self.lengths
         turns = np.array([math.remainder(t, math.tau) for t in np.diff(self.poses[:, 2]).tolist()])
         steps = np.maximum(np.diff(lengths), 1e-9)
-        rates = np.clip(pace * turns / steps, -robot.max_turn_rate, robot.max_turn_rate)
+        rates = np.clip(speed_limit * turns / steps, -robot.max_turn_rate, robot.max_turn_rate)
         return Plan(
-            times=lengths / pace,
+            times=lengths / speed_limit,
             poses=self.poses,
-            speeds=np.full(count, pace),
+            speeds=np.full(count, speed_limit),
             turn_rates=np.concatenate([rates, [0.0]]),
             travel_cost=robot.mass * float(lengths[-1]),
             subtasks=(SubTask((integer("box_id", box_id),), 0, count - 1),),

@@ -1,4 +1,4 @@
-"""Shortest ways from one place to many."""
+"""Shortest paths from one place to many."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ class PathsFromStart:
     Args:
         static: what to go around.
         clearance: distance to keep from it [m]; a start that is nearer leaves straight first.
-        start: (2,) where the ways begin [m].
+        start: (2,) where the paths begin [m].
     """
 
     def __init__(self, static: StaticMap, clearance: float, start: FloatArray) -> None:
@@ -30,16 +30,16 @@ class PathsFromStart:
             self._tree = goal_distances(static, goal, clearance=clearance)
 
     def to(self, place: FloatArray) -> FloatArray | None:
-        """(N, 2) from the start to a place (2,) [m]; None if there is no way."""
+        """(N, 2) from the start to a place (2,) [m]; None if there is no path."""
         if self._begin is None:
             return None
         tree = self._tree
         if not free_points(place[None], tree.obstacles, self._static.bounds, tree.gap)[0]:
             return None
-        way = tree.path_from(place)
-        if not math.isfinite(way.length):
+        path = tree.path_from(place)
+        if not math.isfinite(path.length):
             return None
-        points = way.points[::-1]
+        points = path.points[::-1]
         if (self._begin != self._start).any():
             points = np.concatenate([self._start[None], points])
         return points

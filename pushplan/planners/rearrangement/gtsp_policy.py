@@ -26,7 +26,7 @@ class Gtsp:
     """Plans once and follows its path, as the policy of the Bench-Push paper does.
 
     Every object is a cluster; a node is a straight push of it across one open edge of the area, or
-    into the receptacle. An arc costs the straight way from the end of one push to the start of the
+    into the receptacle. An arc costs the straight line from the end of one push to the start of the
     next, and that push. Other objects are not looked at, and nothing is looked at afterwards. No
     chance is involved.
 
@@ -49,6 +49,12 @@ class Gtsp:
     def reset(self, world: World, rng: np.random.Generator) -> None:
         """Forget the last episode."""
         self._forget()
+
+    def warm_up(self) -> None:
+        """Load the kernels that an episode may need."""
+        from pushplan.planners.rearrangement.kernel_warmup import warm_up_rearrangement
+
+        warm_up_rearrangement()
 
     def act(self, world: World, observation: Any = None) -> Twist:
         """The velocity for this step; stops at the end of the path.
@@ -96,8 +102,8 @@ class Gtsp:
         graph = VisibilityGraph(world.static, clearance=world.robot.inscribed_radius)
         for n in [*tour.nodes[at + 1 :], *tour.nodes[:at]]:
             _, start, end = nodes[int(n)]
-            way = graph.shortest_path(points[-1], start)
-            points += [*(way.points[1:] if len(way.points) > 1 else [start]), end]
+            path = graph.shortest_path(points[-1], start)
+            points += [*(path.points[1:] if len(path.points) > 1 else [start]), end]
         legs = np.array(points[1:])
         ahead, either = np.ones(len(legs)), np.zeros(len(legs) + 1)
         return Route(legs, ahead, either, heading, float(tour.cost))
@@ -120,7 +126,7 @@ def _pushes(scene: PushScene, k: int) -> list[tuple[int, FloatArray, FloatArray]
         found = [goal.polygon.mean(axis=0)]
     pushes = []
     for target in found:
-        way = target - box
-        start = pose_behind(scene, k, math.atan2(way[1], way[0]), 0.0)
-        pushes.append((k, start[:2], start[:2] + way))
+        move = target - box
+        start = pose_behind(scene, k, math.atan2(move[1], move[0]), 0.0)
+        pushes.append((k, start[:2], start[:2] + move))
     return pushes

@@ -6,10 +6,10 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-import shapely
 
 from pushplan.geometry import VisibilityGraph, convex_penetration, goal_distances
 from pushplan.motion.collision import footprint, is_free, obstacles
+from pushplan.planners.rearrangement.object_paths import done_places
 from pushplan.world import (
     ClearanceArea,
     Goal,
@@ -31,6 +31,8 @@ _OPTIONS = sorted(
 )
 """Options to push, in order of preference: turn against the shortest path [rad], and how far the
 robot's middle is to the left of the object's, as a fraction of half the bumper's width."""
+_INSET = 0.7
+"""Distance that a path's end keeps from the edges of a receptacle [radii of the object]."""
 _LEANS = tuple(math.radians(lean) for lean in (0, 20, -20, 40, -40))
 """Directions of the last leg against the heading of the push [rad]."""
 
@@ -77,7 +79,9 @@ def goal_heading(world: World, k: int) -> float | None:
     """
     radius = float(world.movables.radii[k])
     here = world.movables.poses[k, :2]
-    goals = _goals(world.goal, radius)
+    goals = done_places(world.goal, radius, _INSET)
+    if goals is None:
+        goals = [np.stack([_middle(world.goal), _middle(world.goal)])]
     path = goal_distances(world.static, goals, clearance=0.7 * radius).path_from(here)
     if not math.isfinite(path.length):
         path = goal_distances(world.static, goals).path_from(here)
@@ -187,20 +191,3 @@ def _into(polygon: FloatArray, outline: FloatArray, slack: float) -> FloatArray:
         if excess > slack:
             shift -= excess * outward
     return shift
-
-
-def _goals(goal: Goal, radius: float) -> list[FloatArray]:
-    """Where the centre of an object has to be: convex polygons and segments."""
-    if isinstance(goal, Receptacle):
-        inner = shapely.Polygon(goal.polygon).buffer(-0.7 * radius, join_style="mitre")
-        if inner.is_empty:
-            middle = _middle(goal)
-            return [np.stack([middle, middle])]
-        return [np.asarray(inner.exterior.coords)[:-1]]
-    if isinstance(goal, ClearanceArea):
-        ends = np.stack([goal.polygon, np.roll(goal.polygon, -1, axis=0)], axis=1)
-        along = ends[:, 1] - ends[:, 0]
-        outward = np.stack([along[:, 1], -along[:, 0]], axis=1)
-        outward *= 1.1 * radius / np.hypot(along[:, 0], along[:, 1])[:, None]
-        return list((ends + outward[:, None])[goal.open_edges])
-    raise InvalidInputError(f"this needs a goal for the objects, got {type(goal).__name__}")

@@ -27,7 +27,7 @@ MOVES: IntArray = np.array(
     + [(y, -x) for x, y in _QUARTER],
     dtype=np.int64,
 )
-"""(16, 2) cells along x and y that a straight move along each heading covers."""
+"""(16, 2) cells along x and y that a straight move along each heading crosses."""
 HEADINGS: FloatArray = np.arctan2(MOVES[:, 1], MOVES[:, 0])
 """(16,) the headings [rad]."""
 LENGTHS: FloatArray = np.hypot(MOVES[:, 0], MOVES[:, 1])

@@ -85,9 +85,8 @@ def candidate_pushes(
 ) -> list[Push]:
     """All candidates of a scene; ``pre_relocations`` see `build_push_graph`."""
     pushes = simple_pushes(simulator)
-    if (
-        pre_relocations or not pushes
-    ):  # what is hard to get at is often freed by what is done before
+    # what is hard to get at is often freed by what is done before
+    if pre_relocations or not pushes:
         relocated = 0
         away = np.hypot(*(scene.poses[:, :2] - scene.world.robot_pose[:2]).T)
         for k in sorted(simulator.left.tolist(), key=lambda k: (float(away[k]), k)):

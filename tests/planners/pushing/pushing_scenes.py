@@ -8,7 +8,7 @@ import numpy as np
 
 from pushplan.envs.registry import SIMULATORS, look_up
 from pushplan.envs.simulators.base import Materials, Simulator
-from pushplan.envs.tasks.testbed import SOLIDS
+from pushplan.envs.tasks.materials import SOLIDS
 from pushplan.planners.pushing import PushModel, PushState
 from pushplan.world import Episode, Movables, Receptacle, RobotModel, StaticMap, Twist, World
 

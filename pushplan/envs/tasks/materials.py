@@ -1,10 +1,10 @@
-"""The third dimension of the testbed, by robot."""
+"""Materials of the tasks with boxes, and the third dimension of the testbed, by robot."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 
-from pushplan.envs.simulators.base import Solids
+from pushplan.envs.simulators.base import Materials, Solids
 
 SOLIDS: Mapping[str, Solids] = {
     "turtlebot3": Solids(
@@ -24,3 +24,15 @@ SOLIDS: Mapping[str, Solids] = {
     ),
 }
 """Heights [m]: boxes are 8 cm cubes, walls 0.2 m; the Burger's lidar tower is left out."""
+
+BENCHMARK_MATERIALS = Materials(
+    robot_object=0.0, object_object=1.0, object_static=0.5, rolling_time=2.0
+)
+"""Those of the 2D benchmark: boxes 1.0, walls 0.5, and no grip at the bumper."""
+TESTBED_MATERIALS = Materials(
+    robot_object=0.4,
+    object_object=0.4,
+    object_static=0.4,
+    rolling_time=0.5,
+    solids=SOLIDS["turtlebot3"],
+)
