@@ -194,7 +194,7 @@ def rate(worlds: list[World], config: ShipLatticeConfig) -> str:
     """Nodes of exhaustive searches, and how many are expanded in a second of CPU time."""
     total, seconds = 0, 0.0
     for world in worlds:
-        radius = turning_radius(world.robot, config.turn_share)
+        radius = turning_radius(world.robot, config.turn_fraction)
         builder = LatticeBuilder(
             world, config, radius=radius, side=0.0, floe_costs=partial(floe_costs, config)
         )

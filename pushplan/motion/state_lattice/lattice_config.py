@@ -21,7 +21,7 @@ class LatticeConfig:
         shifts: lane changes to each side.
         step: of the lattice, about [B]; the turning radius is a whole number of steps.
         cells_per_step: cells of the cost map in a step of the lattice.
-        turn_share: fraction of the greatest turn rate that plans use; the rest is for tracking.
+        turn_fraction: fraction of the greatest turn rate that plans use; the rest is for tracking.
         inset: how far beyond the goal line a path ends [R].
         horizon: how far ahead a path goes at most [R].
         spacing: distance between the poses of a path [R].
@@ -36,7 +36,7 @@ class LatticeConfig:
     shifts: int = 3
     step: float = 0.5
     cells_per_step: int = 4
-    turn_share: float = 0.9
+    turn_fraction: float = 0.9
     inset: float = 0.2
     horizon: float = 60.0
     spacing: float = 0.15
@@ -46,7 +46,7 @@ class LatticeConfig:
     def __post_init__(self) -> None:
         choice("heuristic", self.heuristic, HEURISTICS)
         number("inset", self.inset, low=0.0)
-        number("turn_share", self.turn_share, low=0.0, high=1.0, open_low=True)
+        number("turn_fraction", self.turn_fraction, low=0.0, high=1.0, open_low=True)
         for name in ("step", "horizon", "spacing"):
             number(name, getattr(self, name), low=0.0, open_low=True)
         integer("cells_per_step", self.cells_per_step, low=1)

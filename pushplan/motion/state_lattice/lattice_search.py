@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from pushplan.geometry.angles import wrap_angle
 from pushplan.motion.state_lattice.built_lattice import BuiltLattice
 from pushplan.motion.state_lattice.lattice_builder import LatticeBuilder
 from pushplan.motion.state_lattice.pose_lattice import bound_at, swath_sum, within
@@ -33,7 +34,7 @@ def open_search(built: BuiltLattice, builder: LatticeBuilder) -> tuple[AStar, li
     branching = int(np.diff(motions.first).max())
     star = AStar(lattice, built.size, branching)
     row, column, heading = built.start
-    turns = np.abs((motions.angles - heading + np.pi) % (2.0 * np.pi) - np.pi)
+    turns = np.abs(wrap_angle(motions.angles - heading))
     nearest = int(np.argmin(turns))
     if turns[nearest] < 1e-6:
         node = built.node(nearest, row, column)

@@ -58,6 +58,13 @@ class PoseLattice(NamedTuple):
 
 
 @kernel
+def place_of(lattice: PoseLattice, node: int) -> tuple[int, int, int]:
+    """Heading, row and column of a node."""
+    rest, v = node // lattice.columns, node % lattice.columns
+    return rest // lattice.rows, rest % lattice.rows, v
+
+
+@kernel
 def swath_sum(sums: FloatArray, runs: IntArray, begin: int, end: int, at: int) -> float:
     """Sum of a map over the runs ``begin`` to ``end`` - 1 around the cell at the offset ``at``."""
     total = 0.0
@@ -97,10 +104,7 @@ def successors(
     lattice: PoseLattice, node: int, nodes: IntArray, costs: FloatArray, edges: IntArray
 ) -> int:
     """List the successors of a node; see `astar.expand`."""
-    v = node % lattice.columns
-    rest = node // lattice.columns
-    u = rest % lattice.rows
-    h = rest // lattice.rows
+    h, u, v = place_of(lattice, node)
     count = 0
     for p in range(lattice.first[h], lattice.first[h + 1]):
         to_u, to_v = u + lattice.ends[p, 0], v + lattice.ends[p, 1]
@@ -130,10 +134,7 @@ def successors(
 @kernel
 def bound_at(lattice: PoseLattice, node: int) -> float:
     """Bound or estimate of the cost from a node to the goal [m], times the inflation."""
-    v = node % lattice.columns
-    rest = node // lattice.columns
-    u = rest % lattice.rows
-    h = rest // lattice.rows
+    h, u, v = place_of(lattice, node)
     if lattice.goal[0] == 0.0:
         bound: float = max(lattice.row_bounds[h, u], lattice.place_costs[u, v])
         return lattice.inflation * bound
@@ -145,8 +146,7 @@ def bound_at(lattice: PoseLattice, node: int) -> float:
 @kernel
 def reached(lattice: PoseLattice, node: int) -> bool:
     """Whether a node lies in the goal."""
-    v = node % lattice.columns
-    u = (node // lattice.columns) % lattice.rows
+    _, u, v = place_of(lattice, node)
     if lattice.goal[0] == 0.0:
         arrived: bool = u >= lattice.goal[1] - 1e-9
     else:

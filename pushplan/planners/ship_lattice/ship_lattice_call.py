@@ -20,8 +20,8 @@ from pushplan.motion.state_lattice.lattice_path import bare_path, lay_path
 from pushplan.motion.state_lattice.lattice_search import open_search, path_arcs
 from pushplan.planners.ship_lattice.floe_costs import floe_costs
 from pushplan.planners.ship_lattice.nearby_objects import NearbyObjects
-from pushplan.planners.ship_lattice.path_improver import PathImprover
 from pushplan.planners.ship_lattice.ship_lattice_config import ShipLatticeConfig
+from pushplan.planners.ship_lattice.ship_path_improver import ShipPathImprover
 from pushplan.planners.ship_lattice.shortcut_proposals import ShortcutProblem
 from pushplan.search.astar import FOUND, PAUSED
 from pushplan.world import GoalLine, Plan, PlanStatus, StopCheck, World
@@ -67,7 +67,7 @@ class ShipLatticeCall:
         self.built: BuiltLattice | None = None
         self.side = 0.0
         self.near: NearbyObjects | None = None
-        self.improver: PathImprover | None = None
+        self.improver: ShipPathImprover | None = None
         self.cost = math.inf
         self.poses: FloatArray = np.zeros((0, 3))
         self.curvatures: FloatArray = np.zeros(0)
@@ -107,7 +107,7 @@ class ShipLatticeCall:
 
     def _limits(self) -> list[tuple[float, float]]:
         """Fractions of the turn rate and distances from the bounds [m] to try in turn."""
-        fraction = self.config.turn_share
+        fraction = self.config.turn_fraction
         side = self.config.side * 2.0 * self.world.robot.inscribed_radius
         nearer = [(fraction, part * side) for part in (1.0, 0.8, 0.6, 0.4, 0.2, 0.0)]
         return [*nearer, (1.0, 0.0)]
@@ -174,7 +174,7 @@ class ShipLatticeCall:
             end_fraction=_END_FRACTION,
             goal=np.concatenate([point, normal]),
         )
-        self.improver = PathImprover(
+        self.improver = ShipPathImprover(
             path_sweeper(self.near.world, self.interaction),
             np.ascontiguousarray(self.near.world.movables.poses),
             robot_mass=world.robot.mass,
@@ -248,4 +248,4 @@ class ShipLatticeCall:
             objects = self.near.everything(self.world, best.objects, missing)
             works = np.concatenate([best.works, np.repeat(best.works[-1:], missing)])
             path = SweptPath(best.poses, best.curvatures, objects, best.lengths, works)
-        return timed_plan(self.world, path, self.config.turn_share)
+        return timed_plan(self.world, path, self.config.turn_fraction)

@@ -99,7 +99,7 @@ def channel_view(world: World, config: PredictiveConfig, model: IceInteraction) 
     goal = min(away, config.farthest * length)
     near = np.flatnonzero((floes[:, 1] > -reach) & (floes[:, 1] < goal + reach))
     off = math.remainder(float(world.robot_pose[2]) - turn - 0.5 * math.pi, 2.0 * math.pi)
-    radius = robot.turning_radius / config.turn_share
+    radius = robot.turning_radius / config.turn_fraction
     margin = config.margin * 0.5 * float(np.ptp(robot.vertices[:, 1]))
     low, high = _box(world, turn, margin, (1.0 + 1e-6) * radius * (1.0 - math.cos(off)), off)
     aside = 0.5 * max(goal, 0.0) + 5.0 * length  # no path leads farther from the straight one

@@ -44,8 +44,8 @@ def plan_call(
     """
     check = (lambda iterations, cost: False) if stop is None else stop.start()
     iterations = nodes = 0
-    for fraction in dict.fromkeys((config.turn_share, max(config.turn_share, _TIGHTEST))):
-        view = channel_view(world, replace(config, turn_share=fraction), interaction)
+    for fraction in dict.fromkeys((config.turn_fraction, max(config.turn_fraction, _TIGHTEST))):
+        view = channel_view(world, replace(config, turn_fraction=fraction), interaction)
         beam: BeamSearch[Any] = BeamSearch(view, config, make_propagator(view), check, iterations)
         call = PredictiveCall(beam, widening=stop is not None)
         status = call.run()
@@ -59,7 +59,7 @@ def plan_call(
         first_solution_s=call.first - began,
         iterations=iterations,
         nodes=nodes,
-        detail={"cost": beam.best_cost, "tight": float(fraction > config.turn_share)},
+        detail={"cost": beam.best_cost, "tight": float(fraction > config.turn_fraction)},
     )
     return PlanResult(status, call.plan(), stats)
 

@@ -13,7 +13,7 @@ class PredictiveConfig:
 
     Args:
         push_weight: w, the cost of a unit of work on the ice against a unit of the ship's own.
-        turn_share: fraction of the greatest turn rate that plans use; the rest is for tracking.
+        turn_fraction: fraction of the greatest turn rate that plans use; the rest is for tracking.
         arc: length of the pieces that the search puts together.
         curvatures: to each side of straight ahead.
         width: partial paths kept from piece to piece.
@@ -32,7 +32,7 @@ class PredictiveConfig:
     """
 
     push_weight: float = 1.5
-    turn_share: float = 0.9
+    turn_fraction: float = 0.9
     arc: float = 0.4
     curvatures: int = 2
     width: int = 6
@@ -52,7 +52,7 @@ class PredictiveConfig:
             number(name, getattr(self, name), low=0.0)
         for name in ("arc", "row", "column", "horizon", "farthest"):
             number(name, getattr(self, name), low=0.0, open_low=True)
-        number("turn_share", self.turn_share, low=0.0, high=1.0, open_low=True)
+        number("turn_fraction", self.turn_fraction, low=0.0, high=1.0, open_low=True)
         number("tries", self.tries, low=1.0)
         integer("curvatures", self.curvatures, low=1)
         integer("width", self.width, low=1)

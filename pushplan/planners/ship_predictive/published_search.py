@@ -14,7 +14,7 @@ from pushplan.motion.state_lattice.lattice_builder import LatticeBuilder
 from pushplan.motion.state_lattice.lattice_config import LatticeConfig
 from pushplan.motion.state_lattice.lattice_path import bare_path, lay_path, sample_arcs
 from pushplan.motion.state_lattice.lattice_search import open_search, path_arcs
-from pushplan.motion.state_lattice.pose_lattice import bound_at, reached, successors
+from pushplan.motion.state_lattice.pose_lattice import bound_at, place_of, reached, successors
 from pushplan.planners.ship_predictive.beam_search import SPACING
 from pushplan.planners.ship_predictive.channel_view import ChannelView
 from pushplan.planners.ship_predictive.map_propagator import MapPropagator
@@ -36,7 +36,7 @@ class PublishedSearch:
 
     def __init__(self, view: ChannelView, network: IceNetwork, weight: float) -> None:
         world = view.world
-        radius = turning_radius(world.robot, LATTICE.turn_share)
+        radius = turning_radius(world.robot, LATTICE.turn_fraction)
         builder = LatticeBuilder(world, LATTICE, radius=radius, side=_clearance(world))
         self._view, self._weight = view, weight
         self._propagator = MapPropagator(view, network)
@@ -110,8 +110,7 @@ class PublishedSearch:
     def _pose(self, node: int) -> FloatArray:
         """(3,) a node's pose in the frame of the channel."""
         lattice, (row, column, _) = self._built.lattice, self._built.start
-        rest, v = divmod(node, lattice.columns)
-        h, u = divmod(rest, lattice.rows)
+        h, u, v = place_of(lattice, node)
         ahead, left = lattice.step * (u - row), lattice.step * (v - column)
         return np.array([-left, ahead, self._built.motions.angles[h] + 0.5 * math.pi])
 
@@ -130,7 +129,7 @@ class PublishedSearch:
 
 def timed_path(world: World, poses: FloatArray, curvatures: FloatArray) -> Plan:
     """A plan at full speed about which nothing is predicted."""
-    return timed_plan(world, bare_path(poses, curvatures), LATTICE.turn_share)
+    return timed_plan(world, bare_path(poses, curvatures), LATTICE.turn_fraction)
 
 
 def _clearance(world: World) -> float:

@@ -294,7 +294,7 @@ def test_a_lattice_needs_no_lattice_type() -> None:
 @pytest.mark.parametrize(
     "changes",
     [
-        {"price": "gold"},
+        {"floe_cost": "gold"},
         {"headings": 9},
         {"step": 0.0},
         {"searches": (-1.0,)},

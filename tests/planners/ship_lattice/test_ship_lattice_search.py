@@ -29,7 +29,7 @@ EXACT = {"heuristic": "bound", "inflation": 1.0}
 
 
 def builder_of(world: World, config: ShipLatticeConfig) -> LatticeBuilder:
-    radius = turning_radius(world.robot, config.turn_share)
+    radius = turning_radius(world.robot, config.turn_fraction)
     return LatticeBuilder(
         world, config, radius=radius, side=0.2, floe_costs=partial(floe_costs, config)
     )

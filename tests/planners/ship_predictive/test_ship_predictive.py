@@ -304,7 +304,7 @@ def test_the_policy_crosses_the_ice(name):
 
 @pytest.mark.parametrize(
     "values",
-    [{"width": 0}, {"push_weight": -1.0}, {"turn_share": 1.5}, {"arc": np.nan}, {"widest": 1}],
+    [{"width": 0}, {"push_weight": -1.0}, {"turn_fraction": 1.5}, {"arc": np.nan}, {"widest": 1}],
 )
 def test_bad_parameters(values):
     with pytest.raises(InvalidInputError):

@@ -16,7 +16,7 @@ _PORTION = 8
 
 
 @dataclass(frozen=True)
-class Candidate:
+class SweptCandidate:
     """A path and what is predicted along it.
 
     Args:
@@ -36,7 +36,7 @@ class Candidate:
     cost: float
 
 
-class PathImprover:
+class ShipPathImprover:
     """Finds the costs of paths by sweeps and changes paths at random.
 
     Args:
@@ -65,14 +65,14 @@ class PathImprover:
         self.sweeper, self.start = sweeper, start
         self.robot_mass, self.weight, self.ahead = robot_mass, weight, ahead
         self.problem, self.stopped, self.free = problem, stopped, free
-        self.best: Candidate | None = None
+        self.best: SweptCandidate | None = None
 
     def consider(
         self,
         poses: FloatArray,
         curvatures: FloatArray,
         first: int = 0,
-        base: Candidate | None = None,
+        base: SweptCandidate | None = None,
     ) -> bool:
         """Find the cost of a path and keep it if it is the cheapest so far.
 
@@ -114,7 +114,7 @@ class PathImprover:
             at = end
             if own + self.weight * works[at] >= limit:
                 return False
-        self.best = Candidate(
+        self.best = SweptCandidate(
             poses, curvatures, lengths, objects, works, own + self.weight * float(works[-1])
         )
         return True
