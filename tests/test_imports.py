@@ -20,7 +20,7 @@ HEAVY = ("pymunk", "mujoco", "gymnasium", "torch", "matplotlib")
         "control",
         "drawing",
         "planners",
-        "planners.kinodynamic",
+        "planners.rrt",
         "planners.push_aware.policies",
     ],
 )

@@ -15,11 +15,12 @@ def task(preset="benchmark", action="velocity", **variations):
 
 @pytest.mark.parametrize("layout", LAYOUTS)
 @pytest.mark.parametrize("preset", PRESETS)
-def test_starts_are_valid(preset, layout):
+@pytest.mark.parametrize("seeds", [50, pytest.param(200, marks=pytest.mark.slow)])
+def test_starts_are_valid(preset, layout, seeds):
     clearing = task(preset, layout=layout, random_start=True)
     area = shapely.Polygon(clearing.goal.polygon)
     xs = []
-    for seed in range(200):
+    for seed in range(seeds):
         world = clearing.start(stream(seed, "layout"))
         check_start(world, clearing.preset.box_spacing)
         assert all(area.contains(box) for box in shapes(world))

@@ -22,12 +22,13 @@ def task(preset="benchmark", action="velocity", **variations):
 
 @pytest.mark.parametrize("layout", LAYOUTS)
 @pytest.mark.parametrize("preset", PRESETS)
-def test_starts_are_valid(preset, layout):
+@pytest.mark.parametrize("seeds", [50, pytest.param(200, marks=pytest.mark.slow)])
+def test_starts_are_valid(preset, layout, seeds):
     delivery = task(preset, layout=layout)
     goal = shapely.Polygon(delivery.goal.polygon)
     dimensions = delivery.preset
     columns = []
-    for seed in range(200):
+    for seed in range(seeds):
         world = delivery.start(stream(seed, "layout"))
         check_start(world, dimensions.box_spacing)
         assert not shapely.union_all(shapes(world)).intersects(goal)
