@@ -7,9 +7,10 @@ from functools import partial
 from typing import Any, TypeVar, overload
 
 import numpy as np
-from numba import njit
+from numba import config
 from numba.core import options
 
+from pushplan.compiled.dispatcher import KernelDispatcher
 from pushplan.world.checks import FloatArray
 
 _F = TypeVar("_F", bound=Callable[..., Any])
@@ -44,12 +45,14 @@ def kernel(function: Any = None, *, allocates: bool = False, inline: bool = Fals
 
 
 def _compiled(function: Callable[..., Any], *, allocates: bool, inline: bool) -> Any:
-    chosen: dict[str, Any] = {"cache": True, "nogil": True}
+    if config.DISABLE_JIT:
+        return function
+    chosen: dict[str, Any] = {"nopython": True, "nogil": True}
     if inline:
         chosen["forceinline"] = True
     if not allocates and _COUNTS_REFERENCES:
         chosen["_nrt"] = False
-    return njit(**chosen)(function)
+    return KernelDispatcher(function, targetoptions=chosen)
 
 
 @kernel

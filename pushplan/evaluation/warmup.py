@@ -7,39 +7,41 @@ from typing import Any
 
 from pushplan.evaluation.episode import PolicyError, Recording
 from pushplan.evaluation.jobs import JobSettings
-from pushplan.evaluation.loading import load_object
 from pushplan.evaluation.policies import PolicySpec, policy_names
 from pushplan.world import InvalidInputError, UnknownNameError
 
-WARMUPS: dict[str, str] = {
-    "policies": "pushplan.evaluation.warmup:policies",
-    "observations": "pushplan.evaluation.warmup:observations",
-    "planners": "pushplan.planners.kernel_warmup:warm_up",
-    "metrics": "pushplan.evaluation.warmup:metrics",
-}
-"""What -> "module:function" that is called without arguments."""
+OTHERS = ("observations", "metrics")
+"""What has kernels beside policies."""
 
 STEPS = 3
 
 
 def warm_up(name: str) -> float:
-    """Run one entry of `WARMUPS`.
+    """Run a policy, or one of `OTHERS`, for a moment.
+
+    A policy is warmed up as `pushplan.planners.warm_up` does it, and makes a few steps in every
+    kind of start of the smoke suite that it is made for; networks only do that.
 
     Returns:
         How long it took [s].
+
+    Raises:
+        UnknownNameError: if there is no such policy.
     """
     begin = time.perf_counter()
-    load_object(WARMUPS[name])()
+    if name == "observations":
+        _observations()
+    elif name == "metrics":
+        _metrics()
+    else:
+        if name not in policy_names():
+            raise UnknownNameError("policy", name, (*policy_names(), *OTHERS))
+        PolicySpec(name, name).warm_up()
+        _record(name)
     return time.perf_counter() - begin
 
 
-def policies() -> None:
-    """A few steps of every policy, networks too, in every kind of start of the smoke suite."""
-    for name in policy_names():
-        _record(name)
-
-
-def observations() -> None:
+def _observations() -> None:
     """A few steps with each kind of observation that a network may have been trained on."""
     from pushplan.learned import FeatureObservation
 
@@ -47,7 +49,7 @@ def observations() -> None:
         _record("random", observation)
 
 
-def metrics() -> None:
+def _metrics() -> None:
     """Every metric of a short episode."""
     from pushplan.metrics import compute
 

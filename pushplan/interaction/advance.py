@@ -10,9 +10,10 @@ from __future__ import annotations
 
 from typing import Any, Protocol, cast, runtime_checkable
 
-from numba.core import types
+from numba import types
 from numba.extending import overload
 
+from pushplan.compiled import add_type_kernels
 from pushplan.interaction.model import InteractionModel
 from pushplan.world import World
 from pushplan.world.checks import FloatArray
@@ -52,6 +53,7 @@ def register_advance(kind: type, step: Any) -> None:
         kind: a named tuple class of arrays, numbers and such tuples.
         step: compiled function with the arguments of `advance_objects`; it makes no arrays.
     """
+    add_type_kernels(kind, step)
 
     @overload(advance_objects, jit_options=cast(Any, {"_nrt": False}))
     def _advance(model, robot_from, robot_to, poses, moved):  # type: ignore[no-untyped-def]

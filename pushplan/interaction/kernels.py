@@ -285,28 +285,15 @@ def _resolve(
 
 @kernel
 def advance(
-    robot_from: FloatArray,
-    robot_to: FloatArray,
-    poses: FloatArray,
-    lengths: FloatArray,
+    robot_from: FloatArray,  # (3,)
+    robot_to: FloatArray,  # (3,) where it goes, along a straight line
+    poses: FloatArray,  # (K, 3) of the objects, changed in place; without a jam's small step
+    lengths: FloatArray,  # (K,) path lengths of the objects [m], added to in place
     bodies: Bodies,
     settings: Settings,
     scratch: Scratch,
 ) -> bool:
-    """Drive the robot from one pose to a near one, pushing what is in the way.
-
-    Args:
-        robot_from: (3,) where it is.
-        robot_to: (3,) where it goes, along a straight line.
-        poses: (K, 3) poses of the objects, changed in place.
-        lengths: (K,) path lengths of the objects [m], added to in place.
-        bodies: shapes and masses.
-        settings: numerical settings.
-        scratch: from `make_scratch`.
-
-    Returns:
-        False where the robot jams: ``poses`` are then those of the last small step without a jam.
-    """
+    """Drive the robot to a near pose, pushing what is in the way; False where it jams."""
     dx, dy = robot_to[0] - robot_from[0], robot_to[1] - robot_from[1]
     turn = robot_to[2] - robot_from[2]
     turn -= 2.0 * np.pi * np.round(turn / (2.0 * np.pi))  # the short way
@@ -361,20 +348,13 @@ def robot_held(pose: FloatArray, bodies: Bodies, settings: Settings, scratch: Sc
 
 @kernel(allocates=True)
 def sweep_path(
-    path: FloatArray, poses: FloatArray, bodies: Bodies, settings: Settings, out: FloatArray
+    path: FloatArray,  # (N, 3) robot poses
+    poses: FloatArray,  # (K, 3) of the objects, changed in place
+    bodies: Bodies,
+    settings: Settings,
+    out: FloatArray,  # (N, K, 3) receives the poses at each path pose
 ) -> int:
-    """Sweep the robot along a path; the compiled heart of `QuasiStatic.sweep`.
-
-    Args:
-        path: (N, 3) robot poses.
-        poses: (K, 3) poses of the objects, changed in place.
-        bodies: shapes and masses.
-        settings: numerical settings.
-        out: (N, K, 3) receives the poses at each path pose.
-
-    Returns:
-        The first pose that is not reached, or -1.
-    """
+    """Sweep the robot along a path into ``out``; the first pose not reached, or -1."""
     scratch = make_scratch(bodies)
     lengths = np.zeros(poses.shape[0])
     jammed = -1

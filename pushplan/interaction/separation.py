@@ -17,27 +17,16 @@ def _nudge(pose: FloatArray, x: float, y: float, ix: float, iy: float, inv: floa
 
 @kernel
 def separate(
-    points: FloatArray,
-    found: int,
-    a: FloatArray,
-    weight_a: float,
-    inv_a: float,
-    b: FloatArray,
+    points: FloatArray,  # (2, 5) contact points from the first to the second, from `contacts`
+    found: int,  # how many of them count
+    a: FloatArray,  # (3,) pose of the first body, changed in place
+    weight_a: float,  # its inverse mass; 0 if it cannot move
+    inv_a: float,  # its 1 / c²
+    b: FloatArray,  # (3,) pose of the second body, likewise
     weight_b: float,
     inv_b: float,
 ) -> float:
-    """Move two bodies apart by the least total motion; returns the sum of the impulses.
-
-    Args:
-        points: (2, 5) contact points from the first to the second, as `contacts` gives them.
-        found: how many of them count.
-        a: (3,) pose of the first body, changed in place.
-        weight_a: its inverse mass; 0 if it cannot move.
-        inv_a: its 1 / c².
-        b: (3,) pose of the second body, likewise.
-        weight_b: its inverse mass.
-        inv_b: its 1 / c².
-    """
+    """Move two bodies apart by the least total motion; returns the sum of the impulses."""
     x0, y0, x1, y1 = points[0, 0], points[0, 1], points[1, 0], points[1, 1]
     nx, ny = points[0, 2], points[0, 3]
     arm_a = (x0 - a[0]) * ny - (y0 - a[1]) * nx
@@ -71,25 +60,16 @@ def separate(
 
 @kernel
 def drag_along(
-    points: FloatArray,
+    points: FloatArray,  # as in `separate`; two points count as the one between them
     found: int,
-    limit: float,
-    robot_from: FloatArray,
-    robot_to: FloatArray,
-    before: FloatArray,
-    pose: FloatArray,
-    inv: float,
+    limit: float,  # friction times what the body was moved along the normal [m]
+    robot_from: FloatArray,  # (3,) what the body touches has moved from here
+    robot_to: FloatArray,  # (3,) to here
+    before: FloatArray,  # (3,) pose of the body before the step
+    pose: FloatArray,  # (3,) pose of the body, changed in place
+    inv: float,  # its 1 / c²
 ) -> None:
-    """Coulomb friction: carry the contact sideways with the robot, up to ``limit`` [m].
-
-    Args:
-        points, found: as in `separate`; two points count as the one between them.
-        limit: friction times what the body was moved along the normal [m].
-        robot_from, robot_to: (3,) what the body touches has moved from the one to the other.
-        before: (3,) pose of the body before the step.
-        pose: (3,) pose of the body, changed in place.
-        inv: its 1 / c².
-    """
+    """Coulomb friction: carry the contact sideways with the robot, up to ``limit`` [m]."""
     x, y, nx, ny = points[0, 0], points[0, 1], points[0, 2], points[0, 3]
     if found == 2:
         x, y = 0.5 * (x + points[1, 0]), 0.5 * (y + points[1, 1])

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import numba.experimental.function_type  # noqa: F401  (lets kernels take functions as arguments)
 import numpy as np
-from numba.core import types
+from numba import types
 
 from pushplan.compiled import copy_into, kernel
 from pushplan.interaction.advance import CompiledInteraction, register_advance

@@ -24,18 +24,13 @@ def _turn(angle: float) -> float:
 
 
 @kernel
-def dubins(start: FloatArray, end: FloatArray, radius: float, out: FloatArray) -> float:
-    """Shortest forward path between two poses under a curvature bound.
-
-    Args:
-        start: (3,) x, y [m], theta [rad].
-        end: (3,) likewise.
-        radius: least turning radius [m].
-        out: (3, 2) receives the three pieces: length [m] and curvature [1/m], left positive.
-
-    Returns:
-        The length of the path [m].
-    """
+def dubins(
+    start: FloatArray,  # (3,) x, y [m], theta [rad]
+    end: FloatArray,  # (3,)
+    radius: float,  # least turning radius [m]
+    out: FloatArray,  # (3, 2) receives length [m] and curvature [1/m] of the three pieces
+) -> float:
+    """Length [m] of the shortest forward path between two poses under a curvature bound."""
     dx, dy = end[0] - start[0], end[1] - start[1]
     d = np.sqrt(dx * dx + dy * dy) / radius
     phi = np.arctan2(dy, dx)
@@ -113,20 +108,13 @@ def step_along(curvature: float, spacing: float) -> float:
 
 @kernel(allocates=True)
 def sample_pieces(
-    start: FloatArray, pieces: FloatArray, spacing: float, out: FloatArray, curvatures: FloatArray
+    start: FloatArray,  # (3,) pose at the beginning
+    pieces: FloatArray,  # (P, 2) length [m] and curvature [1/m] of each arc
+    spacing: float,  # greatest distance between two poses [m]; less in tight turns
+    out: FloatArray,  # (M, 3) receives the poses
+    curvatures: FloatArray,  # (M,) receives the curvature that leads to each pose [1/m]
 ) -> int:
-    """Poses along consecutive arcs, without the start itself.
-
-    Args:
-        start: (3,) pose at the beginning.
-        pieces: (P, 2) length [m] and curvature [1/m] of each arc.
-        spacing: greatest distance between two poses [m]; less in tight turns.
-        out: (M, 3) receives the poses.
-        curvatures: (M,) receives the curvature that leads to each pose [1/m].
-
-    Returns:
-        The number of poses, or -1 if ``out`` is too short.
-    """
+    """Number of poses along arcs, without the start itself, or -1 if ``out`` is too short."""
     count = 0
     here = start.copy()
     for i in range(pieces.shape[0]):

@@ -16,6 +16,7 @@ from pushplan.motion.collision import first_blocked
 from pushplan.motion.dubins import dubins, sample_pieces
 from pushplan.motion.goal_region import in_goal
 from pushplan.motion.path_problem import PathProblem, SweptPath
+from pushplan.motion.shortcut_kernels import copy_rest, copy_start, displace
 from pushplan.world.checks import FloatArray
 
 PATIENCE = 1_500
@@ -76,19 +77,15 @@ def _propose(
     target = path.poses[last]
     if to_end:
         target = _new_end(at, path.poses[count - 1], normal, problem)
-    trial.poses[: first + 1] = path.poses[: first + 1]
-    trial.curvatures[: first + 1] = path.curvatures[: first + 1]
-    size = first + 1
+    size = copy_start(path.poses, path.curvatures, first, trial.poses, trial.curvatures)
     via = np.empty(3)
     stops = 1
     if not to_end and draw[2] < 0.65 and last - first > 3:
         stops = 2
-        middle = path.poses[(first + last) // 2]
         # displacements of all sizes, from fine adjustments to another side of a box
         shift = problem.displacement * normal[0] * 10.0 ** (-1.5 * draw[3])
-        via[0] = middle[0] - shift * np.sin(middle[2])
-        via[1] = middle[1] + shift * np.cos(middle[2])
-        via[2] = middle[2] + 0.3 * normal[1] * 10.0 ** (-1.5 * draw[3])
+        turn = 0.3 * normal[1] * 10.0 ** (-1.5 * draw[3])
+        displace(path.poses[(first + last) // 2], shift, turn, via)
     for stop in range(stops):
         goal = via if stops == 2 and stop == 0 else target
         here = trial.poses[size - 1].copy()
@@ -111,12 +108,9 @@ def _propose(
         return first, new, size
     if size + rest > trial.poses.shape[0]:
         return first, 0, 0
-    trial.poses[size : size + rest] = path.poses[last + 1 : count]
-    # the new piece may end with whole turns more or less than the old one
-    turns = np.round((trial.poses[size - 1, 2] - path.poses[last, 2]) / (2.0 * np.pi))
-    trial.poses[size : size + rest, 2] += 2.0 * np.pi * turns
-    trial.curvatures[size : size + rest] = path.curvatures[last + 1 : count]
-    return first, new, size + rest
+    old, curvatures = path.poses[:count], path.curvatures[:count]
+    size = copy_rest(old, curvatures, last, trial.poses, trial.curvatures, size)
+    return first, new, size
 
 
 @kernel(allocates=True)

@@ -85,13 +85,13 @@ def _fill_hidden(
     per_metre: float,
 ) -> None:
     """Overwrite the pixels in the shadow of the loops by the length of the path to them."""
-    spots, at = np.empty_like(sight.loops), np.empty((1, 2))
-    to_pixels(view, sight.loops, spots)
+    loops, offsets, table, origin, step, bends, lengths = sight  # quicker than in the loops
+    spots, at = np.empty_like(loops), np.empty((1, 2))
+    to_pixels(view, loops, spots)
     to_pixels(view, eye, at)
     hidden = np.zeros(image.shape, dtype=np.uint8)
-    fill_shadows(hidden, at[0, 0], at[0, 1], spots, sight.offsets, 1)
+    fill_shadows(hidden, at[0, 0], at[0, 1], spots, offsets, 1)
     c, s = math.cos(view[2]), math.sin(view[2])
-    table, origin, step = sight.table, sight.origin, sight.step
     rows, cols = table.shape[0], table.shape[1]
     for r in range(image.shape[0]):
         up = (0.5 * view[3] - r - 0.5) * view[5]
@@ -104,6 +104,6 @@ def _fill_hidden(
             best = math.inf
             if 0.0 <= u < cols and 0.0 <= v < rows:  # ways stay inside the bounds
                 i, j = int(v), int(u)
-                for k in range(sight.bends.shape[0]):
-                    best = min(best, sight.lengths[k] + table[i, j, sight.bends[k]])
+                for k in range(bends.shape[0]):
+                    best = min(best, lengths[k] + table[i, j, bends[k]])
             image[r, q] = int(min(255.0, per_metre * best + 0.5))

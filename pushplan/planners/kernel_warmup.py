@@ -2,71 +2,80 @@
 
 from __future__ import annotations
 
+import contextlib
 import functools
 from dataclasses import replace
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 
-from pushplan.control import MpcTracker
 from pushplan.planners.following.plan_follower import PlanFollower
-from pushplan.planners.rearrangement.kernel_warmup import warm_up_rearrangement
-from pushplan.planners.registry import OPEN_WATER, make_planner, planner_names
+from pushplan.planners.registry import make_policy, policy_names
 from pushplan.world import (
     Drive,
     GoalDisc,
     GoalLine,
+    InvalidInputError,
     MaxIterations,
     Movables,
     RobotModel,
     StaticMap,
     World,
 )
+from pushplan.world.policy_abilities import WarmsUp
 
-_ENOUGH = {"push-aware": 6000}
-"""Iterations after which all kernels of a planner have been used, where 600 are not enough."""
+_ITERATIONS = 600
+"""Iterations of a planner that does not say how many it needs to use all of its kernels."""
 
 _POSES = ((2.0, 5.0, 0.0), (2.05, 5.0, 0.1), (5.0, 5.35, 0.2))
 """At the start, between the headings of a lattice, and a little too close to a wall."""
 
-_PUSHERS = ("greedy", "gtsp", "gtsp-mpc")
-_PLANNER_OF = {"push-aware-constant-speed": "push-aware"}
-_NO_KERNELS = ("random",)
+
+@runtime_checkable
+class CountsIterations(Protocol):
+    """A planner that says after how many iterations it has used all of its kernels."""
+
+    warm_up_iterations: int
 
 
 def warm_up(*names: str) -> None:
-    """Plan a few times in a small room with each planner, so that later calls find kernels loaded.
+    """Run each policy for a moment in small worlds, so that later calls find kernels loaded.
 
     Numba compiles a kernel on its first use after an installation (seconds) and loads it from its
-    cache on the first use in a process (a second or so, three for those that push objects to a
-    goal). A controller calls this once when it starts; again for the same names it does nothing.
+    cache on the first use in a process. A controller calls this once when it starts; again for the
+    same names it does nothing. A policy that `WarmsUp` says itself what is to be run.
 
     Args:
         names: planners or policies of `planner_names()` and `policy_names()`; all by default.
 
     Raises:
-        UnknownNameError: if there is no such planner.
+        UnknownNameError: if there is no such planner or policy.
     """
-    wanted = dict.fromkeys(_PLANNER_OF.get(name, name) for name in names or planner_names())
-    if not names or set(names) & set(_PUSHERS):
-        warm_up_rearrangement()
-    for name in wanted:
-        if name not in (*_PUSHERS, *_NO_KERNELS):
-            _warm_up_planner(name)
+    for name in names or policy_names():
+        _warm_up(name)
 
 
 @functools.cache
-def _warm_up_planner(name: str) -> None:
-    planner = make_planner(name)
-    room, water = _room(), _water()
-    world, enough = (water, 30) if name in OPEN_WATER else (room, 600)
-    planner.plan(world, stop=MaxIterations(_ENOUGH.get(name, enough)))
-    if world is room:  # some go about it in another way where nothing is static
-        planner.plan(water, stop=MaxIterations(enough))
-    policy = PlanFollower(planner, MpcTracker() if name.startswith("ship") else None)
-    policy.stop = MaxIterations(enough)
+def _warm_up(name: str) -> None:
+    policy = make_policy(name)
+    if isinstance(policy, WarmsUp):
+        policy.warm_up()
+    elif isinstance(policy, PlanFollower):
+        for world in (_room(), _water()):
+            with contextlib.suppress(InvalidInputError):  # another planner's world
+                _plan_and_follow(policy, world)
+
+
+def _plan_and_follow(policy: PlanFollower, world: World) -> None:
+    planner = policy.planner
+    enough = planner.warm_up_iterations if isinstance(planner, CountsIterations) else _ITERATIONS
+    planner.plan(world, stop=MaxIterations(enough))
+    fewer = MaxIterations(min(enough, _ITERATIONS))
+    policy.stop = fewer
+    policy.reset(world, np.random.default_rng(0))
     for step, pose in enumerate(_POSES):
         moved = world.moved(robot_pose=pose, time=0.1 * step)
-        planner.plan(moved, stop=MaxIterations(enough))
+        planner.plan(moved, stop=fewer)
         policy.act(moved)
 
 

@@ -16,7 +16,7 @@ from numba import types
 from numba.extending import overload
 from numpy.typing import NDArray
 
-from pushplan.compiled import kernel
+from pushplan.compiled import add_type_kernels, kernel
 from pushplan.search.heap import pop_least, push_or_lift
 from pushplan.world.checks import BoolArray, FloatArray, IntArray
 
@@ -61,6 +61,7 @@ def register(kind: type, successors: Any, bound: Any, reached: Any) -> None:
         bound: compiled function for `estimate`.
         reached: compiled function for `is_goal`.
     """
+    add_type_kernels(kind, successors, bound, reached)
 
     def handles(lattice: Any) -> bool:
         return isinstance(lattice, types.NamedTuple) and lattice.instance_class is kind

@@ -109,3 +109,12 @@ class ShowsPlan(Protocol):
     def current_plan(self) -> Plan | None:
         """The plan that is being driven; None while there is none."""
         ...
+
+
+@runtime_checkable
+class WarmsUp(Protocol):
+    """Says itself how its compiled kernels are loaded ahead; others are run in a small world."""
+
+    def warm_up(self) -> None:
+        """Run, once a process, all that an episode may need."""
+        ...

@@ -7,7 +7,7 @@ import sys
 
 import pytest
 
-from pushplan.planners import kernel_warmup, make_planner, warm_up
+from pushplan.planners import kernel_warmup, make_policy, warm_up
 from pushplan.world import UnknownNameError
 
 LOADED = """
@@ -85,13 +85,13 @@ def test_every_name_can_be_warmed_up():
 
 
 def test_a_second_time_nothing_is_done(monkeypatch):
-    made, straight = [], make_planner("straight")
-    monkeypatch.setattr(kernel_warmup, "make_planner", lambda name: made.append(name) or straight)
-    kernel_warmup._warm_up_planner.cache_clear()
+    made, policy = [], make_policy("straight")
+    monkeypatch.setattr(kernel_warmup, "make_policy", lambda name: made.append(name) or policy)
+    kernel_warmup._warm_up.cache_clear()
     for _ in range(2):
-        warm_up("straight", "push-aware-constant-speed", "push-aware")
-    assert made == ["straight", "push-aware"]
-    kernel_warmup._warm_up_planner.cache_clear()
+        warm_up("straight", "straight")
+    assert made == ["straight"]
+    kernel_warmup._warm_up.cache_clear()
 
 
 def output(script, *arguments):

@@ -42,31 +42,16 @@ class TreeLimits:
 
 @kernel(allocates=True)
 def steer(
-    start: FloatArray,
-    target: FloatArray,
-    sampled: float,
-    limits: tuple[float, float, float, float],
+    start: FloatArray,  # (3,)
+    target: FloatArray,  # (3,)
+    sampled: float,  # a random curvature [1/m]; the others are spread evenly or aim at the target
+    limits: tuple[float, float, float, float],  # as in `TreeLimits`
     shape: Footprint,
     among: ConvexObstacles,
-    scratch: FloatArray,
-    out: FloatArray,
+    scratch: FloatArray,  # memory for the footprint's corners
+    out: FloatArray,  # (3,) receives the end of the arc
 ) -> tuple[float, float]:
-    """The free arc from ``start`` that comes nearest to ``target``, among seven curvatures.
-
-    Args:
-        start: (3,) pose.
-        target: (3,) pose.
-        sampled: a curvature that was drawn at random [1/m]; the other six are spread evenly or
-            aim at the target.
-        limits: max_curvature, edge_length, spacing, turn_weight, as in `TreeLimits`.
-        shape: the footprint.
-        among: what it must not touch.
-        scratch: memory for the footprint's corners.
-        out: (3,) receives the end of the arc.
-
-    Returns:
-        Curvature [1/m] and length [m] of the arc; length 0 if every arc is blocked at once.
-    """
+    """Curvature and length of the free arc nearest to a target, of seven; length 0: blocked."""
     bound, longest, spacing, turn_weight = limits
     dx, dy = target[0] - start[0], target[1] - start[1]
     side = -np.sin(start[2]) * dx + np.cos(start[2]) * dy
@@ -266,4 +251,5 @@ class _Region(base.GoalSampleableRegion):
 
 
 def _wrap(angle: float) -> float:
+    # `wrap_angle` differs in last bits, from which other trees grow
     return float((angle + np.pi) % (2.0 * np.pi) - np.pi)

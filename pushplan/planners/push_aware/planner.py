@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass, field
+from typing import ClassVar
 
 import numpy as np
 
@@ -53,6 +54,9 @@ class PushAware:
         interaction: predicts the objects, `cautious_model` by default; a model without a compiled
             form is slow here.
     """
+
+    warm_up_iterations: ClassVar[int] = 6000
+    """After which it has used all of its kernels."""
 
     config: PushAwareConfig = field(default_factory=PushAwareConfig)
     interaction: InteractionModel = field(default_factory=cautious_model)

@@ -100,6 +100,12 @@ class GreedyPusher:
         """Forget the last episode."""
         self._forget(world.time)
 
+    def warm_up(self) -> None:
+        """Load the kernels that an episode may need."""
+        from pushplan.planners.rearrangement.kernel_warmup import warm_up_greedy
+
+        warm_up_greedy()
+
     def act(self, world: World, observation: Any = None) -> Twist:
         """The velocity for this step; stops when every box is done.
 

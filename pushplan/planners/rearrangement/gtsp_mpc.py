@@ -86,6 +86,12 @@ class GtspMpc:
         """Forget the last episode."""
         self._forget()
 
+    def warm_up(self) -> None:
+        """Load the kernels that an episode may need."""
+        from pushplan.planners.rearrangement.kernel_warmup import warm_up_rearrangement
+
+        warm_up_rearrangement()
+
     def act(self, world: World, observation: Any = None) -> Twist:
         """The velocity for this step; stops when nothing is left to be done.
 

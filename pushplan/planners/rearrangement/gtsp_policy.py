@@ -50,6 +50,12 @@ class Gtsp:
         """Forget the last episode."""
         self._forget()
 
+    def warm_up(self) -> None:
+        """Load the kernels that an episode may need."""
+        from pushplan.planners.rearrangement.kernel_warmup import warm_up_rearrangement
+
+        warm_up_rearrangement()
+
     def act(self, world: World, observation: Any = None) -> Twist:
         """The velocity for this step; stops at the end of the path.
 

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import functools
+from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
@@ -10,6 +12,7 @@ from pushplan.gtsp import warm_up_solver
 from pushplan.planners.pushing import warm_up as warm_up_pushing
 from pushplan.planners.rearrangement.arc_kernels import arc_step
 from pushplan.planners.rearrangement.extraction import extraction_primitives
+from pushplan.planners.rearrangement.greedy import GreedyPusher
 from pushplan.planners.rearrangement.gtsp_mpc import GtspMpc
 from pushplan.planners.rearrangement.pre_relocation import pre_relocation_pushes
 from pushplan.planners.rearrangement.push_scene import PushScene
@@ -18,9 +21,9 @@ from pushplan.planners.rearrangement.recovery import recovery_path
 from pushplan.world import (
     ClearanceArea,
     Movables,
+    Policy,
     Receptacle,
     StaticMap,
-    Twist,
     World,
     box_delivery_robot,
 )
@@ -35,34 +38,57 @@ _WEDGED = (-2.2, -0.985, 0.0)
 def warm_up_rearrangement() -> None:
     """Plan and drive for boxes in each kind of task, so that every step of an episode is quick.
 
-    The robot starts between two columns that leave it no clearance to turn about, and its boxes do
-    not move: it has to get out, get to a box, push and plan again. A second call does nothing.
+    A second call does nothing.
     """
     warm_up_solver()
     warm_up_pushing()
+    policy = GtspMpc()
+    for world in _worlds():
+        scene = PushScene(world, policy.config)
+        extraction_primitives(PushSimulator(scene), 0)
+        pre_relocation_pushes(PushSimulator(scene), 0)
+        recovery_path(scene)
+    _drive(GtspMpc)
+
+
+@functools.cache
+def warm_up_greedy() -> None:
+    """Drive and push in each kind of task."""
+    _drive(GreedyPusher)
+
+
+def _drive(policy: Callable[[], Policy]) -> None:
+    for world in _worlds():
+        driven = policy()
+        for _ in range(_STEPS):
+            world = _driven(world, driven.act(world, None))
+
+
+def _worlds() -> list[World]:
+    """One small world for each kind of goal.
+
+    The robot starts between two columns that leave it no clearance to turn about, and its boxes do
+    not move: it has to get out, get to a box, push and plan again.
+    """
     square = np.array([[0.5, 0.5], [-0.5, 0.5], [-0.5, -0.5], [0.5, -0.5]])
     columns = [0.2 * square + (-2.2, y) for y in (-2.7, -1.3)]
-    for goal in (
+    goals = (
         ClearanceArea(3.0 * square, np.array([True, False, False, False])),
         Receptacle(square + 2.5),
-    ):
-        world = World(
+    )
+    return [
+        World(
             robot=box_delivery_robot(),
             robot_pose=np.array([-2.2, -2.0, 0.0]),
             static=StaticMap.build(polygons=columns, bounds=(-3.0, -3.0, 3.0, 3.0)),
             movables=Movables.from_outlines(2 * [0.44 * square], [(0.2, 0.1, 0.0), _WEDGED]),
             goal=goal,
         )
-        policy = GtspMpc()
-        scene = PushScene(world, policy.config)
-        extraction_primitives(PushSimulator(scene), 0)
-        pre_relocation_pushes(PushSimulator(scene), 0)
-        recovery_path(scene)
-        for _ in range(_STEPS):
-            world = _driven(world, policy.act(world))
+        for goal in goals
+    ]
 
 
-def _driven(world: World, twist: Twist) -> World:
+def _driven(world: World, twist: Any) -> World:
     """A step later, when nothing is in the robot's way."""
     pose = np.empty(3)
     arc_step(np.array(world.robot_pose), _PERIOD * twist.linear, _PERIOD * twist.angular, pose)

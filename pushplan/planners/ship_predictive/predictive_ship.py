@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass, field
+from typing import ClassVar
 
 import numpy as np
 
@@ -34,6 +35,9 @@ class PredictiveShip:
         config: parameters.
         interaction: predicts the floes.
     """
+
+    warm_up_iterations: ClassVar[int] = 30
+    """After which it has used all of its kernels."""
 
     config: PredictiveConfig = field(default_factory=PredictiveConfig)
     interaction: IceInteraction = field(default_factory=IceInteraction)

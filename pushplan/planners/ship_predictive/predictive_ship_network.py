@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass, field
+from typing import ClassVar
 
 import numpy as np
 
@@ -32,6 +33,9 @@ class PredictiveShipNetwork:
         interaction: sweeps the plan that is returned, for its prediction; the search does not
             use it.
     """
+
+    warm_up_iterations: ClassVar[int] = 30
+    """After which it has used all of its kernels."""
 
     config: PredictiveConfig = field(default_factory=lambda: PredictiveConfig(widest=24, sparse=0))
     network: IceNetwork = field(default_factory=IceNetwork)

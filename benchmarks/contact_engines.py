@@ -1,0 +1,52 @@
+"""The two contact engines in ice: path steps per second in one run, and predicted work.
+
+python benchmarks/contact_engines.py [SCENES]
+"""
+
+from __future__ import annotations
+
+import sys
+import time
+
+import numpy as np
+
+from pushplan.envs import make
+from pushplan.interaction import QuasiStatic
+from pushplan.interaction.ice import IceInteraction
+from pushplan.scenarios import Scenario
+
+STEPS = 60
+
+
+def compare(concentration: float, scenes: int) -> None:
+    models = (QuasiStatic(friction=1.0), IceInteraction())
+    seconds, work, steps = np.zeros(2), np.zeros(2), 0
+    for seed in range(scenes):
+        variations = {"concentration": concentration}
+        env = make(Scenario("ship_ice", variations=variations, seed=seed), observation="state")
+        env.reset(seed=seed)
+        world = env.world
+        length = 0.1 * world.robot.circumscribed_radius
+        x, y, theta = world.robot_pose
+        along = length * np.arange(STEPS)
+        path = np.column_stack(
+            [x + along * np.cos(theta), y + along * np.sin(theta), np.full(STEPS, theta)]
+        )
+        for i, model in enumerate(models):
+            if seed == 0:
+                model.sweep(world, path[:2])
+            began = time.perf_counter()
+            work[i] += model.sweep(world, path).work
+            seconds[i] += time.perf_counter() - began
+        steps += STEPS
+    rates, ratio = steps / seconds, seconds[0] / seconds[1]
+    print(
+        f"{concentration:.0%} ice, {len(world.movables)} floes: quasi-static {rates[0]:.0f} "
+        f"steps/s, ice {rates[1]:.0f} steps/s ({ratio:.1f} x); work ice / quasi-static "
+        f"{work[1] / work[0]:.2f}"
+    )
+
+
+if __name__ == "__main__":
+    for concentration in (0.2, 0.5):
+        compare(concentration, int(sys.argv[1]) if len(sys.argv) > 1 else 4)
