@@ -102,9 +102,9 @@ class GreedyPusher:
 
     def warm_up(self) -> None:
         """Load the kernels that an episode may need."""
-        from pushplan.planners.rearrangement.kernel_warmup import warm_up_greedy
+        from pushplan.planners.rearrangement import kernel_warmup
 
-        warm_up_greedy()
+        kernel_warmup.drive_in_small_worlds(GreedyPusher)
 
     def act(self, world: World, observation: Any = None) -> Twist:
         """The velocity for this step; stops when every box is done.

@@ -88,9 +88,10 @@ class GtspMpc:
 
     def warm_up(self) -> None:
         """Load the kernels that an episode may need."""
-        from pushplan.planners.rearrangement.kernel_warmup import warm_up_rearrangement
+        from pushplan.planners.rearrangement import kernel_warmup
 
-        warm_up_rearrangement()
+        kernel_warmup.warm_up_rearrangement()
+        kernel_warmup.drive_in_small_worlds(GtspMpc)
 
     def act(self, world: World, observation: Any = None) -> Twist:
         """The velocity for this step; stops when nothing is left to be done.

@@ -52,9 +52,10 @@ class Gtsp:
 
     def warm_up(self) -> None:
         """Load the kernels that an episode may need."""
-        from pushplan.planners.rearrangement.kernel_warmup import warm_up_rearrangement
+        from pushplan.planners.rearrangement import kernel_warmup
 
-        warm_up_rearrangement()
+        kernel_warmup.warm_up_rearrangement()
+        kernel_warmup.drive_in_small_worlds(Gtsp)
 
     def act(self, world: World, observation: Any = None) -> Twist:
         """The velocity for this step; stops at the end of the path.

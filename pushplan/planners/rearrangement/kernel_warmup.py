@@ -12,11 +12,10 @@ from pushplan.gtsp import warm_up_solver
 from pushplan.planners.pushing import warm_up as warm_up_pushing
 from pushplan.planners.rearrangement.arc_kernels import arc_step
 from pushplan.planners.rearrangement.extraction import extraction_primitives
-from pushplan.planners.rearrangement.greedy import GreedyPusher
-from pushplan.planners.rearrangement.gtsp_mpc import GtspMpc
 from pushplan.planners.rearrangement.pre_relocation import pre_relocation_pushes
 from pushplan.planners.rearrangement.push_scene import PushScene
 from pushplan.planners.rearrangement.push_simulator import PushSimulator
+from pushplan.planners.rearrangement.rearrangement_config import RearrangementConfig
 from pushplan.planners.rearrangement.recovery import recovery_path
 from pushplan.world import (
     ClearanceArea,
@@ -36,28 +35,19 @@ _WEDGED = (-2.2, -0.985, 0.0)
 
 @functools.cache
 def warm_up_rearrangement() -> None:
-    """Plan and drive for boxes in each kind of task, so that every step of an episode is quick.
-
-    A second call does nothing.
-    """
+    """Solve, push and look for every kind of push in each kind of task."""
     warm_up_solver()
     warm_up_pushing()
-    policy = GtspMpc()
     for world in _worlds():
-        scene = PushScene(world, policy.config)
+        scene = PushScene(world, RearrangementConfig())
         extraction_primitives(PushSimulator(scene), 0)
         pre_relocation_pushes(PushSimulator(scene), 0)
         recovery_path(scene)
-    _drive(GtspMpc)
 
 
 @functools.cache
-def warm_up_greedy() -> None:
-    """Drive and push in each kind of task."""
-    _drive(GreedyPusher)
-
-
-def _drive(policy: Callable[[], Policy]) -> None:
+def drive_in_small_worlds(policy: Callable[[], Policy]) -> None:
+    """Let a new policy plan and drive for boxes in each kind of task."""
     for world in _worlds():
         driven = policy()
         for _ in range(_STEPS):
