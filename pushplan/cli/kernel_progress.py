@@ -67,5 +67,4 @@ def kernel_progress(*names: str) -> Iterator[KernelProgress]:
             sys.stderr.write("\r\033[K")
 
 
-_READY: set[str] = set()
-"""Kernels that have become ready in this process while somebody counted."""
+_READY: set[str] = set()  # kernels that have become ready in this process while somebody counted

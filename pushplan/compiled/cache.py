@@ -23,8 +23,7 @@ try:
 except ImportError:  # on Windows two processes may compile the same kernel, and both are right
     fcntl = None  # type: ignore[assignment]
 
-_PATIENCE = 300.0
-"""How long a process waits for another that compiles the same kernel [s]."""
+_PATIENCE = 300.0  # how long a process waits for another that compiles the same kernel [s]
 _POLL = 0.05  # [s]
 
 

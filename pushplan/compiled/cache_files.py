@@ -21,10 +21,8 @@ _DIGEST = hashlib.sha256().digest_size
 class Folders(NamedTuple):
     """Where kernels are kept."""
 
-    read: tuple[Path, ...]
-    """Folders that are looked through, in order."""
-    write: Path | None
-    """The one that is written to, None if none can be."""
+    read: tuple[Path, ...]  # Folders that are looked through, in order
+    write: Path | None  # The one that is written to, None if none can be
 
 
 def find_folders(source: str) -> Folders:

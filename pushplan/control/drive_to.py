@@ -17,10 +17,8 @@ _NEAR, _MISSED = 0.02, 0.1
 radii]."""
 _STALLED = 0.1
 _PATIENCE = 2
-_ESCAPES = 2
-"""How often one drive makes room for a turn."""
-_LONGEST = 5
-"""Periods for which a command may stand."""
+_ESCAPES = 2  # how often one drive makes room for a turn
+_LONGEST = 5  # periods for which a command may stand
 
 
 class DriveTo:

@@ -28,11 +28,9 @@ from pushplan.evaluation.worker import (
 from pushplan.world import PushplanError
 
 _POLL_S = 0.2
-_STARTS = 2
-"""So many workers in a row may end before they are ready until the pool gives up."""
+_STARTS = 2  # so many workers in a row may end before they are ready until the pool gives up
 _LOG_TAIL = 6000
-_TRACE_S = 0.2
-"""Time that a worker has to write where it hangs before it is ended."""
+_TRACE_S = 0.2  # time that a worker has to write where it hangs before it is ended
 
 
 class WorkerDiedError(PushplanError):

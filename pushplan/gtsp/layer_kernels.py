@@ -21,30 +21,21 @@ from pushplan.world.checks import FloatArray, IntArray
 class Layers(NamedTuple):
     """A tour and its values; m clusters of at most K nodes."""
 
-    costs: FloatArray
-    """(N, N + SPARE)"""
-    reverse: FloatArray
-    """(N, N + SPARE) of the transpose."""
-    at: IntArray
-    """(m,) first node of each cluster; of the root, the node that counts."""
-    size: IntArray
-    """(m,) nodes of each cluster; 1 for the root."""
-    after: IntArray
-    """(m,) next cluster."""
-    before: IntArray
-    """(m,) previous cluster."""
+    costs: FloatArray  # (N, N + SPARE)
+    reverse: FloatArray  # (N, N + SPARE) of the transpose
+    at: IntArray  # (m,) first node of each cluster; of the root, the node that counts
+    size: IntArray  # (m,) nodes of each cluster; 1 for the root
+    after: IntArray  # (m,) next cluster
+    before: IntArray  # (m,) previous cluster
     ahead: FloatArray  # (m, K)
     behind: FloatArray  # (m, K)
     carry: FloatArray  # (m,)
-    old_links: IntArray
-    """(m, 2) what ``after`` and ``before`` were when the round began."""
+    old_links: IntArray  # (m, 2) what ``after`` and ``before`` were when the round began
     old_ahead: FloatArray  # (m, K)
     old_behind: FloatArray  # (m, K)
     old_carry: FloatArray  # (m,)
-    stamp: IntArray
-    """(m,) round in which a cluster was touched last."""
-    touched: IntArray
-    """(m + 1,) how many clusters the round has touched, and which."""
+    stamp: IntArray  # (m,) round in which a cluster was touched last
+    touched: IntArray  # (m + 1,) how many clusters the round has touched, and which
     out: FloatArray  # (K + SPARE,) working memory, as the next two
     left: FloatArray
     right: FloatArray

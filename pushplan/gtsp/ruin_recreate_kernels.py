@@ -141,41 +141,26 @@ def _to_front(order: IntArray, root: int, scratch: IntArray) -> None:
 class TourProblem(NamedTuple):
     """What a search works on."""
 
-    costs: FloatArray
-    """(N, N + SPARE) finite."""
-    reverse: FloatArray
-    """(N, N + SPARE) of the transpose."""
-    offsets: IntArray
-    """(m + 1,) with m at least 3."""
-    near: IntArray
-    """(m, k) clusters by distance."""
-    between: FloatArray
-    """(m, k) these distances."""
-    max_removed: int
-    """Clusters that a round removes at most, at most m - 2."""
-    blink: float
-    """Fraction of places that an insertion overlooks."""
-    reach: int
-    """Neighbours that a segment swap tries."""
-    symmetric: bool
-    """Whether a reversed segment costs the same."""
+    costs: FloatArray  # (N, N + SPARE) finite
+    reverse: FloatArray  # (N, N + SPARE) of the transpose
+    offsets: IntArray  # (m + 1,) with m at least 3
+    near: IntArray  # (m, k) clusters by distance
+    between: FloatArray  # (m, k) these distances
+    max_removed: int  # Clusters that a round removes at most, at most m - 2
+    blink: float  # Fraction of places that an insertion overlooks
+    reach: int  # Neighbours that a segment swap tries
+    symmetric: bool  # Whether a reversed segment costs the same
 
 
 class TourState(NamedTuple):
     """What a search has found; all of it is changed."""
 
-    current: IntArray
-    """(m,) order, the root (a small cluster) first."""
-    current_nodes: IntArray
-    """(m,) its nodes."""
-    best: IntArray
-    """(m,) best order so far."""
-    best_nodes: IntArray
-    """(m,) its nodes."""
-    values: FloatArray
-    """(2,) costs of both."""
-    random: IntArray
-    """(1,) state of the random numbers."""
+    current: IntArray  # (m,) order, the root (a small cluster) first
+    current_nodes: IntArray  # (m,) its nodes
+    best: IntArray  # (m,) best order so far
+    best_nodes: IntArray  # (m,) its nodes
+    values: FloatArray  # (2,) costs of both
+    random: IntArray  # (1,) state of the random numbers
 
 
 @kernel(allocates=True)

@@ -141,33 +141,22 @@ def allow_memories(walks: FloatArray) -> None:
 class PathProblem(NamedTuple):
     """What bounds the paths of one length."""
 
-    within: FloatArray
-    """(n, 2^b, K) walks to the root from the new node, by `allow_memories`."""
-    costs: FloatArray
-    """(n, K, n, K) from a node (first two) to a node."""
-    lists: IntArray
-    """(n, b) the clusters that each cluster remembers."""
-    prices: FloatArray
-    """(n,) what a visit of each cluster earns."""
-    sizes: IntArray
-    """(n,) nodes of each cluster."""
-    limit: float
-    """Paths that cannot stay below this are dropped."""
+    within: FloatArray  # (n, 2^b, K) walks to the root from the new node, by `allow_memories`
+    costs: FloatArray  # (n, K, n, K) from a node (first two) to a node
+    lists: IntArray  # (n, b) the clusters that each cluster remembers
+    prices: FloatArray  # (n,) what a visit of each cluster earns
+    sizes: IntArray  # (n,) nodes of each cluster
+    limit: float  # Paths that cannot stay below this are dropped
 
 
 class Paths(NamedTuple):
     """Paths of one length."""
 
-    sets: IntArray
-    """(P,) clusters of each path as a bit mask."""
-    ends: IntArray
-    """(P,) its last node, ``d * K + i``."""
-    values: FloatArray
-    """(P,) its cost."""
-    rests: FloatArray
-    """(P,) sum of the prices of the clusters that it lacks."""
-    parents: IntArray
-    """(P,) the path that it comes from."""
+    sets: IntArray  # (P,) clusters of each path as a bit mask
+    ends: IntArray  # (P,) its last node, ``d * K + i``
+    values: FloatArray  # (P,) its cost
+    rests: FloatArray  # (P,) sum of the prices of the clusters that it lacks
+    parents: IntArray  # (P,) the path that it comes from
 
 
 @kernel(allocates=True)

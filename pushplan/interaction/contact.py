@@ -69,18 +69,14 @@ def contacts(a: FloatArray, b: FloatArray, out: FloatArray) -> int:
 class FacingEdges(NamedTuple):
     """An edge of a polygon, and the edge of another one that faces it most."""
 
-    px: float
-    """Where the first edge begins [m]."""
+    px: float  # Where the first edge begins [m]
     py: float
-    tx: float
-    """Unit vector along it; its outward normal is (ty, -tx)."""
+    tx: float  # Unit vector along it; its outward normal is (ty, -tx)
     ty: float
     length: float
-    su: float
-    """Ends of the other edge along the first [m]."""
+    su: float  # Ends of the other edge along the first [m]
     sw: float
-    du: float
-    """The same ends along the normal [m]."""
+    du: float  # The same ends along the normal [m]
     dw: float
 
 

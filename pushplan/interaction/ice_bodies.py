@@ -13,57 +13,39 @@ from pushplan.world.checks import FloatArray, IntArray
 class IceBodies(NamedTuple):
     """Shapes and masses, as the kernels read them."""
 
-    hull: FloatArray
-    """(V, 2) convex parts of the robot in its body frame [m]."""
-    hull_offsets: IntArray
-    """(P + 1,)"""
+    hull: FloatArray  # (V, 2) convex parts of the robot in its body frame [m]
+    hull_offsets: IntArray  # (P + 1,)
     hull_radius: float
-    vertices: FloatArray
-    """(W, 2) outlines of the objects in their body frames [m]."""
-    offsets: IntArray
-    """(K + 1,)"""
-    radii: FloatArray
-    """(K,) circumscribed radii [m]."""
-    masses: FloatArray
-    """(K,) [kg]."""
-    inverse_gyration: FloatArray
-    """(K,) 1 / c² [1/m²], c² being inertia over mass."""
+    vertices: FloatArray  # (W, 2) outlines of the objects in their body frames [m]
+    offsets: IntArray  # (K + 1,)
+    radii: FloatArray  # (K,) circumscribed radii [m]
+    masses: FloatArray  # (K,) [kg]
+    inverse_gyration: FloatArray  # (K,) 1 / c² [1/m²], c² being inertia over mass
 
 
 class IceSettings(NamedTuple):
     """Numerical settings."""
 
-    step: float
-    """Longest motion of a hull corner in one step [m]."""
-    iterations: int
-    """Gauss-Seidel rounds in a step."""
+    step: float  # Longest motion of a hull corner in one step [m]
+    iterations: int  # Gauss-Seidel rounds in a step
     hull_friction: float
-    friction: float
-    """Coulomb coefficients between hull and object, and between objects."""
-    still: float
-    """Displacement in a step below which a body does not look for neighbours [m]."""
+    friction: float  # Coulomb coefficients between hull and object, and between objects
+    still: float  # Displacement in a step below which a body does not look for neighbours [m]
 
 
 class IceScratch(NamedTuple):
     """Memory that one caller reuses."""
 
-    hull: FloatArray
-    """(V, 2) hull corners in the world frame."""
-    corners: FloatArray
-    """(W, 2) object corners in the world frame, kept up to date."""
-    moves: FloatArray
-    """(K, 3) displacement of each object in this step."""
-    state: IntArray
-    """(K,) 0 out of it, 1 in contact with something, 2 its neighbours are known."""
-    pairs: IntArray
-    """(C, 2) bodies of each contact point."""
+    hull: FloatArray  # (V, 2) hull corners in the world frame
+    corners: FloatArray  # (W, 2) object corners in the world frame, kept up to date
+    moves: FloatArray  # (K, 3) displacement of each object in this step
+    state: IntArray  # (K,) 0 out of it, 1 in contact with something, 2 its neighbours are known
+    pairs: IntArray  # (C, 2) bodies of each contact point
     points: FloatArray
     """(C, 11) of each contact point: normal, arms from both bodies, gap, both effective inverse
     masses, accumulated impulses along and across the normal."""
-    spot: FloatArray
-    """(2, 5) points of one pair: x, y, normal, gap."""
-    pose: FloatArray
-    """(2, 3) pose of the hull before a step, and its displacement."""
+    spot: FloatArray  # (2, 5) points of one pair: x, y, normal, gap
+    pose: FloatArray  # (2, 3) pose of the hull before a step, and its displacement
 
 
 class IceProblem(NamedTuple):

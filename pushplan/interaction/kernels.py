@@ -24,44 +24,28 @@ from pushplan.world.checks import FloatArray, IntArray
 class Bodies(NamedTuple):
     """What the kernels know of the robot, the objects and the walls; arrays in SI units."""
 
-    robot_vertices: FloatArray
-    """(V, 2) convex parts of the robot in its body frame."""
-    robot_offsets: IntArray
-    """(P + 1,)"""
+    robot_vertices: FloatArray  # (V, 2) convex parts of the robot in its body frame
+    robot_offsets: IntArray  # (P + 1,)
     robot_radius: float
-    vertices: FloatArray
-    """(W, 2) outlines of the objects in their body frames."""
-    offsets: IntArray
-    """(K + 1,)"""
-    radii: FloatArray
-    """(K,) circumscribed radii."""
-    inverse_masses: FloatArray
-    """(K,)"""
-    inverse_gyration: FloatArray
-    """(K,) 1 / c² [1/m²]"""
-    static_vertices: FloatArray
-    """(X, 2) convex static parts in the world frame."""
-    static_offsets: IntArray
-    """(S + 1,)"""
-    static_boxes: FloatArray
-    """(S, 4) x_min, y_min, x_max, y_max of each part."""
+    vertices: FloatArray  # (W, 2) outlines of the objects in their body frames
+    offsets: IntArray  # (K + 1,)
+    radii: FloatArray  # (K,) circumscribed radii
+    inverse_masses: FloatArray  # (K,)
+    inverse_gyration: FloatArray  # (K,) 1 / c² [1/m²]
+    static_vertices: FloatArray  # (X, 2) convex static parts in the world frame
+    static_offsets: IntArray  # (S + 1,)
+    static_boxes: FloatArray  # (S, 4) x_min, y_min, x_max, y_max of each part
 
 
 class Settings(NamedTuple):
     """Numerical settings of the kernels."""
 
-    max_step: float
-    """Longest motion of a robot corner in one resolution step [m]."""
-    tolerance: float
-    """Overlap that counts as resolved [m]."""
-    jam_depth: float
-    """Overlap that cannot be resolved and counts as a jam [m]."""
-    iterations: int
-    """Gauss-Seidel rounds in one step."""
-    friction: float
-    """Coulomb coefficient between robot and objects."""
-    static_friction: float = 0.0
-    """Coulomb coefficient between objects and walls."""
+    max_step: float  # Longest motion of a robot corner in one resolution step [m]
+    tolerance: float  # Overlap that counts as resolved [m]
+    jam_depth: float  # Overlap that cannot be resolved and counts as a jam [m]
+    iterations: int  # Gauss-Seidel rounds in one step
+    friction: float  # Coulomb coefficient between robot and objects
+    static_friction: float = 0.0  # Coulomb coefficient between objects and walls
 
 
 @kernel
@@ -93,24 +77,15 @@ def _gather_near(
 class Scratch(NamedTuple):
     """Memory that one caller reuses from step to step."""
 
-    robot: FloatArray
-    """(V, 2) robot corners in the world frame."""
-    outlines: FloatArray
-    """(W, 2) object corners in the world frame."""
-    active: IntArray
-    """(K,) objects that may move in this step."""
-    before: FloatArray
-    """(K, 3) poses before this step."""
-    points: FloatArray
-    """(2, 5) contact points."""
-    fixed: FloatArray
-    """(3,) a pose that stands for whatever cannot move."""
-    here: FloatArray
-    """(3,) where a small step begins."""
-    there: FloatArray
-    """(3,) where it ends."""
-    saved: FloatArray
-    """(K, 3) poses before it."""
+    robot: FloatArray  # (V, 2) robot corners in the world frame
+    outlines: FloatArray  # (W, 2) object corners in the world frame
+    active: IntArray  # (K,) objects that may move in this step
+    before: FloatArray  # (K, 3) poses before this step
+    points: FloatArray  # (2, 5) contact points
+    fixed: FloatArray  # (3,) a pose that stands for whatever cannot move
+    here: FloatArray  # (3,) where a small step begins
+    there: FloatArray  # (3,) where it ends
+    saved: FloatArray  # (K, 3) poses before it
     tests: IntArray
     """(1,) pairs of outlines that were tested so far: a measure of time without a clock."""
 

@@ -13,12 +13,9 @@ from pushplan.world.checks import FloatArray, IntArray
 class QuasiStaticContacts(NamedTuple):
     """`QuasiStatic` in compiled form, with memory for one thread."""
 
-    inverse_masses: FloatArray
-    """(K,)"""
-    radii: FloatArray
-    """(K,) circumscribed radii [m]"""
-    tests: IntArray
-    """(1,) pairs of outlines that were tested so far."""
+    inverse_masses: FloatArray  # (K,)
+    radii: FloatArray  # (K,) circumscribed radii [m]
+    tests: IntArray  # (1,) pairs of outlines that were tested so far
     bodies: Bodies
     settings: Settings
     scratch: Scratch

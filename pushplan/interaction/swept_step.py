@@ -66,10 +66,8 @@ class SweptContacts(NamedTuple):
     inverse_masses: FloatArray
     radii: FloatArray
     tests: IntArray
-    call: Any
-    """a `SweepCall`"""
-    path: FloatArray
-    """(2, 3) its arguments and results, as in `SweepCall`"""
+    call: Any  # a `SweepCall`
+    path: FloatArray  # (2, 3) its arguments and results, as in `SweepCall`
     poses: FloatArray
     moved: FloatArray
 

@@ -18,16 +18,11 @@ from pushplan.world.checks import FloatArray
 class ArcMemory(NamedTuple):
     """Memory that `roll_arc` reuses, and what it found."""
 
-    corners: FloatArray
-    """(V, 2) of the footprint."""
-    end: FloatArray
-    """(3,) pose that was reached."""
-    last: FloatArray
-    """(3,) pose before it."""
-    objects: FloatArray
-    """(K, 3) poses of the objects there."""
-    moved: FloatArray
-    """(K,) path lengths of the objects along the arc [m]."""
+    corners: FloatArray  # (V, 2) of the footprint
+    end: FloatArray  # (3,) pose that was reached
+    last: FloatArray  # (3,) pose before it
+    objects: FloatArray  # (K, 3) poses of the objects there
+    moved: FloatArray  # (K,) path lengths of the objects along the arc [m]
 
 
 @kernel(allocates=True)

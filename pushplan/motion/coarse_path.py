@@ -13,10 +13,8 @@ from pushplan.world import GoalDisc, StaticMap, World
 from pushplan.world.checks import FloatArray, IntArray, frozen
 from pushplan.world.outline import flatten
 
-_SIDE = 96
-"""Cells along the longer side of the workspace, if that resolves the robot's own width."""
-_MOST = 400
-"""Cells along the longer side at most."""
+_SIDE = 96  # cells along the longer side of the workspace, if that resolves the robot's own width
+_MOST = 400  # cells along the longer side at most
 
 
 @kernel(allocates=True)

@@ -20,25 +20,18 @@ from pushplan.world.outline import convex_outline, flatten
 class Footprint(NamedTuple):
     """Convex parts of a robot in its body frame."""
 
-    vertices: FloatArray
-    """(V, 2) [m]"""
-    offsets: IntArray
-    """(P + 1,)"""
-    radius: float
-    """Circumscribed radius [m]."""
+    vertices: FloatArray  # (V, 2) [m]
+    offsets: IntArray  # (P + 1,)
+    radius: float  # Circumscribed radius [m]
 
 
 class ConvexObstacles(NamedTuple):
     """Convex polygons in the world frame."""
 
-    vertices: FloatArray
-    """(X, 2) [m]"""
-    offsets: IntArray
-    """(S + 1,)"""
-    boxes: FloatArray
-    """(S, 4) x_min, y_min, x_max, y_max of each [m]."""
-    bounds: FloatArray
-    """(4,) the workspace; a pose outside is not free."""
+    vertices: FloatArray  # (X, 2) [m]
+    offsets: IntArray  # (S + 1,)
+    boxes: FloatArray  # (S, 4) x_min, y_min, x_max, y_max of each [m]
+    bounds: FloatArray  # (4,) the workspace; a pose outside is not free
 
 
 @functools.lru_cache(maxsize=64)

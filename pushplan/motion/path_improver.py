@@ -24,8 +24,7 @@ from pushplan.world.checks import FloatArray
 
 _THIN_MARGIN = 0.05
 """Margin below which a post could hide between two poses of the usual spacing [R]."""
-_LEAST_SPACING = 0.02
-"""Least spacing for that reason [R]."""
+_LEAST_SPACING = 0.02  # least spacing for that reason [R]
 _ENDLESS = 2**62
 
 

@@ -5,8 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator
 
-_PIECE_S = 0.001
-"""Time between two looks [s]."""
+_PIECE_S = 0.001  # time between two looks [s]
 
 
 class Pace:

@@ -14,14 +14,10 @@ from pushplan.world.checks import FloatArray, IntArray
 class _Buckets(NamedTuple):
     """Placed discs in the cells of a grid."""
 
-    head: IntArray
-    """(R, C) last disc in each cell, -1 for none."""
-    following: IntArray
-    """(K,) the one before it in the same cell."""
-    centres: FloatArray
-    """(K, 2) [m]"""
-    radii: FloatArray
-    """(K,) [m]"""
+    head: IntArray  # (R, C) last disc in each cell, -1 for none
+    following: IntArray  # (K,) the one before it in the same cell
+    centres: FloatArray  # (K, 2) [m]
+    radii: FloatArray  # (K,) [m]
 
 
 @kernel(allocates=True)

@@ -19,25 +19,19 @@ CAPACITY = 48
 class Discs(NamedTuple):
     """Discs that a power diagram is of, and which of them may be neighbours."""
 
-    centres: FloatArray
-    """(K, 2) [m]"""
-    radii: FloatArray
-    """(K,) [m]; a disc that overlaps no other lies in its own cell."""
-    reaches: FloatArray
-    """(K,) half side of the square that a cell cannot leave [m]."""
+    centres: FloatArray  # (K, 2) [m]
+    radii: FloatArray  # (K,) [m]; a disc that overlaps no other lies in its own cell
+    reaches: FloatArray  # (K,) half side of the square that a cell cannot leave [m]
     neighbours: IntArray
     """Discs whose squares may meet, those of one disc after those of the one before."""
-    neighbour_offsets: IntArray
-    """(K + 1,) where those of each disc start."""
+    neighbour_offsets: IntArray  # (K + 1,) where those of each disc start
 
 
 class Outlines(NamedTuple):
     """Convex outlines, counter-clockwise, in buffers of equal length."""
 
-    corners: FloatArray
-    """(K, N, 2)"""
-    counts: IntArray
-    """(K,) corners in use."""
+    corners: FloatArray  # (K, N, 2)
+    counts: IntArray  # (K,) corners in use
 
 
 @kernel(allocates=True)

@@ -20,8 +20,7 @@ from pushplan.world.outline import flatten, signed_area, unflatten, well_formed
 SCHEMA = "pushplan-ice/1"
 """Name and version of the JSON form; files of another version are refused."""
 ENDINGS = (".json", ".npz", ".npy")
-_OVERLAP = 1e-6
-"""Floes may overlap by this fraction of the smaller one: rounding, where they touch."""
+_OVERLAP = 1e-6  # floes may overlap by this fraction of the smaller one: rounding, where they touch
 _MAX_BYTES = 10**8
 _READ_ERRORS = (
     *(OSError, ValueError, EOFError, KeyError, MemoryError, RecursionError, RuntimeError),

@@ -12,14 +12,10 @@ from pushplan.world.checks import FloatArray, IntArray
 class IceWater(NamedTuple):
     """A rectangle of water with regions to stay off."""
 
-    box: FloatArray
-    """(4,) x_min, y_min, x_max, y_max [m]; floes stay inside."""
-    blocks: FloatArray
-    """(V, 2) corners of the convex regions [m], counter-clockwise, flattened."""
-    block_offsets: IntArray
-    """(B + 1,) where each region starts."""
-    gap: float
-    """Least distance between floes, and from floes to regions [m]."""
+    box: FloatArray  # (4,) x_min, y_min, x_max, y_max [m]; floes stay inside
+    blocks: FloatArray  # (V, 2) corners of the convex regions [m], counter-clockwise, flattened
+    block_offsets: IntArray  # (B + 1,) where each region starts
+    gap: float  # Least distance between floes, and from floes to regions [m]
 
 
 @kernel

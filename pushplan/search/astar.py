@@ -89,24 +89,15 @@ class SearchState(NamedTuple):
     Entries of nodes that are not ``known`` hold nothing: a large lattice costs what is looked at.
     """
 
-    known: BoolArray
-    """(N,) nodes to which a way has been found."""
-    costs: FloatArray
-    """(N,) least cost known to each node."""
-    parents: IntArray
-    """(N,) node before each node, -1 at a start."""
-    edges: IntArray
-    """(N,) label of the edge that leads to each node."""
-    closed: BoolArray
-    """(N,) nodes that have been expanded at their present cost."""
-    keys: FloatArray
-    """(N,) cost plus estimate of the nodes in the heap, in heap order."""
-    heap: IntArray
-    """(N,) nodes in the heap, in heap order."""
-    places: IntArray
-    """(N,) where in the heap a node is, -1 if it is not."""
-    counters: IntArray
-    """(4,) size of the heap, nodes expanded, edges generated, goal or -1."""
+    known: BoolArray  # (N,) nodes to which a way has been found
+    costs: FloatArray  # (N,) least cost known to each node
+    parents: IntArray  # (N,) node before each node, -1 at a start
+    edges: IntArray  # (N,) label of the edge that leads to each node
+    closed: BoolArray  # (N,) nodes that have been expanded at their present cost
+    keys: FloatArray  # (N,) cost plus estimate of the nodes in the heap, in heap order
+    heap: IntArray  # (N,) nodes in the heap, in heap order
+    places: IntArray  # (N,) where in the heap a node is, -1 if it is not
+    counters: IntArray  # (4,) size of the heap, nodes expanded, edges generated, goal or -1
 
 
 def new_state(size: int) -> SearchState:

@@ -21,24 +21,19 @@ from pushplan.world.checks import FloatArray
 class Track(NamedTuple):
     """A path as the kernels read it."""
 
-    poses: FloatArray
-    """(M, 3) x, y [m], theta [rad]."""
-    lengths: FloatArray
-    """(M,) path length from the first pose [m]."""
-    speeds: FloatArray
-    """(M,) forward speed from each pose on [m/s]."""
+    poses: FloatArray  # (M, 3) x, y [m], theta [rad]
+    lengths: FloatArray  # (M,) path length from the first pose [m]
+    speeds: FloatArray  # (M,) forward speed from each pose on [m/s]
 
 
 class Tuning(NamedTuple):
     """Limits and weights, as `MpcConfig` and the robot give them."""
 
-    size: float
-    """R [m]"""
+    size: float  # R [m]
     max_speed: float
     max_turn_rate: float
     max_acceleration: float
-    stops: bool
-    """Whether the robot stops at the end of the path."""
+    stops: bool  # Whether the robot stops at the end of the path
     optimise_speed: bool
     heading_weight: float
     turn_weight: float

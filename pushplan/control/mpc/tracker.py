@@ -23,10 +23,8 @@ from pushplan.control.pure_pursuit import PurePursuit
 from pushplan.world import Drive, Plan, RobotModel, Twist, World
 from pushplan.world.checks import FloatArray
 
-_BACK = 0.25
-"""How far the place on the path may move back from one call to the next [R]."""
-_WINDOW = 2.0
-"""How far ahead of the last place the next one is looked for [R]."""
+_BACK = 0.25  # how far the place on the path may move back from one call to the next [R]
+_WINDOW = 2.0  # how far ahead of the last place the next one is looked for [R]
 
 
 @dataclass

@@ -22,10 +22,8 @@ from pushplan.world import PushplanError, World
 from pushplan.world.checks import BoolArray, FloatArray, IntArray
 
 _LOG = logging.getLogger(__name__)
-_FASTEST = 1e8
-"""No velocity of a sane simulation exceeds this [m/s] or [rad/s]."""
-_AWAKE = -1 - 10
-"""What MuJoCo writes for a tree that has just been woken: -(1 + mjMINAWAKE)."""
+_FASTEST = 1e8  # no velocity of a sane simulation exceeds this [m/s] or [rad/s]
+_AWAKE = -1 - 10  # what MuJoCo writes for a tree that has just been woken: -(1 + mjMINAWAKE)
 
 
 def log_warnings() -> None:

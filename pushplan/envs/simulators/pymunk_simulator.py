@@ -23,12 +23,10 @@ from pushplan.world.checks import BoolArray, FloatArray, IntArray, array, frozen
 
 _GLIDE_SAMPLES = 4
 """Poses recorded in a step in which nothing can happen; one where the robot drives straight."""
-_SAMPLED = 24.0
-"""Steps of fewer substeps than this are sampled more coarsely."""
+_SAMPLED = 24.0  # steps of fewer substeps than this are sampled more coarsely
 _LEAST_SIZE = 0.01
 """Objects far smaller than this fraction of the robot or of the others do not refine the steps."""
-_REST = 2e-4
-"""Objects that move slower than this fraction of their size per second stop."""
+_REST = 2e-4  # objects that move slower than this fraction of their size per second stop
 
 
 class PymunkSimulator(Simulator):

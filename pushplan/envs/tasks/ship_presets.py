@@ -126,8 +126,7 @@ def _supply_vessel(length: float, beam: float) -> FloatArray:
 
 _LENGTH, _BEAM, _SHIP_MASS = 76.2, 18.0, 6.0e6
 _FLOE_DENSITY = ICE_DENSITY * ICE_THICKNESS
-_SCALE = _LENGTH / 2.0
-"""Length of the full-scale ship over that of the model."""
+_SCALE = _LENGTH / 2.0  # length of the full-scale ship over that of the model
 
 FULL_SCALE = ShipPreset(
     channel=(200.0, 1250.0),

@@ -20,26 +20,19 @@ class FloeCosts(NamedTuple):
     the middle most.
     """
 
-    totals: FloatArray
-    """(K,) of covering the whole floe, in metres of travel."""
-    areas: FloatArray
-    """(K,) [m²]"""
+    totals: FloatArray  # (K,) of covering the whole floe, in metres of travel
+    areas: FloatArray  # (K,) [m²]
     exponent: float
-    soft: float
-    """Positive where the exponent is negative."""
+    soft: float  # Positive where the exponent is negative
 
 
 class PlacedFloes(NamedTuple):
     """K floes as they lie on a map; row and column in cells."""
 
-    outlines: FloatArray
-    """(V, 2) corners, flattened."""
-    offsets: IntArray
-    """(K + 1,) where each floe starts."""
-    centres: FloatArray
-    """(K, 2)"""
-    radii: FloatArray
-    """(K,) radius of the disc of the same area [cells]."""
+    outlines: FloatArray  # (V, 2) corners, flattened
+    offsets: IntArray  # (K + 1,) where each floe starts
+    centres: FloatArray  # (K, 2)
+    radii: FloatArray  # (K,) radius of the disc of the same area [cells]
     costs: FloeCosts
 
 

@@ -16,12 +16,9 @@ from pushplan.motion.state_lattice.swaths import flat_runs
 from pushplan.search.astar import AStar
 from pushplan.world.checks import FloatArray, IntArray
 
-_NEAREST = 4
-"""Headings of the lattice that a robot between two of them may turn to."""
-_PATHS = 8
-"""Paths to each of them."""
-_SLACK = 0.8
-"""How much more than the change of heading they may turn [rad]."""
+_NEAREST = 4  # headings of the lattice that a robot between two of them may turn to
+_PATHS = 8  # paths to each of them
+_SLACK = 0.8  # how much more than the change of heading they may turn [rad]
 
 
 def open_search(built: BuiltLattice, builder: LatticeBuilder) -> tuple[AStar, list[FloatArray]]:

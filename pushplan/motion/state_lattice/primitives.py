@@ -24,10 +24,8 @@ from pushplan.motion.state_lattice.primitive_set import (
 )
 from pushplan.world.checks import FloatArray, IntArray, frozen
 
-_MOST_TURN = 1.3
-"""Greatest change of heading along one primitive [rad]."""
-_SLACK = 0.35
-"""How much more than its change of heading a primitive may turn [rad]."""
+_MOST_TURN = 1.3  # greatest change of heading along one primitive [rad]
+_SLACK = 0.35  # how much more than its change of heading a primitive may turn [rad]
 
 
 def connections(heading: float, target: float, config: PrimitiveConfig, slack: float) -> FloatArray:

@@ -35,8 +35,7 @@ from pushplan.world import (
 from pushplan.world.checks import number
 from pushplan.world.polyline import path_lengths
 
-_REMEMBERED = 5
-"""Planning calls whose times say how long the next one will take."""
+_REMEMBERED = 5  # planning calls whose times say how long the next one will take
 
 
 @dataclass(frozen=True)

@@ -13,8 +13,7 @@ from pushplan.world import Drive, Plan, World
 from pushplan.world.checks import FloatArray
 from pushplan.world.polyline import path_length
 
-_SPACING = 0.15
-"""Distance between the poses of a stretch without a plan [R]."""
+_SPACING = 0.15  # distance between the poses of a stretch without a plan [R]
 
 
 def world_ahead(

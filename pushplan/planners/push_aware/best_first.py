@@ -34,16 +34,11 @@ from pushplan.world.checks import FloatArray, IntArray
 class Branching(NamedTuple):
     """How nodes are expanded."""
 
-    curvatures: FloatArray
-    """(C,) [1/m]"""
-    length: float
-    """of an edge [m]"""
-    inflation: float
-    """of the heuristic, in the order of the queue"""
-    pruning_factor: float
-    """on the length that is left, where a node is given up for its cost"""
-    masses: FloatArray
-    """(K,) of the objects as the search weighs them [kg]"""
+    curvatures: FloatArray  # (C,) [1/m]
+    length: float  # of an edge [m]
+    inflation: float  # of the heuristic, in the order of the queue
+    pruning_factor: float  # on the length that is left, where a node is given up for its cost
+    masses: FloatArray  # (K,) of the objects as the search weighs them [kg]
 
 
 class PushLattice(NamedTuple):
@@ -52,8 +47,7 @@ class PushLattice(NamedTuple):
     tree: PushTree
     table: CostToGo
     branching: Branching
-    bound: float
-    """Cost above which nodes are of no use [kg m]."""
+    bound: float  # Cost above which nodes are of no use [kg m]
     problem: PathProblem
     memory: ArcMemory
 

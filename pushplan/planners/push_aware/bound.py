@@ -16,8 +16,7 @@ _SLIM = 1e-3
 """Share by which the disc is less than the inscribed one: gaps of the robot's own width count."""
 _DIRECTIONS = 360
 _PARTS = 12
-_CORNERS = 120
-"""Convex static parts, and their corners, up to which a visibility graph is made."""
+_CORNERS = 120  # convex static parts, and their corners, up to which a visibility graph is made
 
 
 def lower_bound(world: World) -> float:

@@ -28,10 +28,8 @@ class CostToGo(NamedTuple):
     """(rows, columns, headings) [m]; inf where the robot overlaps a wall or has no way"""
     floor: FloatArray
     """(rows, columns) [m] least length for the robot's inscribed disc, on the grid"""
-    origin: FloatArray
-    """(2,) least x, y of the grid [m]"""
-    cell: float
-    """Side of a cell [m]."""
+    origin: FloatArray  # (2,) least x, y of the grid [m]
+    cell: float  # Side of a cell [m]
 
 
 @kernel(allocates=True)

@@ -16,19 +16,13 @@ from pushplan.world import GoalDisc, NavigationGoal, RobotModel, StaticMap
 
 HEADINGS = 32
 """Headings of the grid."""
-_CELL = 0.33
-"""Side of a cell [R]."""
-_COARSEST = 0.8
-"""Side of a cell beyond which a table would not resolve the robot [R]."""
-_MOST_CELLS = 16_000
-"""Cells (x, y) at most; larger maps get larger cells."""
-_ARC = 2.0
-"""Length of the arcs that carry values from cell to cell [cells]."""
-_SETTLED = 0.02
-"""Change of a value below which the table is done [R]."""
+_CELL = 0.33  # side of a cell [R]
+_COARSEST = 0.8  # side of a cell beyond which a table would not resolve the robot [R]
+_MOST_CELLS = 16_000  # cells (x, y) at most; larger maps get larger cells
+_ARC = 2.0  # length of the arcs that carry values from cell to cell [cells]
+_SETTLED = 0.02  # change of a value below which the table is done [R]
 _MOST_SWEEPS = 60
-_BLOCK = 60
-"""Cells (x, y) that are worked on between two looks at the stop rule: under 2 ms."""
+_BLOCK = 60  # cells (x, y) that are worked on between two looks at the stop rule: under 2 ms
 
 
 class CostToGoMaker:

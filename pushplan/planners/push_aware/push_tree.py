@@ -16,24 +16,16 @@ from pushplan.world.checks import FloatArray, IntArray
 class PushTree(NamedTuple):
     """A search tree, in memory that is made once for a call."""
 
-    poses: FloatArray
-    """(N, 3)"""
-    costs: FloatArray
-    """(N,) m₀ l₀ + w Σ mᵢ lᵢ so far [kg m]"""
-    estimates: FloatArray
-    """(N,) the same for the whole path through the node"""
-    parents: IntArray
-    """(N,) -1 at the root"""
-    arcs: FloatArray
-    """(N, 2) length [m] and curvature [1/m] of the arc that leads to the node"""
+    poses: FloatArray  # (N, 3)
+    costs: FloatArray  # (N,) m₀ l₀ + w Σ mᵢ lᵢ so far [kg m]
+    estimates: FloatArray  # (N,) the same for the whole path through the node
+    parents: IntArray  # (N,) -1 at the root
+    arcs: FloatArray  # (N, 2) length [m] and curvature [1/m] of the arc that leads to the node
     rows: IntArray
     """(N,) which row of ``objects`` holds; -1 while the arc to the node has not been driven"""
-    objects: FloatArray
-    """(M, K, 3)"""
-    best: FloatArray
-    """(rows, columns, headings, signatures) least cost of a node in each cell"""
-    counts: IntArray
-    """(4,) nodes, rows of objects, whether memory was full, arcs driven"""
+    objects: FloatArray  # (M, K, 3)
+    best: FloatArray  # (rows, columns, headings, signatures) least cost of a node in each cell
+    counts: IntArray  # (4,) nodes, rows of objects, whether memory was full, arcs driven
 
 
 def make_push_tree(

@@ -19,12 +19,9 @@ from pushplan.search.astar import EXHAUSTED, FOUND
 from pushplan.world import GoalDisc, PlanStatus
 from pushplan.world.checks import FloatArray
 
-_RANDOM_NODES = 20_000
-"""Nodes of a random tree at most; then another is begun."""
-_SIGNATURES = 4
-"""Ways to have pushed the objects that some searches tell apart in each cell."""
-_LONGEST_ARC = 2.0
-"""Longest arc of the random tree [R]."""
+_RANDOM_NODES = 20_000  # nodes of a random tree at most; then another is begun
+_SIGNATURES = 4  # ways to have pushed the objects that some searches tell apart in each cell
+_LONGEST_ARC = 2.0  # longest arc of the random tree [R]
 
 
 @dataclass(frozen=True)

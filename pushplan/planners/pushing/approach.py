@@ -26,16 +26,13 @@ _MILD = [(0, 0.0), (0, 0.25), (0, -0.25), (0, 0.45), (0, -0.45)]
 _HARD = [(t, s) for t in (0, 12, -12, 30, -30) for s in (0.0, 0.4, -0.4, 0.65, -0.65, 0.8, -0.8)]
 """Headings of the robot against the direction of the path [degrees] and further offsets of the box
 from the best one [half bumpers], in order of preference."""
-_COARSE = 0.02
-"""How far the path to a box may be from the shortest one [circumscribed radii]."""
+_COARSE = 0.02  # how far the path to a box may be from the shortest one [circumscribed radii]
 _LEANS = tuple(math.radians(lean) for lean in (0, 20, -20, 40, -40))
 """Directions of the last leg against the robot's heading at its end."""
 _LEGS = (1.05, 0.6)
 """Lengths of the last leg [circumscribed radii]: the robot turns in free space before it."""
-_STEP = 0.3
-"""Greatest turn between two headings that are checked [rad]."""
-_SPAN = 1.2
-"""Sliding that one push should make do with [half bumpers]."""
+_STEP = 0.3  # greatest turn between two headings that are checked [rad]
+_SPAN = 1.2  # sliding that one push should make do with [half bumpers]
 _FARTHEST, _RIM = 0.6, 0.8
 """Greatest offsets at the beginning, with and without clearance beside the box [half bumpers]."""
 

@@ -15,12 +15,9 @@ from pushplan.world.checks import FloatArray, expect, number
 from pushplan.world.outline import convex_outline
 
 _SAMPLES = 401
-_STEEP = 0.8
-"""|dx/dy| from which an edge is a flank and no longer part of the front."""
-_FLAT = 0.02
-"""Depth of a front, as a fraction of its half width, below which it counts as straight."""
-_BENT = 0.7
-"""Greatest curvature times depth of a box: a box fits into the bumper's hollow."""
+_STEEP = 0.8  # |dx/dy| from which an edge is a flank and no longer part of the front
+_FLAT = 0.02  # depth of a front, as a fraction of its half width, below which it counts as straight
+_BENT = 0.7  # greatest curvature times depth of a box: a box fits into the bumper's hollow
 
 
 @dataclass(frozen=True)

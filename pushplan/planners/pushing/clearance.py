@@ -14,8 +14,7 @@ from pushplan.world import RobotModel, StaticMap
 from pushplan.world.checks import FloatArray, frozen
 from pushplan.world.outline import flatten
 
-_NEARER = 1e-6
-"""What is nearer than the clearance already may come this much nearer [R]."""
+_NEARER = 1e-6  # what is nearer than the clearance already may come this much nearer [R]
 
 
 class Clearance:

@@ -27,10 +27,8 @@ class ClearanceProblem(NamedTuple):
     vertices: FloatArray
     """(V, 2) corners of the robot's parts, then of the box, in their frames [m]."""
     offsets: IntArray
-    own: int
-    """How many of the parts are the robot's."""
-    radii: FloatArray
-    """(P,) of the disc about the origin that holds each part [m]."""
+    own: int  # How many of the parts are the robot's
+    radii: FloatArray  # (P,) of the disc about the origin that holds each part [m]
     least: float
     slack: float
     obstacles: Obstacles

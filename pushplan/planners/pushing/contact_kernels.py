@@ -30,22 +30,14 @@ FLUSH = 1e-9
 class Contact(NamedTuple):
     """Bumper and pushed face, as the kernels read them."""
 
-    front: float
-    """x of the bumper in its middle, from the axle [m]."""
-    half: float
-    """Half the bumper's width [m]."""
-    curvature: float
-    """Curvature of the bumper's front [1/m]; positive where its ends reach ahead."""
-    depth: float
-    """a: from the pushed face to the box's centre [m]."""
-    low: float
-    """Right end of the face from the centre, along t [m], negative."""
-    high: float
-    """Left end of the face [m]."""
-    spread: float
-    """c = greatest torque / greatest force of the ground [m]."""
-    friction: float
-    """Between bumper and box."""
+    front: float  # x of the bumper in its middle, from the axle [m]
+    half: float  # Half the bumper's width [m]
+    curvature: float  # Curvature of the bumper's front [1/m]; positive where its ends reach ahead
+    depth: float  # a: from the pushed face to the box's centre [m]
+    low: float  # Right end of the face from the centre, along t [m], negative
+    high: float  # Left end of the face [m]
+    spread: float  # c = greatest torque / greatest force of the ground [m]
+    friction: float  # Between bumper and box
 
 
 @kernel(allocates=True)

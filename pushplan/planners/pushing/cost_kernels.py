@@ -21,13 +21,10 @@ SPEED_SMOOTHNESS = 0.1
 class Weights(NamedTuple):
     """Costs and scales of the cost, see `PushingConfig`."""
 
-    length: float
-    """L [m]"""
+    length: float  # L [m]
     max_speed: float
-    half: float
-    """Half the bumper, as far as offsets may reach [m]."""
-    curvature: float
-    """Greatest that is used without a cost [1/m]; negative where there is no limit."""
+    half: float  # Half the bumper, as far as offsets may reach [m]
+    curvature: float  # Greatest that is used without a cost [1/m]; negative where there is no limit
     heading: float
     offset: float
     rim: float
@@ -43,38 +40,25 @@ class Weights(NamedTuple):
 class PushingProblem(NamedTuple):
     """The pushing problem of one call."""
 
-    contact: Contact
-    """Bumper, face and friction."""
-    track: Track
-    """The box's path."""
+    contact: Contact  # Bumper, face and friction
+    track: Track  # The box's path
     weights: Weights
-    start: FloatArray
-    """(6,) state when the first command takes effect."""
-    along: float
-    """Path length of the box's place [m]."""
-    last: FloatArray
-    """(2,) the command before the first."""
-    units: FloatArray
-    """(2,) of speed [m/s] and turn rate [rad/s] in the program."""
-    steps: FloatArray
-    """(N,) [s]"""
-    groups: IntArray
-    """(N,) which of the M commands holds in each step."""
+    start: FloatArray  # (6,) state when the first command takes effect
+    along: float  # Path length of the box's place [m]
+    last: FloatArray  # (2,) the command before the first
+    units: FloatArray  # (2,) of speed [m/s] and turn rate [rad/s] in the program
+    steps: FloatArray  # (N,) [s]
+    groups: IntArray  # (N,) which of the M commands holds in each step
 
 
 class Memory(NamedTuple):
     """What an assembly fills."""
 
-    jacobian: FloatArray
-    """(6 N, 2 M)"""
-    residual: FloatArray
-    """(6 N,)"""
-    hessian: FloatArray
-    """(2 M, 2 M) P."""
-    gradient: FloatArray
-    """(2 M,) q."""
-    states: FloatArray
-    """(N + 1, 6) the nominal motion."""
+    jacobian: FloatArray  # (6 N, 2 M)
+    residual: FloatArray  # (6 N,)
+    hessian: FloatArray  # (2 M, 2 M) P
+    gradient: FloatArray  # (2 M,) q
+    states: FloatArray  # (N + 1, 6) the nominal motion
 
 
 @kernel(allocates=True)
@@ -146,16 +130,11 @@ def differentiate(
 class Step(NamedTuple):
     """One step of the horizon."""
 
-    k: int
-    """Its number."""
-    g: int
-    """The command that holds in it."""
-    tau: float
-    """Its length [T]."""
-    wanted: float
-    """Speed that the path has there [m/s]."""
-    turn: float
-    """Turn rate likewise [rad/s]."""
+    k: int  # Its number
+    g: int  # The command that holds in it
+    tau: float  # Its length [T]
+    wanted: float  # Speed that the path has there [m/s]
+    turn: float  # Turn rate likewise [rad/s]
 
 
 @kernel(allocates=True)

@@ -28,8 +28,7 @@ _ESCAPES = ((-1.0, 0.0), (-0.5, 1.0), (-0.5, -1.0), (0.0, 1.0), (0.0, -1.0), (0.
 _MOVED, _TWISTED = 0.2, 0.35
 """A box that was moved by more while the robot drove up to it [R, rad] is approached anew."""
 _DETOURS = 4
-_TURNED = 0.7
-"""A turn after which it has got away [rad]."""
+_TURNED = 0.7  # A turn after which it has got away [rad]
 
 
 class PushPhase(enum.Enum):

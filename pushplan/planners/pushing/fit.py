@@ -20,16 +20,13 @@ from pushplan.planners.pushing.parameters import PushParameters
 from pushplan.world import Episode, InvalidInputError, PushplanError
 from pushplan.world.checks import FloatArray, expect
 
-_TOUCH = 0.06
-"""Greatest gap of a box that is being pushed [depth of the box]."""
-_WINDOW = 0.4
-"""Travel of the robot over which one prediction runs [L]."""
+_TOUCH = 0.06  # greatest gap of a box that is being pushed [depth of the box]
+_WINDOW = 0.4  # travel of the robot over which one prediction runs [L]
 _LEAST_WINDOWS = 5
 _STARTS = (0.02, 0.15, 0.3, 0.5, 0.8)
 _SPREADS = (1.0, 1.8)
 _BOUNDS = ((0.0, 0.1), (2.0, 5.0))
-_ROBUST = 0.02
-"""Residuals beyond this count less: another box or a wall was in the way [L, rad]."""
+_ROBUST = 0.02  # residuals beyond this count less: another box or a wall was in the way [L, rad]
 
 
 @dataclass(frozen=True)

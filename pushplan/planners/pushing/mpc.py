@@ -30,16 +30,14 @@ from pushplan.world.checks import FloatArray, expect
 
 _BACK, _WINDOW = 0.5, 2.0
 """How far the box's place may move back or ahead from one call to the next [L]."""
-_LEAST = 0.4
-"""Least speed of a push that has not ended, as a fraction of the greatest."""
+_LEAST = 0.4  # least speed of a push that has not ended, as a fraction of the greatest
 _LOOK = 4.0
 """Periods for which a command must stay clear of static things, or it is driven more slowly."""
 _BESIDE, _AHEAD = 1.5, 2.0
 """Greatest offset [half bumpers] and gap [L] that the problem is solved for."""
 _BLOCKED, _ASIDE = 0.5, (0.1, -0.1, 0.3, -0.3, 0.7, -0.7)
 """Fraction of a command below which others are tried, and their turns [speed / L]."""
-_TURNED = math.radians(50.0)
-"""Angle at which another face is taken to be the pushed one."""
+_TURNED = math.radians(50.0)  # angle at which another face is taken to be the pushed one
 
 
 @dataclass

@@ -14,8 +14,7 @@ from pushplan.planners.pushing.contact_kernels import Contact, advance
 from pushplan.world import Twist
 from pushplan.world.checks import FloatArray
 
-_JUMP = 0.35
-"""A pose farther than this from the predicted one replaces it [L]."""
+_JUMP = 0.35  # A pose farther than this from the predicted one replaces it [L]
 
 
 class _CommandLog:

@@ -14,10 +14,8 @@ from pushplan.world import InvalidInputError, Plan, RobotModel, SubTask
 from pushplan.world.checks import ArrayRecord, FloatArray, array, expect, integer, number
 from pushplan.world.polyline import arc_lengths, step_lengths
 
-_PIECES = 24
-"""Least number of poses along a path of one piece."""
-_GREATEST_TURN = 0.05
-"""Greatest turn between two poses [rad]."""
+_PIECES = 24  # least number of poses along a path of one piece
+_GREATEST_TURN = 0.05  # greatest turn between two poses [rad]
 
 
 @dataclass(frozen=True, eq=False)

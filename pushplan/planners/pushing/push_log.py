@@ -15,10 +15,8 @@ from pushplan.planners.pushing.path import PushPath
 from pushplan.world import Episode, InvalidInputError
 from pushplan.world.checks import ArrayRecord, BoolArray, FloatArray, expect
 
-_TOUCH = 0.05
-"""Greatest gap of a box that touches the bumper [L]."""
-_FLOOR = -1.0
-"""Least margin that is told apart."""
+_TOUCH = 0.05  # greatest gap of a box that touches the bumper [L]
+_FLOOR = -1.0  # least margin that is told apart
 
 
 @dataclass(frozen=True, eq=False)

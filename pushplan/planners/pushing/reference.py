@@ -20,8 +20,7 @@ from pushplan.world import RobotModel
 from pushplan.world.checks import FloatArray, IntArray
 
 _SUBSTEPS = 2
-_ROUNDS = 3
-"""How often the box's places on the path are looked up again."""
+_ROUNDS = 3  # how often the box's places on the path are looked up again
 _SETTINGS: dict[str, Any] = {
     "ipopt.print_level": 0,
     "ipopt.sb": "yes",

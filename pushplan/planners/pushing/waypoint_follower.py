@@ -8,15 +8,12 @@ from pushplan.control import clamp_twist
 from pushplan.world import RobotModel, Twist
 from pushplan.world.checks import FloatArray
 
-_ASTRAY = math.radians(25.0)
-"""Bearing at which the robot stops to turn."""
+_ASTRAY = math.radians(25.0)  # bearing at which the robot stops to turn
 _STEADY = 0.4
 """Least distance that steering reckons with [circumscribed radii]: nearer points are noise."""
-_ROOM = 0.5
-"""How far it backs off where it cannot turn [circumscribed radii]."""
+_ROOM = 0.5  # how far it backs off where it cannot turn [circumscribed radii]
 _ESCAPES = 2
-_BEST = 0.02
-"""What counts as getting on [circumscribed radii, rad]."""
+_BEST = 0.02  # what counts as getting on [circumscribed radii, rad]
 
 
 class WaypointFollower:

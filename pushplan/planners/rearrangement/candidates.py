@@ -22,10 +22,8 @@ from pushplan.world.polyline import path_length
 
 TILTS = tuple(math.radians(tilt) for tilt in (0.0, 20.0, -20.0, 40.0, -40.0))
 """Directions of line pushes against the normal of an edge [rad]."""
-_PARTNERS = 4
-"""How many others are looked at that an object could be collected with."""
-_HARD = 3
-"""How many objects that no simple push gets home, the nearest ones, are looked at closely."""
+_PARTNERS = 4  # how many others are looked at that an object could be collected with
+_HARD = 3  # how many objects that no simple push gets home, the nearest ones, are looked at closely
 _PATHS = ((1.08, False), (0.0, False), (1.08, True))
 """Paths of a target object: clearance in half widths of the bumper, 0 for its own; whether it goes
 to the middle of a receptacle."""

@@ -19,18 +19,12 @@ from pushplan.world.checks import FloatArray
 class PushingController(NamedTuple):
     """Parameters of the geometric pushing controller."""
 
-    step: float
-    """Distance between two commands [m]."""
-    turn: float
-    """Greatest turn in one step [rad]."""
-    size: float
-    """Circumscribed radius of the robot [m]."""
-    half: float
-    """Half the width of the bumper [m]."""
-    front: float
-    """How far the bumper is ahead of the robot's origin [m]."""
-    ahead: float
-    """Look-ahead distance of the object on its path [m]."""
+    step: float  # Distance between two commands [m]
+    turn: float  # Greatest turn in one step [rad]
+    size: float  # Circumscribed radius of the robot [m]
+    half: float  # Half the width of the bumper [m]
+    front: float  # How far the bumper is ahead of the robot's origin [m]
+    ahead: float  # Look-ahead distance of the object on its path [m]
     gain: float
     """Curvature of the robot's path for each radian that it is off its heading, times ``size``."""
 

@@ -27,34 +27,23 @@ from pushplan.planners.rearrangement.push_simulator import PushSimulator
 from pushplan.planners.rearrangement.rollout_cache import Primitive
 from pushplan.world.checks import FloatArray
 
-_STARTS = 300
-"""From how many places round the object an extraction primitive may begin."""
-_DRAWS = 3000
-"""How many places are looked at for that."""
-_LENGTH = 1.6
-"""Of an arc [circumscribed radii]."""
-_ROUNDS = 3
-"""How many arcs follow one another at most."""
-_BEAM = 60
-"""How many states are driven on from."""
+_STARTS = 300  # from how many places round the object an extraction primitive may begin
+_DRAWS = 3000  # how many places are looked at for that
+_LENGTH = 1.6  # of an arc [circumscribed radii]
+_ROUNDS = 3  # how many arcs follow one another at most
+_BEAM = 60  # how many states are driven on from
 _TRIALS = 15
 """In how many places, after each round, it is looked whether the object can be pushed home."""
-_ENOUGH = 3
-"""After so many places that an object can be delivered from no more are looked for."""
-_SIDES = 20
-"""How many of them are kept, all sides from which they begin counted."""
+_ENOUGH = 3  # after so many places that an object can be delivered from no more are looked for
+_SIDES = 20  # how many of them are kept, all sides from which they begin counted
 _SHAKEN = ((0.0, 0.0, 0.0), (0.08, 0.08, 0.15), (-0.08, 0.08, -0.15), (0.0, -0.1, 0.0))
 """Errors of the prediction with which that has to succeed [circumscribed radii, rad]."""
-_LEAST = 0.15
-"""By how much an object has to be moved for it to count [circumscribed radii]."""
+_LEAST = 0.15  # by how much an object has to be moved for it to count [circumscribed radii]
 _NEARLY = (0.0, 0.6, -0.6)
 """Directions in which a push brings an object nearer to its goal, against the way there [rad]."""
-_NEAR = 8.0
-"""What is farther from the object does not count for a search [circumscribed radii]."""
-_SEARCHES = 24
-"""How often they are searched until something is done; bounds the time of an episode."""
-_CURVATURES = (0.0, 0.7, -0.7, 1.6, -1.6)
-"""Of the arcs, times the robot's circumscribed radius."""
+_NEAR = 8.0  # what is farther from the object does not count for a search [circumscribed radii]
+_SEARCHES = 24  # how often they are searched until something is done; bounds the time of an episode
+_CURVATURES = (0.0, 0.7, -0.7, 1.6, -1.6)  # of the arcs, times the robot's circumscribed radius
 _SPREAD = np.array([0.8191725134, 0.6710436067, 0.5497004779])
 """Steps of an additive recurrence that fills a cube evenly (Roberts 2018)."""
 

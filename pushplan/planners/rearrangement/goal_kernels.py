@@ -19,14 +19,11 @@ REMOVED = 1e7
 class ObjectGoal(NamedTuple):
     """The goal of the objects, as kernels read it."""
 
-    polygon: FloatArray
-    """(N, 2) the area that objects have to leave, or get into."""
+    polygon: FloatArray  # (N, 2) the area that objects have to leave, or get into
     edges: FloatArray
     """(E, 3) unit normal and offset of the edges within which a delivered object lies."""
-    is_receptacle: bool
-    """Whether objects have to get into the polygon, and are removed there."""
-    slack: float
-    """By how much an object has to be clear of the polygon's edge [m]."""
+    is_receptacle: bool  # Whether objects have to get into the polygon, and are removed there
+    slack: float  # By how much an object has to be clear of the polygon's edge [m]
 
 
 @kernel

@@ -23,12 +23,9 @@ from pushplan.world.checks import FloatArray, expect, number
 
 _RETREATS = ((-1.0, 0.0), (-0.5, 1.0), (-0.5, -1.0), (1.0, 0.0), (0.5, 1.0), (0.5, -1.0))
 """Speed and turn rate, as fractions of the greatest, that are tried in turn to get away."""
-_OPTIONS = 8
-"""How many directions to push a box are tried before the first comes again."""
-_MOVED = 0.03
-"""Less than this is no motion [circumscribed radii]."""
-_ASTRAY = 0.8
-"""Difference between heading and push at which the robot lines up anew [rad]."""
+_OPTIONS = 8  # how many directions to push a box are tried before the first comes again
+_MOVED = 0.03  # less than this is no motion [circumscribed radii]
+_ASTRAY = 0.8  # difference between heading and push at which the robot lines up anew [rad]
 
 
 @dataclass(frozen=True)

@@ -24,12 +24,9 @@ from pushplan.world.checks import FloatArray, expect
 
 _FALLBACK = 60.0
 """How long the fallback works where nothing is found [circumscribed radii at full speed]."""
-_TRIES = 6
-"""How often it does so without progress before what is left is given up."""
-_PENALTY = 3.0
-"""What is added to the cost of a push that has failed [circumscribed radii]."""
-_TABU_AFTER = 3
-"""After so many failures a push is tabu until something else has been done."""
+_TRIES = 6  # how often it does so without progress before what is left is given up
+_PENALTY = 3.0  # what is added to the cost of a push that has failed [circumscribed radii]
+_TABU_AFTER = 3  # after so many failures a push is tabu until something else has been done
 
 
 class GtspMpc:

@@ -18,8 +18,7 @@ from pushplan.planners.rearrangement.route_follower import RouteFollower
 from pushplan.world import ClearanceArea, MaxIterations, Receptacle, Twist, World
 from pushplan.world.checks import FloatArray, expect
 
-_PATIENCE = 5
-"""Commands without motion after which the rest of a leg is left out."""
+_PATIENCE = 5  # commands without motion after which the rest of a leg is left out
 
 
 class Gtsp:

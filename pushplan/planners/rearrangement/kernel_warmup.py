@@ -29,8 +29,7 @@ from pushplan.world import (
 
 _STEPS = 150
 _PERIOD = 0.2  # [s]
-_WEDGED = (-2.2, -0.985, 0.0)
-"""A box a little in one of the columns."""
+_WEDGED = (-2.2, -0.985, 0.0)  # A box a little in one of the columns
 
 
 @functools.cache

@@ -12,10 +12,8 @@ from pushplan.world import Twist, World
 
 _ALIGNED = math.radians(20.0)
 """A push that begins farther off the object's path is left to the geometric controller."""
-_BLOCKED = 0.2
-"""Share of a command that is driven, below which the push does not get on."""
-_PATIENCE = 4
-"""Commands for which it may be so."""
+_BLOCKED = 0.2  # share of a command that is driven, below which the push does not get on
+_PATIENCE = 4  # commands for which it may be so
 
 
 def suits_mpc(scene: PushScene, push: Push) -> bool:

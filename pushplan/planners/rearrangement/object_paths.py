@@ -12,10 +12,8 @@ from pushplan.geometry import GoalDistances, goal_distances
 from pushplan.world import ClearanceArea, Goal, InvalidInputError, Receptacle, StaticMap
 from pushplan.world.checks import FloatArray
 
-_INSET = 1.05
-"""Distance of an object from the edges of a receptacle when it is done [radii]."""
-_MOST = 20_000
-"""How many lengths and paths are kept."""
+_INSET = 1.05  # distance of an object from the edges of a receptacle when it is done [radii]
+_MOST = 20_000  # how many lengths and paths are kept
 
 
 class ObjectPaths:

@@ -49,8 +49,7 @@ class PoseGrid(NamedTuple):
     x: float
     y: float
     step: float
-    blocked: BoolArray
-    """(16, rows, columns) where something static is in the way."""
+    blocked: BoolArray  # (16, rows, columns) where something static is in the way
     blocked_moves: BoolArray
     """(2, 16, rows, columns) from where it is in the way of the move ahead, and of the turn to the
     next heading."""

@@ -14,30 +14,21 @@ from pushplan.compiled import kernel
 from pushplan.planners.rearrangement.pose_grid_kernels import LENGTHS, MOVES, TURNS, PoseGrid
 from pushplan.world.checks import FloatArray, IntArray
 
-_BUCKETS = 1024
-"""How many buckets of poses a search has in one round."""
-_WIDTH = 0.1
-"""Costs that one bucket spans [cells]."""
+_BUCKETS = 1024  # how many buckets of poses a search has in one round
+_WIDTH = 0.1  # costs that one bucket spans [cells]
 
 
 class PoseSearchProblem(NamedTuple):
     """What `search_poses` solves."""
 
-    starts: IntArray
-    """(S,) flat indices of poses."""
-    costs: FloatArray
-    """(S,) what it costs to be there [m]."""
+    starts: IntArray  # (S,) flat indices of poses
+    costs: FloatArray  # (S,) what it costs to be there [m]
     grid: PoseGrid
-    depths: FloatArray
-    """(16, rows, columns) depth in the objects, from `add_layers` [m]."""
-    touch: FloatArray
-    """(16, rows, columns) weights of the objects, likewise."""
-    turn_cost: float
-    """Cost of a turn [m/rad]."""
-    arm: float
-    """How far a turn carries an object along [m/rad]."""
-    targets: IntArray
-    """Flat indices of poses after which to stop; none to go on to the end."""
+    depths: FloatArray  # (16, rows, columns) depth in the objects, from `add_layers` [m]
+    touch: FloatArray  # (16, rows, columns) weights of the objects, likewise
+    turn_cost: float  # Cost of a turn [m/rad]
+    arm: float  # How far a turn carries an object along [m/rad]
+    targets: IntArray  # Flat indices of poses after which to stop; none to go on to the end
 
 
 @kernel(allocates=True, inline=True)
@@ -162,10 +153,8 @@ class Arrivals(NamedTuple):
     """Poses of the lattice from which some places are reached, one place after the other."""
 
     nodes: IntArray
-    extra: FloatArray
-    """Cost of the rest of the path [m]."""
-    ends: IntArray
-    """(N,) where the poses of each place end."""
+    extra: FloatArray  # Cost of the rest of the path [m]
+    ends: IntArray  # (N,) where the poses of each place end
 
 
 @kernel(allocates=True)

@@ -27,8 +27,7 @@ _TURNS = (0, *(sign * turn for turn in range(15, 151, 15) for sign in (1, -1)))
 
 _BESIDE = (1.1, -1.1, 1.35, -1.35)
 """Places, as `SHIFTS`, from which the end of the bumper strikes an object flat at a wall."""
-_ENOUGH = 20
-"""After so many ways to free an object no more are looked for."""
+_ENOUGH = 20  # after so many ways to free an object no more are looked for
 _NEARLY = tuple(math.radians(turn) for turn in (0, 30, -30, 60, -60))
 """Directions of a push that bring an object nearer to its goal, against the shortest path [rad]."""
 

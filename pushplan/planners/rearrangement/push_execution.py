@@ -19,8 +19,7 @@ from pushplan.planners.rearrangement.route_follower import RouteFollower
 from pushplan.world import Twist, World
 from pushplan.world.checks import FloatArray
 
-_PATIENCE = 4
-"""Commands without motion after which the robot counts as stuck."""
+_PATIENCE = 4  # commands without motion after which the robot counts as stuck
 
 
 class ExecutionEnd(enum.Enum):

@@ -25,8 +25,7 @@ from pushplan.world.checks import FloatArray
 PRE_RELOCATIONS = 2
 """For how many objects, the nearest ones, pre-relocation pushes are looked for without others."""
 
-_FAR = 5.0
-"""Cost of getting to what cannot be got to later [diagonals of the map]."""
+_FAR = 5.0  # cost of getting to what cannot be got to later [diagonals of the map]
 
 
 @dataclass(frozen=True, eq=False)

@@ -36,10 +36,8 @@ from pushplan.planners.rearrangement.rollout_cache import RolloutCache
 from pushplan.world import ClearanceArea, Goal, Receptacle, RobotModel, StaticMap, World
 from pushplan.world.checks import BoolArray, FloatArray, IntArray, frozen
 
-_STEP = 0.12
-"""Longest step between two commands of a push [circumscribed radii]."""
-_ARM = 0.8
-"""How far a turn by one radian carries an object along [circumscribed radii]."""
+_STEP = 0.12  # longest step between two commands of a push [circumscribed radii]
+_ARM = 0.8  # how far a turn by one radian carries an object along [circumscribed radii]
 _GOAL_SLACK = 0.012
 """By how much an object has to be clear of its goal's edge [circumscribed radii]."""
 TARGET_COST = 5.0

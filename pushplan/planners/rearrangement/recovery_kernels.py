@@ -16,29 +16,21 @@ from pushplan.world.checks import FloatArray, IntArray
 
 STEP = 0.08
 """Length of a step [circumscribed radii], and turn of one on the spot [rad]."""
-_CELL = 0.6
-"""Sides of the boxes of poses of which one is looked at each [steps]."""
-_REACH = 3.0
-"""How far away the place to turn may be [circumscribed radii]."""
-_MOST = 100_000
-"""Poses that are looked at."""
-_CLEARANCE = 1.05
-"""Clearance that the robot needs to turn about [circumscribed radii]."""
-_DEEPER = 1e-3
-"""By how much the robot may get deeper into what it touches [circumscribed radii]."""
+_CELL = 0.6  # sides of the boxes of poses of which one is looked at each [steps]
+_REACH = 3.0  # how far away the place to turn may be [circumscribed radii]
+_MOST = 100_000  # poses that are looked at
+_CLEARANCE = 1.05  # clearance that the robot needs to turn about [circumscribed radii]
+_DEEPER = 1e-3  # by how much the robot may get deeper into what it touches [circumscribed radii]
 
 
 class RecoveryProblem(NamedTuple):
     """Where the robot is, and what it must not touch."""
 
-    start: FloatArray
-    """(3,) pose of the robot."""
-    steps: FloatArray
-    """(A, 2) distance [m] and turn [rad] of each step that it may take."""
+    start: FloatArray  # (3,) pose of the robot
+    steps: FloatArray  # (A, 2) distance [m] and turn [rad] of each step that it may take
     shape: Footprint
     among: ConvexObstacles
-    size: float
-    """Circumscribed radius of the robot [m]."""
+    size: float  # Circumscribed radius of the robot [m]
 
 
 @kernel(allocates=True)

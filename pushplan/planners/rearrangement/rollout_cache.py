@@ -10,8 +10,7 @@ from pushplan.planners.rearrangement.goal_kernels import REMOVED
 from pushplan.world import Movables
 from pushplan.world.checks import BoolArray, FloatArray, IntArray
 
-_OLD = 8
-"""For how many plans what is not asked for is kept."""
+_OLD = 8  # for how many plans what is not asked for is kept
 
 Primitive = tuple[FloatArray, float]
 """Poses (N, 3) of the robot in an extraction primitive, and the cost of what it leaves [m]."""

@@ -24,14 +24,10 @@ STAGES = 8
 class RolloutLog(NamedTuple):
     """What a rollout is written into."""
 
-    track: FloatArray
-    """(T, 3) the robot's poses."""
-    steps: FloatArray
-    """(STAGES,) how many poses each stage has."""
-    poses: FloatArray
-    """(STAGES, K, 3) the objects' poses at the end of each stage."""
-    lengths: FloatArray
-    """(STAGES, K) their path lengths [m]."""
+    track: FloatArray  # (T, 3) the robot's poses
+    steps: FloatArray  # (STAGES,) how many poses each stage has
+    poses: FloatArray  # (STAGES, K, 3) the objects' poses at the end of each stage
+    lengths: FloatArray  # (STAGES, K) their path lengths [m]
     box: FloatArray
     """(4,) x_min, y_min, x_max, y_max of all that moved, and of its surroundings [m]."""
 
@@ -39,16 +35,11 @@ class RolloutLog(NamedTuple):
 class RolloutProblem(NamedTuple):
     """A push to roll out."""
 
-    target: int
-    """Index of the object that follows the path, -1 for a line push."""
-    path: FloatArray
-    """(M, 2) of the target object [m]."""
-    shift: float
-    """See `steer_push`."""
-    limit: float
-    """Greatest length of the robot's path [m]."""
-    wanted: BoolArray
-    """(K,) objects that are to be done; the push ends when all are."""
+    target: int  # Index of the object that follows the path, -1 for a line push
+    path: FloatArray  # (M, 2) of the target object [m]
+    shift: float  # See `steer_push`
+    limit: float  # Greatest length of the robot's path [m]
+    wanted: BoolArray  # (K,) objects that are to be done; the push ends when all are
     controller: PushingController
     bodies: Bodies
     settings: Settings
@@ -58,18 +49,12 @@ class RolloutProblem(NamedTuple):
 class _Memory(NamedTuple):
     """Memory of one rollout."""
 
-    here: FloatArray
-    """(3,) the robot."""
-    there: FloatArray
-    """(3,) where it goes."""
-    poses: FloatArray
-    """(K, 3)"""
-    saved: FloatArray
-    """(K, 3) before the step."""
-    lengths: FloatArray
-    """(K,) path lengths [m]."""
-    done: BoolArray
-    """(K,)"""
+    here: FloatArray  # (3,) the robot
+    there: FloatArray  # (3,) where it goes
+    poses: FloatArray  # (K, 3)
+    saved: FloatArray  # (K, 3) before the step
+    lengths: FloatArray  # (K,) path lengths [m]
+    done: BoolArray  # (K,)
     scratch: Scratch
 
 

@@ -15,8 +15,7 @@ from pushplan.planners.rearrangement.push_scene import TARGET_COST, PushScene
 from pushplan.planners.rearrangement.route_kernels import LITTLE_TURN, RouteProblem, cheapest_legs
 from pushplan.world.checks import ArrayRecord, FloatArray
 
-_MOST = 14
-"""Corners of the lattice's path that a route may have corners at."""
+_MOST = 14  # corners of the lattice's path that a route may have corners at
 _LONGEST = 6
 """Points further on that a leg may end at, where the robot has to keep to the lattice's path."""
 _AWAY = (0.3, -0.3, 0.6, -0.6, 1.0, -1.0)

@@ -26,22 +26,15 @@ _TIGHT_COST = 25.0
 class RouteProblem(NamedTuple):
     """What motions cost."""
 
-    step: float
-    """Distance of the poses that are looked at [m]."""
-    turn_cost: float
-    """Of a turn [m/rad]."""
-    arm: float
-    """How far a turn carries an object along [m/rad]."""
-    shape: Footprint
-    """With the margin that objects cost from."""
-    tight: Footprint
-    """With the margin that walls are kept from."""
+    step: float  # Distance of the poses that are looked at [m]
+    turn_cost: float  # Of a turn [m/rad]
+    arm: float  # How far a turn carries an object along [m/rad]
+    shape: Footprint  # With the margin that objects cost from
+    tight: Footprint  # With the margin that walls are kept from
     among: ConvexObstacles
-    poses: FloatArray
-    """(K, 3) of the objects."""
+    poses: FloatArray  # (K, 3) of the objects
     bodies: Bodies
-    weights: FloatArray
-    """(K,) cost of carrying each object along."""
+    weights: FloatArray  # (K,) cost of carrying each object along
 
 
 @kernel(allocates=True)

@@ -27,12 +27,9 @@ from pushplan.search.astar import FOUND, PAUSED
 from pushplan.world import GoalLine, Plan, PlanStatus, StopCheck, World
 from pushplan.world.checks import FloatArray
 
-_SPREAD = 0.6
-"""Typical sideways displacement of a shortcut [R]."""
-_MOST_TURN = 2.5
-"""Greatest turn of one of its curves [rad]."""
-_END_FRACTION = 0.15
-"""Fraction of the shortcuts that move the end."""
+_SPREAD = 0.6  # typical sideways displacement of a shortcut [R]
+_MOST_TURN = 2.5  # greatest turn of one of its curves [rad]
+_END_FRACTION = 0.15  # fraction of the shortcuts that move the end
 
 
 class ShipLatticeCall:

@@ -11,8 +11,7 @@ from pushplan.interaction.path_sweepers import PathSweeper
 from pushplan.planners.ship_lattice.shortcut_proposals import ShortcutProblem, propose
 from pushplan.world.checks import FloatArray
 
-_PORTION = 8
-"""Poses that are swept between two looks at the stop rule."""
+_PORTION = 8  # poses that are swept between two looks at the stop rule
 
 
 @dataclass(frozen=True)

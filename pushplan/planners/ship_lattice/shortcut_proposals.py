@@ -17,18 +17,12 @@ from pushplan.world.checks import FloatArray
 class ShortcutProblem(NamedTuple):
     """What a changed path has to keep to."""
 
-    radius: float
-    """Least turning radius [m]."""
-    spacing: float
-    """Greatest distance between two poses [m]."""
-    spread: float
-    """Typical sideways displacement [m]."""
-    most_turn: float
-    """Greatest turn of a curve [rad]."""
-    end_fraction: float
-    """Fraction of the changes that are changes of the end."""
-    goal: FloatArray
-    """(4,) point x, y and unit normal of the line where the path ends."""
+    radius: float  # Least turning radius [m]
+    spacing: float  # Greatest distance between two poses [m]
+    spread: float  # Typical sideways displacement [m]
+    most_turn: float  # Greatest turn of a curve [rad]
+    end_fraction: float  # Fraction of the changes that are changes of the end
+    goal: FloatArray  # (4,) point x, y and unit normal of the line where the path ends
 
 
 @kernel(allocates=True)

@@ -15,12 +15,9 @@ from pushplan.world.checks import FloatArray
 class Channel(NamedTuple):
     """Places where the ship's origin may be."""
 
-    goal: float
-    """y of the line to which the search goes [m]."""
-    low: FloatArray
-    """(2,) least x, y [m]."""
-    high: FloatArray
-    """(2,) greatest x, y [m]."""
+    goal: float  # y of the line to which the search goes [m]
+    low: FloatArray  # (2,) least x, y [m]
+    high: FloatArray  # (2,) greatest x, y [m]
 
 
 @kernel

@@ -23,8 +23,7 @@ from pushplan.world import GoalLine, InvalidInputError, World
 from pushplan.world.checks import FloatArray, IntArray
 from pushplan.world.outline import areas_and_centroids
 
-_MOST_PLACES = 20_000
-"""Rows times columns of the table of costs to go, about."""
+_MOST_PLACES = 20_000  # rows times columns of the table of costs to go, about
 
 
 @dataclass(frozen=True)

@@ -28,47 +28,29 @@ interpolated, and the search looks for the way back where it has to start there.
 class CostToGo(NamedTuple):
     """Costs to go, and what they were made from; lengths in metres."""
 
-    table: FloatArray
-    """(R, C, H) cost from each row, column and heading to the goal line [kg m]."""
-    field: FloatArray
-    """(F, C) mass ahead of the bow [kg], rows from ``field_low``."""
-    left: float
-    """x of the first column."""
-    low: float
-    """y of the first row."""
-    column: float
-    """Distance between the columns of the table."""
-    row: float
-    """Distance between the rows of the table."""
-    cell: float
-    """Distance between the rows and the columns of the field."""
-    field_low: float
-    """y of its first row; its first column is that of the table."""
-    bow: float
-    """How far ahead of the ship's origin its bow meets ice."""
-    mass: float
-    """Of the ship [kg]."""
-    weight: float
-    """w, cost of work against travel."""
-    radius: float
-    """Least turning radius."""
+    table: FloatArray  # (R, C, H) cost from each row, column and heading to the goal line [kg m]
+    field: FloatArray  # (F, C) mass ahead of the bow [kg], rows from ``field_low``
+    left: float  # x of the first column
+    low: float  # y of the first row
+    column: float  # Distance between the columns of the table
+    row: float  # Distance between the rows of the table
+    cell: float  # Distance between the rows and the columns of the field
+    field_low: float  # y of its first row; its first column is that of the table
+    bow: float  # How far ahead of the ship's origin its bow meets ice
+    mass: float  # Of the ship [kg]
+    weight: float  # w, cost of work against travel
+    radius: float  # Least turning radius
 
 
 class Floes(NamedTuple):
     """K floes, and the work that they cause."""
 
-    poses: FloatArray
-    """(K, 3)"""
-    radii: FloatArray
-    """(K,) of discs with their areas [m]."""
-    masses: FloatArray
-    """(K,) [kg]"""
-    half_beam: float
-    """Of the ship [m]."""
-    gain: float
-    """Work per mass ahead of the bow."""
-    crowding: float
-    """How much more it is for each typical floe there."""
+    poses: FloatArray  # (K, 3)
+    radii: FloatArray  # (K,) of discs with their areas [m]
+    masses: FloatArray  # (K,) [kg]
+    half_beam: float  # Of the ship [m]
+    gain: float  # Work per mass ahead of the bow
+    crowding: float  # How much more it is for each typical floe there
 
 
 @kernel(allocates=True)

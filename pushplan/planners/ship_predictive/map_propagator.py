@@ -15,8 +15,7 @@ from pushplan.planners.ship_predictive.channel_view import ChannelView
 from pushplan.planners.ship_predictive.floe_propagator import FloePropagator
 from pushplan.world.checks import FloatArray
 
-_TRACED = 10
-"""Poses that are swept between two looks at the stop rule."""
+_TRACED = 10  # poses that are swept between two looks at the stop rule
 
 
 class MapPropagator:

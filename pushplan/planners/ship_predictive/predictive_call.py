@@ -20,8 +20,7 @@ from pushplan.world import Plan, PlanResult, PlanStats, PlanStatus, Stop, World
 from pushplan.world.checks import FloatArray
 from pushplan.world.polyline import step_lengths
 
-_TIGHTEST = 0.999
-"""Fraction of the turn rate that is used where there is no path with less."""
+_TIGHTEST = 0.999  # fraction of the turn rate that is used where there is no path with less
 
 
 def plan_call(

@@ -31,8 +31,7 @@ from pushplan.world import InvalidInputError, stream
 log = logging.getLogger(__name__)
 
 _LEAST_RATE = 0.1
-_AROUND = 2
-"""Pixels about a movable one that exploration at objects may take."""
+_AROUND = 2  # pixels about a movable one that exploration at objects may take
 
 
 class SamLearner:
