@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from pushplan.compiled import kernel
+from pushplan.compiled import copy_into, kernel
 from pushplan.world.checks import FloatArray, IntArray
 
 
-@kernel(allocates=True)
+@kernel
 def fill_subsets(
     low: int,  # at least 1
     high: int,
@@ -28,7 +28,7 @@ def fill_subsets(
             out = table[subset, d]
             rest = subset ^ (1 << d)
             if rest == 0:
-                out[:] = first[d]
+                copy_into(out, first[d])
                 continue
             out[:] = np.inf
             for c in range(count):
@@ -36,7 +36,7 @@ def fill_subsets(
                     _relax(table[rest, c], blocks[c, :, d], sizes[c], out, width)
 
 
-@kernel(allocates=True)
+@kernel
 def _relax(values: FloatArray, block: FloatArray, size: int, out: FloatArray, width: int) -> None:
     """``out = min(out, values + block)`` over the rows of a block, four at a time."""
     i = 0
@@ -56,7 +56,7 @@ def _relax(values: FloatArray, block: FloatArray, size: int, out: FloatArray, wi
         i += 1
 
 
-@kernel(allocates=True)
+@kernel
 def read_path(
     table: FloatArray,  # (2^m, m, K)
     blocks: FloatArray,  # (m, K, m, K)

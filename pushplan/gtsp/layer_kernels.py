@@ -70,7 +70,7 @@ def make_layers(costs: FloatArray, reverse: FloatArray, offsets: IntArray, root:
     )
 
 
-@kernel(allocates=True)
+@kernel
 def build(tour: Layers, order: IntArray, root_node: int) -> float:
     """Compute all values of a closed tour from scratch; returns its cost."""
     count = len(order)
@@ -84,14 +84,16 @@ def build(tour: Layers, order: IntArray, root_node: int) -> float:
     for p in range(1, count):
         c = order[p]
         _from(tour.costs, tour.ahead, tour, order[p - 1], c, tour.out)
-        tour.ahead[c, : tour.size[c]] = tour.out[: tour.size[c]]
+        for v in range(tour.size[c]):
+            tour.ahead[c, v] = tour.out[v]
     _from(tour.costs, tour.ahead, tour, order[count - 1], root, tour.out)
     total = tour.out[0]
     tour.behind[root, 0] = -total
     for p in range(count - 1, 0, -1):
         c, d = order[p], order[p + 1 if p + 1 < count else 0]
         _from(tour.reverse, tour.behind, tour, d, c, tour.out)
-        tour.behind[c, : tour.size[c]] = tour.out[: tour.size[c]]
+        for v in range(tour.size[c]):
+            tour.behind[c, v] = tour.out[v]
     return float(total)
 
 

@@ -83,7 +83,7 @@ def push_values(
         out[w], out[w + 1], out[w + 2], out[w + 3] = first, second, third, fourth
 
 
-@kernel(allocates=True)
+@kernel
 def best_nodes(
     costs: FloatArray,  # (N, >= N)
     offsets: IntArray,  # (m + 1,)
@@ -100,7 +100,8 @@ def best_nodes(
     for node in range(offsets[root], offsets[root + 1]):
         at = offsets[order[1]]
         size = offsets[order[1] + 1] - at
-        layers[1, :size] = costs[node, at : at + size]
+        for v in range(size):
+            layers[1, v] = costs[node, at + v]
         for i in range(2, count):
             to = offsets[order[i]]
             n_to = offsets[order[i] + 1] - to

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pushplan.compiled import kernel
+from pushplan.compiled import copy_into, kernel
 from pushplan.gtsp.layer_kernels import (
     Layers,
     build,
@@ -127,13 +127,13 @@ def _cheapest_place(
     return place
 
 
-@kernel(allocates=True)
+@kernel
 def _to_front(order: IntArray, root: int, scratch: IntArray) -> None:
     """Rotate a closed order so that it begins with the root."""
     p = 0
     while order[p] != root:
         p += 1
-    scratch[:] = order
+    copy_into(scratch, order)
     for q in range(len(order)):
         order[q] = scratch[(p + q) % len(order)]
 
@@ -208,8 +208,8 @@ def search_tours(
             cost = best_nodes(costs, offsets, order, count, nodes, layers)
         if cost < values[1] - tolerance:
             values[1] = cost
-            best[:] = order
-            best_choice[:] = nodes
-        current[:] = order
-        current_nodes[:] = nodes
+            copy_into(best, order)
+            copy_into(best_choice, nodes)
+        copy_into(current, order)
+        copy_into(current_nodes, nodes)
         values[0] = build(tour, order, nodes[0])

@@ -8,15 +8,17 @@ from pushplan.compiled import kernel
 from pushplan.world.checks import FloatArray, IntArray
 
 
-@kernel(allocates=True)
+@kernel
 def _rotate(values: IntArray, scratch: IntArray, low: int, middle: int, high: int) -> None:
     """``values[low:middle]`` and ``values[middle:high]`` change places."""
     first = middle - low
-    scratch[:first] = values[low:middle]
+    for i in range(first):
+        scratch[i] = values[low + i]
     second = high - middle
     for i in range(second):
         values[low + i] = values[middle + i]
-    values[low + second : high] = scratch[:first]
+    for i in range(first):
+        values[low + second + i] = scratch[i]
 
 
 @kernel(allocates=True)
@@ -50,7 +52,7 @@ def improve_by_swaps(
     return total
 
 
-@kernel(allocates=True)
+@kernel
 def _first_swap(
     costs: FloatArray,
     near: IntArray,
@@ -94,7 +96,7 @@ def _first_swap(
     return 0.0
 
 
-@kernel(allocates=True)
+@kernel
 def _swap(
     order: IntArray, nodes: IntArray, place: IntArray, scratch: IntArray, i: int, j: int, k: int
 ) -> None:
@@ -109,7 +111,7 @@ def _swap(
         place[order[p]] = p
 
 
-@kernel(allocates=True)
+@kernel
 def _first_reversal(
     costs: FloatArray,
     near: IntArray,

@@ -47,7 +47,7 @@ def memory_moves(
     return moves
 
 
-@kernel(allocates=True)
+@kernel
 def extend_walks(
     walks: FloatArray,  # (n, 2^b, K) cost of the cheapest walk of k arcs from a node to the root
     longer: FloatArray,  # (n, 2^b, K) filled with that of k + 1 arcs
@@ -76,7 +76,7 @@ def extend_walks(
                             out[i] = min(out[i], value + row[i])
 
 
-@kernel(allocates=True)
+@kernel
 def read_visits(
     walks: FloatArray,  # (n, n, 2^b, K) by number of arcs less 1
     first: FloatArray,  # (n, K) cost from the root to each node
@@ -122,7 +122,7 @@ def read_visits(
     return best
 
 
-@kernel(allocates=True)
+@kernel
 def allow_memories(walks: FloatArray) -> None:
     """Turn the entries ``walks[:, M]`` into the least of all memories that lie within M."""
     count, memories, width = walks.shape
@@ -159,7 +159,7 @@ class Paths(NamedTuple):
     parents: IntArray  # (P,) the path that it comes from
 
 
-@kernel(allocates=True)
+@kernel
 def extend_paths(
     problem: PathProblem,
     paths: Paths,

@@ -42,7 +42,7 @@ class Tuning(NamedTuple):
     speed_weight: float
 
 
-@kernel(allocates=True)
+@kernel
 def locate(track: Track, x: float, y: float, low: float, high: float) -> tuple[float, int, float]:
     """Path length [m], segment and fraction of it of the nearest point between two lengths [m]."""
     # past the last pose the path goes on straight
@@ -71,7 +71,7 @@ def locate(track: Track, x: float, y: float, low: float, high: float) -> tuple[f
     return along, index, fraction
 
 
-@kernel(allocates=True)
+@kernel
 def errors(
     track: Track, x: float, y: float, theta: float, index: int, fraction: float
 ) -> tuple[float, float, float, float]:
@@ -99,7 +99,7 @@ def errors(
     return offset, wrap_angle(theta - heading), heading, curvature
 
 
-@kernel(allocates=True)
+@kernel
 def _speed_at(track: Track, along: float, index: int, tuning: Tuning, dt: float) -> float:
     """Speed [m/s] that the plan has at a place, and that still allows to stop at its end."""
     speed: float = min(track.speeds[index], tuning.max_speed)
@@ -111,7 +111,7 @@ def _speed_at(track: Track, along: float, index: int, tuning: Tuning, dt: float)
     return speed
 
 
-@kernel(allocates=True)
+@kernel
 def arc(
     x: float,
     y: float,
@@ -173,7 +173,7 @@ def assemble(
             nominal[k, 1] = turning
         arc(here[0], here[1], here[2], speed, nominal[k, 1], dt, out)
         _differentiate(jacobian, k, count, out, dt, tuning)
-        here[:] = out[:3]
+        here[0], here[1], here[2] = out[0], out[1], out[2]
         place, index, fraction = locate(track, here[0], here[1], place, place + 2.0 * speed * dt)
         offset, error, heading, curvature = errors(
             track, here[0], here[1], here[2], index, fraction
@@ -192,7 +192,7 @@ def assemble(
         _add_input_costs(hessian, gradient, k, count, asked, before, tau, tuning)
 
 
-@kernel(allocates=True)
+@kernel
 def _differentiate(
     jacobian: FloatArray, k: int, count: int, motion: FloatArray, dt: float, tuning: Tuning
 ) -> None:
@@ -208,7 +208,7 @@ def _differentiate(
         jacobian[1, count + k] += motion[8] * tuning.max_speed
 
 
-@kernel(allocates=True)
+@kernel
 def _add_input_costs(
     hessian: FloatArray,
     gradient: FloatArray,
@@ -234,7 +234,7 @@ def _add_input_costs(
         hessian[k, k - 1] -= smoothness
 
 
-@kernel(allocates=True)
+@kernel
 def _add(
     hessian: FloatArray,
     gradient: FloatArray,
@@ -263,7 +263,7 @@ def _add(
             hessian[i, j] += part * row[i]
 
 
-@kernel(allocates=True)
+@kernel
 def _diagonal(
     hessian: FloatArray, gradient: FloatArray, k: int, wanted: float, weight: float
 ) -> None:

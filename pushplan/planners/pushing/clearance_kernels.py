@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pushplan.compiled import kernel
+from pushplan.compiled import copy_into, kernel
 from pushplan.geometry.convex import convex_distance, convex_penetration
 from pushplan.geometry.obstacles import Obstacles
 from pushplan.planners.pushing.contact_kernels import Contact, advance, box_pose
@@ -37,9 +37,8 @@ class ClearanceProblem(NamedTuple):
 @kernel(allocates=True)
 def gaps(contact: Contact, state: FloatArray, problem: ClearanceProblem) -> tuple[float, float]:
     """Least distance of the robot and of the box from static things [m], negative inside one."""
-    found = np.full(2, np.inf)
-    placed = np.empty_like(problem.vertices)
-    box = np.empty(3)
+    found, box, placed = np.empty(2), np.empty(3), np.empty_like(problem.vertices)
+    found[:] = np.inf
     box_pose(contact, state, box)
     obstacles = problem.obstacles
     for p in range(problem.offsets.shape[0] - 1):
@@ -91,22 +90,23 @@ def free_fraction(
     problem: ClearanceProblem,
 ) -> float:
     """Fraction of a command that keeps robot and box clear of static things."""
-    here, before, detail = start.copy(), start.copy(), np.empty(6)
+    here, before, detail = np.empty(6), np.empty(6), np.empty(6)
+    copy_into(here, start)
     now = gaps(contact, here, problem)
     robot = min(problem.least, now[0] - problem.slack)
     box = min(problem.least, now[1] - problem.slack)
     travel_ahead = (abs(v) + abs(w) * (contact.front + contact.depth)) * duration
     for i in range(SAMPLES):
-        before[:] = here
+        copy_into(before, here)
         advance(contact, here, v, w, duration / SAMPLES, detail)
         if _clear(contact, here, problem, robot, box, travel_ahead * (i + 1) / SAMPLES):
             continue
         free, step = i / SAMPLES, 0.5 / SAMPLES
         for _ in range(HALVINGS):
-            here[:] = before
+            copy_into(here, before)
             advance(contact, here, v, w, step * duration, detail)
             if _clear(contact, here, problem, robot, box, travel_ahead * (free + step)):
-                before[:] = here
+                copy_into(before, here)
                 free += step
             step *= 0.5
         return free

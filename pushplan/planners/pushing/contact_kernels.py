@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pushplan.compiled import kernel
+from pushplan.compiled import copy_into, kernel
 from pushplan.geometry.angles import wrap_angle
 from pushplan.world.checks import FloatArray
 
@@ -40,7 +40,7 @@ class Contact(NamedTuple):
     friction: float  # Between bumper and box
 
 
-@kernel(allocates=True)
+@kernel
 def line(contact: Contact, offset: float) -> tuple[float, float]:
     """The part of the face that is in front of the bumper, along t [m]; empty if low >= high."""
     low = max(contact.low, -contact.half - offset)
@@ -48,7 +48,7 @@ def line(contact: Contact, offset: float) -> tuple[float, float]:
     return low, high
 
 
-@kernel(allocates=True)
+@kernel
 def flush_angle(contact: Contact, offset: float) -> float:
     """Angle of the face against the robot's heading when it lies on the bumper [rad]."""
     low, high = line(contact, offset)
@@ -58,7 +58,7 @@ def flush_angle(contact: Contact, offset: float) -> float:
     return -curvature * (offset + 0.5 * (low + high)) / (1.0 - curvature * contact.depth)
 
 
-@kernel(allocates=True)
+@kernel
 def standoff(contact: Contact, offset: float, angle: float) -> tuple[float, float]:
     """X of the box's centre when it touches the bumper [m], and where it does, along t [m]."""
     c, s = np.cos(angle), np.sin(angle)
@@ -78,7 +78,7 @@ def standoff(contact: Contact, offset: float, angle: float) -> tuple[float, floa
     return best, at
 
 
-@kernel(allocates=True)
+@kernel
 def _corner(
     contact: Contact, y: float, tilt: float, un: float, ut: float, w: float, out: FloatArray
 ) -> None:
@@ -107,7 +107,7 @@ def _corner(
     out[4], out[5] = float(CORNER_SLIDE), ratio
 
 
-@kernel(allocates=True)
+@kernel
 def contact_velocity(
     contact: Contact,
     offset: float,  # of the box's centre to the left of the robot's x axis [m]
@@ -162,7 +162,7 @@ def contact_velocity(
     _corner(contact, y, tilt, un, ut, w, out)
 
 
-@kernel(allocates=True)
+@kernel
 def _drive(state: FloatArray, v: float, w: float, dt: float) -> None:
     """Move the robot along an arc and leave the box where it is on the ground."""
     theta, turn = state[2], w * dt
@@ -173,7 +173,7 @@ def _drive(state: FloatArray, v: float, w: float, dt: float) -> None:
     state[2] = theta + turn
 
 
-@kernel(allocates=True)
+@kernel
 def _leave(contact: Contact, state: FloatArray, v: float, w: float, dt: float) -> float:
     """Move the robot for ``dt`` while the box stands; the gap after it [m]."""
     turn = w * dt
@@ -189,7 +189,7 @@ def _leave(contact: Contact, state: FloatArray, v: float, w: float, dt: float) -
     return gap
 
 
-@kernel(allocates=True)
+@kernel
 def push_step(
     contact: Contact, state: FloatArray, v: float, w: float, dt: float, out: FloatArray
 ) -> None:
@@ -208,7 +208,7 @@ def push_step(
     _drive(state, v, w, dt)
 
 
-@kernel(allocates=True)
+@kernel
 def advance(
     contact: Contact,
     state: FloatArray,  # (6,) robot pose, the box's offset, its face's angle, gap >= 0; changed
@@ -222,17 +222,18 @@ def advance(
     travel = abs(v) * dt + abs(w) * dt * reach
     count = max(1, min(_SUBSTEPS, int(np.ceil(travel / (_SUBSTEP * reach)))))
     step = dt / count
-    trial = np.empty(6)
     out[:] = 0.0
     for _ in range(count):
-        trial[:] = state
-        gap = max(state[5], 0.0)
-        trial[5] = gap
-        after = _leave(contact, trial, v, w, step)
+        x, y, theta = state[0], state[1], state[2]
+        offset, angle, before = state[3], state[4], state[5]
+        gap = max(before, 0.0)
+        state[5] = gap
+        after = _leave(contact, state, v, w, step)
         if after >= 1e-9:
-            state[:] = trial
             out[:] = 0.0
             continue
+        state[0], state[1], state[2] = x, y, theta
+        state[3], state[4], state[5] = offset, angle, before
         fraction = gap / (gap - after) if gap > 1e-9 and gap > after else 0.0
         if fraction > 0.0:
             _leave(contact, state, v, w, fraction * step)
@@ -241,7 +242,7 @@ def advance(
             push_step(contact, state, v, w, (1.0 - fraction) * step, out)
 
 
-@kernel(allocates=True)
+@kernel
 def rollout(
     contact: Contact,
     state: FloatArray,
@@ -251,9 +252,9 @@ def rollout(
     details: FloatArray,
 ) -> None:
     """States (N + 1, 6) and details (N, 6) under twists (N, 2) held for steps (N,) [s]."""
-    states[0] = state
+    copy_into(states[0], state)
     for k in range(steps.shape[0]):
-        states[k + 1] = states[k]
+        copy_into(states[k + 1], states[k])
         advance(contact, states[k + 1], twists[k, 0], twists[k, 1], steps[k], details[k])
 
 
@@ -268,20 +269,20 @@ def predicted(
     return state[3], state[4]
 
 
-@kernel(allocates=True)
+@kernel
 def observe(
     contact: Contact, normal: float, robot: FloatArray, box: FloatArray, out: FloatArray
 ) -> None:
     """State (6,) of poses (3,) with the face's normal [rad]; the gap is negative in overlap."""
     dx, dy = box[0] - robot[0], box[1] - robot[1]
     c, s = np.cos(robot[2]), np.sin(robot[2])
-    out[:3] = robot
+    out[0], out[1], out[2] = robot[0], robot[1], robot[2]
     out[3] = c * dy - s * dx
     out[4] = wrap_angle(box[2] + normal - robot[2])
     out[5] = c * dx + s * dy - standoff(contact, out[3], out[4])[0]
 
 
-@kernel(allocates=True)
+@kernel
 def box_pose(contact: Contact, state: FloatArray, out: FloatArray) -> None:
     """x, y [m] of the box's centre and direction [rad] of the pushed face's normal, world."""
     x = standoff(contact, state[3], state[4])[0] + state[5]

@@ -61,7 +61,7 @@ class Memory(NamedTuple):
     states: FloatArray  # (N + 1, 6) the nominal motion
 
 
-@kernel(allocates=True)
+@kernel
 def residuals(
     weights: Weights,
     lateral: float,  # distance of the box from its path, left positive [m]
@@ -88,7 +88,7 @@ def residuals(
         out[5] = root * np.sqrt(weights.grip) * (over if w > 0.0 else -over)
 
 
-@kernel(allocates=True)
+@kernel
 def differentiate(
     contact: Contact,
     weights: Weights,
@@ -137,7 +137,7 @@ class Step(NamedTuple):
     turn: float  # Turn rate likewise [rad/s]
 
 
-@kernel(allocates=True)
+@kernel
 def add_command_costs(
     problem: PushingProblem, step: Step, nominal: FloatArray, memory: Memory
 ) -> float:

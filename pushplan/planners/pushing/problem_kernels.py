@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pushplan.compiled import kernel
+from pushplan.compiled import copy_into, kernel
 from pushplan.control.mpc.kernels import arc, errors, locate
 from pushplan.planners.pushing.contact_kernels import Contact, advance, flush_angle, standoff
 from pushplan.planners.pushing.cost_kernels import (
@@ -29,7 +29,7 @@ NEAR = 1e-4
 condition of P, and is nothing once the commands do not change any more."""
 
 
-@kernel(allocates=True)
+@kernel
 def _relative(
     contact: Contact, s: float, angle: float, v: float, w: float, dt: float, work: FloatArray
 ) -> tuple[float, float]:
@@ -41,7 +41,7 @@ def _relative(
     return state[3], state[4]
 
 
-@kernel(allocates=True)
+@kernel
 def linearise(
     contact: Contact,
     s: float,
@@ -80,7 +80,7 @@ def linearise(
         slopes[1, j] = (a[1] - b[1]) / (h + low)
 
 
-@kernel(allocates=True)
+@kernel
 def _propagate(
     rows: FloatArray,  # (5, 2 M) changed in place
     motion: FloatArray,  # (9,) as `arc` fills it
@@ -124,7 +124,7 @@ def assemble(problem: PushingProblem, nominal: FloatArray, memory: Memory) -> fl
         [0.01 * weights.half, 0.02, 0.05 * units[0], 0.02 * units[0] / weights.length]
     )
     here = states[0]
-    here[:] = start
+    copy_into(here, start)
     here[0] += start[5] * np.cos(start[2])  # as if the gap had closed already
     here[1] += start[5] * np.sin(start[2])
     here[5] = 0.0
@@ -144,7 +144,7 @@ def assemble(problem: PushingProblem, nominal: FloatArray, memory: Memory) -> fl
         arc(here[0], here[1], here[2], v, w, dt, motion)
         _propagate(rows, motion, slopes, units, dt, g)
         here = states[k + 1]
-        here[:] = states[k]
+        copy_into(here, states[k])
         advance(contact, here, v, w, dt, detail)
         here[5] = 0.0
         bx, by = _box(contact, here)
@@ -213,7 +213,7 @@ def _square(problem: PushingProblem, nominal: FloatArray, memory: Memory) -> Non
         gradient[a] -= keep * z[i]
 
 
-@kernel(allocates=True)
+@kernel
 def _box(contact: Contact, state: FloatArray) -> tuple[float, float]:
     """The box's centre [m]."""
     x = standoff(contact, state[3], state[4])[0] + state[5]

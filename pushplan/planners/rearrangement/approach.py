@@ -64,7 +64,7 @@ def search_approaches(
         until: flat indices of poses after which to stop; none to go on to the end.
     """
     for reach in (1.5, 4.0):
-        starts, costs = near_poses(contact_grid.grid, pose, reach)
+        starts, costs = near_poses(contact_grid.grid, np.array(pose), reach)
         if len(starts):
             break
     problem = PoseSearchProblem(

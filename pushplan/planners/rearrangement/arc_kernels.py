@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from pushplan.compiled import kernel
+from pushplan.compiled import copy_into, kernel
 from pushplan.interaction.kernels import (
     Bodies,
     Scratch,
@@ -56,13 +56,15 @@ def sweep_arcs(
     lengths = np.zeros(poses.shape[0])
     tracks = np.empty((arcs.shape[0], count + 1, 3))
     out = np.empty((arcs.shape[0], count + 1, poses.shape[0], 3))
-    reached = np.ones(arcs.shape[0], dtype=np.int64)
+    reached = np.empty(arcs.shape[0], dtype=np.int64)
     for a in range(arcs.shape[0]):
-        tracks[a, 0], out[a, 0] = start, poses
+        reached[a] = 1
+        copy_into(tracks[a, 0], start)
+        copy_into(out[a, 0], poses)
         for n in range(1, count + 1):
             here, there, after = tracks[a, n - 1], tracks[a, n], out[a, n]
             arc_step(here, arcs[a, 0], arcs[a, 1], there)
-            after[:] = out[a, n - 1]
+            copy_into(after, out[a, n - 1])
             if not push_to(here, there, after, lengths, bodies, settings, scratch):
                 break
             reached[a] = n + 1

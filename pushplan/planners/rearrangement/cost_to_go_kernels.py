@@ -24,8 +24,9 @@ def cost_to_go(
     # cities and sets that may grow by several objects at once; -1 follows where nothing helps
     count = masks.shape[0]
     every = (1 << objects) - 1
-    best = np.full((every + 1, count + 1), np.inf)
-    following = np.full((every + 1, count + 1), -1, dtype=np.int64)
+    best = np.empty((every + 1, count + 1))
+    following = np.empty((every + 1, count + 1), dtype=np.int64)
+    best[:], following[:] = np.inf, -1
     best[every] = 0.0
     for mask in range(every - 1, -1, -1):
         for last in range(count + 1):

@@ -35,8 +35,8 @@ _WEDGED = (-2.2, -0.985, 0.0)  # A box a little in one of the columns
 @functools.cache
 def warm_up_rearrangement() -> None:
     """Solve, push and look for every kind of push in each kind of task."""
-    warm_up_solver()
-    warm_up_pushing()
+    warm_up_solver(proof=False)
+    warm_up_pushing(executor=False)
     for world in _worlds():
         scene = PushScene(world, RearrangementConfig())
         extraction_primitives(PushSimulator(scene), 0)

@@ -128,18 +128,17 @@ def contact_depths(grid: PoseGrid, shape: Footprint, poses: FloatArray, bodies: 
     """(K, 16, rows, columns) how deep the footprint is in each of the objects [m]."""
     count, rows, cols = grid.blocked.shape
     out = np.zeros((poses.shape[0], count, rows, cols), dtype=np.float32)
-    outline, pose = np.empty_like(bodies.vertices), np.empty(3)
-    body = np.empty_like(shape.vertices)
+    outline, moved = np.empty_like(bodies.vertices), np.empty_like(bodies.vertices)
+    pose, body = np.zeros(3), np.empty_like(shape.vertices)
     for k in range(poses.shape[0]):
         a, b = bodies.offsets[k], bodies.offsets[k + 1]
         transform_points(poses[k], bodies.vertices[a:b], outline[a:b])
         reach = shape.radius + bodies.radii[k]
-        i0 = max(0, int(np.ceil((poses[k, 1] - reach - grid.y) / grid.step)))
-        i1 = min(rows - 1, int(np.floor((poses[k, 1] + reach - grid.y) / grid.step)))
-        j0 = max(0, int(np.ceil((poses[k, 0] - reach - grid.x) / grid.step)))
-        j1 = min(cols - 1, int(np.floor((poses[k, 0] + reach - grid.x) / grid.step)))
+        i0 = max(0, int(math.ceil((poses[k, 1] - reach - grid.y) / grid.step)))
+        i1 = min(rows - 1, int(math.floor((poses[k, 1] + reach - grid.y) / grid.step)))
+        j0 = max(0, int(math.ceil((poses[k, 0] - reach - grid.x) / grid.step)))
+        j1 = min(cols - 1, int(math.floor((poses[k, 0] + reach - grid.x) / grid.step)))
         for t in range(count):
-            pose[:] = 0.0
             pose[2] = HEADINGS[t]
             transform_points(pose, shape.vertices, body)
             for i in range(i0, i1 + 1):
@@ -150,10 +149,11 @@ def contact_depths(grid: PoseGrid, shape: Footprint, poses: FloatArray, bodies: 
                     if dx * dx + dy * dy >= reach * reach or grid.blocked[t, i, j]:
                         continue
                     deepest = 0.0
-                    moved = outline[a:b] - np.array([x, y])
+                    for n in range(a, b):
+                        moved[n, 0], moved[n, 1] = outline[n, 0] - x, outline[n, 1] - y
                     for p in range(shape.offsets.shape[0] - 1):
                         part = body[shape.offsets[p] : shape.offsets[p + 1]]
-                        deepest = max(deepest, convex_penetration(part, moved)[0])
+                        deepest = max(deepest, convex_penetration(part, moved[a:b])[0])
                     out[k, t, i, j] = deepest
     return out
 

@@ -31,7 +31,7 @@ class PoseSearchProblem(NamedTuple):
     targets: IntArray  # Flat indices of poses after which to stop; none to go on to the end
 
 
-@kernel(allocates=True, inline=True)
+@kernel(inline=True)
 def _unlink(node: int, heads: IntArray, after: IntArray, ahead: IntArray) -> None:
     """Take a node out of its bucket."""
     if ahead[node] >= 0:
@@ -43,7 +43,7 @@ def _unlink(node: int, heads: IntArray, after: IntArray, ahead: IntArray) -> Non
     ahead[node] = -1
 
 
-@kernel(allocates=True, inline=True)
+@kernel(inline=True)
 def _link(node: int, bucket: int, heads: IntArray, after: IntArray, ahead: IntArray) -> None:
     """Put a node that is in no bucket into one."""
     after[node], ahead[node] = heads[bucket], -2 - bucket
@@ -52,7 +52,7 @@ def _link(node: int, bucket: int, heads: IntArray, after: IntArray, ahead: IntAr
     heads[bucket] = node
 
 
-@kernel(allocates=True)
+@kernel
 def _deal(
     best: FloatArray, width: float, heads: IntArray, after: IntArray, ahead: IntArray
 ) -> float:
@@ -69,7 +69,7 @@ def _deal(
     return base
 
 
-@kernel(allocates=True)
+@kernel
 def _beside(
     t: int,
     i: int,
@@ -97,13 +97,16 @@ def search_poses(problem: PoseSearchProblem) -> tuple[FloatArray, IntArray]:
     # what lies beyond the last bucket waits for another round
     grid, depths, targets = problem.grid, problem.depths, problem.targets
     total, (_, rows, cols) = depths.size, depths.shape
-    best = np.full(total, np.inf)
-    before = np.full(total, -1, dtype=np.int64)
+    best, before = np.empty(total), np.empty(total, dtype=np.int64)
+    best[:] = np.inf
+    before[:] = -1
     flat, shut, near = depths.ravel(), grid.blocked.ravel(), problem.touch.ravel()
     ahead_shut, turn_shut = grid.blocked_moves[0].ravel(), grid.blocked_moves[1].ravel()
     # doubly linked lists; the first of bucket b has -2 - b ahead of it, -1 is in no bucket
-    after, ahead = np.empty(total, dtype=np.int64), np.full(total, -1, dtype=np.int64)
-    heads = np.full(_BUCKETS + 1, -1, dtype=np.int64)
+    after, ahead = np.empty(total, dtype=np.int64), np.empty(total, dtype=np.int64)
+    heads = np.empty(_BUCKETS + 1, dtype=np.int64)
+    ahead[:] = -1
+    heads[:] = -1
     width, met = _WIDTH * grid.step, 0
     for s in range(problem.starts.shape[0]):
         node = problem.starts[s]
@@ -160,8 +163,8 @@ class Arrivals(NamedTuple):
 @kernel(allocates=True)
 def least_costs(costs: FloatArray, arrivals: Arrivals) -> FloatArray:
     """(N,) cost of getting to each of some places [m], from what `search_poses` returns."""
-    out = np.full(arrivals.ends.shape[0], np.inf)
-    at = 0
+    out, at = np.empty(arrivals.ends.shape[0]), 0
+    out[:] = np.inf
     for n in range(arrivals.ends.shape[0]):
         while at < arrivals.ends[n]:
             out[n] = min(out[n], costs[arrivals.nodes[at]] + arrivals.extra[at])

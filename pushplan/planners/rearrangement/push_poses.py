@@ -39,7 +39,7 @@ def pose_behind(
     outline = scene.world.movables.outline(k)
     distance = scene.front + scene.config.slack * scene.size
     at = scene.poses[k] if pose is None else pose
-    return pose_behind_outline(at, outline, heading, shift, distance)
+    return pose_behind_outline(np.array(at), outline, heading, shift, distance)
 
 
 def initial_heading(path: FloatArray, ahead: float) -> float:

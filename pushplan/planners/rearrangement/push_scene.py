@@ -186,7 +186,7 @@ class PushScene:
     @cached_property
     def done(self) -> BoolArray:
         """(K,) whether each object is where it belongs."""
-        return all_done(self.poses, self.bodies, self.object_goal)
+        return all_done(np.array(self.poses), self.bodies, self.object_goal)
 
     @property
     def turn_cost(self) -> float:

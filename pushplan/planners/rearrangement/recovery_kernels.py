@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pushplan.compiled import kernel
+from pushplan.compiled import copy_into, kernel
 from pushplan.geometry import core_distance
 from pushplan.motion.collision import ConvexObstacles, Footprint
 from pushplan.planners.rearrangement.arc_kernels import arc_step
@@ -33,7 +33,7 @@ class RecoveryProblem(NamedTuple):
     size: float  # Circumscribed radius of the robot [m]
 
 
-@kernel(allocates=True)
+@kernel
 def can_turn(pose: FloatArray, size: float, among: ConvexObstacles) -> bool:
     """Whether the disc that the robot needs to turn about is within the bounds and free."""
     x, y, bounds, radius = pose[0], pose[1], among.bounds, _CLEARANCE * size
@@ -54,10 +54,14 @@ def can_turn(pose: FloatArray, size: float, among: ConvexObstacles) -> bool:
 @kernel(allocates=True)
 def _path_to(node: int, nodes: FloatArray, before: IntArray) -> FloatArray:
     """(N, 3) the poses that have led to one."""
-    chain = [node]
-    while before[chain[-1]] >= 0:
-        chain.append(before[chain[-1]])
-    path: FloatArray = nodes[np.array(chain[::-1])]
+    count, last = 1, node
+    while before[last] >= 0:
+        last = before[last]
+        count += 1
+    path = np.empty((count, 3))
+    for n in range(count - 1, -1, -1):
+        copy_into(path[n], nodes[node])
+        node = before[node]
     return path
 
 
@@ -71,7 +75,8 @@ def search_recovery(problem: RecoveryProblem) -> FloatArray:
     nodes, before = np.empty((_MOST, 3)), np.empty(_MOST, dtype=np.int64)
     scratch, pose, between = np.empty_like(shape.vertices), np.empty(3), np.empty(3)
     limit = static_depth(start, shape, among, scratch) + _DEEPER * size
-    nodes[0], before[0], count = start, -1, 1
+    copy_into(nodes[0], start)
+    before[0], count = -1, 1
     at = 0
     while at < count:
         for distance, turn in problem.steps:
@@ -87,7 +92,8 @@ def search_recovery(problem: RecoveryProblem) -> FloatArray:
             if static_depth(between, shape, among, scratch) > limit:
                 continue
             seen[i, j, t] = True
-            nodes[count], before[count] = pose, at
+            copy_into(nodes[count], pose)
+            before[count] = at
             count += 1
             if count == _MOST:
                 return nodes[:0]

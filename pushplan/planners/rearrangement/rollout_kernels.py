@@ -14,7 +14,7 @@ from pushplan.compiled import copy_into, kernel
 from pushplan.interaction.kernels import Bodies, Scratch, Settings, make_scratch
 from pushplan.planners.rearrangement.arc_kernels import arc_step, push_to
 from pushplan.planners.rearrangement.controller_kernels import PushingController, steer_push
-from pushplan.planners.rearrangement.goal_kernels import REMOVED, ObjectGoal, all_done, is_done
+from pushplan.planners.rearrangement.goal_kernels import REMOVED, ObjectGoal, is_done
 from pushplan.world.checks import BoolArray, FloatArray
 
 STAGES = 8
@@ -109,9 +109,11 @@ def roll_out(
         poses.copy(),
         np.empty_like(poses),
         np.zeros(poses.shape[0]),
-        all_done(poses, problem.bodies, problem.goal),
+        np.empty(poses.shape[0], dtype=np.bool_),
         make_scratch(problem.bodies),
     )
+    for k in range(poses.shape[0]):
+        memory.done[k] = is_done(k, memory.poses, problem.bodies, problem.goal)
     return _roll(memory, problem, log)
 
 

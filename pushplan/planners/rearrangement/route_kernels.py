@@ -63,7 +63,7 @@ def _object_depth(pose: FloatArray, problem: RouteProblem, body: FloatArray) -> 
     return total, touch
 
 
-@kernel(allocates=True)
+@kernel
 def static_depth(
     pose: FloatArray, shape: Footprint, among: ConvexObstacles, scratch: FloatArray
 ) -> float:
@@ -155,8 +155,9 @@ def cheapest_legs(
 ) -> tuple[FloatArray, IntArray, FloatArray]:
     """Costs of ending ahead and back; the row before each row (2 i, 2 i + 1); turns (2 N, 2)."""
     count = points.shape[0]
-    best, came = np.full(2 * count, np.inf), np.full(2 * count, -1, dtype=np.int64)
-    headings, turns = np.full(2 * count, heading), np.zeros((2 * count, 2))
+    best, came = np.empty(2 * count), np.empty(2 * count, dtype=np.int64)
+    headings, turns = np.empty(2 * count), np.zeros((2 * count, 2))
+    best[:], came[:], headings[:] = np.inf, -1, heading
     best[0] = 0.0
     for to in range(2, 2 * count):
         j, sign = to // 2, 1.0 - 2.0 * (to % 2)
