@@ -146,7 +146,6 @@ def _refuse(message: str) -> int:
 @contextmanager
 def _progress(policies: str) -> Iterator[_Progress]:
     """Kernels while they are compiled; then a bar where there is a terminal, else lines."""
-
     with ExitStack() as running, ExitStack() as compiling:
         compiling.enter_context(kernel_progress(*policies.split(",")))
         show = _bar(running) if sys.stderr.isatty() else _Lines()
