@@ -7,9 +7,9 @@ Usage::
     python benchmarks/manipulation.py --figure docs/images/gtsp-mpc.png
 
 Prints one row of a Markdown table for each suite and policy: means with bootstrap intervals of
-95 %, the share of episodes with everything done, the paired difference to the first policy, and
+95 %, the fraction of episodes with everything done, the paired difference to the first policy, and
 the longest decision of an episode: the median over the episodes, and the longest of all. With
-``--weights`` `gtsp-mpc` runs at these weights of work too. Below the table it names every episode in
+``--weights`` `gtsp-mpc` runs at these weights of work too. Below the table it names each episode in
 which something was left undone. With ``--out`` the episodes are kept, a folder for each suite, and
 a run that was interrupted goes on. With ``--figure`` it only draws what `gtsp-mpc` plans first in
 some scenes.
