@@ -65,6 +65,6 @@ __all__ = [
     "PlansBesideDriving", "Policy", "PushplanError", "Receptacle", "RobotModel", "ScenarioError",
     "SchemaError", "ShowsPlan", "StaticMap", "Stop", "StopCheck", "SubTask", "Twist",
     "UnknownNameError", "WarmsUp", "WheelSpeeds", "World", "area_clearing_robot",
-    "box_delivery_robot", "jackal", "load_world", "maze_robot", "save_world", "stream", "turtlebot3_burger",
-    "world_from_dict", "world_to_dict",
+    "box_delivery_robot", "jackal", "load_world", "maze_robot", "save_world", "stream",
+    "turtlebot3_burger", "world_from_dict", "world_to_dict",
 ]  # fmt: skip
