@@ -7,6 +7,7 @@ from contextlib import contextmanager
 from typing import Any
 
 from numba.core.registry import CPUDispatcher
+from numba.core.types import unliteral
 
 from pushplan.compiled.cache import KernelCache
 from pushplan.compiled.pipeline import InnerCompiler, OuterCompiler
@@ -82,6 +83,7 @@ class KernelDispatcher(_CachedDispatcher):
 
     def get_call_template(self, args: Any, kws: Any) -> Any:
         """Tell a caller among the kernels what it returns."""
+        args = tuple(unliteral(kind) for kind in args)  # not once more for each constant
         if self.is_compiling:  # it calls itself
             return super().get_call_template(args, kws)
         return self.inner.get_call_template(args, kws)
