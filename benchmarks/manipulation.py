@@ -3,13 +3,13 @@
 Usage::
 
     python benchmarks/manipulation.py [--episodes 50] [--workers 2] [--only area-clearing-2d]
-        [--policies greedy,gtsp,gtsp-mpc] [--prices 40,200] [--seed 0] [--out runs/manipulation]
+        [--policies greedy,gtsp,gtsp-mpc] [--weights 40,200] [--seed 0] [--out runs/manipulation]
     python benchmarks/manipulation.py --figure docs/images/gtsp-mpc.png
 
 Prints one row of a Markdown table for each suite and policy: means with bootstrap intervals of
-95 %, the share of episodes with everything done, the paired difference to the first policy, and
+95 %, the fraction of episodes with everything done, the paired difference to the first policy, and
 the longest decision of an episode: the median over the episodes, and the longest of all. With
-``--prices`` `gtsp-mpc` runs at these prices of work too. Below the table it names every episode in
+``--weights`` `gtsp-mpc` runs at these weights of work too. Below the table it names each episode in
 which something was left undone. With ``--out`` the episodes are kept, a folder for each suite, and
 a run that was interrupted goes on. With ``--figure`` it only draws what `gtsp-mpc` plans first in
 some scenes.
@@ -43,16 +43,16 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--only", default="", help="a suite, or all whose names hold this text")
     parser.add_argument("--policies", default="greedy,gtsp,gtsp-mpc")
-    parser.add_argument("--prices", default="", help="of work, for gtsp-mpc, besides its own")
-    parser.add_argument("--figure", default="", help="draw planned sequences to this file instead")
+    parser.add_argument("--weights", default="", help="of work, for gtsp-mpc, besides its own")
+    parser.add_argument("--figure", default="", help="draw planned orders to this file instead")
     parser.add_argument("--out", default="", help="keep the episodes in this folder")
     options = parser.parse_args()
     if options.figure:
         figure(options.figure, options.seed)
         return
     specs = [PolicySpec(name, name) for name in options.policies.split(",")]
-    for price in options.prices.split(",") if options.prices else ():
-        specs.append(PolicySpec(f"gtsp-mpc-{price}", "gtsp-mpc", {"work_weight": float(price)}))
+    for weight in options.weights.split(",") if options.weights else ():
+        specs.append(PolicySpec(f"gtsp-mpc-{weight}", "gtsp-mpc", {"work_weight": float(weight)}))
     policies = [spec.label for spec in specs]
     columns = "suite policy episodes done S E I E-first I-first decision,s".split()
     print(f"| {' | '.join(columns)} |\n|{'---|' * len(columns)}", flush=True)

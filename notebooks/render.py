@@ -37,8 +37,8 @@ DOCS = HERE.parent / "docs"
 ORDER = (
     "first_plan",
     "your_own_planner",
-    "price_of_pushing",
-    "sequencing_and_pushing",
+    "cost_of_pushing",
+    "gtsp_and_pushing",
     "learned_against_classical",
     "planner_in_a_control_loop",
 )

@@ -31,6 +31,7 @@ from pushplan.world.policy_abilities import (
     LogsPlans,
     PlansBesideDriving,
     ShowsPlan,
+    WarmsUp,
 )
 from pushplan.world.protocols import Controller, Planner, Policy
 from pushplan.world.robot import Drive, RobotModel
@@ -63,7 +64,7 @@ __all__ = [
     "Movables", "NavigationGoal", "Plan", "PlanResult", "PlanStats", "PlanStatus", "Planner",
     "PlansBesideDriving", "Policy", "PushplanError", "Receptacle", "RobotModel", "ScenarioError",
     "SchemaError", "ShowsPlan", "StaticMap", "Stop", "StopCheck", "SubTask", "Twist",
-    "UnknownNameError", "WheelSpeeds", "World", "area_clearing_robot", "box_delivery_robot",
-    "jackal", "load_world", "maze_robot", "save_world", "stream", "turtlebot3_burger",
-    "world_from_dict", "world_to_dict",
+    "UnknownNameError", "WarmsUp", "WheelSpeeds", "World", "area_clearing_robot",
+    "box_delivery_robot", "jackal", "load_world", "maze_robot", "save_world", "stream",
+    "turtlebot3_burger", "world_from_dict", "world_to_dict",
 ]  # fmt: skip

@@ -1,8 +1,8 @@
-"""The floor of every suite: what policies score that know nothing or next to nothing.
+"""Measure the baselines of every suite: the scores of policies that know nothing or little.
 
 Usage::
 
-    python benchmarks/floors.py [--episodes 10] [--workers 2] [--only box-delivery]
+    python benchmarks/baselines.py [--episodes 10] [--workers 2] [--only box-delivery]
 
 `random` on every suite, `straight` where the robot has a goal, `greedy` where the objects have one.
 Prints a table in Markdown: means over the episodes.
