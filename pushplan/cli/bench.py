@@ -7,7 +7,7 @@ import os
 import sys
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from typing import TYPE_CHECKING, Any
 
 from pushplan.cli import paper
@@ -20,6 +20,7 @@ from pushplan.cli.common import (
     say,
     whole,
 )
+from pushplan.cli.kernel_progress import kernel_progress
 
 if TYPE_CHECKING:
     from pushplan.evaluation import ResultRow, Results
@@ -99,7 +100,7 @@ def run(options: argparse.Namespace) -> int:
         return _refuse(wrong)
     out = options.out or os.path.join("runs", options.suite)
     comparison = None
-    with _progress() as progress:
+    with _progress(options.policies or "") as progress:
         try:
             if options.suite == paper.SUITE:
                 comparison = paper.compare(options, out, progress)
@@ -143,11 +144,21 @@ def _refuse(message: str) -> int:
 
 
 @contextmanager
-def _progress() -> Iterator[_Progress]:
-    """A bar where there is a terminal, else a line now and then."""
-    if not sys.stderr.isatty():
-        yield _Lines()
-        return
+def _progress(policies: str) -> Iterator[_Progress]:
+    """Kernels while they are compiled; then a bar where there is a terminal, else lines."""
+    with ExitStack() as running, ExitStack() as compiling:
+        compiling.enter_context(kernel_progress(*policies.split(",")))
+        show = _bar(running) if sys.stderr.isatty() else _Lines()
+
+        def update(done: int, total: int, row: ResultRow | None) -> None:
+            compiling.close()
+            show(done, total, row)
+
+        yield update
+
+
+def _bar(running: ExitStack) -> _Progress:
+    """A bar that appears with the first update."""
     from rich.console import Console
     from rich.progress import (
         BarColumn,
@@ -162,21 +173,23 @@ def _progress() -> Iterator[_Progress]:
         BarColumn(),
         MofNCompleteColumn(),
         TimeElapsedColumn(),
-        TextColumn("left"),
+        TextColumn("so far,"),
         TimeRemainingColumn(),
-        TextColumn("{task.description}"),
+        TextColumn("left {task.description}"),
     )
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task("", total=None)
-        failed = 0
+    bar = Progress(*columns, console=Console(stderr=True), transient=True)
+    task = bar.add_task("", total=None)
+    failed = 0
 
-        def update(done: int, total: int, row: ResultRow | None) -> None:
-            nonlocal failed
-            failed += row is not None and row.failed
-            text = f"[red]{failed} failed" if failed else ""
-            bar.update(task, completed=done, total=total, description=text)
+    def update(done: int, total: int, row: ResultRow | None) -> None:
+        nonlocal failed
+        if not bar.live.is_started:
+            running.enter_context(bar)
+        failed += row is not None and row.failed
+        text = f"[red]{failed} failed" if failed else ""
+        bar.update(task, completed=done, total=total, description=text)
 
-        yield update
+    return update
 
 
 class _Lines:

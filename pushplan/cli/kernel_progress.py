@@ -9,8 +9,6 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from importlib.resources import files
 
-from pushplan.compiled import watching
-
 
 @dataclass
 class KernelProgress:
@@ -40,30 +38,34 @@ class KernelProgress:
 
 @contextmanager
 def kernel_progress(*names: str) -> Iterator[KernelProgress]:
-    """Count kernels, on a line of the terminal if there is one.
+    """Count kernels: on one line of a terminal, or once in words in a log.
 
     Args:
         names: policies that are to be warmed up and nothing else.
     """
+    from pushplan.compiled import watching  # Numba is loaded only where kernels are
+
     text = files("pushplan.cli").joinpath("kernel_names.json").read_text(encoding="utf-8")
     known = json.loads(text)
     expected = [set(known.get(name, ())) for name in names]
     whole = frozenset(set().union(*expected)) if all(expected) else frozenset()
     progress = KernelProgress(whole - _READY)
-    shown = sys.stderr.isatty()
+    terminal = sys.stderr.isatty()
 
     def watch(kernel: str, loaded: bool) -> None:
         progress(kernel, loaded)
         _READY.add(kernel)
-        if shown and not loaded:
+        if terminal and not loaded:
             sys.stderr.write(f"\r\033[K{progress}")
             sys.stderr.flush()
+        elif not loaded and progress.compiled == 1:
+            sys.stderr.write("compiling kernels; later runs find them in the cache\n")
 
     try:
         with watching(watch):
             yield progress
     finally:
-        if shown:
+        if terminal and progress.compiled:
             sys.stderr.write("\r\033[K")
 
 

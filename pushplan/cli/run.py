@@ -13,6 +13,7 @@ from pushplan.cli.common import (
     milliseconds,
     say,
 )
+from pushplan.cli.kernel_progress import kernel_progress
 from pushplan.cli.scenario_options import add_scenario_options, scenario_of
 
 if TYPE_CHECKING:
@@ -60,7 +61,8 @@ def run(options: argparse.Namespace) -> int:
     settings = JobSettings(observation=options.observation)
     mode = "human" if options.live else None
     env = settings.environment(scenario, policy, render_mode=mode)
-    dry_run(Job(spec, scenario), settings)  # so that no timing holds loading and compiling
+    with kernel_progress(spec.label):
+        dry_run(Job(spec, scenario), settings)  # so that no timing holds loading and compiling
     try:
         episode = run_episode(
             env, policy, scenario, observer=camera, latency_factor=options.latency

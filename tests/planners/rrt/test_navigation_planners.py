@@ -45,7 +45,12 @@ def generator(seed: int) -> np.random.Generator:
     return np.random.default_rng(seed)
 
 
-@pytest.mark.parametrize("name", planner_names(open_water=False))
+WARM = [
+    pytest.param(name, marks=pytest.mark.warm(name)) for name in planner_names(open_water=False)
+]
+
+
+@pytest.mark.parametrize("name", WARM)
 class TestEveryPlanner:
     def test_it_is_a_planner(self, name):
         assert isinstance(make_planner(name), Planner)
