@@ -16,9 +16,9 @@ from pushplan.world.checks import BoolArray, FloatArray, IntArray, frozen
 ARC_STEP = math.pi / 36.0
 """Turn per corner where a round outline becomes a polygon [rad]; an arc gets 0.06 % longer."""
 SMALL_RADIUS = 1e-3
-"""Arcs below this share of the map's diagonal get fewer corners: the same error in metres."""
+"""Arcs below this fraction of the map's diagonal get fewer corners: the same error in metres."""
 GAP = 1e-7
-"""Share of the map's diagonal by which paths stay off obstacles, so that touching ones close."""
+"""Fraction of the map's diagonal by which paths stay off obstacles, so that touching ones close."""
 
 
 class Contours(NamedTuple):
