@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from typing import Any
 
 from numba.core.registry import CPUDispatcher
-from numba.core.types import unliteral
+from numba.core.types.misc import unliteral
 
 from pushplan.compiled.cache import KernelCache
 from pushplan.compiled.pipeline import InnerCompiler, OuterCompiler

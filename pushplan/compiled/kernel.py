@@ -12,7 +12,6 @@ from numba.core import options
 from numpy.typing import NDArray
 
 from pushplan.compiled.dispatcher import KernelDispatcher
-from pushplan.world.checks import FloatArray
 
 _F = TypeVar("_F", bound=Callable[..., Any])
 _T = TypeVar("_T", bound=np.generic)
@@ -58,7 +57,7 @@ def _compiled(function: Callable[..., Any], *, allocates: bool, inline: bool) ->
 
 
 @kernel
-def copy_into(out: FloatArray, source: FloatArray) -> None:
+def copy_into(out: NDArray[_T], source: NDArray[_T]) -> None:
     """Copy an array, of one or two dimensions, into another of its shape."""
     for index in np.ndindex(source.shape):
         out[index] = source[index]

@@ -137,7 +137,7 @@ def _bodies(robot: RobotModel, shapes: _Shapes, static: StaticMap, gyration: flo
     movables = shapes.movables
     squares = [polygon_inertia(movables.outline(k)) for k in range(len(movables))]
     parts = static.convex_parts
-    vertices, offsets = map(owned, flatten(parts))
+    vertices, offsets = flatten(parts)
     boxes = [np.concatenate([part.min(axis=0), part.max(axis=0)]) for part in parts]
     return Bodies(
         robot_vertices=owned(robot.vertices),
@@ -148,7 +148,7 @@ def _bodies(robot: RobotModel, shapes: _Shapes, static: StaticMap, gyration: flo
         radii=owned(movables.radii),
         inverse_masses=1.0 / movables.masses,
         inverse_gyration=1.0 / (np.array(squares) * gyration**2) if squares else np.zeros(0),
-        static_vertices=vertices,
-        static_offsets=offsets,
+        static_vertices=owned(vertices),
+        static_offsets=owned(offsets),
         static_boxes=np.array(boxes).reshape(-1, 4),
     )

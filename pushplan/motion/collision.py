@@ -43,16 +43,18 @@ def footprint(robot: RobotModel, margin: float = 0.0) -> Footprint:
     for part in robot.parts:
         grown = Polygon(part).buffer(margin, join_style="mitre")
         parts.append(convex_outline("footprint", np.asarray(grown.exterior.coords)[:-1]))
-    vertices, offsets = map(owned, flatten(parts))
-    return Footprint(vertices, offsets, float(np.hypot(vertices[:, 0], vertices[:, 1]).max()))
+    vertices, offsets = flatten(parts)
+    radius = float(np.hypot(vertices[:, 0], vertices[:, 1]).max())
+    return Footprint(owned(vertices), owned(offsets), radius)
 
 
 def obstacles(static: StaticMap, outlines: Sequence[FloatArray] = ()) -> ConvexObstacles:
     """Everything static, and further convex outlines in the world frame."""
     parts = (*static.convex_parts, *outlines)
-    vertices, offsets = map(owned, flatten(parts))
-    boxes = [np.concatenate([part.min(axis=0), part.max(axis=0)]) for part in parts]
-    return ConvexObstacles(vertices, offsets, np.array(boxes).reshape(-1, 4), owned(static.bounds))
+    vertices, offsets = flatten(parts)
+    corners = [np.concatenate([part.min(axis=0), part.max(axis=0)]) for part in parts]
+    boxes = np.array(corners).reshape(-1, 4)
+    return ConvexObstacles(owned(vertices), owned(offsets), boxes, owned(static.bounds))
 
 
 @kernel
