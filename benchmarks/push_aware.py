@@ -211,7 +211,7 @@ def anytime(names: list[str], count: int, seed: int, longest: float, clock: Cloc
             say(f"| `{name}` | `{label}` | {' | '.join(cells)} |")
     say(f"\nCost after a time, over that after {longest:g} s, and its gap to the lower bound:\n")
     heads = " | ".join(f"{1e3 * budget:.0f} ms" for budget in BUDGETS)
-    say(f"| suite | | {heads} | gap | expansions/s | repairs and edges/s |")
+    say(f"| suite | | {heads} | gap | expansions/s | shortcuts and edges/s |")
     say("|---|---|" + "---|" * (len(BUDGETS) + 3))
     for name in names:
         planner.plan(scenes[name][0], stop=Until(1.0, clock))  # makes the table of this map

@@ -1,7 +1,7 @@
 """Compiled functions: the one decorator, its cache on disk, and how kernels are loaded ahead."""
 
+from pushplan.compiled.by_type import KernelByType
 from pushplan.compiled.dispatcher import watching
-from pushplan.compiled.fingerprint import add_type_kernels
-from pushplan.compiled.kernel import copy_into, kernel
+from pushplan.compiled.kernel import copy_into, kernel, owned
 
-__all__ = ["add_type_kernels", "copy_into", "kernel", "watching"]
+__all__ = ["KernelByType", "copy_into", "kernel", "owned", "watching"]

@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from typing import Any
 
 from numba.core.registry import CPUDispatcher
-from numba.core.types import unliteral
+from numba.core.types.misc import unliteral
 
 from pushplan.compiled.cache import KernelCache
 from pushplan.compiled.pipeline import InnerCompiler, OuterCompiler
@@ -83,10 +83,10 @@ class KernelDispatcher(_CachedDispatcher):
 
     def get_call_template(self, args: Any, kws: Any) -> Any:
         """Tell a caller among the kernels what it returns."""
+        args = tuple(unliteral(kind) for kind in args)  # not once more for each constant
         if self.is_compiling:  # it calls itself
             return super().get_call_template(args, kws)
-        args = [unliteral(arg) for arg in args]  # no form of its own for a constant
-        return self.inner.get_call_template(args, {key: unliteral(kws[key]) for key in kws})
+        return self.inner.get_call_template(args, kws)
 
     def get_overload(self, sig: Any) -> Any:
         """Find the code that a caller among the kernels links in."""

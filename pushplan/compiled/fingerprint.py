@@ -18,7 +18,7 @@ _TYPE_KERNELS: dict[type, tuple[Any, ...]] = {}
 
 def add_type_kernels(kind: type, *kernels: Any) -> None:
     """Say that kernels which take a type call others that are chosen by it."""
-    _TYPE_KERNELS[kind] = kernels
+    _TYPE_KERNELS[kind] = (*_TYPE_KERNELS.get(kind, ()), *kernels)
 
 
 def fingerprint(kernel: Any, signature: tuple[Any, ...], target: Any, form: str) -> str:
@@ -33,12 +33,20 @@ def fingerprint(kernel: Any, signature: tuple[Any, ...], target: Any, form: str)
     versions = (numba.__version__, llvmlite.__version__, sys.version_info[:3])
     by_type = [
         source_digest(called)
-        for kind in signature
-        for called in _TYPE_KERNELS.get(getattr(kind, "instance_class", object), ())
+        for kind in _named_tuples(signature)
+        for called in _TYPE_KERNELS.get(kind, ())
     ]
     options = sorted(kernel.targetoptions.items())
     parts = (form, versions, target.magic_tuple(), options, signature, by_type)
     return _digest([source_digest(kernel), repr(parts)])
+
+
+def _named_tuples(kinds: tuple[Any, ...]) -> Iterator[type]:
+    """Classes of the named tuples among the types of arguments, and of those inside them."""
+    for kind in kinds:
+        if hasattr(kind, "instance_class"):
+            yield kind.instance_class
+            yield from _named_tuples(kind.types)
 
 
 @functools.cache

@@ -9,11 +9,12 @@ from typing import Any, TypeVar, overload
 import numpy as np
 from numba import config
 from numba.core import options
+from numpy.typing import NDArray
 
 from pushplan.compiled.dispatcher import KernelDispatcher
-from pushplan.world.checks import FloatArray
 
 _F = TypeVar("_F", bound=Callable[..., Any])
+_T = TypeVar("_T", bound=np.generic)
 
 _COUNTS_REFERENCES = hasattr(getattr(options, "DefaultOptions", None), "_nrt")
 
@@ -56,7 +57,13 @@ def _compiled(function: Callable[..., Any], *, allocates: bool, inline: bool) ->
 
 
 @kernel
-def copy_into(out: FloatArray, source: FloatArray) -> None:
+def copy_into(out: NDArray[_T], source: NDArray[_T]) -> None:
     """Copy an array, of one or two dimensions, into another of its shape."""
     for index in np.ndindex(source.shape):
         out[index] = source[index]
+
+
+def owned(values: NDArray[_T]) -> NDArray[_T]:
+    """Give an array as kernels take it: C-contiguous and writable; a copy of one that is not."""
+    values = np.ascontiguousarray(values)
+    return values if values.flags.writeable else values.copy()

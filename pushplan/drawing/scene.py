@@ -20,7 +20,7 @@ LONG, LONGEST = 2.5, 1.6
 """Of a world whose longer side is more than `LONG` times the shorter one, a picture shows
 `LONGEST` times the shorter side by default."""
 RIM = 0.02
-"""Share of the longer side that walls outside the bounds add to a picture on each side."""
+"""Fraction of the longer side that walls outside the bounds add to a picture on each side."""
 
 
 def draw_world(

@@ -152,7 +152,7 @@ def _boxes(
 
 
 def _planning_time(run: RunRecord) -> tuple[str, Figure] | None:
-    """Share of planning calls that took at most so long."""
+    """Fraction of planning calls that took at most so long."""
     if not values_of(run.rows, "plan_time_median_s"):
         return None
 

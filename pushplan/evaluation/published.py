@@ -17,7 +17,7 @@ SETTINGS = {"paper": "paper", "robot": "paper, physical robot", "code": "the pap
 """Where a row comes from -> words."""
 
 ENOUGH = 0.9
-"""Share of successes, or S_manip, from which on a value of I is held against another."""
+"""Fraction of successes, or S_manip, from which on a value of I is held against another."""
 
 
 @dataclass(frozen=True)

@@ -101,7 +101,7 @@ def bootstrap_interval(
 
 
 def wilson(successes: int, count: int, *, z: float = 1.959963984540054) -> Proportion:
-    """Share of successes with Wilson's score interval (JASA 22, 1927).
+    """Fraction of successes with Wilson's score interval (JASA 22, 1927).
 
     Raises:
         InvalidInputError: if there are more successes than trials, or no trial.

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pushplan.compiled import kernel
+from pushplan.compiled import copy_into, kernel
 from pushplan.geometry.obstacles import Obstacles, obstacle_distance, obstacles_of
 from pushplan.world import StaticMap
 from pushplan.world.checks import BoolArray, FloatArray, IntArray, frozen
@@ -16,9 +16,9 @@ from pushplan.world.checks import BoolArray, FloatArray, IntArray, frozen
 ARC_STEP = math.pi / 36.0
 """Turn per corner where a round outline becomes a polygon [rad]; an arc gets 0.06 % longer."""
 SMALL_RADIUS = 1e-3
-"""Arcs below this share of the map's diagonal get fewer corners: the same error in metres."""
+"""Arcs below this fraction of the map's diagonal get fewer corners: the same error in metres."""
 GAP = 1e-7
-"""Share of the map's diagonal by which paths stay off obstacles, so that touching ones close."""
+"""Fraction of the map's diagonal by which paths stay off obstacles, so that touching ones close."""
 
 
 class Contours(NamedTuple):
@@ -152,12 +152,12 @@ def segment_crossings(first: FloatArray, second: FloatArray) -> FloatArray:
                 continue
             if count == found.shape[0]:
                 larger = np.empty((2 * count, 2))
-                larger[:count] = found
+                copy_into(larger[:count], found)
                 found = larger
             found[count, 0] = px + t * dx
             found[count, 1] = py + t * dy
             count += 1
-    return found[:count].copy()
+    return found[:count]
 
 
 def box_edges(box: FloatArray) -> FloatArray:

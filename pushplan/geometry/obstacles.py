@@ -49,7 +49,7 @@ def obstacles_of(static: StaticMap, clearance: float = 0.0) -> Obstacles:
     return Obstacles(vertices, offsets, frozen(radii), frozen(boxes))
 
 
-@kernel(allocates=True)
+@kernel
 def core_distance(x: float, y: float, vertices: FloatArray, first: int, last: int) -> float:
     """Signed distance [m] of a point to the core ``vertices[first:last]``, negative inside."""
     best_sq, inside = math.inf, last - first > 2
@@ -63,7 +63,7 @@ def core_distance(x: float, y: float, vertices: FloatArray, first: int, last: in
     return -distance if inside else distance
 
 
-@kernel(allocates=True)
+@kernel
 def obstacle_distance(
     x: float, y: float, vertices: FloatArray, offsets: IntArray, radii: FloatArray
 ) -> float:
@@ -78,7 +78,7 @@ def obstacle_distance(
     return best
 
 
-@kernel(allocates=True)
+@kernel
 def _segments_closer(
     px: float,
     py: float,
@@ -107,7 +107,7 @@ def _segments_closer(
     )
 
 
-@kernel(allocates=True)
+@kernel
 def line_of_sight(
     px: float,
     py: float,

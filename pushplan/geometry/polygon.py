@@ -6,7 +6,7 @@ from pushplan.compiled import kernel
 from pushplan.world.checks import FloatArray
 
 
-@kernel(allocates=True)
+@kernel
 def polygon_area(v: FloatArray) -> float:
     """Shoelace area [m²] of the polygon with corners ``v`` (N, 2) [m], positive if CCW."""
     total = 0.0
@@ -19,7 +19,7 @@ def polygon_area(v: FloatArray) -> float:
     return 0.5 * total
 
 
-@kernel(allocates=True)
+@kernel
 def polygon_centroid(v: FloatArray) -> tuple[float, float]:
     """Centre of area x, y [m] of the polygon with corners ``v`` (N, 2) [m].
 
@@ -43,7 +43,7 @@ def polygon_centroid(v: FloatArray) -> tuple[float, float]:
     return x0 + mx / (3.0 * twice), y0 + my / (3.0 * twice)
 
 
-@kernel(allocates=True)
+@kernel
 def polygon_inertia(v: FloatArray) -> float:
     """Polar second moment about the centroid per unit mass [m²] of a uniform polygon.
 
@@ -69,7 +69,7 @@ def polygon_inertia(v: FloatArray) -> float:
     return moment / (6.0 * twice)
 
 
-@kernel(allocates=True)
+@kernel
 def point_in_polygon(x: float, y: float, v: FloatArray) -> bool:
     """Whether the point lies inside the simple polygon ``v`` (N, 2) [m], by crossing number.
 

@@ -101,7 +101,7 @@ def outside_area(target: Target, points: FloatArray) -> BoolArray:
     return outside
 
 
-@kernel(allocates=True)
+@kernel
 def _nearest_in_polygon(
     x: float, y: float, corners: FloatArray, first: int, last: int
 ) -> tuple[float, float]:
@@ -126,7 +126,7 @@ def _nearest_in_polygon(
     return bx, by
 
 
-@kernel(allocates=True)
+@kernel
 def nearest_in_region(k: int, x: float, y: float, regions: Regions) -> tuple[float, float]:
     """Point of region ``k`` that is nearest to x, y [m]: the point itself if it is inside."""
     discs, lines = regions.discs.shape[0], regions.lines.shape[0]

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pushplan.compiled import kernel
+from pushplan.compiled import kernel, owned
 from pushplan.geometry.contours import (
     Contours,
     box_edges,
@@ -72,7 +72,7 @@ class _Graph(NamedTuple):
 def _graph_of(static: StaticMap, clearance: float) -> _Graph:
     shapes, gap = obstacles_of(static, clearance), gap_of(static)
     every = contours_of(static, clearance)
-    keep = free_points(every.corners, shapes, static.bounds, gap)
+    keep = free_points(owned(every.corners), shapes, static.bounds, gap)
     kept = Contours(*(frozen(np.ascontiguousarray(values[keep])) for values in every))
     pairs, lengths = visible_pairs(kept.corners, kept.incoming, kept.outgoing, shapes, gap)
     tails = np.concatenate([pairs[:, 0], pairs[:, 1]])

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pushplan.compiled import kernel
+from pushplan.compiled import copy_into, kernel
 from pushplan.geometry.obstacles import Obstacles, line_of_sight
 from pushplan.geometry.regions import Regions, nearest_in_region
 from pushplan.world.checks import FloatArray, IntArray
@@ -34,7 +34,7 @@ class Nodes(NamedTuple):
     distances: FloatArray
 
 
-@kernel(allocates=True, inline=True)
+@kernel(inline=True)
 def is_tangent(
     dx: float, dy: float, ix: float, iy: float, ox: float, oy: float, gap: float
 ) -> bool:
@@ -47,7 +47,7 @@ def is_tangent(
     return (before >= -gap and after <= gap) or (before <= gap and after >= -gap)
 
 
-@kernel(allocates=True)
+@kernel
 def _sees(px: float, py: float, qx: float, qy: float, obstacles: Obstacles, gap: float) -> bool:
     return bool(
         line_of_sight(
@@ -94,14 +94,14 @@ def visible_pairs(
             if count == lengths.shape[0]:
                 more_pairs = np.empty((2 * count, 2), dtype=np.int64)
                 more_lengths = np.empty(2 * count)
-                more_pairs[:count] = pairs
-                more_lengths[:count] = lengths
+                copy_into(more_pairs[:count], pairs)
+                copy_into(more_lengths[:count], lengths)
                 pairs, lengths = more_pairs, more_lengths
             pairs[count, 0] = i
             pairs[count, 1] = j
             lengths[count] = math.hypot(dx, dy)
             count += 1
-    return pairs[:count].copy(), lengths[:count].copy()
+    return pairs[:count], lengths[:count]
 
 
 @kernel(allocates=True)
@@ -133,7 +133,7 @@ def relax(
                 parents[other] = node
 
 
-@kernel(allocates=True)
+@kernel
 def goal_leg(
     x: float,
     y: float,
@@ -158,7 +158,7 @@ def goal_leg(
     return best, bx, by
 
 
-@kernel(allocates=True)
+@kernel
 def node_leg(
     x: float,
     y: float,

@@ -2,18 +2,15 @@
 
 A compiled interaction model is a named tuple with the fields ``inverse_masses`` (K,), ``radii``
 (K,) and ``tests`` (1,), a count of its work that stands for time without a clock, and a step that
-`register_advance` makes known. `QuasiStatic.compiled` makes one; `compile_interaction` makes one
-of any other model.
+`advance_objects.add` makes known, a kernel that makes no arrays. `QuasiStatic.compiled` makes one;
+`compile_interaction` makes one of any other model.
 """
 
 from __future__ import annotations
 
-from typing import Any, Protocol, cast, runtime_checkable
+from typing import Any, Protocol, runtime_checkable
 
-from numba import types
-from numba.extending import overload
-
-from pushplan.compiled import add_type_kernels
+from pushplan.compiled import KernelByType
 from pushplan.interaction.model import InteractionModel
 from pushplan.world import World
 from pushplan.world.checks import FloatArray
@@ -28,6 +25,7 @@ class CompiledInteraction(InteractionModel, Protocol):
         ...
 
 
+@KernelByType
 def advance_objects(
     model: Any, robot_from: FloatArray, robot_to: FloatArray, poses: FloatArray, moved: FloatArray
 ) -> bool:
@@ -43,22 +41,4 @@ def advance_objects(
     Returns:
         Whether the robot gets there; False where it jams.
     """
-    raise NotImplementedError(f"no step is known for a {type(model).__name__}")
-
-
-def register_advance(kind: type, step: Any) -> None:
-    """Teach `advance_objects` a type of model.
-
-    Args:
-        kind: a named tuple class of arrays, numbers and such tuples.
-        step: compiled function with the arguments of `advance_objects`; it makes no arrays.
-    """
-    add_type_kernels(kind, step)
-
-    @overload(advance_objects, jit_options=cast(Any, {"_nrt": False}))
-    def _advance(model, robot_from, robot_to, poses, moved):  # type: ignore[no-untyped-def]
-        if isinstance(model, types.NamedTuple) and model.instance_class is kind:
-            return lambda model, robot_from, robot_to, poses, moved: step(
-                model, robot_from, robot_to, poses, moved
-            )
-        return None
+    raise NotImplementedError

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from pushplan.compiled import owned
 from pushplan.interaction.ice_bodies import IceBodies, IceProblem, IceSettings, ice_problem
 from pushplan.interaction.ice_contacts import sweep_ice
 from pushplan.interaction.model import Interaction
@@ -68,7 +69,7 @@ class IceInteraction:
             bodies.vertices,
             bodies.offsets,
             bodies.radii,
-            world.movables.masses,
+            owned(world.movables.masses),
             bodies.inverse_gyration,
         )
 
@@ -90,7 +91,7 @@ class IceInteraction:
 
     def sweep(self, world: World, path: ArrayLike) -> Interaction:
         """Predict the motion of every object; see `InteractionModel.sweep`."""
-        robot_path: FloatArray = array("path", path, (None, 3))
+        robot_path: FloatArray = owned(array("path", path, (None, 3)))
         if len(robot_path) == 0:
             raise InvalidInputError("path must hold at least one pose, got none")
         poses = world.movables.poses.copy()

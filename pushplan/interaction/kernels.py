@@ -271,7 +271,7 @@ def advance(
     """Drive the robot to a near pose, pushing what is in the way; False where it jams."""
     dx, dy = robot_to[0] - robot_from[0], robot_to[1] - robot_from[1]
     turn = robot_to[2] - robot_from[2]
-    turn -= 2.0 * np.pi * np.round(turn / (2.0 * np.pi))  # the short way
+    turn -= 2.0 * np.pi * np.rint(turn / (2.0 * np.pi))  # the short way
     motion = np.sqrt(dx * dx + dy * dy) + abs(turn) * bodies.robot_radius
     mid_x, mid_y = robot_from[0] + 0.5 * dx, robot_from[1] + 0.5 * dy
     reach = bodies.robot_radius + 0.5 * np.sqrt(dx * dx + dy * dy)
@@ -333,12 +333,12 @@ def sweep_path(
     scratch = make_scratch(bodies)
     lengths = np.zeros(poses.shape[0])
     jammed = -1
-    out[0] = poses
+    copy_into(out[0], poses)
     for n in range(1, path.shape[0]):
         if jammed < 0 and (
             robot_held(path[n], bodies, settings, scratch)
             or not advance(path[n - 1], path[n], poses, lengths, bodies, settings, scratch)
         ):
             jammed = n
-        out[n] = poses
+        copy_into(out[n], poses)
     return jammed

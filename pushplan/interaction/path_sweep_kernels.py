@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pushplan.compiled import kernel
+from pushplan.compiled import copy_into, kernel
 from pushplan.interaction.ice_bodies import IceBodies, IceSettings, ice_problem, select_bodies
 from pushplan.interaction.ice_contacts import sweep_ice
 from pushplan.world.checks import FloatArray
@@ -50,8 +50,8 @@ def sweep_near(
     sweep_ice(path, here, ice_problem(part, settings), moved)
     add_works(moved, part.masses, works)
     for n in range(path.shape[0]):
-        out[n] = poses
+        copy_into(out[n], poses)
         for i in range(count):
-            out[n, chosen[i]] = moved[n, i]
+            copy_into(out[n, chosen[i]], moved[n, i])
     for i in range(count):
-        poses[chosen[i]] = here[i]
+        copy_into(poses[chosen[i]], here[i])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Protocol
 
+from pushplan.compiled import owned
 from pushplan.interaction.ice import IceInteraction
 from pushplan.interaction.kernels import sweep_path
 from pushplan.interaction.model import InteractionModel
@@ -52,7 +53,7 @@ class QuasiStaticSweeper:
 
     def __init__(self, world: World, interaction: QuasiStatic) -> None:
         self._bodies, self._settings = interaction.bodies(world), interaction.settings(world)
-        self._masses = world.movables.masses
+        self._masses = owned(world.movables.masses)
 
     def run(self, path: FloatArray, poses: FloatArray, out: FloatArray, works: FloatArray) -> bool:
         """See `PathSweeper`."""

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from pushplan.compiled import owned
 from pushplan.geometry import polygon_inertia
 from pushplan.interaction.kernels import Bodies, Settings, make_scratch, sweep_path
 from pushplan.interaction.model import Interaction
@@ -87,7 +88,7 @@ class QuasiStatic:
 
     def sweep(self, world: World, path: ArrayLike) -> Interaction:
         """Predict the motion of every object; see `InteractionModel.sweep`."""
-        robot_path: FloatArray = array("path", path, (None, 3))
+        robot_path: FloatArray = owned(array("path", path, (None, 3)))
         if len(robot_path) == 0:
             raise InvalidInputError("path must hold at least one pose, got none")
         poses = world.movables.poses.copy()
@@ -139,15 +140,15 @@ def _bodies(robot: RobotModel, shapes: _Shapes, static: StaticMap, gyration: flo
     vertices, offsets = flatten(parts)
     boxes = [np.concatenate([part.min(axis=0), part.max(axis=0)]) for part in parts]
     return Bodies(
-        robot_vertices=robot.vertices,
-        robot_offsets=robot.offsets,
+        robot_vertices=owned(robot.vertices),
+        robot_offsets=owned(robot.offsets),
         robot_radius=robot.circumscribed_radius,
-        vertices=movables.vertices,
-        offsets=movables.offsets,
-        radii=movables.radii,
+        vertices=owned(movables.vertices),
+        offsets=owned(movables.offsets),
+        radii=owned(movables.radii),
         inverse_masses=1.0 / movables.masses,
         inverse_gyration=1.0 / (np.array(squares) * gyration**2) if squares else np.zeros(0),
-        static_vertices=vertices,
-        static_offsets=offsets,
+        static_vertices=owned(vertices),
+        static_offsets=owned(offsets),
         static_boxes=np.array(boxes).reshape(-1, 4),
     )

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from pushplan.compiled import kernel
-from pushplan.interaction.advance import register_advance
+from pushplan.interaction.advance import advance_objects
 from pushplan.interaction.kernels import Bodies, Scratch, Settings, advance
 from pushplan.world.checks import FloatArray, IntArray
 
@@ -35,4 +35,4 @@ def _step(
     )
 
 
-register_advance(QuasiStaticContacts, _step)
+advance_objects.add(QuasiStaticContacts, _step)

@@ -9,8 +9,8 @@ import numba.experimental.function_type  # noqa: F401  (lets kernels take functi
 import numpy as np
 from numba import types
 
-from pushplan.compiled import copy_into, kernel
-from pushplan.interaction.advance import CompiledInteraction, register_advance
+from pushplan.compiled import copy_into, kernel, owned
+from pushplan.interaction.advance import CompiledInteraction, advance_objects
 from pushplan.interaction.model import InteractionModel
 from pushplan.world import World
 from pushplan.world.checks import FloatArray, IntArray
@@ -93,7 +93,7 @@ def _step(
     return True
 
 
-register_advance(SweptContacts, _step)
+advance_objects.add(SweptContacts, _step)
 
 
 def compile_interaction(model: InteractionModel, world: World) -> Any:
@@ -111,5 +111,5 @@ def compile_interaction(model: InteractionModel, world: World) -> Any:
     call, objects = SweepCall(model, world), world.movables
     tests = np.zeros(1, np.int64)
     return SweptContacts(
-        1.0 / objects.masses, objects.radii, tests, call, call.path, call.poses, call.moved
+        1.0 / objects.masses, owned(objects.radii), tests, call, call.path, call.poses, call.moved
     )

@@ -88,7 +88,7 @@ def sweep_cost(
         dx = path.poses[n, 0] - path.poses[n - 1, 0]
         dy = path.poses[n, 1] - path.poses[n - 1, 1]
         path.lengths[n] = path.lengths[n - 1] + np.sqrt(dx * dx + dy * dy)
-        path.objects[n] = path.objects[n - 1]
+        copy_into(path.objects[n], path.objects[n - 1])
         moved[:] = 0.0
         free = advance_objects(contacts, path.poses[n - 1], path.poses[n], path.objects[n], moved)
         path.works[n] = path.works[n - 1] + work_of(moved, contacts.inverse_masses)
@@ -101,7 +101,7 @@ def sweep_cost(
     return cost
 
 
-@kernel(allocates=True)
+@kernel
 def lay_out(
     start: FloatArray,  # (3,) first pose
     arcs: FloatArray,  # (E, 2) length [m] and curvature [1/m]
@@ -109,7 +109,7 @@ def lay_out(
     problem: PathProblem,
 ) -> int:
     """Write the poses of arcs into a path, up to the goal; returns their number, 0: no room."""
-    path.poses[0] = start
+    copy_into(path.poses[0], start)
     path.curvatures[0] = 0.0
     found = sample_pieces(start, arcs, problem.spacing, path.poses[1:], path.curvatures[1:])
     if found < 0:

@@ -36,8 +36,11 @@ def _cell_weights(
     for k in range(offsets.shape[0] - 1):
         corners = vertices[offsets[k] : offsets[k + 1]]
         far = reach[k]
-        x0, x1 = corners[:, 0].min() - far, corners[:, 0].max() + far
-        y0, y1 = corners[:, 1].min() - far, corners[:, 1].max() + far
+        x0, x1, y0, y1 = corners[0, 0], corners[0, 0], corners[0, 1], corners[0, 1]
+        for i in range(1, corners.shape[0]):
+            x0, x1 = min(x0, corners[i, 0]), max(x1, corners[i, 0])
+            y0, y1 = min(y0, corners[i, 1]), max(y1, corners[i, 1])
+        x0, x1, y0, y1 = x0 - far, x1 + far, y0 - far, y1 + far
         c0, c1 = int((x0 - origin[0]) / cell), int((x1 - origin[0]) / cell) + 1
         r0, r1 = int((y0 - origin[1]) / cell), int((y1 - origin[1]) / cell) + 1
         for r in range(max(r0, 0), min(r1, rows)):

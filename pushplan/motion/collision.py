@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from shapely import Polygon
 
-from pushplan.compiled import kernel
+from pushplan.compiled import kernel, owned
 from pushplan.geometry import convex_overlap
 from pushplan.geometry.transforms import transform_points
 from pushplan.world import RobotModel, StaticMap
@@ -38,21 +38,23 @@ class ConvexObstacles(NamedTuple):
 def footprint(robot: RobotModel, margin: float = 0.0) -> Footprint:
     """The robot's footprint, every part grown by ``margin`` [m] with sharp corners."""
     if margin == 0.0:
-        return Footprint(robot.vertices, robot.offsets, robot.circumscribed_radius)
+        return Footprint(owned(robot.vertices), owned(robot.offsets), robot.circumscribed_radius)
     parts = []
     for part in robot.parts:
         grown = Polygon(part).buffer(margin, join_style="mitre")
         parts.append(convex_outline("footprint", np.asarray(grown.exterior.coords)[:-1]))
     vertices, offsets = flatten(parts)
-    return Footprint(vertices, offsets, float(np.hypot(vertices[:, 0], vertices[:, 1]).max()))
+    radius = float(np.hypot(vertices[:, 0], vertices[:, 1]).max())
+    return Footprint(owned(vertices), owned(offsets), radius)
 
 
 def obstacles(static: StaticMap, outlines: Sequence[FloatArray] = ()) -> ConvexObstacles:
     """Everything static, and further convex outlines in the world frame."""
     parts = (*static.convex_parts, *outlines)
     vertices, offsets = flatten(parts)
-    boxes = [np.concatenate([part.min(axis=0), part.max(axis=0)]) for part in parts]
-    return ConvexObstacles(vertices, offsets, np.array(boxes).reshape(-1, 4), static.bounds)
+    corners = [np.concatenate([part.min(axis=0), part.max(axis=0)]) for part in parts]
+    boxes = np.array(corners).reshape(-1, 4)
+    return ConvexObstacles(owned(vertices), owned(offsets), boxes, owned(static.bounds))
 
 
 @kernel

@@ -106,7 +106,7 @@ def step_along(curvature: float, spacing: float) -> float:
     return min(spacing, MAX_TURN / max(abs(curvature), 1e-12))
 
 
-@kernel(allocates=True)
+@kernel
 def sample_pieces(
     start: FloatArray,  # (3,) pose at the beginning
     pieces: FloatArray,  # (P, 2) length [m] and curvature [1/m] of each arc
@@ -116,7 +116,7 @@ def sample_pieces(
 ) -> int:
     """Number of poses along arcs, without the start itself, or -1 if ``out`` is too short."""
     count = 0
-    here = start.copy()
+    here = start
     for i in range(pieces.shape[0]):
         length, curvature = pieces[i, 0], pieces[i, 1]
         if length < 1e-9:
@@ -128,5 +128,5 @@ def sample_pieces(
             along_arc(here, length * step / steps, curvature, out[count])
             curvatures[count] = curvature
             count += 1
-        here[:] = out[count - 1]
+        here = out[count - 1]
     return count

@@ -8,6 +8,7 @@ from functools import partial
 
 import numpy as np
 
+from pushplan.compiled import owned
 from pushplan.interaction import InteractionModel
 from pushplan.interaction.swept_step import SweptContacts, compile_interaction
 from pushplan.motion.arc_rollout import lay_out, sweep_cost
@@ -166,7 +167,7 @@ class PathImprover:
         steps = [length / step_along(bend, problem.spacing) for length, bend in arcs.tolist()]
         capacity = 3 * int(sum(steps) + len(arcs)) + 200
         path = make_swept_path(capacity, count)
-        used = lay_out(self.world.robot_pose, arcs, path, problem)
+        used = lay_out(owned(self.world.robot_pose), arcs, path, problem)
         assert used > 0  # there is room for three times as many poses
         if not free:
             shape = problem.footprint

@@ -64,7 +64,7 @@ def copy_rest(
     """Copy a path after its pose ``last``, with the whole turns of a new piece; the new size."""
     rest = poses.shape[0] - 1 - last
     # the new piece may end with whole turns more or less than the old one
-    turns = np.round((out[size - 1, 2] - poses[last, 2]) / (2.0 * np.pi))
+    turns = np.rint((out[size - 1, 2] - poses[last, 2]) / (2.0 * np.pi))
     copy_into(out[size : size + rest], poses[last + 1 :])
     copy_into(out_curvatures[size : size + rest], curvatures[last + 1 :])
     for n in range(size, size + rest):

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pushplan.compiled import kernel
+from pushplan.compiled import copy_into, kernel
 from pushplan.motion.arc_rollout import sweep_cost
 from pushplan.motion.collision import first_blocked
 from pushplan.motion.dubins import dubins, sample_pieces
@@ -49,7 +49,7 @@ def _new_end(
     return end
 
 
-@kernel(allocates=True)
+@kernel
 def _pick_piece(count: int, draw: FloatArray) -> tuple[int, int]:
     """First and last pose of the piece to replace: short pieces as often as long ones."""
     span = int(2 + (count - 2) * draw[0] * draw[0])
@@ -88,7 +88,7 @@ def _propose(
         displace(path.poses[(first + last) // 2], shift, turn, via)
     for stop in range(stops):
         goal = via if stops == 2 and stop == 0 else target
-        here = trial.poses[size - 1].copy()
+        here = trial.poses[size - 1]
         dubins(here, goal, problem.turning_radius, pieces)
         added = sample_pieces(
             here, pieces, problem.spacing, trial.poses[size:], trial.curvatures[size:]
@@ -145,13 +145,13 @@ def shortcut(
             continue
         trial.lengths[first] = path.lengths[first]
         trial.works[first] = path.works[first]
-        trial.objects[first] = path.objects[first]
+        copy_into(trial.objects[first], path.objects[first])
         found = sweep_cost(trial, first, size, cost, PATIENCE, problem)
         if found < (1.0 - 1e-9) * cost:
             for n in range(first + 1, size):
-                path.poses[n] = trial.poses[n]
+                copy_into(path.poses[n], trial.poses[n])
                 path.curvatures[n] = trial.curvatures[n]
-                path.objects[n] = trial.objects[n]
+                copy_into(path.objects[n], trial.objects[n])
                 path.lengths[n] = trial.lengths[n]
                 path.works[n] = trial.works[n]
             cost, count = found, size

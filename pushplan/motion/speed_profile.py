@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from pushplan.compiled import owned
 from pushplan.motion.collision import footprint, is_free, obstacles
 from pushplan.motion.path_problem import SweptPath
 from pushplan.world import Drive, InvalidInputError, Plan, RobotModel, World
@@ -49,7 +50,7 @@ def start_margin(world: World, margin: float) -> float | None:
     walls = obstacles(world.static)
     for fraction in (1.0, 0.5, 0.25, 0.1, 0.0):
         shape = footprint(world.robot, fraction * margin)
-        if is_free(world.robot_pose, shape, walls, np.empty_like(shape.vertices)):
+        if is_free(owned(world.robot_pose), shape, walls, np.empty_like(shape.vertices)):
             return fraction * margin
     return None
 

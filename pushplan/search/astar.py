@@ -12,11 +12,9 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import types
-from numba.extending import overload
 from numpy.typing import NDArray
 
-from pushplan.compiled import add_type_kernels, kernel
+from pushplan.compiled import KernelByType, kernel
 from pushplan.search.heap import pop_least, push_or_lift
 from pushplan.world.checks import BoolArray, FloatArray, IntArray
 
@@ -26,6 +24,7 @@ SIZE, EXPANDED, GENERATED, GOAL = 0, 1, 2, 3
 """Entries of `SearchState.counters`."""
 
 
+@KernelByType
 def expand(lattice: Any, node: int, nodes: IntArray, costs: FloatArray, edges: IntArray) -> int:
     """List the successors of a node; by the type of lattice.
 
@@ -39,17 +38,19 @@ def expand(lattice: Any, node: int, nodes: IntArray, costs: FloatArray, edges: I
     Returns:
         The number of successors.
     """
-    raise NotImplementedError(f"no successors are known for a {type(lattice).__name__}")
+    raise NotImplementedError
 
 
+@KernelByType
 def estimate(lattice: Any, node: int) -> float:
     """A lower bound of the cost from a node to the goal, by the type of lattice."""
-    raise NotImplementedError(f"no estimate is known for a {type(lattice).__name__}")
+    raise NotImplementedError
 
 
+@KernelByType
 def is_goal(lattice: Any, node: int) -> bool:
     """Whether a node is a goal; by the type of lattice."""
-    raise NotImplementedError(f"no goal is known for a {type(lattice).__name__}")
+    raise NotImplementedError
 
 
 def register(kind: type, successors: Any, bound: Any, reached: Any) -> None:
@@ -61,26 +62,9 @@ def register(kind: type, successors: Any, bound: Any, reached: Any) -> None:
         bound: compiled function for `estimate`.
         reached: compiled function for `is_goal`.
     """
-    add_type_kernels(kind, successors, bound, reached)
-
-    def handles(lattice: Any) -> bool:
-        return isinstance(lattice, types.NamedTuple) and lattice.instance_class is kind
-
-    @overload(expand)
-    def _expand(lattice, node, nodes, costs, edges):  # type: ignore[no-untyped-def]
-        if handles(lattice):
-            return lambda lattice, node, nodes, costs, edges: successors(
-                lattice, node, nodes, costs, edges
-            )
-        return None
-
-    @overload(estimate)
-    def _estimate(lattice, node):  # type: ignore[no-untyped-def]
-        return (lambda lattice, node: bound(lattice, node)) if handles(lattice) else None
-
-    @overload(is_goal)
-    def _is_goal(lattice, node):  # type: ignore[no-untyped-def]
-        return (lambda lattice, node: reached(lattice, node)) if handles(lattice) else None
+    expand.add(kind, successors)
+    estimate.add(kind, bound)
+    is_goal.add(kind, reached)
 
 
 class SearchState(NamedTuple):
@@ -115,7 +99,7 @@ def new_state(size: int) -> SearchState:
     )
 
 
-@kernel(allocates=True)
+@kernel
 def offer(state: SearchState, node: int, cost: float, bound: float, parent: int, edge: int) -> None:
     """Take note of a way to ``node``; it is opened if none as cheap was known.
 
@@ -139,7 +123,7 @@ def offer(state: SearchState, node: int, cost: float, bound: float, parent: int,
     push_or_lift(state.keys, state.heap, state.places, state.counters, node, cost + bound)
 
 
-@kernel(allocates=True)
+@kernel
 def take(state: SearchState) -> int:
     """The open node of least cost plus estimate, now closed; -1 if none is open."""
     if state.counters[SIZE] == 0:

@@ -18,7 +18,7 @@ from pushplan.world.checks import FloatArray, IntArray
 
 ROBOT, OBJECT, STATIC = 1, 2, 3
 CORRECTION = 0.2
-"""Share of an overlap beyond the slop that is taken back in one substep."""
+"""Fraction of an overlap beyond the slop that is taken back in one substep."""
 _POSE_AND_TWIST = (
     batch.BodyFields.POSITION
     | batch.BodyFields.ANGLE

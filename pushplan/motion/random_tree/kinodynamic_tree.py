@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from ompl import base, control
 
-from pushplan.compiled import kernel
+from pushplan.compiled import copy_into, kernel
 from pushplan.motion.collision import ConvexObstacles, Footprint, is_free
 from pushplan.motion.dubins import along_arc, step_along
 from pushplan.motion.random_tree.ompl_lock import own_state, seeded_ompl
@@ -76,7 +76,7 @@ def steer(
             miss += turn_weight * turn
             if miss < best:
                 best, best_curvature, best_length = miss, curvature, length
-                out[:] = pose
+                copy_into(out, pose)
     return best_curvature, best_length
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from pushplan.compiled import owned
 from pushplan.geometry import VisibilityGraph
 from pushplan.motion.coarse_path import coarse_path, reachable
 from pushplan.motion.collision import is_free, obstacles
@@ -48,7 +49,7 @@ class TreePaths:
         if np.isinf(push_weight):
             boxes = [world.movables.outline_world(k) for k in range(len(world.movables))]
             among = obstacles(world.static, boxes)
-            if not is_free(world.robot_pose, shape, among, np.empty_like(shape.vertices)):
+            if not is_free(owned(world.robot_pose), shape, among, np.empty_like(shape.vertices)):
                 return None  # the robot touches an object already: only pushing helps
         coarse = coarse_path(world, push_weight)
         if improver.stopped():

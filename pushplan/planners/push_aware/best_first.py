@@ -62,7 +62,7 @@ def make_search(
     return star
 
 
-@kernel(allocates=True)
+@kernel
 def _signature(objects: FloatArray, start: FloatArray, radii: FloatArray, count: int) -> int:
     """Which objects have been moved, folded into a number below ``count``."""
     if count == 1:
@@ -75,7 +75,7 @@ def _signature(objects: FloatArray, start: FloatArray, radii: FloatArray, count:
     return int(code % count)
 
 
-@kernel(allocates=True)
+@kernel
 def _cell(tree: PushTree, table: CostToGo, pose: FloatArray) -> tuple[int, int, int]:
     rows, cols, headings = tree.best.shape[:3]
     r = min(max(int((pose[1] - table.origin[1]) / table.cell), 0), rows - 1)
@@ -84,7 +84,7 @@ def _cell(tree: PushTree, table: CostToGo, pose: FloatArray) -> tuple[int, int, 
     return r, c, k
 
 
-@kernel(allocates=True)
+@kernel
 def _best_there(tree: PushTree, node: int, table: CostToGo, radii: FloatArray) -> float:
     """Least cost of a node in the cell of this one."""
     r, c, k = _cell(tree, table, tree.poses[node])
@@ -93,7 +93,7 @@ def _best_there(tree: PushTree, node: int, table: CostToGo, radii: FloatArray) -
     return best
 
 
-@kernel(allocates=True)
+@kernel
 def _settle(lattice: PushLattice, node: int, length: float) -> bool:
     """Write down what a node really costs; False if its cell has a cheaper one."""
     tree, problem, memory = lattice.tree, lattice.problem, lattice.memory
@@ -127,7 +127,7 @@ def _settle(lattice: PushLattice, node: int, length: float) -> bool:
     return True
 
 
-@kernel(allocates=True)
+@kernel
 def _drive_to(lattice: PushLattice, node: int) -> bool:
     """Drive a node's arc; False if that leads nowhere, or memory is full."""
     tree = lattice.tree
@@ -141,7 +141,7 @@ def _drive_to(lattice: PushLattice, node: int) -> bool:
     return bool(tree.costs[node] < lattice.bound)
 
 
-@kernel(allocates=True)
+@kernel
 def _successors(
     lattice: PushLattice, number: int, numbers: IntArray, costs: FloatArray, edges: IntArray
 ) -> int:
@@ -190,7 +190,7 @@ def _successors(
     return found
 
 
-@kernel(allocates=True)
+@kernel
 def _estimate(lattice: PushLattice, number: int) -> float:
     """What is left to pay; the arc of a guess is paid when it is driven."""
     tree, node = lattice.tree, number >> 1
@@ -199,7 +199,7 @@ def _estimate(lattice: PushLattice, number: int) -> float:
     return left
 
 
-@kernel(allocates=True)
+@kernel
 def _reached(lattice: PushLattice, number: int) -> bool:
     pose = lattice.tree.poses[number >> 1]
     return number % 2 == 1 and in_goal(pose[0], pose[1], lattice.problem.goal)

@@ -65,14 +65,16 @@ def flood(
     origin, cell = table.origin, table.cell
     rows, cols = open_cells.shape
     starts, count = np.empty(rows * cols + 1, np.int64), 0
+    weights = np.full((rows, cols), np.inf)
     for at in range(rows * cols):
         r, c = at // cols, at % cols
+        if open_cells[r, c]:
+            weights[r, c] = 1.0
         x, y = origin[0] + (c + 0.5) * cell, origin[1] + (r + 0.5) * cell
         # a disc may be smaller than a cell
         if (open_cells[r, c] and in_goal(x, y, goal)) or (r == center[0] and c == center[1]):
             starts[count] = at
             count += 1
-    weights = np.where(open_cells, 1.0, np.inf)
     none = np.zeros((rows, cols), np.bool_)
     lengths, _, order = grid_dijkstra(weights, starts[:count], none, cell)
     return lengths, order

@@ -10,6 +10,7 @@ from functools import lru_cache
 
 import numpy as np
 
+from pushplan.compiled import owned
 from pushplan.geometry import VisibilityGraph
 from pushplan.motion.dubins import dubins
 from pushplan.planners.push_aware.bound import graph_is_quick
@@ -43,7 +44,7 @@ def warm_start_arcs(
         return None
     vias = _vias(corners, radius, depth)
     arcs = np.empty((3 * len(vias), 2))
-    here = world.robot_pose
+    here = owned(world.robot_pose)
     for i, there in enumerate(vias):
         dubins(here, there, radius, arcs[3 * i : 3 * i + 3])
         here = there

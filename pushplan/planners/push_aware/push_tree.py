@@ -53,16 +53,16 @@ def make_push_tree(
     )
 
 
-@kernel(allocates=True)
+@kernel
 def plant(tree: PushTree, pose: FloatArray, objects: FloatArray, estimate: float) -> None:
     """Begin a search at ``pose`` (3,) with the objects at ``objects`` (K, 3)."""
     tree.best[:] = np.inf
-    tree.poses[0] = pose
+    copy_into(tree.poses[0], pose)
     tree.costs[0] = 0.0
     tree.estimates[0] = estimate
     tree.parents[0] = -1
     tree.rows[0] = 0
-    tree.objects[0] = objects
+    copy_into(tree.objects[0], objects)
     tree.counts[0] = 1
     tree.counts[1] = 1
     tree.counts[2] = 0
@@ -92,6 +92,6 @@ def trace(tree: PushTree, node: int) -> FloatArray:
     arcs = np.empty((count, 2))
     at = node
     for i in range(count - 1, -1, -1):
-        arcs[i] = tree.arcs[at]
+        copy_into(arcs[i], tree.arcs[at])
         at = tree.parents[at]
     return arcs

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pushplan.compiled import kernel
+from pushplan.compiled import copy_into, kernel
 from pushplan.motion.arc_rollout import make_arc_memory, work_of
 from pushplan.motion.dubins import along_arc
 from pushplan.motion.goal_region import distance_to_goal, in_goal
@@ -64,7 +64,8 @@ def grow(
         if new == tree.poses.shape[0] or tree.counts[1] == tree.objects.shape[0]:
             return -2
         draw = draws[i]
-        target[:2] = low + draw[:2] * (high - low)
+        for axis in range(2):
+            target[axis] = low[axis] + draw[axis] * (high[axis] - low[axis])
         target[2], target[3] = 2.0 * np.pi * draw[2], bound * draw[3]
         near = nearest(tree, target, scales, bound)
         curvature, length = (
@@ -88,7 +89,7 @@ def grow(
         tree.rows[new] = tree.rows[near]
         if work > 0.0:
             tree.rows[new] = tree.counts[1]
-            tree.objects[tree.counts[1]] = memory.objects
+            copy_into(tree.objects[tree.counts[1]], memory.objects)
             tree.counts[1] += 1
         tree.counts[0] += 1
         if in_goal(x, y, problem.goal):

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from pushplan.compiled import owned
 from pushplan.motion.path_improver import Candidate, PathImprover
 from pushplan.motion.random_tree.tree_paths import TreePaths
 from pushplan.planners.push_aware.best_first import Branching, make_search
@@ -120,7 +121,7 @@ class PushAwareSearch:
     def _first_variant(self, table: CostToGo) -> _SearchVariant:
         config = self.config
         inflation = max(config.heuristic_inflation, 0.5 * (1.0 + self._cost_ratio(table)))
-        masses = self.world.movables.masses
+        masses = owned(self.world.movables.masses)
         return _SearchVariant(config.arc, config.curvatures, inflation, 1, masses)
 
     def _random_variant(self, table: CostToGo) -> _SearchVariant:
@@ -171,7 +172,7 @@ class PushAwareSearch:
             self.config.pruning_factor,
             variant.masses,
         )
-        plant(nodes, self.world.robot_pose, self.world.movables.poses, 0.0)
+        self._plant(nodes)
         self.searches += 1
         bound = (1.0 + self.config.slack) * improver.plan_cost
         star = make_search(nodes, table, branching, bound, improver.problem)
@@ -197,7 +198,7 @@ class PushAwareSearch:
             config = self.config
             count = min(config.nodes, _RANDOM_NODES)
             self._tree = make_push_tree(count, len(world.movables), config.memory)
-            plant(self._tree, world.robot_pose, world.movables.poses, 0.0)
+            self._plant(self._tree)
         scales = np.array([2.0 * self.size, np.pi, 2.0 * self.size * world.robot.mass])
         last = improver.iterations + arcs
         while improver.iterations < last and not improver.stopped():
@@ -212,7 +213,11 @@ class PushAwareSearch:
             if node >= 0:
                 self._try(trace(self._tree, node))
             if node == -2:
-                plant(self._tree, world.robot_pose, world.movables.poses, 0.0)
+                self._plant(self._tree)
+
+    def _plant(self, tree: PushTree) -> None:
+        """Begin a search where the robot and the objects are."""
+        plant(tree, owned(self.world.robot_pose), owned(self.world.movables.poses), 0.0)
 
     def _few(self) -> int:
         """Arcs to drive between two looks at the stop rule."""

@@ -360,7 +360,7 @@ class PushExecutor:
         return rest
 
     def _free(self, world: World, pose: FloatArray, command: Twist) -> float:
-        """Share of a command that the robot alone may drive."""
+        """Fraction of a command that the robot alone may drive."""
         robot = world.robot
         if self._static is not world.static:
             self._static = world.static
