@@ -134,10 +134,10 @@ def contact_depths(grid: PoseGrid, shape: Footprint, poses: FloatArray, bodies: 
         a, b = bodies.offsets[k], bodies.offsets[k + 1]
         transform_points(poses[k], bodies.vertices[a:b], outline[a:b])
         reach = shape.radius + bodies.radii[k]
-        i0 = max(0, int(math.ceil((poses[k, 1] - reach - grid.y) / grid.step)))
-        i1 = min(rows - 1, int(math.floor((poses[k, 1] + reach - grid.y) / grid.step)))
-        j0 = max(0, int(math.ceil((poses[k, 0] - reach - grid.x) / grid.step)))
-        j1 = min(cols - 1, int(math.floor((poses[k, 0] + reach - grid.x) / grid.step)))
+        i0 = max(0, math.ceil((poses[k, 1] - reach - grid.y) / grid.step))
+        i1 = min(rows - 1, math.floor((poses[k, 1] + reach - grid.y) / grid.step))
+        j0 = max(0, math.ceil((poses[k, 0] - reach - grid.x) / grid.step))
+        j1 = min(cols - 1, math.floor((poses[k, 0] + reach - grid.x) / grid.step))
         for t in range(count):
             pose[2] = HEADINGS[t]
             transform_points(pose, shape.vertices, body)
