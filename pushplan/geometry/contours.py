@@ -129,12 +129,7 @@ def free_points(points: FloatArray, obstacles: Obstacles, box: FloatArray, gap: 
 
 @kernel(allocates=True)
 def segment_crossings(first: FloatArray, second: FloatArray) -> FloatArray:
-    """Points (N, 2) [m] where a segment of one list crosses one of the other.
-
-    Args:
-        first: (A, 4) segments x1, y1, x2, y2 [m].
-        second: (B, 4) segments.
-    """
+    """Points (N, 2) [m] where segments (A, 4) x1, y1, x2, y2 cross others (B, 4)."""
     found = np.empty((16, 2))
     count = 0
     for i in range(first.shape[0]):

@@ -52,6 +52,7 @@ def convex_penetration(a: FloatArray, b: FloatArray) -> tuple[float, float, floa
 
 @kernel
 def _is_separated_by_edge(a: FloatArray, b: FloatArray) -> bool:
+    """Whether an edge of ``a`` has all of ``b`` on its outer side."""
     n = a.shape[0]
     for i in range(n):
         j = i + 1 if i + 1 < n else 0
@@ -70,12 +71,7 @@ def _is_separated_by_edge(a: FloatArray, b: FloatArray) -> bool:
 
 @kernel
 def convex_overlap(a: FloatArray, b: FloatArray) -> bool:
-    """Whether the interiors of two convex counter-clockwise polygons meet; touching is no overlap.
-
-    Args:
-        a: (N, 2) corners [m].
-        b: (M, 2) corners [m].
-    """
+    """Whether the interiors of two convex counter-clockwise polygons meet; touching does not."""
     return not (_is_separated_by_edge(a, b) or _is_separated_by_edge(b, a))
 
 
@@ -96,6 +92,7 @@ def point_segment_distance_sq(
 
 @kernel
 def _least_corner_distance_sq(a: FloatArray, b: FloatArray) -> float:
+    """Least squared distance [m²] of a corner of ``a`` to an edge of ``b``."""
     best = math.inf
     n = a.shape[0]
     for i in range(n):
@@ -108,12 +105,7 @@ def _least_corner_distance_sq(a: FloatArray, b: FloatArray) -> float:
 
 @kernel
 def convex_distance(a: FloatArray, b: FloatArray) -> float:
-    """Euclidean distance [m] between two convex counter-clockwise polygons, 0 if they overlap.
-
-    Args:
-        a: (N, 2) corners [m].
-        b: (M, 2) corners [m].
-    """
+    """Distance [m] between two convex counter-clockwise polygons, 0 if they overlap."""
     if convex_overlap(a, b):
         return 0.0
     # of two disjoint polygons, the nearest points include a corner of one

@@ -35,6 +35,7 @@ def _fill_distances(
     gap: float,
     sliver: float,
 ) -> None:
+    """Write the distance [m] to the goal at the centre of each cell."""
     for i in range(out.shape[0]):
         y = oy + (i + 0.5) * step
         hint = NO_LEG

@@ -98,6 +98,7 @@ def _fill_clearance(
     offsets: IntArray,
     radii: FloatArray,
 ) -> None:
+    """Write the distance [m] to the nearest obstacle at the centre of each cell."""
     for i in range(out.shape[0]):
         y = oy + (i + 0.5) * step
         for j in range(out.shape[1]):

@@ -67,11 +67,7 @@ def core_distance(x: float, y: float, vertices: FloatArray, first: int, last: in
 def obstacle_distance(
     x: float, y: float, vertices: FloatArray, offsets: IntArray, radii: FloatArray
 ) -> float:
-    """Distance [m] of a point to the nearest obstacle, negative inside one, inf if there is none.
-
-    Outside it is the exact Euclidean distance; inside, minus the depth in the obstacle in which
-    the point lies deepest.
-    """
+    """Distance [m] to the nearest obstacle: minus the greatest depth inside, inf without any."""
     best = math.inf
     for k in range(radii.shape[0]):
         best = min(best, core_distance(x, y, vertices, offsets[k], offsets[k + 1]) - radii[k])
@@ -119,13 +115,7 @@ def line_of_sight(
     boxes: FloatArray,
     margin: float,
 ) -> bool:
-    """Whether the segment p-q stays ``margin`` [m] or more away from every obstacle.
-
-    Args:
-        px, py, qx, qy: ends of the segment [m].
-        vertices, offsets, radii, boxes: as in `Obstacles`.
-        margin: [m], may be slightly negative to let a path touch.
-    """
+    """Whether the segment p-q stays ``margin`` [m], at least, away from all obstacles."""
     dx, dy = qx - px, qy - py
     length = math.sqrt(dx * dx + dy * dy)
     ux, uy = (dx / length, dy / length) if length > 0.0 else (1.0, 0.0)

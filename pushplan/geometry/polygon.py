@@ -21,10 +21,7 @@ def polygon_area(v: FloatArray) -> float:
 
 @kernel
 def polygon_centroid(v: FloatArray) -> tuple[float, float]:
-    """Centre of area x, y [m] of the polygon with corners ``v`` (N, 2) [m].
-
-    A polygon without area gets the mean of its corners.
-    """
+    """Centre of area x, y [m] of corners (N, 2); their mean where there is no area."""
     n = v.shape[0]
     x0, y0 = v[0, 0], v[0, 1]
     twice, mx, my, sx, sy = 0.0, 0.0, 0.0, 0.0, 0.0
@@ -45,15 +42,7 @@ def polygon_centroid(v: FloatArray) -> tuple[float, float]:
 
 @kernel
 def polygon_inertia(v: FloatArray) -> float:
-    """Polar second moment about the centroid per unit mass [m²] of a uniform polygon.
-
-    Args:
-        v: (N, 2) corners [m] of a simple polygon, either orientation.
-
-    Returns:
-        ∫ |r|² dA / A; multiply by the mass [kg] for the moment of inertia [kg m²]. 0 where the
-        polygon has no area.
-    """
+    """Second moment ∫ |r|² dA / A [m²] of corners (N, 2) about the centroid; 0 without area."""
     n = v.shape[0]
     cx, cy = polygon_centroid(v)
     twice, moment = 0.0, 0.0
@@ -71,10 +60,7 @@ def polygon_inertia(v: FloatArray) -> float:
 
 @kernel
 def point_in_polygon(x: float, y: float, v: FloatArray) -> bool:
-    """Whether the point lies inside the simple polygon ``v`` (N, 2) [m], by crossing number.
-
-    Points exactly on the outline may count either way.
-    """
+    """Whether a point is inside corners (N, 2) [m]; on the outline it may count either way."""
     inside = False
     n = v.shape[0]
     j = n - 1

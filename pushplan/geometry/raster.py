@@ -17,13 +17,7 @@ from pushplan.world.checks import FloatArray, IntArray
 
 @kernel(allocates=True)
 def fill_convex(image: NDArray[Any], vertices_px: FloatArray, value: Any) -> None:
-    """Set every pixel whose centre is inside a convex polygon, clipped to the image.
-
-    Args:
-        image: (H, W) of any number type or bool, changed in place.
-        vertices_px: (N, 2) corners x, y [px], either orientation.
-        value: what the pixels are set to.
-    """
+    """Set the pixels whose centres are in a convex polygon of corners (N, 2) x, y [px]."""
     rows, cols = image.shape
     n = vertices_px.shape[0]
     low, high = math.inf, -math.inf
@@ -67,13 +61,6 @@ def fill_convex(image: NDArray[Any], vertices_px: FloatArray, value: Any) -> Non
 def fill_convex_parts(
     image: NDArray[Any], vertices_px: FloatArray, offsets: IntArray, value: Any
 ) -> None:
-    """`fill_convex` for each of P polygons that are flattened into one array.
-
-    Args:
-        image: (H, W), changed in place.
-        vertices_px: (V, 2) corners of all polygons [px].
-        offsets: (P + 1,) where each polygon starts.
-        value: what the pixels are set to.
-    """
+    """`fill_convex` for P polygons, flattened to corners (V, 2) with offsets (P + 1,)."""
     for k in range(offsets.shape[0] - 1):
         fill_convex(image, vertices_px[offsets[k] : offsets[k + 1]], value)

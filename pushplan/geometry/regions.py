@@ -105,6 +105,7 @@ def outside_area(target: Target, points: FloatArray) -> BoolArray:
 def _nearest_in_polygon(
     x: float, y: float, corners: FloatArray, first: int, last: int
 ) -> tuple[float, float]:
+    """Nearest point of a convex polygon or segment; the point itself where it is inside."""
     inside = last - first > 2
     best, bx, by = math.inf, x, y
     for i in range(first, last):

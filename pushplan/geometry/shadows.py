@@ -64,14 +64,7 @@ def _outermost(x: float, y: float, corners: FloatArray) -> tuple[int, int]:
 
 @kernel(allocates=True)
 def fill_shadow(mask: Mask, x: float, y: float, corners: FloatArray, value: int) -> None:
-    """Fill a convex polygon and everything that it hides from a viewpoint.
-
-    Args:
-        mask: (H, W), changed in place.
-        x, y: the viewpoint [px], anywhere; from inside, the polygon hides nothing.
-        corners: (N, 2) [px], either orientation.
-        value: what the pixels are set to.
-    """
+    """Fill a convex polygon (N, 2) [px] and all that it hides from x, y; none from inside."""
     n = corners.shape[0]
     first, last = _outermost(x, y, corners)
     if first < 0:
@@ -160,6 +153,7 @@ def _fill_table(
 def _bends_in_sight(
     x: float, y: float, bends: Contours, obstacles: Obstacles, gap: float, sliver: float
 ) -> tuple[IntArray, FloatArray]:
+    """Corners that x, y sees along a tangent, and their distances [m]."""
     room = obstacle_distance(x, y, obstacles.vertices, obstacles.offsets, obstacles.radii)
     count = bends.corners.shape[0]
     found, lengths = np.empty(count, dtype=np.int64), np.empty(count)

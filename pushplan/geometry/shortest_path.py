@@ -112,6 +112,7 @@ def _ways_out(static: StaticMap, clearance: float) -> FloatArray:
 def _first_legs(
     points: FloatArray, regions: Regions, obstacles: Obstacles, box: FloatArray, gap: float
 ) -> FloatArray:
+    """Distance to the goal and nearest goal point for each point (N, 2) that sees it."""
     out = np.empty((points.shape[0], 3))
     for i in range(points.shape[0]):
         out[i, 0], out[i, 1], out[i, 2] = goal_leg(

@@ -38,10 +38,7 @@ class Nodes(NamedTuple):
 def is_tangent(
     dx: float, dy: float, ix: float, iy: float, ox: float, oy: float, gap: float
 ) -> bool:
-    """Whether a leg that arrives from (dx, dy) beside a corner touches its outline as a tangent.
-
-    A leg that meets a corner head on is never part of a shortest path.
-    """
+    """Whether a leg from (dx, dy) touches a corner as a tangent, as on shortest paths it does."""
     before = ix * dy - iy * dx
     after = ox * dy - oy * dx
     return (before >= -gap and after <= gap) or (before <= gap and after >= -gap)
@@ -49,6 +46,7 @@ def is_tangent(
 
 @kernel
 def _sees(px: float, py: float, qx: float, qy: float, obstacles: Obstacles, gap: float) -> bool:
+    """Whether the segment p-q keeps its distance from all obstacles."""
     return bool(
         line_of_sight(
             px,
@@ -72,11 +70,7 @@ def visible_pairs(
     obstacles: Obstacles,
     gap: float,
 ) -> tuple[IntArray, FloatArray]:
-    """Pairs of corners that see each other along a tangent of both outlines.
-
-    Returns:
-        (E, 2) indices and (E,) lengths [m].
-    """
+    """Pairs (E, 2) of corners that see each other along a common tangent; lengths (E,) [m]."""
     pairs = np.empty((64, 2), dtype=np.int64)
     lengths = np.empty(64)
     count = 0
@@ -108,15 +102,7 @@ def visible_pairs(
 def relax(
     distances: FloatArray, parents: IntArray, starts: IntArray, ends: IntArray, lengths: FloatArray
 ) -> None:
-    """Dijkstra's algorithm from given first distances, in place.
-
-    Args:
-        distances: (V,) first guess [m], inf where there is none.
-        parents: (V,) receives the next node towards the goal where the way leads over one.
-        starts: (V + 1,) where the edges of each node start.
-        ends: (E,) the node at the other end.
-        lengths: (E,) [m].
-    """
+    """Dijkstra's algorithm from given first distances (V,) [m], in place."""
     done = np.zeros(distances.shape[0], dtype=np.bool_)
     for _ in range(distances.shape[0]):
         node, best = -1, math.inf

@@ -12,16 +12,7 @@ from pushplan.world.checks import FloatArray
 
 @kernel
 def least_overlap(a: FloatArray, b: FloatArray) -> tuple[float, int]:
-    """Greatest separation of a polygon from the edges of another, and the edge that has it.
-
-    Args:
-        a: (N, 2) corners of the polygon with the edges, counter-clockwise [m].
-        b: (M, 2) corners of the other one.
-
-    Returns:
-        Signed gap [m] along the outward normal of an edge of ``a`` (negative: overlap), and the
-        corner that the edge begins at. Stops at the first edge that separates the two.
-    """
+    """Widest signed gap [m] of ``b`` along an edge normal of ``a``, and the corner it begins at."""
     best, edge = -np.inf, 0
     for i in range(a.shape[0]):
         j = i + 1 if i + 1 < a.shape[0] else 0
@@ -43,17 +34,7 @@ def least_overlap(a: FloatArray, b: FloatArray) -> tuple[float, int]:
 
 @kernel
 def contacts(a: FloatArray, b: FloatArray, out: FloatArray) -> int:
-    """Contact points of two overlapping convex polygons, by clipping the incident edge.
-
-    Args:
-        a: (N, 2) corners of the first polygon, counter-clockwise [m].
-        b: (M, 2) corners of the second one.
-        out: (2, 5) receives for each point x, y [m], the unit normal from the first to the second,
-            and the depth [m] by which the second has to move along it.
-
-    Returns:
-        The number of points: 0 where the two do not overlap, else 1 or 2.
-    """
+    """Write up to two contact points x, y, normal, depth of overlapping convex polygons; count."""
     gap_a, edge_a = least_overlap(a, b)
     if gap_a >= 0.0:
         return 0

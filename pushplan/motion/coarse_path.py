@@ -28,10 +28,7 @@ def _cell_weights(
     reach: FloatArray,
     weight: FloatArray,
 ) -> FloatArray:
-    """Extra cost per metre of each cell: the sum over polygons of weight where they are near.
-
-    The weight applies in full on the polygon and fades to nothing at its reach.
-    """
+    """Extra cost per metre of each cell: weights of polygons, fading to 0 at their reach."""
     extra = np.zeros((rows, cols))
     for k in range(offsets.shape[0] - 1):
         corners = vertices[offsets[k] : offsets[k + 1]]

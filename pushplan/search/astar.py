@@ -101,16 +101,7 @@ def new_state(size: int) -> SearchState:
 
 @kernel
 def offer(state: SearchState, node: int, cost: float, bound: float, parent: int, edge: int) -> None:
-    """Take note of a way to ``node``; it is opened if none as cheap was known.
-
-    Args:
-        state: the search.
-        node: where the way leads.
-        cost: of the whole way.
-        bound: lower bound of the cost from there on.
-        parent: node before it, -1 for a start.
-        edge: label of the last edge.
-    """
+    """Take note of a path to ``node``; it is opened if none as cheap was known."""
     if not cost + bound < np.inf or (state.known[node] and cost >= state.costs[node]):
         return
     if not state.known[node]:

@@ -31,6 +31,7 @@ class GraphLattice(NamedTuple):
 def _successors(
     lattice: GraphLattice, node: int, nodes: IntArray, costs: FloatArray, edges: IntArray
 ) -> int:
+    """List the targets of the edges of a node."""
     count = 0
     for e in range(lattice.first[node], lattice.first[node + 1]):
         nodes[count], costs[count], edges[count] = lattice.targets[e], lattice.costs[e], e
@@ -40,12 +41,14 @@ def _successors(
 
 @kernel
 def _bound(lattice: GraphLattice, node: int) -> float:
+    """Lower bound of the cost to a goal."""
     bound: float = lattice.bounds[node]
     return bound
 
 
 @kernel
 def _reached(lattice: GraphLattice, node: int) -> bool:
+    """Whether a node is a goal."""
     reached: bool = lattice.goals[node]
     return reached
 

@@ -11,6 +11,7 @@ from pushplan.world.checks import FloatArray, IntArray
 
 @kernel(inline=True)
 def _before(key_a: float, node_a: int, key_b: float, node_b: int) -> bool:
+    """Whether a key comes first; equal keys go by the number of the node."""
     return key_a < key_b or (key_a == key_b and node_a < node_b)
 
 
@@ -18,16 +19,7 @@ def _before(key_a: float, node_a: int, key_b: float, node_b: int) -> bool:
 def push_or_lift(
     keys: FloatArray, heap: IntArray, places: IntArray, size: IntArray, node: int, key: float
 ) -> None:
-    """Put a node into the heap, or change its key if it is there.
-
-    Args:
-        keys: (N,) keys in heap order.
-        heap: (N,) nodes in heap order.
-        places: (N,) place of each node in the heap, -1 if it is not there.
-        size: first entry is the number of nodes in the heap.
-        node: the node.
-        key: its key.
-    """
+    """Put a node into the heap, or change its key if it is there."""
     at = places[node]
     if at < 0:
         at = size[0]

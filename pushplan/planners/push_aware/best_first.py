@@ -77,6 +77,7 @@ def _signature(objects: FloatArray, start: FloatArray, radii: FloatArray, count:
 
 @kernel
 def _cell(tree: PushTree, table: CostToGo, pose: FloatArray) -> tuple[int, int, int]:
+    """Row, column and heading of the cell of a pose."""
     rows, cols, headings = tree.best.shape[:3]
     r = min(max(int((pose[1] - table.origin[1]) / table.cell), 0), rows - 1)
     c = min(max(int((pose[0] - table.origin[0]) / table.cell), 0), cols - 1)
@@ -201,6 +202,7 @@ def _estimate(lattice: PushLattice, number: int) -> float:
 
 @kernel
 def _reached(lattice: PushLattice, number: int) -> bool:
+    """Whether a driven node lies in the goal."""
     pose = lattice.tree.poses[number >> 1]
     return number % 2 == 1 and in_goal(pose[0], pose[1], lattice.problem.goal)
 
