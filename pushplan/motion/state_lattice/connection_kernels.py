@@ -19,7 +19,7 @@ def fill_connections(
     slack: float,  # how much a path may turn beyond the change of heading [rad]
     out: FloatArray,  # (M, 9) receives length, x, y, and the three pieces of each path
 ) -> int:
-    """Write the Dubins paths from the origin that hardly turn in vain; returns their number."""
+    """Write the Dubins paths from the origin without needless turns; returns their number."""
     start, end, pieces = np.zeros(3), np.empty(3), np.empty((3, 2))
     start[2], end[2] = heading, target
     change = abs(wrap_angle(target - heading))
