@@ -70,7 +70,7 @@ class ModelSweeper:
 
     def run(self, path: FloatArray, poses: FloatArray, out: FloatArray, works: FloatArray) -> bool:
         """See `PathSweeper`."""
-        start = self._world.moved(robot_pose=path[0], movable_poses=poses)
+        start = self._world.moved(robot_pose=path[0], robot_twist=(0, 0, 0), movable_poses=poses)
         swept = self._interaction.sweep(start, path)
         out[:] = swept.object_poses
         poses[:] = out[-1]

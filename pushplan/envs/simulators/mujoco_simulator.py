@@ -151,11 +151,12 @@ class MujocoSimulator(Simulator):
         poses: FloatArray = array("path", path, (None, 3))
         if len(poses) == 0:
             raise InvalidInputError("path must hold at least one pose")
-        start = self.world().moved(robot_pose=poses[0])
+        twist = np.zeros(3)
         if self._scene.afloat and len(poses) > 1:  # a ship is long in getting under way
             along = poses[1, :2] - poses[0, :2]
-            speed = start.robot.max_speed / max(float(np.hypot(*along)), 1e-9)
-            start = replace(start, robot_twist=np.array([*(speed * along), 0.0]))
+            speed = self._world.robot.max_speed / max(float(np.hypot(*along)), 1e-9)
+            twist[:2] = speed * along
+        start = self.world().moved(robot_pose=poses[0], robot_twist=twist)
         self.build(start, self._materials)
         found, jammed = follow_path(self, self._world.robot, poses)
         return Interaction(found, self._world.movables.masses, jammed)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -10,6 +11,7 @@ from typing import ClassVar, Literal
 import numpy as np
 
 from pushplan.envs.simulators.base import Materials
+from pushplan.envs.tasks.variations import TaskVariations
 from pushplan.observation import ObservationBuilder
 from pushplan.world import Drive, RobotModel, World
 from pushplan.world.checks import BoolArray, FloatArray, IntArray
@@ -73,8 +75,22 @@ class Task(ABC):
     waypoint_window: float = 0.0
     """Side of the square around the robot that waypoint actions reach [m], where it has them."""
 
+    slowness: float
+    """How much longer an episode may take than the preset allows, for a slower robot."""
+
     @abstractmethod
     def __init__(self, *, preset: str, variations: Mapping[str, object], action: str) -> None: ...
+
+    def _drive(self, robot: RobotModel, control_step: float, variations: TaskVariations) -> None:
+        """Set robot, control step and slowness from those of the preset."""
+        self.robot = variations.limit(robot)
+        self.control_step = variations.control_step or control_step
+        speed, turn = robot.max_speed, robot.max_turn_rate
+        self.slowness = max(1.0, speed / self.robot.max_speed, turn / self.robot.max_turn_rate)
+
+    def _steps_for(self, steps: int, control_step: float) -> int:
+        """How many control steps last as long as so many of the preset's, for a slower robot."""
+        return math.ceil(steps * control_step * self.slowness / self.control_step - 1e-9)
 
     @abstractmethod
     def start(self, rng: np.random.Generator) -> World:

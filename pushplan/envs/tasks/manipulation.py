@@ -111,6 +111,7 @@ class ManipulationVariations(TaskVariations):
     layouts: ClassVar[tuple[str, ...]]
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         put = object.__setattr__
         choice("layout", self.layout, self.layouts)
         choice("box_yaw", self.box_yaw, ("aligned", "random"))
@@ -161,12 +162,13 @@ class ManipulationTask(Task):
         if action not in self.actions:
             raise UnknownNameError(f"action of task {self.name!r}", action, self.actions)
         self.action = action
-        self.robot = self._make_robot()
+        robot = self._make_robot()
+        self._drive(robot, dimensions.control_step, wanted)
         self.materials = self._make_materials()
-        self.control_step = dimensions.control_step
         self.heading_step = dimensions.heading_step
         self.waypoint_window = dimensions.windows[wanted.layout]
-        self.idle_time = self.idle_limits["heading"] * self.heading_step / self.robot.max_speed
+        step_time = self.slowness * self.heading_step / robot.max_speed
+        self.idle_time = self.idle_limits["heading"] * step_time
         self.box_size = wanted.box_size or dimensions.box_size
         least = LEAST_SIZE * dimensions.box_size
         if self.box_size < least:

@@ -38,7 +38,7 @@ _IMAGE_CHANNELS = ("footprint", "movable", "static", "goal_distance")
 _START_TRIES = 2000
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class MazeVariations(TaskVariations):
     """What may depart from a preset; None leaves the preset's value.
 
@@ -65,6 +65,7 @@ class MazeVariations(TaskVariations):
     bumper_friction: float | None = None
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         put = object.__setattr__
         choice("shape", self.shape, ("u", "z"))
         choice("box_yaw", self.box_yaw, ("aligned", "random"))
@@ -109,10 +110,11 @@ class MazeTask(Task):
         self.preset: MazePreset = PRESETS[preset]
         self.variations = MazeVariations.read({} if variations is None else variations)
         try:
-            self.robot = self.preset.robot(drive_of(action), self.variations.bumper)
+            robot = self.preset.robot(drive_of(action), self.variations.bumper)
         except InvalidInputError as error:
             raise ScenarioError(f"maze, preset {preset!r}: {error}") from error
-        self.control_step = self.preset.control_step
+        self._drive(robot, self.preset.control_step, self.variations)
+        self._max_steps = self._steps_for(self.preset.max_steps, self.preset.control_step)
         friction = self.variations.bumper_friction
         self.materials = (
             self.preset.materials
@@ -237,7 +239,7 @@ class MazeTask(Task):
             return StepOutcome(reward + WALL_REWARD, False, "wall", True, False)
         if self.goal.distance(x1, y1) == 0.0:
             return StepOutcome(reward + SUCCESS_REWARD, True, "goal", True, False)
-        late = self._steps >= self.preset.max_steps
+        late = self._steps >= self._max_steps
         return StepOutcome(reward, False, "time_limit" if late else "", False, late)
 
     def observation(self, name: str) -> ObservationBuilder:

@@ -39,7 +39,7 @@ _START_TRIES = 500
 _UP = 0.5 * math.pi
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class ShipIceVariations(TaskVariations):
     """What may depart from a preset; None leaves the preset's value.
 
@@ -63,6 +63,7 @@ class ShipIceVariations(TaskVariations):
     ice_file: str | None = None
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         put = object.__setattr__
         if self.ice_file is not None and not isinstance(self.ice_file, str):
             raise InvalidInputError(f"ice_file must be a path as text, got {self.ice_file!r}")
@@ -109,8 +110,8 @@ class ShipIceTask(Task):
             raise UnknownNameError("action of ship_ice", action, self.actions)
         self.preset: ShipPreset = PRESETS[preset]
         self.variations = ShipIceVariations.read({} if variations is None else variations)
-        self.robot = self.preset.robot()
-        self.control_step = self.preset.control_step
+        self._drive(self.preset.robot(), self.preset.control_step, self.variations)
+        self._max_steps = self._steps_for(self.preset.max_steps, self.preset.control_step)
         self.materials = self.preset.materials
         bounds = self.preset.bounds
         self.static = StaticMap.build(bounds=bounds)
@@ -223,7 +224,7 @@ class ShipIceTask(Task):
             return StepOutcome(reward + OUTSIDE_REWARD, False, "left_channel", True, False)
         if self.goal.distance(x, y) == 0.0:
             return StepOutcome(reward + SUCCESS_REWARD, True, "goal", True, False)
-        late = self._steps >= self.preset.max_steps
+        late = self._steps >= self._max_steps
         return StepOutcome(reward, False, "time_limit" if late else "", False, late)
 
     def observation(self, name: str) -> ObservationBuilder:
