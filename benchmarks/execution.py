@@ -19,6 +19,7 @@ from pathlib import Path
 from pushplan.envs.registry import goal_kind
 from pushplan.evaluation import bench
 from pushplan.evaluation.results import Results
+from pushplan.evaluation.rows import Status
 from pushplan.scenarios import suite
 from pushplan.scenarios.scenario import Variations
 
@@ -76,11 +77,18 @@ def main() -> None:
                 ]
                 words = "-".join(f"{value:g}" for value in cell.values()) or "default"
                 out = options.out and options.out / f"{name}__{policy}__{words}"
-                results = bench(changed, [policy], workers=options.workers, out=out, timeout_s=None, observation="state")
+                results = bench(
+                    changed,
+                    [policy],
+                    workers=options.workers,
+                    out=out,
+                    timeout_s=None,
+                    observation="state",
+                )
                 figures = " | ".join(f"{mean(results, c):.3f}" for c in columns)
                 print(f"| {cell.get('control_step', 'default')} "
                       f"| {cell.get('max_turn_rate', 'default')} | {figures} "
-                      f"| {sum(row.status != 'ok' for row in results.rows)} |", flush=True)  # fmt: skip
+                      f"| {sum(row.status != Status.DONE for row in results.rows)} |", flush=True)  # fmt: skip
 
 
 if __name__ == "__main__":
