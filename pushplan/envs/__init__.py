@@ -9,8 +9,9 @@ packages, so either import this package first, or let Gymnasium do it::
 
 from __future__ import annotations
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+from pushplan.world.lazy_names import lazy_names
 
 if TYPE_CHECKING:
     from pushplan.envs.push_env import EpisodeOverError, PushEnv, make
@@ -19,23 +20,14 @@ if TYPE_CHECKING:
 
 __all__ = ["EpisodeOverError", "PushEnv", "RolloutInteraction", "Trace", "make", "register_all"]
 
-_LAZY = {
-    "EpisodeOverError": "pushplan.envs.push_env",
-    "PushEnv": "pushplan.envs.push_env",
-    "RolloutInteraction": "pushplan.envs.rollout",
-    "Trace": "pushplan.envs.trace",
-    "make": "pushplan.envs.push_env",
-}
-
-
-def __getattr__(name: str) -> Any:
-    if name in _LAZY:
-        return getattr(import_module(_LAZY[name]), name)
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-
-
-def __dir__() -> list[str]:
-    return __all__
+__getattr__, __dir__ = lazy_names(
+    __name__,
+    {
+        "push_env": "EpisodeOverError PushEnv make",
+        "rollout": "RolloutInteraction",
+        "trace": "Trace",
+    },
+)
 
 
 def register_all() -> None:

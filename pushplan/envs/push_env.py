@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from pushplan.control import clamp_twist
 from pushplan.envs.actions import ActionMode, Motion, waiting
-from pushplan.envs.registry import ACTIONS, SIMULATORS, TASKS, default_preset, look_up
+from pushplan.envs.registry import ACTIONS, SIMULATORS, TASKS, default_preset
 from pushplan.envs.roster import Roster
 from pushplan.envs.simulators.base import Simulator
 from pushplan.envs.tasks.base import StepOutcome, Task
@@ -35,6 +35,7 @@ from pushplan.world import (
     stream,
 )
 from pushplan.world.checks import frozen, integer, number
+from pushplan.world.lazy_names import look_up
 
 RENDER_MODES = ("human", "rgb_array", "camera")
 CAMERA_SIZE = (640, 480)
