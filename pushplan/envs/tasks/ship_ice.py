@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 import numpy as np
 import shapely
@@ -24,7 +23,8 @@ from pushplan.world import (
     UnknownNameError,
     World,
 )
-from pushplan.world.checks import FloatArray, number
+from pushplan.world.checked_fields import Fraction, Limits, PositiveFloat
+from pushplan.world.checks import FloatArray
 from pushplan.world.outline import transform
 
 OUTSIDE_REWARD = -50.0
@@ -55,30 +55,19 @@ class ShipIceVariations(TaskVariations):
 
     task = "ship_ice"
 
-    concentration: float | None = None
-    clumping: float = 0.6
-    goal_distance: float | None = None
+    concentration: Annotated[float, Limits(0.0, 0.5)] | None = None
+    clumping: Fraction = 0.6
+    goal_distance: PositiveFloat | None = None
     start_x: float | None = None
     start_heading: float = _UP
     ice_file: str | None = None
 
     def __post_init__(self) -> None:
-        put = object.__setattr__
+        super().__post_init__()
         if self.ice_file is not None and not isinstance(self.ice_file, str):
             raise InvalidInputError(f"ice_file must be a path as text, got {self.ice_file!r}")
-        if self.concentration is not None:
-            fraction = number("concentration", self.concentration, low=0.0, high=0.5)
-            put(self, "concentration", fraction)
-            if self.ice_file is not None:
-                raise InvalidInputError("concentration and ice_file exclude each other")
-        put(self, "clumping", number("clumping", self.clumping, low=0.0, high=1.0))
-        if self.goal_distance is not None:
-            away = number("goal_distance", self.goal_distance, low=0.0, open_low=True)
-            put(self, "goal_distance", away)
-        if self.start_x is not None:
-            put(self, "start_x", number("start_x", self.start_x))
-        heading = number("start_heading", self.start_heading)
-        put(self, "start_heading", heading)
+        if self.concentration is not None and self.ice_file is not None:
+            raise InvalidInputError("concentration and ice_file exclude each other")
 
 
 class ShipIceTask(Task):
@@ -96,19 +85,12 @@ class ShipIceTask(Task):
     actions: ClassVar[tuple[str, ...]] = ("turn_rate",)
     observations: ClassVar[tuple[str, ...]] = ("image", "state")
 
-    def __init__(
-        self,
-        *,
-        preset: str = "benchmark",
-        variations: Mapping[str, object] | None = None,
-        action: str = "turn_rate",
-    ) -> None:
-        if preset not in PRESETS:
-            raise UnknownNameError("preset of ship_ice", preset, PRESETS)
-        if action not in self.actions:
-            raise UnknownNameError("action of ship_ice", action, self.actions)
-        self.preset: ShipPreset = PRESETS[preset]
-        self.variations = ShipIceVariations.read({} if variations is None else variations)
+    preset: ShipPreset
+    preset_table = PRESETS
+    variations: ShipIceVariations
+    variation_class = ShipIceVariations
+
+    def _prepare(self) -> None:
         self.robot = self.preset.robot()
         self.control_step = self.preset.control_step
         self.materials = self.preset.materials
