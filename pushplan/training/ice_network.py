@@ -19,7 +19,13 @@ from typing import TYPE_CHECKING, Any
 from pushplan.interaction.occupancy import CELLS_PER_LENGTH, CHANNELS, PATCH_CELLS
 from pushplan.training.ice_data import LEVELS, IcePairs, read_shards
 from pushplan.world import MissingDependencyError
-from pushplan.world.checks import integer, number
+from pushplan.world.checked_fields import (
+    CheckedFields,
+    NonNegativeFloat,
+    NonNegativeInt,
+    PositiveFloat,
+    PositiveInt,
+)
 
 if TYPE_CHECKING:
     from pushplan.training.ice_unet import IceUNet
@@ -30,7 +36,7 @@ OPSET = 17
 
 
 @dataclass(frozen=True)
-class IceTrainingConfig:
+class IceTrainingConfig(CheckedFields):
     """Parameters of the training.
 
     Args:
@@ -45,21 +51,13 @@ class IceTrainingConfig:
         threads: of PyTorch; the result depends on it in the last digits.
     """
 
-    epochs: int = 12
-    batch: int = 64
-    rate: float = 4e-3
-    decay: float = 1e-4
-    map_weight: float = 20.0
-    seed: int = 0
-    threads: int = 1
-
-    def __post_init__(self) -> None:
-        for name in ("epochs", "batch", "threads"):
-            integer(name, getattr(self, name), low=1)
-        integer("seed", self.seed, low=0)
-        for name in ("rate", "map_weight"):
-            number(name, getattr(self, name), low=0.0, open_low=True)
-        number("decay", self.decay, low=0.0)
+    epochs: PositiveInt = 12
+    batch: PositiveInt = 64
+    rate: PositiveFloat = 4e-3
+    decay: NonNegativeFloat = 1e-4
+    map_weight: PositiveFloat = 20.0
+    seed: NonNegativeInt = 0
+    threads: PositiveInt = 1
 
 
 def train(pairs: IcePairs, config: IceTrainingConfig | None = None) -> tuple[IceUNet, list[float]]:

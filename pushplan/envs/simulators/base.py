@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 from typing import ClassVar
 
 import numpy as np
@@ -14,11 +14,12 @@ from pushplan.envs.simulators.water import Water
 from pushplan.envs.trace import Trace
 from pushplan.interaction.model import Interaction
 from pushplan.world import InvalidInputError, Twist, World
+from pushplan.world.checked_fields import CheckedFields, PositiveFloat
 from pushplan.world.checks import ArrayRecord, FloatArray, frozen, number
 
 
 @dataclass(frozen=True)
-class Solids:
+class Solids(CheckedFields):
     """The third dimension of a scene, for engines that have one.
 
     Args:
@@ -29,16 +30,11 @@ class Solids:
         wheel_radius: of the robot's driven wheels [m].
     """
 
-    object_height: float
-    robot_height: float
-    wall_height: float
-    bumper_height: float
-    wheel_radius: float
-
-    def __post_init__(self) -> None:
-        for item in fields(self):
-            value = number(item.name, getattr(self, item.name), low=0.0, open_low=True)
-            object.__setattr__(self, item.name, value)
+    object_height: PositiveFloat
+    robot_height: PositiveFloat
+    wall_height: PositiveFloat
+    bumper_height: PositiveFloat
+    wheel_radius: PositiveFloat
 
 
 @dataclass(frozen=True)

@@ -32,7 +32,8 @@ from pushplan.world import (
     SchemaError,
     stream,
 )
-from pushplan.world.checks import integer, known_keys, number
+from pushplan.world.checked_fields import CheckedFields, Fraction, NonNegativeInt, PositiveInt
+from pushplan.world.checks import known_keys
 
 SCHEMA = "pushplan-dataset/1"
 METADATA = "metadata.json"
@@ -45,7 +46,7 @@ _UNREADABLE = (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile)
 
 
 @dataclass(frozen=True)
-class DatasetRequest:
+class DatasetRequest(CheckedFields):
     """What is recorded.
 
     Args:
@@ -65,18 +66,15 @@ class DatasetRequest:
     task: str
     scenarios: tuple[Mapping[str, Any], ...]
     observation: Mapping[str, Any]
-    episodes: int
+    episodes: PositiveInt
     simulator: str = "pymunk"
     preset: str | None = None
-    first_seed: int = TRAINING_SEEDS
-    noise: float = 0.0
-    hold: int = 4
+    first_seed: NonNegativeInt = TRAINING_SEEDS
+    noise: Fraction = 0.0
+    hold: PositiveInt = 4
 
     def __post_init__(self) -> None:
-        integer("episodes", self.episodes, low=1)
-        integer("first_seed", self.first_seed, low=0)
-        integer("hold", self.hold, low=1)
-        number("noise", self.noise, low=0.0, high=1.0)
+        super().__post_init__()
         if not self.scenarios:
             raise InvalidInputError("scenarios must hold at least one mapping of variations")
 
@@ -157,7 +155,8 @@ def _environment(
 
 
 def _mode(env: PushEnv) -> str:
-    from pushplan.envs.registry import ACTIONS, look_up
+    from pushplan.envs.registry import ACTIONS
+    from pushplan.world.lazy_names import look_up
 
     kinds = {look_up("action", ACTIONS, name): name for name in ACTIONS}
     return kinds[type(env._mode)]

@@ -5,31 +5,32 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from pushplan.world import InvalidInputError
-from pushplan.world.checks import integer, number
+from pushplan.world.checked_fields import (
+    CheckedFields,
+    Fraction,
+    NonNegativeFloat,
+    PositiveFloat,
+    PositiveFraction,
+    PositiveInt,
+)
+from pushplan.world.checks import integer
 
 
-def _check(
-    options: object,
-    *,
-    positive: tuple[str, ...],
-    fractions: tuple[str, ...],
-    whole: tuple[str, ...],
-) -> None:
-    for name in positive:
-        number(name, getattr(options, name), low=0.0, open_low=True)
-    for name in fractions:
-        number(name, getattr(options, name), low=0.0, high=1.0)
-    for name in whole:
-        integer(name, getattr(options, name), low=1)
-    widths = getattr(options, "widths", (1,))
-    if not isinstance(widths, tuple) or not widths:
-        raise InvalidInputError(f"widths must be a list of whole numbers, got {widths!r}")
-    for width in widths:
-        integer("width", width, low=1)
+class AlgorithmOptions(CheckedFields):
+    """Base of the parameters of an algorithm: numbers, and the widths of its network."""
+
+    widths: tuple[int, ...]
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if not isinstance(self.widths, tuple) or not self.widths:
+            raise InvalidInputError(f"widths must be a list of whole numbers, got {self.widths!r}")
+        for width in self.widths:
+            integer("width", width, low=1)
 
 
 @dataclass(frozen=True)
-class PpoOptions:
+class PpoOptions(AlgorithmOptions):
     """Proximal policy optimisation (Schulman et al. 2017, arXiv 1707.06347).
 
     Args:
@@ -45,30 +46,20 @@ class PpoOptions:
         widths: of the hidden layers, for actor and critic each.
     """
 
-    rate: float = 3e-4
-    rollout: int = 512
-    batch: int = 256
-    epochs: int = 8
-    discount: float = 0.99
-    trace: float = 0.95
-    clip: float = 0.2
-    entropy: float = 0.0
+    rate: PositiveFloat = 3e-4
+    rollout: PositiveInt = 512
+    batch: PositiveInt = 256
+    epochs: PositiveInt = 8
+    discount: Fraction = 0.99
+    trace: Fraction = 0.95
+    clip: PositiveFloat = 0.2
+    entropy: NonNegativeFloat = 0.0
     deviation: float = -0.5
     widths: tuple[int, ...] = (128, 128)
 
-    def __post_init__(self) -> None:
-        _check(
-            self,
-            positive=("rate", "clip"),
-            fractions=("discount", "trace"),
-            whole=("rollout", "batch", "epochs"),
-        )
-        number("entropy", self.entropy, low=0.0)
-        number("deviation", self.deviation)
-
 
 @dataclass(frozen=True)
-class SacOptions:
+class SacOptions(AlgorithmOptions):
     """Soft actor-critic (Haarnoja et al. 2018, arXiv 1801.01290).
 
     Args:
@@ -83,27 +74,19 @@ class SacOptions:
         widths: of the hidden layers.
     """
 
-    rate: float = 5e-4
-    buffer: int = 200_000
-    first: int = 2_000
-    batch: int = 256
-    every: int = 8
-    updates: int = 8
-    discount: float = 0.99
-    follow: float = 0.01
+    rate: PositiveFloat = 5e-4
+    buffer: PositiveInt = 200_000
+    first: PositiveInt = 2_000
+    batch: PositiveInt = 256
+    every: PositiveInt = 8
+    updates: PositiveInt = 8
+    discount: Fraction = 0.99
+    follow: PositiveFraction = 0.01
     widths: tuple[int, ...] = (128, 128)
-
-    def __post_init__(self) -> None:
-        _check(
-            self,
-            positive=("rate", "follow"),
-            fractions=("discount", "follow"),
-            whole=("buffer", "first", "batch", "every", "updates"),
-        )
 
 
 @dataclass(frozen=True)
-class SamOptions:
+class SamOptions(AlgorithmOptions):
     """Double deep Q-learning on spatial action maps (Wu et al. 2020, arXiv 2004.09141).
 
     Args:
@@ -130,45 +113,35 @@ class SamOptions:
             the same layers. Random ones by default.
     """
 
-    rate: float = 5e-4
-    buffer: int = 20_000
-    first: int = 1_000
-    batch: int = 32
-    every: int = 1
-    discount: float = 0.85
-    lookahead: int = 1
-    target_every: int = 500
-    follow: float = 0.0
-    explore: float = 0.15
-    explore_end: float = 0.05
-    at_objects: float = 0.5
-    clip: float = 10.0
+    rate: PositiveFloat = 5e-4
+    buffer: PositiveInt = 20_000
+    first: PositiveInt = 1_000
+    batch: PositiveInt = 32
+    every: PositiveInt = 1
+    discount: Fraction = 0.85
+    lookahead: PositiveInt = 1
+    target_every: PositiveInt = 500
+    follow: Fraction = 0.0
+    explore: Fraction = 0.15
+    explore_end: Fraction = 0.05
+    at_objects: Fraction = 0.5
+    clip: PositiveFloat = 10.0
     mirror: bool = True
     widths: tuple[int, ...] = (16, 32)
-    blocks: int = 4
-    shrink: int = 1
+    blocks: PositiveInt = 4
+    shrink: PositiveInt = 1
     start: str = ""
 
     def __post_init__(self) -> None:
-        _check(
-            self,
-            positive=("rate", "clip"),
-            fractions=("discount", "follow", "explore", "explore_end", "at_objects"),
-            whole=(
-                *("buffer", "first", "batch", "every"),
-                *("lookahead", "target_every", "blocks", "shrink"),
-            ),
-        )
+        super().__post_init__()
         if len(self.widths) != 2:
             raise InvalidInputError(f"widths of sam are two numbers, got {self.widths}")
-        if not isinstance(self.mirror, bool):
-            raise InvalidInputError(f"mirror must be true or false, got {self.mirror!r}")
         if not isinstance(self.start, str):
             raise InvalidInputError(f"start must be a policy's name or a file, got {self.start!r}")
 
 
 @dataclass(frozen=True)
-class BcOptions:
+class BcOptions(AlgorithmOptions):
     """Behaviour cloning: regression of the actions in a data set.
 
     Args:
@@ -179,15 +152,11 @@ class BcOptions:
         decay: of the weights.
     """
 
-    rate: float = 1e-3
-    batch: int = 256
-    held_out: float = 0.1
+    rate: PositiveFloat = 1e-3
+    batch: PositiveInt = 256
+    held_out: Fraction = 0.1
     widths: tuple[int, ...] = (128, 128)
-    decay: float = 1e-5
-
-    def __post_init__(self) -> None:
-        _check(self, positive=("rate",), fractions=("held_out",), whole=("batch",))
-        number("decay", self.decay, low=0.0)
+    decay: NonNegativeFloat = 1e-5
 
 
 Options = PpoOptions | SacOptions | SamOptions | BcOptions
