@@ -14,7 +14,8 @@ from typing import TYPE_CHECKING
 from pushplan.world.lazy_names import lazy_names
 
 if TYPE_CHECKING:
-    from pushplan.envs.push_env import EpisodeOverError, PushEnv, make
+    from pushplan.envs.making import make
+    from pushplan.envs.push_env import EpisodeOverError, PushEnv
     from pushplan.envs.rollout import RolloutInteraction
     from pushplan.envs.trace import Trace
 
@@ -23,7 +24,8 @@ __all__ = ["EpisodeOverError", "PushEnv", "RolloutInteraction", "Trace", "make",
 __getattr__, __dir__ = lazy_names(
     __name__,
     {
-        "push_env": "EpisodeOverError PushEnv make",
+        "making": "make",
+        "push_env": "EpisodeOverError PushEnv",
         "rollout": "RolloutInteraction",
         "trace": "Trace",
     },
@@ -38,9 +40,7 @@ def register_all() -> None:
 
     for gym_id, task in GYM_IDS.items():
         if gym_id not in registry:
-            register(
-                id=gym_id, entry_point="pushplan.envs.push_env:make_env", kwargs={"task": task}
-            )
+            register(id=gym_id, entry_point="pushplan.envs.making:make_env", kwargs={"task": task})
 
 
 register_all()

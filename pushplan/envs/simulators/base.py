@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import ClassVar
 
 import numpy as np
@@ -15,7 +15,7 @@ from pushplan.envs.trace import Trace
 from pushplan.interaction.model import Interaction
 from pushplan.world import InvalidInputError, Twist, World
 from pushplan.world.checked_fields import CheckedFields, PositiveFloat
-from pushplan.world.checks import ArrayRecord, FloatArray, frozen, number
+from pushplan.world.checks import ArrayRecord, FloatArray, IntArray, array, frozen, number
 
 
 @dataclass(frozen=True)
@@ -114,6 +114,9 @@ class Simulator(ABC):
     is_exact: ClassVar[bool] = False
     """Whether the robot follows a command exactly unless it is held."""
 
+    _world: World
+    _held = _touched = False
+
     @abstractmethod
     def build(self, world: World, materials: Materials) -> None:
         """Replace the scene with this one."""
@@ -134,12 +137,29 @@ class Simulator(ABC):
         """
 
     @abstractmethod
+    def _motion(self) -> tuple[float, FloatArray, FloatArray]:
+        """Time [s], poses and twists (1 + K, 3) of the robot and the objects now."""
+
     def world(self) -> World:
         """A snapshot of the scene now."""
+        time, poses, twists = self._motion()
+        return replace(
+            self._world,
+            robot_pose=poses[0],
+            robot_twist=twists[0],
+            movables=self._world.movables.moved_to(poses[1:], twists[1:]),
+            time=time,
+        )
 
-    @abstractmethod
     def save(self) -> SimulatorState:
         """The state now, cheap enough for every step."""
+        time, poses, twists = self._motion()
+        parts = (poses[0], twists[0], poses[1:], twists[1:], self._hidden())
+        return SimulatorState(time, *(frozen(part) for part in parts))
+
+    def _hidden(self) -> FloatArray:
+        """What the engine has to remember beside poses and twists."""
+        return np.zeros(0)
 
     @abstractmethod
     def restore(self, state: SimulatorState) -> None:
@@ -168,11 +188,37 @@ class Simulator(ABC):
         raise NotImplementedError(f"simulator {self.name!r} has no camera")
 
     @property
-    @abstractmethod
     def touched_static(self) -> bool:
         """Whether the robot's footprint touched something static during the last step."""
+        return self._touched
 
     @property
-    @abstractmethod
     def held(self) -> bool:
         """Whether the robot was kept from moving as commanded during the last step."""
+        return self._held
+
+    def _without(self, object_ids: Sequence[int]) -> tuple[World, IntArray]:
+        """The world now without some objects, and their rows.
+
+        Raises:
+            InvalidInputError: if one of them is not there.
+        """
+        world = self.world()
+        keep = ~np.isin(world.movables.ids, object_ids)
+        if len(object_ids) != (~keep).sum():
+            raise InvalidInputError(
+                f"cannot remove {list(object_ids)}, valid ids: {world.movables.ids.tolist()}"
+            )
+        return replace(world, movables=world.movables.select(keep)), np.flatnonzero(~keep)
+
+
+def checked_path(path: ArrayLike) -> FloatArray:
+    """(N, 3) poses to follow.
+
+    Raises:
+        InvalidInputError: if there is none, or they have another shape or are not finite.
+    """
+    poses: FloatArray = array("path", path, (None, 3))
+    if len(poses) == 0:
+        raise InvalidInputError("path must hold at least one pose")
+    return poses
