@@ -37,27 +37,19 @@ OPSET = 17
 
 @dataclass(frozen=True)
 class IceTrainingConfig(CheckedFields):
-    """Parameters of the training.
+    """Parameters of the training."""
 
-    Args:
-        epochs: passes over the pairs.
-        batch: pairs in a step.
-        rate: greatest learning rate of AdamW; it rises over the first tenth of the steps and
-            falls to nothing along a cosine (one-cycle schedule).
-        decay: of the weights.
-        map_weight: of the mean squared error of the occupancy, against the Poisson deviance of the
-            work, which is unbiased in the mean and allows more error where the work is more.
-        seed: of initial weights, order and mirroring.
-        threads: of PyTorch; the result depends on it in the last digits.
-    """
-
-    epochs: PositiveInt = 12
-    batch: PositiveInt = 64
+    epochs: PositiveInt = 12  # passes over the pairs
+    batch: PositiveInt = 64  # pairs in a step
+    # greatest learning rate of AdamW; it rises over the first tenth of the steps and falls to
+    # nothing along a cosine (one-cycle schedule)
     rate: PositiveFloat = 4e-3
-    decay: NonNegativeFloat = 1e-4
+    decay: NonNegativeFloat = 1e-4  # of the weights
+    # of the mean squared error of the occupancy, against the Poisson deviance of the work, which is
+    # unbiased in the mean and allows more error where the work is more
     map_weight: PositiveFloat = 20.0
-    seed: NonNegativeInt = 0
-    threads: PositiveInt = 1
+    seed: NonNegativeInt = 0  # of initial weights, order and mirroring
+    threads: PositiveInt = 1  # of PyTorch; the result depends on it in the last digits
 
 
 def train(pairs: IcePairs, config: IceTrainingConfig | None = None) -> tuple[IceUNet, list[float]]:

@@ -20,21 +20,13 @@ from pushplan.world.checks import ArrayRecord, FloatArray, IntArray, array, froz
 
 @dataclass(frozen=True)
 class Solids(CheckedFields):
-    """The third dimension of a scene, for engines that have one.
+    """The third dimension of a scene, for engines that have one."""
 
-    Args:
-        object_height: of boxes or floes [m].
-        robot_height: of the robot's body [m].
-        wall_height: of everything static [m].
-        bumper_height: of the footprint parts of the robot other than its first one [m].
-        wheel_radius: of the robot's driven wheels [m].
-    """
-
-    object_height: PositiveFloat
-    robot_height: PositiveFloat
-    wall_height: PositiveFloat
-    bumper_height: PositiveFloat
-    wheel_radius: PositiveFloat
+    object_height: PositiveFloat  # of boxes or floes [m]
+    robot_height: PositiveFloat  # of the robot's body [m]
+    wall_height: PositiveFloat  # of everything static [m]
+    bumper_height: PositiveFloat  # of the footprint parts of the robot other than its first one [m]
+    wheel_radius: PositiveFloat  # of the robot's driven wheels [m]
 
 
 @dataclass(frozen=True)

@@ -51,66 +51,40 @@ START_TRIES = 2000
 
 @dataclass(frozen=True, kw_only=True)
 class ManipulationPreset:
-    """Dimensions that both tasks have.
+    """Dimensions that both tasks have."""
 
-    Args:
-        robots: makers of the robots by name, called with ``drive`` and, where the preset has
-            one, ``bumper``; the first is the default.
-        bumper: the bumper unless said otherwise; None where robots have one of their own.
-        boxes: number of boxes by layout.
-        box_size: side of the boxes [m].
-        box_mass: [kg]; the area in m² if None, as the 2D benchmark's metric takes it.
-        box_spacing: least distance between the centres of two boxes at the start [m].
-        wall: thickness of the walls [m].
-        materials: friction; solids are filled in by robot where there are any.
-        control_step: time between two commands [s].
-        heading_step: how far a heading action drives [m].
-        windows: side of the observed square by layout [m].
-        field_resolution: side of a cell of the distance field [m].
-        progress_reward: for each metre by which the way of an object to its goal changes [1/m].
-    """
-
+    # makers of the robots by name, called with ``drive`` and, where the preset has one, ``bumper``;
+    # the first is the default
     robots: Mapping[str, Callable[..., RobotModel]]
-    bumper: str | None
-    boxes: Mapping[str, int]
-    box_size: float
-    box_mass: float | None
-    box_spacing: float
-    wall: float
-    materials: Materials
-    control_step: float
-    heading_step: float
-    windows: Mapping[str, float]
-    field_resolution: float
-    progress_reward: float
+    bumper: str | None  # the bumper unless said otherwise; None where robots have one of their own
+    boxes: Mapping[str, int]  # number of boxes by layout
+    box_size: float  # side of the boxes [m]
+    box_mass: float | None  # [kg]; the area in m² if None, as the 2D benchmark's metric takes it
+    box_spacing: float  # least distance between the centres of two boxes at the start [m]
+    wall: float  # thickness of the walls [m]
+    materials: Materials  # friction; solids are filled in by robot where there are any
+    control_step: float  # time between two commands [s]
+    heading_step: float  # how far a heading action drives [m]
+    windows: Mapping[str, float]  # side of the observed square by layout [m]
+    field_resolution: float  # side of a cell of the distance field [m]
+    progress_reward: float  # for each metre by which the way of an object to its goal changes [1/m]
 
 
 @dataclass(frozen=True, kw_only=True)
 class ManipulationVariations(TaskVariations):
-    """What may depart from a preset; None leaves the preset's value.
+    """What may depart from a preset; None leaves the preset's value."""
 
-    Args:
-        layout: name of the layout.
-        boxes: number of boxes, at least 1.
-        box_size: side of the boxes [m], at least 1 % of the preset's; their least spacing grows
-            with it.
-        box_yaw: headings of the boxes at the start, ``"aligned"`` or ``"random"``.
-        wheeled: fraction of the boxes that stand on casters, 0 to 1.
-        robot: one of the preset's robots.
-        bumper: one of `pushplan.world.BUMPERS`, where the robot's can be changed.
-        bumper_friction: friction coefficient between robot and boxes.
-        random_start: whether the robot's start is random.
-    """
-
-    layout: str
-    boxes: PositiveInt | None = None
+    layout: str  # name of the layout
+    boxes: PositiveInt | None = None  # number of boxes, at least 1
+    # side of the boxes [m], at least 1 % of the preset's; their least spacing grows with it
     box_size: PositiveFloat | None = None
-    box_yaw: Yaw
-    wheeled: Fraction = 0.0
-    robot: str | None = None
+    box_yaw: Yaw  # headings of the boxes at the start, ``"aligned"`` or ``"random"``
+    wheeled: Fraction = 0.0  # fraction of the boxes that stand on casters, 0 to 1
+    robot: str | None = None  # one of the preset's robots
+    # one of `pushplan.world.BUMPERS`, where the robot's can be changed
     bumper: Annotated[str, OneOf(BUMPERS)] | None = None
-    bumper_friction: NonNegativeFloat | None = None
-    random_start: bool
+    bumper_friction: NonNegativeFloat | None = None  # friction coefficient between robot and boxes
+    random_start: bool  # whether the robot's start is random
 
     layouts: ClassVar[tuple[str, ...]]
 

@@ -45,29 +45,21 @@ _START_TRIES = 2000
 
 @dataclass(frozen=True)
 class MazeVariations(TaskVariations):
-    """What may depart from a preset; None leaves the preset's value.
-
-    Args:
-        shape: ``"u"`` or ``"z"``.
-        boxes: number of boxes.
-        box_size: side of the boxes [m].
-        box_yaw: headings of the boxes at the start, ``"aligned"`` with the walls or ``"random"``.
-        wheeled: fraction of the boxes that stand on casters, 0 to 1.
-        random_start: whether the robot starts anywhere instead of at the preset's start.
-        bumper: what the testbed's robot carries in front, one of `pushplan.world.BUMPERS`.
-        bumper_friction: friction coefficient between robot and boxes.
-    """
+    """What may depart from a preset; None leaves the preset's value."""
 
     task = "maze"
 
-    shape: Annotated[str, OneOf(("u", "z"))] = "u"
-    boxes: NonNegativeInt = 5
-    box_size: PositiveFloat | None = None
+    shape: Annotated[str, OneOf(("u", "z"))] = "u"  # ``"u"`` or ``"z"``
+    boxes: NonNegativeInt = 5  # number of boxes
+    box_size: PositiveFloat | None = None  # side of the boxes [m]
+    # headings of the boxes at the start, ``"aligned"`` with the walls or ``"random"``
     box_yaw: Yaw = "aligned"
-    wheeled: Fraction = 0.0
+    wheeled: Fraction = 0.0  # fraction of the boxes that stand on casters, 0 to 1
+    # whether the robot starts anywhere instead of at the preset's start
     random_start: bool | None = None
+    # what the testbed's robot carries in front, one of `pushplan.world.BUMPERS`
     bumper: str | None = None
-    bumper_friction: NonNegativeFloat | None = None
+    bumper_friction: NonNegativeFloat | None = None  # friction coefficient between robot and boxes
 
 
 class MazeTask(Task):

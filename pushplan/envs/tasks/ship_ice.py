@@ -41,25 +41,19 @@ _UP = 0.5 * math.pi
 
 @dataclass(frozen=True)
 class ShipIceVariations(TaskVariations):
-    """What may depart from a preset; None leaves the preset's value.
-
-    Args:
-        concentration: area of the floes as a fraction of that of the ice field, 0 to 0.5.
-        clumping: 0 for ice that is equally likely everywhere, 1 for patches and open water.
-        goal_distance: how far the goal line lies ahead of the start line [m].
-        start_x: where on the start line the ship starts [m]; anywhere if None.
-        start_heading: [rad], straight ahead by default.
-        ice_file: ice from a file, as `pushplan.scenarios.load_ice` reads it, instead of random
-            ice.
-    """
+    """What may depart from a preset; None leaves the preset's value."""
 
     task = "ship_ice"
 
+    # area of the floes as a fraction of that of the ice field, 0 to 0.5
     concentration: Annotated[float, Limits(0.0, 0.5)] | None = None
+    # 0 for ice that is equally likely everywhere, 1 for patches and open water
     clumping: Fraction = 0.6
+    # how far the goal line lies ahead of the start line [m]
     goal_distance: PositiveFloat | None = None
-    start_x: float | None = None
-    start_heading: float = _UP
+    start_x: float | None = None  # where on the start line the ship starts [m]; anywhere if None
+    start_heading: float = _UP  # [rad], straight ahead by default
+    # ice from a file, as `pushplan.scenarios.load_ice` reads it, instead of random ice
     ice_file: str | None = None
 
     def __post_init__(self) -> None:

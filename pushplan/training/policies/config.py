@@ -32,17 +32,11 @@ _SCIENTIFIC = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)[eE][-+]?\d+")
 
 @dataclass(frozen=True)
 class ActionChoice:
-    """How the network acts.
+    """How the network acts."""
 
-    Args:
-        mode: action mode of the environment.
-        output: see `pushplan.learned.ActionSpec`.
-        repeat: control steps, or actions, for which a decision stands.
-    """
-
-    mode: str
-    output: str = "continuous"
-    repeat: int = 1
+    mode: str  # action mode of the environment
+    output: str = "continuous"  # see `pushplan.learned.ActionSpec`
+    repeat: int = 1  # control steps, or actions, for which a decision stands
 
     def __post_init__(self) -> None:
         choice("output", self.output, OUTPUTS)

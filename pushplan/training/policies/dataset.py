@@ -47,31 +47,20 @@ _UNREADABLE = (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile)
 
 @dataclass(frozen=True)
 class DatasetRequest(CheckedFields):
-    """What is recorded.
+    """What is recorded."""
 
-    Args:
-        task: name of the task.
-        scenarios: variations of it; the episodes take them in turn.
-        observation: what is recorded as observed, as in a specification.
-        episodes: how many.
-        simulator: name of the simulator.
-        preset: of the task.
-        first_seed: of the first layout; by default beyond all that scores are made on.
-        noise: probability for each action that a random one is carried out instead, for a few
-            steps. The one that the policy wanted is recorded all the same, so that a learner sees
-            how to come back.
-        hold: for how many steps a random action stands.
-    """
-
-    task: str
-    scenarios: tuple[Mapping[str, Any], ...]
-    observation: Mapping[str, Any]
-    episodes: PositiveInt
-    simulator: str = "pymunk"
-    preset: str | None = None
+    task: str  # name of the task
+    scenarios: tuple[Mapping[str, Any], ...]  # variations of it; the episodes take them in turn
+    observation: Mapping[str, Any]  # what is recorded as observed, as in a specification
+    episodes: PositiveInt  # how many
+    simulator: str = "pymunk"  # name of the simulator
+    preset: str | None = None  # of the task
+    # of the first layout; by default beyond all that scores are made on
     first_seed: NonNegativeInt = TRAINING_SEEDS
+    # probability for each action that a random one is carried out instead, for a few steps. The one
+    # that the policy wanted is recorded all the same, so that a learner sees how to come back.
     noise: Fraction = 0.0
-    hold: PositiveInt = 4
+    hold: PositiveInt = 4  # for how many steps a random action stands
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -31,105 +31,69 @@ class AlgorithmOptions(CheckedFields):
 
 @dataclass(frozen=True)
 class PpoOptions(AlgorithmOptions):
-    """Proximal policy optimisation (Schulman et al. 2017, arXiv 1707.06347).
+    """Proximal policy optimisation (Schulman et al. 2017, arXiv 1707.06347)."""
 
-    Args:
-        rate: learning rate at the start; it falls linearly to a tenth at the end.
-        rollout: decisions of each environment between two updates.
-        batch: decisions in a gradient step.
-        epochs: passes over a rollout.
-        discount: of a decision.
-        trace: lambda of the generalised advantage.
-        clip: of the probability ratio.
-        entropy: weight of the entropy.
-        deviation: logarithm of the first standard deviation of actions.
-        widths: of the hidden layers, for actor and critic each.
-    """
-
+    # learning rate at the start; it falls linearly to a tenth at the end
     rate: PositiveFloat = 3e-4
-    rollout: PositiveInt = 512
-    batch: PositiveInt = 256
-    epochs: PositiveInt = 8
-    discount: Fraction = 0.99
-    trace: Fraction = 0.95
-    clip: PositiveFloat = 0.2
-    entropy: NonNegativeFloat = 0.0
-    deviation: float = -0.5
-    widths: tuple[int, ...] = (128, 128)
+    rollout: PositiveInt = 512  # decisions of each environment between two updates
+    batch: PositiveInt = 256  # decisions in a gradient step
+    epochs: PositiveInt = 8  # passes over a rollout
+    discount: Fraction = 0.99  # of a decision
+    trace: Fraction = 0.95  # lambda of the generalised advantage
+    clip: PositiveFloat = 0.2  # of the probability ratio
+    entropy: NonNegativeFloat = 0.0  # weight of the entropy
+    deviation: float = -0.5  # logarithm of the first standard deviation of actions
+    widths: tuple[int, ...] = (128, 128)  # of the hidden layers, for actor and critic each
 
 
 @dataclass(frozen=True)
 class SacOptions(AlgorithmOptions):
-    """Soft actor-critic (Haarnoja et al. 2018, arXiv 1801.01290).
+    """Soft actor-critic (Haarnoja et al. 2018, arXiv 1801.01290)."""
 
-    Args:
-        rate: learning rate.
-        buffer: decisions that are remembered.
-        first: random decisions before learning begins.
-        batch: decisions in a gradient step.
-        every: decisions of each environment between two rounds of updates.
-        updates: gradient steps in such a round.
-        discount: of a decision.
-        follow: fraction by which the target critics follow in each gradient step.
-        widths: of the hidden layers.
-    """
-
-    rate: PositiveFloat = 5e-4
-    buffer: PositiveInt = 200_000
-    first: PositiveInt = 2_000
-    batch: PositiveInt = 256
-    every: PositiveInt = 8
-    updates: PositiveInt = 8
-    discount: Fraction = 0.99
+    rate: PositiveFloat = 5e-4  # learning rate
+    buffer: PositiveInt = 200_000  # decisions that are remembered
+    first: PositiveInt = 2_000  # random decisions before learning begins
+    batch: PositiveInt = 256  # decisions in a gradient step
+    every: PositiveInt = 8  # decisions of each environment between two rounds of updates
+    updates: PositiveInt = 8  # gradient steps in such a round
+    discount: Fraction = 0.99  # of a decision
+    # fraction by which the target critics follow in each gradient step
     follow: PositiveFraction = 0.01
-    widths: tuple[int, ...] = (128, 128)
+    widths: tuple[int, ...] = (128, 128)  # of the hidden layers
 
 
 @dataclass(frozen=True)
 class SamOptions(AlgorithmOptions):
-    """Double deep Q-learning on spatial action maps (Wu et al. 2020, arXiv 2004.09141).
+    """Double deep Q-learning on spatial action maps (Wu et al. 2020, arXiv 2004.09141)."""
 
-    Args:
-        rate: learning rate of Adam at the start; it falls linearly to a tenth.
-        buffer: decisions that are remembered.
-        first: decisions before learning begins.
-        batch: decisions in a gradient step.
-        every: decisions for each gradient step.
-        discount: of a decision.
-        lookahead: decisions whose rewards are added up before the value of what is seen then.
-        target_every: gradient steps between two copies of the network to the target.
-        follow: fraction by which the target follows the network in each gradient step instead of
-            being copied; it is then their running average, is validated and becomes the policy.
-        explore: fraction of the decisions over which exploration falls from 1 to ``explore_end``.
-        explore_end: probability of a random pixel then.
-        at_objects: fraction of the random pixels that are drawn around movable objects.
-        clip: greatest norm of the gradient.
-        mirror: learn from mirrored maps as often as from others; both tasks are symmetric.
-        widths: channels at half and at a quarter of the map's resolution.
-        blocks: residual blocks at a quarter.
-        shrink: factor by which the network is coarser than that behind its first layer; 2 for maps
-            of twice the resolution.
-        start: shipped policy, or ONNX file, with the weights to begin with; its network must have
-            the same layers. Random ones by default.
-    """
-
-    rate: PositiveFloat = 5e-4
-    buffer: PositiveInt = 20_000
-    first: PositiveInt = 1_000
-    batch: PositiveInt = 32
-    every: PositiveInt = 1
-    discount: Fraction = 0.85
+    rate: PositiveFloat = 5e-4  # learning rate of Adam at the start; it falls linearly to a tenth
+    buffer: PositiveInt = 20_000  # decisions that are remembered
+    first: PositiveInt = 1_000  # decisions before learning begins
+    batch: PositiveInt = 32  # decisions in a gradient step
+    every: PositiveInt = 1  # decisions for each gradient step
+    discount: Fraction = 0.85  # of a decision
+    # decisions whose rewards are added up before the value of what is seen then
     lookahead: PositiveInt = 1
+    # gradient steps between two copies of the network to the target
     target_every: PositiveInt = 500
+    # fraction by which the target follows the network in each gradient step instead of being
+    # copied; it is then their running average, is validated and becomes the policy
     follow: Fraction = 0.0
+    # fraction of the decisions over which exploration falls from 1 to ``explore_end``
     explore: Fraction = 0.15
-    explore_end: Fraction = 0.05
+    explore_end: Fraction = 0.05  # probability of a random pixel then
+    # fraction of the random pixels that are drawn around movable objects
     at_objects: Fraction = 0.5
-    clip: PositiveFloat = 10.0
+    clip: PositiveFloat = 10.0  # greatest norm of the gradient
+    # learn from mirrored maps as often as from others; both tasks are symmetric
     mirror: bool = True
-    widths: tuple[int, ...] = (16, 32)
-    blocks: PositiveInt = 4
+    widths: tuple[int, ...] = (16, 32)  # channels at half and at a quarter of the map's resolution
+    blocks: PositiveInt = 4  # residual blocks at a quarter
+    # factor by which the network is coarser than that behind its first layer; 2 for maps of twice
+    # the resolution
     shrink: PositiveInt = 1
+    # shipped policy, or ONNX file, with the weights to begin with; its network must have the same
+    # layers. Random ones by default.
     start: str = ""
 
     def __post_init__(self) -> None:
@@ -142,21 +106,13 @@ class SamOptions(AlgorithmOptions):
 
 @dataclass(frozen=True)
 class BcOptions(AlgorithmOptions):
-    """Behaviour cloning: regression of the actions in a data set.
+    """Behaviour cloning: regression of the actions in a data set."""
 
-    Args:
-        rate: greatest learning rate of Adam, on a one-cycle schedule.
-        batch: decisions in a gradient step.
-        held_out: fraction of the episodes that only measure the error.
-        widths: of the hidden layers.
-        decay: of the weights.
-    """
-
-    rate: PositiveFloat = 1e-3
-    batch: PositiveInt = 256
-    held_out: Fraction = 0.1
-    widths: tuple[int, ...] = (128, 128)
-    decay: NonNegativeFloat = 1e-5
+    rate: PositiveFloat = 1e-3  # greatest learning rate of Adam, on a one-cycle schedule
+    batch: PositiveInt = 256  # decisions in a gradient step
+    held_out: Fraction = 0.1  # fraction of the episodes that only measure the error
+    widths: tuple[int, ...] = (128, 128)  # of the hidden layers
+    decay: NonNegativeFloat = 1e-5  # of the weights
 
 
 Options = PpoOptions | SacOptions | SamOptions | BcOptions
