@@ -86,9 +86,11 @@ def main() -> None:
                     observation="state",
                 )
                 figures = " | ".join(f"{mean(results, c):.3f}" for c in columns)
-                print(f"| {cell.get('control_step', 'default')} "
-                      f"| {cell.get('max_turn_rate', 'default')} | {figures} "
-                      f"| {sum(row.status != Status.DONE for row in results.rows)} |", flush=True)  # fmt: skip
+                failed = sum(row.status != Status.DONE for row in results.rows)
+                where = " | ".join(
+                    str(cell.get(key, "default")) for key in ("control_step", "max_turn_rate")
+                )
+                print(f"| {where} | {figures} | {failed} |", flush=True)
 
 
 if __name__ == "__main__":

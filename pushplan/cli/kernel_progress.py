@@ -12,12 +12,9 @@ from importlib.resources import files
 
 @dataclass
 class KernelProgress:
-    """What has become ready so far.
+    """What has become ready so far."""
 
-    Args:
-        expected: names of the kernels that are to come; empty if that is not known.
-    """
-
+    # names of the kernels that are to come; empty if that is not known
     expected: frozenset[str] = frozenset()
     compiled: int = 0
     loaded: int = 0

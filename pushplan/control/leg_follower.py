@@ -18,6 +18,7 @@ _ASTRAY = math.radians(15.0)
 _PASSED, _BESIDE = 0.12, 0.03
 """Distances at which a point that lies behind, or abeam, counts as reached [circumscribed radii]:
 to turn for so little could sweep into something."""
+_SURE = 8.0  # distance from which on the bearing of a point is steered by [`near`]
 LITTLE_TURN = 0.6
 """A turn by less is not made the longer way [rad]."""
 _PATIENCE = 2.0
@@ -154,8 +155,10 @@ class LegFollower:
                 self._next += 1
                 self._take_up()
                 continue
-            limit = self._aligned if self._turning else _ASTRAY
-            if abs(bearing) > limit and not self._is_aimed(abs(bearing), time):
+            misses = distance * math.sin(min(abs(bearing), 0.5 * math.pi)) > self._near
+            astray = abs(bearing) > _ASTRAY and misses
+            wrong = abs(bearing) > self._aligned if self._turning else astray
+            if wrong and not self._is_aimed(abs(bearing), time):
                 if not self._turning:
                     if distance > self._turned_at - self._near:
                         return None  # turning again has brought it no nearer
@@ -177,8 +180,9 @@ class LegFollower:
     def _is_reached(self, distance: float, bearing: float) -> bool:
         """Whether a leg is over, from what is left of it."""
         size = self._robot.circumscribed_radius
-        passed = not self._turning and bearing > 0.5 * math.pi and distance < _PASSED * size
-        beside = bearing > _ASTRAY and distance < _BESIDE * size
+        behind = not self._turning and bearing > 0.5 * math.pi
+        passed = behind and distance < max(_PASSED * size, 3.0 * self._near)
+        beside = bearing > _ASTRAY and distance < max(_BESIDE * size, 1.5 * self._near)
         return distance <= self._near or passed or beside
 
     def _is_aimed(self, error: float, time: float) -> bool:
@@ -199,7 +203,8 @@ class LegFollower:
             fastest = min(fastest, 0.5 * robot.max_turn_rate * distance / abs(math.sin(bearing)))
         speed = min(fastest, distance / seconds)
         self.steady = distance / fastest if abs(bearing) < 1e-6 else 0.0
-        turn = bearing / seconds if distance > 0.02 * robot.circumscribed_radius else 0.0
+        # near the point its bearing says little
+        turn = min(1.0, distance / (_SURE * self._near)) * bearing / seconds
         return clamp_twist(robot, sign * speed, turn)
 
     def _make_room(self, pose: FloatArray, time: float, held: float, stopped: bool) -> Twist | None:

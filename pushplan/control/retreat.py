@@ -36,19 +36,24 @@ class Retreat:
         )
         self._ways = [way for way in commands if way.linear or way.angular]
         self._stall = StallChecker(robot, _PATIENCE)
+        self.got_away = False
+        """Whether it has got away by the distance."""
 
-    def command(self, pose: FloatArray, time: float, *, stopped: bool = False) -> Twist | None:
+    def command(
+        self, pose: FloatArray, time: float, held: float, *, stopped: bool = False
+    ) -> Twist | None:
         """The velocity to drive now; None when it has got away, or there is no way.
 
         Args:
             pose: (3,) of the robot.
             time: [s].
+            held: for how long the command will be held [s].
             stopped: whether the present way is known to be closed.
         """
         size = self._robot.circumscribed_radius
         turned = abs(math.remainder(float(pose[2] - self._from[2]), math.tau))
         if math.dist(pose[:2], self._from[:2]) >= self._distance or turned > _TURNED:
-            self._ways = []
+            self._ways, self.got_away = [], True
         if self._ways and (self._stall.update(pose, time) or stopped):
             tried = self._ways.pop(0)
             if math.dist(pose[:2], self._tried_from[:2]) > _FREED * size and self._ways:

@@ -28,19 +28,12 @@ _TIMES = {
 
 @dataclass(frozen=True)
 class Table:
-    """A table of texts. A line break in a cell separates a value from its interval.
+    """A table of texts. A line break in a cell separates a value from its interval."""
 
-    Args:
-        title: one line.
-        headings: one a column.
-        cells: rows of as many texts.
-        note: what the numbers are.
-    """
-
-    title: str
-    headings: tuple[str, ...]
-    cells: tuple[tuple[str, ...], ...]
-    note: str = ""
+    title: str  # one line
+    headings: tuple[str, ...]  # one a column
+    cells: tuple[tuple[str, ...], ...]  # rows of as many texts
+    note: str = ""  # what the numbers are
 
 
 SCORE_NOTE = (

@@ -22,21 +22,13 @@ GAP = 1e-7
 
 
 class Contours(NamedTuple):
-    """Corners of polygons around every obstacle, each corner with its neighbours' directions.
+    """Corners of polygons around every obstacle, each corner with its neighbours' directions."""
 
-    Attributes:
-        corners: (V, 2) all corners [m]; each obstacle's run counter-clockwise.
-        incoming: (V, 2) unit direction from the previous corner of the same obstacle.
-        outgoing: (V, 2) unit direction to the next corner.
-        owner: (V,) index of the obstacle.
-        following: (V,) index of the next corner of the same obstacle.
-    """
-
-    corners: FloatArray
-    incoming: FloatArray
-    outgoing: FloatArray
-    owner: IntArray
-    following: IntArray
+    corners: FloatArray  # (V, 2) all corners [m]; each obstacle's run counter-clockwise
+    incoming: FloatArray  # (V, 2) unit direction from the previous corner of the same obstacle
+    outgoing: FloatArray  # (V, 2) unit direction to the next corner
+    owner: IntArray  # (V,) index of the obstacle
+    following: IntArray  # (V,) index of the next corner of the same obstacle
 
 
 def gap_of(static: StaticMap) -> float:

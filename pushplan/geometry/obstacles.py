@@ -21,19 +21,13 @@ from pushplan.world.outline import flatten
 
 
 class Obstacles(NamedTuple):
-    """C grown convex cores; a plain tuple of arrays, so that it can be passed into kernels.
+    """C grown convex cores; a plain tuple of arrays, so that it can be passed into kernels."""
 
-    Attributes:
-        vertices: (V, 2) corners of the cores [m], each counter-clockwise; a segment has two.
-        offsets: (C + 1,) where each core starts.
-        radii: (C,) how far each obstacle reaches beyond its core [m].
-        boxes: (C, 4) x_min, y_min, x_max, y_max of each obstacle [m].
-    """
-
+    # (V, 2) corners of the cores [m], each counter-clockwise; a segment has two
     vertices: FloatArray
-    offsets: IntArray
-    radii: FloatArray
-    boxes: FloatArray
+    offsets: IntArray  # (C + 1,) where each core starts
+    radii: FloatArray  # (C,) how far each obstacle reaches beyond its core [m]
+    boxes: FloatArray  # (C, 4) x_min, y_min, x_max, y_max of each obstacle [m]
 
 
 @lru_cache(maxsize=64)

@@ -26,19 +26,14 @@ Target = GoalDisc | GoalLine | Receptacle | ClearanceArea | tuple[FloatArray, ..
 
 
 class Regions(NamedTuple):
-    """A union of discs, half-planes and convex polygons; a plain tuple for kernels.
+    """A union of discs, half-planes and convex polygons; a plain tuple for kernels."""
 
-    Attributes:
-        discs: (D, 3) x, y, radius [m]; a radius of 0 is a point.
-        lines: (H, 4) point x, y [m] and unit normal; everything on or beyond the line belongs.
-        corners: (V, 2) corners of convex polygons [m], counter-clockwise; two make a segment.
-        offsets: (P + 1,) where each polygon starts.
-    """
-
-    discs: FloatArray
+    discs: FloatArray  # (D, 3) x, y, radius [m]; a radius of 0 is a point
+    # (H, 4) point x, y [m] and unit normal; everything on or beyond the line belongs
     lines: FloatArray
+    # (V, 2) corners of convex polygons [m], counter-clockwise; two make a segment
     corners: FloatArray
-    offsets: IntArray
+    offsets: IntArray  # (P + 1,) where each polygon starts
 
 
 def as_target(goal: Goal | Sequence[ArrayLike]) -> Target:

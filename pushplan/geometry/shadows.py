@@ -188,24 +188,16 @@ def _bends_in_sight(
 
 @dataclass(frozen=True, eq=False)
 class BendDistances:
-    """How far every cell of a map is from every bend around its obstacles.
+    """How far every cell of a map is from every bend around its obstacles."""
 
-    Attributes:
-        static: the map.
-        grid: where the cells are.
-        table: (rows, columns, B) length [m] of the shortest way that goes on past the bend; inf
-            where no way leads. Cells inside an obstacle have the value of the nearest free one.
-        bends: the B places where shortest paths bend.
-        loops: (V, 2) corners of convex polygons just around the obstacles [m], flattened.
-        offsets: (P + 1,) where each polygon starts.
-    """
-
-    static: StaticMap
-    grid: Grid
+    static: StaticMap  # the map
+    grid: Grid  # where the cells are
+    # (rows, columns, B) length [m] of the shortest way that goes on past the bend; inf where no way
+    # leads. Cells inside an obstacle have the value of the nearest free one.
     table: Table
-    bends: Contours
-    loops: FloatArray
-    offsets: IntArray
+    bends: Contours  # the B places where shortest paths bend
+    loops: FloatArray  # (V, 2) corners of convex polygons just around the obstacles [m], flattened
+    offsets: IntArray  # (P + 1,) where each polygon starts
 
     def in_sight(self, x: float, y: float) -> tuple[IntArray, FloatArray]:
         """Bends over which a shortest path from a point [m] may lead, and how far each is [m]."""

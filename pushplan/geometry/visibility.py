@@ -19,18 +19,13 @@ GOAL_LEG = -1
 
 
 class Nodes(NamedTuple):
-    """Places where a shortest path may bend or end, sorted by their distance to the goal.
+    """Places where a shortest path may bend or end, sorted by their distance to the goal."""
 
-    Attributes:
-        points: (V, 2) positions [m].
-        incoming: (V, 2) unit direction of the outline towards the node, 0 where it is no corner.
-        outgoing: (V, 2) unit direction of the outline away from the node.
-        distances: (V,) shortest distance from the node to the goal [m], inf if there is no way.
-    """
-
-    points: FloatArray
+    points: FloatArray  # (V, 2) positions [m]
+    # (V, 2) unit direction of the outline towards the node, 0 where it is no corner
     incoming: FloatArray
-    outgoing: FloatArray
+    outgoing: FloatArray  # (V, 2) unit direction of the outline away from the node
+    # (V,) shortest distance from the node to the goal [m], inf if there is no way
     distances: FloatArray
 
 

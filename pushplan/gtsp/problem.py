@@ -16,17 +16,11 @@ from pushplan.world.checks import FloatArray, IntArray
 
 @dataclass(frozen=True)
 class Problem:
-    """Costs with the nodes ordered by clusters.
+    """Costs with the nodes ordered by clusters."""
 
-    Args:
-        costs: (N, N) float64; inf forbids an arc. Arcs inside a cluster mean nothing.
-        offsets: (m + 1,) cluster c has the nodes ``offsets[c]`` to ``offsets[c + 1] - 1``.
-        names: (N,) what the caller calls each node.
-    """
-
-    costs: FloatArray
-    offsets: IntArray
-    names: IntArray
+    costs: FloatArray  # (N, N) float64; inf forbids an arc. Arcs inside a cluster mean nothing.
+    offsets: IntArray  # (m + 1,) cluster c has the nodes ``offsets[c]`` to ``offsets[c + 1] - 1``
+    names: IntArray  # (N,) what the caller calls each node
 
     @staticmethod
     def build(costs: NDArray[np.number], members: Sequence[IntArray]) -> Problem:

@@ -33,19 +33,12 @@ FEW_PATHS = 4_000
 
 @dataclass
 class Proof:
-    """What is known of the optimum.
+    """What is known of the optimum."""
 
-    Args:
-        bound: no tour is cheaper, -inf if nothing is known.
-        complete: whether the best tour that is known is proven to be optimal.
-        nodes: a cheaper tour than the given one, if one was found.
-        detail: further numbers, by name.
-    """
-
-    bound: float = -np.inf
-    complete: bool = False
-    nodes: IntArray | None = None
-    detail: dict[str, float] = field(default_factory=dict)
+    bound: float = -np.inf  # no tour is cheaper, -inf if nothing is known
+    complete: bool = False  # whether the best tour that is known is proven to be optimal
+    nodes: IntArray | None = None  # a cheaper tour than the given one, if one was found
+    detail: dict[str, float] = field(default_factory=dict)  # further numbers, by name
 
 
 def prove(problem: Problem, cost: float, stopped: Callable[[], bool], config: GtspConfig) -> Proof:

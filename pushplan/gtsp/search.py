@@ -19,25 +19,15 @@ MOST_ROUNDS = 2000
 
 @dataclass
 class Budget:
-    """What a call may use, and how much of it is gone.
+    """What a call may use, and how much of it is gone."""
 
-    Args:
-        check: the armed stop rule.
-        began: when the call began, of `time.perf_counter` [s].
-        seconds: wall-clock budget [s], infinite if none.
-        rounds: budget of rounds, infinite if none.
-        used: rounds so far.
-        cost: of the best tour so far.
-        best_s: when it was found, since the beginning of the call [s].
-    """
-
-    check: StopCheck
-    began: float
-    seconds: float
-    rounds: float
-    used: int = 0
-    cost: float = np.inf
-    best_s: float = np.nan
+    check: StopCheck  # the armed stop rule
+    began: float  # when the call began, of `time.perf_counter` [s]
+    seconds: float  # wall-clock budget [s], infinite if none
+    rounds: float  # budget of rounds, infinite if none
+    used: int = 0  # rounds so far
+    cost: float = np.inf  # of the best tour so far
+    best_s: float = np.nan  # when it was found, since the beginning of the call [s]
 
     @staticmethod
     def start(stop: Stop | None, iterations: int) -> Budget:

@@ -30,15 +30,10 @@ CHANNELS = ("occupancy", "footprint", "swath")
 
 @dataclass(frozen=True, eq=False)
 class Passage(ArrayRecord):
-    """A path through the objects: a world, and the poses that the robot sweeps through.
+    """A path through the objects: a world, and the poses that the robot sweeps through."""
 
-    Args:
-        world: the snapshot; of the robot only the footprint is used.
-        path: (N, 3) robot poses x, y [m], theta [rad], N at least 2.
-    """
-
-    world: World
-    path: FloatArray
+    world: World  # the snapshot; of the robot only the footprint is used
+    path: FloatArray  # (N, 3) robot poses x, y [m], theta [rad], N at least 2
 
     def __post_init__(self) -> None:
         if not isinstance(self.world, World):
@@ -54,23 +49,19 @@ class Passage(ArrayRecord):
 class PassageBatch:
     """Passages as a predictor reads them.
 
-    Args:
-        patches: (B, 3, 40, 40) covered fraction of each cell: occupancy, footprint at the start,
-            swath. Rows count up ahead (towards the goal), columns to the right.
-        cell: side of a cell [m].
-        density: mass over area of the objects [kg/m²].
-        frames: (B, 3) where each patch lies, as in `occupancy_kernels`; None where
-            the patches come from a map and predictors that need none are asked.
-        passages: the worlds, for predictors that follow single objects; () where there are none.
-
     Raises:
         InvalidInputError: if a shape is wrong or a value is not a fraction.
     """
 
+    # (B, 3, 40, 40) covered fraction of each cell: occupancy, footprint at the start, swath. Rows
+    # count up ahead (towards the goal), columns to the right.
     patches: Patch
-    cell: float
-    density: float = 1.0
+    cell: float  # side of a cell [m]
+    density: float = 1.0  # mass over area of the objects [kg/m²]
+    # (B, 3) where each patch lies, as in `occupancy_kernels`; None where the patches come from a
+    # map and predictors that need none are asked
     frames: FloatArray | None = None
+    # the worlds, for predictors that follow single objects; () where there are none
     passages: tuple[Passage, ...] = ()
 
     def __post_init__(self) -> None:
@@ -96,15 +87,10 @@ class PassageBatch:
 
 @dataclass(frozen=True, eq=False)
 class OccupancyForecast:
-    """What a predictor expects of each passage of a batch.
+    """What a predictor expects of each passage of a batch."""
 
-    Args:
-        after: (B, 40, 40) covered fraction of each cell once the robot has passed.
-        work: (B,) sum of mass times path length over the objects [kg m].
-    """
-
-    after: Patch
-    work: FloatArray
+    after: Patch  # (B, 40, 40) covered fraction of each cell once the robot has passed
+    work: FloatArray  # (B,) sum of mass times path length over the objects [kg m]
 
     def __post_init__(self) -> None:
         put = object.__setattr__

@@ -19,7 +19,13 @@ from typing import TYPE_CHECKING, Any
 from pushplan.interaction.occupancy import CELLS_PER_LENGTH, CHANNELS, PATCH_CELLS
 from pushplan.training.ice_data import LEVELS, IcePairs, read_shards
 from pushplan.world import MissingDependencyError
-from pushplan.world.checks import integer, number
+from pushplan.world.checked_fields import (
+    CheckedFields,
+    NonNegativeFloat,
+    NonNegativeInt,
+    PositiveFloat,
+    PositiveInt,
+)
 
 if TYPE_CHECKING:
     from pushplan.training.ice_unet import IceUNet
@@ -30,36 +36,20 @@ OPSET = 17
 
 
 @dataclass(frozen=True)
-class IceTrainingConfig:
-    """Parameters of the training.
+class IceTrainingConfig(CheckedFields):
+    """Parameters of the training."""
 
-    Args:
-        epochs: passes over the pairs.
-        batch: pairs in a step.
-        rate: greatest learning rate of AdamW; it rises over the first tenth of the steps and
-            falls to nothing along a cosine (one-cycle schedule).
-        decay: of the weights.
-        map_weight: of the mean squared error of the occupancy, against the Poisson deviance of the
-            work, which is unbiased in the mean and allows more error where the work is more.
-        seed: of initial weights, order and mirroring.
-        threads: of PyTorch; the result depends on it in the last digits.
-    """
-
-    epochs: int = 12
-    batch: int = 64
-    rate: float = 4e-3
-    decay: float = 1e-4
-    map_weight: float = 20.0
-    seed: int = 0
-    threads: int = 1
-
-    def __post_init__(self) -> None:
-        for name in ("epochs", "batch", "threads"):
-            integer(name, getattr(self, name), low=1)
-        integer("seed", self.seed, low=0)
-        for name in ("rate", "map_weight"):
-            number(name, getattr(self, name), low=0.0, open_low=True)
-        number("decay", self.decay, low=0.0)
+    epochs: PositiveInt = 12  # passes over the pairs
+    batch: PositiveInt = 64  # pairs in a step
+    # greatest learning rate of AdamW; it rises over the first tenth of the steps and falls to
+    # nothing along a cosine (one-cycle schedule)
+    rate: PositiveFloat = 4e-3
+    decay: NonNegativeFloat = 1e-4  # of the weights
+    # of the mean squared error of the occupancy, against the Poisson deviance of the work, which is
+    # unbiased in the mean and allows more error where the work is more
+    map_weight: PositiveFloat = 20.0
+    seed: NonNegativeInt = 0  # of initial weights, order and mirroring
+    threads: PositiveInt = 1  # of PyTorch; the result depends on it in the last digits
 
 
 def train(pairs: IcePairs, config: IceTrainingConfig | None = None) -> tuple[IceUNet, list[float]]:

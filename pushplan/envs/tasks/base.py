@@ -6,14 +6,14 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import ClassVar, Literal
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 
 from pushplan.envs.simulators.base import Materials
 from pushplan.envs.tasks.variations import TaskVariations
 from pushplan.observation import ObservationBuilder
-from pushplan.world import Drive, RobotModel, World
+from pushplan.world import Drive, RobotModel, UnknownNameError, World
 from pushplan.world.checks import BoolArray, FloatArray, IntArray
 
 
@@ -43,18 +43,22 @@ class Task(ABC):
     """One task with one preset and its variations.
 
     Args:
-        preset: one of `presets`.
+        preset: one of `presets`, the first if None.
         variations: what departs from the preset, by name.
-        action: name of the action mode, one of `actions`; `drive_of` says what the robot becomes.
+        action: name of the action mode, one of `actions`, the first if None; `drive_of` says what
+            the robot becomes.
 
     Raises:
-        UnknownNameError: if there is no such preset or variation.
+        UnknownNameError: if there is no such preset, variation or action.
         ScenarioError: if the value of a variation makes no sense.
     """
 
     name: ClassVar[str]
     goal_kind: ClassVar[Literal["robot", "objects"]] = "robot"
     """Who has a goal: decides which metrics apply."""
+    preset_table: ClassVar[Mapping[str, Any]]
+    """Dimensions by the name of the preset."""
+    variation_class: ClassVar[type[TaskVariations]]
     presets: ClassVar[tuple[str, ...]]
     """Sets of dimensions; the first is the default."""
     solid_presets: ClassVar[tuple[str, ...]]
@@ -70,27 +74,51 @@ class Task(ABC):
     robot: RobotModel
     reach: float
     """No coordinate and no distance that is observed exceeds this [m]."""
+    slowness: float
+    """How much longer an episode may take than the preset allows, for a slower robot."""
     heading_step: float = 0.0
     """How far a heading action drives [m], where the task has it."""
     waypoint_window: float = 0.0
     """Side of the square around the robot that waypoint actions reach [m], where it has them."""
 
-    slowness: float
-    """How much longer an episode may take than the preset allows, for a slower robot."""
+    preset: Any
+    """The dimensions, one of the values of `preset_table`."""
+    variations: Any
 
-    @abstractmethod
-    def __init__(self, *, preset: str, variations: Mapping[str, object], action: str) -> None: ...
+    def __init__(
+        self,
+        *,
+        preset: str | None = None,
+        variations: Mapping[str, object] | None = None,
+        action: str | None = None,
+    ) -> None:
+        preset = self.presets[0] if preset is None else preset
+        self.action = self.actions[0] if action is None else action
+        if preset not in self.preset_table:
+            raise UnknownNameError(f"preset of {self.name}", preset, self.preset_table)
+        if self.action not in self.actions:
+            raise UnknownNameError(f"action of task {self.name!r}", self.action, self.actions)
+        self.preset_name, self.preset = preset, self.preset_table[preset]
+        self.variations = self.variation_class.read({} if variations is None else variations)
+        self._prepare()
 
-    def _drive(self, robot: RobotModel, control_step: float, variations: TaskVariations) -> None:
-        """Set robot, control step and slowness from those of the preset."""
-        self.robot = variations.limit(robot)
-        self.control_step = variations.control_step or control_step
+    def _prepare(self) -> None:
+        """Set what is the same in every start: the robot, the materials, the times, the goal."""
+        raise NotImplementedError(f"task {self.name!r} has neither __init__ nor _prepare")
+
+    def _drive(self, robot: RobotModel) -> None:
+        """Set robot, control step and slowness, from the preset and what departs from it."""
+        preset, wanted = self.preset, self.variations
+        self.robot = wanted.limit(robot)
+        self.control_step = wanted.control_step or preset.control_step
         speed, turn = robot.max_speed, robot.max_turn_rate
         self.slowness = max(1.0, speed / self.robot.max_speed, turn / self.robot.max_turn_rate)
 
-    def _steps_for(self, steps: int, control_step: float) -> int:
-        """How many control steps last as long as so many of the preset's, for a slower robot."""
-        return math.ceil(steps * control_step * self.slowness / self.control_step - 1e-9)
+    @property
+    def _max_steps(self) -> int:
+        """Control steps that last as long as those of the preset, or longer for a slower robot."""
+        seconds: float = self.preset.max_steps * self.preset.control_step * self.slowness
+        return math.ceil(seconds / self.control_step - 1e-9)
 
     @abstractmethod
     def start(self, rng: np.random.Generator) -> World:

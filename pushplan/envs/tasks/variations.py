@@ -4,34 +4,26 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
-from typing import Any, ClassVar, Self
+from typing import Annotated, Any, ClassVar, Self
 
 from pushplan.world import InvalidInputError, RobotModel, ScenarioError, UnknownNameError
-from pushplan.world.checks import number
+from pushplan.world.checked_fields import CheckedFields, OneOf, PositiveFloat
+
+Yaw = Annotated[str, OneOf(("aligned", "random"))]
+"""Headings of boxes at the start."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class TaskVariations:
-    """What may depart from the presets of every task; None leaves the preset's value.
+class TaskVariations(CheckedFields):
+    """What may depart from the presets of every task; None leaves the preset's value."""
 
-    Args:
-        control_step: time between two commands [s].
-        max_speed: greatest speed of the robot [m/s]; that backwards changes with it.
-        max_turn_rate: the same of turning [rad/s].
-    """
-
-    control_step: float | None = None
-    max_speed: float | None = None
-    max_turn_rate: float | None = None
+    control_step: PositiveFloat | None = None  # time between two commands [s]
+    # greatest speed of the robot [m/s]; that backwards changes with it
+    max_speed: PositiveFloat | None = None
+    max_turn_rate: PositiveFloat | None = None  # of the robot [rad/s]
 
     task: ClassVar[str]
     """Name of the task."""
-
-    def __post_init__(self) -> None:
-        for name in ("control_step", "max_speed", "max_turn_rate"):
-            value = getattr(self, name)
-            if value is not None:
-                object.__setattr__(self, name, number(name, value, low=0.0, open_low=True))
 
     def limit(self, robot: RobotModel) -> RobotModel:
         """The robot of a preset with these limits of speed and turn rate."""

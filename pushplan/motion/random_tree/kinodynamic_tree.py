@@ -25,19 +25,12 @@ from pushplan.world.checks import FloatArray
 
 @dataclass(frozen=True)
 class TreeLimits:
-    """How the tree may grow.
+    """How the tree may grow."""
 
-    Args:
-        max_curvature: greatest |curvature| of an edge [1/m].
-        edge_length: longest edge [m].
-        spacing: distance between collision checks [m].
-        turn_weight: what a radian of heading error is worth in metres.
-    """
-
-    max_curvature: float
-    edge_length: float
-    spacing: float
-    turn_weight: float
+    max_curvature: float  # greatest |curvature| of an edge [1/m]
+    edge_length: float  # longest edge [m]
+    spacing: float  # distance between collision checks [m]
+    turn_weight: float  # what a radian of heading error is worth in metres
 
 
 @kernel(allocates=True)

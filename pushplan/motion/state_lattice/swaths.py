@@ -13,15 +13,11 @@ from pushplan.world.checks import FloatArray, IntArray
 
 
 class Swaths(NamedTuple):
-    """Newly covered cells of P primitives, relative to the cell of the start.
+    """Newly covered cells of P primitives, relative to the cell of the start."""
 
-    Args:
-        first: (P + 1,) where the runs of each primitive start.
-        runs: (R, 3) column, first row, and the row after the last: columns, since a robot drives
-            along rows most of the time and its swath then is few long runs.
-    """
-
-    first: IntArray
+    first: IntArray  # (P + 1,) where the runs of each primitive start
+    # (R, 3) column, first row, and the row after the last: columns, since a robot drives along rows
+    # most of the time and its swath then is few long runs
     runs: IntArray
 
 

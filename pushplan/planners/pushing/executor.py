@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, fields
 
 import numpy as np
 
-from pushplan.control import EpisodeClock, LegFollower, Legs, Retreat, StallChecker, clamp_twist
+from pushplan.control import EpisodeClock, LegFollower, Legs, ProgressChecker, Retreat, clamp_twist
 from pushplan.planners.pushing import contact_kernels
 from pushplan.planners.pushing.approach import find_approach
 from pushplan.planners.pushing.clearance import Clearance
@@ -25,6 +25,8 @@ _GAP = 1e9
 _MOVED, _TWISTED = 0.2, 0.35
 """A box that was moved by more while the robot drove up to it [R, rad] is approached anew."""
 _DETOURS = 4
+_END = 1e-3  # length of a path that is not worth another push [circumscribed radii]
+_PROGRESS = 0.02  # by which a push has to get on within its patience [circumscribed radii]
 _LOOK = 0.2
 """Time for which an approach must stay clear of static things, at least [s]."""
 
@@ -163,7 +165,7 @@ class PushExecutor:
         self._plan: Plan | None = None
         self._static: StaticMap | None = None
         self._retreat: Retreat | None = None
-        self._stall: StallChecker | None = None
+        self._progress: ProgressChecker | None = None
 
     @property
     def status(self) -> PushStatus:
@@ -236,7 +238,8 @@ class PushExecutor:
             arrived = self._driver.arrived
             self._driver, self._detours = None, 0
             self.mpc.forget()
-            self._stall = StallChecker(world.robot, self.config.patience)
+            least = _PROGRESS * world.robot.circumscribed_radius
+            self._progress = ProgressChecker(least, self.config.patience)
             if arrived:
                 self._phase = PushPhase.PUSH
             else:
@@ -292,7 +295,7 @@ class PushExecutor:
             return twist
         size = world.robot.circumscribed_radius
         self._left = max(self._plan.length - mpc.along, 0.0)
-        if self._left <= max(task.tolerance, 1e-9):
+        if self._left <= max(task.tolerance, _END * size):
             self._end(PushPhase.DONE, "end")
             return None
         if self._left < self._left_then - config.progress * size:
@@ -306,11 +309,10 @@ class PushExecutor:
         if abs(mpc.lateral) > config.astray * size:
             self._give_up(world, "astray", pose)
             return None
-        assert self._stall is not None
-        if self._stall.update(pose, world.time):
+        assert self._progress is not None
+        if not self._progress.update(self._left, world.time):
             self._give_up(world, "blocked" if mpc.slowed < 0.5 else "stuck", pose)
             return None
-        self._stall.send(twist)
         return twist
 
     def _give_up(self, world: World, reason: str, pose: FloatArray) -> None:
@@ -322,8 +324,10 @@ class PushExecutor:
     def _recover(self, world: World, task: PushTask, k: int, pose: FloatArray) -> Twist | None:
         """Drive straight back, or away however there is room."""
         assert self._retreat is not None
-        stopped = False
-        while (command := self._retreat.command(pose, world.time, stopped=stopped)) is not None:
+        held, stopped = self._clock.held, False
+        while (
+            command := self._retreat.command(pose, world.time, held, stopped=stopped)
+        ) is not None:
             fraction = self._free(world, pose, command)
             if fraction >= 0.25:
                 return clamp_twist(
@@ -338,7 +342,7 @@ class PushExecutor:
         path = task.path
         box = world.movables.poses[k, :2]
         along, away = path.nearest(box)
-        if along >= path.length - max(task.tolerance, 1e-6):
+        if along >= path.length - max(task.tolerance, _END * world.robot.circumscribed_radius):
             return None
         size = world.robot.circumscribed_radius
         joint = path.length

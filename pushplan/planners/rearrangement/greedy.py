@@ -19,6 +19,8 @@ from pushplan.planners.rearrangement.line_up import (
     line_up,
     unit,
 )
+from pushplan.planners.rearrangement.pose_follower import PoseFollower
+from pushplan.planners.rearrangement.recovery import recovery_path
 from pushplan.world import Twist, World
 from pushplan.world.checks import FloatArray, expect, number
 
@@ -85,7 +87,7 @@ class GreedyPusher:
     def _forget(self) -> None:
         self._attempt: _Attempt | None = None
         self._failures: dict[int, int] = {}
-        self._away: Retreat | None = None
+        self._away: Retreat | PoseFollower | None = None
         self._stall: StallChecker | None = None
         self._wait_until = -math.inf
         self._clock = EpisodeClock(self.config.response)
@@ -192,7 +194,12 @@ class GreedyPusher:
         """Get away from where the last attempt ended."""
         command = None
         if self._away is not None:
-            command = self._away.command(world.robot_pose, world.time)
+            command = self._away.command(world.robot_pose, world.time, self._clock.held)
+            if command is None and isinstance(self._away, Retreat) and not self._away.got_away:
+                path = recovery_path(world, 0.0)
+                if path is not None:
+                    self._away = PoseFollower(world.robot, path, self.config.response)
+                    return self._retreat(world)
             if command is None:
                 self._away = None
         return command

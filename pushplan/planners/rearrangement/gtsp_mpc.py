@@ -132,7 +132,7 @@ class GtspMpc:
         world, chosen, held = scene.world, None, self._clock.held
         for _ in range(4):
             if self._retreat is not None:
-                away = self._retreat.command(world.robot_pose, world.time)
+                away = self._retreat.command(world.robot_pose, world.time, held)
                 if away is not None:
                     return away
                 self._retreat = None
@@ -167,7 +167,8 @@ class GtspMpc:
 
     def _recover(self, scene: PushScene) -> Twist | None:
         """Without a push: get out of a tight place, or else plan with the optimistic model."""
-        here, path = scene.world.robot_pose, recovery_path(scene)
+        margin = 0.5 * self.config.margin * scene.size
+        here, path = scene.world.robot_pose, recovery_path(scene.world, margin)
         tried = self._recovered_from is not None and bool(
             np.abs(self._recovered_from - here).max() < 0.02 * scene.size
         )

@@ -41,7 +41,7 @@ def warm_up_rearrangement() -> None:
         scene = PushScene(world, RearrangementConfig())
         extraction_primitives(PushSimulator(scene), 0)
         pre_relocation_pushes(PushSimulator(scene), 0)
-        recovery_path(scene)
+        recovery_path(world, 0.0)
 
 
 @functools.cache

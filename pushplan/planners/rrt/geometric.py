@@ -26,11 +26,12 @@ from pushplan.world import (
     StopCheck,
     World,
 )
-from pushplan.world.checks import FloatArray, expect, integer, number
+from pushplan.world.checked_fields import CheckedFields, Fraction, PositiveFloat, PositiveInt
+from pushplan.world.checks import FloatArray, expect
 
 
 @dataclass(frozen=True)
-class GeometricRRTConfig:
+class GeometricRRTConfig(CheckedFields):
     """Parameters of `GeometricRRT`. Lengths are in units of the robot's circumscribed radius R.
 
     Args:
@@ -43,18 +44,12 @@ class GeometricRRTConfig:
         spacing: distance between the poses of the plan [R].
     """
 
-    clearance: float = 1.9
-    step: float = 1.0
-    goal_bias: float = 0.1
-    resolution: float = 0.1
-    pass_iterations: int = 20_000
-    spacing: float = 0.15
-
-    def __post_init__(self) -> None:
-        for name in ("clearance", "step", "resolution", "spacing"):
-            number(name, getattr(self, name), low=0.0, open_low=True)
-        number("goal_bias", self.goal_bias, low=0.0, high=1.0)
-        integer("pass_iterations", self.pass_iterations, low=1)
+    clearance: PositiveFloat = 1.9
+    step: PositiveFloat = 1.0
+    goal_bias: Fraction = 0.1
+    resolution: PositiveFloat = 0.1
+    pass_iterations: PositiveInt = 20_000
+    spacing: PositiveFloat = 0.15
 
 
 @dataclass(frozen=True)

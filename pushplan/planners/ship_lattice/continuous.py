@@ -19,17 +19,11 @@ _CURVATURE_WEIGHT = 0.05
 
 
 class CostField(NamedTuple):
-    """Cost of driving a metre through a place, on a grid in the frame of a lattice.
+    """Cost of driving a metre through a place, on a grid in the frame of a lattice."""
 
-    Args:
-        first: (2,) place of entry (0, 0) [m].
-        spacing: between entries [m].
-        values: (rows, columns) [m/m].
-    """
-
-    first: FloatArray
-    spacing: float
-    values: FloatArray
+    first: FloatArray  # (2,) place of entry (0, 0) [m]
+    spacing: float  # between entries [m]
+    values: FloatArray  # (rows, columns) [m/m]
 
 
 def cost_field(

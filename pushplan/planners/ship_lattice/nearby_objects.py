@@ -13,15 +13,10 @@ from pushplan.world.checks import BoolArray, FloatArray
 
 @dataclass(frozen=True)
 class NearbyObjects:
-    """The part of a world that a sweep of limited length can move.
+    """The part of a world that a sweep of limited length can move."""
 
-    Args:
-        world: with the objects that are near.
-        which: (K,) which of all objects they are.
-    """
-
-    world: World
-    which: BoolArray
+    world: World  # with the objects that are near
+    which: BoolArray  # (K,) which of all objects they are
 
     @classmethod
     def around(cls, world: World, normal: FloatArray, ahead: float) -> NearbyObjects:

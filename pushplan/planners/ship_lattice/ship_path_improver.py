@@ -16,23 +16,14 @@ _PORTION = 8  # poses that are swept between two looks at the stop rule
 
 @dataclass(frozen=True)
 class SweptCandidate:
-    """A path and what is predicted along it.
+    """A path and what is predicted along it."""
 
-    Args:
-        poses: (N, 3) [m, m, rad].
-        curvatures: (N,) that lead to them [1/m].
-        lengths: (N,) path length so far [m].
-        objects: (M, K, 3) poses of the objects at the first M poses of the path.
-        works: (M,) work so far [kg m].
-        cost: travel plus weighted work [kg m], as far as it is predicted.
-    """
-
-    poses: FloatArray
-    curvatures: FloatArray
-    lengths: FloatArray
-    objects: FloatArray
-    works: FloatArray
-    cost: float
+    poses: FloatArray  # (N, 3) [m, m, rad]
+    curvatures: FloatArray  # (N,) that lead to them [1/m]
+    lengths: FloatArray  # (N,) path length so far [m]
+    objects: FloatArray  # (M, K, 3) poses of the objects at the first M poses of the path
+    works: FloatArray  # (M,) work so far [kg m]
+    cost: float  # travel plus weighted work [kg m], as far as it is predicted
 
 
 class ShipPathImprover:

@@ -27,29 +27,17 @@ CHECKPOINT, BEST, POLICY, RECORD = "checkpoint.pt", "best.pt", "policy.onnx", "t
 
 @dataclass(frozen=True)
 class CurvePoint:
-    """One row of a learning curve.
+    """One row of a learning curve."""
 
-    Args:
-        steps: decisions so far.
-        seconds: wall-clock time of training so far, without validation [s].
-        episodes: training episodes that ended in this chunk.
-        train_return: mean unscaled reward of them; NaN where none ended.
-        train_success: fraction of them that reached the goal.
-        valid_return: mean unscaled reward of the validation episodes.
-        valid_success: fraction of them that reached the goal.
-        valid_share: mean fraction of their sub-tasks that were done.
-        loss: of the learner, in its own units.
-    """
-
-    steps: int
-    seconds: float
-    episodes: int
-    train_return: float
-    train_success: float
-    valid_return: float
-    valid_success: float
-    valid_share: float
-    loss: float
+    steps: int  # decisions so far
+    seconds: float  # wall-clock time of training so far, without validation [s]
+    episodes: int  # training episodes that ended in this chunk
+    train_return: float  # mean unscaled reward of them; NaN where none ended
+    train_success: float  # fraction of them that reached the goal
+    valid_return: float  # mean unscaled reward of the validation episodes
+    valid_success: float  # fraction of them that reached the goal
+    valid_share: float  # mean fraction of their sub-tasks that were done
+    loss: float  # of the learner, in its own units
 
     @property
     def rank(self) -> tuple[float, float]:

@@ -317,8 +317,8 @@ def test_a_path_is_traced_ahead_back_and_round():
         steps.append(pose)
     path = np.array([[0.3, -0.2, 2.9], *steps])
     at, tracer = np.array([0.31, -0.21, 2.95]), PoseFollower(robot, path, 0.2)
-    for _ in range(60):
-        twist = tracer.command(at)
+    for step in range(60):
+        twist = tracer.command(at, 0.2 * step, 0.2)
         if twist is None:
             break
         middle = at[2] + 0.1 * twist.angular
@@ -395,7 +395,7 @@ def test_the_search_is_that_of_dijkstra():
         {"slack": 2.0},
         {"per_object": 0},
         {"max_simulations": 2.5},
-        {"period": "soon"},
+        {"response": "soon"},
         {"mpc": 1},
     ],
 )
