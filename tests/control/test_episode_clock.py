@@ -44,14 +44,14 @@ def test_policies_give_one_command_for_one_instant(k):
     policy.reset(world, np.random.default_rng(0))
     first = policy.act(world, None)
     assert policy.act(world, None) == first
-    later = world.moved(robot_pose=world.robot_pose + [0.01, 0.0, 0.0], time=0.1)
+    later = world.moved(robot_pose=world.robot_pose + 0.01, time=0.1)
     second = policy.act(later, None)
     for _ in range(3):  # perception is slower than the loop
         assert policy.act(later, None) == second
     with pytest.raises(InvalidInputError, match="went back"):
         policy.act(world, None)
     with pytest.raises(InvalidInputError, match="stands at"):
-        policy.act(later.moved(robot_pose=world.robot_pose + [0.02, 0.0, 0.0]), None)
+        policy.act(later.moved(robot_pose=world.robot_pose + 0.02), None)
     policy.reset(world, np.random.default_rng(0))
     assert policy.act(world, None) == first
 
