@@ -113,9 +113,7 @@ def free_points(points: FloatArray, obstacles: Obstacles, box: FloatArray, gap: 
     for i in range(points.shape[0]):
         x, y = points[i, 0], points[i, 1]
         inside = box[0] - gap <= x <= box[2] + gap and box[1] - gap <= y <= box[3] + gap
-        keep[i] = inside and (
-            obstacle_distance(x, y, obstacles.vertices, obstacles.offsets, obstacles.radii) >= gap
-        )
+        keep[i] = inside and obstacle_distance(x, y, obstacles) >= gap
     return keep
 
 
