@@ -45,7 +45,7 @@ def is_tangent(
     """Whether a leg from (dx, dy) touches corner ``k`` as a tangent, as shortest paths do."""
     before = incoming[k, 0] * dy - incoming[k, 1] * dx
     after = outgoing[k, 0] * dy - outgoing[k, 1] * dx
-    return (before >= -gap and after <= gap) or (before <= gap and after >= -gap)
+    return bool((before >= -gap and after <= gap) or (before <= gap and after >= -gap))
 
 
 @kernel(allocates=True)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from dataclasses import dataclass
 from functools import partial
 
@@ -20,8 +19,9 @@ from pushplan.motion.path_search_config import PathSearchConfig
 from pushplan.motion.shortcutting import shortcut
 from pushplan.motion.speed_profile import TIGHTEST, start_margin, timed_plan
 from pushplan.motion.time_slicing import Pace
-from pushplan.world import Drive, Plan, PlanStatus, StopCheck, World
+from pushplan.world import Drive, PlanResult, PlanStatus
 from pushplan.world.checks import FloatArray
+from pushplan.world.planning_call import PlanningCall
 
 _THIN_MARGIN = 0.05
 """Margin below which a post could hide between two poses of the usual spacing [R]."""
@@ -43,26 +43,26 @@ class PathImprover:
     """What the searches of one planning call share: the problem, its clock, and the best path.
 
     Args:
-        world: the snapshot.
+        call: its world, stop rule and source of chance.
         config: parameters.
         interaction: predicts the objects.
         turning_radius: least one of plans at first [m].
-        check: the armed stop rule.
-        rng: source of chance.
-        began: when the call began, by `time.perf_counter` [s].
     """
 
     def __init__(
         self,
-        world: World,
+        call: PlanningCall,
         config: PathSearchConfig,
         interaction: InteractionModel,
         turning_radius: float,
-        check: StopCheck,
-        rng: np.random.Generator,
-        began: float,
     ) -> None:
-        self.world, self.config, self.rng, self.goal = world, config, rng, world.navigation_goal
+        world = call.world
+        self.world, self.config, self.rng, self.goal = (
+            world,
+            config,
+            call.rng,
+            world.navigation_goal,
+        )
         self.size = world.robot.circumscribed_radius
         self.iterations = self.nodes = self.relaxed = 0
         self.tight = False
@@ -81,7 +81,7 @@ class PathImprover:
         )
         # crowded worlds are slow to sweep: look at the stop rule more often
         self._batch = max(1, 10 * config.batch // (10 + len(world.movables)))
-        self._check, self._began, self._margin = check, began, 0.0
+        self._call, self._margin = call, 0.0
         self._shortcut_pace, self._sweep_pace = Pace(), Pace()
         self._best: SweptPath | None = None
 
@@ -151,7 +151,7 @@ class PathImprover:
         """Whether the stop rule fires now."""
         if isinstance(self.problem.contacts, SweptContacts):
             self.problem.contacts.call.raise_error()
-        return self._check(self.iterations, self.plan_cost)
+        return self._call.check(self.iterations, self.plan_cost)
 
     def candidate(
         self, arcs: FloatArray, limit: float = np.inf, *, free: bool = True
@@ -204,7 +204,7 @@ class PathImprover:
             draws = self.rng.random((self._batch, 4))
             normals = self.rng.standard_normal((self._batch, 2))
             # between pieces only the clock counts: what else may fire has been looked at
-            late = partial(self._check, self.iterations, self.plan_cost)
+            late = partial(self._call.check, self.iterations, self.plan_cost)
             for first, last in self._shortcut_pace.pieces(self._batch, late):
                 candidate.count, candidate.cost = shortcut(
                     candidate.path,
@@ -222,12 +222,23 @@ class PathImprover:
         if cost >= self.best_cost:
             return
         if np.isnan(self.first_solution_s) and cost < self.jam_cost:
-            self.first_solution_s = time.perf_counter() - self._began
+            self.first_solution_s = self._call.elapsed
         self.best_cost = cost
         self.tight = self.relaxed > 1
         self._best = SweptPath(*(part[:count].copy() for part in path))
 
-    def plan(self) -> Plan:
-        """The best path so far as a plan."""
-        assert self._best is not None
-        return timed_plan(self.world, self._best, self.config.turn_fraction)
+    def result(self, status: PlanStatus, **detail: float) -> PlanResult:
+        """The result of the call: the best path so far as a plan, where the status has one."""
+        plan = None
+        if status.has_plan:
+            assert self._best is not None
+            plan = timed_plan(self.world, self._best, self.config.turn_fraction)
+        return self._call.result(
+            status,
+            plan,
+            self.first_solution_s,
+            self.iterations,
+            self.nodes,
+            tight=float(self.tight),
+            **detail,
+        )

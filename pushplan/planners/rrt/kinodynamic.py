@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -11,10 +10,10 @@ from pushplan.interaction import InteractionModel, QuasiStatic
 from pushplan.motion.path_improver import PathImprover
 from pushplan.motion.path_search_config import PathSearchConfig
 from pushplan.motion.speed_profile import turning_radius
-from pushplan.planners.arguments import check_call
 from pushplan.planners.rrt.kinodynamic_search import KinodynamicSearch
-from pushplan.world import PlanResult, PlanStats, PlanStatus, Stop, World
+from pushplan.world import PlanResult, Stop, World
 from pushplan.world.checks import expect
+from pushplan.world.planning_call import PlanningCall
 from pushplan.world.stop import DefaultBudget
 
 
@@ -51,11 +50,7 @@ class KinodynamicRRT:
         expect("interaction", self.interaction, InteractionModel)  # type: ignore[type-abstract]
 
     def plan(
-        self,
-        world: World,
-        *,
-        stop: Stop | None = None,
-        rng: np.random.Generator | None = None,
+        self, world: World, *, stop: Stop | None = None, rng: np.random.Generator | None = None
     ) -> PlanResult:
         """Plan from ``world``; see `pushplan.world.Planner`.
 
@@ -64,23 +59,9 @@ class KinodynamicRRT:
         Raises:
             InvalidInputError: if the world's goal is not one for the robot.
         """
-        began = time.perf_counter()
-        check_call(world, stop, rng)
-        stop = DefaultBudget(self.config.default_iterations) if stop is None else stop
-        rng = np.random.default_rng(0) if rng is None else rng
+        call = PlanningCall(world, stop, rng, DefaultBudget(self.config.default_iterations))
         radius = turning_radius(world.robot, self.config.turn_fraction)
-        improver = PathImprover(
-            world, self.config, self.interaction, radius, stop.start(), rng, began
-        )
+        improver = PathImprover(call, self.config, self.interaction, radius)
         search = KinodynamicSearch(improver)
-        status = search.run()
-        if status is None:
-            status = PlanStatus.CANCELLED if stop.cancelled else PlanStatus.TIMED_OUT
-        stats = PlanStats(
-            wall_time_s=time.perf_counter() - began,
-            first_solution_s=improver.first_solution_s,
-            iterations=improver.iterations,
-            nodes=improver.nodes,
-            detail={"trees": float(search.trees.trees), "tight": float(improver.tight)},
-        )
-        return PlanResult(status, improver.plan() if status.has_plan else None, stats)
+        status = search.run() or call.stopped_status
+        return improver.result(status, trees=float(search.trees.trees))

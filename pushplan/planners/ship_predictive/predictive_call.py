@@ -16,51 +16,40 @@ from pushplan.planners.ship_predictive.beam_search import BeamSearch
 from pushplan.planners.ship_predictive.channel_view import ChannelView, channel_view
 from pushplan.planners.ship_predictive.predictive_config import PredictiveConfig
 from pushplan.planners.ship_predictive.turning import in_table, tight_turn, turned_start
-from pushplan.world import Plan, PlanResult, PlanStats, PlanStatus, Stop, World
+from pushplan.world import Plan, PlanResult, PlanStatus
 from pushplan.world.checks import FloatArray
+from pushplan.world.planning_call import PlanningCall
 from pushplan.world.polyline import step_lengths
 
 _TIGHTEST = 0.999  # fraction of the turn rate that is used where there is no path with less
 
 
 def plan_call(
-    world: World,
+    call: PlanningCall,
     config: PredictiveConfig,
     interaction: IceInteraction,
     make_propagator: Callable[[ChannelView], StatePropagator[Any]],
-    stop: Stop | None,
-    began: float,
 ) -> PlanResult:
-    """Plan with the usual turn rate, or with all of it where there is no path otherwise.
-
-    Args:
-        world: the snapshot.
-        config: parameters.
-        interaction: predicts the floes.
-        make_propagator: makes what keeps the ice along a path.
-        stop: ends the call.
-        began: when it began, on the clock of `time.perf_counter`.
-    """
-    check = (lambda iterations, cost: False) if stop is None else stop.start()
+    """Plan with the usual turn rate, or with all of it where there is no path otherwise."""
     iterations = nodes = 0
     for fraction in dict.fromkeys((config.turn_fraction, max(config.turn_fraction, _TIGHTEST))):
-        view = channel_view(world, replace(config, turn_fraction=fraction), interaction)
-        beam: BeamSearch[Any] = BeamSearch(view, config, make_propagator(view), check, iterations)
-        call = PredictiveCall(beam, widening=stop is not None)
-        status = call.run()
+        view = channel_view(call.world, replace(config, turn_fraction=fraction), interaction)
+        propagator = make_propagator(view)
+        beam: BeamSearch[Any] = BeamSearch(view, config, propagator, call.check, iterations)
+        search = PredictiveCall(beam, widening=call.has_rule)
+        status = search.run()
         iterations, nodes = beam.iterations, nodes + beam.nodes
         if status is not PlanStatus.GOAL_UNREACHABLE:
             break
-    if status is PlanStatus.TIMED_OUT and stop is not None and stop.cancelled:
-        status = PlanStatus.CANCELLED
-    stats = PlanStats(
-        wall_time_s=time.perf_counter() - began,
-        first_solution_s=call.first - began,
-        iterations=iterations,
-        nodes=nodes,
-        detail={"cost": beam.best_cost, "tight": float(fraction > config.turn_fraction)},
+    return call.result(
+        call.stopped_status if status is PlanStatus.TIMED_OUT else status,
+        search.plan(),
+        search.first - call.began,
+        iterations,
+        nodes,
+        cost=beam.best_cost,
+        tight=float(fraction > config.turn_fraction),
     )
-    return PlanResult(status, call.plan(), stats)
 
 
 class PredictiveCall:
