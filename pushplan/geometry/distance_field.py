@@ -47,21 +47,18 @@ def _fill_distances(
 
 @kernel(allocates=True)
 def sample_values(
-    values: FloatArray, ox: float, oy: float, step: float, x: float, y: float
+    values: FloatArray,  # (rows, columns) distances [m], inf where there is no way
+    ox: float,  # least x of the grid [m]
+    oy: float,  # least y of the grid [m]
+    step: float,  # side of a cell [m]
+    x: float,  # [m]; points outside the grid read its nearest cell
+    y: float,  # [m]
 ) -> float:
     """Read a distance field at a point: bilinear, but never across a wall.
 
     A distance to a goal changes by at most the step between free neighbours; where the four cells
     around the point differ by more, or one is not finite, a wall lies between them and the cell
     that holds the point counts alone, or if it has no value the least of the others.
-
-    Args:
-        values: (rows, columns) distances [m], inf where there is no way.
-        ox: least x of the grid [m].
-        oy: least y of the grid [m].
-        step: side of a cell [m].
-        x: [m]; points outside the grid read its nearest cell.
-        y: [m].
     """
     rows, cols = values.shape
     result: float

@@ -185,13 +185,11 @@ class BendDistances:
 
 
 @lru_cache(maxsize=4)
-def bend_distances(static: StaticMap, resolution: float) -> BendDistances:
-    """The distances of a map, kept for the maps used last.
-
-    Args:
-        static: obstacles and bounds.
-        resolution: side of a cell [m]; more where the table would pass `MAX_VALUES`.
-    """
+def bend_distances(
+    static: StaticMap,  # obstacles and bounds
+    resolution: float,  # side of a cell [m]; more where the table would pass `MAX_VALUES`
+) -> BendDistances:
+    """The distances of a map, kept for the maps used last."""
     bends, between = bends_of(static)
     width, height = (static.bounds[2:] - static.bounds[:2]).tolist()
     count = len(bends.corners)

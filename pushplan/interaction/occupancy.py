@@ -137,13 +137,12 @@ def ice_density(world: World) -> float:
     return float(movables.masses.sum()) / area
 
 
-def patch_frame(path: FloatArray, ahead: float, cell: float) -> FloatArray:
+def patch_frame(
+    path: FloatArray,  # (N, 3) robot poses
+    ahead: float,  # direction in which rows count up [rad]
+    cell: float,  # side of a cell [m]
+) -> FloatArray:
     """The frame of the patch around a passage, about the middle between its two ends.
-
-    Args:
-        path: (N, 3) robot poses.
-        ahead: direction in which rows count up [rad].
-        cell: side of a cell [m].
 
     Returns:
         (3,) as in `occupancy_kernels`. The corner lies on a grid of cells

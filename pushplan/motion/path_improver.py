@@ -40,21 +40,14 @@ class Candidate:
 
 
 class PathImprover:
-    """What the searches of one planning call share: the problem, its clock, and the best path.
-
-    Args:
-        call: its world, stop rule and source of chance.
-        config: parameters.
-        interaction: predicts the objects.
-        turning_radius: least one of plans at first [m].
-    """
+    """What the searches of one planning call share: the problem, its clock, and the best path."""
 
     def __init__(
         self,
-        call: PlanningCall,
+        call: PlanningCall,  # its world, stop rule and source of chance
         config: PathSearchConfig,
         interaction: InteractionModel,
-        turning_radius: float,
+        turning_radius: float,  # least one of plans at first [m]
     ) -> None:
         world = call.world
         self.world, self.config, self.rng, self.goal = (
@@ -154,15 +147,13 @@ class PathImprover:
         return self._call.check(self.iterations, self.plan_cost)
 
     def candidate(
-        self, arcs: FloatArray, limit: float = np.inf, *, free: bool = True
+        self,
+        arcs: FloatArray,  # (E, 2) length [m] and curvature [1/m]
+        limit: float = np.inf,  # cost that it must stay below [kg m]
+        *,
+        free: bool = True,  # whether it is known to touch no wall and to reach the goal
     ) -> Candidate | None:
-        """The path along some arcs with its cost; None if it is not one that could be a plan.
-
-        Args:
-            arcs: (E, 2) length [m] and curvature [1/m].
-            limit: cost that it must stay below [kg m].
-            free: whether it is known to touch no wall and to reach the goal.
-        """
+        """The path along some arcs with its cost; None if it is not one that could be a plan."""
         problem, count = self.problem, len(self.world.movables)
         steps = [length / step_along(bend, problem.spacing) for length, bend in arcs.tolist()]
         capacity = 3 * int(sum(steps) + len(arcs)) + 200

@@ -145,19 +145,16 @@ def _trapezium(back: float, back_half: float, front: float, front_half: float) -
 
 
 def _bumper(
-    kind: str, back: float, body_half: float, half: float, depth: float, curve: float
+    kind: str,  # one of `BUMPERS`
+    back: float,  # x of the face that it is mounted on [m]
+    body_half: float,  # half the width of that face [m]
+    half: float,  # half the width of the bumper [m]
+    # how far it reaches forward in the middle, or for the navigation bumper at its ends less half
+    # the curve [m]
+    depth: float,
+    curve: float,  # how much farther the ends (collector) or the middle (navigation) reach [m]
 ) -> list[FloatArray]:
-    """Convex parts of a bumper.
-
-    Args:
-        kind: one of `BUMPERS`.
-        back: x of the face that it is mounted on [m].
-        body_half: half the width of that face [m].
-        half: half the width of the bumper [m].
-        depth: how far it reaches forward in the middle, or for the navigation bumper at its ends
-            less half the curve [m].
-        curve: how much farther the ends (collector) or the middle (navigation) reach [m].
-    """
+    """Convex parts of a bumper."""
     choice("bumper", kind, BUMPERS)
     if kind == "none":
         return []

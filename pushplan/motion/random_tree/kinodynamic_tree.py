@@ -177,6 +177,7 @@ class _Growth:
         return self.target
 
     def satisfied(self, x: float, y: float, yaw: float) -> bool:
+        """Whether a pose is in the goal, which the tree has then reached by an edge to it."""
         if self.goal.distance(x, y) > 0.0:
             return False
         if (x, y, yaw) in self.edges:

@@ -16,13 +16,12 @@ from pushplan.world.checks import FloatArray
 
 
 class TreePaths:
-    """Grows trees for a `PathImprover`, which keeps the clock and the best path.
+    """Grows trees for a `PathImprover`, which keeps the clock and the best path."""
 
-    Args:
-        improver: of this planning call.
-    """
-
-    def __init__(self, improver: PathImprover) -> None:
+    def __init__(
+        self,
+        improver: PathImprover,  # of this planning call
+    ) -> None:
         self._improver, self._fraction = improver, improver.config.coarse_path_fraction
         self._exact: FloatArray | None = None
         self.trees = 0
@@ -34,13 +33,12 @@ class TreePaths:
         self._fraction *= 0.5
         self._improver.relax()
 
-    def grow(self, push_weight: float, budget: int) -> Candidate | None:
-        """The path of a new tree.
-
-        Args:
-            push_weight: of the coarse path; infinite treats objects as obstacles.
-            budget: iterations.
-        """
+    def grow(
+        self,
+        push_weight: float,  # of the coarse path; infinite treats objects as obstacles
+        budget: int,
+    ) -> Candidate | None:
+        """The path of a new tree."""
         improver, world, problem = self._improver, self._improver.world, self._improver.problem
         config, size = improver.config, improver.size
         self.trees += 1

@@ -37,14 +37,13 @@ class _SearchVariant:
 
 
 class PushAwareSearch:
-    """A first plan, then searches over poses and pushed objects, each under the best cost so far.
+    """A first plan, then searches over poses and pushed objects, each under the best cost so far."""
 
-    Args:
-        improver: keeps the best path.
-        config: parameters.
-    """
-
-    def __init__(self, improver: PathImprover, config: PushAwareConfig) -> None:
+    def __init__(
+        self,
+        improver: PathImprover,  # keeps the best path
+        config: PushAwareConfig,
+    ) -> None:
         self.improver, self.config, self.trees = improver, config, TreePaths(improver)
         self.world, self.rng, self.size = improver.world, improver.rng, improver.size
         self.expansions = self.searches = self.random_arcs = 0

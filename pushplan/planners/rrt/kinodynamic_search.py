@@ -10,13 +10,12 @@ from pushplan.world import PlanStatus
 
 
 class KinodynamicSearch:
-    """One planning call: trees, and shortcutting of their paths.
+    """One planning call: trees, and shortcutting of their paths."""
 
-    Args:
-        improver: keeps the best path.
-    """
-
-    def __init__(self, improver: PathImprover) -> None:
+    def __init__(
+        self,
+        improver: PathImprover,  # keeps the best path
+    ) -> None:
         self.improver, self.trees = improver, TreePaths(improver)
 
     def run(self) -> PlanStatus | None:

@@ -33,16 +33,13 @@ _END_FRACTION = 0.15  # fraction of the shortcuts that move the end
 
 
 class ShipLatticeCall:
-    """Lattice, search and improvement of one planning call.
-
-    Args:
-        call: its world, clock, stop rule and source of chance.
-        config: parameters.
-        interaction: predicts what a path does.
-    """
+    """Lattice, search and improvement of one planning call."""
 
     def __init__(
-        self, call: PlanningCall, config: ShipLatticeConfig, interaction: InteractionModel | None
+        self,
+        call: PlanningCall,  # its world, clock, stop rule and source of chance
+        config: ShipLatticeConfig,
+        interaction: InteractionModel | None,
     ) -> None:
         self.call, self.config, self.interaction = call, config, interaction
         self.world = world = call.world
