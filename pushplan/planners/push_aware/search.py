@@ -37,7 +37,7 @@ class _SearchVariant:
 
 
 class PushAwareSearch:
-    """A first plan, then searches over poses and pushed objects, each under the best cost so far."""
+    """A first plan, then searches over poses and pushed objects, each below the best cost."""
 
     def __init__(
         self,

@@ -47,7 +47,7 @@ class NearbyObjects:
         objects: FloatArray,  # (M, N, 3) poses of those that are near
         missing: int,  # how many more poses there are
     ) -> FloatArray:
-        """(M + missing, K, 3) poses of all objects of a world; those after the M given ones rest."""
+        """(M + missing, K, 3) poses of all objects of a world; after the M given ones they rest."""
         count = len(objects)
         out = np.empty((count + missing, len(world.movables), 3))
         out[:] = world.movables.poses
