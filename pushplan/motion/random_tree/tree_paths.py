@@ -10,7 +10,7 @@ from pushplan.motion.coarse_path import coarse_path, reachable
 from pushplan.motion.collision import is_free, obstacles
 from pushplan.motion.path_improver import Candidate, PathImprover
 from pushplan.motion.polyline import polyline_plan
-from pushplan.motion.random_tree.kinodynamic_tree import TreeLimits, grow_tree
+from pushplan.motion.random_tree.kinodynamic_tree import TreeGrowth, TreeLimits
 from pushplan.motion.random_tree.targets import Targets
 from pushplan.world.checks import FloatArray
 
@@ -72,17 +72,9 @@ class TreePaths:
             turn_weight=0.5 * size,
         )
         spread = config.coarse_path_spread * size
-        arcs = grow_tree(
-            world.robot_pose,
-            improver.goal,
-            Targets(coarse, self._fraction, spread, world.static.bounds, improver.rng),
-            limits,
-            shape,
-            among,
-            int(improver.rng.integers(1, 2**31)),
-            done,
-            improver.stopped,
-        )
+        targets = Targets(coarse, self._fraction, spread, world.static.bounds, improver.rng)
+        growth = TreeGrowth(world.robot_pose, improver.goal, targets, limits, shape, among)
+        arcs = growth.grow(int(improver.rng.integers(1, 2**31)), done, improver.stopped)
         if arcs is None:
             return None
         improver.nodes += len(arcs)

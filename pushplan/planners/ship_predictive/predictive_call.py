@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -52,24 +52,19 @@ def plan_call(
     )
 
 
+@dataclass(eq=False)
 class PredictiveCall:
-    """Beams of growing width, and the best path of all.
+    """Beams of growing width, and the best path of all."""
 
-    Args:
-        beam: searches.
-        widening: whether to go on with wider beams.
-    """
-
-    def __init__(self, beam: BeamSearch[Any], widening: bool) -> None:
-        self._beam, self._widening = beam, widening
-        self._best: BeamNode[Any] | None = None
-        self._objects: FloatArray | None = None
-        self.first = math.nan
-        """When there was a plan, on the clock of `time.perf_counter`."""
+    beam: BeamSearch[Any]
+    widening: bool  # whether to go on with wider beams
+    first: float = math.nan  # when there was a plan, on the clock of `time.perf_counter`
+    _best: BeamNode[Any] | None = None
+    _objects: FloatArray | None = None
 
     def run(self) -> PlanStatus:
         """Search until done or stopped."""
-        beam, view = self._beam, self._beam.view
+        beam, view = self.beam, self.beam.view
         if not view.inside(view.start[None]):
             return PlanStatus.START_BLOCKED
         if view.away > view.channel.high[1]:
@@ -93,19 +88,19 @@ class PredictiveCall:
         return PlanStatus.SOLVED if view.channel.goal == view.away else PlanStatus.APPROXIMATE
 
     def _widen(self, root: BeamNode[Any]) -> None:
-        beam, config = self._beam, self._beam.config
+        beam, config = self.beam, self.beam.config
         width = config.beam_width(len(beam.view.near))
         while not beam.stopped:
             node = beam.search(root, width, config.horizon * beam.view.length)
             if node is not None:
                 self._consider(beam.finish(node))
             width *= 2
-            if not self._widening or width > config.widest:
+            if not self.widening or width > config.widest:
                 return
 
     def _consider(self, node: BeamNode[Any] | None) -> None:
         """Take up a path that is cheaper than the best, if there is time to say what it does."""
-        beam = self._beam
+        beam = self.beam
         if node is None or not node.total < beam.best_cost:
             return
         objects = beam.propagator.trace(node, lambda: beam.check(beam.iterations, beam.best_cost))
@@ -119,7 +114,7 @@ class PredictiveCall:
         """The best path at full speed, with what it does to the floes."""
         if self._best is None:
             return None
-        view, path = self._beam.view, self._best.path()
+        view, path = self.beam.view, self._best.path()
         world = view.world
         robot = world.robot
         poses = view.to_world(path[:, :3])
