@@ -298,8 +298,8 @@ def _pushed_out(point: FloatArray, shapes: Obstacles, extra: float) -> FloatArra
     for k, radius in enumerate(shapes.radii.tolist()):
         core = shapes.vertices[shapes.offsets[k] : shapes.offsets[k + 1]]
         edges = np.roll(core, -1, axis=0) - core
-        share = ((point - core) * edges).sum(axis=1) / np.maximum((edges**2).sum(axis=1), 1e-300)
-        feet = core + np.clip(share, 0.0, 1.0)[:, None] * edges
+        fraction = ((point - core) * edges).sum(axis=1) / np.maximum((edges**2).sum(axis=1), 1e-300)
+        feet = core + np.clip(fraction, 0.0, 1.0)[:, None] * edges
         away = point - feet
         nearest = int(np.argmin(np.hypot(away[:, 0], away[:, 1])))
         direction = away[nearest]

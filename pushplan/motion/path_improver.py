@@ -155,7 +155,7 @@ class PathImprover:
     ) -> Candidate | None:
         """The path along some arcs with its cost; None if it is not one that could be a plan."""
         problem, count = self.problem, len(self.world.movables)
-        steps = [length / step_along(bend, problem.spacing) for length, bend in arcs.tolist()]
+        steps = [length / step_along(turn, problem.spacing) for length, turn in arcs.tolist()]
         capacity = 3 * int(sum(steps) + len(arcs)) + 200
         path = make_swept_path(capacity, count)
         used = lay_out(owned(self.world.robot_pose), arcs, path, problem)

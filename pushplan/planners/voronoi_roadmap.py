@@ -110,8 +110,8 @@ class Skeleton:
         samples = np.maximum(np.ceil(around / spacing), 3.0).astype(np.int64)
         owners = np.repeat(np.arange(len(counts)), samples)
         first = np.cumsum(samples) - samples
-        share = (np.arange(len(owners)) - first[owners] + 0.5) / samples[owners]
-        along = reached[ends[owners] - 1] - (1.0 - share) * around[owners]
+        fraction = (np.arange(len(owners)) - first[owners] + 0.5) / samples[owners]
+        along = reached[ends[owners] - 1] - (1.0 - fraction) * around[owners]
         at = np.minimum(np.searchsorted(reached, along), ends[owners] - 1)
         left = (reached[at] - along) / np.maximum(np.hypot(edges[at, 0], edges[at, 1]), 1e-12)
         return corners[after[at]] - edges[at] * left[:, None], owners
@@ -122,7 +122,7 @@ class Skeleton:
             triangles = Delaunay(sites)
         except QhullError:
             return None  # all points on one line
-        # its dual: corners of the diagram are circumcentres, and neighbours share a ridge
+        # its dual: corners of the diagram are circumcentres, and neighbours fraction a ridge
         corners = _circumcentres(sites[triangles.simplices])
         first, opposite = np.nonzero(triangles.neighbors > np.arange(len(corners))[:, None])
         ridges = np.column_stack([first, triangles.neighbors[first, opposite]])

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from pushplan.compiled import owned
@@ -32,6 +34,19 @@ class TreePaths:
         """Look farther from the coarse path, as the way out may be the other way."""
         self._fraction *= 0.5
         self._improver.relax()
+
+    def grow_two(self, push_weight: float) -> Iterator[Candidate]:
+        """Paths of two trees, around the objects and among them, until the stop rule fires."""
+        config = self._improver.config
+        for weight, budget in (
+            (np.inf, config.avoid_iterations),
+            (push_weight, config.tree_iterations),
+        ):
+            if self._improver.stopped():
+                return
+            candidate = self.grow(weight, budget)
+            if candidate is not None:
+                yield candidate
 
     def grow(
         self,
