@@ -71,7 +71,7 @@ class ShipPathImprover:
                 return False
             end = min(at + _PORTION, last - 1)
             added = works[at + 1 : end + 1]
-            if not self.sweeper.run(poses[at : end + 1], here, objects[at : end + 1], added):
+            if not self.sweeper(poses[at : end + 1], here, objects[at : end + 1], added):
                 return False
             added[:] = works[at] + np.cumsum(added)
             at = end
