@@ -33,9 +33,6 @@ _TYPES |= dict.fromkeys(("seed", "success", "plan_calls"), "INTEGER")
 class RunDirectory:
     """The one writer of a run directory. Safe against being killed at any instant.
 
-    Args:
-        path: the folder; made if it is missing.
-
     Raises:
         InvalidInputError: if another process is writing there.
         SchemaError: if the folder holds results of another version.

@@ -44,11 +44,6 @@ class MujocoBodies:
 
     Bodies on the ground have six degrees of freedom and the robot's wheels one each; floating
     bodies have three. Positions are ordered robot first, then objects.
-
-    Args:
-        world: the scene; its poses are where everything begins.
-        materials: friction, rolling, water and the third dimension.
-        options: numerical settings.
     """
 
     def __init__(self, world: World, materials: Materials, options: MujocoOptions) -> None:
