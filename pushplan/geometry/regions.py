@@ -11,14 +11,7 @@ from numpy.typing import ArrayLike
 
 from pushplan.compiled import kernel
 from pushplan.geometry.contours import segment_crossings
-from pushplan.world import (
-    ClearanceArea,
-    Goal,
-    GoalDisc,
-    GoalLine,
-    InvalidInputError,
-    Receptacle,
-)
+from pushplan.world import ClearanceArea, Goal, GoalDisc, GoalLine, InvalidInputError, Receptacle
 from pushplan.world.checks import BoolArray, FloatArray, IntArray, array, frozen
 from pushplan.world.outline import convex_outline, flatten
 

@@ -12,12 +12,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from pushplan.gtsp.walk_kernels import (
-    allow_memories,
-    extend_walks,
-    memory_moves,
-    read_visits,
-)
+from pushplan.gtsp.walk_kernels import allow_memories, extend_walks, memory_moves, read_visits
 from pushplan.world.checks import FloatArray, IntArray
 
 MARGIN = 1e-10
