@@ -22,11 +22,7 @@ step is over); None when the action is done."""
 
 
 class ActionMode(ABC):
-    """One way to command a robot. Actions are arrays in ``[-1, 1]``; others are clipped to it.
-
-    Args:
-        task: whose robot is driven, with its limits.
-    """
+    """One way to command a robot. Actions are arrays in ``[-1, 1]``; others are clipped to it."""
 
     size: ClassVar[int]
     """Number of elements of an action."""

@@ -19,10 +19,6 @@ CAMERA_SIZE = (640, 480)
 class Renderer:
     """Shows the scene of one environment.
 
-    Args:
-        mode: one of `RENDER_MODES`, or None.
-        simulator: whose camera is used.
-
     Raises:
         UnknownNameError: if there is no such mode.
         MissingDependencyError: if there is no display for a window, or the simulator has no camera.

@@ -85,10 +85,7 @@ def published_tables() -> tuple[PublishedTable, ...]:
 
 
 def chosen_tables(only: str | Sequence[str] | None = None) -> tuple[PublishedTable, ...]:
-    """The tables of some suites or tasks.
-
-    Args:
-        only: names of suites or tasks, as a list or with commas; all tables if None.
+    """The tables of some suites or tasks, as a list or with commas; all tables if None.
 
     Raises:
         UnknownNameError: if there is no table for a name.

@@ -100,14 +100,13 @@ class AnytimeSearch:
         self.values = np.full(2, np.inf)
         self.pace = 3e-5 + 3e-7 * problem.width**2
 
-    def run(self, budget: Budget, begin: float, end: float) -> None:
-        """One annealing from a random order, until it is frozen.
-
-        Args:
-            budget: of the call.
-            begin: fraction of it that is gone when the tour is hottest.
-            end: fraction that is gone when it is coldest, where the run ends at the latest.
-        """
+    def run(
+        self,
+        budget: Budget,  # of the call
+        begin: float,  # fraction of it that is gone when the tour is hottest
+        end: float,  # fraction that is gone when it is coldest, where the run ends at the latest
+    ) -> None:
+        """One annealing from a random order, until it is frozen."""
         self._random_start(budget)
         config, lowest, frozen, first = self.config, np.inf, 0.0, True
         while not budget.stopped():

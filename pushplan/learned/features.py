@@ -5,13 +5,14 @@ from __future__ import annotations
 import functools
 import math
 from dataclasses import dataclass
-from typing import Annotated, ClassVar
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pushplan.geometry import GoalDistances, goal_distances
 from pushplan.learned.ray_kernels import cast_rays, near_outlines
+from pushplan.observation.builder import LimitedVector
 from pushplan.world import Goal, GoalDisc, GoalLine, StaticMap, World
 from pushplan.world.checked_fields import CheckedFields, Limits, PositiveFloat
 from pushplan.world.checks import FloatArray, IntArray
@@ -21,7 +22,7 @@ _GUIDE, _EACH = 10, 9
 
 
 @dataclass(frozen=True)
-class FeatureObservation(CheckedFields):
+class FeatureObservation(LimitedVector, CheckedFields):
     """What matters for pushing, in the robot's frame, cheap to compute and to learn from.
 
     Our own variant beside the images of the Bench-Push paper. All lengths are divided by
@@ -52,22 +53,10 @@ class FeatureObservation(CheckedFields):
     range: PositiveFloat = 6.0
     limit: PositiveFloat = 5.0
 
-    dtype: ClassVar[np.dtype[np.float32]] = np.dtype(np.float32)
-
     @property
     def shape(self) -> tuple[int]:
         """Length of the vector."""
         return (_GUIDE + 2 * self.rays + _EACH * self.objects,)
-
-    @property
-    def low(self) -> float:
-        """Least value of any entry."""
-        return -self.limit
-
-    @property
-    def high(self) -> float:
-        """Greatest value of any entry."""
-        return self.limit
 
     def observe(self, world: World) -> NDArray[np.float32]:
         """The vector."""

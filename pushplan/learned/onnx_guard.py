@@ -45,9 +45,6 @@ class OnnxContents:
 def inspect(data: bytes) -> OnnxContents:
     """Check a model and read its metadata.
 
-    Args:
-        data: the whole file.
-
     Raises:
         NotOnnxError: if it is empty, truncated, no ONNX, or asks for what a policy does not need:
             data in other files, operators outside `OPERATORS`, control flow, functions, training

@@ -31,9 +31,6 @@ class Door:
 class Network:
     """A model whose file has been checked, ready to run.
 
-    Args:
-        data: the file.
-
     Raises:
         NotOnnxError: if ONNX Runtime does not take it, or it has several inputs or outputs.
         MissingDependencyError: without onnxruntime.

@@ -149,11 +149,6 @@ class Specification:
         ``task.control_step``, ``task.waypoint_window``, ``task.heading_step`` and
         ``observation_space``; and ``preset`` of the scenario.
 
-        Args:
-            env: a `pushplan.envs.PushEnv` or anything like it.
-            label: what errors call the policy.
-            scenario: what the environment was made for, if known.
-
         Raises:
             InvalidInputError: naming what the file says and what the environment has.
         """

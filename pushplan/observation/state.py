@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pushplan.observation.builder import LimitedVector
 from pushplan.world import GoalDisc, GoalLine, World
 from pushplan.world.checked_fields import CheckedFields, NonNegativeInt, PositiveFloat
 from pushplan.world.checks import FloatArray
@@ -17,7 +17,7 @@ _OWN, _EACH = 6, 5
 
 
 @dataclass(frozen=True)
-class StateObservation(CheckedFields):
+class StateObservation(LimitedVector, CheckedFields):
     """Low-dimensional observation of fixed length.
 
     Robot x, y [m], cos and sin of its heading; x, y [m] of the goal in the robot's frame; then for
@@ -35,22 +35,10 @@ class StateObservation(CheckedFields):
     max_objects: NonNegativeInt = 20
     limit: PositiveFloat = 1000.0
 
-    dtype: ClassVar[np.dtype[np.float32]] = np.dtype(np.float32)
-
     @property
     def shape(self) -> tuple[int]:
         """Length of the vector."""
         return (_OWN + _EACH * self.max_objects,)
-
-    @property
-    def low(self) -> float:
-        """Least value of any entry."""
-        return -self.limit
-
-    @property
-    def high(self) -> float:
-        """Greatest value of any entry."""
-        return self.limit
 
     def observe(self, world: World) -> NDArray[np.float32]:
         """The vector."""

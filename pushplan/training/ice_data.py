@@ -103,11 +103,6 @@ def _logged(paths: Iterable[Path], split: str, shards: int) -> list[Path]:
 def read_shards(folder: str | Path, split: str, limit: int | None = None) -> IcePairs:
     """All pairs of a split, in the order of their shards.
 
-    Args:
-        folder: where `write_shards` put them.
-        split: ``"train"`` or ``"held-out"``.
-        limit: how many shards at most.
-
     Raises:
         InvalidInputError: if there are none, or a file is not a shard.
     """

@@ -90,13 +90,7 @@ def _correlation(a: FloatArray, b: FloatArray) -> float:
 def held_out(
     concentration: float, voyages: int, config: PassageConfig | None = None
 ) -> list[tuple[PassageBatch, OccupancyForecast]]:
-    """Passages through ice of one concentration that no network was trained on.
-
-    Args:
-        concentration: of the ice.
-        voyages: how many fields of ice.
-        config: of the passages; its concentrations are replaced.
-    """
+    """Passages through ice of one concentration that no network was trained on, a field each."""
     integer("voyages", voyages, low=1)
     fixed = replace(
         config or PassageConfig(),

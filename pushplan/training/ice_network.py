@@ -10,7 +10,6 @@ import argparse
 import json
 import logging
 import time
-import warnings
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -18,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 from pushplan.interaction.occupancy import CELLS_PER_LENGTH, CHANNELS, PATCH_CELLS
 from pushplan.training.ice_data import LEVELS, IcePairs, read_shards
-from pushplan.world import MissingDependencyError
+from pushplan.training.libraries import need, parameter_count, write_onnx
 from pushplan.world.checked_fields import (
     CheckedFields,
     NonNegativeFloat,
@@ -31,8 +30,6 @@ if TYPE_CHECKING:
     from pushplan.training.ice_unet import IceUNet
 
 log = logging.getLogger(__name__)
-
-OPSET = 17
 
 
 @dataclass(frozen=True)
@@ -61,8 +58,8 @@ def train(pairs: IcePairs, config: IceTrainingConfig | None = None) -> tuple[Ice
     Raises:
         MissingDependencyError: without PyTorch.
     """
-    torch = _torch()
-    from pushplan.training.ice_unet import IceUNet, parameter_count, seeded
+    torch = need("torch")
+    from pushplan.training.ice_unet import IceUNet, seeded
 
     config = config or IceTrainingConfig()
     torch.set_num_threads(config.threads)
@@ -110,38 +107,11 @@ def _loss(network: IceUNet, chosen: list[Any], mirrored: bool, map_weight: float
 
 def export(network: IceUNet, path: str | Path) -> None:
     """Write a network as ONNX for any batch size; PyTorch is not needed to run it."""
-    torch = _torch()
+    torch = need("torch")
     from pushplan.training.ice_unet import ExportedIceUNet
 
     example = torch.zeros(2, len(CHANNELS), PATCH_CELLS, PATCH_CELLS)
-    Path(path).parent.mkdir(parents=True, exist_ok=True)
-    with warnings.catch_warnings():
-        # the exporter that needs no further package; it is marked as old
-        warnings.simplefilter("ignore", DeprecationWarning)
-        _write(torch, ExportedIceUNet(network), example, path)
-
-
-def _write(torch: Any, network: Any, example: Any, path: str | Path) -> None:
-    torch.onnx.export(
-        network,
-        (example,),
-        str(path),
-        input_names=["patches"],
-        output_names=["after", "work"],
-        dynamic_axes={"patches": {0: "batch"}, "after": {0: "batch"}, "work": {0: "batch"}},
-        opset_version=OPSET,
-        dynamo=False,
-    )
-
-
-def _torch() -> Any:
-    try:
-        import torch
-    except ImportError as error:
-        raise MissingDependencyError(
-            "training needs PyTorch: pip install 'pushplan[learn]'"
-        ) from error
-    return torch
+    write_onnx(ExportedIceUNet(network), example, path, ("patches", "after", "work"))
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

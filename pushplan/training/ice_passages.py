@@ -51,11 +51,6 @@ class PassageConfig:
 def random_voyage(world: World, config: PassageConfig, rng: np.random.Generator) -> FloatArray:
     """A path along the channel in arcs of random length and curvature.
 
-    Args:
-        world: the ship at its start, heading up the channel.
-        config: what arcs.
-        rng: the only source of randomness.
-
     Returns:
         (N, 3) poses, the hull's ``spacing`` apart, that keep clear of the channel's ends. They may
         pass its sides by up to a hull length.

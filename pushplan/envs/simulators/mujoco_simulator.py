@@ -37,9 +37,6 @@ class MujocoSimulator(Simulator):
     `touched_static` looks at the samples of a step. `held`: the hull touched something at one of
     them, and in the second half of the step the robot moved along its heading, or turned, with
     less than half of the commanded rate, and was not speeding up either.
-
-    Args:
-        options: numerical and mechanical settings.
     """
 
     name = "mujoco"

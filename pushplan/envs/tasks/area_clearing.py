@@ -12,19 +12,9 @@ import shapely
 from pushplan.envs.tasks.area_clearing_presets import LAYOUTS, PRESETS, AreaClearingPreset
 from pushplan.envs.tasks.base import StepOutcome
 from pushplan.envs.tasks.layout import FreeSpace, rectangle, squares, walls_around
-from pushplan.envs.tasks.manipulation import (
-    START_TRIES,
-    ManipulationTask,
-    ManipulationVariations,
-)
+from pushplan.envs.tasks.manipulation import START_TRIES, ManipulationTask, ManipulationVariations
 from pushplan.envs.tasks.variations import Yaw
-from pushplan.world import (
-    ClearanceArea,
-    InvalidInputError,
-    ScenarioError,
-    StaticMap,
-    World,
-)
+from pushplan.world import ClearanceArea, InvalidInputError, ScenarioError, StaticMap, World
 from pushplan.world.checks import BoolArray, FloatArray
 
 CLEARED_REWARD = 10.0

@@ -12,11 +12,7 @@ import shapely
 from pushplan.envs.tasks.base import StepOutcome
 from pushplan.envs.tasks.box_delivery_presets import LAYOUTS, PRESETS, BoxDeliveryPreset
 from pushplan.envs.tasks.layout import rectangle, walls_around
-from pushplan.envs.tasks.manipulation import (
-    START_TRIES,
-    ManipulationTask,
-    ManipulationVariations,
-)
+from pushplan.envs.tasks.manipulation import START_TRIES, ManipulationTask, ManipulationVariations
 from pushplan.envs.tasks.variations import Yaw
 from pushplan.world import InvalidInputError, Receptacle, StaticMap, World
 from pushplan.world.checks import FloatArray, IntArray

@@ -24,11 +24,7 @@ _CORNERS = np.array([(-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5)])
 
 @dataclass(frozen=True)
 class FreeSpace:
-    """The free floor among static obstacles.
-
-    Args:
-        static: the obstacles; thick segments count with their exact round outline.
-    """
+    """The free floor among static obstacles; thick segments count with their round outline."""
 
     static: StaticMap
 

@@ -29,16 +29,12 @@ class _Key(NamedTuple):
 
 
 def swaths(
-    primitives: PrimitiveSet, vertices: FloatArray, offsets: IntArray, cells_per_step: int
+    primitives: PrimitiveSet,  # the set
+    vertices: FloatArray,  # (V, 2) convex parts of the footprint in lattice steps, body frame
+    offsets: IntArray,  # (Q + 1,) where each part starts
+    cells_per_step: int,  # how many cells of the map a lattice step is long
 ) -> Swaths:
-    """Swaths of all primitives of a set, cached by everything that they depend on.
-
-    Args:
-        primitives: the set.
-        vertices: (V, 2) convex parts of the footprint in lattice steps, body frame.
-        offsets: (Q + 1,) where each part starts.
-        cells_per_step: how many cells of the map a lattice step is long.
-    """
+    """Swaths of all primitives of a set, cached by everything that they depend on."""
     rounded = np.round(vertices, 9)
     key = _Key(rounded.tobytes(), offsets.tobytes())
     return _swaths(primitives, key, cells_per_step)

@@ -23,8 +23,8 @@ from pushplan.envs import PushEnv
 from pushplan.learned.builders import builder_from_dict, builder_to_dict
 from pushplan.learned.specification import RobotSpec
 from pushplan.observation import ObservationBuilder
+from pushplan.training.libraries import need
 from pushplan.training.policies.environment import TRAINING_SEEDS
-from pushplan.training.policies.libraries import need
 from pushplan.world import (
     ChoosesActions,
     ChoosesObservation,
@@ -82,12 +82,6 @@ class EpisodeData:
 
 def record(request: DatasetRequest, policy: Any, label: str, folder: str | Path) -> Path:
     """Run a policy and write what it saw and did.
-
-    Args:
-        request: what is recorded.
-        policy: a `pushplan.world.Policy`.
-        label: what the data set calls it.
-        folder: a new or empty folder.
 
     Raises:
         InvalidInputError: if the folder holds something, or the request makes no sense.
@@ -222,10 +216,6 @@ def episodes(folder: str | Path) -> Iterator[EpisodeData]:
 
 def to_minari(folder: str | Path, name: str) -> Any:
     """Make a data set of Minari's own, in Minari's folder (``MINARI_DATASETS_PATH``).
-
-    Args:
-        folder: a data set of `record`.
-        name: such as ``"pushplan/maze/push-aware-v0"``.
 
     Returns:
         The ``minari.MinariDataset``.
