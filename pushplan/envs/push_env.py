@@ -17,6 +17,7 @@ from pushplan.envs.actions import ActionMode, Motion, waiting
 from pushplan.envs.registry import ACTIONS, SIMULATORS, TASKS, default_preset, look_up
 from pushplan.envs.roster import Roster
 from pushplan.envs.simulators.base import Simulator
+from pushplan.envs.simulators.kernel_warmup import warm_up_simulator
 from pushplan.envs.tasks.base import StepOutcome, Task
 from pushplan.envs.trace import Trace
 from pushplan.envs.window import Window, has_display
@@ -140,6 +141,12 @@ class PushEnv(gymnasium.Env[NDArray[Any], NDArray[Any]]):
                 self._over = "the action mode has changed"
                 return True
         return False
+
+    def warm_up(self) -> None:
+        """Load the kernels of the simulator; ends the episode."""
+        self._over = "warm_up() has ended the episode"
+        world = self.task.start(stream(0, "layout"))
+        warm_up_simulator(self._simulator, world, self.task.materials)
 
     @property
     def world(self) -> World:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from pushplan.geometry import GoalDistances, goal_distances
 from pushplan.learned.ray_kernels import cast_rays, near_outlines
 from pushplan.world import Goal, GoalDisc, GoalLine, StaticMap, World
-from pushplan.world.checks import FloatArray, IntArray, integer, number
+from pushplan.world.checks import FloatArray, IntArray, frozen, integer, number
 from pushplan.world.outline import centroid, flatten
 
 _GUIDE, _EACH = 10, 9
@@ -91,7 +91,9 @@ class FeatureObservation:
                 *(x, y, self.range, objects.poses, objects.radii),
                 *(objects.vertices, objects.offsets),
             )
-            out[_GUIDE + self.rays : _GUIDE + 2 * self.rays] = self._cast(x, y, theta, *near)
+            out[_GUIDE + self.rays : _GUIDE + 2 * self.rays] = self._cast(
+                x, y, theta, *map(frozen, near)
+            )
         if self.objects and len(world.movables):
             self._nearest(out[_GUIDE + 2 * self.rays :].reshape(-1, _EACH), world, to_body)
         return np.clip(out, -self.limit, self.limit).astype(np.float32)

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from ompl import base, geometric
 
-from pushplan.compiled import kernel
+from pushplan.compiled import kernel, owned
 from pushplan.geometry import core_distance
 from pushplan.motion.collision import ConvexObstacles, obstacles
 from pushplan.motion.polyline import polyline_plan
@@ -94,7 +94,7 @@ class GeometricRRT:
         iterations, status, plan = 0, PlanStatus.TIMED_OUT, None
         if start_margin(world, 0.0) is None:
             return _result(PlanStatus.START_BLOCKED, None, 0, time.perf_counter() - began)
-        start = np.ascontiguousarray(world.robot_pose[:2])
+        start = owned(world.robot_pose[:2])
         size = world.robot.circumscribed_radius
         wide, narrow = config.clearance * size, world.robot.inscribed_radius
         passes = [(boxes, wide), ([], wide), ([], min(size, wide)), ([], min(narrow, wide))]
