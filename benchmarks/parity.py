@@ -19,9 +19,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pushplan.drawing import draw_world, save_image
-from pushplan.envs.registry import SIMULATORS, TASKS, look_up
+from pushplan.envs.registry import SIMULATORS, TASKS
 from pushplan.world import GoalDisc, Movables, StaticMap, Twist, World, stream
 from pushplan.world.checks import FloatArray
+from pushplan.world.lazy_names import look_up
 
 PERIOD = 0.2
 HALF = 0.04

@@ -22,7 +22,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pushplan.control import PurePursuit
-from pushplan.envs.registry import SIMULATORS, look_up
+from pushplan.envs.registry import SIMULATORS
 from pushplan.envs.simulators.base import Materials, Simulator
 from pushplan.envs.tasks.materials import SOLIDS
 from pushplan.evaluation import push_figure
@@ -55,6 +55,7 @@ from pushplan.world import (
     turtlebot3_burger,
 )
 from pushplan.world.checks import FloatArray
+from pushplan.world.lazy_names import look_up
 
 SQUARE = 0.5 * np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
 FLOOR = StaticMap.build(bounds=[-100.0, -100.0, 100.0, 100.0])

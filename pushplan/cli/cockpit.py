@@ -81,12 +81,6 @@ class Cockpit:
 
     A step is simulated at once and then shown over the time that it takes, so that the picture
     is in real time and a key acts on the next step.
-
-    Args:
-        env: the environment.
-        display: where to show it.
-        speed: simulated seconds per second.
-        clock: wall-clock time.
     """
 
     def __init__(self, env: Any, display: Display, speed: float, clock: Clock) -> None:

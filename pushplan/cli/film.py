@@ -23,9 +23,6 @@ FPS = 20
 class Camera:
     """Watches an episode and draws it when it is over.
 
-    Args:
-        path: where the picture or film goes; its ending says which.
-
     Raises:
         InvalidInputError: if the ending is unknown or the folder is missing.
     """

@@ -44,13 +44,7 @@ def add(commands: Any) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Read, solve, say what was found; 1 if there is no tour."""
-    from pushplan.gtsp import (
-        GtspConfig,
-        read_gtsp,
-        solve_gtsp,
-        warm_up_solver,
-        write_tour,
-    )
+    from pushplan.gtsp import GtspConfig, read_gtsp, solve_gtsp, warm_up_solver, write_tour
     from pushplan.world import Deadline, MaxIterations, stream
 
     check_folder(options.out)

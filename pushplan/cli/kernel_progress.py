@@ -12,15 +12,11 @@ from importlib.resources import files
 
 @dataclass
 class KernelProgress:
-    """What has become ready so far.
+    """What has become ready so far."""
 
-    Args:
-        expected: names of the kernels that are to come; empty if that is not known.
-        terminal: whether to write on one line of a terminal; else a log gets one line in all.
-    """
-
+    # names of the kernels that are to come; empty if that is not known
     expected: frozenset[str] = frozenset()
-    terminal: bool = False
+    terminal: bool = False  # to write on one line of; else a log gets one line in all
     compiled: int = 0
     loaded: int = 0
     ready: set[str] = field(default_factory=set)

@@ -90,10 +90,6 @@ def twist_of(held: Collection[str], robot: RobotModel) -> Twist:
 
     Opposite keys cancel each other, and stop overrides them all. A robot with one constant speed
     only steers.
-
-    Args:
-        held: of `DRIVING`.
-        robot: its limits.
     """
     turn = float("left" in held) - float("right" in held)
     if robot.drive is Drive.CONSTANT_SPEED:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Iterable
 from typing import Any
 
 from pushplan.cli.common import add_command, say
@@ -22,52 +21,20 @@ def add(commands: Any) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """One name a line."""
-    for name in _KINDS[options.kind]():
+    from pushplan.world.lazy_names import look_up
+
+    names = look_up("kind", _KINDS, options.kind)
+    for name in names() if callable(names) else names:
         say(name)
     return 0
 
 
-def _planners() -> Iterable[str]:
-    from pushplan.planners import planner_names
-
-    return planner_names()
-
-
-def _policies() -> Iterable[str]:
-    from pushplan.evaluation.policies import policy_names
-
-    return policy_names()
-
-
-def _suites() -> Iterable[str]:
-    from pushplan.scenarios import suite_names
-
-    return suite_names()
-
-
-def _metrics() -> Iterable[str]:
-    from pushplan.metrics import metric_names
-
-    return metric_names()
-
-
-def _tasks() -> Iterable[str]:
-    from pushplan.envs.registry import TASKS
-
-    return TASKS
-
-
-def _simulators() -> Iterable[str]:
-    from pushplan.envs.registry import SIMULATORS
-
-    return SIMULATORS
-
-
-_KINDS: dict[str, Callable[[], Iterable[str]]] = {
-    "planners": _planners,
-    "policies": _policies,
-    "tasks": _tasks,
-    "suites": _suites,
-    "metrics": _metrics,
-    "simulators": _simulators,
+_KINDS: dict[str, str] = {
+    "planners": "pushplan.planners:planner_names",
+    "policies": "pushplan.evaluation.policies:policy_names",
+    "tasks": "pushplan.envs.registry:TASKS",
+    "suites": "pushplan.scenarios:suite_names",
+    "metrics": "pushplan.metrics:metric_names",
+    "simulators": "pushplan.envs.registry:SIMULATORS",
 }
+"""What there is -> the names themselves, or a function that gives them."""

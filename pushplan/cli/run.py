@@ -5,14 +5,7 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING, Any
 
-from pushplan.cli.common import (
-    add_command,
-    add_latency,
-    add_trust,
-    check_folder,
-    milliseconds,
-    say,
-)
+from pushplan.cli.common import add_command, add_latency, add_trust, check_folder, milliseconds, say
 from pushplan.cli.kernel_progress import kernel_progress
 from pushplan.cli.scenario_options import add_scenario_options, scenario_of
 

@@ -11,11 +11,7 @@ from pushplan.world.polyline import path_length, path_lengths
 
 
 class Scoreboard:
-    """Adds up lengths and work from poses as they come in.
-
-    Args:
-        start: the scene at the start.
-    """
+    """Adds up lengths and work from poses as they come in."""
 
     def __init__(self, start: World) -> None:
         self._start = start

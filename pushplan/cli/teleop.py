@@ -91,8 +91,9 @@ class _WindowDisplay:
 
 def _environment(scenario: Scenario, action: str | None) -> Any:
     from pushplan.envs import make
-    from pushplan.envs.registry import TASKS, look_up
+    from pushplan.envs.registry import TASKS
     from pushplan.world import InvalidInputError
+    from pushplan.world.lazy_names import look_up
 
     known = look_up("task", TASKS, scenario.task).actions
     usable = [name for name in known if name in ACTIONS]

@@ -10,37 +10,21 @@ from pushplan.world import GoalLine, World
 
 @dataclass(frozen=True)
 class Palette:
-    """Colours of what is drawn; pairs are a fill and an edge.
+    """Colours of what is drawn; pairs are a fill and an edge."""
 
-    Attributes:
-        floor: the ground.
-        wall: what is static.
-        robot: the chassis.
-        robot_edge: outline of the robot.
-        bumper: its other parts.
-        box: objects.
-        wheeled: objects on casters.
-        box_edge_px: width of their edges at 600 px.
-        ghost: where objects were or will be.
-        goal: where something has to go.
-        plan: the planned path.
-        trail: the path so far.
-        text: letters.
-    """
-
-    floor: Color = (250, 249, 246)
-    wall: Color = (84, 84, 88)
-    robot: Color = (0, 114, 178)
-    robot_edge: Color = (0, 66, 110)
-    bumper: Color = (38, 50, 66)
-    box: tuple[Color, Color] = ((146, 94, 52), (92, 56, 28))
-    wheeled: tuple[Color, Color] = ((226, 192, 140), (150, 112, 62))
-    box_edge_px: float = 1.5
-    ghost: Color = (214, 160, 116)
-    goal: tuple[Color, Color] = ((206, 236, 222), (0, 158, 115))
-    plan: Color = (213, 94, 0)
-    trail: Color = (86, 180, 233)
-    text: Color = (40, 40, 44)
+    floor: Color = (250, 249, 246)  # the ground
+    wall: Color = (84, 84, 88)  # what is static
+    robot: Color = (0, 114, 178)  # the chassis
+    robot_edge: Color = (0, 66, 110)  # outline of the robot
+    bumper: Color = (38, 50, 66)  # its other parts
+    box: tuple[Color, Color] = ((146, 94, 52), (92, 56, 28))  # objects
+    wheeled: tuple[Color, Color] = ((226, 192, 140), (150, 112, 62))  # objects on casters
+    box_edge_px: float = 1.5  # width of their edges at 600 px
+    ghost: Color = (214, 160, 116)  # where objects were or will be
+    goal: tuple[Color, Color] = ((206, 236, 222), (0, 158, 115))  # where something has to go
+    plan: Color = (213, 94, 0)  # the planned path
+    trail: Color = (86, 180, 233)  # the path so far
+    text: Color = (40, 40, 44)  # letters
 
 
 FLOOR_PALETTE = Palette()

@@ -9,33 +9,27 @@ packages, so either import this package first, or let Gymnasium do it::
 
 from __future__ import annotations
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+from pushplan.world.lazy_names import lazy_names
 
 if TYPE_CHECKING:
-    from pushplan.envs.push_env import EpisodeOverError, PushEnv, make
+    from pushplan.envs.making import make
+    from pushplan.envs.push_env import EpisodeOverError, PushEnv
     from pushplan.envs.rollout import RolloutInteraction
     from pushplan.envs.trace import Trace
 
 __all__ = ["EpisodeOverError", "PushEnv", "RolloutInteraction", "Trace", "make", "register_all"]
 
-_LAZY = {
-    "EpisodeOverError": "pushplan.envs.push_env",
-    "PushEnv": "pushplan.envs.push_env",
-    "RolloutInteraction": "pushplan.envs.rollout",
-    "Trace": "pushplan.envs.trace",
-    "make": "pushplan.envs.push_env",
-}
-
-
-def __getattr__(name: str) -> Any:
-    if name in _LAZY:
-        return getattr(import_module(_LAZY[name]), name)
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-
-
-def __dir__() -> list[str]:
-    return __all__
+__getattr__, __dir__ = lazy_names(
+    __name__,
+    {
+        "making": "make",
+        "push_env": "EpisodeOverError PushEnv",
+        "rollout": "RolloutInteraction",
+        "trace": "Trace",
+    },
+)
 
 
 def register_all() -> None:
@@ -46,9 +40,7 @@ def register_all() -> None:
 
     for gym_id, task in GYM_IDS.items():
         if gym_id not in registry:
-            register(
-                id=gym_id, entry_point="pushplan.envs.push_env:make_env", kwargs={"task": task}
-            )
+            register(id=gym_id, entry_point="pushplan.envs.making:make_env", kwargs={"task": task})
 
 
 register_all()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import ClassVar
 
 import numpy as np
@@ -11,7 +11,7 @@ from gymnasium.spaces import Box
 from numpy.typing import ArrayLike, NDArray
 
 from pushplan.envs.tasks.base import Task
-from pushplan.world import Action, InvalidInputError, Twist, WheelSpeeds, World
+from pushplan.world import Action, InvalidInputError, Twist, UnknownNameError, WheelSpeeds, World
 from pushplan.world.checks import FloatArray
 
 Motion = Callable[[FloatArray, bool], tuple[Twist, float] | None]
@@ -22,11 +22,7 @@ action is done."""
 
 
 class ActionMode(ABC):
-    """One way to command a robot. Actions are arrays in ``[-1, 1]``; others are clipped to it.
-
-    Args:
-        task: whose robot is driven, with its limits.
-    """
+    """One way to command a robot. Actions are arrays in ``[-1, 1]``; others are clipped to it."""
 
     size: ClassVar[int]
     """Number of elements of an action."""
@@ -91,6 +87,24 @@ class ActionMode(ABC):
         if separation == 0.0:
             raise InvalidInputError(f"robot {self.robot.name!r} has no wheels, send a Twist")
         return Twist(0.5 * (action.left + action.right), (action.right - action.left) / separation)
+
+
+def chosen_action(task: type[Task], wanted: str | Sequence[str] | None) -> str:
+    """The action mode of a task: its first, or the first of those wanted that it has.
+
+    Raises:
+        UnknownNameError: if it has none of them.
+    """
+    if wanted is None:
+        return task.actions[0]
+    several = isinstance(wanted, Sequence) and not isinstance(wanted, str)
+    names = tuple(wanted) if several else (wanted,)
+    for name in names:
+        if name in task.actions:
+            return name
+    raise UnknownNameError(
+        f"action of task {task.name!r}", ", ".join(map(str, names)), task.actions
+    )
 
 
 def _once(command: Twist) -> Motion:

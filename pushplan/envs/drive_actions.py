@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NoReturn
+from typing import ClassVar, NoReturn
 
 import numpy as np
 
@@ -23,7 +23,30 @@ def _motion(driver: DriveTo) -> Motion:
     return next_command
 
 
-class HeadingAction(ActionMode):
+class _DriveAction(ActionMode):
+    """A mode that drives to a point, and takes no velocities."""
+
+    name: ClassVar[str]
+    takes_velocities = False
+
+    def __init__(self, task: Task) -> None:
+        super().__init__(task)
+        self._step = task.heading_step
+        self._half = 0.5 * task.waypoint_window
+        self._period = task.control_step
+
+    def afterwards(self, command: Twist) -> Twist:
+        """It stands."""
+        return clamp_twist(self.robot, 0.0, 0.0)
+
+    def _from_twist(self, twist: Twist) -> NoReturn:
+        raise InvalidInputError(
+            f"action mode {self.name!r} takes no velocities, got {twist!r}: make the environment "
+            "with action='velocity', or give the policy the attribute actions = ('velocity',)"
+        )
+
+
+class HeadingAction(_DriveAction):
     """Turn to a heading and drive a fixed distance along it.
 
     One element: the heading relative to the robot's in units of pi, 0 straight ahead, positive to
@@ -31,13 +54,8 @@ class HeadingAction(ActionMode):
     stopped.
     """
 
+    name = "heading"
     size = 1
-    takes_velocities = False
-
-    def __init__(self, task: Task) -> None:
-        super().__init__(task)
-        self._step = task.heading_step
-        self._period = task.control_step
 
     def start(self, action: FloatArray, world: World) -> Motion:
         """Drive straight to the point at that heading and distance."""
@@ -45,15 +63,8 @@ class HeadingAction(ActionMode):
         target = self._step * np.array([[np.cos(heading), np.sin(heading)]])
         return _motion(DriveTo(self.robot, transform(world.robot_pose, target), self._period))
 
-    def afterwards(self, command: Twist) -> Twist:
-        """It stands."""
-        return clamp_twist(self.robot, 0.0, 0.0)
 
-    def _from_twist(self, twist: Twist) -> NoReturn:
-        raise _no_velocities("heading", twist)
-
-
-class WaypointAction(ActionMode):
+class WaypointAction(_DriveAction):
     """Drive to a point by the shortest way around what is static.
 
     Two elements: the point in the robot's frame, x ahead and y to the left, in units of half the
@@ -62,13 +73,8 @@ class WaypointAction(ActionMode):
     reached is driven at straight. It ends early where the robot is stopped.
     """
 
+    name = "waypoint"
     size = 2
-    takes_velocities = False
-
-    def __init__(self, task: Task) -> None:
-        super().__init__(task)
-        self._half = 0.5 * task.waypoint_window
-        self._period = task.control_step
 
     def start(self, action: FloatArray, world: World) -> Motion:
         """Drive the shortest way there."""
@@ -84,17 +90,3 @@ class WaypointAction(ActionMode):
             if len(path.points) > 1:
                 return path.points[1:]
         return target[None]
-
-    def afterwards(self, command: Twist) -> Twist:
-        """It stands."""
-        return clamp_twist(self.robot, 0.0, 0.0)
-
-    def _from_twist(self, twist: Twist) -> NoReturn:
-        raise _no_velocities("waypoint", twist)
-
-
-def _no_velocities(mode: str, twist: Twist) -> InvalidInputError:
-    return InvalidInputError(
-        f"action mode {mode!r} takes no velocities, got {twist!r}: make the environment with "
-        "action='velocity', or give the policy the attribute actions = ('velocity',)"
-    )

@@ -13,21 +13,19 @@ from gymnasium.spaces import Box
 from numpy.typing import ArrayLike, NDArray
 
 from pushplan.control import clamp_twist
-from pushplan.envs.actions import ActionMode, Motion, waiting
-from pushplan.envs.registry import ACTIONS, SIMULATORS, TASKS, default_preset, look_up
+from pushplan.envs.actions import ActionMode, Motion, chosen_action, waiting
+from pushplan.envs.registry import ACTIONS, SIMULATORS, TASKS, default_preset
+from pushplan.envs.rendering import Renderer
 from pushplan.envs.roster import Roster
 from pushplan.envs.simulators.base import Simulator
 from pushplan.envs.simulators.kernel_warmup import warm_up_simulator
 from pushplan.envs.tasks.base import StepOutcome, Task
 from pushplan.envs.trace import Trace
-from pushplan.envs.window import Window, has_display
 from pushplan.observation import ObservationBuilder
-from pushplan.scenarios import Scenario
 from pushplan.world import (
     Action,
     ClearanceArea,
     InvalidInputError,
-    MissingDependencyError,
     PushplanError,
     Receptacle,
     ScenarioError,
@@ -36,10 +34,8 @@ from pushplan.world import (
     stream,
 )
 from pushplan.world.checks import frozen, integer, number
+from pushplan.world.lazy_names import look_up
 
-RENDER_MODES = ("human", "rgb_array", "camera")
-CAMERA_SIZE = (640, 480)
-"""Width and height of a camera picture [px]."""
 _SEED_LIMIT = 2**31
 
 
@@ -93,12 +89,13 @@ class PushEnv(gymnasium.Env[NDArray[Any], NDArray[Any]]):
         task_class: type[Task] = look_up("task", TASKS, task)
         engine: type[Simulator] = look_up("simulator", SIMULATORS, simulator)
         self._may_adapt = action is None
-        action = _chosen_action(task_class, action)
+        action = chosen_action(task_class, action)
         preset = default_preset(task, simulator) if preset is None else preset
         if preset not in task_class.presets:
             raise UnknownNameError(f"preset of {task}", preset, task_class.presets)
-        self.metadata = _metadata(engine)
-        self.render_mode = _checked_render_mode(render_mode, engine)
+        self._simulator = engine()
+        self._renderer = Renderer(render_mode, self._simulator)
+        self.metadata, self.render_mode = self._renderer.metadata, render_mode
         variations = {} if variations is None else variations
         self._make_task = partial(task_class, preset=preset, variations=variations)
         self._use_action(action)
@@ -112,8 +109,6 @@ class PushEnv(gymnasium.Env[NDArray[Any], NDArray[Any]]):
         if not hasattr(observation, "observe"):
             raise UnknownNameError(f"observation of {task}", observation, task_class.observations)
         self._builder: ObservationBuilder = observation
-        self._simulator = engine()
-        self._window: Window | None = None
         self._first_seed = None if seed is None else integer("seed", seed, low=0)
         self._world: World | None = None
         self._trace: Trace | None = None
@@ -199,7 +194,7 @@ class PushEnv(gymnasium.Env[NDArray[Any], NDArray[Any]]):
             frozen(np.array([world.time])), world.robot_pose[None], world.movables.poses[None]
         )
         self._over = ""
-        self._show()
+        self._renderer.show(world)
         info = _info(StepOutcome(0.0, False, "", False, False), 0.0, False)
         if isinstance(world.goal, Receptacle | ClearanceArea):
             info["completed"] = np.zeros(len(world.movables), dtype=bool)
@@ -281,7 +276,7 @@ class PushEnv(gymnasium.Env[NDArray[Any], NDArray[Any]]):
         outcome = self.task.score(before, after, work=work, touched_static=touched)
         if outcome.terminated or outcome.truncated:
             self._over = f"the episode has ended ({outcome.reason})"
-        self._show()
+        self._renderer.show(after)
         return (
             self._observe(after),
             outcome.reward,
@@ -298,88 +293,11 @@ class PushEnv(gymnasium.Env[NDArray[Any], NDArray[Any]]):
 
     def render(self) -> NDArray[np.uint8] | None:
         """The scene now as (H, W, 3) uint8; None in ``"human"`` mode, which draws by itself."""
-        if self.render_mode == "rgb_array":
-            return _picture(self.world)
-        if self.render_mode == "camera":
-            return self._simulator.photograph(*CAMERA_SIZE)
-        self._show()
-        return None
+        return None if self.render_mode is None else self._renderer.render(self.world)
 
     def close(self) -> None:
         """Close the window, if there is one; may be called again."""
-        if self._window is not None:
-            self._window.close()
-            self._window = None
-
-    def _show(self) -> None:
-        if self.render_mode == "human":
-            if self._window is None:
-                self._window = Window("pushplan", fps=self.metadata["render_fps"])
-            self._window.show(_picture(self.world))
-
-
-def make(
-    scenario: Scenario,
-    *,
-    observation: str | ObservationBuilder | None = None,
-    action: str | Sequence[str] | None = None,
-    render_mode: str | None = None,
-) -> PushEnv:
-    """The environment of a scenario. Its first `reset` uses the scenario's seed.
-
-    Args:
-        scenario: what to run.
-        observation: name of one of the task's observations, or a builder; its first if None.
-        action: name of the action mode, or several in order of preference; the task's first if
-            None.
-        render_mode: ``"rgb_array"``, ``"camera"``, ``"human"`` or None.
-    """
-    return PushEnv(
-        task=scenario.task,
-        simulator=scenario.simulator,
-        preset=scenario.preset,
-        variations=scenario.variations,
-        observation=observation,
-        action=action,
-        render_mode=render_mode,
-        seed=scenario.seed,
-    )
-
-
-def make_env(
-    *,
-    task: str,
-    simulator: str = "pymunk",
-    preset: str | None = None,
-    observation: str | ObservationBuilder | None = None,
-    action: str | None = None,
-    render_mode: str | None = None,
-    **variations: object,
-) -> PushEnv:
-    """What ``gymnasium.make`` calls: variations are keyword arguments of their own."""
-    return PushEnv(
-        task=task,
-        simulator=simulator,
-        preset=preset,
-        variations=variations,
-        observation=observation,
-        action=action,
-        render_mode=render_mode,
-    )
-
-
-def _chosen_action(task: type[Task], wanted: str | Sequence[str] | None) -> str:
-    if wanted is None:
-        return task.actions[0]
-    names = (
-        tuple(wanted) if isinstance(wanted, Sequence) and not isinstance(wanted, str) else (wanted,)
-    )
-    for name in names:
-        if name in task.actions:
-            return name
-    raise UnknownNameError(
-        f"action of task {task.name!r}", ", ".join(map(str, names)), task.actions
-    )
+        self._renderer.close()
 
 
 def _space(builder: ObservationBuilder, reach: float) -> Box:
@@ -394,36 +312,6 @@ def _space(builder: ObservationBuilder, reach: float) -> Box:
     return Box(low.astype(kind), high.astype(kind), builder.shape, kind)
 
 
-def _picture(world: World) -> NDArray[np.uint8]:
-    from pushplan.drawing import draw_world  # most runs draw nothing
-
-    return draw_world(world)
-
-
 def _info(outcome: StepOutcome, work: float, held: bool) -> dict[str, Any]:
     info = {"success": outcome.success, "reason": outcome.reason, "work": work, "held": held}
     return info if outcome.completed is None else {**info, "completed": outcome.completed}
-
-
-def _metadata(engine: type[Simulator]) -> dict[str, Any]:
-    """Render modes that work here: a window needs a display, a camera an engine with one."""
-    modes = ["rgb_array"]
-    if has_display():
-        modes.append("human")
-    if engine.has_camera:
-        modes.append("camera")
-    return {"render_modes": modes, "render_fps": 10}
-
-
-def _checked_render_mode(render_mode: str | None, engine: type[Simulator]) -> str | None:
-    if render_mode is not None and render_mode not in RENDER_MODES:
-        raise UnknownNameError("render mode", render_mode, RENDER_MODES)
-    if render_mode == "human" and not has_display():
-        raise MissingDependencyError(
-            "render mode 'human' needs tkinter and a display; 'rgb_array' works without"
-        )
-    if render_mode == "camera" and not engine.has_camera:
-        raise MissingDependencyError(
-            f"simulator {engine.name!r} has no camera; render mode 'rgb_array' draws the scene"
-        )
-    return render_mode

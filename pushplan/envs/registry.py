@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from importlib import import_module
-from typing import Any
 
-from pushplan.world import UnknownNameError
+from pushplan.world.lazy_names import look_up
 
 TASKS: dict[str, str] = {
     "maze": "pushplan.envs.tasks.maze:MazeTask",
@@ -29,18 +27,6 @@ GYM_IDS: Mapping[str, str] = {
     f"pushplan/{''.join(word.capitalize() for word in name.split('_'))}-v0": name for name in TASKS
 }
 """Gymnasium id -> task."""
-
-
-def look_up(kind: str, table: Mapping[str, str], name: object) -> Any:
-    """Import and return what ``name`` stands for in a table.
-
-    Raises:
-        UnknownNameError: if it is not in the table.
-    """
-    if not isinstance(name, str) or name not in table:
-        raise UnknownNameError(kind, name, table)
-    module, _, attribute = table[name].partition(":")
-    return getattr(import_module(module), attribute)
 
 
 def goal_kind(task: str) -> str | None:

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from numpy.typing import ArrayLike
 
-from pushplan.envs.registry import SIMULATORS, look_up
+from pushplan.envs.registry import SIMULATORS
 from pushplan.envs.simulators.base import Materials, Simulator
 from pushplan.interaction.model import Interaction
 from pushplan.world import World
+from pushplan.world.lazy_names import look_up
 
 
 class RolloutInteraction:

@@ -5,8 +5,9 @@ Everything is imported on first use, so that one door does not pay for the other
 
 from __future__ import annotations
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+from pushplan.world.lazy_names import lazy_names
 
 if TYPE_CHECKING:
     from pushplan.evaluation.batch import run_batch
@@ -23,37 +24,52 @@ if TYPE_CHECKING:
     from pushplan.evaluation.statistics import Estimate, Proportion, bootstrap_interval, wilson
     from pushplan.evaluation.summary import PairedDifference, PolicySummary
 
-_HOMES = {
-    "batch": ("run_batch",),
-    "benchmark": ("bench",),
-    "episode": ("InvalidActionError", "PolicyError", "run_episode"),
-    "compatibility": ("UnusablePolicyError",),
-    "jobs": ("Job", "JobSettings", "JobResult"),
-    "paper": ("Comparison", "bench_paper"),
-    "policies": ("PolicySpec", "parse_policies", "parse_policy"),
-    "pool": ("WorkerPool",),
-    "push_plots": ("push_figure",),
-    "results": ("Results", "compare"),
-    "rows": ("TIMING_COLUMNS", "ResultRow", "Status", "columns"),
-    "statistics": ("Estimate", "Proportion", "bootstrap_interval", "wilson"),
-    "summary": ("PairedDifference", "PolicySummary"),
-}
-_LAZY = {name: module for module, names in _HOMES.items() for name in names}
-
 __all__ = [
-    "TIMING_COLUMNS", "Comparison", "Estimate", "InvalidActionError", "Job", "JobResult",
-    "JobSettings", "PairedDifference", "PolicyError", "PolicySpec", "PolicySummary", "Proportion",
-    "ResultRow", "Results", "Status", "UnusablePolicyError", "WorkerPool", "bench", "bench_paper",
-    "bootstrap_interval", "columns", "compare", "parse_policies", "parse_policy", "push_figure",
-    "run_batch", "run_episode", "wilson",
-]  # fmt: skip
+    "TIMING_COLUMNS",
+    "Comparison",
+    "Estimate",
+    "InvalidActionError",
+    "Job",
+    "JobResult",
+    "JobSettings",
+    "PairedDifference",
+    "PolicyError",
+    "PolicySpec",
+    "PolicySummary",
+    "Proportion",
+    "ResultRow",
+    "Results",
+    "Status",
+    "UnusablePolicyError",
+    "WorkerPool",
+    "bench",
+    "bench_paper",
+    "bootstrap_interval",
+    "columns",
+    "compare",
+    "parse_policies",
+    "parse_policy",
+    "push_figure",
+    "run_batch",
+    "run_episode",
+    "wilson",
+]
 
-
-def __getattr__(name: str) -> Any:
-    if name not in _LAZY:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(import_module(f"pushplan.evaluation.{_LAZY[name]}"), name)
-
-
-def __dir__() -> list[str]:
-    return __all__
+__getattr__, __dir__ = lazy_names(
+    __name__,
+    {
+        "batch": "run_batch",
+        "benchmark": "bench",
+        "compatibility": "UnusablePolicyError",
+        "episode": "InvalidActionError PolicyError run_episode",
+        "jobs": "Job JobResult JobSettings",
+        "paper": "Comparison bench_paper",
+        "policies": "PolicySpec parse_policies parse_policy",
+        "pool": "WorkerPool",
+        "push_plots": "push_figure",
+        "results": "Results compare",
+        "rows": "TIMING_COLUMNS ResultRow Status columns",
+        "statistics": "Estimate Proportion bootstrap_interval wilson",
+        "summary": "PairedDifference PolicySummary",
+    },
+)

@@ -22,11 +22,6 @@ def usable_policies(
 ) -> list[PolicySpec]:
     """Read policies, and make each once, so that what cannot run is refused before anything runs.
 
-    Args:
-        given: as for `parse_policies`.
-        scenarios: what they will run; a policy has to be made for one of them.
-        settings: of the jobs.
-
     Raises:
         UnknownNameError: if there is no policy of a name.
         UnusablePolicyError: if a policy cannot be made, or for none of the scenarios.

@@ -86,15 +86,7 @@ def run_episode(
 
 
 class Recording:
-    """An episode in the making; what was recorded before a failure stays available.
-
-    Args:
-        policy: chooses the actions.
-        scenario: what is run.
-        label: what results call the policy.
-        latency_factor: see `run_episode`.
-        clock: measures how long the policy takes [s].
-    """
+    """An episode in the making; what was recorded before a failure stays available."""
 
     def __init__(
         self,

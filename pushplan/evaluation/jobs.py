@@ -8,12 +8,12 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from pushplan.evaluation.episode import checked_latency_factor, wanted_observation
+from pushplan.evaluation.episode import wanted_observation
 from pushplan.evaluation.loading import load_object
 from pushplan.evaluation.policies import PolicySpec
 from pushplan.evaluation.rows import ResultRow, Status, blank_row
 from pushplan.world import ChecksEnvironment, ChoosesActions, Policy
-from pushplan.world.checks import number
+from pushplan.world.checked_fields import CheckedFields, NonNegativeFloat, PositiveFloat
 
 DEFAULT_ENV = "pushplan.envs:make"
 
@@ -60,7 +60,7 @@ def file_stem(policy: str, scenario: str, seed: int) -> str:
 
 
 @dataclass(frozen=True)
-class JobSettings:
+class JobSettings(CheckedFields):
     """What all jobs of a batch share.
 
     Args:
@@ -80,16 +80,10 @@ class JobSettings:
 
     make_env: str | Callable[..., Any] = DEFAULT_ENV
     observation: str = "auto"
-    timeout_s: float | None = 300.0
-    grace_s: float = 2.0
+    timeout_s: PositiveFloat | None = 300.0
+    grace_s: NonNegativeFloat = 2.0
     dry_run: bool = True
-    latency_factor: float | None = None
-
-    def __post_init__(self) -> None:
-        if self.timeout_s is not None:
-            number("timeout_s", self.timeout_s, low=0.0, open_low=True)
-        number("grace_s", self.grace_s, low=0.0)
-        checked_latency_factor(self.latency_factor)
+    latency_factor: NonNegativeFloat | None = None
 
     @property
     def force_after_s(self) -> float | None:

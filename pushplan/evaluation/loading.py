@@ -20,9 +20,6 @@ def load_object(spec: str) -> Any:
     A file is imported once a process, with its folder on the import path, so that it may import
     its neighbours. Whatever the file raises passes through.
 
-    Args:
-        spec: ``"module:Name"`` or ``"path/to/file.py:Name"``.
-
     Raises:
         InvalidInputError: if the text has no such form, or there is no such file or name.
     """

@@ -60,12 +60,7 @@ nothing. The paper gives no success in navigation; E_nav is 0 without it.
 
 
 def overview(tables: Sequence[PublishedTable], rows: Sequence[Sequence[ResultRow]]) -> Table:
-    """Who of ours is above the best of the paper in every score at once.
-
-    Args:
-        tables: what the paper says.
-        rows: ours, for each table.
-    """
+    """Who of ours is above the best of the paper in every score at once."""
     cells = []
     for table, ours in zip(tables, rows, strict=True):
         best = {

@@ -19,12 +19,7 @@ from multiprocessing.connection import Connection, wait
 from pathlib import Path
 from typing import Any
 
-from pushplan.evaluation.worker import (
-    THREAD_VARIABLES,
-    WORKER_VARIABLE,
-    Reply,
-    WorkerSetup,
-)
+from pushplan.evaluation.worker import THREAD_VARIABLES, WORKER_VARIABLE, Reply, WorkerSetup
 from pushplan.world import PushplanError
 
 _POLL_S = 0.2

@@ -22,53 +22,32 @@ ENOUGH = 0.9
 
 @dataclass(frozen=True)
 class Score:
-    """A published number.
+    """A published number."""
 
-    Args:
-        value: mean, or median.
-        sd: standard deviation, if it was given.
-    """
-
-    value: float
-    sd: float | None = None
+    value: float  # mean, or median
+    sd: float | None = None  # standard deviation, if it was given
 
 
 @dataclass(frozen=True)
 class PublishedRow:
-    """One policy of the paper.
+    """One policy of the paper."""
 
-    Args:
-        policy: as the paper calls it.
-        setting: a key of `SETTINGS`.
-        episodes: how many, if known.
-        scores: ``"success"``, ``"E_nav"``, ... -> number.
-    """
-
-    policy: str
-    setting: str
-    episodes: int | None
-    scores: Mapping[str, Score]
+    policy: str  # as the paper calls it
+    setting: str  # a key of `SETTINGS`
+    episodes: int | None  # how many, if known
+    scores: Mapping[str, Score]  # ``"success"``, ``"E_nav"``, ... -> number.
 
 
 @dataclass(frozen=True)
 class PublishedTable:
-    """What the paper says about the scenes of one suite.
+    """What the paper says about the scenes of one suite."""
 
-    Args:
-        suite: of ours that mirrors it.
-        title: one line.
-        source: table or figure.
-        statistic: ``"mean"`` or ``"median"``.
-        notes: what is comparable and what is not.
-        rows: none where there is no number.
-    """
-
-    suite: str
-    title: str
-    source: str
-    statistic: str
-    notes: tuple[str, ...]
-    rows: tuple[PublishedRow, ...]
+    suite: str  # of ours that mirrors it
+    title: str  # one line
+    source: str  # table or figure
+    statistic: str  # ``"mean"`` or ``"median"``
+    notes: tuple[str, ...]  # what is comparable and what is not
+    rows: tuple[PublishedRow, ...]  # none where there is no number
 
     @property
     def task(self) -> str:
@@ -106,10 +85,7 @@ def published_tables() -> tuple[PublishedTable, ...]:
 
 
 def chosen_tables(only: str | Sequence[str] | None = None) -> tuple[PublishedTable, ...]:
-    """The tables of some suites or tasks.
-
-    Args:
-        only: names of suites or tasks, as a list or with commas; all tables if None.
+    """The tables of some suites or tasks, as a list or with commas; all tables if None.
 
     Raises:
         UnknownNameError: if there is no table for a name.

@@ -10,7 +10,7 @@ from pushplan.evaluation.jobs import file_stem
 from pushplan.evaluation.rows import ResultRow
 from pushplan.evaluation.run_record import RunRecord
 from pushplan.evaluation.statistics import estimate
-from pushplan.evaluation.store import DATABASE, csv_text, open_results, write_atomic
+from pushplan.evaluation.store import DATABASE, open_results, rows_csv, write_atomic
 from pushplan.evaluation.summary import (
     PairedDifference,
     PolicySummary,
@@ -106,7 +106,7 @@ class Results(RunRecord):
         folder = Path(out) if out is not None else self.path or Path()
         self._check_same_run(folder)
         folder.mkdir(parents=True, exist_ok=True)
-        write_atomic(folder / "results.csv", csv_text(self.rows).encode())
+        write_atomic(folder / "results.csv", rows_csv(self.rows).encode())
         tables = self.tables(wide=True)
         write_atomic(folder / "summary.md", markdown(tables).encode())
         write_atomic(folder / "summary.csv", summary_csv(self.summary(), self.titles).encode())

@@ -13,17 +13,12 @@ from pushplan.evaluation.summary import policies_of, settings_of
 
 @dataclass(frozen=True)
 class RunRecord:
-    """Rows of a run and what was noted about it.
+    """Rows of a run and what was noted about it."""
 
-    Args:
-        rows: sorted.
-        about: configuration, policies and titles of the settings.
-        path: the run directory; None for rows that come from elsewhere.
-    """
-
-    rows: tuple[ResultRow, ...]
+    rows: tuple[ResultRow, ...]  # sorted
+    # configuration, policies and titles of the settings
     about: Mapping[str, Any] = field(default_factory=dict)
-    path: Path | None = None
+    path: Path | None = None  # the run directory; None for rows that come from elsewhere
 
     @property
     def policies(self) -> list[str]:

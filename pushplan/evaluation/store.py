@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import contextlib
-import csv
 import fcntl
-import io
 import json
 import os
 import sqlite3
@@ -14,6 +12,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any
 
+from pushplan.evaluation.csv_text import csv_text
 from pushplan.evaluation.jobs import file_stem
 from pushplan.evaluation.rows import ResultRow, Status, columns
 from pushplan.metrics import METRICS
@@ -32,9 +31,6 @@ _TYPES |= dict.fromkeys(("seed", "success", "plan_calls"), "INTEGER")
 
 class RunDirectory:
     """The one writer of a run directory. Safe against being killed at any instant.
-
-    Args:
-        path: the folder; made if it is missing.
 
     Raises:
         InvalidInputError: if another process is writing there.
@@ -161,7 +157,7 @@ class RunDirectory:
     def write_csv(self) -> Path:
         """Write ``results.csv`` from the database; a report of other rows is removed."""
         path = self.path / "results.csv"
-        text = csv_text(self.rows()).encode()
+        text = rows_csv(self.rows()).encode()
         if not path.is_file() or path.read_bytes() != text:
             for name in REPORT:
                 (self.path / name).unlink(missing_ok=True)
@@ -224,14 +220,10 @@ def read_about(db: sqlite3.Connection) -> dict[str, Any]:
     return about
 
 
-def csv_text(rows: Iterable[ResultRow]) -> str:
-    """The rows as CSV with a header; floats are written so that they read back the same."""
-    buffer = io.StringIO()
-    writer = csv.writer(buffer, lineterminator="\n")
-    writer.writerow(columns())
-    for row in rows:
-        writer.writerow([_cell(getattr(row, name)) for name in columns()])
-    return buffer.getvalue()
+def rows_csv(rows: Iterable[ResultRow]) -> str:
+    """The rows as CSV with a header."""
+    names = columns()
+    return csv_text(names, ([_cell(getattr(row, name)) for name in names] for row in rows))
 
 
 def write_atomic(path: Path, data: bytes) -> None:

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import csv
 import io
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from pushplan.evaluation.csv_text import csv_text
 from pushplan.evaluation.statistics import Estimate
 from pushplan.evaluation.summary import PairedDifference, PolicySummary
 from pushplan.metrics import METRICS, Role, metric_names
@@ -28,19 +28,12 @@ _TIMES = {
 
 @dataclass(frozen=True)
 class Table:
-    """A table of texts. A line break in a cell separates a value from its interval.
+    """A table of texts. A line break in a cell separates a value from its interval."""
 
-    Args:
-        title: one line.
-        headings: one a column.
-        cells: rows of as many texts.
-        note: what the numbers are.
-    """
-
-    title: str
-    headings: tuple[str, ...]
-    cells: tuple[tuple[str, ...], ...]
-    note: str = ""
+    title: str  # one line
+    headings: tuple[str, ...]  # one a column
+    cells: tuple[tuple[str, ...], ...]  # rows of as many texts
+    note: str = ""  # what the numbers are
 
 
 SCORE_NOTE = (
@@ -160,31 +153,31 @@ def markdown(tables: Sequence[Table]) -> str:
 
 def summary_csv(summaries: Sequence[PolicySummary], titles: dict[str, str]) -> str:
     """One line for each setting, policy and metric, with all digits."""
-    buffer = io.StringIO()
-    writer = csv.writer(buffer, lineterminator="\n")
-    writer.writerow(("setting", "policy", "metric", "count", "mean", "sd", "median", "low", "high"))
+    lines: list[Sequence[object]] = []
     for summary in summaries:
         who = (titles.get(summary.setting, summary.setting), summary.policy)
         rate = summary.success
-        writer.writerow((*who, "success", rate.count, rate.fraction, "", "", rate.low, rate.high))
-        for name, value in summary.metrics.items():
-            numbers = (value.count, value.mean, value.sd, value.median, value.low, value.high)
-            writer.writerow((*who, name, *numbers))
-    return buffer.getvalue()
+        lines.append((*who, "success", rate.count, rate.fraction, "", "", rate.low, rate.high))
+        lines += [(*who, name, *_numbers(value)) for name, value in summary.metrics.items()]
+    return csv_text("setting,policy,metric,count,mean,sd,median,low,high".split(","), lines)
 
 
 def differences_csv(pairs: Sequence[PairedDifference], titles: dict[str, str]) -> str:
     """One line for each setting, metric and pair of policies, with all digits."""
-    buffer = io.StringIO()
-    writer = csv.writer(buffer, lineterminator="\n")
     names = "setting,metric,first,second,count,mean,sd,median,low,high,wins,losses"
-    writer.writerow(names.split(","))
-    for pair in pairs:
-        d = pair.difference
-        who = (titles.get(pair.setting, pair.setting), pair.metric, pair.first, pair.second)
-        numbers = (d.count, d.mean, d.sd, d.median, d.low, d.high, pair.wins, pair.losses)
-        writer.writerow((*who, *numbers))
-    return buffer.getvalue()
+    lines = [
+        (
+            *(titles.get(pair.setting, pair.setting), pair.metric, pair.first, pair.second),
+            *_numbers(pair.difference),
+            *(pair.wins, pair.losses),
+        )
+        for pair in pairs
+    ]
+    return csv_text(names.split(","), lines)
+
+
+def _numbers(value: Estimate) -> tuple[float, ...]:
+    return value.count, value.mean, value.sd, value.median, value.low, value.high
 
 
 def rich_table(table: Table) -> RichTable:

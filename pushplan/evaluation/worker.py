@@ -33,34 +33,21 @@ WORKER_VARIABLE = "PUSHPLAN_WORKER"
 
 @dataclass(frozen=True)
 class WorkerSetup:
-    """What a worker is told before its first call.
+    """What a worker is told before its first call."""
 
-    Args:
-        main: file of the owner's ``__main__`` module, for what is defined there.
-        preload: modules to import before the first call, so that no call pays for it.
-        memory_limit_mb: private memory at which allocations fail [MB].
-        trace_after_s: a call that takes this long has its stack written to the log [s].
-    """
-
-    main: str | None
-    preload: tuple[str, ...]
-    memory_limit_mb: float | None
-    trace_after_s: float | None
+    main: str | None  # file of the owner's ``__main__`` module, for what is defined there
+    preload: tuple[str, ...]  # modules to import before the first call, so that no call pays for it
+    memory_limit_mb: float | None  # private memory at which allocations fail [MB]
+    trace_after_s: float | None  # a call that takes this long has its stack written to the log [s]
 
 
 @dataclass(frozen=True)
 class Reply:
-    """What a worker sends after a call.
+    """What a worker sends after a call."""
 
-    Args:
-        result: what the call returned.
-        error: what it raised.
-        last: whether the worker ends now.
-    """
-
-    result: Any = None
-    error: BaseException | None = None
-    last: bool = False
+    result: Any = None  # what the call returned
+    error: BaseException | None = None  # what it raised
+    last: bool = False  # whether the worker ends now
 
 
 def main(descriptor: int) -> None:

@@ -21,19 +21,13 @@ from pushplan.world.outline import flatten
 
 
 class Obstacles(NamedTuple):
-    """C grown convex cores; a plain tuple of arrays, so that it can be passed into kernels.
+    """C grown convex cores; a plain tuple of arrays, so that it can be passed into kernels."""
 
-    Attributes:
-        vertices: (V, 2) corners of the cores [m], each counter-clockwise; a segment has two.
-        offsets: (C + 1,) where each core starts.
-        radii: (C,) how far each obstacle reaches beyond its core [m].
-        boxes: (C, 4) x_min, y_min, x_max, y_max of each obstacle [m].
-    """
-
+    # (V, 2) corners of the cores [m], each counter-clockwise; a segment has two
     vertices: FloatArray
-    offsets: IntArray
-    radii: FloatArray
-    boxes: FloatArray
+    offsets: IntArray  # (C + 1,) where each core starts
+    radii: FloatArray  # (C,) how far each obstacle reaches beyond its core [m]
+    boxes: FloatArray  # (C, 4) x_min, y_min, x_max, y_max of each obstacle [m]
 
 
 @lru_cache(maxsize=64)
@@ -64,11 +58,10 @@ def core_distance(x: float, y: float, vertices: FloatArray, first: int, last: in
 
 
 @kernel
-def obstacle_distance(
-    x: float, y: float, vertices: FloatArray, offsets: IntArray, radii: FloatArray
-) -> float:
+def obstacle_distance(x: float, y: float, obstacles: Obstacles) -> float:
     """Distance [m] to the nearest obstacle: minus the greatest depth inside, inf without any."""
     best = math.inf
+    vertices, offsets, radii, _ = obstacles
     for k in range(radii.shape[0]):
         best = min(best, core_distance(x, y, vertices, offsets[k], offsets[k + 1]) - radii[k])
     return best
@@ -105,17 +98,10 @@ def _segments_closer(
 
 @kernel
 def line_of_sight(
-    px: float,
-    py: float,
-    qx: float,
-    qy: float,
-    vertices: FloatArray,
-    offsets: IntArray,
-    radii: FloatArray,
-    boxes: FloatArray,
-    margin: float,
+    px: float, py: float, qx: float, qy: float, obstacles: Obstacles, margin: float
 ) -> bool:
     """Whether the segment p-q stays ``margin`` [m], at least, away from all obstacles."""
+    vertices, offsets, radii, boxes = obstacles
     dx, dy = qx - px, qy - py
     length = math.sqrt(dx * dx + dy * dy)
     ux, uy = (dx / length, dy / length) if length > 0.0 else (1.0, 0.0)

@@ -11,14 +11,7 @@ from numpy.typing import ArrayLike
 
 from pushplan.compiled import kernel
 from pushplan.geometry.contours import segment_crossings
-from pushplan.world import (
-    ClearanceArea,
-    Goal,
-    GoalDisc,
-    GoalLine,
-    InvalidInputError,
-    Receptacle,
-)
+from pushplan.world import ClearanceArea, Goal, GoalDisc, GoalLine, InvalidInputError, Receptacle
 from pushplan.world.checks import BoolArray, FloatArray, IntArray, array, frozen
 from pushplan.world.outline import convex_outline, flatten
 
@@ -26,19 +19,14 @@ Target = GoalDisc | GoalLine | Receptacle | ClearanceArea | tuple[FloatArray, ..
 
 
 class Regions(NamedTuple):
-    """A union of discs, half-planes and convex polygons; a plain tuple for kernels.
+    """A union of discs, half-planes and convex polygons; a plain tuple for kernels."""
 
-    Attributes:
-        discs: (D, 3) x, y, radius [m]; a radius of 0 is a point.
-        lines: (H, 4) point x, y [m] and unit normal; everything on or beyond the line belongs.
-        corners: (V, 2) corners of convex polygons [m], counter-clockwise; two make a segment.
-        offsets: (P + 1,) where each polygon starts.
-    """
-
-    discs: FloatArray
+    discs: FloatArray  # (D, 3) x, y, radius [m]; a radius of 0 is a point
+    # (H, 4) point x, y [m] and unit normal; everything on or beyond the line belongs
     lines: FloatArray
+    # (V, 2) corners of convex polygons [m], counter-clockwise; two make a segment
     corners: FloatArray
-    offsets: IntArray
+    offsets: IntArray  # (P + 1,) where each polygon starts
 
 
 def as_target(goal: Goal | Sequence[ArrayLike]) -> Target:
@@ -136,8 +124,8 @@ def nearest_in_region(k: int, x: float, y: float, regions: Regions) -> tuple[flo
         distance = math.hypot(x - cx, y - cy)
         if distance <= radius:
             return x, y
-        share = radius / distance
-        return cx + share * (x - cx), cy + share * (y - cy)
+        fraction = radius / distance
+        return cx + fraction * (x - cx), cy + fraction * (y - cy)
     k -= discs
     if k < lines:
         px, py, nx, ny = (

@@ -3,15 +3,22 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Annotated
 
-from pushplan.world.checks import choice, integer, number
-from pushplan.world.errors import InvalidInputError
+from pushplan.world.checked_fields import (
+    CheckedFields,
+    Fraction,
+    Limits,
+    OneOf,
+    PositiveFloat,
+    PositiveInt,
+)
 
 METHODS = ("auto", "exact", "search")
 
 
 @dataclass(frozen=True)
-class GtspConfig:
+class GtspConfig(CheckedFields):
     """Parameters of `solve_gtsp`. Temperatures are in units of a mean reduced arc of the tour.
 
     Args:
@@ -40,37 +47,22 @@ class GtspConfig:
         chunk_s: time between two looks at the stop rule [s], where it can be foreseen.
     """
 
-    method: str = "auto"
-    iterations: int = 60_000
-    exact_clusters: int = 16
-    memory_mb: float = 1024.0
+    method: Annotated[str, OneOf(METHODS)] = "auto"
+    iterations: PositiveInt = 60_000
+    exact_clusters: Annotated[int, Limits(1, 30)] = 16
+    memory_mb: PositiveFloat = 1024.0
     lower_bound: bool = False
-    proof_fraction: float = 0.7
-    proof_states: int = 2_000_000
-    neighbours: int = 12
-    swap_neighbours: int = 8
-    max_removed: int = 20
-    removed_fraction: float = 0.3
-    blink: float = 0.01
-    hot: float = 2.0
-    cold: float = 0.03
-    frozen: float = 0.4
-    restarts: int = 12
-    run_rounds: float = 8.0
-    search_nodes: int = 3000
-    chunk_s: float = 0.002
-
-    def __post_init__(self) -> None:
-        choice("method", self.method, METHODS)
-        if not isinstance(self.lower_bound, bool):
-            raise InvalidInputError(f"lower_bound must be True or False, got {self.lower_bound!r}")
-        for name in ("iterations", "neighbours", "swap_neighbours", "max_removed", "restarts"):
-            integer(name, getattr(self, name), low=1)
-        integer("exact_clusters", self.exact_clusters, low=1, high=30)
-        integer("search_nodes", self.search_nodes, low=1)
-        integer("proof_states", self.proof_states, low=1)
-        for name in ("memory_mb", "hot", "cold", "run_rounds", "chunk_s"):
-            number(name, getattr(self, name), low=0.0, open_low=True)
-        for name in ("proof_fraction", "removed_fraction", "frozen"):
-            number(name, getattr(self, name), low=0.0, high=1.0)
-        number("blink", self.blink, low=0.0, high=0.5)
+    proof_fraction: Fraction = 0.7
+    proof_states: PositiveInt = 2_000_000
+    neighbours: PositiveInt = 12
+    swap_neighbours: PositiveInt = 8
+    max_removed: PositiveInt = 20
+    removed_fraction: Fraction = 0.3
+    blink: Annotated[float, Limits(0.0, 0.5)] = 0.01
+    hot: PositiveFloat = 2.0
+    cold: PositiveFloat = 0.03
+    frozen: Fraction = 0.4
+    restarts: PositiveInt = 12
+    run_rounds: PositiveFloat = 8.0
+    search_nodes: PositiveInt = 3000
+    chunk_s: PositiveFloat = 0.002

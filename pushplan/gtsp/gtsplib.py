@@ -51,16 +51,12 @@ _KEYWORDS = (
 
 @dataclass
 class TsplibText:
-    """The keywords and sections of a file, each with the line it stands in.
+    """The keywords and sections of a file, each with the line it stands in."""
 
-    Args:
-        path: of the file.
-        keywords: value and line number of each keyword.
-        sections: the line number of its heading and the (line number, words) below it.
-    """
-
-    path: Path
+    path: Path  # of the file
+    # value and line number of each keyword
     keywords: dict[str, tuple[str, int]] = field(default_factory=dict)
+    # the line number of its heading and the (line number, words) below it
     sections: dict[str, tuple[int, list[tuple[int, list[str]]]]] = field(default_factory=dict)
 
     def wrong(self, line: int, rule: str) -> SchemaError:

@@ -16,17 +16,11 @@ from pushplan.world.checks import FloatArray, IntArray
 
 @dataclass(frozen=True)
 class Problem:
-    """Costs with the nodes ordered by clusters.
+    """Costs with the nodes ordered by clusters."""
 
-    Args:
-        costs: (N, N) float64; inf forbids an arc. Arcs inside a cluster mean nothing.
-        offsets: (m + 1,) cluster c has the nodes ``offsets[c]`` to ``offsets[c + 1] - 1``.
-        names: (N,) what the caller calls each node.
-    """
-
-    costs: FloatArray
-    offsets: IntArray
-    names: IntArray
+    costs: FloatArray  # (N, N) float64; inf forbids an arc. Arcs inside a cluster mean nothing.
+    offsets: IntArray  # (m + 1,) cluster c has the nodes ``offsets[c]`` to ``offsets[c + 1] - 1``
+    names: IntArray  # (N,) what the caller calls each node
 
     @staticmethod
     def build(costs: NDArray[np.number], members: Sequence[IntArray]) -> Problem:
@@ -134,13 +128,10 @@ def _known(values: FloatArray) -> FloatArray:
 
 
 def usable(
-    costs: NDArray[np.number], members: Sequence[IntArray]
+    costs: NDArray[np.number],  # (N, N)
+    members: Sequence[IntArray],  # nodes of each cluster
 ) -> tuple[list[IntArray], int | None]:
     """Leave out nodes that no tour can enter or leave.
-
-    Args:
-        costs: (N, N).
-        members: nodes of each cluster.
 
     Returns:
         The members that are left, and a cluster that has none left, if there is one.

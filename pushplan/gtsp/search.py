@@ -19,25 +19,15 @@ MOST_ROUNDS = 2000
 
 @dataclass
 class Budget:
-    """What a call may use, and how much of it is gone.
+    """What a call may use, and how much of it is gone."""
 
-    Args:
-        check: the armed stop rule.
-        began: when the call began, of `time.perf_counter` [s].
-        seconds: wall-clock budget [s], infinite if none.
-        rounds: budget of rounds, infinite if none.
-        used: rounds so far.
-        cost: of the best tour so far.
-        best_s: when it was found, since the beginning of the call [s].
-    """
-
-    check: StopCheck
-    began: float
-    seconds: float
-    rounds: float
-    used: int = 0
-    cost: float = np.inf
-    best_s: float = np.nan
+    check: StopCheck  # the armed stop rule
+    began: float  # when the call began, of `time.perf_counter` [s]
+    seconds: float  # wall-clock budget [s], infinite if none
+    rounds: float  # budget of rounds, infinite if none
+    used: int = 0  # rounds so far
+    cost: float = np.inf  # of the best tour so far
+    best_s: float = np.nan  # when it was found, since the beginning of the call [s]
 
     @staticmethod
     def start(stop: Stop | None, iterations: int) -> Budget:
@@ -110,14 +100,13 @@ class AnytimeSearch:
         self.values = np.full(2, np.inf)
         self.pace = 3e-5 + 3e-7 * problem.width**2
 
-    def run(self, budget: Budget, begin: float, end: float) -> None:
-        """One annealing from a random order, until it is frozen.
-
-        Args:
-            budget: of the call.
-            begin: fraction of it that is gone when the tour is hottest.
-            end: fraction that is gone when it is coldest, where the run ends at the latest.
-        """
+    def run(
+        self,
+        budget: Budget,  # of the call
+        begin: float,  # fraction of it that is gone when the tour is hottest
+        end: float,  # fraction that is gone when it is coldest, where the run ends at the latest
+    ) -> None:
+        """One annealing from a random order, until it is frozen."""
         self._random_start(budget)
         config, lowest, frozen, first = self.config, np.inf, 0.0, True
         while not budget.stopped():

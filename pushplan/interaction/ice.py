@@ -10,10 +10,15 @@ from numpy.typing import ArrayLike
 from pushplan.compiled import owned
 from pushplan.interaction.ice_bodies import IceBodies, IceProblem, IceSettings, ice_problem
 from pushplan.interaction.ice_contacts import sweep_ice
-from pushplan.interaction.model import Interaction
+from pushplan.interaction.model import Interaction, checked_path
 from pushplan.interaction.quasi_static import QuasiStatic
 from pushplan.world import World
-from pushplan.world.checks import FloatArray, array, integer, number
+from pushplan.world.checked_fields import (
+    CheckedFields,
+    NonNegativeFloat,
+    PositiveFraction,
+    PositiveInt,
+)
 from pushplan.world.errors import InvalidInputError
 
 STILL = 0.03
@@ -21,7 +26,7 @@ STILL = 0.03
 
 
 @dataclass(frozen=True)
-class IceInteraction:
+class IceInteraction(CheckedFields):
     """Floes that push floes, with friction between all of them; nothing static.
 
     The same physics as `QuasiStatic`, and friction between the objects as well. Contacts are found
@@ -39,16 +44,10 @@ class IceInteraction:
         InvalidInputError: if a value is out of range.
     """
 
-    hull_friction: float = 1.0
-    friction: float = 1.0
-    step: float = 0.5
-    iterations: int = 16
-
-    def __post_init__(self) -> None:
-        number("hull_friction", self.hull_friction, low=0.0)
-        number("friction", self.friction, low=0.0)
-        number("step", self.step, low=0.0, high=1.0, open_low=True)
-        integer("iterations", self.iterations, low=1)
+    hull_friction: NonNegativeFloat = 1.0
+    friction: NonNegativeFloat = 1.0
+    step: PositiveFraction = 0.5
+    iterations: PositiveInt = 16
 
     def bodies(self, world: World) -> IceBodies:
         """The world's shapes and masses as the kernels read them.
@@ -91,9 +90,7 @@ class IceInteraction:
 
     def sweep(self, world: World, path: ArrayLike) -> Interaction:
         """Predict the motion of every object; see `InteractionModel.sweep`."""
-        robot_path: FloatArray = owned(array("path", path, (None, 3)))
-        if len(robot_path) == 0:
-            raise InvalidInputError("path must hold at least one pose, got none")
+        robot_path = checked_path(path)
         poses = world.movables.poses.copy()
         out = np.empty((len(robot_path), len(poses), 3))
         sweep_ice(robot_path, poses, self.problem(world), out)

@@ -20,6 +20,7 @@ from pushplan.interaction.occupancy_kernels import Patch, cover_objects, cover_s
 from pushplan.world import World
 from pushplan.world.checks import ArrayRecord, FloatArray, array, number
 from pushplan.world.errors import InvalidInputError
+from pushplan.world.outline import next_corner
 
 PATCH_CELLS = 40
 """Cells along each side of a patch."""
@@ -30,15 +31,10 @@ CHANNELS = ("occupancy", "footprint", "swath")
 
 @dataclass(frozen=True, eq=False)
 class Passage(ArrayRecord):
-    """A path through the objects: a world, and the poses that the robot sweeps through.
+    """A path through the objects: a world, and the poses that the robot sweeps through."""
 
-    Args:
-        world: the snapshot; of the robot only the footprint is used.
-        path: (N, 3) robot poses x, y [m], theta [rad], N at least 2.
-    """
-
-    world: World
-    path: FloatArray
+    world: World  # the snapshot; of the robot only the footprint is used
+    path: FloatArray  # (N, 3) robot poses x, y [m], theta [rad], N at least 2
 
     def __post_init__(self) -> None:
         if not isinstance(self.world, World):
@@ -54,23 +50,19 @@ class Passage(ArrayRecord):
 class PassageBatch:
     """Passages as a predictor reads them.
 
-    Args:
-        patches: (B, 3, 40, 40) covered fraction of each cell: occupancy, footprint at the start,
-            swath. Rows count up ahead (towards the goal), columns to the right.
-        cell: side of a cell [m].
-        density: mass over area of the objects [kg/m²].
-        frames: (B, 3) where each patch lies, as in `occupancy_kernels`; None where
-            the patches come from a map and predictors that need none are asked.
-        passages: the worlds, for predictors that follow single objects; () where there are none.
-
     Raises:
         InvalidInputError: if a shape is wrong or a value is not a fraction.
     """
 
+    # (B, 3, 40, 40) covered fraction of each cell: occupancy, footprint at the start, swath. Rows
+    # count up ahead (towards the goal), columns to the right.
     patches: Patch
-    cell: float
-    density: float = 1.0
+    cell: float  # side of a cell [m]
+    density: float = 1.0  # mass over area of the objects [kg/m²]
+    # (B, 3) where each patch lies, as in `occupancy_kernels`; None where the patches come from a
+    # map and predictors that need none are asked
     frames: FloatArray | None = None
+    # the worlds, for predictors that follow single objects; () where there are none
     passages: tuple[Passage, ...] = ()
 
     def __post_init__(self) -> None:
@@ -96,15 +88,10 @@ class PassageBatch:
 
 @dataclass(frozen=True, eq=False)
 class OccupancyForecast:
-    """What a predictor expects of each passage of a batch.
+    """What a predictor expects of each passage of a batch."""
 
-    Args:
-        after: (B, 40, 40) covered fraction of each cell once the robot has passed.
-        work: (B,) sum of mass times path length over the objects [kg m].
-    """
-
-    after: Patch
-    work: FloatArray
+    after: Patch  # (B, 40, 40) covered fraction of each cell once the robot has passed
+    work: FloatArray  # (B,) sum of mass times path length over the objects [kg m]
 
     def __post_init__(self) -> None:
         put = object.__setattr__
@@ -144,20 +131,17 @@ def ice_density(world: World) -> float:
     movables = world.movables
     if len(movables) == 0:
         return 1.0
-    x, y = movables.vertices.T
-    following = np.arange(1, len(x) + 1)
-    following[movables.offsets[1:] - 1] = movables.offsets[:-1]
+    (x, y), following = movables.vertices.T, next_corner(movables.offsets)
     area = 0.5 * float((x * y[following] - x[following] * y).sum())
     return float(movables.masses.sum()) / area
 
 
-def patch_frame(path: FloatArray, ahead: float, cell: float) -> FloatArray:
+def patch_frame(
+    path: FloatArray,  # (N, 3) robot poses
+    ahead: float,  # direction in which rows count up [rad]
+    cell: float,  # side of a cell [m]
+) -> FloatArray:
     """The frame of the patch around a passage, about the middle between its two ends.
-
-    Args:
-        path: (N, 3) robot poses.
-        ahead: direction in which rows count up [rad].
-        cell: side of a cell [m].
 
     Returns:
         (3,) as in `occupancy_kernels`. The corner lies on a grid of cells

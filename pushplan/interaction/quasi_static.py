@@ -12,16 +12,22 @@ from numpy.typing import ArrayLike
 from pushplan.compiled import owned
 from pushplan.geometry import polygon_inertia
 from pushplan.interaction.kernels import Bodies, Settings, make_scratch, sweep_path
-from pushplan.interaction.model import Interaction
+from pushplan.interaction.model import Interaction, checked_path
 from pushplan.interaction.quasi_static_step import QuasiStaticContacts
 from pushplan.world import Movables, RobotModel, StaticMap, World
-from pushplan.world.checks import FloatArray, array, integer, number
-from pushplan.world.errors import InvalidInputError
+from pushplan.world.checked_fields import (
+    CheckedFields,
+    NonNegativeFloat,
+    PositiveFloat,
+    PositiveFraction,
+    PositiveInt,
+)
+from pushplan.world.checks import FloatArray
 from pushplan.world.outline import flatten
 
 
 @dataclass(frozen=True)
-class QuasiStatic:
+class QuasiStatic(CheckedFields):
     """Objects move only while they are pushed, by the least total motion.
 
     The robot pushes objects, objects push objects, walls hold both; friction on the ground gives
@@ -44,18 +50,11 @@ class QuasiStatic:
         InvalidInputError: if a value is out of range.
     """
 
-    friction: float = 0.0
-    gyration_scale: float = 1.0
-    step: float = 0.1
-    iterations: int = 12
-    static_friction: float = 0.0
-
-    def __post_init__(self) -> None:
-        number("friction", self.friction, low=0.0)
-        number("gyration_scale", self.gyration_scale, low=0.0, open_low=True)
-        number("step", self.step, low=0.0, high=1.0, open_low=True)
-        integer("iterations", self.iterations, low=1)
-        number("static_friction", self.static_friction, low=0.0)
+    friction: NonNegativeFloat = 0.0
+    gyration_scale: PositiveFloat = 1.0
+    step: PositiveFraction = 0.1
+    iterations: PositiveInt = 12
+    static_friction: NonNegativeFloat = 0.0
 
     def bodies(self, world: World) -> Bodies:
         """The world's shapes as the compiled kernels read them; cached."""
@@ -88,9 +87,7 @@ class QuasiStatic:
 
     def sweep(self, world: World, path: ArrayLike) -> Interaction:
         """Predict the motion of every object; see `InteractionModel.sweep`."""
-        robot_path: FloatArray = owned(array("path", path, (None, 3)))
-        if len(robot_path) == 0:
-            raise InvalidInputError("path must hold at least one pose, got none")
+        robot_path = checked_path(path)
         poses = world.movables.poses.copy()
         out = np.empty((len(robot_path), len(poses), 3))
         jammed = sweep_path(robot_path, poses, self.bodies(world), self.settings(world), out)

@@ -6,8 +6,9 @@
 
 from __future__ import annotations
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+from pushplan.world.lazy_names import lazy_names
 
 if TYPE_CHECKING:
     from pushplan.learned.features import FeatureObservation
@@ -20,30 +21,31 @@ if TYPE_CHECKING:
     from pushplan.learned.shipped import learned_names
     from pushplan.learned.specification import RobotSpec, Specification
 
-_HOMES = {
-    "features": ("FeatureObservation",),
-    "loading": ("LEARNED_PREFIXES", "load_policy"),
-    "network_policy": ("NetworkPolicy",),
-    "objects": ("ObjectPolicy",),
-    "onnx_policy": ("OnnxPolicy",),
-    "outputs": ("ActionSpec",),
-    "sb3_policy": ("Sb3Policy",),
-    "shipped": ("learned_names",),
-    "specification": ("RobotSpec", "Specification"),
-}
-_LAZY = {name: module for module, names in _HOMES.items() for name in names}
-
 __all__ = [
-    "LEARNED_PREFIXES", "ActionSpec", "FeatureObservation", "NetworkPolicy", "ObjectPolicy",
-    "OnnxPolicy", "RobotSpec", "Sb3Policy", "Specification", "learned_names", "load_policy",
-]  # fmt: skip
+    "LEARNED_PREFIXES",
+    "ActionSpec",
+    "FeatureObservation",
+    "NetworkPolicy",
+    "ObjectPolicy",
+    "OnnxPolicy",
+    "RobotSpec",
+    "Sb3Policy",
+    "Specification",
+    "learned_names",
+    "load_policy",
+]
 
-
-def __getattr__(name: str) -> Any:
-    if name not in _LAZY:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(import_module(f"pushplan.learned.{_LAZY[name]}"), name)
-
-
-def __dir__() -> list[str]:
-    return __all__
+__getattr__, __dir__ = lazy_names(
+    __name__,
+    {
+        "features": "FeatureObservation",
+        "loading": "LEARNED_PREFIXES load_policy",
+        "network_policy": "NetworkPolicy",
+        "objects": "ObjectPolicy",
+        "onnx_policy": "OnnxPolicy",
+        "outputs": "ActionSpec",
+        "sb3_policy": "Sb3Policy",
+        "shipped": "learned_names",
+        "specification": "RobotSpec Specification",
+    },
+)

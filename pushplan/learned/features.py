@@ -5,22 +5,24 @@ from __future__ import annotations
 import functools
 import math
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pushplan.geometry import GoalDistances, goal_distances
 from pushplan.learned.ray_kernels import cast_rays, near_outlines
+from pushplan.observation.builder import LimitedVector
 from pushplan.world import Goal, GoalDisc, GoalLine, StaticMap, World
-from pushplan.world.checks import FloatArray, IntArray, frozen, integer, number
+from pushplan.world.checked_fields import CheckedFields, Limits, PositiveFloat
+from pushplan.world.checks import FloatArray, IntArray, frozen
 from pushplan.world.outline import centroid, flatten
 
 _GUIDE, _EACH = 10, 9
 
 
 @dataclass(frozen=True)
-class FeatureObservation:
+class FeatureObservation(LimitedVector, CheckedFields):
     """What matters for pushing, in the robot's frame, cheap to compute and to learn from.
 
     Our own variant beside the images of the Bench-Push paper. All lengths are divided by
@@ -46,34 +48,15 @@ class FeatureObservation:
         limit: values are clipped to it.
     """
 
-    rays: int = 24
-    objects: int = 5
-    range: float = 6.0
-    limit: float = 5.0
-
-    dtype: ClassVar[np.dtype[np.float32]] = np.dtype(np.float32)
-
-    def __post_init__(self) -> None:
-        integer("rays", self.rays, low=0, high=4096)
-        integer("objects", self.objects, low=0, high=4096)
-        for name in ("range", "limit"):
-            value = number(name, getattr(self, name), low=0.0, open_low=True)
-            object.__setattr__(self, name, value)
+    rays: Annotated[int, Limits(0, 4096)] = 24
+    objects: Annotated[int, Limits(0, 4096)] = 5
+    range: PositiveFloat = 6.0
+    limit: PositiveFloat = 5.0
 
     @property
     def shape(self) -> tuple[int]:
         """Length of the vector."""
         return (_GUIDE + 2 * self.rays + _EACH * self.objects,)
-
-    @property
-    def low(self) -> float:
-        """Least value of any entry."""
-        return -self.limit
-
-    @property
-    def high(self) -> float:
-        """Greatest value of any entry."""
-        return self.limit
 
     def observe(self, world: World) -> NDArray[np.float32]:
         """The vector."""

@@ -34,25 +34,16 @@ class NotOnnxError(InvalidInputError):
 
 @dataclass
 class OnnxContents:
-    """What was found.
+    """What was found."""
 
-    Attributes:
-        metadata: the model's own key-value texts.
-        operators: names of the operators that it uses.
-        opset: version of the operator set.
-    """
-
-    metadata: dict[str, str] = field(default_factory=dict)
-    operators: set[str] = field(default_factory=set)
-    opset: int = 0
+    metadata: dict[str, str] = field(default_factory=dict)  # the model's own key-value texts
+    operators: set[str] = field(default_factory=set)  # names of the operators that it uses
+    opset: int = 0  # version of the operator set
     nodes: int = 0
 
 
 def inspect(data: bytes) -> OnnxContents:
     """Check a model and read its metadata.
-
-    Args:
-        data: the whole file.
 
     Raises:
         NotOnnxError: if it is empty, truncated, no ONNX, or asks for what a policy does not need:

@@ -21,24 +21,15 @@ LONGEST_DECISION_S = 10.0
 
 @dataclass(frozen=True)
 class Door:
-    """Input or output of a network.
+    """Input or output of a network."""
 
-    Args:
-        name: of the tensor.
-        type: as ONNX Runtime writes it, such as ``tensor(float)``.
-        shape: numbers; texts where the size is open.
-    """
-
-    name: str
-    type: str
-    shape: tuple[Any, ...]
+    name: str  # of the tensor
+    type: str  # as ONNX Runtime writes it, such as ``tensor(float)``
+    shape: tuple[Any, ...]  # numbers; texts where the size is open
 
 
 class Network:
     """A model whose file has been checked, ready to run.
-
-    Args:
-        data: the file.
 
     Raises:
         NotOnnxError: if ONNX Runtime does not take it, or it has several inputs or outputs.

@@ -12,6 +12,7 @@ from pushplan.learned.builders import builder_from_dict, builder_to_dict
 from pushplan.learned.outputs import ActionSpec
 from pushplan.observation import ObservationBuilder
 from pushplan.world import InvalidInputError, RobotModel, SchemaError
+from pushplan.world.checked_fields import CheckedFields, PositiveFloat
 from pushplan.world.checks import known_keys, number
 
 FORMAT = "pushplan-policy/1"
@@ -23,7 +24,7 @@ _TOLERANCE = 1e-6
 
 
 @dataclass(frozen=True)
-class RobotSpec:
+class RobotSpec(CheckedFields):
     """The robot that a network drives; a policy refuses another one.
 
     Args:
@@ -33,17 +34,17 @@ class RobotSpec:
         radius: circumscribed radius of the footprint [m].
     """
 
+    field_prefix = "robot."
+
     drive: str
-    max_speed: float
-    max_turn_rate: float
-    radius: float
+    max_speed: PositiveFloat
+    max_turn_rate: PositiveFloat
+    radius: PositiveFloat
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         if not isinstance(self.drive, str):
             raise InvalidInputError(f"robot.drive must be a text, got {self.drive!r}")
-        for name in ("max_speed", "max_turn_rate", "radius"):
-            value = number(f"robot.{name}", getattr(self, name), low=0.0, open_low=True)
-            object.__setattr__(self, name, value)
 
     @classmethod
     def of(cls, robot: RobotModel) -> RobotSpec:
@@ -147,11 +148,6 @@ class Specification:
         Only what the environment tells about itself is compared: ``task.name``,
         ``task.control_step``, ``task.waypoint_window``, ``task.heading_step`` and
         ``observation_space``; and ``preset`` of the scenario.
-
-        Args:
-            env: a `pushplan.envs.PushEnv` or anything like it.
-            label: what errors call the policy.
-            scenario: what the environment was made for, if known.
 
         Raises:
             InvalidInputError: naming what the file says and what the environment has.

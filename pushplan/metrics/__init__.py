@@ -6,7 +6,16 @@ from pushplan.metrics.navigation import NavigationScores, navigation_scores
 from pushplan.metrics.registry import METRICS, Metric, Role, compute, metric_names
 
 __all__ = [
-    "METRICS", "ManipulationScores", "Metric", "NavigationScores", "Role", "compute",
-    "interaction_work", "manipulation_scores", "metric_names", "navigation_scores",
-    "object_path_lengths", "path_length",
-]  # fmt: skip
+    "METRICS",
+    "ManipulationScores",
+    "Metric",
+    "NavigationScores",
+    "Role",
+    "compute",
+    "interaction_work",
+    "manipulation_scores",
+    "metric_names",
+    "navigation_scores",
+    "object_path_lengths",
+    "path_length",
+]

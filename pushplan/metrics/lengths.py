@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from pushplan.world import Episode
 from pushplan.world.checks import FloatArray
+from pushplan.world.polyline import path_lengths
 
 
 def path_length(poses: FloatArray) -> float:
     """Length [m] of the polyline through (T, 2 or 3) recorded poses; headings do not count."""
-    return float(_lengths(poses[:, None, :])[0])
+    return float(path_lengths(poses[:, None])[0])
 
 
 def object_path_lengths(episode: Episode) -> FloatArray:
     """(K,) path length l_i [m] of each object's centre over the episode."""
-    return _lengths(episode.object_poses)
+    return path_lengths(episode.object_poses)
 
 
 def interaction_work(episode: Episode) -> float:
@@ -26,9 +25,3 @@ def interaction_work(episode: Episode) -> float:
 def robot_path_length(episode: Episode) -> float:
     """Path length l_0 [m] of the robot's origin over the episode."""
     return path_length(episode.robot_poses)
-
-
-def _lengths(poses: FloatArray) -> FloatArray:
-    steps = np.diff(poses[:, :, :2], axis=0)  # (T - 1, K, 2)
-    lengths: FloatArray = np.hypot(steps[..., 0], steps[..., 1]).sum(axis=0)
-    return lengths

@@ -10,11 +10,7 @@ import numpy as np
 
 from pushplan.geometry import VisibilityGraph, goal_distances
 from pushplan.metrics.lengths import interaction_work, object_path_lengths, robot_path_length
-from pushplan.world import (
-    Episode,
-    StaticMap,
-    World,
-)
+from pushplan.world import Episode, StaticMap, World
 from pushplan.world.checks import BoolArray, FloatArray
 
 

@@ -4,11 +4,19 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from pushplan.world.checks import integer, number
+from pushplan.world.checked_fields import (
+    CheckedFields,
+    Fraction,
+    NonNegativeFloat,
+    NonNegativeInt,
+    PositiveFloat,
+    PositiveFraction,
+    PositiveInt,
+)
 
 
 @dataclass(frozen=True)
-class PathSearchConfig:
+class PathSearchConfig(CheckedFields):
     """Parameters of random trees and shortcutting.
 
     Lengths are in units of the robot's circumscribed radius R.
@@ -35,29 +43,17 @@ class PathSearchConfig:
             no plan.
     """
 
-    push_weight: float = 3.0
-    margin: float = 0.06
-    turn_fraction: float = 0.9
-    inset: float = 0.05
-    spacing: float = 0.15
-    edge: float = 1.6
-    coarse_path_fraction: float = 0.8
-    coarse_path_spread: float = 0.5
-    avoid_iterations: int = 200
-    tree_iterations: int = 1500
-    shortcuts: int = 400
-    least_gain: float = 0.001
-    batch: int = 10
-    default_iterations: int = 4000
-
-    def __post_init__(self) -> None:
-        number("push_weight", self.push_weight, low=0.0)
-        for name in ("margin", "inset", "least_gain"):
-            number(name, getattr(self, name), low=0.0, high=1.0)
-        for name in ("turn_fraction", "coarse_path_fraction"):
-            number(name, getattr(self, name), low=0.0, high=1.0, open_low=name == "turn_fraction")
-        for name in ("spacing", "edge", "coarse_path_spread"):
-            number(name, getattr(self, name), low=0.0, open_low=True)
-        integer("avoid_iterations", self.avoid_iterations, low=0)
-        for name in ("tree_iterations", "shortcuts", "batch", "default_iterations"):
-            integer(name, getattr(self, name), low=1)
+    push_weight: NonNegativeFloat = 3.0
+    margin: Fraction = 0.06
+    turn_fraction: PositiveFraction = 0.9
+    inset: Fraction = 0.05
+    spacing: PositiveFloat = 0.15
+    edge: PositiveFloat = 1.6
+    coarse_path_fraction: Fraction = 0.8
+    coarse_path_spread: PositiveFloat = 0.5
+    avoid_iterations: NonNegativeInt = 200
+    tree_iterations: PositiveInt = 1500
+    shortcuts: PositiveInt = 400
+    least_gain: Fraction = 0.001
+    batch: PositiveInt = 10
+    default_iterations: PositiveInt = 4000

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, Protocol
+from typing import Any, ClassVar, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,3 +36,20 @@ class ObservationBuilder(Protocol):
     def observe(self, world: World) -> NDArray[Any]:
         """A new array for this snapshot."""
         ...
+
+
+class LimitedVector:
+    """Base of builders of float32 vectors whose entries lie between ``-limit`` and ``limit``."""
+
+    limit: float
+    dtype: ClassVar[np.dtype[Any]] = np.dtype(np.float32)
+
+    @property
+    def low(self) -> float:
+        """Least value of any entry."""
+        return -self.limit
+
+    @property
+    def high(self) -> float:
+        """Greatest value of any entry."""
+        return self.limit

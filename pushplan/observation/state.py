@@ -3,20 +3,21 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pushplan.observation.builder import LimitedVector
 from pushplan.world import GoalDisc, GoalLine, World
-from pushplan.world.checks import FloatArray, integer, number
+from pushplan.world.checked_fields import CheckedFields, NonNegativeInt, PositiveFloat
+from pushplan.world.checks import FloatArray
 from pushplan.world.outline import centroid
 
 _OWN, _EACH = 6, 5
 
 
 @dataclass(frozen=True)
-class StateObservation:
+class StateObservation(LimitedVector, CheckedFields):
     """Low-dimensional observation of fixed length.
 
     Robot x, y [m], cos and sin of its heading; x, y [m] of the goal in the robot's frame; then for
@@ -31,29 +32,13 @@ class StateObservation:
         limit: lengths are clipped to this [m].
     """
 
-    max_objects: int = 20
-    limit: float = 1000.0
-
-    dtype: ClassVar[np.dtype[np.float32]] = np.dtype(np.float32)
-
-    def __post_init__(self) -> None:
-        integer("max_objects", self.max_objects, low=0)
-        number("limit", self.limit, low=0.0, open_low=True)
+    max_objects: NonNegativeInt = 20
+    limit: PositiveFloat = 1000.0
 
     @property
     def shape(self) -> tuple[int]:
         """Length of the vector."""
         return (_OWN + _EACH * self.max_objects,)
-
-    @property
-    def low(self) -> float:
-        """Least value of any entry."""
-        return -self.limit
-
-    @property
-    def high(self) -> float:
-        """Greatest value of any entry."""
-        return self.limit
 
     def observe(self, world: World) -> NDArray[np.float32]:
         """The vector."""

@@ -16,26 +16,17 @@ from pushplan.world.movables import Movables
 
 @dataclass(frozen=True)
 class View:
-    """A window on the world: where its pixels are.
+    """A window on the world: where its pixels are."""
 
-    Args:
-        world: what is looked at.
-        pose: (3,) middle of the window [m], and the direction [rad] that is up in the image; left
-            in the image is a quarter turn counter-clockwise from it.
-        rows: [px]
-        cols: [px]
-        step_up: length of a pixel up the image [m].
-        step_across: length of a pixel across it [m].
-        shift: how far the middle lies up the image from the robot [m].
-    """
-
-    world: World
+    world: World  # what is looked at
+    # (3,) middle of the window [m], and the direction [rad] that is up in the image; left in the
+    # image is a quarter turn counter-clockwise from it
     pose: FloatArray
-    rows: int
-    cols: int
-    step_up: float
-    step_across: float
-    shift: float
+    rows: int  # [px]
+    cols: int  # [px]
+    step_up: float  # length of a pixel up the image [m]
+    step_across: float  # length of a pixel across it [m]
+    shift: float  # how far the middle lies up the image from the robot [m]
 
     @cached_property
     def numbers(self) -> FloatArray:

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import importlib
 import inspect
 from typing import Any, cast
 
 from pushplan.world import Planner, Policy, UnknownNameError
+from pushplan.world.lazy_names import look_up
 
 PLANNERS: dict[str, str] = {
     "straight": "pushplan.planners.shortest_path:ShortestPath",
@@ -91,16 +91,9 @@ def make_policy(name: str, **options: Any) -> Policy:
 
 
 def _made(kind: str, name: str, table: dict[str, str], options: dict[str, Any]) -> Any:
-    factory = _load(kind, name, table)
+    factory = look_up(kind, table, name)
     signature = inspect.signature(factory)
     for option in options:
         if option not in signature.parameters:
             raise UnknownNameError(f"option of {kind} {name!r}", option, signature.parameters)
     return factory(**options)
-
-
-def _load(kind: str, name: str, table: dict[str, str]) -> Any:
-    if not isinstance(name, str) or name not in table:
-        raise UnknownNameError(kind, name, table)
-    module, _, attribute = table[name].partition(":")
-    return getattr(importlib.import_module(module), attribute)

@@ -5,11 +5,11 @@ What makes ice loads compiled kernels, and only comes on first use.
 
 from __future__ import annotations
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from pushplan.scenarios.scenario import Scenario, load_scenarios, save_scenarios
 from pushplan.scenarios.suite import Suite, suite, suite_names
+from pushplan.world.lazy_names import lazy_names
 
 if TYPE_CHECKING:
     from pushplan.scenarios.ice import FloeSizes, IceField, generate_ice, load_ice, save_ice
@@ -28,14 +28,6 @@ __all__ = [
     "suite_names",
 ]
 
-_LAZY = ("FloeSizes", "IceField", "generate_ice", "load_ice", "save_ice")
-
-
-def __getattr__(name: str) -> Any:
-    if name in _LAZY:
-        return getattr(import_module("pushplan.scenarios.ice"), name)
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-
-
-def __dir__() -> list[str]:
-    return __all__
+__getattr__, __dir__ = lazy_names(
+    __name__, {"ice": "FloeSizes IceField generate_ice load_ice save_ice"}
+)

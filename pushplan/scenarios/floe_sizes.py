@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
 from pushplan.world import InvalidInputError
-from pushplan.world.checks import FloatArray, number
+from pushplan.world.checked_fields import CheckedFields, Limits, PositiveFloat
+from pushplan.world.checks import FloatArray
 
 MARGIN = 0.003
 """Floes are grown this much too large [fraction of the area], and in the end shrunk to measure."""
 
 
 @dataclass(frozen=True)
-class FloeSizes:
+class FloeSizes(CheckedFields):
     """Log-normal floe sizes. The radius of a floe is that of the disc with its area.
 
     Args:
@@ -27,16 +29,15 @@ class FloeSizes:
         InvalidInputError: if they make no sense together.
     """
 
-    mean_radius: float = 0.33
-    spread: float = 0.28
-    least: float = 0.2
-    greatest: float = 0.6
+    field_prefix = "ice "
+
+    mean_radius: PositiveFloat = 0.33
+    spread: Annotated[float, Limits(0.0, 2.0)] = 0.28
+    least: PositiveFloat = 0.2
+    greatest: PositiveFloat = 0.6
 
     def __post_init__(self) -> None:
-        put = object.__setattr__
-        for key in ("mean_radius", "least", "greatest"):
-            put(self, key, number(f"ice {key}", getattr(self, key), low=0.0, open_low=True))
-        put(self, "spread", number("ice spread", self.spread, low=0.0, high=2.0))
+        super().__post_init__()
         if not self.least <= self.mean_radius <= self.greatest or self.least == self.greatest:
             raise InvalidInputError(
                 "ice radii must have least <= mean_radius <= greatest and least < greatest, got "

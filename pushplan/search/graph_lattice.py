@@ -10,21 +10,13 @@ from pushplan.world.checks import BoolArray, FloatArray, IntArray
 
 
 class GraphLattice(NamedTuple):
-    """A directed graph in compressed rows.
+    """A directed graph in compressed rows."""
 
-    Args:
-        first: (N + 1,) where the edges of each node start.
-        targets: (E,) where each edge leads.
-        costs: (E,) its cost, not negative.
-        bounds: (N,) lower bounds of the cost from each node to a goal.
-        goals: (N,) which nodes are goals.
-    """
-
-    first: IntArray
-    targets: IntArray
-    costs: FloatArray
-    bounds: FloatArray
-    goals: BoolArray
+    first: IntArray  # (N + 1,) where the edges of each node start
+    targets: IntArray  # (E,) where each edge leads
+    costs: FloatArray  # (E,) its cost, not negative
+    bounds: FloatArray  # (N,) lower bounds of the cost from each node to a goal
+    goals: BoolArray  # (N,) which nodes are goals
 
 
 @kernel

@@ -32,17 +32,11 @@ VOYAGES_PER_SHARD = 10
 
 @dataclass(frozen=True, eq=False)
 class IcePairs:
-    """Patches before and after, as the network learns them.
+    """Patches before and after, as the network learns them."""
 
-    Args:
-        patches: (N, 3, 40, 40) uint8 in sixteenths: occupancy, footprint, swath.
-        after: (N, 40, 40) uint8 in sixteenths.
-        work: (N,) area of each object times its path length, summed, in cells³.
-    """
-
-    patches: NDArray[np.uint8]
-    after: NDArray[np.uint8]
-    work: NDArray[np.float32]
+    patches: NDArray[np.uint8]  # (N, 3, 40, 40) uint8 in sixteenths: occupancy, footprint, swath
+    after: NDArray[np.uint8]  # (N, 40, 40) uint8 in sixteenths
+    work: NDArray[np.float32]  # (N,) area of each object times its path length, summed, in cells³
 
     def __len__(self) -> int:
         return len(self.work)
@@ -108,11 +102,6 @@ def _logged(paths: Iterable[Path], split: str, shards: int) -> list[Path]:
 
 def read_shards(folder: str | Path, split: str, limit: int | None = None) -> IcePairs:
     """All pairs of a split, in the order of their shards.
-
-    Args:
-        folder: where `write_shards` put them.
-        split: ``"train"`` or ``"held-out"``.
-        limit: how many shards at most.
 
     Raises:
         InvalidInputError: if there are none, or a file is not a shard.

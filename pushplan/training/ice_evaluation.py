@@ -34,25 +34,15 @@ AROUND = 5
 
 @dataclass(frozen=True)
 class PredictionScores:
-    """Errors of one predictor over some passages.
+    """Errors of one predictor over some passages."""
 
-    Args:
-        passages: how many.
-        patch_mse: mean squared error of the covered fraction over the whole patch.
-        swath_mse: over the cells within half a hull length of the swath.
-        work_bias: mean predicted over mean true work; NaN where no work was done.
-        work_error: mean absolute error of the work over its mean.
-        work_correlation: Pearson's, NaN where one of them is constant.
-        milliseconds: median time for a passage.
-    """
-
-    passages: int
-    patch_mse: float
-    swath_mse: float
-    work_bias: float
-    work_error: float
-    work_correlation: float
-    milliseconds: float
+    passages: int  # how many
+    patch_mse: float  # mean squared error of the covered fraction over the whole patch
+    swath_mse: float  # over the cells within half a hull length of the swath
+    work_bias: float  # mean predicted over mean true work; NaN where no work was done
+    work_error: float  # mean absolute error of the work over its mean
+    work_correlation: float  # Pearson's, NaN where one of them is constant
+    milliseconds: float  # median time for a passage
 
 
 def swath_windows(batch: PassageBatch) -> BoolArray:
@@ -100,13 +90,7 @@ def _correlation(a: FloatArray, b: FloatArray) -> float:
 def held_out(
     concentration: float, voyages: int, config: PassageConfig | None = None
 ) -> list[tuple[PassageBatch, OccupancyForecast]]:
-    """Passages through ice of one concentration that no network was trained on.
-
-    Args:
-        concentration: of the ice.
-        voyages: how many fields of ice.
-        config: of the passages; its concentrations are replaced.
-    """
+    """Passages through ice of one concentration that no network was trained on, a field each."""
     integer("voyages", voyages, low=1)
     fixed = replace(
         config or PassageConfig(),

@@ -10,7 +10,6 @@ import argparse
 import json
 import logging
 import time
-import warnings
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -18,48 +17,36 @@ from typing import TYPE_CHECKING, Any
 
 from pushplan.interaction.occupancy import CELLS_PER_LENGTH, CHANNELS, PATCH_CELLS
 from pushplan.training.ice_data import LEVELS, IcePairs, read_shards
-from pushplan.world import MissingDependencyError
-from pushplan.world.checks import integer, number
+from pushplan.training.libraries import need, parameter_count, write_onnx
+from pushplan.world.checked_fields import (
+    CheckedFields,
+    NonNegativeFloat,
+    NonNegativeInt,
+    PositiveFloat,
+    PositiveInt,
+)
 
 if TYPE_CHECKING:
     from pushplan.training.ice_unet import IceUNet
 
 log = logging.getLogger(__name__)
 
-OPSET = 17
-
 
 @dataclass(frozen=True)
-class IceTrainingConfig:
-    """Parameters of the training.
+class IceTrainingConfig(CheckedFields):
+    """Parameters of the training."""
 
-    Args:
-        epochs: passes over the pairs.
-        batch: pairs in a step.
-        rate: greatest learning rate of AdamW; it rises over the first tenth of the steps and
-            falls to nothing along a cosine (one-cycle schedule).
-        decay: of the weights.
-        map_weight: of the mean squared error of the occupancy, against the Poisson deviance of the
-            work, which is unbiased in the mean and allows more error where the work is more.
-        seed: of initial weights, order and mirroring.
-        threads: of PyTorch; the result depends on it in the last digits.
-    """
-
-    epochs: int = 12
-    batch: int = 64
-    rate: float = 4e-3
-    decay: float = 1e-4
-    map_weight: float = 20.0
-    seed: int = 0
-    threads: int = 1
-
-    def __post_init__(self) -> None:
-        for name in ("epochs", "batch", "threads"):
-            integer(name, getattr(self, name), low=1)
-        integer("seed", self.seed, low=0)
-        for name in ("rate", "map_weight"):
-            number(name, getattr(self, name), low=0.0, open_low=True)
-        number("decay", self.decay, low=0.0)
+    epochs: PositiveInt = 12  # passes over the pairs
+    batch: PositiveInt = 64  # pairs in a step
+    # greatest learning rate of AdamW; it rises over the first tenth of the steps and falls to
+    # nothing along a cosine (one-cycle schedule)
+    rate: PositiveFloat = 4e-3
+    decay: NonNegativeFloat = 1e-4  # of the weights
+    # of the mean squared error of the occupancy, against the Poisson deviance of the work, which is
+    # unbiased in the mean and allows more error where the work is more
+    map_weight: PositiveFloat = 20.0
+    seed: NonNegativeInt = 0  # of initial weights, order and mirroring
+    threads: PositiveInt = 1  # of PyTorch; the result depends on it in the last digits
 
 
 def train(pairs: IcePairs, config: IceTrainingConfig | None = None) -> tuple[IceUNet, list[float]]:
@@ -71,8 +58,8 @@ def train(pairs: IcePairs, config: IceTrainingConfig | None = None) -> tuple[Ice
     Raises:
         MissingDependencyError: without PyTorch.
     """
-    torch = _torch()
-    from pushplan.training.ice_unet import IceUNet, parameter_count, seeded
+    torch = need("torch")
+    from pushplan.training.ice_unet import IceUNet, seeded
 
     config = config or IceTrainingConfig()
     torch.set_num_threads(config.threads)
@@ -120,38 +107,11 @@ def _loss(network: IceUNet, chosen: list[Any], mirrored: bool, map_weight: float
 
 def export(network: IceUNet, path: str | Path) -> None:
     """Write a network as ONNX for any batch size; PyTorch is not needed to run it."""
-    torch = _torch()
+    torch = need("torch")
     from pushplan.training.ice_unet import ExportedIceUNet
 
     example = torch.zeros(2, len(CHANNELS), PATCH_CELLS, PATCH_CELLS)
-    Path(path).parent.mkdir(parents=True, exist_ok=True)
-    with warnings.catch_warnings():
-        # the exporter that needs no further package; it is marked as old
-        warnings.simplefilter("ignore", DeprecationWarning)
-        _write(torch, ExportedIceUNet(network), example, path)
-
-
-def _write(torch: Any, network: Any, example: Any, path: str | Path) -> None:
-    torch.onnx.export(
-        network,
-        (example,),
-        str(path),
-        input_names=["patches"],
-        output_names=["after", "work"],
-        dynamic_axes={"patches": {0: "batch"}, "after": {0: "batch"}, "work": {0: "batch"}},
-        opset_version=OPSET,
-        dynamo=False,
-    )
-
-
-def _torch() -> Any:
-    try:
-        import torch
-    except ImportError as error:
-        raise MissingDependencyError(
-            "training needs PyTorch: pip install 'pushplan[learn]'"
-        ) from error
-    return torch
+    write_onnx(ExportedIceUNet(network), example, path, ("patches", "after", "work"))
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -25,27 +25,17 @@ SPLITS = ("train", "held-out")
 
 @dataclass(frozen=True)
 class PassageConfig:
-    """What passages are drawn. Lengths in hull lengths.
+    """What passages are drawn. Lengths in hull lengths."""
 
-    Args:
-        greatest_concentration: of the ice, drawn from ``least_concentration`` to this.
-        least_concentration: fraction of ice.
-        passages: drawn from each voyage along the channel.
-        shortest: least length of a passage.
-        longest: greatest length.
-        arcs: least and greatest length of the arcs that a voyage is made of.
-        spacing: between the poses of a voyage.
-        steepest: greatest angle between the ship and the channel [rad].
-    """
-
-    greatest_concentration: float = 0.5
-    least_concentration: float = 0.01
-    passages: int = 48
-    shortest: float = 0.2
-    longest: float = 1.2
+    greatest_concentration: float = 0.5  # of the ice, drawn from ``least_concentration`` to this
+    least_concentration: float = 0.01  # fraction of ice
+    passages: int = 48  # drawn from each voyage along the channel
+    shortest: float = 0.2  # least length of a passage
+    longest: float = 1.2  # greatest length
+    # least and greatest length of the arcs that a voyage is made of
     arcs: tuple[float, float] = (0.15, 1.0)
-    spacing: float = 0.05
-    steepest: float = math.radians(75.0)
+    spacing: float = 0.05  # between the poses of a voyage
+    steepest: float = math.radians(75.0)  # greatest angle between the ship and the channel [rad]
 
     def __post_init__(self) -> None:
         fraction = number("greatest_concentration", self.greatest_concentration, low=0.0, high=0.5)
@@ -60,11 +50,6 @@ class PassageConfig:
 
 def random_voyage(world: World, config: PassageConfig, rng: np.random.Generator) -> FloatArray:
     """A path along the channel in arcs of random length and curvature.
-
-    Args:
-        world: the ship at its start, heading up the channel.
-        config: what arcs.
-        rng: the only source of randomness.
 
     Returns:
         (N, 3) poses, the hull's ``spacing`` apart, that keep clear of the channel's ends. They may

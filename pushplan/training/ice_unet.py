@@ -96,11 +96,6 @@ class ExportedIceUNet(nn.Module):
         return after.clamp(0.0, 1.0), work
 
 
-def parameter_count(network: nn.Module) -> int:
-    """How many numbers the network has learned."""
-    return sum(p.numel() for p in network.parameters())
-
-
 def seeded(seed: int) -> torch.Generator:
     """A generator for shuffling; also seeds the one that initialises weights."""
     torch.manual_seed(seed)

@@ -75,6 +75,17 @@ def integer(name: str, value: object, *, low: int | None = None, high: int | Non
     return result
 
 
+def boolean(name: str, value: object) -> bool:
+    """Check that ``value`` is true or false and return it as a bool.
+
+    Raises:
+        InvalidInputError: if it is anything else.
+    """
+    if not isinstance(value, bool | np.bool_):
+        raise InvalidInputError(f"{name} must be true or false, got {value!r}")
+    return bool(value)
+
+
 def choice(kind: str, value: object, valid: Sequence[str]) -> str:
     """Check that ``value`` is one of the valid names and return it.
 

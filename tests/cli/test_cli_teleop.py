@@ -271,7 +271,7 @@ def screen() -> Iterator[str]:
 PERSON = """
 import sys
 from pushplan.cli import main
-from pushplan.envs import push_env, window
+from pushplan.envs import rendering, window
 
 class Typed(window.Window):
     frames = 0
@@ -285,7 +285,7 @@ class Typed(window.Window):
             root.after(1500, lambda: root.event_generate("<KeyRelease-Left>"))
             root.after(3000, self.close)
 
-window.Window = push_env.Window = Typed
+window.Window = rendering.Window = Typed
 code = main(sys.argv[1:])
 print("frames", Typed.frames)
 sys.exit(code)

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pushplan.envs import PushEnv
-from pushplan.envs.registry import ACTIONS, look_up
+from pushplan.envs.registry import ACTIONS
 from pushplan.envs.tasks.base import drive_of
 from pushplan.envs.tasks.maze_presets import PRESETS
 from pushplan.world import (
@@ -19,6 +19,7 @@ from pushplan.world import (
     WheelSpeeds,
     World,
 )
+from pushplan.world.lazy_names import look_up
 
 unit = st.floats(-1.0, 1.0, width=32)
 

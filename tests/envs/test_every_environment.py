@@ -15,10 +15,11 @@ from gymnasium.utils.env_checker import check_env
 
 from pushplan.envs import PushEnv
 from pushplan.envs import make as make_scenario
-from pushplan.envs.registry import ACTIONS, SIMULATORS, TASKS, look_up
+from pushplan.envs.registry import ACTIONS, SIMULATORS, TASKS
 from pushplan.envs.tasks.base import drive_of
 from pushplan.scenarios import suite, suite_names
 from pushplan.world import ClearanceArea, Drive, Receptacle
+from pushplan.world.lazy_names import look_up
 
 LAYOUTS = {
     "maze": [{"shape": "z", "wheeled": 0.4}, {"boxes": 0}, {"bumper_friction": 0.3}],

@@ -26,7 +26,7 @@ from mujoco_scenes import (
 )
 
 from pushplan.envs import PushEnv
-from pushplan.envs.registry import SIMULATORS, look_up
+from pushplan.envs.registry import SIMULATORS
 from pushplan.envs.simulators.mujoco_kernels import drag_damping, planar_rows
 from pushplan.envs.simulators.mujoco_options import MujocoOptions
 from pushplan.envs.simulators.mujoco_rest import rest_cycles
@@ -38,6 +38,7 @@ from pushplan.world import (
     PushplanError,
     Twist,
 )
+from pushplan.world.lazy_names import look_up
 
 
 def ice(count=12, seed=0):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, replace
 from typing import ClassVar
 
 import numpy as np
@@ -14,31 +14,19 @@ from pushplan.envs.simulators.water import Water
 from pushplan.envs.trace import Trace
 from pushplan.interaction.model import Interaction
 from pushplan.world import InvalidInputError, Twist, World
-from pushplan.world.checks import ArrayRecord, FloatArray, frozen, number
+from pushplan.world.checked_fields import CheckedFields, PositiveFloat
+from pushplan.world.checks import ArrayRecord, FloatArray, IntArray, array, frozen, number
 
 
 @dataclass(frozen=True)
-class Solids:
-    """The third dimension of a scene, for engines that have one.
+class Solids(CheckedFields):
+    """The third dimension of a scene, for engines that have one."""
 
-    Args:
-        object_height: of boxes or floes [m].
-        robot_height: of the robot's body [m].
-        wall_height: of everything static [m].
-        bumper_height: of the footprint parts of the robot other than its first one [m].
-        wheel_radius: of the robot's driven wheels [m].
-    """
-
-    object_height: float
-    robot_height: float
-    wall_height: float
-    bumper_height: float
-    wheel_radius: float
-
-    def __post_init__(self) -> None:
-        for item in fields(self):
-            value = number(item.name, getattr(self, item.name), low=0.0, open_low=True)
-            object.__setattr__(self, item.name, value)
+    object_height: PositiveFloat  # of boxes or floes [m]
+    robot_height: PositiveFloat  # of the robot's body [m]
+    wall_height: PositiveFloat  # of everything static [m]
+    bumper_height: PositiveFloat  # of the footprint parts of the robot other than its first one [m]
+    wheel_radius: PositiveFloat  # of the robot's driven wheels [m]
 
 
 @dataclass(frozen=True)
@@ -118,6 +106,9 @@ class Simulator(ABC):
     is_exact: ClassVar[bool] = False
     """Whether the robot follows a command exactly unless it is held."""
 
+    _world: World
+    _held = _touched = False
+
     @abstractmethod
     def build(self, world: World, materials: Materials) -> None:
         """Replace the scene with this one."""
@@ -138,12 +129,29 @@ class Simulator(ABC):
         """
 
     @abstractmethod
+    def _motion(self) -> tuple[float, FloatArray, FloatArray]:
+        """Time [s], poses and twists (1 + K, 3) of the robot and the objects now."""
+
     def world(self) -> World:
         """A snapshot of the scene now."""
+        time, poses, twists = self._motion()
+        return replace(
+            self._world,
+            robot_pose=poses[0],
+            robot_twist=twists[0],
+            movables=self._world.movables.moved_to(poses[1:], twists[1:]),
+            time=time,
+        )
 
-    @abstractmethod
     def save(self) -> SimulatorState:
         """The state now, cheap enough for every step."""
+        time, poses, twists = self._motion()
+        parts = (poses[0], twists[0], poses[1:], twists[1:], self._hidden())
+        return SimulatorState(time, *(frozen(part) for part in parts))
+
+    def _hidden(self) -> FloatArray:
+        """What the engine has to remember beside poses and twists."""
+        return np.zeros(0)
 
     @abstractmethod
     def restore(self, state: SimulatorState) -> None:
@@ -172,11 +180,37 @@ class Simulator(ABC):
         raise NotImplementedError(f"simulator {self.name!r} has no camera")
 
     @property
-    @abstractmethod
     def touched_static(self) -> bool:
         """Whether the robot's footprint touched something static during the last step."""
+        return self._touched
 
     @property
-    @abstractmethod
     def held(self) -> bool:
         """Whether the robot was kept from moving as commanded during the last step."""
+        return self._held
+
+    def _without(self, object_ids: Sequence[int]) -> tuple[World, IntArray]:
+        """The world now without some objects, and their rows.
+
+        Raises:
+            InvalidInputError: if one of them is not there.
+        """
+        world = self.world()
+        keep = ~np.isin(world.movables.ids, object_ids)
+        if len(object_ids) != (~keep).sum():
+            raise InvalidInputError(
+                f"cannot remove {list(object_ids)}, valid ids: {world.movables.ids.tolist()}"
+            )
+        return replace(world, movables=world.movables.select(keep)), np.flatnonzero(~keep)
+
+
+def checked_path(path: ArrayLike) -> FloatArray:
+    """(N, 3) poses to follow.
+
+    Raises:
+        InvalidInputError: if there is none, or they have another shape or are not finite.
+    """
+    poses: FloatArray = array("path", path, (None, 3))
+    if len(poses) == 0:
+        raise InvalidInputError("path must hold at least one pose")
+    return poses

@@ -19,16 +19,12 @@ class Momentum:
 
     A body's law is ``m v' = -(b + c |v|) v``, and likewise about the vertical axis. A wheeled
     object has ``b = m / rolling_time`` and no c.
-
-    Args:
-        keeps: (N,) whether the body keeps anything; the first is the robot, which never does.
-        inertia: (N, 2) mass [kg] and moment of inertia [kg m²].
-        drag: (N, 4) b and c of the translation and of the rotation, over mass and moment.
     """
 
+    # (N,) whether the body keeps anything; the first is the robot, which never does
     keeps: FloatArray
-    inertia: FloatArray
-    drag: FloatArray
+    inertia: FloatArray  # (N, 2) mass [kg] and moment of inertia [kg m²]
+    drag: FloatArray  # (N, 4) b and c of the translation and of the rotation, over mass and moment
 
     @classmethod
     def of(cls, world: World, materials: Materials) -> Momentum:

@@ -14,11 +14,7 @@ from pushplan.envs.simulators.base import Materials
 from pushplan.envs.simulators.mujoco_kernels import drag_damping, planar_rows, sleep_lists
 from pushplan.envs.simulators.mujoco_model import SceneKey, scene_model
 from pushplan.envs.simulators.mujoco_options import MujocoOptions
-from pushplan.envs.simulators.mujoco_rest import (
-    quiet_objects,
-    rest_cycles,
-    rest_gap,
-)
+from pushplan.envs.simulators.mujoco_rest import quiet_objects, rest_cycles, rest_gap
 from pushplan.world import PushplanError, World
 from pushplan.world.checks import BoolArray, FloatArray, IntArray
 
@@ -45,11 +41,6 @@ class MujocoBodies:
 
     Bodies on the ground have six degrees of freedom and the robot's wheels one each; floating
     bodies have three. Positions are ordered robot first, then objects.
-
-    Args:
-        world: the scene; its poses are where everything begins.
-        materials: friction, rolling, water and the third dimension.
-        options: numerical settings.
     """
 
     def __init__(self, world: World, materials: Materials, options: MujocoOptions) -> None:

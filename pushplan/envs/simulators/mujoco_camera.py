@@ -30,11 +30,6 @@ class MujocoCamera:
     The backend is what the environment variable ``MUJOCO_GL`` says, or EGL, which needs no display.
     What it holds is freed with the object.
 
-    Args:
-        model: MjModel of the scene.
-        width: of the pictures [px].
-        height: of the pictures [px].
-
     Raises:
         MissingDependencyError: if there is no OpenGL that draws into memory.
     """
@@ -57,12 +52,7 @@ class MujocoCamera:
         self._finalizer.atexit = False  # the display is gone by then, and all is freed anyway
 
     def take(self, qpos: FloatArray, world: World) -> NDArray[np.uint8]:
-        """(H, W, 3) picture of the bodies, and of the goal.
-
-        Args:
-            qpos: (nq,) positions of the bodies.
-            world: for its bounds, its goal and where the robot is.
-        """
+        """(H, W, 3) picture of the bodies, and of the goal."""
         model, data = self._model, self._data
         data.qpos[:] = qpos
         self._aim(world)

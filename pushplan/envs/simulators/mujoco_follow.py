@@ -34,17 +34,12 @@ class _Drivable(Protocol):
 def follow_path(
     simulator: _Drivable, robot: RobotModel, poses: FloatArray
 ) -> tuple[FloatArray, int]:
-    """Sweep the robot through poses; it stands at the first.
+    """Sweep the robot through poses (N, 3); it stands at the first.
 
     A reference moves straight from pose to pose at the robot's full speed and waits where the robot
     falls behind by more than half its radius. The command is the reference's own motion plus
     feedback on the error in the robot's frame (Kanayama et al. 1990):
     v = v_r cos e_θ + k_x e_x, ω = ω_r + v_r k_y e_y + k_θ sin e_θ.
-
-    Args:
-        simulator: that is stepped.
-        robot: its limits.
-        poses: (N, 3) x, y [m], theta [rad].
 
     Returns:
         (N, K, 3) object poses when the reference was at each pose, and the index of the first pose

@@ -13,12 +13,7 @@ import numpy as np
 from pushplan.drawing.palette import FLOOR_PALETTE, WATER_PALETTE, Palette
 from pushplan.envs.simulators.base import Materials, Solids
 from pushplan.envs.simulators.mujoco_options import MujocoOptions
-from pushplan.envs.simulators.mujoco_robot import (
-    GRAVITY,
-    add_floating,
-    add_ship,
-    add_wheeled_robot,
-)
+from pushplan.envs.simulators.mujoco_robot import GRAVITY, add_floating, add_ship, add_wheeled_robot
 from pushplan.envs.simulators.mujoco_shapes import (
     FLOOR_BIT,
     OBJECT_BIT,

@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
+from typing import Annotated
 
-from pushplan.world.checks import integer, number
+from pushplan.world.checked_fields import (
+    CheckedFields,
+    Limits,
+    PositiveFloat,
+    PositiveFraction,
+    PositiveInt,
+)
 
 
 @dataclass(frozen=True)
-class MujocoOptions:
+class MujocoOptions(CheckedFields):
     """Settings; docs/simulators-mujoco.md has the studies behind the defaults.
 
     Args:
@@ -36,30 +42,21 @@ class MujocoOptions:
         thrust_droop: loss of speed at full thrust, in units of the greatest speed.
     """
 
-    time_step: float = 0.0125
-    water_time_step: float = 0.02
-    drag_interval: float = 0.1
-    samples: int = 8
-    iterations: int = 30
-    tolerance: float = 1e-6
-    contact_time: float = 0.025
-    impedance: float = 0.98
-    sleep_speed: float = 1e-3
-    motor_time: float = 0.025
-    motor_force: float = 0.8
-    rotor_inertia: float = 1.0
-    wheel_friction: float = 0.9
-    thrust: float = 0.2
-    thruster_lever: float = 1.0
-    thrust_droop: float = 0.05
+    field_prefix = "mujoco "
 
-    def __post_init__(self) -> None:
-        for item in fields(self):
-            value, name = getattr(self, item.name), f"mujoco {item.name}"
-            if item.name in ("samples", "iterations"):
-                integer(name, value, low=1)
-            else:
-                high = {"impedance": 0.9999}.get(item.name, math.inf)
-                high = 1.0 if item.name.endswith("time_step") else high
-                positive = number(name, value, low=0.0, open_low=True, high=high)
-                object.__setattr__(self, item.name, positive)
+    time_step: PositiveFraction = 0.0125
+    water_time_step: PositiveFraction = 0.02
+    drag_interval: PositiveFloat = 0.1
+    samples: PositiveInt = 8
+    iterations: PositiveInt = 30
+    tolerance: PositiveFloat = 1e-6
+    contact_time: PositiveFloat = 0.025
+    impedance: Annotated[float, Limits(0.0, 0.9999, open_low=True)] = 0.98
+    sleep_speed: PositiveFloat = 1e-3
+    motor_time: PositiveFloat = 0.025
+    motor_force: PositiveFloat = 0.8
+    rotor_inertia: PositiveFloat = 1.0
+    wheel_friction: PositiveFloat = 0.9
+    thrust: PositiveFloat = 0.2
+    thruster_lever: PositiveFloat = 1.0
+    thrust_droop: PositiveFloat = 0.05

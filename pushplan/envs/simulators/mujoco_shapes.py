@@ -24,20 +24,13 @@ class Surface:
 
     MuJoCo takes the friction of a pair from the geom of the higher priority, and from the greater
     coefficient where priorities are equal.
-
-    Args:
-        kind: what it is, one of the bits above.
-        meets: the kinds of geoms it collides with.
-        friction: sliding friction coefficient; contacts are frictionless where it is 0.
-        priority: the higher one decides the friction of a pair.
-        color: red, green, blue in [0, 1].
     """
 
-    kind: int
-    meets: int
-    friction: float
-    priority: int
-    color: Color
+    kind: int  # what it is, one of the bits above
+    meets: int  # the kinds of geoms it collides with
+    friction: float  # sliding friction coefficient; contacts are frictionless where it is 0
+    priority: int  # the higher one decides the friction of a pair
+    color: Color  # red, green, blue in [0, 1]
 
     def options(self) -> dict[str, Any]:
         """Keyword arguments of ``add_geom``; the mass is stated on the body."""

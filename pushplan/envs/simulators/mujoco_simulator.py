@@ -10,7 +10,7 @@ import mujoco
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pushplan.envs.simulators.base import Materials, Simulator, SimulatorState
+from pushplan.envs.simulators.base import Materials, Simulator, SimulatorState, checked_path
 from pushplan.envs.simulators.mujoco_bodies import MujocoBodies
 from pushplan.envs.simulators.mujoco_camera import MujocoCamera
 from pushplan.envs.simulators.mujoco_follow import follow_path
@@ -19,7 +19,7 @@ from pushplan.envs.simulators.mujoco_options import MujocoOptions
 from pushplan.envs.trace import Trace
 from pushplan.interaction.model import Interaction
 from pushplan.world import InvalidInputError, Twist, World
-from pushplan.world.checks import FloatArray, array, frozen, number
+from pushplan.world.checks import FloatArray, frozen, number
 
 HELD_SHARE = 0.5
 """A robot in contact that moves with less than this fraction of its command is held ..."""
@@ -35,12 +35,9 @@ class MujocoSimulator(Simulator):
     memoryless: the same state and commands give the same bytes. A scene built from a `World`
     starts upright on the ground with the planar velocities that the world states.
 
-    `held`: the hull touched something at one of the step's samples, and in the second half of the
-    step the robot moved along its heading, or turned, with less than half of the commanded rate,
-    and was not speeding up either.
-
-    Args:
-        options: numerical and mechanical settings.
+    `touched_static` looks at the samples of a step. `held`: the hull touched something at one of
+    them, and in the second half of the step the robot moved along its heading, or turned, with
+    less than half of the commanded rate, and was not speeding up either.
     """
 
     name = "mujoco"
@@ -51,7 +48,6 @@ class MujocoSimulator(Simulator):
         self.options = options or MujocoOptions()
         self._bodies: MujocoBodies | None = None
         self._camera: MujocoCamera | None = None
-        self._held = self._touched = False
 
     def build(self, world: World, materials: Materials) -> None:
         """Replace the scene with this one; a scene of the same shapes keeps its model.
@@ -148,9 +144,7 @@ class MujocoSimulator(Simulator):
 
     def follow(self, path: ArrayLike) -> Interaction:
         """Drive the robot through poses at its full speed."""
-        poses: FloatArray = array("path", path, (None, 3))
-        if len(poses) == 0:
-            raise InvalidInputError("path must hold at least one pose")
+        poses = checked_path(path)
         start = self.world().moved(robot_pose=poses[0])
         if self._scene.afloat and len(poses) > 1:  # a ship is long in getting under way
             along = poses[1, :2] - poses[0, :2]
@@ -160,29 +154,12 @@ class MujocoSimulator(Simulator):
         found, jammed = follow_path(self, self._world.robot, poses)
         return Interaction(found, self._world.movables.masses, jammed)
 
-    def world(self) -> World:
-        """A snapshot of the scene now."""
-        poses, twists = self._scene.poses(), self._scene.twists()
-        return replace(
-            self._world,
-            robot_pose=poses[0],
-            robot_twist=twists[0],
-            movables=self._world.movables.moved_to(poses[1:], twists[1:]),
-            time=self._scene.data.time,
-        )
-
-    def save(self) -> SimulatorState:
-        """The state now."""
+    def _motion(self) -> tuple[float, FloatArray, FloatArray]:
         bodies = self._scene
-        poses, twists = bodies.poses(), bodies.twists()
-        return SimulatorState(
-            bodies.data.time,
-            frozen(poses[0]),
-            frozen(twists[0]),
-            frozen(poses[1:]),
-            frozen(twists[1:]),
-            frozen(bodies.hidden()),
-        )
+        return bodies.data.time, bodies.poses(), bodies.twists()
+
+    def _hidden(self) -> FloatArray:
+        return self._scene.hidden()
 
     def restore(self, state: SimulatorState) -> None:
         """Go back to a saved state of the same scene.
@@ -211,15 +188,10 @@ class MujocoSimulator(Simulator):
 
     def remove(self, object_ids: Sequence[int]) -> None:
         """Take objects off the floor."""
-        world, old = self.world(), self._scene
-        keep = ~np.isin(world.movables.ids, object_ids)
-        if len(object_ids) != (~keep).sum():
-            raise InvalidInputError(
-                f"cannot remove {list(object_ids)}, valid ids: {world.movables.ids.tolist()}"
-            )
+        world, gone = self._without(object_ids)
         touched, held = self._touched, self._held
-        hidden = old.hidden_without(np.flatnonzero(~keep))
-        self.build(replace(world, movables=world.movables.select(keep)), self._materials)
+        hidden = self._scene.hidden_without(gone)
+        self.build(world, self._materials)
         self._scene.load_hidden(world.time, hidden)
         self._touched, self._held = touched, held
 
@@ -232,16 +204,6 @@ class MujocoSimulator(Simulator):
         if self._camera is None or self._camera.size != (width, height):
             self._camera = MujocoCamera(self._scene.model, width, height)
         return self._camera.take(self._scene.qpos, self.world())
-
-    @property
-    def touched_static(self) -> bool:
-        """Whether the robot's hull touched something static at one of the last step's samples."""
-        return self._touched
-
-    @property
-    def held(self) -> bool:
-        """Whether the robot was kept from moving as commanded during the last step."""
-        return self._held
 
 
 def _rates(poses: FloatArray) -> tuple[float, float]:

@@ -5,16 +5,20 @@ from __future__ import annotations
 import enum
 import math
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
 from pushplan.envs.simulators.pymunk_bodies import PymunkBodies
 from pushplan.world import InvalidInputError, RobotModel, Twist
-from pushplan.world.checks import FloatArray, IntArray, integer, number
+from pushplan.world.checked_fields import CheckedFields, Limits, PositiveInt
+from pushplan.world.checks import FloatArray, IntArray
+
+_Small = Annotated[float, Limits(0.0, 0.2, open_low=True)]
 
 
 @dataclass(frozen=True)
-class PymunkOptions:
+class PymunkOptions(CheckedFields):
     """Numerical settings. Lengths are fractions of the objects' median radius.
 
     Where sizes differ much, four times the least radius counts instead, if that is smaller.
@@ -33,19 +37,17 @@ class PymunkOptions:
         samples: poses recorded in each call of `PymunkSimulator.step`, at even intervals.
     """
 
-    travel: float = 0.008
-    slop: float = 0.002
-    tolerance: float = 0.012
-    decay: float = 0.04
-    iterations: int = 10
-    samples: int = 8
+    field_prefix = "pymunk "
+
+    travel: _Small = 0.008
+    slop: _Small = 0.002
+    tolerance: _Small = 0.012
+    decay: _Small = 0.04
+    iterations: PositiveInt = 10
+    samples: PositiveInt = 8
 
     def __post_init__(self) -> None:
-        for key in ("travel", "slop", "tolerance", "decay"):
-            value = number(f"pymunk {key}", getattr(self, key), low=0.0, high=0.2, open_low=True)
-            object.__setattr__(self, key, value)
-        for key in ("iterations", "samples"):
-            integer(f"pymunk {key}", getattr(self, key), low=1)
+        super().__post_init__()
         if self.tolerance < self.travel + self.slop:
             raise InvalidInputError(
                 f"pymunk tolerance must be at least travel + slop = "

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pushplan.envs.simulators.base import Materials, Simulator, SimulatorState
+from pushplan.envs.simulators.base import Materials, Simulator, SimulatorState, checked_path
 from pushplan.envs.simulators.momentum import Momentum
 from pushplan.envs.simulators.pymunk_bodies import PymunkBodies
 from pushplan.envs.simulators.pymunk_drive import PymunkDriver, PymunkOptions
@@ -18,8 +17,8 @@ from pushplan.envs.simulators.reach import footprint_gap, struck, within_reach
 from pushplan.envs.trace import Trace
 from pushplan.geometry.obstacles import obstacle_distance, obstacles_of
 from pushplan.interaction.model import Interaction
-from pushplan.world import InvalidInputError, Twist, World
-from pushplan.world.checks import BoolArray, FloatArray, IntArray, array, frozen, number
+from pushplan.world import Twist, World
+from pushplan.world.checks import BoolArray, FloatArray, IntArray, frozen, number
 
 _GLIDE_SAMPLES = 4
 """Poses recorded in a step in which nothing can happen; one where the robot drives straight."""
@@ -43,7 +42,6 @@ class PymunkSimulator(Simulator):
 
     def __init__(self, options: PymunkOptions | None = None) -> None:
         self.options = options or PymunkOptions()
-        self._held = False
 
     def build(self, world: World, materials: Materials) -> None:
         """Replace the scene with this one."""
@@ -180,7 +178,7 @@ class PymunkSimulator(Simulator):
     def _far_from_static(self, reach: float) -> bool:
         x, y = self._rows[0, 0], self._rows[0, 1]
         robot, shapes = self._world.robot, self._obstacles
-        gap = obstacle_distance(x, y, shapes.vertices, shapes.offsets, shapes.radii)
+        gap = obstacle_distance(x, y, shapes)
         if gap > robot.circumscribed_radius + reach:
             return True
         return reach < footprint_gap(
@@ -203,9 +201,7 @@ class PymunkSimulator(Simulator):
 
     def follow(self, path: ArrayLike) -> Interaction:
         """Sweep the robot straight from pose to pose at its full speed."""
-        poses: FloatArray = array("path", path, (None, 3))
-        if len(poses) == 0:
-            raise InvalidInputError("path must hold at least one pose")
+        poses = checked_path(path)
         self._rows[0] = [*poses[0], 0.0, 0.0, 0.0]
         found = np.empty((len(poses), len(self._rows) - 1, 3))
         found[0] = self._rows[1:, :3]
@@ -249,27 +245,9 @@ class PymunkSimulator(Simulator):
         self._time += duration
         return through
 
-    def world(self) -> World:
-        """A snapshot of the scene now."""
-        rows = self._rows
-        return replace(
-            self._world,
-            robot_pose=rows[0, :3],
-            robot_twist=rows[0, 3:],
-            movables=self._world.movables.moved_to(rows[1:, :3], rows[1:, 3:]),
-            time=self._time,
-        )
-
-    def save(self) -> SimulatorState:
-        """The state now."""
+    def _motion(self) -> tuple[float, FloatArray, FloatArray]:
         rows = self._rows.copy()
-        return SimulatorState(
-            self._time,
-            frozen(rows[0, :3]),
-            frozen(rows[0, 3:]),
-            frozen(rows[1:, :3]),
-            frozen(rows[1:, 3:]),
-        )
+        return self._time, rows[:, :3], rows[:, 3:]
 
     def restore(self, state: SimulatorState) -> None:
         """Go back to a saved state of the same scene."""
@@ -291,23 +269,7 @@ class PymunkSimulator(Simulator):
 
     def remove(self, object_ids: Sequence[int]) -> None:
         """Take objects off the floor."""
-        world = self.world()
-        keep = ~np.isin(world.movables.ids, object_ids)
-        if len(object_ids) != (~keep).sum():
-            raise InvalidInputError(
-                f"cannot remove {list(object_ids)}, valid ids: {world.movables.ids.tolist()}"
-            )
-        self.build(replace(world, movables=world.movables.select(keep)), self._materials)
-
-    @property
-    def touched_static(self) -> bool:
-        """Whether the robot touched something static during the last step."""
-        return self._touched
-
-    @property
-    def held(self) -> bool:
-        """Whether the robot was kept from moving as commanded during the last step."""
-        return self._held
+        self.build(self._without(object_ids)[0], self._materials)
 
 
 def _rows(world: World) -> FloatArray:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -11,11 +11,12 @@ from pushplan.compiled import owned
 from pushplan.envs.simulators.water_kernels import flow_shapes
 from pushplan.geometry import polygon_area, polygon_centroid, polygon_inertia
 from pushplan.world import World
+from pushplan.world.checked_fields import CheckedFields, NonNegativeFloat, PositiveFloat
 from pushplan.world.checks import FloatArray, frozen, number
 
 
 @dataclass(frozen=True)
-class Water:
+class Water(CheckedFields):
     """How water brakes bodies: ``F = -(b + c |v|) v``, and likewise about the vertical axis.
 
     Objects are flat floes. Water resists them at their edges (form drag) and underneath (skin
@@ -36,22 +37,16 @@ class Water:
         robot_yaw_time: of its turn rate [s].
     """
 
-    density: float = 1025.0
-    object_draught: float = 1.05
-    object_form_drag: float = 1.1
-    object_skin_drag: float = 0.0055
-    ambient_speed: float = 0.05
-    robot_draught: float = 5.0
-    robot_surge_time: float = 88.0
-    robot_yaw_time: float = 11.6
+    field_prefix = "water "
 
-    def __post_init__(self) -> None:
-        for field in fields(self):
-            positive = field.name.endswith("_time") or field.name == "density"
-            value = number(
-                f"water {field.name}", getattr(self, field.name), low=0.0, open_low=positive
-            )
-            object.__setattr__(self, field.name, value)
+    density: PositiveFloat = 1025.0
+    object_draught: NonNegativeFloat = 1.05
+    object_form_drag: NonNegativeFloat = 1.1
+    object_skin_drag: NonNegativeFloat = 0.0055
+    ambient_speed: NonNegativeFloat = 0.05
+    robot_draught: NonNegativeFloat = 5.0
+    robot_surge_time: PositiveFloat = 88.0
+    robot_yaw_time: PositiveFloat = 11.6
 
     def coefficients(self, world: World) -> FloatArray:
         """Drag of the robot, then of each object.

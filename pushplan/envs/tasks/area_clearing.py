@@ -12,19 +12,9 @@ import shapely
 from pushplan.envs.tasks.area_clearing_presets import LAYOUTS, PRESETS, AreaClearingPreset
 from pushplan.envs.tasks.base import StepOutcome
 from pushplan.envs.tasks.layout import FreeSpace, rectangle, squares, walls_around
-from pushplan.envs.tasks.manipulation import (
-    START_TRIES,
-    ManipulationPreset,
-    ManipulationTask,
-    ManipulationVariations,
-)
-from pushplan.world import (
-    ClearanceArea,
-    InvalidInputError,
-    ScenarioError,
-    StaticMap,
-    World,
-)
+from pushplan.envs.tasks.manipulation import START_TRIES, ManipulationTask, ManipulationVariations
+from pushplan.envs.tasks.variations import Yaw
+from pushplan.world import ClearanceArea, InvalidInputError, ScenarioError, StaticMap, World
 from pushplan.world.checks import BoolArray, FloatArray
 
 CLEARED_REWARD = 10.0
@@ -38,7 +28,7 @@ class AreaClearingVariations(ManipulationVariations):
     """Variations of Area-Clearing; ``random_start`` draws where along the edge the robot starts."""
 
     layout: str = "clear"
-    box_yaw: str = "aligned"
+    box_yaw: Yaw = "aligned"
     random_start: bool = False
 
     task = "area_clearing"
@@ -60,7 +50,7 @@ class AreaClearingTask(ManipulationTask):
     idle_limits: ClassVar[Mapping[str, int]] = {"heading": 200, "waypoint": 200}
 
     preset: AreaClearingPreset
-    preset_table: ClassVar[Mapping[str, ManipulationPreset]] = PRESETS
+    preset_table = PRESETS
     variation_class = AreaClearingVariations
 
     def _furnish_room(self) -> None:

@@ -13,19 +13,12 @@ from pushplan.world import area_clearing_robot, turtlebot3_burger
 
 @dataclass(frozen=True)
 class ClearingLayout:
-    """One room, with its middle and that of the clearance area at the origin.
+    """One room, with its middle and that of the clearance area at the origin."""
 
-    Args:
-        outer: half the width and half the length of the room [m].
-        area: half the width and half the length of the clearance area [m].
-        walls: distance of the walls beside the area from the middle [m]; 0 for none.
-        columns: (x, y) of the middles of columns [m].
-    """
-
-    outer: tuple[float, float]
-    area: tuple[float, float]
-    walls: float = 0.0
-    columns: tuple[tuple[float, float], ...] = ()
+    outer: tuple[float, float]  # half the width and half the length of the room [m]
+    area: tuple[float, float]  # half the width and half the length of the clearance area [m]
+    walls: float = 0.0  # distance of the walls beside the area from the middle [m]; 0 for none
+    columns: tuple[tuple[float, float], ...] = ()  # (x, y) of the middles of columns [m]
 
     def scaled(self, scale: float) -> ClearingLayout:
         """The same layout with every length multiplied by ``scale``."""
@@ -39,21 +32,13 @@ class ClearingLayout:
 
 @dataclass(frozen=True, kw_only=True)
 class AreaClearingPreset(ManipulationPreset):
-    """One set of dimensions.
+    """One set of dimensions."""
 
-    Args:
-        layouts: by name.
-        column: side of the square columns [m].
-        inner_wall: thickness of the walls beside the area [m].
-        box_margin: least distance of a box's centre from the edge of the area at the start [m].
-        start_margin: distance of the robot's start from the lower edge of the area [m].
-    """
-
-    layouts: Mapping[str, ClearingLayout]
-    column: float
-    inner_wall: float
-    box_margin: float
-    start_margin: float
+    layouts: Mapping[str, ClearingLayout]  # by name
+    column: float  # side of the square columns [m]
+    inner_wall: float  # thickness of the walls beside the area [m]
+    box_margin: float  # least distance of a box's centre from the edge of the area at the start [m]
+    start_margin: float  # distance of the robot's start from the lower edge of the area [m]
 
 
 _LAYOUTS: Mapping[str, ClearingLayout] = {

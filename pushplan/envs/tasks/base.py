@@ -5,13 +5,14 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import ClassVar, Literal
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 
 from pushplan.envs.simulators.base import Materials
+from pushplan.envs.tasks.variations import TaskVariations
 from pushplan.observation import ObservationBuilder
-from pushplan.world import Drive, RobotModel, World
+from pushplan.world import Drive, RobotModel, UnknownNameError, World
 from pushplan.world.checks import BoolArray, FloatArray, IntArray
 
 
@@ -41,18 +42,22 @@ class Task(ABC):
     """One task with one preset and its variations.
 
     Args:
-        preset: one of `presets`.
+        preset: one of `presets`, the first if None.
         variations: what departs from the preset, by name.
-        action: name of the action mode, one of `actions`; `drive_of` says what the robot becomes.
+        action: name of the action mode, one of `actions`, the first if None; `drive_of` says what
+            the robot becomes.
 
     Raises:
-        UnknownNameError: if there is no such preset or variation.
+        UnknownNameError: if there is no such preset, variation or action.
         ScenarioError: if the value of a variation makes no sense.
     """
 
     name: ClassVar[str]
     goal_kind: ClassVar[Literal["robot", "objects"]] = "robot"
     """Who has a goal: decides which metrics apply."""
+    preset_table: ClassVar[Mapping[str, Any]]
+    """Dimensions by the name of the preset."""
+    variation_class: ClassVar[type[TaskVariations]]
     presets: ClassVar[tuple[str, ...]]
     """Sets of dimensions; the first is the default."""
     solid_presets: ClassVar[tuple[str, ...]]
@@ -73,8 +78,30 @@ class Task(ABC):
     waypoint_window: float = 0.0
     """Side of the square around the robot that waypoint actions reach [m], where it has them."""
 
-    @abstractmethod
-    def __init__(self, *, preset: str, variations: Mapping[str, object], action: str) -> None: ...
+    preset: Any
+    """The dimensions, one of the values of `preset_table`."""
+    variations: Any
+
+    def __init__(
+        self,
+        *,
+        preset: str | None = None,
+        variations: Mapping[str, object] | None = None,
+        action: str | None = None,
+    ) -> None:
+        preset = self.presets[0] if preset is None else preset
+        self.action = self.actions[0] if action is None else action
+        if preset not in self.preset_table:
+            raise UnknownNameError(f"preset of {self.name}", preset, self.preset_table)
+        if self.action not in self.actions:
+            raise UnknownNameError(f"action of task {self.name!r}", self.action, self.actions)
+        self.preset_name, self.preset = preset, self.preset_table[preset]
+        self.variations = self.variation_class.read({} if variations is None else variations)
+        self._prepare()
+
+    def _prepare(self) -> None:
+        """Set what is the same in every start: the robot, the materials, the times, the goal."""
+        raise NotImplementedError(f"task {self.name!r} has neither __init__ nor _prepare")
 
     @abstractmethod
     def start(self, rng: np.random.Generator) -> World:

@@ -12,12 +12,8 @@ import shapely
 from pushplan.envs.tasks.base import StepOutcome
 from pushplan.envs.tasks.box_delivery_presets import LAYOUTS, PRESETS, BoxDeliveryPreset
 from pushplan.envs.tasks.layout import rectangle, walls_around
-from pushplan.envs.tasks.manipulation import (
-    START_TRIES,
-    ManipulationPreset,
-    ManipulationTask,
-    ManipulationVariations,
-)
+from pushplan.envs.tasks.manipulation import START_TRIES, ManipulationTask, ManipulationVariations
+from pushplan.envs.tasks.variations import Yaw
 from pushplan.world import InvalidInputError, Receptacle, StaticMap, World
 from pushplan.world.checks import FloatArray, IntArray
 from pushplan.world.outline import transform_outlines
@@ -37,7 +33,7 @@ class BoxDeliveryVariations(ManipulationVariations):
     """Variations of Box-Delivery; the robot starts anywhere unless ``random_start`` is false."""
 
     layout: str = "small_empty"
-    box_yaw: str = "random"
+    box_yaw: Yaw = "random"
     random_start: bool = True
 
     task = "box_delivery"
@@ -60,7 +56,7 @@ class BoxDeliveryTask(ManipulationTask):
     idle_limits: ClassVar[Mapping[str, int]] = {"heading": 200, "waypoint": 100}
 
     preset: BoxDeliveryPreset
-    preset_table: ClassVar[Mapping[str, ManipulationPreset]] = PRESETS
+    preset_table = PRESETS
     variation_class = BoxDeliveryVariations
 
     def _furnish_room(self) -> None:

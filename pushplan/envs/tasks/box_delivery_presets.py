@@ -15,33 +15,21 @@ LAYOUTS = ("small_empty", "small_columns", "large_columns", "large_divider")
 
 @dataclass(frozen=True, kw_only=True)
 class BoxDeliveryPreset(ManipulationPreset):
-    """One set of dimensions. Rooms have their middle at the origin.
+    """One set of dimensions. Rooms have their middle at the origin."""
 
-    Args:
-        rooms: length along x and width along y of the room by layout [m].
-        receptacle: side of the square receptacle in the corner at +x, +y [m].
-        corner: legs of the triangles that fill the other corners [m].
-        columns: greatest number of columns by layout.
-        column: side of the square columns [m].
-        column_spacing: least distance between the centres of two columns [m].
-        column_margin: least way between a column and the walls [m].
-        divider: length, as a fraction of the room's, and thickness of the divider [m].
-        divider_margin: least distance of its centre line from the walls along it [m].
-        start_margin: distance of a fixed start from the wall at -x [m].
-        still: a robot that moves less than this in an action has not moved [m].
-    """
-
+    # length along x and width along y of the room by layout [m]
     rooms: Mapping[str, tuple[float, float]]
-    receptacle: float
-    corner: float
-    columns: Mapping[str, int]
-    column: float
-    column_spacing: float
-    column_margin: float
+    receptacle: float  # side of the square receptacle in the corner at +x, +y [m]
+    corner: float  # legs of the triangles that fill the other corners [m]
+    columns: Mapping[str, int]  # greatest number of columns by layout
+    column: float  # side of the square columns [m]
+    column_spacing: float  # least distance between the centres of two columns [m]
+    column_margin: float  # least way between a column and the walls [m]
+    # length, as a fraction of the room's, and thickness of the divider [m]
     divider: tuple[float, float]
-    divider_margin: float
-    start_margin: float
-    still: float
+    divider_margin: float  # least distance of its centre line from the walls along it [m]
+    start_margin: float  # distance of a fixed start from the wall at -x [m]
+    still: float  # a robot that moves less than this in an action has not moved [m]
 
 
 BENCHMARK = BoxDeliveryPreset(

@@ -12,8 +12,9 @@ import numpy as np
 import shapely
 from numpy.typing import ArrayLike, NDArray
 
-from pushplan.world import ScenarioError, StaticMap
+from pushplan.world import Movables, RobotModel, ScenarioError, StaticMap
 from pushplan.world.checks import BoolArray, FloatArray
+from pushplan.world.outline import transform
 
 _BATCH = 64
 _LATTICE_SHIFTS = 16
@@ -23,11 +24,7 @@ _CORNERS = np.array([(-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5)])
 
 @dataclass(frozen=True)
 class FreeSpace:
-    """The free floor among static obstacles.
-
-    Args:
-        static: the obstacles; thick segments count with their exact round outline.
-    """
+    """The free floor among static obstacles; thick segments count with their round outline."""
 
     static: StaticMap
 
@@ -173,6 +170,31 @@ def _lattice(
         if len(best) >= count:
             break
     return best
+
+
+def square_boxes(
+    rng: np.random.Generator, poses: FloatArray, size: float, *, mass: float | None, wheeled: float
+) -> Movables:
+    """Square boxes at poses (N, 3), of which some stand on casters.
+
+    Args:
+        rng: draws which ones.
+        poses: x, y [m], theta [rad].
+        size: side [m].
+        mass: [kg]; 1 kg/m² of their area if None.
+        wheeled: fraction on casters, 0 to 1.
+    """
+    count = len(poses)
+    on_casters = np.zeros(count, dtype=bool)
+    on_casters[rng.permutation(count)[: round(wheeled * count)]] = True
+    masses = None if mass is None else np.full(count, mass)
+    outlines = [_CORNERS * size] * count
+    return Movables.from_outlines(outlines, poses, masses=masses, wheeled=on_casters)
+
+
+def footprint_at(robot: RobotModel, pose: FloatArray) -> list[Any]:
+    """Shapely polygons of the robot's parts at a pose (3,)."""
+    return [shapely.Polygon(transform(pose, part)) for part in robot.parts]
 
 
 def rectangle(x0: float, y0: float, x1: float, y1: float) -> FloatArray:

@@ -5,33 +5,37 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
-import shapely
 
 from pushplan.envs.simulators.base import Materials
 from pushplan.envs.tasks.base import Task, drive_of
 from pushplan.envs.tasks.box_kernels import sample_at
-from pushplan.envs.tasks.layout import FreeSpace
+from pushplan.envs.tasks.layout import FreeSpace, footprint_at, square_boxes
 from pushplan.envs.tasks.materials import SOLIDS
 from pushplan.envs.tasks.reach import Reach
-from pushplan.envs.tasks.variations import TaskVariations
+from pushplan.envs.tasks.variations import TaskVariations, Yaw
 from pushplan.geometry import GeodesicField, geodesic_field
 from pushplan.observation import ImageObservation, ObservationBuilder, StateObservation
 from pushplan.world import (
     BUMPERS,
     InvalidInputError,
     ManipulationGoal,
-    Movables,
     RobotModel,
     ScenarioError,
     StaticMap,
     UnknownNameError,
     World,
 )
-from pushplan.world.checks import FloatArray, choice, integer, number
-from pushplan.world.outline import transform
+from pushplan.world.checked_fields import (
+    Fraction,
+    NonNegativeFloat,
+    OneOf,
+    PositiveFloat,
+    PositiveInt,
+)
+from pushplan.world.checks import FloatArray, choice
 
 LEAST_SIZE = 0.01
 """Least size of boxes, as a fraction of the preset's."""
@@ -47,87 +51,46 @@ START_TRIES = 2000
 
 @dataclass(frozen=True, kw_only=True)
 class ManipulationPreset:
-    """Dimensions that both tasks have.
+    """Dimensions that both tasks have."""
 
-    Args:
-        robots: makers of the robots by name, called with ``drive`` and, where the preset has
-            one, ``bumper``; the first is the default.
-        bumper: the bumper unless said otherwise; None where robots have one of their own.
-        boxes: number of boxes by layout.
-        box_size: side of the boxes [m].
-        box_mass: [kg]; the area in m² if None, as the 2D benchmark's metric takes it.
-        box_spacing: least distance between the centres of two boxes at the start [m].
-        wall: thickness of the walls [m].
-        materials: friction; solids are filled in by robot where there are any.
-        control_step: time between two commands [s].
-        heading_step: how far a heading action drives [m].
-        windows: side of the observed square by layout [m].
-        field_resolution: side of a cell of the distance field [m].
-        progress_reward: for each metre by which the way of an object to its goal changes [1/m].
-    """
-
+    # makers of the robots by name, called with ``drive`` and, where the preset has one, ``bumper``;
+    # the first is the default
     robots: Mapping[str, Callable[..., RobotModel]]
-    bumper: str | None
-    boxes: Mapping[str, int]
-    box_size: float
-    box_mass: float | None
-    box_spacing: float
-    wall: float
-    materials: Materials
-    control_step: float
-    heading_step: float
-    windows: Mapping[str, float]
-    field_resolution: float
-    progress_reward: float
+    bumper: str | None  # the bumper unless said otherwise; None where robots have one of their own
+    boxes: Mapping[str, int]  # number of boxes by layout
+    box_size: float  # side of the boxes [m]
+    box_mass: float | None  # [kg]; the area in m² if None, as the 2D benchmark's metric takes it
+    box_spacing: float  # least distance between the centres of two boxes at the start [m]
+    wall: float  # thickness of the walls [m]
+    materials: Materials  # friction; solids are filled in by robot where there are any
+    control_step: float  # time between two commands [s]
+    heading_step: float  # how far a heading action drives [m]
+    windows: Mapping[str, float]  # side of the observed square by layout [m]
+    field_resolution: float  # side of a cell of the distance field [m]
+    progress_reward: float  # for each metre by which the way of an object to its goal changes [1/m]
 
 
 @dataclass(frozen=True, kw_only=True)
 class ManipulationVariations(TaskVariations):
-    """What may depart from a preset; None leaves the preset's value.
+    """What may depart from a preset; None leaves the preset's value."""
 
-    Args:
-        layout: name of the layout.
-        boxes: number of boxes, at least 1.
-        box_size: side of the boxes [m], at least 1 % of the preset's; their least spacing grows
-            with it.
-        box_yaw: headings of the boxes at the start, ``"aligned"`` or ``"random"``.
-        wheeled: fraction of the boxes that stand on casters, 0 to 1.
-        robot: one of the preset's robots.
-        bumper: one of `pushplan.world.BUMPERS`, where the robot's can be changed.
-        bumper_friction: friction coefficient between robot and boxes.
-        random_start: whether the robot's start is random.
-    """
-
-    layout: str
-    boxes: int | None = None
-    box_size: float | None = None
-    box_yaw: str
-    wheeled: float = 0.0
-    robot: str | None = None
-    bumper: str | None = None
-    bumper_friction: float | None = None
-    random_start: bool
+    layout: str  # name of the layout
+    boxes: PositiveInt | None = None  # number of boxes, at least 1
+    # side of the boxes [m], at least 1 % of the preset's; their least spacing grows with it
+    box_size: PositiveFloat | None = None
+    box_yaw: Yaw  # headings of the boxes at the start, ``"aligned"`` or ``"random"``
+    wheeled: Fraction = 0.0  # fraction of the boxes that stand on casters, 0 to 1
+    robot: str | None = None  # one of the preset's robots
+    # one of `pushplan.world.BUMPERS`, where the robot's can be changed
+    bumper: Annotated[str, OneOf(BUMPERS)] | None = None
+    bumper_friction: NonNegativeFloat | None = None  # friction coefficient between robot and boxes
+    random_start: bool  # whether the robot's start is random
 
     layouts: ClassVar[tuple[str, ...]]
 
     def __post_init__(self) -> None:
-        put = object.__setattr__
+        super().__post_init__()
         choice("layout", self.layout, self.layouts)
-        choice("box_yaw", self.box_yaw, ("aligned", "random"))
-        put(self, "wheeled", number("wheeled", self.wheeled, low=0.0, high=1.0))
-        if self.boxes is not None:
-            put(self, "boxes", integer("boxes", self.boxes, low=1))
-        if self.box_size is not None:
-            put(self, "box_size", number("box_size", self.box_size, low=0.0, open_low=True))
-        if self.bumper is not None:
-            choice("bumper", self.bumper, BUMPERS)
-        if self.bumper_friction is not None:
-            friction = number("bumper_friction", self.bumper_friction, low=0.0)
-            put(self, "bumper_friction", friction)
-        if not isinstance(self.random_start, bool | np.bool_):
-            raise InvalidInputError(
-                f"random_start must be true or false, got {self.random_start!r}"
-            )
 
 
 class ManipulationTask(Task):
@@ -142,25 +105,10 @@ class ManipulationTask(Task):
 
     goal: ManipulationGoal
     preset: ManipulationPreset
-    preset_table: ClassVar[Mapping[str, ManipulationPreset]]
-    variation_class: ClassVar[type[ManipulationVariations]]
+    variations: ManipulationVariations
 
-    def __init__(
-        self,
-        *,
-        preset: str = "benchmark",
-        variations: Mapping[str, object] | None = None,
-        action: str = "heading",
-    ) -> None:
-        if preset not in self.preset_table:
-            raise UnknownNameError(f"preset of {self.name}", preset, self.preset_table)
-        self.preset = dimensions = self.preset_table[preset]
-        self.variations = wanted = self.variation_class.read(
-            {} if variations is None else variations
-        )
-        if action not in self.actions:
-            raise UnknownNameError(f"action of task {self.name!r}", action, self.actions)
-        self.action = action
+    def _prepare(self) -> None:
+        dimensions, wanted = self.preset, self.variations
         self.robot = self._make_robot()
         self.materials = self._make_materials()
         self.control_step = dimensions.control_step
@@ -256,14 +204,13 @@ class ManipulationTask(Task):
         if not reach.within(middle[None], radius + extent).all():
             candidates = candidates[:0]
         pose = self._free_pose(candidates, free_space, reach)
-        footprint = [shapely.Polygon(transform(pose, part)) for part in self.robot.parts]
         region, keep_off = self._box_region()
         preset = self.preset
         poses = free_space.place_squares(
             rng,
             self.box_count,
             size,
-            keep_off=[(shape, 0.0) for shape in (*footprint, *keep_off)],
+            keep_off=[(shape, 0.0) for shape in (*footprint_at(self.robot, pose), *keep_off)],
             gap=GAP * size,
             random_yaw=wanted.box_yaw == "random",
             spacing=preset.box_spacing / preset.box_size * size,
@@ -274,7 +221,7 @@ class ManipulationTask(Task):
             robot=self.robot,
             robot_pose=pose,
             static=static,
-            movables=self._boxes(rng, poses),
+            movables=square_boxes(rng, poses, size, mass=preset.box_mass, wheeled=wanted.wheeled),
             goal=self.goal,
         )
 
@@ -283,25 +230,12 @@ class ManipulationTask(Task):
         near = reach.within(candidates[:, :2], self.robot.circumscribed_radius)
         for candidate in candidates[near]:
             pose: FloatArray = candidate
-            parts = [shapely.Polygon(transform(pose, part)) for part in self.robot.parts]
-            if free_space.is_free(np.array(parts), GAP * self.box_size).all():
+            parts = np.array(footprint_at(self.robot, pose))
+            if free_space.is_free(parts, GAP * self.box_size).all():
                 return pose
         raise ScenarioError(
             f"{self.name}: there is no free start for robot {self.robot.name!r} in layout "
             f"{self.variations.layout!r} from which it can get to the goal"
-        )
-
-    def _boxes(self, rng: np.random.Generator, poses: FloatArray) -> Movables:
-        count, half = len(poses), 0.5 * self.box_size
-        wheeled = np.zeros(count, dtype=bool)
-        wheeled[rng.permutation(count)[: round(self.variations.wheeled * count)]] = True
-        outline = np.array([(-half, -half), (half, -half), (half, half), (-half, half)])
-        mass = self.preset.box_mass
-        return Movables.from_outlines(
-            [outline] * count,
-            poses,
-            masses=None if mass is None else np.full(count, mass),
-            wheeled=wheeled,
         )
 
     def goal_distances(self, poses: FloatArray) -> FloatArray:

@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 import numpy as np
 import shapely
 
 from pushplan.envs.tasks.base import StepOutcome, Task, drive_of
-from pushplan.envs.tasks.layout import FreeSpace
+from pushplan.envs.tasks.layout import FreeSpace, footprint_at, square_boxes
 from pushplan.envs.tasks.maze_presets import PRESETS, MazePreset
-from pushplan.envs.tasks.variations import TaskVariations
+from pushplan.envs.tasks.variations import TaskVariations, Yaw
 from pushplan.geometry.distance_field import GeodesicField, geodesic_field
 from pushplan.observation import ImageObservation, ObservationBuilder, StateObservation
 from pushplan.world import (
@@ -25,8 +24,14 @@ from pushplan.world import (
     UnknownNameError,
     World,
 )
-from pushplan.world.checks import FloatArray, choice, integer, number
-from pushplan.world.outline import transform
+from pushplan.world.checked_fields import (
+    Fraction,
+    NonNegativeFloat,
+    NonNegativeInt,
+    OneOf,
+    PositiveFloat,
+)
+from pushplan.world.checks import FloatArray
 
 WALL_REWARD = -50.0
 SUCCESS_REWARD = 200.0
@@ -40,46 +45,21 @@ _START_TRIES = 2000
 
 @dataclass(frozen=True)
 class MazeVariations(TaskVariations):
-    """What may depart from a preset; None leaves the preset's value.
-
-    Args:
-        shape: ``"u"`` or ``"z"``.
-        boxes: number of boxes.
-        box_size: side of the boxes [m].
-        box_yaw: headings of the boxes at the start, ``"aligned"`` with the walls or ``"random"``.
-        wheeled: fraction of the boxes that stand on casters, 0 to 1.
-        random_start: whether the robot starts anywhere instead of at the preset's start.
-        bumper: what the testbed's robot carries in front, one of `pushplan.world.BUMPERS`.
-        bumper_friction: friction coefficient between robot and boxes.
-    """
+    """What may depart from a preset; None leaves the preset's value."""
 
     task = "maze"
 
-    shape: str = "u"
-    boxes: int = 5
-    box_size: float | None = None
-    box_yaw: str = "aligned"
-    wheeled: float = 0.0
+    shape: Annotated[str, OneOf(("u", "z"))] = "u"  # ``"u"`` or ``"z"``
+    boxes: NonNegativeInt = 5  # number of boxes
+    box_size: PositiveFloat | None = None  # side of the boxes [m]
+    # headings of the boxes at the start, ``"aligned"`` with the walls or ``"random"``
+    box_yaw: Yaw = "aligned"
+    wheeled: Fraction = 0.0  # fraction of the boxes that stand on casters, 0 to 1
+    # whether the robot starts anywhere instead of at the preset's start
     random_start: bool | None = None
+    # what the testbed's robot carries in front, one of `pushplan.world.BUMPERS`
     bumper: str | None = None
-    bumper_friction: float | None = None
-
-    def __post_init__(self) -> None:
-        put = object.__setattr__
-        choice("shape", self.shape, ("u", "z"))
-        choice("box_yaw", self.box_yaw, ("aligned", "random"))
-        put(self, "boxes", integer("boxes", self.boxes, low=0))
-        put(self, "wheeled", number("wheeled", self.wheeled, low=0.0, high=1.0))
-        if self.box_size is not None:
-            size = number("box_size", self.box_size, low=0.0, open_low=True)
-            put(self, "box_size", size)
-        if self.random_start is not None and not isinstance(self.random_start, bool | np.bool_):
-            raise InvalidInputError(
-                f"random_start must be true or false, got {self.random_start!r}"
-            )
-        if self.bumper_friction is not None:
-            friction = number("bumper_friction", self.bumper_friction, low=0.0)
-            put(self, "bumper_friction", friction)
+    bumper_friction: NonNegativeFloat | None = None  # friction coefficient between robot and boxes
 
 
 class MazeTask(Task):
@@ -97,21 +77,16 @@ class MazeTask(Task):
     actions: ClassVar[tuple[str, ...]] = ("turn_rate", "wheels", "velocity")
     observations: ClassVar[tuple[str, ...]] = ("image", "state")
 
-    def __init__(
-        self,
-        *,
-        preset: str = "benchmark",
-        variations: Mapping[str, object] | None = None,
-        action: str = "turn_rate",
-    ) -> None:
-        if preset not in PRESETS:
-            raise UnknownNameError("preset of the maze", preset, PRESETS)
-        self.preset: MazePreset = PRESETS[preset]
-        self.variations = MazeVariations.read({} if variations is None else variations)
+    preset: MazePreset
+    preset_table = PRESETS
+    variations: MazeVariations
+    variation_class = MazeVariations
+
+    def _prepare(self) -> None:
         try:
-            self.robot = self.preset.robot(drive_of(action), self.variations.bumper)
+            self.robot = self.preset.robot(drive_of(self.action), self.variations.bumper)
         except InvalidInputError as error:
-            raise ScenarioError(f"maze, preset {preset!r}: {error}") from error
+            raise ScenarioError(f"maze, preset {self.preset_name!r}: {error}") from error
         self.control_step = self.preset.control_step
         friction = self.variations.bumper_friction
         self.materials = (
@@ -147,40 +122,28 @@ class MazeTask(Task):
         """A new start: the robot, then boxes off it, off each other, the walls and the goal."""
         self._steps = 0
         pose = self._start_pose(rng)
-        movables = self._boxes(rng, pose)
         return World(
             robot=self.robot,
             robot_pose=pose,
             static=self.static,
-            movables=movables,
+            movables=self._boxes(rng, pose),
             goal=self.goal,
         )
 
     def _boxes(self, rng: np.random.Generator, robot_pose: FloatArray) -> Movables:
         wanted, size = self.variations, self.box_size
-        footprint = [shapely.Polygon(transform(robot_pose, p)) for p in self.robot.parts]
         poses = self._free_space.place_squares(
             rng,
             wanted.boxes,
             size,
             keep_off=[
                 (shapely.Point(self.goal.center), self.goal.radius),
-                *((part, 0.0) for part in footprint),
+                *((part, 0.0) for part in footprint_at(self.robot, robot_pose)),
             ],
             gap=GAP * size,
             random_yaw=wanted.box_yaw == "random",
         )
-        wheeled = np.zeros(wanted.boxes, dtype=bool)
-        wheeled[rng.permutation(wanted.boxes)[: round(wanted.wheeled * wanted.boxes)]] = True
-        half = 0.5 * size
-        outline = np.array([(-half, -half), (half, -half), (half, half), (-half, half)])
-        mass = self.preset.box_mass
-        return Movables.from_outlines(
-            [outline] * wanted.boxes,
-            poses,
-            masses=None if mass is None else np.full(wanted.boxes, mass),
-            wheeled=wheeled,
-        )
+        return square_boxes(rng, poses, size, mass=self.preset.box_mass, wheeled=wanted.wheeled)
 
     def _start_pose(self, rng: np.random.Generator) -> FloatArray:
         """The preset's start, or a random one from which the robot can get away.
@@ -218,9 +181,8 @@ class MazeTask(Task):
             headings = pose[2] + side * angles
             around = np.stack([np.sin(headings), -np.cos(headings)], axis=1)
             places = np.column_stack([center + radius * around, headings])
-            outlines = [transform(place, part) for place in places for part in self.robot.parts]
-            shapes = np.array([shapely.Polygon(outline) for outline in outlines])
-            if self._free_space.is_free(shapes, GAP * self.box_size).all():
+            shapes = [part for place in places for part in footprint_at(self.robot, place)]
+            if self._free_space.is_free(np.array(shapes), GAP * self.box_size).all():
                 return True
         return False
 

@@ -24,50 +24,29 @@ from pushplan.world.checks import choice
 
 @dataclass(frozen=True)
 class MazePreset:
-    """One set of dimensions. Mazes are rooms with their lower left corner at the origin.
+    """One set of dimensions. Mazes are rooms with their lower left corner at the origin."""
 
-    Args:
-        rooms: width and length of the room by shape [m].
-        wall: half thickness of the walls [m].
-        thick_lines: whether walls are rounded segments whose centre lines bound the room, or
-            boxes around the free room.
-        starts: fixed start x, y [m], theta [rad], by shape.
-        goals: goal point by shape [m].
-        goal_radius: of the goal itself [m].
-        robot_radius: added to it, as the robot's centre is what has to get there [m].
-        random_start: whether the start is random unless said otherwise.
-        max_speed: [m/s].
-        max_turn_rate: [rad/s].
-        box_size: side of the boxes [m].
-        box_mass: [kg], or None for 1 kg/m² of their area.
-        materials: friction and rolling.
-        control_step: [s].
-        max_steps: control steps until the episode is cut off.
-        progress_reward: for the whole way to the goal.
-        work_reward: per kg m of work on the boxes.
-        window: side of the image observation [m].
-        field_resolution: cells of the goal distance field [m].
-    """
-
-    rooms: Mapping[str, tuple[float, float]]
-    wall: float
+    rooms: Mapping[str, tuple[float, float]]  # width and length of the room by shape [m]
+    wall: float  # half thickness of the walls [m]
+    # whether walls are rounded segments whose centre lines bound the room, or boxes around the free
+    # room
     thick_lines: bool
-    starts: Mapping[str, tuple[float, float, float]]
-    goals: Mapping[str, tuple[float, float]]
-    goal_radius: float
-    robot_radius: float
-    random_start: bool
-    max_speed: float
-    max_turn_rate: float
-    box_size: float
-    box_mass: float | None
-    materials: Materials
-    control_step: float
-    max_steps: int
-    progress_reward: float
-    work_reward: float
-    window: float
-    field_resolution: float
+    starts: Mapping[str, tuple[float, float, float]]  # fixed start x, y [m], theta [rad], by shape
+    goals: Mapping[str, tuple[float, float]]  # goal point by shape [m]
+    goal_radius: float  # of the goal itself [m]
+    robot_radius: float  # added to it, as the robot's centre is what has to get there [m]
+    random_start: bool  # whether the start is random unless said otherwise
+    max_speed: float  # [m/s]
+    max_turn_rate: float  # [rad/s]
+    box_size: float  # side of the boxes [m]
+    box_mass: float | None  # [kg], or None for 1 kg/m² of their area
+    materials: Materials  # friction and rolling
+    control_step: float  # [s]
+    max_steps: int  # control steps until the episode is cut off
+    progress_reward: float  # for the whole way to the goal
+    work_reward: float  # per kg m of work on the boxes
+    window: float  # side of the image observation [m]
+    field_resolution: float  # cells of the goal distance field [m]
 
     def robot(self, drive: Drive, bumper: str | None = None) -> RobotModel:
         """The robot; a differential drive may also reverse at full speed.

@@ -16,15 +16,10 @@ from pushplan.world.checks import BoolArray, FloatArray, IntArray
 
 @dataclass(frozen=True, eq=False)
 class Reach:
-    """The connected free space of a disc-shaped robot around one point.
+    """The connected free space of a disc-shaped robot around one point."""
 
-    Args:
-        grid: where the cells are.
-        distances: (rows, columns) distance of each cell to the nearest place where the robot's
-            centre can be [m].
-    """
-
-    grid: Grid
+    grid: Grid  # where the cells are
+    # (rows, columns) distance of each cell to the nearest place where the robot's centre can be [m]
     distances: FloatArray
 
     @classmethod

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 import numpy as np
 import shapely
@@ -24,7 +23,8 @@ from pushplan.world import (
     UnknownNameError,
     World,
 )
-from pushplan.world.checks import FloatArray, number
+from pushplan.world.checked_fields import Fraction, Limits, PositiveFloat
+from pushplan.world.checks import FloatArray
 from pushplan.world.outline import transform
 
 OUTSIDE_REWARD = -50.0
@@ -41,44 +41,27 @@ _UP = 0.5 * math.pi
 
 @dataclass(frozen=True)
 class ShipIceVariations(TaskVariations):
-    """What may depart from a preset; None leaves the preset's value.
-
-    Args:
-        concentration: area of the floes as a fraction of that of the ice field, 0 to 0.5.
-        clumping: 0 for ice that is equally likely everywhere, 1 for patches and open water.
-        goal_distance: how far the goal line lies ahead of the start line [m].
-        start_x: where on the start line the ship starts [m]; anywhere if None.
-        start_heading: [rad], straight ahead by default.
-        ice_file: ice from a file, as `pushplan.scenarios.load_ice` reads it, instead of random
-            ice.
-    """
+    """What may depart from a preset; None leaves the preset's value."""
 
     task = "ship_ice"
 
-    concentration: float | None = None
-    clumping: float = 0.6
-    goal_distance: float | None = None
-    start_x: float | None = None
-    start_heading: float = _UP
+    # area of the floes as a fraction of that of the ice field, 0 to 0.5
+    concentration: Annotated[float, Limits(0.0, 0.5)] | None = None
+    # 0 for ice that is equally likely everywhere, 1 for patches and open water
+    clumping: Fraction = 0.6
+    # how far the goal line lies ahead of the start line [m]
+    goal_distance: PositiveFloat | None = None
+    start_x: float | None = None  # where on the start line the ship starts [m]; anywhere if None
+    start_heading: float = _UP  # [rad], straight ahead by default
+    # ice from a file, as `pushplan.scenarios.load_ice` reads it, instead of random ice
     ice_file: str | None = None
 
     def __post_init__(self) -> None:
-        put = object.__setattr__
+        super().__post_init__()
         if self.ice_file is not None and not isinstance(self.ice_file, str):
             raise InvalidInputError(f"ice_file must be a path as text, got {self.ice_file!r}")
-        if self.concentration is not None:
-            fraction = number("concentration", self.concentration, low=0.0, high=0.5)
-            put(self, "concentration", fraction)
-            if self.ice_file is not None:
-                raise InvalidInputError("concentration and ice_file exclude each other")
-        put(self, "clumping", number("clumping", self.clumping, low=0.0, high=1.0))
-        if self.goal_distance is not None:
-            away = number("goal_distance", self.goal_distance, low=0.0, open_low=True)
-            put(self, "goal_distance", away)
-        if self.start_x is not None:
-            put(self, "start_x", number("start_x", self.start_x))
-        heading = number("start_heading", self.start_heading)
-        put(self, "start_heading", heading)
+        if self.concentration is not None and self.ice_file is not None:
+            raise InvalidInputError("concentration and ice_file exclude each other")
 
 
 class ShipIceTask(Task):
@@ -96,19 +79,12 @@ class ShipIceTask(Task):
     actions: ClassVar[tuple[str, ...]] = ("turn_rate",)
     observations: ClassVar[tuple[str, ...]] = ("image", "state")
 
-    def __init__(
-        self,
-        *,
-        preset: str = "benchmark",
-        variations: Mapping[str, object] | None = None,
-        action: str = "turn_rate",
-    ) -> None:
-        if preset not in PRESETS:
-            raise UnknownNameError("preset of ship_ice", preset, PRESETS)
-        if action not in self.actions:
-            raise UnknownNameError("action of ship_ice", action, self.actions)
-        self.preset: ShipPreset = PRESETS[preset]
-        self.variations = ShipIceVariations.read({} if variations is None else variations)
+    preset: ShipPreset
+    preset_table = PRESETS
+    variations: ShipIceVariations
+    variation_class = ShipIceVariations
+
+    def _prepare(self) -> None:
         self.robot = self.preset.robot()
         self.control_step = self.preset.control_step
         self.materials = self.preset.materials

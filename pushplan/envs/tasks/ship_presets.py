@@ -23,47 +23,26 @@ ICE_THICKNESS = 1.2
 
 @dataclass(frozen=True)
 class ShipPreset:
-    """One set of dimensions. The channel has its lower left corner at the origin; +y is ahead.
+    """One set of dimensions. The channel has its lower left corner at the origin; +y is ahead."""
 
-    Args:
-        channel: width and length [m]. It has no walls.
-        ice: y from which and to which there is ice [m].
-        sizes: of the floes.
-        floe_density: mass of a floe over its area [kg/m²].
-        footprint: (N, 2) corners of the ship about its origin [m].
-        ship_mass: as the metrics count it [kg].
-        max_speed: at which the ship always goes [m/s].
-        max_turn_rate: [rad/s].
-        start_y: of the ship's origin [m].
-        side_margin: least distance of a random start from the sides of the channel [m].
-        clearance: water around the hull that is free of ice at the start [m].
-        goal_y: of the goal line [m].
-        materials: friction, water and the third dimension.
-        control_step: [s].
-        max_steps: control steps until the episode is cut off.
-        work_reward: per kg m of work on the floes.
-        window: side of the image observation [m].
-        shift: how far its middle lies ahead of the ship's origin [m].
-    """
-
-    channel: tuple[float, float]
-    ice: tuple[float, float]
-    sizes: FloeSizes
-    floe_density: float
-    footprint: FloatArray
-    ship_mass: float
-    max_speed: float
-    max_turn_rate: float
-    start_y: float
-    side_margin: float
-    clearance: float
-    goal_y: float
-    materials: Materials
-    control_step: float
-    max_steps: int
-    work_reward: float
-    window: float
-    shift: float
+    channel: tuple[float, float]  # width and length [m]. It has no walls.
+    ice: tuple[float, float]  # y from which and to which there is ice [m]
+    sizes: FloeSizes  # of the floes
+    floe_density: float  # mass of a floe over its area [kg/m²]
+    footprint: FloatArray  # (N, 2) corners of the ship about its origin [m]
+    ship_mass: float  # as the metrics count it [kg]
+    max_speed: float  # at which the ship always goes [m/s]
+    max_turn_rate: float  # [rad/s]
+    start_y: float  # of the ship's origin [m]
+    side_margin: float  # least distance of a random start from the sides of the channel [m]
+    clearance: float  # water around the hull that is free of ice at the start [m]
+    goal_y: float  # of the goal line [m]
+    materials: Materials  # friction, water and the third dimension
+    control_step: float  # [s]
+    max_steps: int  # control steps until the episode is cut off
+    work_reward: float  # per kg m of work on the floes
+    window: float  # side of the image observation [m]
+    shift: float  # how far its middle lies ahead of the ship's origin [m]
 
     def robot(self) -> RobotModel:
         """The ship."""

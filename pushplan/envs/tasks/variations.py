@@ -4,12 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import fields
-from typing import Any, ClassVar, Self
+from typing import Annotated, Any, ClassVar, Self
 
 from pushplan.world import InvalidInputError, ScenarioError, UnknownNameError
+from pushplan.world.checked_fields import CheckedFields, OneOf
+
+Yaw = Annotated[str, OneOf(("aligned", "random"))]
+"""Headings of boxes at the start."""
 
 
-class TaskVariations:
+class TaskVariations(CheckedFields):
     """Base of the frozen dataclasses that say what may depart from a task's presets."""
 
     task: ClassVar[str]

@@ -13,21 +13,13 @@ from pushplan.world.checks import FloatArray
 
 @dataclass(frozen=True)
 class BuiltLattice:
-    """A lattice among the things of one world.
+    """A lattice among the things of one world."""
 
-    Args:
-        lattice: for the search.
-        frame: in which it lies; its origin is the robot.
-        motions: its primitives.
-        start: row, column and heading [rad] of the robot.
-        arrives: whether the goal of the lattice is that of the world, not one before it.
-    """
-
-    lattice: PoseLattice
-    frame: Frame
-    motions: PrimitiveSet
-    start: tuple[int, int, float]
-    arrives: bool
+    lattice: PoseLattice  # for the search
+    frame: Frame  # in which it lies; its origin is the robot
+    motions: PrimitiveSet  # its primitives
+    start: tuple[int, int, float]  # row, column and heading [rad] of the robot
+    arrives: bool  # whether the goal of the lattice is that of the world, not one before it
 
     def node(self, heading: int, row: int, column: int) -> int:
         """Number of a node."""

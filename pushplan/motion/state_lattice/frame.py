@@ -12,17 +12,11 @@ from pushplan.world.checks import FloatArray
 
 @dataclass(frozen=True)
 class Frame:
-    """A turned and shifted frame.
+    """A turned and shifted frame."""
 
-    Args:
-        x: of its origin [m], world frame.
-        y: likewise.
-        angle: of its first axis [rad].
-    """
-
-    x: float
-    y: float
-    angle: float
+    x: float  # of its origin [m], world frame
+    y: float  # likewise
+    angle: float  # of its first axis [rad]
 
     @classmethod
     def towards_goal(cls, world: World) -> Frame:

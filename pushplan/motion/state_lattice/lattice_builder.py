@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -28,29 +29,18 @@ _MOST_NODES = 3_000_000
 _MOST_CELLS = 1_000_000
 
 
+@dataclass(eq=False)
 class LatticeBuilder:
-    """Makes the lattice of one planning call.
+    """Makes the lattice of one planning call."""
 
-    Args:
-        world: the snapshot.
-        config: parameters.
-        radius: least turning radius [m].
-        side: distance of the robot's origin from the bounds [m].
-        floe_costs: what floes cost; None where they cost nothing.
-    """
+    world: World
+    config: LatticeConfig
+    radius: float  # least turning radius [m]
+    side: float  # distance of the robot's origin from the bounds [m]
+    floe_costs: FloeCostFunction | None = None  # None where floes cost nothing
 
-    def __init__(
-        self,
-        world: World,
-        config: LatticeConfig,
-        *,
-        radius: float,
-        side: float,
-        floe_costs: FloeCostFunction | None = None,
-    ) -> None:
-        self.world, self.config, self.radius, self.side = world, config, radius, side
-        self._floe_costs = floe_costs
-        robot = world.robot
+    def __post_init__(self) -> None:
+        world, config, radius, robot = self.world, self.config, self.radius, self.world.robot
         # the radius is a whole number of steps, so that few sets of primitives are ever needed
         wanted = config.step * 2.0 * max(robot.inscribed_radius, 0.1 * robot.circumscribed_radius)
         ratio = float(min(max(round(radius / wanted), 2), 40))
@@ -158,9 +148,9 @@ class LatticeBuilder:
             inflation=self.config.inflation,
         )
         floes = self.world.movables
-        if self._floe_costs is None or not len(floes):
+        if self.floe_costs is None or not len(floes):
             return lattice, grid.no_costs()
-        return lattice, grid.cost_sums(floes, self._floe_costs(self.world, self.cell))
+        return lattice, grid.cost_sums(floes, self.floe_costs(self.world, self.cell))
 
     @property
     def _hull(self) -> int:

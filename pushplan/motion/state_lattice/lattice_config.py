@@ -3,16 +3,24 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Self
+from typing import Annotated, Any, Self
 
 from pushplan.motion.state_lattice.primitive_set import PrimitiveConfig
-from pushplan.world.checks import choice, integer, number
+from pushplan.world.checked_fields import (
+    CheckedFields,
+    Limits,
+    NonNegativeFloat,
+    OneOf,
+    PositiveFloat,
+    PositiveFraction,
+    PositiveInt,
+)
 
 HEURISTICS = ("estimate", "bound")
 
 
 @dataclass(frozen=True)
-class LatticeConfig:
+class LatticeConfig(CheckedFields):
     """Parameters of a `LatticeBuilder`. R is the circumscribed radius, B twice the inscribed one.
 
     Args:
@@ -34,23 +42,17 @@ class LatticeConfig:
     headings: int = 16
     variants: int = 2
     shifts: int = 3
-    step: float = 0.5
-    cells_per_step: int = 4
-    turn_fraction: float = 0.9
-    inset: float = 0.2
-    horizon: float = 60.0
-    spacing: float = 0.15
-    heuristic: str = "estimate"
-    inflation: float = 1.2
+    step: PositiveFloat = 0.5
+    cells_per_step: PositiveInt = 4
+    turn_fraction: PositiveFraction = 0.9
+    inset: NonNegativeFloat = 0.2
+    horizon: PositiveFloat = 60.0
+    spacing: PositiveFloat = 0.15
+    heuristic: Annotated[str, OneOf(HEURISTICS)] = "estimate"
+    inflation: Annotated[float, Limits(1.0)] = 1.2
 
     def __post_init__(self) -> None:
-        choice("heuristic", self.heuristic, HEURISTICS)
-        number("inset", self.inset, low=0.0)
-        number("turn_fraction", self.turn_fraction, low=0.0, high=1.0, open_low=True)
-        for name in ("step", "horizon", "spacing"):
-            number(name, getattr(self, name), low=0.0, open_low=True)
-        integer("cells_per_step", self.cells_per_step, low=1)
-        number("inflation", self.inflation, low=1.0)
+        super().__post_init__()
         PrimitiveConfig(self.headings, 1.0, self.variants, self.shifts)
 
     @classmethod

@@ -26,19 +26,12 @@ _BLOCKED_MARGIN = 0.8
 
 @dataclass(frozen=True)
 class LatticeMap:
-    """A grid of cells that is aligned with a lattice.
+    """A grid of cells that is aligned with a lattice."""
 
-    Args:
-        frame: of the lattice.
-        cell: side of a cell [m].
-        origin: (2,) row and column of the frame's origin.
-        shape: rows and columns.
-    """
-
-    frame: Frame
-    cell: float
-    origin: IntArray
-    shape: tuple[int, int]
+    frame: Frame  # of the lattice
+    cell: float  # side of a cell [m]
+    origin: IntArray  # (2,) row and column of the frame's origin
+    shape: tuple[int, int]  # rows and columns
 
     def to_cells(self, points_world: FloatArray) -> FloatArray:
         """(N, 2) points of the world as rows and columns of the map."""

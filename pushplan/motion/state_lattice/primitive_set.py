@@ -55,21 +55,13 @@ class PrimitiveConfig:
 
 @dataclass(frozen=True, eq=False)
 class PrimitiveSet(ArrayRecord):
-    """H headings and P primitives, those of one heading after those of the one before.
+    """H headings and P primitives, those of one heading after those of the one before."""
 
-    Args:
-        config: what it was made from.
-        angles: (H,) headings [rad], increasing from 0.
-        first: (H + 1,) where the primitives of each heading start.
-        ends: (P, 3) steps along x and y, and the heading at the end.
-        pieces: (P, 3, 2) length [steps] and curvature [1/steps] of the three arcs.
-    """
-
-    config: PrimitiveConfig
-    angles: FloatArray
-    first: IntArray
-    ends: IntArray
-    pieces: FloatArray
+    config: PrimitiveConfig  # what it was made from
+    angles: FloatArray  # (H,) headings [rad], increasing from 0
+    first: IntArray  # (H + 1,) where the primitives of each heading start
+    ends: IntArray  # (P, 3) steps along x and y, and the heading at the end
+    pieces: FloatArray  # (P, 3, 2) length [steps] and curvature [1/steps] of the three arcs
 
     @functools.cached_property
     def lengths(self) -> FloatArray:

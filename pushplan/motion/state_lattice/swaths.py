@@ -13,15 +13,11 @@ from pushplan.world.checks import FloatArray, IntArray
 
 
 class Swaths(NamedTuple):
-    """Newly covered cells of P primitives, relative to the cell of the start.
+    """Newly covered cells of P primitives, relative to the cell of the start."""
 
-    Args:
-        first: (P + 1,) where the runs of each primitive start.
-        runs: (R, 3) column, first row, and the row after the last: columns, since a robot drives
-            along rows most of the time and its swath then is few long runs.
-    """
-
-    first: IntArray
+    first: IntArray  # (P + 1,) where the runs of each primitive start
+    # (R, 3) column, first row, and the row after the last: columns, since a robot drives along rows
+    # most of the time and its swath then is few long runs
     runs: IntArray
 
 
@@ -33,16 +29,12 @@ class _Key(NamedTuple):
 
 
 def swaths(
-    primitives: PrimitiveSet, vertices: FloatArray, offsets: IntArray, cells_per_step: int
+    primitives: PrimitiveSet,  # the set
+    vertices: FloatArray,  # (V, 2) convex parts of the footprint in lattice steps, body frame
+    offsets: IntArray,  # (Q + 1,) where each part starts
+    cells_per_step: int,  # how many cells of the map a lattice step is long
 ) -> Swaths:
-    """Swaths of all primitives of a set, cached by everything that they depend on.
-
-    Args:
-        primitives: the set.
-        vertices: (V, 2) convex parts of the footprint in lattice steps, body frame.
-        offsets: (Q + 1,) where each part starts.
-        cells_per_step: how many cells of the map a lattice step is long.
-    """
+    """Swaths of all primitives of a set, cached by everything that they depend on."""
     rounded = np.round(vertices, 9)
     key = _Key(rounded.tobytes(), offsets.tobytes())
     return _swaths(primitives, key, cells_per_step)

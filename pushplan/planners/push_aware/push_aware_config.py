@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Annotated
 
 from pushplan.motion.path_search_config import PathSearchConfig
 from pushplan.motion.speed_profile import TIGHTEST
-from pushplan.world.checks import integer, number
+from pushplan.world.checked_fields import Limits, NonNegativeFloat, PositiveFloat, PositiveInt
 
 
 @dataclass(frozen=True)
@@ -44,33 +45,15 @@ class PushAwareConfig(PathSearchConfig):
     turn_fraction: float = 0.98
     margin: float = 0.08
     default_iterations: int = 20_000
-    differential_radius: float = 1.0
-    heuristic_inflation: float = 1.05
-    pruning_factor: float = 0.92
-    arc: float = 2.0
-    curvatures: int = 5
-    nodes: int = 100_000
-    memory: float = 48.0
-    expansions: int = 30
-    first_search: int = 1000
-    slack: float = 0.05
-    cost_sigma: float = 0.7
-    random_fraction: float = 0.03
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        for name in (
-            "heuristic_inflation",
-            "pruning_factor",
-            "slack",
-            "cost_sigma",
-            "random_fraction",
-        ):
-            number(name, getattr(self, name), low=0.0)
-        for name in ("arc", "memory"):
-            number(name, getattr(self, name), low=0.0, open_low=True)
-        number("differential_radius", self.differential_radius, low=TIGHTEST)
-        integer("curvatures", self.curvatures, low=3)
-        integer("nodes", self.nodes, low=2)
-        for name in ("expansions", "first_search"):
-            integer(name, getattr(self, name), low=1)
+    differential_radius: Annotated[float, Limits(TIGHTEST)] = 1.0
+    heuristic_inflation: NonNegativeFloat = 1.05
+    pruning_factor: NonNegativeFloat = 0.92
+    arc: PositiveFloat = 2.0
+    curvatures: Annotated[int, Limits(3)] = 5
+    nodes: Annotated[int, Limits(2)] = 100_000
+    memory: PositiveFloat = 48.0
+    expansions: PositiveInt = 30
+    first_search: PositiveInt = 1000
+    slack: NonNegativeFloat = 0.05
+    cost_sigma: NonNegativeFloat = 0.7
+    random_fraction: NonNegativeFloat = 0.03

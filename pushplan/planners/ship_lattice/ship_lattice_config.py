@@ -3,10 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Self
+from typing import Annotated, Any, Self
 
 from pushplan.motion.state_lattice.lattice_config import LatticeConfig
-from pushplan.world.checks import choice, integer, number
+from pushplan.world.checked_fields import (
+    Limits,
+    NonNegativeFloat,
+    NonNegativeInt,
+    OneOf,
+    PositiveInt,
+)
+from pushplan.world.checks import number
 from pushplan.world.errors import InvalidInputError
 
 FLOE_COSTS = ("displacement", "kinetic-energy")
@@ -35,27 +42,20 @@ class ShipLatticeConfig(LatticeConfig):
             first path, and predicts nothing.
     """
 
-    push_weight: float = 1.5
-    floe_cost: str = "displacement"
-    collision_weight: float = 1.0
-    displacement: float = 2.7
-    exponent: float = -0.5
-    side: float = 0.75
-    batch: int = 100
+    push_weight: NonNegativeFloat = 1.5
+    floe_cost: Annotated[str, OneOf(FLOE_COSTS)] = "displacement"
+    collision_weight: NonNegativeFloat = 1.0
+    displacement: NonNegativeFloat = 2.7
+    exponent: Annotated[float, Limits(-0.9, 4.0)] = -0.5
+    side: NonNegativeFloat = 0.75
+    batch: PositiveInt = 100
     searches: tuple[float, ...] = (1.0, 0.0, 0.5, 2.0, 4.0)
-    refinement: int = 0
-    shortcuts: int = 60
-    sweep_horizon: float = 10.0
+    refinement: NonNegativeInt = 0
+    shortcuts: NonNegativeInt = 60
+    sweep_horizon: NonNegativeFloat = 10.0
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        choice("floe_cost", self.floe_cost, FLOE_COSTS)
-        for name in ("push_weight", "collision_weight", "displacement", "side", "sweep_horizon"):
-            number(name, getattr(self, name), low=0.0)
-        number("exponent", self.exponent, low=-0.9, high=4.0)
-        integer("batch", self.batch, low=1)
-        for name in ("shortcuts", "refinement"):
-            integer(name, getattr(self, name), low=0)
         if not isinstance(self.searches, (tuple, list)) or len(self.searches) == 0:
             raise InvalidInputError(f"searches must be one factor or more, got {self.searches!r}")
         object.__setattr__(self, "searches", tuple(self.searches))

@@ -28,37 +28,21 @@ _MOST_PLACES = 20_000  # rows times columns of the table of costs to go, about
 
 @dataclass(frozen=True)
 class ChannelView:
-    """What a search needs; all in the frame of the channel, y ahead, the ship's start at x = 0.
+    """What a search needs; all in the frame of the channel, y ahead, the ship's start at x = 0."""
 
-    Args:
-        world: the snapshot, in the world frame.
-        turn: angle by which the frame is turned against the world's [rad].
-        start: (3,) pose of the ship.
-        away: y of the goal line [m].
-        channel: where the ship's origin may be; its goal is the goal line, or one before it.
-        near: numbers of the floes that may be met.
-        floes: (K, 3) their poses.
-        bodies: their shapes and the hull's.
-        settings: of their motion.
-        costs: costs to go.
-        length: of the hull [m].
-        radius: least turning radius [m].
-        curvatures: (B,) that the search uses [1/m].
-    """
-
-    world: World
-    turn: float
-    start: FloatArray
-    away: float
-    channel: Channel
-    near: IntArray
-    floes: FloatArray
-    bodies: IceBodies
-    settings: IceSettings
-    costs: CostToGo
-    length: float
-    radius: float
-    curvatures: FloatArray
+    world: World  # the snapshot, in the world frame
+    turn: float  # angle by which the frame is turned against the world's [rad]
+    start: FloatArray  # (3,) pose of the ship
+    away: float  # y of the goal line [m]
+    channel: Channel  # where the ship's origin may be; its goal is the goal line, or one before it
+    near: IntArray  # numbers of the floes that may be met
+    floes: FloatArray  # (K, 3) their poses
+    bodies: IceBodies  # their shapes and the hull's
+    settings: IceSettings  # of their motion
+    costs: CostToGo  # costs to go
+    length: float  # of the hull [m]
+    radius: float  # least turning radius [m]
+    curvatures: FloatArray  # (B,) that the search uses [1/m]
 
     def to_world(self, poses: FloatArray) -> FloatArray:
         """Carry (..., 3) poses from the frame of the channel to the world's."""

@@ -3,12 +3,22 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Annotated
 
-from pushplan.world.checks import integer, number
+from pushplan.world.checked_fields import (
+    CheckedFields,
+    Limits,
+    NonNegativeFloat,
+    NonNegativeInt,
+    PositiveFloat,
+    PositiveFraction,
+    PositiveInt,
+)
+from pushplan.world.checks import integer
 
 
 @dataclass(frozen=True)
-class PredictiveConfig:
+class PredictiveConfig(CheckedFields):
     """Parameters of `PredictiveShip` and `PredictiveShipNetwork`. Lengths in hull lengths.
 
     Args:
@@ -31,32 +41,24 @@ class PredictiveConfig:
         crowding: how much more that is for each typical floe there.
     """
 
-    push_weight: float = 1.5
-    turn_fraction: float = 0.9
-    arc: float = 0.4
-    curvatures: int = 2
-    width: int = 6
-    sparse: int = 150
+    push_weight: NonNegativeFloat = 1.5
+    turn_fraction: PositiveFraction = 0.9
+    arc: PositiveFloat = 0.4
+    curvatures: PositiveInt = 2
+    width: PositiveInt = 6
+    sparse: NonNegativeInt = 150
     widest: int = 48
-    tries: float = 2.5
-    horizon: float = 5.0
-    farthest: float = 40.0
-    margin: float = 1.0
-    row: float = 0.12
-    column: float = 0.1
-    gain: float = 1.5
-    crowding: float = 1.0
+    tries: Annotated[float, Limits(1.0)] = 2.5
+    horizon: PositiveFloat = 5.0
+    farthest: PositiveFloat = 40.0
+    margin: NonNegativeFloat = 1.0
+    row: PositiveFloat = 0.12
+    column: PositiveFloat = 0.1
+    gain: NonNegativeFloat = 1.5
+    crowding: NonNegativeFloat = 1.0
 
     def __post_init__(self) -> None:
-        for name in ("push_weight", "margin", "gain", "crowding"):
-            number(name, getattr(self, name), low=0.0)
-        for name in ("arc", "row", "column", "horizon", "farthest"):
-            number(name, getattr(self, name), low=0.0, open_low=True)
-        number("turn_fraction", self.turn_fraction, low=0.0, high=1.0, open_low=True)
-        number("tries", self.tries, low=1.0)
-        integer("curvatures", self.curvatures, low=1)
-        integer("width", self.width, low=1)
-        integer("sparse", self.sparse, low=0)
+        super().__post_init__()
         integer("widest", self.widest, low=self.width)
 
     def beam_width(self, floes: int) -> int:

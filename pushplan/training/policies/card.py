@@ -25,11 +25,6 @@ _WORDS = {
 def write_card(folder: str | Path, scores: Sequence[ScoreRow], path: str | Path) -> Path:
     """Write the model card of a training.
 
-    Args:
-        folder: of the training.
-        scores: of held-out scenarios.
-        path: the file (.md).
-
     Raises:
         SchemaError: if the folder holds no finished training.
     """

@@ -3,20 +3,18 @@
 from __future__ import annotations
 
 import logging
-import time
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pushplan.training.libraries import need
 from pushplan.training.policies.config import TrainingConfig
 from pushplan.training.policies.dataset import episodes, read_metadata
 from pushplan.training.policies.environment import TrainingEnv
-from pushplan.training.policies.libraries import need
 from pushplan.training.policies.options import BcOptions
-from pushplan.training.policies.run import CurvePoint, Stopwatch, TrainingRun, validate
+from pushplan.training.policies.run import Learned, TrainingRun, Until, train_chunks
 from pushplan.training.policies.sb3_training import chunk_seed
 from pushplan.world import InvalidInputError
 
@@ -30,15 +28,9 @@ def train_bc(
     data: str | Path,
     *,
     device: str = "cpu",
-    until: Callable[[int], bool] | None = None,
+    until: Until | None = None,
 ) -> Any:
     """Fit a network to a data set; ``steps`` and ``chunk`` count the pairs that are shown.
-
-    Args:
-        run: the folder and the configuration.
-        data: folder of the data set.
-        device: of PyTorch.
-        until: asked with the number of chunks that are done; true leaves the training off.
 
     Returns:
         The network with the weights of the best chunk.
@@ -59,25 +51,19 @@ def train_bc(
     if state is not None:
         network.load_state_dict(state["weights"])
         optimizer.load_state_dict(state["optimizer"])
-    watch = Stopwatch(run.seconds)
-    for chunk in range(run.done, run.chunks):
-        if until is not None and until(chunk):
-            break
+
+    def learn(chunk: int) -> Learned:
         _fit(network, optimizer, train, config, chunk, device)
-        began = time.perf_counter()
-        scores = validate(env, lambda seen: _decide(network, seen, device), config.validation)
-        watch.forget(time.perf_counter() - began)
-        point = CurvePoint(
-            min((chunk + 1) * config.chunk, config.steps),
-            watch.seconds,
-            0,
-            float("nan"),
-            float("nan"),
-            *scores,
-            loss=_error(network, test, device),
-        )
-        state = {"weights": network.state_dict(), "optimizer": optimizer.state_dict()}
-        run.save(state, point)
+        steps = min((chunk + 1) * config.chunk, config.steps)
+        return Learned(steps, _error(network, test, device))
+
+    def decide(seen: NDArray[Any]) -> NDArray[Any]:
+        return _decide(network, seen, device)
+
+    def state_now() -> dict[str, Any]:
+        return {"weights": network.state_dict(), "optimizer": optimizer.state_dict()}
+
+    for point in train_chunks(run, env, until, learn=learn, decide=decide, state=state_now):
         log.info(
             "%d of %d pairs, %.0f s: error %.4f held out, success %.2f in validation",
             *(point.steps, config.steps, point.seconds, point.loss, point.valid_success),

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from importlib import resources
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import yaml
 
@@ -17,7 +17,14 @@ from pushplan.learned.builders import builder_from_dict
 from pushplan.learned.outputs import OUTPUTS
 from pushplan.training.policies.options import OPTIONS, Options
 from pushplan.world import InvalidInputError, SchemaError, UnknownNameError
-from pushplan.world.checks import choice, integer, known_keys, number
+from pushplan.world.checked_fields import (
+    CheckedFields,
+    NonNegativeInt,
+    OneOf,
+    PositiveFloat,
+    PositiveInt,
+)
+from pushplan.world.checks import choice, integer, known_keys
 
 ALGORITHMS = tuple(OPTIONS)
 _SCIENTIFIC = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)[eE][-+]?\d+")
@@ -25,17 +32,11 @@ _SCIENTIFIC = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)[eE][-+]?\d+")
 
 @dataclass(frozen=True)
 class ActionChoice:
-    """How the network acts.
+    """How the network acts."""
 
-    Args:
-        mode: action mode of the environment.
-        output: see `pushplan.learned.ActionSpec`.
-        repeat: control steps, or actions, for which a decision stands.
-    """
-
-    mode: str
-    output: str = "continuous"
-    repeat: int = 1
+    mode: str  # action mode of the environment
+    output: str = "continuous"  # see `pushplan.learned.ActionSpec`
+    repeat: int = 1  # control steps, or actions, for which a decision stands
 
     def __post_init__(self) -> None:
         choice("output", self.output, OUTPUTS)
@@ -43,7 +44,7 @@ class ActionChoice:
 
 
 @dataclass(frozen=True)
-class TrainingConfig:
+class TrainingConfig(CheckedFields):
     """What is trained on what. The same configuration, seed and machine give the same policy.
 
     Args:
@@ -66,7 +67,7 @@ class TrainingConfig:
         suites: on which the result is scored, with scenarios that training never draws.
     """
 
-    algorithm: str
+    algorithm: Annotated[str, OneOf(ALGORITHMS)]
     task: str
     scenarios: tuple[Mapping[str, Any], ...]
     observation: Mapping[str, Any]
@@ -74,27 +75,21 @@ class TrainingConfig:
     options: Options
     simulator: str = "pymunk"
     preset: str | None = None
-    steps: int = 100_000
-    seed: int = 0
-    envs: int = 4
-    chunk: int = 10_000
-    reward_scale: float = 1.0
-    limit: int = 0
-    validation: int = 20
+    steps: PositiveInt = 100_000
+    seed: NonNegativeInt = 0
+    envs: PositiveInt = 4
+    chunk: PositiveInt = 10_000
+    reward_scale: PositiveFloat = 1.0
+    limit: NonNegativeInt = 0
+    validation: NonNegativeInt = 20
     suites: tuple[str, ...] = field(default_factory=tuple)
 
     def __post_init__(self) -> None:
-        put = object.__setattr__
-        choice("algorithm", self.algorithm, ALGORITHMS)
+        super().__post_init__()
         choice("task", self.task, tuple(TASKS))
         choice("simulator", self.simulator, tuple(SIMULATORS))
         if self.preset is None:
-            put(self, "preset", default_preset(self.task, self.simulator))
-        for name in ("steps", "envs", "chunk"):
-            integer(name, getattr(self, name), low=1)
-        for name in ("seed", "limit", "validation"):
-            integer(name, getattr(self, name), low=0)
-        put(self, "reward_scale", number("reward_scale", self.reward_scale, low=0.0, open_low=True))
+            object.__setattr__(self, "preset", default_preset(self.task, self.simulator))
         if not self.scenarios:
             raise InvalidInputError("scenarios must hold at least one mapping of variations")
         if not isinstance(self.options, OPTIONS[self.algorithm]):

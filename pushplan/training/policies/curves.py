@@ -12,14 +12,7 @@ from pushplan.training.policies.run import CurvePoint
 def draw_curve(
     points: Sequence[CurvePoint], path: str | Path, title: str, *, pairs: bool = False
 ) -> Path:
-    """Draw return and success over decisions, for training and validation.
-
-    Args:
-        points: rows of the curve.
-        path: the picture (.png).
-        title: above it.
-        pairs: whether steps are pairs of a data set, not decisions.
-    """
+    """Draw return and success over decisions, for training and validation."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 

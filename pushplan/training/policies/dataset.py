@@ -23,8 +23,8 @@ from pushplan.envs import PushEnv
 from pushplan.learned.builders import builder_from_dict, builder_to_dict
 from pushplan.learned.specification import RobotSpec
 from pushplan.observation import ObservationBuilder
+from pushplan.training.libraries import need
 from pushplan.training.policies.environment import TRAINING_SEEDS
-from pushplan.training.policies.libraries import need
 from pushplan.world import (
     ChoosesActions,
     ChoosesObservation,
@@ -32,7 +32,8 @@ from pushplan.world import (
     SchemaError,
     stream,
 )
-from pushplan.world.checks import integer, known_keys, number
+from pushplan.world.checked_fields import CheckedFields, Fraction, NonNegativeInt, PositiveInt
+from pushplan.world.checks import known_keys
 
 SCHEMA = "pushplan-dataset/1"
 METADATA = "metadata.json"
@@ -45,38 +46,24 @@ _UNREADABLE = (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile)
 
 
 @dataclass(frozen=True)
-class DatasetRequest:
-    """What is recorded.
+class DatasetRequest(CheckedFields):
+    """What is recorded."""
 
-    Args:
-        task: name of the task.
-        scenarios: variations of it; the episodes take them in turn.
-        observation: what is recorded as observed, as in a specification.
-        episodes: how many.
-        simulator: name of the simulator.
-        preset: of the task.
-        first_seed: of the first layout; by default beyond all that scores are made on.
-        noise: probability for each action that a random one is carried out instead, for a few
-            steps. The one that the policy wanted is recorded all the same, so that a learner sees
-            how to come back.
-        hold: for how many steps a random action stands.
-    """
-
-    task: str
-    scenarios: tuple[Mapping[str, Any], ...]
-    observation: Mapping[str, Any]
-    episodes: int
-    simulator: str = "pymunk"
-    preset: str | None = None
-    first_seed: int = TRAINING_SEEDS
-    noise: float = 0.0
-    hold: int = 4
+    task: str  # name of the task
+    scenarios: tuple[Mapping[str, Any], ...]  # variations of it; the episodes take them in turn
+    observation: Mapping[str, Any]  # what is recorded as observed, as in a specification
+    episodes: PositiveInt  # how many
+    simulator: str = "pymunk"  # name of the simulator
+    preset: str | None = None  # of the task
+    # of the first layout; by default beyond all that scores are made on
+    first_seed: NonNegativeInt = TRAINING_SEEDS
+    # probability for each action that a random one is carried out instead, for a few steps. The one
+    # that the policy wanted is recorded all the same, so that a learner sees how to come back.
+    noise: Fraction = 0.0
+    hold: PositiveInt = 4  # for how many steps a random action stands
 
     def __post_init__(self) -> None:
-        integer("episodes", self.episodes, low=1)
-        integer("first_seed", self.first_seed, low=0)
-        integer("hold", self.hold, low=1)
-        number("noise", self.noise, low=0.0, high=1.0)
+        super().__post_init__()
         if not self.scenarios:
             raise InvalidInputError("scenarios must hold at least one mapping of variations")
 
@@ -95,12 +82,6 @@ class EpisodeData:
 
 def record(request: DatasetRequest, policy: Any, label: str, folder: str | Path) -> Path:
     """Run a policy and write what it saw and did.
-
-    Args:
-        request: what is recorded.
-        policy: a `pushplan.world.Policy`.
-        label: what the data set calls it.
-        folder: a new or empty folder.
 
     Raises:
         InvalidInputError: if the folder holds something, or the request makes no sense.
@@ -157,7 +138,8 @@ def _environment(
 
 
 def _mode(env: PushEnv) -> str:
-    from pushplan.envs.registry import ACTIONS, look_up
+    from pushplan.envs.registry import ACTIONS
+    from pushplan.world.lazy_names import look_up
 
     kinds = {look_up("action", ACTIONS, name): name for name in ACTIONS}
     return kinds[type(env._mode)]
@@ -234,10 +216,6 @@ def episodes(folder: str | Path) -> Iterator[EpisodeData]:
 
 def to_minari(folder: str | Path, name: str) -> Any:
     """Make a data set of Minari's own, in Minari's folder (``MINARI_DATASETS_PATH``).
-
-    Args:
-        folder: a data set of `record`.
-        name: such as ``"pushplan/maze/push-aware-v0"``.
 
     Returns:
         The ``minari.MinariDataset``.

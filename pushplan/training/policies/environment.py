@@ -44,9 +44,6 @@ class TrainingEnv(gymnasium.Env[NDArray[Any], Any]):
     Observations are those of the configuration; actions are outputs of the network in [-1, 1]
     (`ActionSpec`), or with spatial action maps the number of a pixel. ``info`` at the end of an
     episode holds ``is_success`` and ``share``, how many of the sub-tasks are done.
-
-    Args:
-        config: what is trained.
     """
 
     def __init__(self, config: TrainingConfig) -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-import warnings
 from pathlib import Path
 from typing import Any
 
@@ -12,12 +11,11 @@ from numpy.typing import NDArray
 
 from pushplan.learned import OnnxPolicy, Specification
 from pushplan.learned.specification import METADATA_KEY
+from pushplan.training.libraries import need, write_onnx
 from pushplan.training.policies.config import TrainingConfig
 from pushplan.training.policies.environment import TrainingEnv
-from pushplan.training.policies.libraries import need
 from pushplan.world import InvalidInputError
 
-OPSET = 17
 PARITY = 1e-4
 """Greatest difference between PyTorch and ONNX Runtime, relative to the greatest output."""
 
@@ -37,22 +35,9 @@ def export(network: Any, specification: Specification, path: str | Path) -> Path
     """
     torch, onnx = need("torch"), need("onnx")
     path = Path(path)
-    path.parent.mkdir(parents=True, exist_ok=True)
     network = network.to("cpu").eval()
     example = torch.from_numpy(examples(specification, 2))
-    with warnings.catch_warnings():
-        # the exporter that needs no further package; it is marked as old
-        warnings.simplefilter("ignore")
-        torch.onnx.export(
-            network,
-            (example,),
-            str(path),
-            input_names=["observation"],
-            output_names=["output"],
-            dynamic_axes={"observation": {0: "batch"}, "output": {0: "batch"}},
-            opset_version=OPSET,
-            dynamo=False,
-        )
+    write_onnx(network, example, path, ("observation", "output"))
     model = onnx.load(str(path))
     del model.metadata_props[:]
     entry = model.metadata_props.add()

@@ -7,16 +7,12 @@ from typing import Any
 from pushplan.learned.loading import learned_file
 from pushplan.learned.onnx_guard import inspect
 from pushplan.learned.shipped import learned_names, weights_of
-from pushplan.training.policies.libraries import need
+from pushplan.training.libraries import need
 from pushplan.world import InvalidInputError
 
 
 def load_weights(network: Any, source: str) -> None:
     """Give a PyTorch module the weights of an ONNX file that was exported from one like it.
-
-    Args:
-        network: the module.
-        source: name of a shipped policy, or a file.
 
     Raises:
         InvalidInputError: if there is no such file, or its weights are not those of such a module.

@@ -126,12 +126,7 @@ class SpatialActionNetwork(nn.Module):
 
 
 class SquashedActor(nn.Module):
-    """The deterministic action of a Stable-Baselines3 policy, for export.
-
-    Args:
-        policy: of a PPO or SAC model.
-        is_image: whether observations are images, 0 to 255.
-    """
+    """The deterministic action of a Stable-Baselines3 policy, for export."""
 
     def __init__(self, policy: Any, is_image: bool) -> None:
         super().__init__()
@@ -149,8 +144,3 @@ class SquashedActor(nn.Module):
             seen = seen / IMAGE_SCALE
         mean = self.mean(self.body(self.features(seen)))
         return torch.tanh(mean) if self.squash else mean.clamp(-1.0, 1.0)
-
-
-def parameter_count(network: nn.Module) -> int:
-    """How many numbers a network has."""
-    return sum(p.numel() for p in network.parameters())

@@ -5,189 +5,114 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from pushplan.world import InvalidInputError
-from pushplan.world.checks import integer, number
+from pushplan.world.checked_fields import (
+    CheckedFields,
+    Fraction,
+    NonNegativeFloat,
+    PositiveFloat,
+    PositiveFraction,
+    PositiveInt,
+)
+from pushplan.world.checks import integer
 
 
-def _check(
-    options: object,
-    *,
-    positive: tuple[str, ...],
-    fractions: tuple[str, ...],
-    whole: tuple[str, ...],
-) -> None:
-    for name in positive:
-        number(name, getattr(options, name), low=0.0, open_low=True)
-    for name in fractions:
-        number(name, getattr(options, name), low=0.0, high=1.0)
-    for name in whole:
-        integer(name, getattr(options, name), low=1)
-    widths = getattr(options, "widths", (1,))
-    if not isinstance(widths, tuple) or not widths:
-        raise InvalidInputError(f"widths must be a list of whole numbers, got {widths!r}")
-    for width in widths:
-        integer("width", width, low=1)
+class AlgorithmOptions(CheckedFields):
+    """Base of the parameters of an algorithm: numbers, and the widths of its network."""
 
-
-@dataclass(frozen=True)
-class PpoOptions:
-    """Proximal policy optimisation (Schulman et al. 2017, arXiv 1707.06347).
-
-    Args:
-        rate: learning rate at the start; it falls linearly to a tenth at the end.
-        rollout: decisions of each environment between two updates.
-        batch: decisions in a gradient step.
-        epochs: passes over a rollout.
-        discount: of a decision.
-        trace: lambda of the generalised advantage.
-        clip: of the probability ratio.
-        entropy: weight of the entropy.
-        deviation: logarithm of the first standard deviation of actions.
-        widths: of the hidden layers, for actor and critic each.
-    """
-
-    rate: float = 3e-4
-    rollout: int = 512
-    batch: int = 256
-    epochs: int = 8
-    discount: float = 0.99
-    trace: float = 0.95
-    clip: float = 0.2
-    entropy: float = 0.0
-    deviation: float = -0.5
-    widths: tuple[int, ...] = (128, 128)
+    widths: tuple[int, ...]
 
     def __post_init__(self) -> None:
-        _check(
-            self,
-            positive=("rate", "clip"),
-            fractions=("discount", "trace"),
-            whole=("rollout", "batch", "epochs"),
-        )
-        number("entropy", self.entropy, low=0.0)
-        number("deviation", self.deviation)
+        super().__post_init__()
+        if not isinstance(self.widths, tuple) or not self.widths:
+            raise InvalidInputError(f"widths must be a list of whole numbers, got {self.widths!r}")
+        for width in self.widths:
+            integer("width", width, low=1)
 
 
 @dataclass(frozen=True)
-class SacOptions:
-    """Soft actor-critic (Haarnoja et al. 2018, arXiv 1801.01290).
+class PpoOptions(AlgorithmOptions):
+    """Proximal policy optimisation (Schulman et al. 2017, arXiv 1707.06347)."""
 
-    Args:
-        rate: learning rate.
-        buffer: decisions that are remembered.
-        first: random decisions before learning begins.
-        batch: decisions in a gradient step.
-        every: decisions of each environment between two rounds of updates.
-        updates: gradient steps in such a round.
-        discount: of a decision.
-        follow: fraction by which the target critics follow in each gradient step.
-        widths: of the hidden layers.
-    """
-
-    rate: float = 5e-4
-    buffer: int = 200_000
-    first: int = 2_000
-    batch: int = 256
-    every: int = 8
-    updates: int = 8
-    discount: float = 0.99
-    follow: float = 0.01
-    widths: tuple[int, ...] = (128, 128)
-
-    def __post_init__(self) -> None:
-        _check(
-            self,
-            positive=("rate", "follow"),
-            fractions=("discount", "follow"),
-            whole=("buffer", "first", "batch", "every", "updates"),
-        )
+    # learning rate at the start; it falls linearly to a tenth at the end
+    rate: PositiveFloat = 3e-4
+    rollout: PositiveInt = 512  # decisions of each environment between two updates
+    batch: PositiveInt = 256  # decisions in a gradient step
+    epochs: PositiveInt = 8  # passes over a rollout
+    discount: Fraction = 0.99  # of a decision
+    trace: Fraction = 0.95  # lambda of the generalised advantage
+    clip: PositiveFloat = 0.2  # of the probability ratio
+    entropy: NonNegativeFloat = 0.0  # weight of the entropy
+    deviation: float = -0.5  # logarithm of the first standard deviation of actions
+    widths: tuple[int, ...] = (128, 128)  # of the hidden layers, for actor and critic each
 
 
 @dataclass(frozen=True)
-class SamOptions:
-    """Double deep Q-learning on spatial action maps (Wu et al. 2020, arXiv 2004.09141).
+class SacOptions(AlgorithmOptions):
+    """Soft actor-critic (Haarnoja et al. 2018, arXiv 1801.01290)."""
 
-    Args:
-        rate: learning rate of Adam at the start; it falls linearly to a tenth.
-        buffer: decisions that are remembered.
-        first: decisions before learning begins.
-        batch: decisions in a gradient step.
-        every: decisions for each gradient step.
-        discount: of a decision.
-        lookahead: decisions whose rewards are added up before the value of what is seen then.
-        target_every: gradient steps between two copies of the network to the target.
-        follow: fraction by which the target follows the network in each gradient step instead of
-            being copied; it is then their running average, is validated and becomes the policy.
-        explore: fraction of the decisions over which exploration falls from 1 to ``explore_end``.
-        explore_end: probability of a random pixel then.
-        at_objects: fraction of the random pixels that are drawn around movable objects.
-        clip: greatest norm of the gradient.
-        mirror: learn from mirrored maps as often as from others; both tasks are symmetric.
-        widths: channels at half and at a quarter of the map's resolution.
-        blocks: residual blocks at a quarter.
-        shrink: factor by which the network is coarser than that behind its first layer; 2 for maps
-            of twice the resolution.
-        start: shipped policy, or ONNX file, with the weights to begin with; its network must have
-            the same layers. Random ones by default.
-    """
+    rate: PositiveFloat = 5e-4  # learning rate
+    buffer: PositiveInt = 200_000  # decisions that are remembered
+    first: PositiveInt = 2_000  # random decisions before learning begins
+    batch: PositiveInt = 256  # decisions in a gradient step
+    every: PositiveInt = 8  # decisions of each environment between two rounds of updates
+    updates: PositiveInt = 8  # gradient steps in such a round
+    discount: Fraction = 0.99  # of a decision
+    # fraction by which the target critics follow in each gradient step
+    follow: PositiveFraction = 0.01
+    widths: tuple[int, ...] = (128, 128)  # of the hidden layers
 
-    rate: float = 5e-4
-    buffer: int = 20_000
-    first: int = 1_000
-    batch: int = 32
-    every: int = 1
-    discount: float = 0.85
-    lookahead: int = 1
-    target_every: int = 500
-    follow: float = 0.0
-    explore: float = 0.15
-    explore_end: float = 0.05
-    at_objects: float = 0.5
-    clip: float = 10.0
+
+@dataclass(frozen=True)
+class SamOptions(AlgorithmOptions):
+    """Double deep Q-learning on spatial action maps (Wu et al. 2020, arXiv 2004.09141)."""
+
+    rate: PositiveFloat = 5e-4  # learning rate of Adam at the start; it falls linearly to a tenth
+    buffer: PositiveInt = 20_000  # decisions that are remembered
+    first: PositiveInt = 1_000  # decisions before learning begins
+    batch: PositiveInt = 32  # decisions in a gradient step
+    every: PositiveInt = 1  # decisions for each gradient step
+    discount: Fraction = 0.85  # of a decision
+    # decisions whose rewards are added up before the value of what is seen then
+    lookahead: PositiveInt = 1
+    # gradient steps between two copies of the network to the target
+    target_every: PositiveInt = 500
+    # fraction by which the target follows the network in each gradient step instead of being
+    # copied; it is then their running average, is validated and becomes the policy
+    follow: Fraction = 0.0
+    # fraction of the decisions over which exploration falls from 1 to ``explore_end``
+    explore: Fraction = 0.15
+    explore_end: Fraction = 0.05  # probability of a random pixel then
+    # fraction of the random pixels that are drawn around movable objects
+    at_objects: Fraction = 0.5
+    clip: PositiveFloat = 10.0  # greatest norm of the gradient
+    # learn from mirrored maps as often as from others; both tasks are symmetric
     mirror: bool = True
-    widths: tuple[int, ...] = (16, 32)
-    blocks: int = 4
-    shrink: int = 1
+    widths: tuple[int, ...] = (16, 32)  # channels at half and at a quarter of the map's resolution
+    blocks: PositiveInt = 4  # residual blocks at a quarter
+    # factor by which the network is coarser than that behind its first layer; 2 for maps of twice
+    # the resolution
+    shrink: PositiveInt = 1
+    # shipped policy, or ONNX file, with the weights to begin with; its network must have the same
+    # layers. Random ones by default.
     start: str = ""
 
     def __post_init__(self) -> None:
-        _check(
-            self,
-            positive=("rate", "clip"),
-            fractions=("discount", "follow", "explore", "explore_end", "at_objects"),
-            whole=(
-                *("buffer", "first", "batch", "every"),
-                *("lookahead", "target_every", "blocks", "shrink"),
-            ),
-        )
+        super().__post_init__()
         if len(self.widths) != 2:
             raise InvalidInputError(f"widths of sam are two numbers, got {self.widths}")
-        if not isinstance(self.mirror, bool):
-            raise InvalidInputError(f"mirror must be true or false, got {self.mirror!r}")
         if not isinstance(self.start, str):
             raise InvalidInputError(f"start must be a policy's name or a file, got {self.start!r}")
 
 
 @dataclass(frozen=True)
-class BcOptions:
-    """Behaviour cloning: regression of the actions in a data set.
+class BcOptions(AlgorithmOptions):
+    """Behaviour cloning: regression of the actions in a data set."""
 
-    Args:
-        rate: greatest learning rate of Adam, on a one-cycle schedule.
-        batch: decisions in a gradient step.
-        held_out: fraction of the episodes that only measure the error.
-        widths: of the hidden layers.
-        decay: of the weights.
-    """
-
-    rate: float = 1e-3
-    batch: int = 256
-    held_out: float = 0.1
-    widths: tuple[int, ...] = (128, 128)
-    decay: float = 1e-5
-
-    def __post_init__(self) -> None:
-        _check(self, positive=("rate",), fractions=("held_out",), whole=("batch",))
-        number("decay", self.decay, low=0.0)
+    rate: PositiveFloat = 1e-3  # greatest learning rate of Adam, on a one-cycle schedule
+    batch: PositiveInt = 256  # decisions in a gradient step
+    held_out: Fraction = 0.1  # fraction of the episodes that only measure the error
+    widths: tuple[int, ...] = (128, 128)  # of the hidden layers
+    decay: NonNegativeFloat = 1e-5  # of the weights
 
 
 Options = PpoOptions | SacOptions | SamOptions | BcOptions

@@ -13,13 +13,7 @@ from pushplan.world.checks import integer
 
 
 class ReplayBuffer:
-    """The last decisions, in arrays; images stay 8-bit.
-
-    Args:
-        size: how many.
-        shape: of an observation.
-        dtype: of an observation.
-    """
+    """The last decisions, in arrays; images stay 8-bit."""
 
     def __init__(self, size: int, shape: tuple[int, ...], dtype: Any = np.uint8) -> None:
         self.size = integer("size", size, low=1)
@@ -85,13 +79,7 @@ class ReplayBuffer:
 
 
 class Lookahead:
-    """Decisions of an episode whose rewards are still added up.
-
-    Args:
-        memory: where they go.
-        discount: of a decision.
-        decisions: how many are added up.
-    """
+    """Decisions of an episode whose rewards are still added up."""
 
     def __init__(self, memory: ReplayBuffer, discount: float, decisions: int) -> None:
         self._memory, self._discount, self._decisions = memory, discount, decisions

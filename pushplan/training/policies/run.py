@@ -8,48 +8,40 @@ import json
 import math
 import os
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import yaml
 
+from pushplan.training.libraries import need
 from pushplan.training.policies.config import TrainingConfig, read_config
 from pushplan.training.policies.environment import TrainingEnv
-from pushplan.training.policies.libraries import need
 from pushplan.world import InvalidInputError
 
 CONFIG, CURVE, PICTURE = "config.yaml", "curve.csv", "curve.png"
 CHECKPOINT, BEST, POLICY, RECORD = "checkpoint.pt", "best.pt", "policy.onnx", "training.json"
 
 
+Until = Callable[[int], bool]
+"""Asked with the number of chunks that are done; true leaves a training off."""
+
+
 @dataclass(frozen=True)
 class CurvePoint:
-    """One row of a learning curve.
+    """One row of a learning curve."""
 
-    Args:
-        steps: decisions so far.
-        seconds: wall-clock time of training so far, without validation [s].
-        episodes: training episodes that ended in this chunk.
-        train_return: mean unscaled reward of them; NaN where none ended.
-        train_success: fraction of them that reached the goal.
-        valid_return: mean unscaled reward of the validation episodes.
-        valid_success: fraction of them that reached the goal.
-        valid_share: mean fraction of their sub-tasks that were done.
-        loss: of the learner, in its own units.
-    """
-
-    steps: int
-    seconds: float
-    episodes: int
-    train_return: float
-    train_success: float
-    valid_return: float
-    valid_success: float
-    valid_share: float
-    loss: float
+    steps: int  # decisions so far
+    seconds: float  # wall-clock time of training so far, without validation [s]
+    episodes: int  # training episodes that ended in this chunk
+    train_return: float  # mean unscaled reward of them; NaN where none ended
+    train_success: float  # fraction of them that reached the goal
+    valid_return: float  # mean unscaled reward of the validation episodes
+    valid_success: float  # fraction of them that reached the goal
+    valid_share: float  # mean fraction of their sub-tasks that were done
+    loss: float  # of the learner, in its own units
 
     @property
     def rank(self) -> tuple[float, float]:
@@ -170,21 +162,60 @@ class TrainingRun:
         os.replace(partial, self.path(CURVE))
 
 
-class Stopwatch:
-    """Adds up the time of training, without that of validation."""
+class Learned(NamedTuple):
+    """What came of the training in one chunk."""
 
-    def __init__(self, before: float) -> None:
-        self._before = before
-        self._began = time.perf_counter()
+    steps: int  # decisions or pairs so far
+    loss: float
+    returns: Sequence[float] = ()  # scaled rewards of the episodes that ended in the chunk
+    successes: Sequence[float] = ()  # whether these episodes reached the goal
 
-    @property
-    def seconds(self) -> float:
-        """So far [s]."""
-        return self._before + time.perf_counter() - self._began
 
-    def forget(self, seconds: float) -> None:
-        """Take off what was no training."""
-        self._began += seconds
+def train_chunks(
+    run: TrainingRun,
+    env: TrainingEnv,
+    until: Until | None,
+    *,
+    learn: Callable[[int], Learned],
+    decide: Callable[[Any], Any],
+    state: Callable[[], Mapping[str, Any]],
+) -> Iterator[CurvePoint]:
+    """Train chunk by chunk, from the last checkpoint of a run to its end.
+
+    Args:
+        run: the folder and the configuration.
+        env: in which the policy is validated.
+        until: leaves the training off.
+        learn: trains for the chunk of this number.
+        decide: from observation to action, as `validate` takes it.
+        state: what `TrainingRun.save` keeps.
+
+    Yields:
+        The row of the curve of each chunk, after its checkpoint was written.
+    """
+    began = time.perf_counter() - run.seconds
+    for chunk in range(run.done, run.chunks):
+        if until is not None and until(chunk):
+            break
+        learned = learn(chunk)
+        paused = time.perf_counter()
+        scores = validate(env, decide, run.config.validation)
+        began += time.perf_counter() - paused  # validation is no training
+        point = CurvePoint(
+            learned.steps,
+            time.perf_counter() - began,
+            len(learned.returns),
+            _mean(learned.returns) / run.config.reward_scale,
+            _mean(learned.successes),
+            *scores,
+            loss=learned.loss,
+        )
+        run.save(state(), point)
+        yield point
+
+
+def _mean(values: Sequence[float]) -> float:
+    return float(np.mean(values)) if values else float("nan")
 
 
 def validate(
@@ -208,9 +239,7 @@ def validate(
         returns.append(total)
         successes.append(info["is_success"])
         fractions.append(info["share"])
-    if not episodes:
-        return (float("nan"),) * 3
-    return float(np.mean(returns)), float(np.mean(successes)), float(np.mean(fractions))
+    return _mean(returns), _mean(successes), _mean(fractions)
 
 
 def _same(old: TrainingConfig, new: TrainingConfig, folder: Path) -> None:

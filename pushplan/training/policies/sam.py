@@ -9,22 +9,19 @@ from __future__ import annotations
 
 import copy
 import logging
-import time
-from collections.abc import Callable
-from functools import partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pushplan.observation.channels import MOVABLE
+from pushplan.training.libraries import need
 from pushplan.training.policies.config import TrainingConfig
 from pushplan.training.policies.environment import TrainingEnv
 from pushplan.training.policies.initial import load_weights
-from pushplan.training.policies.libraries import need
 from pushplan.training.policies.options import SamOptions
 from pushplan.training.policies.replay import Lookahead, ReplayBuffer
-from pushplan.training.policies.run import CurvePoint, Stopwatch, TrainingRun, validate
+from pushplan.training.policies.run import CurvePoint, Learned, TrainingRun, Until, train_chunks
 from pushplan.training.policies.sb3_training import chunk_seed
 from pushplan.world import InvalidInputError, stream
 
@@ -35,13 +32,7 @@ _AROUND = 2  # pixels about a movable one that exploration at objects may take
 
 
 class SamLearner:
-    """Network, target and memory of a training.
-
-    Args:
-        config: what is trained.
-        shape: of the map, channels first.
-        device: of PyTorch.
-    """
+    """Network, target and memory of a training."""
 
     def __init__(self, config: TrainingConfig, shape: tuple[int, ...], device: str) -> None:
         from pushplan.training.policies.networks import SpatialActionNetwork
@@ -148,15 +139,8 @@ class SamLearner:
         self.updates = int(state["updates"])
 
 
-def train_sam(
-    run: TrainingRun, *, device: str = "cpu", until: Callable[[int], bool] | None = None
-) -> Any:
+def train_sam(run: TrainingRun, *, device: str = "cpu", until: Until | None = None) -> Any:
     """Train from the last checkpoint of a run to its end; as `train_sb3`, resumable exactly.
-
-    Args:
-        run: the folder and the configuration.
-        device: of PyTorch.
-        until: asked with the number of chunks that are done; true leaves the training off.
 
     Returns:
         The network with the weights of the best chunk.
@@ -169,27 +153,19 @@ def train_sam(
         learner.restore(state)
     elif learner.options.start:
         learner.begin_with(learner.options.start)
-    watch = Stopwatch(run.seconds)
-    logger = _Board(run)
-    for chunk in range(run.done, run.chunks):
-        if until is not None and until(chunk):
-            break
-        episodes = _chunk(learner, config, envs, chunk)
-        began = time.perf_counter()
-        scores = validate(envs[0], partial(learner.best, network=learner.result), config.validation)
-        watch.forget(time.perf_counter() - began)
-        returns, successes = zip(*episodes, strict=True) if episodes else ((), ())
-        point = CurvePoint(
-            min((chunk + 1) * config.chunk, config.steps),
-            watch.seconds,
-            len(episodes),
-            float(np.mean(returns)) / config.reward_scale if returns else float("nan"),
-            float(np.mean(successes)) if successes else float("nan"),
-            *scores,
-            loss=float(np.mean(learner.losses)) if learner.losses else float("nan"),
-        )
+
+    def learn(chunk: int) -> Learned:
         learner.losses.clear()
-        run.save(learner.state(), point)
+        ended = _chunk(learner, config, envs, chunk)
+        loss = float(np.mean(learner.losses)) if learner.losses else float("nan")
+        steps = min((chunk + 1) * config.chunk, config.steps)
+        return Learned(steps, loss, *(zip(*ended, strict=True) if ended else ()))
+
+    def decide(seen: NDArray[Any]) -> int:
+        return learner.best(seen, learner.result)
+
+    logger = _Board(run)
+    for point in train_chunks(run, envs[0], until, learn=learn, decide=decide, state=learner.state):
         logger.write(point)
         log.info(
             "%d of %d decisions, %.0f s: fraction %.2f, success %.2f in validation",

@@ -3,20 +3,17 @@
 from __future__ import annotations
 
 import logging
-import time
 import zlib
-from collections.abc import Callable
-from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from pushplan.training.libraries import need
 from pushplan.training.policies.config import TrainingConfig
 from pushplan.training.policies.environment import TrainingEnv
-from pushplan.training.policies.libraries import need
 from pushplan.training.policies.options import PpoOptions, SacOptions
-from pushplan.training.policies.run import CurvePoint, Stopwatch, TrainingRun, validate
+from pushplan.training.policies.run import Learned, TrainingRun, Until, train_chunks
 
 log = logging.getLogger(__name__)
 
@@ -29,19 +26,13 @@ def train_sb3(
     *,
     device: str = "cpu",
     processes: bool = False,
-    until: Callable[[int], bool] | None = None,
+    until: Until | None = None,
 ) -> Any:
     """Train from the last checkpoint of a run to its end.
 
     Each chunk begins with fresh episodes and with generators seeded by the seed and the number of
     the chunk, so that a training that was left off ends with the same weights as one that was not
     (on the same machine and versions, on the processor).
-
-    Args:
-        run: the folder and the configuration.
-        device: of PyTorch.
-        processes: a process for each environment, instead of one for all.
-        until: asked with the number of chunks that are done; true leaves the training off.
 
     Returns:
         The Stable-Baselines3 model with the weights of the best chunk.
@@ -52,11 +43,10 @@ def train_sb3(
     config = run.config
     valid_env = TrainingEnv(config)
     state = run.load()
-    watch = Stopwatch(run.seconds)
-    model = None
-    for chunk in range(run.done, run.chunks):
-        if until is not None and until(chunk):
-            break
+    model: Any = None
+
+    def learn(chunk: int) -> Learned:
+        nonlocal model
         seed = chunk_seed(config.seed, chunk)
         if model is None:
             model = make_model(config, vector_env(config, processes), device, run.folder, seed)
@@ -66,19 +56,16 @@ def train_sb3(
         watcher = Watcher()
         size = min(config.chunk, config.steps - chunk * config.chunk)
         model.learn(size, callback=watcher, reset_num_timesteps=False, tb_log_name="tb")
-        began = time.perf_counter()
-        scores = validate(valid_env, partial(_decide, model), config.validation)
-        watch.forget(time.perf_counter() - began)
-        point = CurvePoint(
-            model.num_timesteps,
-            watch.seconds,
-            len(watcher.returns),
-            _mean(watcher.returns) / config.reward_scale,
-            _mean(watcher.successes),
-            *scores,
-            loss=float(model.logger.name_to_value.get(_loss_key(config), np.nan)),
-        )
-        _save(model, run, point)
+        loss = float(model.logger.name_to_value.get(_loss_key(config), np.nan))
+        return Learned(model.num_timesteps, loss, watcher.returns, watcher.successes)
+
+    def decide(seen: Any) -> Any:
+        return model.predict(seen, deterministic=True)[0]
+
+    def state_now() -> dict[str, Any]:
+        return _state(model, config)
+
+    for point in train_chunks(run, valid_env, until, learn=learn, decide=decide, state=state_now):
         log.info(
             "%d of %d decisions, %.0f s: success %.2f in training, %.2f in validation",
             *(point.steps, config.steps, point.seconds, point.train_success, point.valid_success),
@@ -175,19 +162,11 @@ def _begin_chunk(model: Any, config: TrainingConfig, seed: int, fraction: float)
         model._setup_lr_schedule()
 
 
-def _decide(model: Any, seen: Any) -> Any:
-    return model.predict(seen, deterministic=True)[0]
-
-
-def _mean(values: list[float]) -> float:
-    return float(np.mean(values)) if values else float("nan")
-
-
 def _loss_key(config: TrainingConfig) -> str:
     return "train/loss" if config.algorithm == "ppo" else "train/critic_loss"
 
 
-def _save(model: Any, run: TrainingRun, point: CurvePoint) -> None:
+def _state(model: Any, config: TrainingConfig) -> dict[str, Any]:
     """Weights, optimisers and counters as tensors and numbers; a replay buffer beside them."""
     parameters = model.get_parameters()
     state: dict[str, Any] = {
@@ -196,7 +175,7 @@ def _save(model: Any, run: TrainingRun, point: CurvePoint) -> None:
         "steps": int(model.num_timesteps),
         "updates": int(model._n_updates),
     }
-    if run.config.algorithm == "sac":
+    if config.algorithm == "sac":
         torch = need("torch")
         buffer = model.replay_buffer
         used = buffer.buffer_size if buffer.full else buffer.pos
@@ -204,7 +183,7 @@ def _save(model: Any, run: TrainingRun, point: CurvePoint) -> None:
         state["position"], state["full"] = int(buffer.pos), bool(buffer.full)
         for name in _BUFFER:
             state[name] = torch.from_numpy(getattr(buffer, name)[:used])
-    run.save(state, point)
+    return state
 
 
 _BUFFER = ("observations", "next_observations", "actions", "rewards", "dones", "timeouts")

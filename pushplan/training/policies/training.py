@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from pushplan.learned.sb3_policy import attach
+from pushplan.training.libraries import chosen_device, hardware, need, parameter_count
 from pushplan.training.policies.config import TrainingConfig
 from pushplan.training.policies.environment import TrainingEnv
-from pushplan.training.policies.libraries import chosen_device, hardware, need
-from pushplan.training.policies.run import CURVE, PICTURE, POLICY, TrainingRun
+from pushplan.training.policies.run import CURVE, PICTURE, POLICY, TrainingRun, Until
 from pushplan.world import InvalidInputError
 
 
@@ -26,7 +25,7 @@ def train_policy(
     threads: int = 1,
     data: str | Path | None = None,
     command: str = "",
-    until: Callable[[int], bool] | None = None,
+    until: Until | None = None,
 ) -> Path | None:
     """Train, and write ``policy.onnx``, ``curve.csv``, ``curve.png`` and ``training.json``.
 
@@ -128,7 +127,6 @@ def _finish(
 ) -> Path:
     from pushplan.training.policies.dataset import read_metadata
     from pushplan.training.policies.export import decision_time, export, observation_time
-    from pushplan.training.policies.networks import parameter_count
 
     best = max(run.curve, key=lambda point: (point.rank, point.steps))
     path = export(network, specification_of(run, best_steps=best.steps), run.path(POLICY))

@@ -6,11 +6,12 @@ from collections.abc import Callable
 
 import numpy as np
 
-from pushplan.envs.registry import SIMULATORS, look_up
+from pushplan.envs.registry import SIMULATORS
 from pushplan.envs.simulators.base import Materials, Simulator
 from pushplan.envs.tasks.materials import SOLIDS
 from pushplan.planners.pushing import PushModel, PushState
 from pushplan.world import Episode, Movables, Receptacle, RobotModel, StaticMap, Twist, World
+from pushplan.world.lazy_names import look_up
 
 SQUARE = 0.5 * np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
 FAR = Receptacle([(90.0, 90.0), (91.0, 90.0), (91.0, 91.0), (90.0, 91.0)])

@@ -3,9 +3,14 @@
 from __future__ import annotations
 
 import importlib
+import warnings
+from pathlib import Path
 from typing import Any
 
 from pushplan.world import InvalidInputError, MissingDependencyError
+
+OPSET = 17
+"""Of the ONNX files that are written."""
 
 
 def need(name: str) -> Any:
@@ -47,3 +52,33 @@ def hardware(device: str) -> str:
     torch = need("torch")
     words = f"{os.cpu_count()}-core {platform.machine()} machine"
     return f"{words}, {torch.cuda.get_device_name()}" if device != "cpu" else words
+
+
+def parameter_count(network: Any) -> int:
+    """How many numbers a PyTorch module has learned."""
+    return sum(p.numel() for p in network.parameters())
+
+
+def write_onnx(network: Any, example: Any, path: str | Path, names: tuple[str, ...]) -> None:
+    """Write a PyTorch module as ONNX for any batch size; PyTorch is not needed to run it.
+
+    Args:
+        network: the module.
+        example: a batch that it takes.
+        path: the ``.onnx`` file; its folder is made if it is not there.
+        names: of its input, then of its outputs.
+    """
+    Path(path).parent.mkdir(parents=True, exist_ok=True)
+    with warnings.catch_warnings():
+        # the exporter that needs no further package; it is marked as old
+        warnings.simplefilter("ignore")
+        need("torch").onnx.export(
+            network,
+            (example,),
+            str(path),
+            input_names=[names[0]],
+            output_names=list(names[1:]),
+            dynamic_axes={name: {0: "batch"} for name in names},
+            opset_version=OPSET,
+            dynamo=False,
+        )
