@@ -9,20 +9,24 @@ from pushplan.world import Twist, World
 
 
 def warm_up_simulator(simulator: Simulator, world: World, materials: Materials) -> None:
-    """Step once where the robot is, and once with an object right before it.
+    """Step where the robot is, with an object right before it, and with something static there.
 
     Args:
         simulator: holds another scene afterwards.
-        world: whose robot reaches no object yet.
+        world: whose robot reaches nothing yet.
         materials: as `Simulator.build` takes them.
     """
-    robot, period = world.robot, 0.1 * world.robot.circumscribed_radius / world.robot.max_speed
-    ahead = Twist(robot.max_speed, 0.0)
-    simulator.build(world, materials)
-    simulator.step(ahead, period)
+    robot = world.robot
+    radius, ahead = robot.circumscribed_radius, Twist(robot.max_speed, 0.0)
+    worlds = [world]
     if len(world.movables):
         x, y, _ = world.movables.poses[0]
-        gap = robot.circumscribed_radius + float(world.movables.radii[0])
-        simulator.build(world.moved(robot_pose=np.array([x - gap, y, 0.0])), materials)
+        gap = radius + float(world.movables.radii[0])
+        worlds.append(world.moved(robot_pose=np.array([x - gap, y, 0.0])))
+    for part in world.static.convex_parts[:1]:
+        (x, _), (_, y) = part.min(axis=0), part.mean(axis=0)
+        worlds.append(world.moved(robot_pose=np.array([x - radius, y, 0.0])))
+    for scene in worlds:
+        simulator.build(scene, materials)
         for _ in range(5):
-            simulator.step(ahead, period)
+            simulator.step(ahead, 0.2 * radius / robot.max_speed)
