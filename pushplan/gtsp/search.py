@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from pushplan.gtsp.gtsp_config import GtspConfig
-from pushplan.gtsp.node_choice_kernels import best_nodes
+from pushplan.gtsp.node_choice_kernels import SPARE, best_nodes
 from pushplan.gtsp.problem import Problem
 from pushplan.gtsp.ruin_recreate_kernels import TourProblem, TourState, search_tours
 from pushplan.world.checks import FloatArray, IntArray
@@ -174,7 +174,7 @@ class AnytimeSearch:
         rng = np.random.default_rng(int(self.state[0]) + budget.used)
         self.order = np.concatenate(([problem.root], rng.permutation(rest)))
         self.nodes = problem.offsets[self.order]
-        layers = np.empty((problem.count, problem.width))
+        layers = np.empty((problem.count, problem.width + SPARE))
         self.values[0] = best_nodes(
             problem.finite, self.offsets, self.order, problem.count, self.nodes, layers
         )

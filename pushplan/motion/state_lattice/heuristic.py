@@ -24,16 +24,3 @@ def dubins_to_line(
     turning = radius * (angle - left)
     length: FloatArray = np.where(distance >= gained, straight, np.maximum(turning, 0.0))
     return np.where(distance <= 0.0, 0.0, length)
-
-
-def row_bounds(
-    headings: FloatArray,  # (H,) relative to the normal of the goal line [rad]
-    rows: FloatArray,  # (U,) rows of the lattice
-    goal_row: float,  # row of the goal line, in steps
-    step: float,  # of the lattice [m]
-    radius: float,  # least turning radius [m]
-) -> FloatArray:
-    """(H, U) length [m] of the shortest path from each heading and row of a lattice."""
-    distance = np.maximum(goal_row - rows, 0.0) * step
-    lengths = dubins_to_line(distance[None], headings[:, None], radius)
-    return np.ascontiguousarray(lengths)

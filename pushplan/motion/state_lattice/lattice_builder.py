@@ -12,7 +12,7 @@ import numpy as np
 from pushplan.motion.state_lattice.built_lattice import BuiltLattice
 from pushplan.motion.state_lattice.cost_map import FloeCosts
 from pushplan.motion.state_lattice.frame import Frame
-from pushplan.motion.state_lattice.heuristic import row_bounds
+from pushplan.motion.state_lattice.heuristic import dubins_to_line
 from pushplan.motion.state_lattice.lattice_config import LatticeConfig
 from pushplan.motion.state_lattice.lattice_map import LatticeMap
 from pushplan.motion.state_lattice.place_costs import LEAN, Window, place_costs
@@ -163,9 +163,8 @@ class LatticeBuilder:
             return lattice.row_bounds, lattice.place_costs
         cells, goal_row = self.cells, self.start[0] + self.ahead
         reach = int(lattice.corner[0])
-        lengths = row_bounds(
-            self.motions.angles, np.arange(float(self.rows)), goal_row, self.step, self.radius
-        )
+        distances = np.maximum(goal_row - np.arange(float(self.rows)), 0.0) * self.step
+        lengths = dubins_to_line(distances[None], self.motions.angles[:, None], self.radius)
         radius = self.world.robot.inscribed_radius / self.cell
         half = max(math.floor(radius - 1.0), 0)
         window = Window(half, self._hull, 0, 1, 1.0, self.cell, LEAN)
@@ -181,7 +180,7 @@ class LatticeBuilder:
             self._map.columns_between(self.world.static, self.side, reach, last),
             window,
         )
-        return lengths, costs
+        return np.ascontiguousarray(lengths), costs
 
     def _planes(self) -> FloatArray:
         """The bounds of the world as half planes for the robot's origin [steps]."""

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from ompl import base, geometric
 
-from pushplan.compiled import kernel
+from pushplan.compiled import kernel, owned
 from pushplan.geometry import core_distance
 from pushplan.motion.collision import ConvexObstacles, obstacles
 from pushplan.motion.polyline import polyline_plan
@@ -70,7 +70,7 @@ class GeometricRRT:
         iterations = 0
         if start_margin(world, 0.0) is None:
             return call.result(PlanStatus.START_BLOCKED)
-        start = np.ascontiguousarray(world.robot_pose[:2])
+        start = owned(world.robot_pose[:2])
         size = world.robot.circumscribed_radius
         wide, narrow = config.clearance * size, world.robot.inscribed_radius
         passes = [(boxes, wide), ([], wide), ([], min(size, wide)), ([], min(narrow, wide))]

@@ -7,6 +7,7 @@ from functools import partial
 
 import numpy as np
 
+from pushplan.compiled import owned
 from pushplan.interaction import InteractionModel
 from pushplan.interaction.path_sweepers import path_sweeper
 from pushplan.motion.coarse_path import reachable
@@ -61,7 +62,7 @@ class ShipLatticeCall:
         """Plan until done or stopped; None where there is no plan by then."""
         world = self.world
         shape, walls = footprint(world.robot), obstacles(world.static)
-        if not is_free(world.robot_pose, shape, walls, np.empty_like(shape.vertices)):
+        if not is_free(owned(world.robot_pose), shape, walls, np.empty_like(shape.vertices)):
             return PlanStatus.START_BLOCKED
         if self.goal.distance(*(float(v) for v in world.robot_pose[:2])) <= 0.0:
             self.poses, self.curvatures = world.robot_pose[None].copy(), np.zeros(1)
