@@ -100,6 +100,7 @@ class GreedyPusher:
         """Load the kernels that an episode may need."""
         from pushplan.planners.rearrangement import kernel_warmup
 
+        kernel_warmup.warm_up_recovery()
         kernel_warmup.drive_in_small_worlds(GreedyPusher)
 
     def act(self, world: World, observation: Any = None) -> Twist:
