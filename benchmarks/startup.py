@@ -3,8 +3,9 @@
     python -m benchmarks.startup [NAME ...] [--write]
 
 Each figure is of a process of its own that imports pushplan and calls `warm_up(NAME)`; `everything`
-is `pushplan compile`. With ``--write`` the names of the kernels of each policy go into the package,
-so that its progress knows how many are to come.
+is `pushplan compile`. With ``--write`` nothing is measured: the names of the kernels that
+`pushplan compile NAME` makes ready go into the package, for all names, so that its progress knows
+how many are to come.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ import subprocess
 import sys
 import tempfile
 from pathlib import Path
+from typing import Any
 
 _NAMES = ("straight", "kinodynamic-rrt", "push-aware", "greedy", "gtsp-mpc", "ship-lattice")
 _EVERYTHING = "everything"
@@ -24,55 +26,81 @@ _SCRIPT = """
 import json, sys, time
 began, busy = time.perf_counter(), time.process_time()
 from pushplan.compiled import watching
-kernels = []
-with watching(lambda kernel, loaded: kernels.append((kernel, loaded))):
+kernels = set()
+with watching(lambda kernel, loaded: kernels.add(kernel)):
     if sys.argv[1] == "everything":
-        from pushplan.evaluation.policies import policy_names
-        from pushplan.evaluation.warmup import OTHERS, warm_up
-        for name in (*policy_names(), *OTHERS):
+        from pushplan.evaluation.warmup import names, warm_up
+        for name in names():
             warm_up(name)
     else:
         from pushplan.planners import warm_up
         warm_up(sys.argv[1])
-print(json.dumps([time.process_time() - busy, time.perf_counter() - began, kernels]))
+print(json.dumps([time.process_time() - busy, time.perf_counter() - began, len(kernels)]))
+"""
+_KERNELS = """
+import json, sys
+from pushplan.compiled import watching
+from pushplan.evaluation.warmup import warm_up
+kernels = set()
+with watching(lambda kernel, loaded: kernels.add(kernel)):
+    warm_up(sys.argv[1])
+print(json.dumps(sorted(kernels)))
 """
 
 
-def measure(name: str, cache: str) -> tuple[float, float, list[str]]:
+def measure(name: str, cache: str) -> tuple[float, float, int]:
     """Warm up in a new process.
 
     Returns:
-        CPU time [s], time [s] and the names of the kernels that Python called.
+        CPU time [s], time [s] and how many kernels Python called.
     """
+    busy, took, kernels = _last_line(_SCRIPT, name, {"NUMBA_CACHE_DIR": cache})
+    return busy, took, kernels
+
+
+def write_kernel_names() -> None:
+    """Write down which kernels each name of `pushplan compile` makes ready."""
+    from pushplan.evaluation.warmup import names
+
+    _write({name: _last_line(_KERNELS, name, {}) for name in names()})
+
+
+def _write(kernels: dict[str, list[str]]) -> None:
+    """One line for each set of kernels that some names, and no others, make ready."""
+    by_names: dict[str, list[str]] = {}
+    for kernel in sorted(set().union(*kernels.values())):
+        users = " ".join(name for name in kernels if kernel in kernels[name])
+        by_names.setdefault(users, []).append(kernel)
+    _MANIFEST.write_text(json.dumps(by_names, indent=1) + "\n")
+
+
+def _last_line(script: str, name: str, settings: dict[str, str]) -> Any:
     done = subprocess.run(
-        [sys.executable, "-c", _SCRIPT, name],
-        env={**os.environ, "NUMBA_CACHE_DIR": cache},
+        [sys.executable, "-c", script, name],
+        env={**os.environ, **settings},
         capture_output=True,
         text=True,
         check=True,
     )
-    busy, took, kernels = json.loads(done.stdout.splitlines()[-1])
-    return busy, took, sorted({kernel for kernel, _ in kernels})
+    return json.loads(done.stdout.splitlines()[-1])
 
 
 def main() -> None:
-    """Print the table."""
+    """Print the table, or write the names."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("names", nargs="*", default=(*_NAMES, _EVERYTHING))
     parser.add_argument("--write", action="store_true", help="write the names of the kernels")
     options = parser.parse_args()
-    known = json.loads(_MANIFEST.read_text()) if options.write else {}
+    if options.write:
+        write_kernel_names()
+        return
     print("| policy | kernels | cold [s of CPU] | warm [s of CPU] | warm [s] |")
     print("|---|---|---|---|---|")
     for name in options.names:
         with tempfile.TemporaryDirectory() as cache:
             cold, _, kernels = measure(name, cache)
             busy, took, _ = measure(name, cache)
-        print(f"| {name} | {len(kernels)} | {cold:.1f} | {busy:.1f} | {took:.1f} |", flush=True)
-        if name != _EVERYTHING:
-            known[name] = kernels
-    if options.write:
-        _MANIFEST.write_text(json.dumps(known, indent=1, sort_keys=True) + "\n")
+        print(f"| {name} | {kernels} | {cold:.1f} | {busy:.1f} | {took:.1f} |", flush=True)
 
 
 if __name__ == "__main__":

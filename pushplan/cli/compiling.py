@@ -26,11 +26,14 @@ def add(commands: Any) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """One line for each thing that was run to compile it."""
-    from pushplan.evaluation.policies import policy_names
-    from pushplan.evaluation.warmup import OTHERS, warm_up
+    from pushplan.evaluation.warmup import names, warm_up
 
-    for name in options.names or (*policy_names(), *OTHERS):
-        with kernel_progress(name) as progress:
+    wanted = options.names or names()
+    with kernel_progress(*wanted) as progress:
+        for name in wanted:
+            compiled, loaded = progress.compiled, progress.loaded
             took = warm_up(name)
-        say(f"{name}: {took:.1f} s, {progress.compiled} kernels compiled, {progress.loaded} loaded")
+            progress.clear()
+            compiled, loaded = progress.compiled - compiled, progress.loaded - loaded
+            say(f"{name}: {took:.1f} s, {compiled} kernels compiled, {loaded} loaded")
     return 0

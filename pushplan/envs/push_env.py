@@ -18,6 +18,7 @@ from pushplan.envs.registry import ACTIONS, SIMULATORS, TASKS, default_preset
 from pushplan.envs.rendering import Renderer
 from pushplan.envs.roster import Roster
 from pushplan.envs.simulators.base import Simulator
+from pushplan.envs.simulators.kernel_warmup import warm_up_simulator
 from pushplan.envs.tasks.base import StepOutcome, Task
 from pushplan.envs.trace import Trace
 from pushplan.observation import ObservationBuilder
@@ -135,6 +136,12 @@ class PushEnv(gymnasium.Env[NDArray[Any], NDArray[Any]]):
                 self._over = "the action mode has changed"
                 return True
         return False
+
+    def warm_up(self) -> None:
+        """Load the kernels of the simulator; ends the episode."""
+        self._over = "warm_up() has ended the episode"
+        world = self.task.start(stream(0, "layout"))
+        warm_up_simulator(self._simulator, world, self.task.materials)
 
     @property
     def world(self) -> World:

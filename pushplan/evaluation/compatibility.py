@@ -85,6 +85,7 @@ def incompatibility(spec: PolicySpec, scenario: Any, settings: JobSettings) -> s
             reason = _first_step(policy, scenario, env)
             if reason is None and settings.dry_run:
                 spec.warm_up()  # what is compiled here, workers find in the cache
+                env.warm_up()
             return reason
     return None
 

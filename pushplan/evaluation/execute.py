@@ -25,6 +25,7 @@ from pushplan.evaluation.episode import (
 from pushplan.evaluation.jobs import Job, JobResult, JobSettings, failed_result, timeout_reason
 from pushplan.evaluation.limits import EpisodeTimeout, hard_limit, soft_limit
 from pushplan.evaluation.rows import Status, blank_row, scored_row
+from pushplan.world.policy_abilities import WarmsUp
 
 DRY_RUN_STEPS = 2
 _dry_runs: set[tuple[str, str, str]] = set()
@@ -108,6 +109,8 @@ def dry_run(job: Job, settings: JobSettings) -> None:
         policy = job.policy.make()
         env = settings.environment(job.scenario, policy)
         try:
+            if isinstance(env, WarmsUp):
+                env.warm_up()
             Recording(policy, job.scenario).run(env, limit=DRY_RUN_STEPS)
         finally:
             getattr(env, "close", _nothing)()

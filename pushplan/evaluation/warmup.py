@@ -10,14 +10,18 @@ from pushplan.evaluation.jobs import JobSettings
 from pushplan.evaluation.policies import PolicySpec, policy_names
 from pushplan.world import InvalidInputError, UnknownNameError
 
-OTHERS = ("observations", "metrics")
-"""What has kernels beside policies."""
+_OTHERS = ("observations", "metrics")
 
 STEPS = 3
 
 
+def names() -> tuple[str, ...]:
+    """What `warm_up` knows: every policy, and what has kernels beside policies."""
+    return (*policy_names(), *_OTHERS)
+
+
 def warm_up(name: str) -> float:
-    """Run a policy, or one of `OTHERS`, for a moment.
+    """Run a policy, or one of the other `names`, for a moment.
 
     A policy is warmed up as `pushplan.planners.warm_up` does it, and makes a few steps in every
     kind of start of the smoke suite that it is made for; networks only do that.
@@ -26,7 +30,7 @@ def warm_up(name: str) -> float:
         How long it took [s].
 
     Raises:
-        UnknownNameError: if there is no such policy.
+        UnknownNameError: if there is no such name.
     """
     begin = time.perf_counter()
     if name == "observations":
@@ -35,7 +39,7 @@ def warm_up(name: str) -> float:
         _metrics()
     else:
         if name not in policy_names():
-            raise UnknownNameError("policy", name, (*policy_names(), *OTHERS))
+            raise UnknownNameError("policy", name, names())
         PolicySpec(name, name).warm_up()
         _record(name)
     return time.perf_counter() - begin
@@ -83,5 +87,6 @@ def _record(policy: str, observation: Any = None) -> list[Recording]:
                 raise
         else:
             recordings.append(recording)
+            env.warm_up()
         env.close()
     return recordings

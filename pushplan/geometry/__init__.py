@@ -4,13 +4,8 @@ from pushplan.geometry.convex import convex_distance, convex_overlap, convex_pen
 from pushplan.geometry.distance_field import GeodesicField, geodesic_field, sample_values
 from pushplan.geometry.grid import Grid, clearance_field, occupancy
 from pushplan.geometry.obstacles import core_distance
-from pushplan.geometry.polygon import (
-    point_in_polygon,
-    polygon_area,
-    polygon_centroid,
-    polygon_inertia,
-)
-from pushplan.geometry.raster import fill_convex, fill_convex_parts
+from pushplan.geometry.polygon import polygon_area, polygon_centroid, polygon_inertia
+from pushplan.geometry.raster import fill_convex
 from pushplan.geometry.shortest_path import GoalDistances, Path, VisibilityGraph, goal_distances
 from pushplan.geometry.transforms import transform_outlines, transform_points
 
@@ -26,11 +21,9 @@ __all__ = [
     "convex_penetration",
     "core_distance",
     "fill_convex",
-    "fill_convex_parts",
     "geodesic_field",
     "goal_distances",
     "occupancy",
-    "point_in_polygon",
     "polygon_area",
     "polygon_centroid",
     "polygon_inertia",

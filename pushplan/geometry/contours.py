@@ -40,8 +40,8 @@ def standoff_of(static: StaticMap, clearance: float) -> float:
     """Greatest distance [m] of a contour polygon from the outline that it is drawn around."""
     radius = max(float(obstacles_of(static, clearance).radii.max(initial=0.0)), 0.0)
     # 1 / cos(step / 2) - 1, which is step² / 8 for small steps and 1.35 times that at the coarsest
-    share = 1.5 * ARC_STEP**2 / 8.0
-    return share * max(radius, SMALL_RADIUS * _diagonal(static)) + 4.0 * gap_of(static)
+    fraction = 1.5 * ARC_STEP**2 / 8.0
+    return fraction * max(radius, SMALL_RADIUS * _diagonal(static)) + 4.0 * gap_of(static)
 
 
 def _diagonal(static: StaticMap) -> float:
@@ -113,9 +113,7 @@ def free_points(points: FloatArray, obstacles: Obstacles, box: FloatArray, gap: 
     for i in range(points.shape[0]):
         x, y = points[i, 0], points[i, 1]
         inside = box[0] - gap <= x <= box[2] + gap and box[1] - gap <= y <= box[3] + gap
-        keep[i] = inside and (
-            obstacle_distance(x, y, obstacles.vertices, obstacles.offsets, obstacles.radii) >= gap
-        )
+        keep[i] = inside and obstacle_distance(x, y, obstacles) >= gap
     return keep
 
 

@@ -14,62 +14,51 @@ from scipy import ndimage
 from pushplan.compiled import kernel
 from pushplan.geometry.contours import standoff_of
 from pushplan.geometry.grid import Grid, clearance_field
-from pushplan.geometry.obstacles import Obstacles, obstacle_distance
-from pushplan.geometry.regions import Regions, outside_area
+from pushplan.geometry.obstacles import obstacle_distance
+from pushplan.geometry.regions import outside_area
 from pushplan.geometry.shortest_path import GoalDistances, goal_distances
-from pushplan.geometry.visibility import NO_LEG, Nodes, goal_leg, node_leg
+from pushplan.geometry.visibility import NO_LEG, GoalScene, Nodes, goal_leg, node_leg
 from pushplan.world import Goal, StaticMap
 from pushplan.world.checks import FloatArray, array, frozen, number
 
 
 @kernel(allocates=True)
 def _fill_distances(
-    out: FloatArray,
-    ox: float,
-    oy: float,
-    step: float,
-    nodes: Nodes,
-    regions: Regions,
-    obstacles: Obstacles,
-    box: FloatArray,
-    gap: float,
-    sliver: float,
+    out: FloatArray, origin: FloatArray, step: float, nodes: Nodes, scene: GoalScene, sliver: float
 ) -> None:
     """Write the distance [m] to the goal at the centre of each cell."""
+    obstacles, box, gap = scene.obstacles, scene.box, scene.gap
     for i in range(out.shape[0]):
-        y = oy + (i + 0.5) * step
+        y = origin[1] + (i + 0.5) * step
         hint = NO_LEG
         for j in range(out.shape[1]):
-            x = ox + (j + 0.5) * step
+            x = origin[0] + (j + 0.5) * step
             out[i, j] = math.inf
             if x > box[2] + gap or y > box[3] + gap:
                 continue
-            room = obstacle_distance(x, y, obstacles.vertices, obstacles.offsets, obstacles.radii)
-            if room < gap:
+            clearance = obstacle_distance(x, y, obstacles)
+            if clearance < gap:
                 continue
-            length, _, _ = goal_leg(x, y, regions, obstacles, box, gap)
-            tangent_only = room > sliver
+            length, _, _ = goal_leg(x, y, scene)
+            tangent_only = clearance > sliver
             best, hint = node_leg(x, y, length, hint, tangent_only, nodes, obstacles, gap)
             out[i, j] = best
 
 
 @kernel(allocates=True)
 def sample_values(
-    values: FloatArray, ox: float, oy: float, step: float, x: float, y: float
+    values: FloatArray,  # (rows, columns) distances [m], inf where there is no way
+    ox: float,  # least x of the grid [m]
+    oy: float,  # least y of the grid [m]
+    step: float,  # side of a cell [m]
+    x: float,  # [m]; points outside the grid read its nearest cell
+    y: float,  # [m]
 ) -> float:
     """Read a distance field at a point: bilinear, but never across a wall.
 
     A distance to a goal changes by at most the step between free neighbours; where the four cells
     around the point differ by more, or one is not finite, a wall lies between them and the cell
     that holds the point counts alone, or if it has no value the least of the others.
-
-    Args:
-        values: (rows, columns) distances [m], inf where there is no way.
-        ox: least x of the grid [m].
-        oy: least y of the grid [m].
-        step: side of a cell [m].
-        x: [m]; points outside the grid read its nearest cell.
-        y: [m].
     """
     rows, cols = values.shape
     result: float
@@ -141,18 +130,8 @@ class GeodesicField:
 def _field(source: GoalDistances, resolution: float) -> GeodesicField:
     grid = Grid.cover(source.static.bounds, resolution)
     values = np.empty(grid.shape)
-    _fill_distances(
-        values,
-        float(grid.origin[0]),
-        float(grid.origin[1]),
-        resolution,
-        source.nodes,
-        source.regions,
-        source.obstacles,
-        source.static.bounds,
-        source.gap,
-        standoff_of(source.static, source.clearance),
-    )
+    sliver = standoff_of(source.static, source.clearance)
+    _fill_distances(values, grid.origin, resolution, source.nodes, source.scene, sliver)
     values[outside_area(source.target, np.stack(np.meshgrid(grid.x, grid.y), axis=-1))] = 0.0
     return GeodesicField(frozen(values), grid, source)
 

@@ -9,13 +9,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pushplan.compiled import kernel
-from pushplan.geometry.obstacles import obstacle_distance, obstacles_of
+from pushplan.geometry.obstacles import Obstacles, obstacle_distance, obstacles_of
 from pushplan.world import InvalidInputError, StaticMap
 from pushplan.world.checks import (
     ArrayRecord,
     BoolArray,
     FloatArray,
-    IntArray,
     array,
     frozen,
     integer,
@@ -89,21 +88,13 @@ class Grid(ArrayRecord):
 
 
 @kernel(allocates=True)
-def _fill_clearance(
-    out: FloatArray,
-    ox: float,
-    oy: float,
-    step: float,
-    vertices: FloatArray,
-    offsets: IntArray,
-    radii: FloatArray,
-) -> None:
+def _fill_clearance(out: FloatArray, origin: FloatArray, step: float, shapes: Obstacles) -> None:
     """Write the distance [m] to the nearest obstacle at the centre of each cell."""
     for i in range(out.shape[0]):
-        y = oy + (i + 0.5) * step
+        y = origin[1] + (i + 0.5) * step
         for j in range(out.shape[1]):
-            x = ox + (j + 0.5) * step
-            out[i, j] = obstacle_distance(x, y, vertices, offsets, radii)
+            x = origin[0] + (j + 0.5) * step
+            out[i, j] = obstacle_distance(x, y, shapes)
 
 
 def clearance_field(static: StaticMap, grid: Grid) -> FloatArray:
@@ -113,17 +104,8 @@ def clearance_field(static: StaticMap, grid: Grid) -> FloatArray:
     obstacle in which the cell lies deepest), inf in a map without obstacles. The bounds of the
     map are no obstacle.
     """
-    shapes = obstacles_of(static)
     out = np.empty(grid.shape)
-    _fill_clearance(
-        out,
-        float(grid.origin[0]),
-        float(grid.origin[1]),
-        grid.resolution,
-        shapes.vertices,
-        shapes.offsets,
-        shapes.radii,
-    )
+    _fill_clearance(out, grid.origin, grid.resolution, obstacles_of(static))
     return frozen(out)
 
 

@@ -58,11 +58,10 @@ def core_distance(x: float, y: float, vertices: FloatArray, first: int, last: in
 
 
 @kernel
-def obstacle_distance(
-    x: float, y: float, vertices: FloatArray, offsets: IntArray, radii: FloatArray
-) -> float:
+def obstacle_distance(x: float, y: float, obstacles: Obstacles) -> float:
     """Distance [m] to the nearest obstacle: minus the greatest depth inside, inf without any."""
     best = math.inf
+    vertices, offsets, radii, _ = obstacles
     for k in range(radii.shape[0]):
         best = min(best, core_distance(x, y, vertices, offsets[k], offsets[k + 1]) - radii[k])
     return best
@@ -99,17 +98,10 @@ def _segments_closer(
 
 @kernel
 def line_of_sight(
-    px: float,
-    py: float,
-    qx: float,
-    qy: float,
-    vertices: FloatArray,
-    offsets: IntArray,
-    radii: FloatArray,
-    boxes: FloatArray,
-    margin: float,
+    px: float, py: float, qx: float, qy: float, obstacles: Obstacles, margin: float
 ) -> bool:
     """Whether the segment p-q stays ``margin`` [m], at least, away from all obstacles."""
+    vertices, offsets, radii, boxes = obstacles
     dx, dy = qx - px, qy - py
     length = math.sqrt(dx * dx + dy * dy)
     ux, uy = (dx / length, dy / length) if length > 0.0 else (1.0, 0.0)

@@ -1,4 +1,4 @@
-"""Compiled measures of simple polygons: area, centroid, inertia, point inside."""
+"""Compiled measures of simple polygons: area, centroid, inertia."""
 
 from __future__ import annotations
 
@@ -56,19 +56,3 @@ def polygon_inertia(v: FloatArray) -> float:
     if twice == 0.0:
         return 0.0
     return moment / (6.0 * twice)
-
-
-@kernel
-def point_in_polygon(x: float, y: float, v: FloatArray) -> bool:
-    """Whether a point is inside corners (N, 2) [m]; on the outline it may count either way."""
-    inside = False
-    n = v.shape[0]
-    j = n - 1
-    for i in range(n):
-        yi, yj = v[i, 1], v[j, 1]
-        if (yi > y) != (yj > y):
-            cut = v[i, 0] + (v[j, 0] - v[i, 0]) * (y - yi) / (yj - yi)
-            if x < cut:
-                inside = not inside
-        j = i
-    return inside

@@ -12,7 +12,7 @@ from typing import Any
 from numpy.typing import NDArray
 
 from pushplan.compiled import kernel
-from pushplan.world.checks import FloatArray, IntArray
+from pushplan.world.checks import FloatArray
 
 
 @kernel(allocates=True)
@@ -55,12 +55,3 @@ def fill_convex(image: NDArray[Any], vertices_px: FloatArray, value: Any) -> Non
         stop = min(cols - 1, math.floor(min(right, float(cols)) - 0.5))
         for c in range(start, stop + 1):
             image[r, c] = value
-
-
-@kernel(allocates=True)
-def fill_convex_parts(
-    image: NDArray[Any], vertices_px: FloatArray, offsets: IntArray, value: Any
-) -> None:
-    """`fill_convex` for P polygons, flattened to corners (V, 2) with offsets (P + 1,)."""
-    for k in range(offsets.shape[0] - 1):
-        fill_convex(image, vertices_px[offsets[k] : offsets[k + 1]], value)

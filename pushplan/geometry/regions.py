@@ -124,8 +124,8 @@ def nearest_in_region(k: int, x: float, y: float, regions: Regions) -> tuple[flo
         distance = math.hypot(x - cx, y - cy)
         if distance <= radius:
             return x, y
-        share = radius / distance
-        return cx + share * (x - cx), cy + share * (y - cy)
+        fraction = radius / distance
+        return cx + fraction * (x - cx), cy + fraction * (y - cy)
     k -= discs
     if k < lines:
         px, py, nx, ny = (

@@ -133,13 +133,7 @@ def _fill_table(
                 dx = (j + 0.5 - eyes[k, 0]) * step
                 dy = (i + 0.5 - eyes[k, 1]) * step
                 if hidden[k, i, j] or not is_tangent(
-                    dx,
-                    dy,
-                    bends.incoming[k, 0],
-                    bends.incoming[k, 1],
-                    bends.outgoing[k, 0],
-                    bends.outgoing[k, 1],
-                    gap,
+                    dx, dy, bends.incoming, bends.outgoing, k, gap
                 ):
                     continue
                 length = math.sqrt(dx * dx + dy * dy)
@@ -154,33 +148,17 @@ def _bends_in_sight(
     x: float, y: float, bends: Contours, obstacles: Obstacles, gap: float, sliver: float
 ) -> tuple[IntArray, FloatArray]:
     """Corners that x, y sees along a tangent, and their distances [m]."""
-    room = obstacle_distance(x, y, obstacles.vertices, obstacles.offsets, obstacles.radii)
+    clearance = obstacle_distance(x, y, obstacles)
     count = bends.corners.shape[0]
     found, lengths = np.empty(count, dtype=np.int64), np.empty(count)
     n = 0
     for k in range(count):
         qx, qy = bends.corners[k, 0], bends.corners[k, 1]
-        if room > sliver and not is_tangent(
-            x - qx,
-            y - qy,
-            bends.incoming[k, 0],
-            bends.incoming[k, 1],
-            bends.outgoing[k, 0],
-            bends.outgoing[k, 1],
-            gap,
+        if clearance > sliver and not is_tangent(
+            x - qx, y - qy, bends.incoming, bends.outgoing, k, gap
         ):
             continue
-        if line_of_sight(
-            x,
-            y,
-            qx,
-            qy,
-            obstacles.vertices,
-            obstacles.offsets,
-            obstacles.radii,
-            obstacles.boxes,
-            gap,
-        ):
+        if line_of_sight(x, y, qx, qy, obstacles, gap):
             found[n], lengths[n] = k, math.hypot(x - qx, y - qy)
             n += 1
     return found[:n], lengths[:n]
@@ -201,24 +179,17 @@ class BendDistances:
 
     def in_sight(self, x: float, y: float) -> tuple[IntArray, FloatArray]:
         """Bends over which a shortest path from a point [m] may lead, and how far each is [m]."""
-        return _bends_in_sight(
-            x,
-            y,
-            self.bends,
-            obstacles_of(self.static),
-            gap_of(self.static),
-            standoff_of(self.static, 0.0),
-        )
+        sliver = standoff_of(self.static, 0.0)
+        around = obstacles_of(self.static)
+        return _bends_in_sight(x, y, self.bends, around, gap_of(self.static), sliver)
 
 
 @lru_cache(maxsize=4)
-def bend_distances(static: StaticMap, resolution: float) -> BendDistances:
-    """The distances of a map, kept for the maps used last.
-
-    Args:
-        static: obstacles and bounds.
-        resolution: side of a cell [m]; more where the table would pass `MAX_VALUES`.
-    """
+def bend_distances(
+    static: StaticMap,  # obstacles and bounds
+    resolution: float,  # side of a cell [m]; more where the table would pass `MAX_VALUES`
+) -> BendDistances:
+    """The distances of a map, kept for the maps used last."""
     bends, between = bends_of(static)
     width, height = (static.bounds[2:] - static.bounds[:2]).tolist()
     count = len(bends.corners)

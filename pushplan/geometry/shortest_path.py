@@ -33,6 +33,7 @@ from pushplan.geometry.regions import (
 from pushplan.geometry.visibility import (
     GOAL_LEG,
     NO_LEG,
+    GoalScene,
     Nodes,
     goal_leg,
     node_leg,
@@ -109,15 +110,11 @@ def _ways_out(static: StaticMap, clearance: float) -> FloatArray:
 
 
 @kernel(allocates=True)
-def _first_legs(
-    points: FloatArray, regions: Regions, obstacles: Obstacles, box: FloatArray, gap: float
-) -> FloatArray:
+def _first_legs(points: FloatArray, scene: GoalScene) -> FloatArray:
     """Distance to the goal and nearest goal point for each point (N, 2) that sees it."""
     out = np.empty((points.shape[0], 3))
     for i in range(points.shape[0]):
-        out[i, 0], out[i, 1], out[i, 2] = goal_leg(
-            points[i, 0], points[i, 1], regions, obstacles, box, gap
-        )
+        out[i, 0], out[i, 1], out[i, 2] = goal_leg(points[i, 0], points[i, 1], scene)
     return out
 
 
@@ -150,6 +147,11 @@ class GoalDistances:
         """How far paths stay off the grown obstacles [m]."""
         return gap_of(self.static)
 
+    @property
+    def scene(self) -> GoalScene:
+        """Goal and obstacles as the kernels read them."""
+        return GoalScene(self.regions, self.obstacles, self.static.bounds, self.gap)
+
     def path_from(self, start: ArrayLike) -> Path:
         """The shortest path from a point (2,) [m] to the goal."""
         origin: FloatArray = array("start", start, (2,))
@@ -171,11 +173,10 @@ class GoalDistances:
 
     def _from_free(self, start: FloatArray) -> tuple[float, list[FloatArray]]:
         x, y = start.tolist()
-        shapes, gap = self.obstacles, self.gap
-        length, qx, qy = goal_leg(x, y, self.regions, shapes, self.static.bounds, gap)
+        length, qx, qy = goal_leg(x, y, self.scene)
         if length == 0.0:
             return 0.0, [start]
-        over, node = node_leg(x, y, length, -1, False, self.nodes, shapes, gap)
+        over, node = node_leg(x, y, length, -1, False, self.nodes, self.obstacles, self.gap)
         if node == NO_LEG:
             return length, [start, np.array([qx, qy])]
         points = [start]
@@ -193,25 +194,21 @@ def _distances(
 ) -> GoalDistances:
     target: Any = key[0] if len(key) == 1 else tuple(_unpack(part) for part in key[1:])
     regions = regions_of(target, to_center=to_center)
-    graph, shapes, gap = (
-        _graph_of(static, clearance),
-        obstacles_of(static, clearance),
-        gap_of(static),
-    )
+    graph, shapes = _graph_of(static, clearance), obstacles_of(static, clearance)
+    gap = gap_of(static)
     # where the goal is partly covered, a path may end at the rim of what covers it
     rim = np.concatenate([contour_edges(contours_of(static, clearance)), box_edges(static.bounds)])
     ends = region_crossings(regions, rim)
     ends = ends[free_points(ends, shapes, static.bounds, gap)]
     corners = graph.contours
     count = len(corners.corners)
-    legs = _first_legs(corners.corners, regions, shapes, static.bounds, gap)
-    points = Regions(
-        np.hstack([ends, np.zeros((len(ends), 1))]),
-        np.zeros((0, 4)),
-        np.zeros((0, 2)),
-        np.zeros(1, dtype=np.int64),
+    scene = GoalScene(regions, shapes, static.bounds, gap)
+    legs = _first_legs(corners.corners, scene)
+    discs = np.hstack([ends, np.zeros((len(ends), 1))])
+    none = np.zeros((0, 4)), np.zeros((0, 2)), np.zeros(1, dtype=np.int64)
+    rims = _first_legs(
+        corners.corners, scene._replace(regions=Regions(*map(frozen, (discs, *none))))
     )
-    rims = _first_legs(corners.corners, Regions(*map(frozen, points)), shapes, static.bounds, gap)
     legs = np.where((rims[:, 0] < legs[:, 0])[:, None], rims, legs)
     distances, parents = legs[:, 0].copy(), np.full(count, GOAL_LEG, dtype=np.int64)
     relax(distances, parents, graph.starts, graph.ends, graph.lengths)
@@ -279,9 +276,9 @@ def leave_inflation(static: StaticMap, clearance: float, point: FloatArray) -> F
     x, y = point.tolist()
     gap = gap_of(static)
     raw, grown = obstacles_of(static), obstacles_of(static, clearance)
-    if obstacle_distance(x, y, raw.vertices, raw.offsets, raw.radii) < -gap:
+    if obstacle_distance(x, y, raw) < -gap:
         return None
-    if obstacle_distance(x, y, grown.vertices, grown.offsets, grown.radii) >= gap:
+    if obstacle_distance(x, y, grown) >= gap:
         return point
     found = [_ways_out(static, clearance), _pushed_out(point, grown, 2.0 * gap)]
     places = np.ascontiguousarray(np.concatenate(found))
@@ -289,7 +286,7 @@ def leave_inflation(static: StaticMap, clearance: float, point: FloatArray) -> F
     steps = np.hypot(*(places - point).T)
     for i in np.argsort(steps, kind="stable").tolist():
         px, py = places[i].tolist()
-        if line_of_sight(x, y, px, py, raw.vertices, raw.offsets, raw.radii, raw.boxes, -2.0 * gap):
+        if line_of_sight(x, y, px, py, raw, -2.0 * gap):
             place: FloatArray = places[i]
             return place
     return None
@@ -301,8 +298,8 @@ def _pushed_out(point: FloatArray, shapes: Obstacles, extra: float) -> FloatArra
     for k, radius in enumerate(shapes.radii.tolist()):
         core = shapes.vertices[shapes.offsets[k] : shapes.offsets[k + 1]]
         edges = np.roll(core, -1, axis=0) - core
-        share = ((point - core) * edges).sum(axis=1) / np.maximum((edges**2).sum(axis=1), 1e-300)
-        feet = core + np.clip(share, 0.0, 1.0)[:, None] * edges
+        fraction = ((point - core) * edges).sum(axis=1) / np.maximum((edges**2).sum(axis=1), 1e-300)
+        feet = core + np.clip(fraction, 0.0, 1.0)[:, None] * edges
         away = point - feet
         nearest = int(np.argmin(np.hypot(away[:, 0], away[:, 1])))
         direction = away[nearest]

@@ -29,32 +29,23 @@ class Nodes(NamedTuple):
     distances: FloatArray
 
 
+class GoalScene(NamedTuple):
+    """A goal among obstacles, as kernels read them."""
+
+    regions: Regions  # where paths end
+    obstacles: Obstacles
+    box: FloatArray  # (4,) x_min, y_min, x_max, y_max of where paths may lead [m]
+    gap: float  # how far paths stay off obstacles [m]
+
+
 @kernel(inline=True)
 def is_tangent(
-    dx: float, dy: float, ix: float, iy: float, ox: float, oy: float, gap: float
+    dx: float, dy: float, incoming: FloatArray, outgoing: FloatArray, k: int, gap: float
 ) -> bool:
-    """Whether a leg from (dx, dy) touches a corner as a tangent, as on shortest paths it does."""
-    before = ix * dy - iy * dx
-    after = ox * dy - oy * dx
-    return (before >= -gap and after <= gap) or (before <= gap and after >= -gap)
-
-
-@kernel
-def _sees(px: float, py: float, qx: float, qy: float, obstacles: Obstacles, gap: float) -> bool:
-    """Whether the segment p-q keeps its distance from all obstacles."""
-    return bool(
-        line_of_sight(
-            px,
-            py,
-            qx,
-            qy,
-            obstacles.vertices,
-            obstacles.offsets,
-            obstacles.radii,
-            obstacles.boxes,
-            gap,
-        )
-    )
+    """Whether a leg from (dx, dy) touches corner ``k`` as a tangent, as shortest paths do."""
+    before = incoming[k, 0] * dy - incoming[k, 1] * dx
+    after = outgoing[k, 0] * dy - outgoing[k, 1] * dx
+    return bool((before >= -gap and after <= gap) or (before <= gap and after >= -gap))
 
 
 @kernel(allocates=True)
@@ -72,13 +63,14 @@ def visible_pairs(
     for i in range(points.shape[0]):
         for j in range(i + 1, points.shape[0]):
             dx, dy = points[j, 0] - points[i, 0], points[j, 1] - points[i, 1]
-            if not is_tangent(
-                dx, dy, incoming[i, 0], incoming[i, 1], outgoing[i, 0], outgoing[i, 1], gap
-            ) or not is_tangent(
-                -dx, -dy, incoming[j, 0], incoming[j, 1], outgoing[j, 0], outgoing[j, 1], gap
+            if not (
+                is_tangent(dx, dy, incoming, outgoing, i, gap)
+                and is_tangent(-dx, -dy, incoming, outgoing, j, gap)
             ):
                 continue
-            if not _sees(points[i, 0], points[i, 1], points[j, 0], points[j, 1], obstacles, gap):
+            if not line_of_sight(
+                points[i, 0], points[i, 1], points[j, 0], points[j, 1], obstacles, gap
+            ):
                 continue
             if count == lengths.shape[0]:
                 more_pairs = np.empty((2 * count, 2), dtype=np.int64)
@@ -115,15 +107,9 @@ def relax(
 
 
 @kernel
-def goal_leg(
-    x: float,
-    y: float,
-    regions: Regions,
-    obstacles: Obstacles,
-    box: FloatArray,
-    gap: float,
-) -> tuple[float, float, float]:
+def goal_leg(x: float, y: float, scene: GoalScene) -> tuple[float, float, float]:
     """The straight way from x, y to the nearest visible region: length [m] (inf) and its end."""
+    regions, obstacles, box, gap = scene
     best, bx, by = math.inf, x, y
     count = regions.discs.shape[0] + regions.lines.shape[0] + regions.offsets.shape[0] - 1
     for k in range(count):
@@ -133,7 +119,7 @@ def goal_leg(
             length < best
             and box[0] - gap <= qx <= box[2] + gap
             and box[1] - gap <= qy <= box[3] + gap
-            and _sees(x, y, qx, qy, obstacles, gap)
+            and line_of_sight(x, y, qx, qy, obstacles, gap)
         ):
             best, bx, by = length, qx, qy
     return best, bx, by
@@ -143,25 +129,14 @@ def goal_leg(
 def node_leg(
     x: float,
     y: float,
-    limit: float,
-    hint: int,
-    tangent_only: bool,
+    limit: float,  # a distance that is already known [m]; only a shorter one counts
+    hint: int,  # node to try first, such as the one of a neighbour; negative for none
+    tangent_only: bool,  # skip nodes that no shortest path can touch from a place off the contours
     nodes: Nodes,
     obstacles: Obstacles,
-    gap: float,
+    gap: float,  # distance to keep from obstacles [m]
 ) -> tuple[float, int]:
-    """The best node to walk to from x, y: distance to the goal over it [m] and its index.
-
-    Args:
-        x, y: position [m].
-        limit: a distance that is already known [m]; only a shorter one counts.
-        hint: node to try first, such as the one of a neighbour; negative for none.
-        tangent_only: skip nodes that a shortest path cannot touch from here. Off for places
-            between an outline and the polygon that is drawn around it.
-        nodes: sorted by distance.
-        obstacles: what blocks the view.
-        gap: distance to keep from obstacles [m].
-    """
+    """The best node to walk to from x, y: distance to the goal over it [m] and its index."""
     best, found = limit, NO_LEG
     count = nodes.points.shape[0]
     for trial in range(-1, count):
@@ -173,20 +148,14 @@ def node_leg(
         elif nodes.distances[i] >= best:
             break
         dx, dy = x - nodes.points[i, 0], y - nodes.points[i, 1]
-        room = best - nodes.distances[i]
-        if dx * dx + dy * dy >= room * room or room <= 0.0:
+        left = best - nodes.distances[i]
+        if dx * dx + dy * dy >= left * left or left <= 0.0:
             continue
-        if tangent_only and not is_tangent(
-            dx,
-            dy,
-            nodes.incoming[i, 0],
-            nodes.incoming[i, 1],
-            nodes.outgoing[i, 0],
-            nodes.outgoing[i, 1],
-            gap,
-        ):
+        if tangent_only and not is_tangent(dx, dy, nodes.incoming, nodes.outgoing, i, gap):
             continue
         length = nodes.distances[i] + math.sqrt(dx * dx + dy * dy)
-        if length < best and _sees(x, y, nodes.points[i, 0], nodes.points[i, 1], obstacles, gap):
+        if length < best and line_of_sight(
+            x, y, nodes.points[i, 0], nodes.points[i, 1], obstacles, gap
+        ):
             best, found = length, i
     return best, found

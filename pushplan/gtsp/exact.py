@@ -28,14 +28,11 @@ def expected_seconds(problem: Problem) -> float:
 
 
 def solve_exactly(
-    problem: Problem, stopped: Callable[[], bool], chunk_s: float
+    problem: Problem,  # with at least 2 clusters
+    stopped: Callable[[], bool],  # asked about every ``chunk_s``
+    chunk_s: float,  # [s]
 ) -> tuple[bool, IntArray | None]:
     """The cheapest tour.
-
-    Args:
-        problem: with at least 2 clusters.
-        stopped: asked about every ``chunk_s``.
-        chunk_s: [s].
 
     Returns:
         Whether it got to its end, and the nodes in visiting order; None if no tour is finite or it

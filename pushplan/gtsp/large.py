@@ -14,18 +14,13 @@ NEAREST = 5
 
 
 def promising(
-    costs: NDArray[np.number],
-    members: Sequence[IntArray],
-    most: int,
+    costs: NDArray[np.number],  # (N, N)
+    members: Sequence[IntArray],  # nodes of each cluster
+    most: int,  # nodes in all, but at least one of each cluster
+    # asked between clusters; what is not yet looked at keeps its order
     stopped: Callable[[], bool],
 ) -> list[IntArray]:
     """The nodes of each cluster with the cheapest arcs from and to its nearest clusters.
-
-    Args:
-        costs: (N, N).
-        members: nodes of each cluster.
-        most: nodes in all, but at least one of each cluster.
-        stopped: asked between clusters; what is not yet looked at keeps its order.
 
     Returns:
         The nodes that are kept.
@@ -57,12 +52,11 @@ def _total(best: FloatArray) -> FloatArray:
     return np.where(np.isfinite(best[0]), total, np.inf)
 
 
-def best_choice(costs: NDArray[np.number], layers: Sequence[IntArray]) -> IntArray:
+def best_choice(
+    costs: NDArray[np.number],  # (N, N)
+    layers: Sequence[IntArray],  # nodes of each cluster in visiting order, at least 2 clusters
+) -> IntArray:
     """The cheapest nodes for a closed order of clusters, on costs that are not gathered.
-
-    Args:
-        costs: (N, N).
-        layers: nodes of each cluster in visiting order, at least 2 clusters.
 
     Returns:
         A node of each.

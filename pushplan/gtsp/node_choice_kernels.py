@@ -35,30 +35,6 @@ def below(state: IntArray, count: int) -> int:
 
 
 @kernel(inline=True)
-def push_layer(
-    costs: FloatArray, values: FloatArray, at: int, n_at: int, to: int, n_to: int, out: FloatArray
-) -> None:
-    """``out[w] = min_v values[v] + costs[at + v, to + w]``: one step of a layered shortest path."""
-    row = costs[at, to : to + n_to]
-    head = values[0]
-    for w in range(n_to):
-        out[w] = head + row[w]
-    v = 1
-    while v + 1 < n_at:
-        first, second = values[v], values[v + 1]
-        row, below_it = costs[at + v, to : to + n_to], costs[at + v + 1, to : to + n_to]
-        for w in range(n_to):
-            x = min(first + row[w], second + below_it[w])
-            out[w] = min(x, out[w])
-        v += 2
-    if v < n_at:
-        head = values[v]
-        row = costs[at + v, to : to + n_to]
-        for w in range(n_to):
-            out[w] = min(head + row[w], out[w])
-
-
-@kernel(inline=True)
 def push_values(
     costs: FloatArray,  # (N, N + SPARE); up to `SPARE` columns past the cluster are read
     values: FloatArray,  # (m, >= n_at)
@@ -85,12 +61,12 @@ def push_values(
 
 @kernel
 def best_nodes(
-    costs: FloatArray,  # (N, >= N)
+    costs: FloatArray,  # (N, N + SPARE)
     offsets: IntArray,  # (m + 1,)
     order: IntArray,  # (>= count,) clusters in visiting order
     count: int,  # how many of them, at least 2
     nodes: IntArray,  # (>= count,) filled with the chosen nodes
-    layers: FloatArray,  # (>= count, K) working memory
+    layers: FloatArray,  # (>= count, K + SPARE) working memory
 ) -> float:
     """Fill the cheapest nodes for a closed order of clusters; returns its cost (Fischetti 1997)."""
     # a shortest path through the layers for every node of ``order[0]``, which should be small
@@ -105,7 +81,7 @@ def best_nodes(
         for i in range(2, count):
             to = offsets[order[i]]
             n_to = offsets[order[i] + 1] - to
-            push_layer(costs, layers[i - 1], at, size, to, n_to, layers[i])
+            push_values(costs, layers, i - 1, at, size, to, n_to, layers[i])
             at, size = to, n_to
         cost, end = np.inf, -1
         for v in range(a, z):

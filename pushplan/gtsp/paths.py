@@ -10,14 +10,13 @@ from pushplan.gtsp.walks import CHUNK_ARCS, Walks
 from pushplan.world.checks import FloatArray, IntArray
 
 
-def cheaper_tour(walks: Walks, most: int) -> tuple[bool, IntArray | None, int]:
+def cheaper_tour(
+    walks: Walks,  # filled; changed by `Walks.allow_memories`
+    most: int,  # paths of one length at most
+) -> tuple[bool, IntArray | None, int]:
     """The cheapest tour below the limit of the walks, by paths of more and more clusters.
 
     A path is known by its clusters and its last node. The walks bound what completes it.
-
-    Args:
-        walks: filled; changed by `Walks.allow_memories`.
-        most: paths of one length at most.
 
     Returns:
         Whether the paths were few enough; the nodes of the tour, None if there is none; how many

@@ -128,13 +128,10 @@ def _known(values: FloatArray) -> FloatArray:
 
 
 def usable(
-    costs: NDArray[np.number], members: Sequence[IntArray]
+    costs: NDArray[np.number],  # (N, N)
+    members: Sequence[IntArray],  # nodes of each cluster
 ) -> tuple[list[IntArray], int | None]:
     """Leave out nodes that no tour can enter or leave.
-
-    Args:
-        costs: (N, N).
-        members: nodes of each cluster.
 
     Returns:
         The members that are left, and a cluster that has none left, if there is one.

@@ -41,15 +41,13 @@ class Proof:
     detail: dict[str, float] = field(default_factory=dict)  # further numbers, by name
 
 
-def prove(problem: Problem, cost: float, stopped: Callable[[], bool], config: GtspConfig) -> Proof:
-    """A lower bound, and a proof where the paths are few enough.
-
-    Args:
-        problem: with at least 4 clusters.
-        cost: of the best tour that is known; may be infinite.
-        stopped: asked every few milliseconds.
-        config: its ``proof_states``.
-    """
+def prove(
+    problem: Problem,  # with at least 4 clusters
+    cost: float,  # of the best tour that is known; may be infinite
+    stopped: Callable[[], bool],  # asked every few milliseconds
+    config: GtspConfig,  # its ``proof_states``
+) -> Proof:
+    """A lower bound, and a proof where the paths are few enough."""
     result = Proof(np.inf, True, None, {"paths": 0.0})
     others = np.delete(np.arange(problem.count), problem.root)
     members = [np.arange(*problem.offsets[c : c + 2]) for c in others]

@@ -17,7 +17,7 @@ from pushplan.gtsp.layer_kernels import (
     make_layers,
     undo,
 )
-from pushplan.gtsp.node_choice_kernels import below, best_nodes, draw
+from pushplan.gtsp.node_choice_kernels import SPARE, below, best_nodes, draw
 from pushplan.gtsp.segment_swap_kernels import improve_by_swaps
 from pushplan.world.checks import FloatArray, IntArray
 
@@ -172,7 +172,7 @@ def search_tours(
     current, current_nodes, best, best_choice, values, state = found
     count, root = len(offsets) - 1, current[0]
     tour = make_layers(costs, reverse, offsets, root)
-    layers = np.empty((count, tour.ahead.shape[1]))
+    layers = np.empty((count, tour.ahead.shape[1] + SPARE))
     order, nodes = np.empty(count, np.int64), np.empty(count, np.int64)
     removed, gone = np.empty(count, np.int64), np.zeros(count, np.int64)
     seen = np.zeros(count + 1, np.int64)

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from pushplan.gtsp.gtsp_config import GtspConfig
-from pushplan.gtsp.node_choice_kernels import best_nodes
+from pushplan.gtsp.node_choice_kernels import SPARE, best_nodes
 from pushplan.gtsp.problem import Problem
 from pushplan.gtsp.ruin_recreate_kernels import TourProblem, TourState, search_tours
 from pushplan.world.checks import FloatArray, IntArray
@@ -100,14 +100,13 @@ class AnytimeSearch:
         self.values = np.full(2, np.inf)
         self.pace = 3e-5 + 3e-7 * problem.width**2
 
-    def run(self, budget: Budget, begin: float, end: float) -> None:
-        """One annealing from a random order, until it is frozen.
-
-        Args:
-            budget: of the call.
-            begin: fraction of it that is gone when the tour is hottest.
-            end: fraction that is gone when it is coldest, where the run ends at the latest.
-        """
+    def run(
+        self,
+        budget: Budget,  # of the call
+        begin: float,  # fraction of it that is gone when the tour is hottest
+        end: float,  # fraction that is gone when it is coldest, where the run ends at the latest
+    ) -> None:
+        """One annealing from a random order, until it is frozen."""
         self._random_start(budget)
         config, lowest, frozen, first = self.config, np.inf, 0.0, True
         while not budget.stopped():
@@ -175,7 +174,7 @@ class AnytimeSearch:
         rng = np.random.default_rng(int(self.state[0]) + budget.used)
         self.order = np.concatenate(([problem.root], rng.permutation(rest)))
         self.nodes = problem.offsets[self.order]
-        layers = np.empty((problem.count, problem.width))
+        layers = np.empty((problem.count, problem.width + SPARE))
         self.values[0] = best_nodes(
             problem.finite, self.offsets, self.order, problem.count, self.nodes, layers
         )

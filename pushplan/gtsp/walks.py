@@ -26,24 +26,16 @@ class Stopped(Exception):
 
 
 class Walks:
-    """Walks from one node of the root, through nodes that may be part of a cheaper tour.
-
-    Args:
-        costs: (N, N), infinite inside of clusters.
-        node: of the root.
-        members: nodes of each other cluster.
-        lists: (n, n - 1) the other clusters by distance from each.
-        limit: only tours below this cost matter; may be infinite.
-        stopped: asked every few milliseconds; `Stopped` is raised where it says so.
-    """
+    """Walks from one node of the root, through nodes that may be part of a cheaper tour."""
 
     def __init__(
         self,
-        costs: FloatArray,
-        node: int,
-        members: list[IntArray],
-        lists: IntArray,
-        limit: float,
+        costs: FloatArray,  # (N, N), infinite inside of clusters
+        node: int,  # of the root
+        members: list[IntArray],  # nodes of each other cluster
+        lists: IntArray,  # (n, n - 1) the other clusters by distance from each
+        limit: float,  # only tours below this cost matter; may be infinite
+        # asked every few milliseconds; `Stopped` is raised where it says so
         stopped: Callable[[], bool],
     ) -> None:
         finite = costs[np.isfinite(costs)]

@@ -9,6 +9,9 @@ import numpy as np
 from pushplan.compiled import kernel
 from pushplan.world.checks import FloatArray
 
+BELOW_ZERO = -5e-324
+"""The greatest number less than 0: points that touch do not overlap."""
+
 
 @kernel
 def least_overlap(a: FloatArray, b: FloatArray) -> tuple[float, int]:
@@ -43,8 +46,12 @@ def contacts(a: FloatArray, b: FloatArray, out: FloatArray) -> int:
         return 0
     # a small preference for the first one's edges keeps the choice from flickering on ties
     if gap_b > gap_a + 1e-9 + 0.01 * abs(gap_a):
-        return _clipped(b, edge_b, a, -1.0, out)
-    return _clipped(a, edge_a, b, 1.0, out)
+        found = clip_facing(b, edge_b, a, -1.0, BELOW_ZERO, True, out)
+    else:
+        found = clip_facing(a, edge_a, b, 1.0, BELOW_ZERO, True, out)
+    for i in range(found):
+        out[i, 4] = -out[i, 4]
+    return int(found)
 
 
 class FacingEdges(NamedTuple):
@@ -94,7 +101,15 @@ def write_point(edges: FacingEdges, s: float, d: float, sign: float, out: FloatA
 
 
 @kernel
-def _clipped(ref: FloatArray, edge: int, inc: FloatArray, sign: float, out: FloatArray) -> int:
+def clip_facing(
+    ref: FloatArray,
+    edge: int,  # corner of ``ref`` where its edge begins
+    inc: FloatArray,
+    sign: float,  # factor on the edge's outward normal
+    widest: float,  # gap up to which a point counts [m]
+    beside: bool,  # whether a facing edge that lies beside the reference edge counts
+    out: FloatArray,  # (2, 5) receives x, y [m], normal, gap [m]
+) -> int:
     """Clip the edge that faces the reference edge against it; returns the number of points."""
     edges = facing_edges(ref, edge, inc)
     found = 0
@@ -105,9 +120,12 @@ def _clipped(ref: FloatArray, edge: int, inc: FloatArray, sign: float, out: Floa
         if clipped != s:
             if abs(span) < 1e-12 * edges.length:
                 continue
-            d = edges.du + (clipped - edges.su) / span * (edges.dw - edges.du)
-        if d < 0.0:
+            fraction = (clipped - edges.su) / span
+            if not beside and (fraction < 0.0 or fraction > 1.0):
+                continue
+            d = edges.du + fraction * (edges.dw - edges.du)
+        if d <= widest:
             write_point(edges, clipped, d, sign, out[found])
-            out[found, 4] = -d
+            out[found, 4] = d
             found += 1
     return found

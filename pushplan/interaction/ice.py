@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from pushplan.compiled import owned
 from pushplan.interaction.ice_bodies import IceBodies, IceProblem, IceSettings, ice_problem
 from pushplan.interaction.ice_contacts import sweep_ice
-from pushplan.interaction.model import Interaction
+from pushplan.interaction.model import Interaction, checked_path
 from pushplan.interaction.quasi_static import QuasiStatic
 from pushplan.world import World
 from pushplan.world.checked_fields import (
@@ -19,7 +19,6 @@ from pushplan.world.checked_fields import (
     PositiveFraction,
     PositiveInt,
 )
-from pushplan.world.checks import FloatArray, array
 from pushplan.world.errors import InvalidInputError
 
 STILL = 0.03
@@ -91,9 +90,7 @@ class IceInteraction(CheckedFields):
 
     def sweep(self, world: World, path: ArrayLike) -> Interaction:
         """Predict the motion of every object; see `InteractionModel.sweep`."""
-        robot_path: FloatArray = owned(array("path", path, (None, 3)))
-        if len(robot_path) == 0:
-            raise InvalidInputError("path must hold at least one pose, got none")
+        robot_path = checked_path(path)
         poses = world.movables.poses.copy()
         out = np.empty((len(robot_path), len(poses), 3))
         sweep_ice(robot_path, poses, self.problem(world), out)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from pushplan.compiled import kernel
-from pushplan.interaction.contact import facing_edges, write_point
+from pushplan.interaction.contact import clip_facing
 from pushplan.world.checks import FloatArray
 
 
@@ -46,30 +46,5 @@ def near_contacts(
     if gap_b > margin:
         return 0
     if gap_b > gap_a + 1e-9 + 0.01 * abs(gap_a):
-        return _clipped(b, edge_b, a, -1.0, margin, out)
-    return _clipped(a, edge_a, b, 1.0, margin, out)
-
-
-@kernel
-def _clipped(
-    ref: FloatArray, edge: int, inc: FloatArray, sign: float, margin: float, out: FloatArray
-) -> int:
-    """Clip the edge that faces the reference edge against it; returns the number of points."""
-    edges = facing_edges(ref, edge, inc)
-    found = 0
-    span = edges.sw - edges.su
-    for end in range(2):
-        s, d = (edges.su, edges.du) if end == 0 else (edges.sw, edges.dw)
-        clipped = min(max(s, 0.0), edges.length)
-        if clipped != s:
-            if abs(span) < 1e-12 * edges.length:
-                continue
-            fraction = (clipped - edges.su) / span
-            if fraction < 0.0 or fraction > 1.0:  # the edge lies beside the reference edge
-                continue
-            d = edges.du + fraction * (edges.dw - edges.du)
-        if d <= margin:
-            write_point(edges, clipped, d, sign, out[found])
-            out[found, 4] = d
-            found += 1
-    return found
+        return int(clip_facing(b, edge_b, a, -1.0, margin, False, out))
+    return int(clip_facing(a, edge_a, b, 1.0, margin, False, out))

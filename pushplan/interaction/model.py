@@ -7,9 +7,22 @@ from typing import Protocol, runtime_checkable
 
 from numpy.typing import ArrayLike
 
-from pushplan.world import World
+from pushplan.compiled import owned
+from pushplan.world import InvalidInputError, World
 from pushplan.world.checks import ArrayRecord, FloatArray, array, integer
 from pushplan.world.polyline import path_lengths
+
+
+def checked_path(path: ArrayLike) -> FloatArray:
+    """Poses (N, 3) that a robot is swept through, as kernels read them.
+
+    Raises:
+        InvalidInputError: if the path is not (N, 3), empty, or not finite.
+    """
+    poses: FloatArray = owned(array("path", path, (None, 3)))
+    if len(poses) == 0:
+        raise InvalidInputError("path must hold at least one pose, got none")
+    return poses
 
 
 @dataclass(frozen=True, eq=False)

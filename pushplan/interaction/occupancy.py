@@ -20,6 +20,7 @@ from pushplan.interaction.occupancy_kernels import Patch, cover_objects, cover_s
 from pushplan.world import World
 from pushplan.world.checks import ArrayRecord, FloatArray, array, number
 from pushplan.world.errors import InvalidInputError
+from pushplan.world.outline import next_corner
 
 PATCH_CELLS = 40
 """Cells along each side of a patch."""
@@ -130,20 +131,17 @@ def ice_density(world: World) -> float:
     movables = world.movables
     if len(movables) == 0:
         return 1.0
-    x, y = movables.vertices.T
-    following = np.arange(1, len(x) + 1)
-    following[movables.offsets[1:] - 1] = movables.offsets[:-1]
+    (x, y), following = movables.vertices.T, next_corner(movables.offsets)
     area = 0.5 * float((x * y[following] - x[following] * y).sum())
     return float(movables.masses.sum()) / area
 
 
-def patch_frame(path: FloatArray, ahead: float, cell: float) -> FloatArray:
+def patch_frame(
+    path: FloatArray,  # (N, 3) robot poses
+    ahead: float,  # direction in which rows count up [rad]
+    cell: float,  # side of a cell [m]
+) -> FloatArray:
     """The frame of the patch around a passage, about the middle between its two ends.
-
-    Args:
-        path: (N, 3) robot poses.
-        ahead: direction in which rows count up [rad].
-        cell: side of a cell [m].
 
     Returns:
         (3,) as in `occupancy_kernels`. The corner lies on a grid of cells

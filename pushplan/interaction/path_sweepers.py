@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Protocol
+from collections.abc import Callable
 
 from pushplan.compiled import owned
 from pushplan.interaction.ice import IceInteraction
@@ -17,65 +17,13 @@ MARGIN = 1.0
 """How far from the hull objects are that a sweep still looks at [circumscribed radii]."""
 
 
-class PathSweeper(Protocol):
-    """Carries the objects along a portion of a path."""
+PathSweeper = Callable[[FloatArray, FloatArray, FloatArray, FloatArray], bool]
+"""Carries the objects along a portion of a path; False where the robot jams.
 
-    def run(self, path: FloatArray, poses: FloatArray, out: FloatArray, works: FloatArray) -> bool:
-        """Sweep.
-
-        Args:
-            path: (N, 3) robot poses.
-            poses: (K, 3) objects at the first of them; those at the last afterwards.
-            out: (N, K, 3) receives the objects at each pose.
-            works: (N - 1,) receives the work from each pose to the next [kg m].
-
-        Returns:
-            False where the robot jams.
-        """
-        ...
-
-
-class IceSweeper:
-    """Floes in open water."""
-
-    def __init__(self, world: World, interaction: IceInteraction) -> None:
-        self._bodies, self._settings = interaction.bodies(world), interaction.settings(world)
-        self._margin = MARGIN * world.robot.circumscribed_radius
-
-    def run(self, path: FloatArray, poses: FloatArray, out: FloatArray, works: FloatArray) -> bool:
-        """See `PathSweeper`."""
-        sweep_near(path, poses, self._bodies, self._settings, self._margin, out, works)
-        return True
-
-
-class QuasiStaticSweeper:
-    """Objects among walls."""
-
-    def __init__(self, world: World, interaction: QuasiStatic) -> None:
-        self._bodies, self._settings = interaction.bodies(world), interaction.settings(world)
-        self._masses = owned(world.movables.masses)
-
-    def run(self, path: FloatArray, poses: FloatArray, out: FloatArray, works: FloatArray) -> bool:
-        """See `PathSweeper`."""
-        jammed = int(sweep_path(path, poses, self._bodies, self._settings, out))
-        add_works(out, self._masses, works)
-        return jammed < 0
-
-
-class ModelSweeper:
-    """Any other interaction model; it is asked anew for each portion."""
-
-    def __init__(self, world: World, interaction: InteractionModel) -> None:
-        self._world, self._interaction = world, interaction
-
-    def run(self, path: FloatArray, poses: FloatArray, out: FloatArray, works: FloatArray) -> bool:
-        """See `PathSweeper`."""
-        start = self._world.moved(robot_pose=path[0], movable_poses=poses)
-        swept = self._interaction.sweep(start, path)
-        out[:] = swept.object_poses
-        poses[:] = out[-1]
-        add_works(out, self._world.movables.masses, works)
-        return swept.jammed_at < 0
+It takes (N, 3) robot poses; (K, 3) objects at the first of them, which it changes into those at the
+last; (N, K, 3) for the objects at each pose; and (N - 1,) for the work from each pose to the next
+[kg m].
+"""
 
 
 def default_interaction(world: World) -> InteractionModel:
@@ -84,10 +32,40 @@ def default_interaction(world: World) -> InteractionModel:
 
 
 def path_sweeper(world: World, interaction: InteractionModel | None = None) -> PathSweeper:
-    """The sweeper for a model, by default `default_interaction`."""
-    interaction = default_interaction(world) if interaction is None else interaction
-    if isinstance(interaction, IceInteraction):
-        return IceSweeper(world, interaction)
-    if isinstance(interaction, QuasiStatic):
-        return QuasiStaticSweeper(world, interaction)
-    return ModelSweeper(world, interaction)
+    """The sweeper for a model, by default `default_interaction`.
+
+    A model that has no kernels is asked anew for each portion.
+    """
+    model = default_interaction(world) if interaction is None else interaction
+    masses = owned(world.movables.masses)
+    if isinstance(model, IceInteraction):
+        ice, ice_settings = model.bodies(world), model.settings(world)
+        margin = MARGIN * world.robot.circumscribed_radius
+
+        def sweep_floes(
+            path: FloatArray, poses: FloatArray, out: FloatArray, works: FloatArray
+        ) -> bool:
+            sweep_near(path, poses, ice, ice_settings, margin, out, works)
+            return True
+
+        return sweep_floes
+    if isinstance(model, QuasiStatic):
+        bodies, settings = model.bodies(world), model.settings(world)
+
+        def sweep_objects(
+            path: FloatArray, poses: FloatArray, out: FloatArray, works: FloatArray
+        ) -> bool:
+            jammed = int(sweep_path(path, poses, bodies, settings, out))
+            add_works(out, masses, works)
+            return jammed < 0
+
+        return sweep_objects
+
+    def ask_model(path: FloatArray, poses: FloatArray, out: FloatArray, works: FloatArray) -> bool:
+        swept = model.sweep(world.moved(robot_pose=path[0], movable_poses=poses), path)
+        out[:] = swept.object_poses
+        poses[:] = out[-1]
+        add_works(out, masses, works)
+        return swept.jammed_at < 0
+
+    return ask_model

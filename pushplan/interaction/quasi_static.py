@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from pushplan.compiled import owned
 from pushplan.geometry import polygon_inertia
 from pushplan.interaction.kernels import Bodies, Settings, make_scratch, sweep_path
-from pushplan.interaction.model import Interaction
+from pushplan.interaction.model import Interaction, checked_path
 from pushplan.interaction.quasi_static_step import QuasiStaticContacts
 from pushplan.world import Movables, RobotModel, StaticMap, World
 from pushplan.world.checked_fields import (
@@ -22,8 +22,7 @@ from pushplan.world.checked_fields import (
     PositiveFraction,
     PositiveInt,
 )
-from pushplan.world.checks import FloatArray, array
-from pushplan.world.errors import InvalidInputError
+from pushplan.world.checks import FloatArray
 from pushplan.world.outline import flatten
 
 
@@ -88,9 +87,7 @@ class QuasiStatic(CheckedFields):
 
     def sweep(self, world: World, path: ArrayLike) -> Interaction:
         """Predict the motion of every object; see `InteractionModel.sweep`."""
-        robot_path: FloatArray = owned(array("path", path, (None, 3)))
-        if len(robot_path) == 0:
-            raise InvalidInputError("path must hold at least one pose, got none")
+        robot_path = checked_path(path)
         poses = world.movables.poses.copy()
         out = np.empty((len(robot_path), len(poses), 3))
         jammed = sweep_path(robot_path, poses, self.bodies(world), self.settings(world), out)

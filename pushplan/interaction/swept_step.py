@@ -96,15 +96,14 @@ def _step(
 advance_objects.add(SweptContacts, _step)
 
 
-def compile_interaction(model: InteractionModel, world: World) -> Any:
+def compile_interaction(
+    model: InteractionModel,  # the interaction model
+    world: World,
+) -> Any:
     """An interaction model as `advance_objects` takes it.
 
     A model that has no compiled form is asked for every step by its ``sweep``: a thousand times
     slower than a compiled one, and objects are at rest at the beginning of each step.
-
-    Args:
-        model: the interaction model.
-        world: the snapshot.
     """
     if isinstance(model, CompiledInteraction):
         return model.compiled(world)

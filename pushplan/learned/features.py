@@ -15,7 +15,7 @@ from pushplan.learned.ray_kernels import cast_rays, near_outlines
 from pushplan.observation.builder import LimitedVector
 from pushplan.world import Goal, GoalDisc, GoalLine, StaticMap, World
 from pushplan.world.checked_fields import CheckedFields, Limits, PositiveFloat
-from pushplan.world.checks import FloatArray, IntArray
+from pushplan.world.checks import FloatArray, IntArray, frozen
 from pushplan.world.outline import centroid, flatten
 
 _GUIDE, _EACH = 10, 9
@@ -74,7 +74,9 @@ class FeatureObservation(LimitedVector, CheckedFields):
                 *(x, y, self.range, objects.poses, objects.radii),
                 *(objects.vertices, objects.offsets),
             )
-            out[_GUIDE + self.rays : _GUIDE + 2 * self.rays] = self._cast(x, y, theta, *near)
+            out[_GUIDE + self.rays : _GUIDE + 2 * self.rays] = self._cast(
+                x, y, theta, *map(frozen, near)
+            )
         if self.objects and len(world.movables):
             self._nearest(out[_GUIDE + 2 * self.rays :].reshape(-1, _EACH), world, to_body)
         return np.clip(out, -self.limit, self.limit).astype(np.float32)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from dataclasses import dataclass
 from functools import partial
 
@@ -20,8 +19,9 @@ from pushplan.motion.path_search_config import PathSearchConfig
 from pushplan.motion.shortcutting import shortcut
 from pushplan.motion.speed_profile import TIGHTEST, start_margin, timed_plan
 from pushplan.motion.time_slicing import Pace
-from pushplan.world import Drive, Plan, PlanStatus, StopCheck, World
+from pushplan.world import Drive, PlanResult, PlanStatus
 from pushplan.world.checks import FloatArray
+from pushplan.world.planning_call import PlanningCall
 
 _THIN_MARGIN = 0.05
 """Margin below which a post could hide between two poses of the usual spacing [R]."""
@@ -40,29 +40,22 @@ class Candidate:
 
 
 class PathImprover:
-    """What the searches of one planning call share: the problem, its clock, and the best path.
-
-    Args:
-        world: the snapshot.
-        config: parameters.
-        interaction: predicts the objects.
-        turning_radius: least one of plans at first [m].
-        check: the armed stop rule.
-        rng: source of chance.
-        began: when the call began, by `time.perf_counter` [s].
-    """
+    """What the searches of one planning call share: the problem, its clock, and the best path."""
 
     def __init__(
         self,
-        world: World,
+        call: PlanningCall,  # its world, stop rule and source of chance
         config: PathSearchConfig,
         interaction: InteractionModel,
-        turning_radius: float,
-        check: StopCheck,
-        rng: np.random.Generator,
-        began: float,
+        turning_radius: float,  # least one of plans at first [m]
     ) -> None:
-        self.world, self.config, self.rng, self.goal = world, config, rng, world.navigation_goal
+        world = call.world
+        self.world, self.config, self.rng, self.goal = (
+            world,
+            config,
+            call.rng,
+            world.navigation_goal,
+        )
         self.size = world.robot.circumscribed_radius
         self.iterations = self.nodes = self.relaxed = 0
         self.tight = False
@@ -81,7 +74,7 @@ class PathImprover:
         )
         # crowded worlds are slow to sweep: look at the stop rule more often
         self._batch = max(1, 10 * config.batch // (10 + len(world.movables)))
-        self._check, self._began, self._margin = check, began, 0.0
+        self._call, self._margin = call, 0.0
         self._shortcut_pace, self._sweep_pace = Pace(), Pace()
         self._best: SweptPath | None = None
 
@@ -151,20 +144,18 @@ class PathImprover:
         """Whether the stop rule fires now."""
         if isinstance(self.problem.contacts, SweptContacts):
             self.problem.contacts.call.raise_error()
-        return self._check(self.iterations, self.plan_cost)
+        return self._call.check(self.iterations, self.plan_cost)
 
     def candidate(
-        self, arcs: FloatArray, limit: float = np.inf, *, free: bool = True
+        self,
+        arcs: FloatArray,  # (E, 2) length [m] and curvature [1/m]
+        limit: float = np.inf,  # cost that it must stay below [kg m]
+        *,
+        free: bool = True,  # whether it is known to touch no wall and to reach the goal
     ) -> Candidate | None:
-        """The path along some arcs with its cost; None if it is not one that could be a plan.
-
-        Args:
-            arcs: (E, 2) length [m] and curvature [1/m].
-            limit: cost that it must stay below [kg m].
-            free: whether it is known to touch no wall and to reach the goal.
-        """
+        """The path along some arcs with its cost; None if it is not one that could be a plan."""
         problem, count = self.problem, len(self.world.movables)
-        steps = [length / step_along(bend, problem.spacing) for length, bend in arcs.tolist()]
+        steps = [length / step_along(turn, problem.spacing) for length, turn in arcs.tolist()]
         capacity = 3 * int(sum(steps) + len(arcs)) + 200
         path = make_swept_path(capacity, count)
         used = lay_out(owned(self.world.robot_pose), arcs, path, problem)
@@ -204,7 +195,7 @@ class PathImprover:
             draws = self.rng.random((self._batch, 4))
             normals = self.rng.standard_normal((self._batch, 2))
             # between pieces only the clock counts: what else may fire has been looked at
-            late = partial(self._check, self.iterations, self.plan_cost)
+            late = partial(self._call.check, self.iterations, self.plan_cost)
             for first, last in self._shortcut_pace.pieces(self._batch, late):
                 candidate.count, candidate.cost = shortcut(
                     candidate.path,
@@ -222,12 +213,23 @@ class PathImprover:
         if cost >= self.best_cost:
             return
         if np.isnan(self.first_solution_s) and cost < self.jam_cost:
-            self.first_solution_s = time.perf_counter() - self._began
+            self.first_solution_s = self._call.elapsed
         self.best_cost = cost
         self.tight = self.relaxed > 1
         self._best = SweptPath(*(part[:count].copy() for part in path))
 
-    def plan(self) -> Plan:
-        """The best path so far as a plan."""
-        assert self._best is not None
-        return timed_plan(self.world, self._best, self.config.turn_fraction)
+    def result(self, status: PlanStatus, **detail: float) -> PlanResult:
+        """The result of the call: the best path so far as a plan, where the status has one."""
+        plan = None
+        if status.has_plan:
+            assert self._best is not None
+            plan = timed_plan(self.world, self._best, self.config.turn_fraction)
+        return self._call.result(
+            status,
+            plan,
+            self.first_solution_s,
+            self.iterations,
+            self.nodes,
+            tight=float(self.tight),
+            **detail,
+        )

@@ -24,7 +24,8 @@ STATIC, MOVABLE = 255, 128
 def footprint(image: Image, view: View) -> None:
     """Where the robot is, 255."""
     robot = view.world.robot
-    view.fill_parts(image, transform(view.world.robot_pose, robot.vertices), robot.offsets)
+    vertices = frozen(transform(view.world.robot_pose, robot.vertices))
+    view.fill_parts(image, vertices, robot.offsets)
 
 
 def movable(image: Image, view: View) -> None:

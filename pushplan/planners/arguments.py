@@ -3,18 +3,6 @@
 from __future__ import annotations
 
 from pushplan.world import ClearanceArea, Drive, InvalidInputError, Receptacle, World
-from pushplan.world.checks import expect
-from pushplan.world.stop import check_rules
-
-
-def check_call(world: object, stop: object, rng: object) -> None:
-    """Check the types of what a planner is called with.
-
-    Raises:
-        InvalidInputError: naming the argument and the type that it must have.
-    """
-    expect("world", world, World)
-    check_rules(stop, rng)
 
 
 def check_pusher(world: World, who: str) -> None:

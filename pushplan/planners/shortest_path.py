@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,10 +10,10 @@ from pushplan.control import PurePursuit
 from pushplan.geometry import VisibilityGraph
 from pushplan.motion.polyline import polyline_plan
 from pushplan.motion.speed_profile import start_margin
-from pushplan.planners.arguments import check_call
 from pushplan.planners.following.plan_follower import PlanFollower
-from pushplan.world import Planner, PlanResult, PlanStats, PlanStatus, Stop, World
+from pushplan.world import Planner, PlanResult, PlanStatus, Stop, World
 from pushplan.world.checks import number
+from pushplan.world.planning_call import PlanningCall
 
 
 @dataclass(frozen=True)
@@ -35,15 +34,10 @@ class ShortestPath:
         number("spacing", self.spacing, low=0.0, open_low=True)
 
     def plan(
-        self,
-        world: World,
-        *,
-        stop: Stop | None = None,
-        rng: np.random.Generator | None = None,
+        self, world: World, *, stop: Stop | None = None, rng: np.random.Generator | None = None
     ) -> PlanResult:
         """Plan from ``world``; exact and without chance, so ``stop`` and ``rng`` are not needed."""
-        began = time.perf_counter()
-        check_call(world, stop, rng)
+        call = PlanningCall(world, stop, rng)
         robot, goal = world.robot, world.navigation_goal
         start = world.robot_pose[:2]
         for clearance in (robot.circumscribed_radius, robot.inscribed_radius):
@@ -51,12 +45,9 @@ class ShortestPath:
             if np.isfinite(path.length):
                 spacing = self.spacing * robot.circumscribed_radius
                 plan = polyline_plan(world, path.points, spacing)
-                wall = time.perf_counter() - began
-                stats = PlanStats(wall, first_solution_s=wall, iterations=1)
-                return PlanResult(PlanStatus.SOLVED, plan, stats)
+                return call.result(PlanStatus.SOLVED, plan, call.elapsed, 1)
         blocked = start_margin(world, 0.0) is None
-        status = PlanStatus.START_BLOCKED if blocked else PlanStatus.GOAL_UNREACHABLE
-        return PlanResult(status, None, PlanStats(time.perf_counter() - began))
+        return call.result(PlanStatus.START_BLOCKED if blocked else PlanStatus.GOAL_UNREACHABLE)
 
 
 def straight(planner: Planner | None = None) -> PlanFollower:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import time
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,20 +15,19 @@ from pushplan.control import PurePursuit
 from pushplan.geometry import VisibilityGraph
 from pushplan.motion.polyline import polyline_plan
 from pushplan.motion.speed_profile import start_margin
-from pushplan.planners.arguments import check_call
 from pushplan.planners.following.plan_follower import PlanFollower
 from pushplan.planners.following.replanning import Replanning
 from pushplan.world import (
     GoalDisc,
     Planner,
     PlanResult,
-    PlanStats,
     PlanStatus,
     Stop,
     StopCheck,
     World,
 )
 from pushplan.world.checks import BoolArray, FloatArray, IntArray, number
+from pushplan.world.planning_call import PlanningCall
 
 _MOST_SITES = 2000
 """Points on outlines at most, but for three on each: the time of a call grows with them."""
@@ -58,11 +56,7 @@ class Skeleton:
         number("narrow", self.narrow, low=0.0)
 
     def plan(
-        self,
-        world: World,
-        *,
-        stop: Stop | None = None,
-        rng: np.random.Generator | None = None,
+        self, world: World, *, stop: Stop | None = None, rng: np.random.Generator | None = None
     ) -> PlanResult:
         """Plan from ``world``; exact and without chance, so ``rng`` is not needed.
 
@@ -73,20 +67,16 @@ class Skeleton:
         Raises:
             InvalidInputError: if the world's goal is not one for the robot.
         """
-        began = time.perf_counter()
-        check_call(world, stop, rng)
-        check = None if stop is None else stop.start()
-        status, points = self._path(world, check)
-        if stop is not None and stop.cancelled:
+        call = PlanningCall(world, stop, rng)
+        status, points = self._path(world, call.check)
+        if call.cancelled:
             status, points = PlanStatus.CANCELLED, None
-        plan = None
-        if points is not None:
-            plan = polyline_plan(world, points, self.spacing * world.robot.circumscribed_radius)
-        wall = time.perf_counter() - began
-        first = wall if plan is not None else float("nan")
-        return PlanResult(status, plan, PlanStats(wall, first_solution_s=first, iterations=1))
+        if points is None:
+            return call.result(status, iterations=1)
+        plan = polyline_plan(world, points, self.spacing * world.robot.circumscribed_radius)
+        return call.result(status, plan, call.elapsed, 1)
 
-    def _path(self, world: World, check: StopCheck | None) -> tuple[PlanStatus, FloatArray | None]:
+    def _path(self, world: World, check: StopCheck) -> tuple[PlanStatus, FloatArray | None]:
         """Corners of the path (N, 2) [m] from the robot to the goal."""
         if start_margin(world, 0.0) is None:
             return PlanStatus.START_BLOCKED, None
@@ -94,7 +84,7 @@ class Skeleton:
         goal = world.navigation_goal
         if goal.distance(float(start[0]), float(start[1])) <= 0.0:
             return PlanStatus.SOLVED, start[None]
-        if check is not None and check(0, math.inf):
+        if check(0, math.inf):
             return PlanStatus.TIMED_OUT, None
         sites, owners = self._sites(world)
         points = self._along(world, sites, owners) if len(set(owners.tolist())) > 1 else None
@@ -120,8 +110,8 @@ class Skeleton:
         samples = np.maximum(np.ceil(around / spacing), 3.0).astype(np.int64)
         owners = np.repeat(np.arange(len(counts)), samples)
         first = np.cumsum(samples) - samples
-        share = (np.arange(len(owners)) - first[owners] + 0.5) / samples[owners]
-        along = reached[ends[owners] - 1] - (1.0 - share) * around[owners]
+        fraction = (np.arange(len(owners)) - first[owners] + 0.5) / samples[owners]
+        along = reached[ends[owners] - 1] - (1.0 - fraction) * around[owners]
         at = np.minimum(np.searchsorted(reached, along), ends[owners] - 1)
         left = (reached[at] - along) / np.maximum(np.hypot(edges[at, 0], edges[at, 1]), 1e-12)
         return corners[after[at]] - edges[at] * left[:, None], owners
@@ -132,7 +122,7 @@ class Skeleton:
             triangles = Delaunay(sites)
         except QhullError:
             return None  # all points on one line
-        # its dual: corners of the diagram are circumcentres, and neighbours share a ridge
+        # its dual: corners of the diagram are circumcentres, and neighbours fraction a ridge
         corners = _circumcentres(sites[triangles.simplices])
         first, opposite = np.nonzero(triangles.neighbors > np.arange(len(corners))[:, None])
         ridges = np.column_stack([first, triangles.neighbors[first, opposite]])

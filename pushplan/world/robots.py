@@ -1,4 +1,10 @@
-"""A catalogue of robots: the TurtleBot3 Burger with its bumpers, the Jackal, the 2D benchmark's."""
+"""A catalogue of robots: the TurtleBot3 Burger with its bumpers, the Jackal, the 2D benchmark's.
+
+All of them take how the robot may move (``drive``) and, as ``limits``, anything else that
+`RobotModel` takes, such as ``max_speed`` [m/s]; some take a ``bumper``, one of `BUMPERS`. An
+`InvalidInputError` says that there is no such bumper, or that a limit makes no sense; an
+`UnknownNameError` that there is no such limit.
+"""
 
 from __future__ import annotations
 
@@ -26,15 +32,6 @@ def turtlebot3_burger(
     Mass 1.07 kg with bumper, wheels 0.16 m apart, 0.22 m/s and 2.84 rad/s (ROBOTIS, TurtleBot3
     e-Manual, "Features"). Bumpers are 0.2 m wide and reach 0.03 to 0.05 m ahead of the body; two
     8 cm boxes find room side by side.
-
-    Args:
-        bumper: one of `BUMPERS`.
-        drive: how it may move.
-        limits: anything else that `RobotModel` takes, such as ``max_speed`` [m/s].
-
-    Raises:
-        InvalidInputError: if there is no such bumper, or a limit makes no sense.
-        UnknownNameError: if there is no such limit.
     """
     body = _box(-0.069, 0.069, 0.0915)
     parts = [body, *_bumper(bumper, 0.069, 0.0915, 0.1, 0.03, 0.02)]
@@ -51,15 +48,6 @@ def jackal(
     (github.com/jackal/jackal, ``jackal_control/config/control.yaml``), wheels 0.3756 m apart
     (``jackal_description/urdf/jackal.urdf.xacro``). Bumpers have the Burger's shapes at 0.46 m
     width.
-
-    Args:
-        bumper: one of `BUMPERS`.
-        drive: how it may move.
-        limits: anything else that `RobotModel` takes, such as ``max_speed`` [m/s].
-
-    Raises:
-        InvalidInputError: if there is no such bumper, or a limit makes no sense.
-        UnknownNameError: if there is no such limit.
     """
     parts = [_box(-0.255, 0.255, 0.215), *_bumper(bumper, 0.255, 0.215, 0.23, 0.05, 0.04)]
     own = {
@@ -74,12 +62,7 @@ def jackal(
 
 
 def maze_robot(drive: Drive | str = Drive.CONSTANT_SPEED, **limits: float) -> RobotModel:
-    """The 2D benchmark's robot for the Maze: an octagon of 1.4 x 1.2 m, no bumper.
-
-    Args:
-        drive: how it may move.
-        limits: anything else that `RobotModel` takes.
-    """
+    """The 2D benchmark's robot for the Maze: an octagon of 1.4 x 1.2 m, no bumper."""
     octagon = [
         *((0.7, -0.5), (0.7, 0.5), (0.6, 0.6), (-0.6, 0.6)),
         *((-0.7, 0.5), (-0.7, -0.5), (-0.6, -0.6), (0.6, -0.6)),
@@ -92,10 +75,6 @@ def box_delivery_robot(drive: Drive | str = Drive.DIFFERENTIAL, **limits: float)
     """The 2D benchmark's robot for Box-Delivery: a body of 0.57 x 0.7 m and a straight bumper.
 
     The benchmark turns by at most (pi / 2) / 15 in a control step of 0.2 s.
-
-    Args:
-        drive: how it may move.
-        limits: anything else that `RobotModel` takes.
     """
     parts = [_box(-0.31, 0.26, 0.35), _trapezium(0.20, 0.39, 0.31, 0.53)]
     own = {"mass": 1.0, "max_speed": 0.3, "max_turn_rate": np.pi / 6.0, "wheel_separation": 0.5}
@@ -106,10 +85,6 @@ def area_clearing_robot(drive: Drive | str = Drive.DIFFERENTIAL, **limits: float
     """The 2D benchmark's robot for Area-Clearing: a body of 1.3 x 1.6 m and a straight bumper.
 
     The benchmark turns by at most (pi / 2) / 15 in a control step of 0.2 s.
-
-    Args:
-        drive: how it may move.
-        limits: anything else that `RobotModel` takes.
     """
     parts = [_box(-0.7, 0.6, 0.8), _trapezium(0.45, 0.9, 0.7, 1.2)]
     own = {"mass": 1.0, "max_speed": 0.2, "max_turn_rate": np.pi / 6.0, "wheel_separation": 1.2}
@@ -145,19 +120,16 @@ def _trapezium(back: float, back_half: float, front: float, front_half: float) -
 
 
 def _bumper(
-    kind: str, back: float, body_half: float, half: float, depth: float, curve: float
+    kind: str,  # one of `BUMPERS`
+    back: float,  # x of the face that it is mounted on [m]
+    body_half: float,  # half the width of that face [m]
+    half: float,  # half the width of the bumper [m]
+    # how far it reaches forward in the middle, or for the navigation bumper at its ends less half
+    # the curve [m]
+    depth: float,
+    curve: float,  # how much farther the ends (collector) or the middle (navigation) reach [m]
 ) -> list[FloatArray]:
-    """Convex parts of a bumper.
-
-    Args:
-        kind: one of `BUMPERS`.
-        back: x of the face that it is mounted on [m].
-        body_half: half the width of that face [m].
-        half: half the width of the bumper [m].
-        depth: how far it reaches forward in the middle, or for the navigation bumper at its ends
-            less half the curve [m].
-        curve: how much farther the ends (collector) or the middle (navigation) reach [m].
-    """
+    """Convex parts of a bumper."""
     choice("bumper", kind, BUMPERS)
     if kind == "none":
         return []

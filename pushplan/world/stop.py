@@ -170,13 +170,11 @@ def _rules(stop: Stop) -> tuple[Stop, ...]:
     return stop.rules if isinstance(stop, AnyOf) else (stop,)
 
 
-def check_rules(stop: object, rng: object) -> None:
-    """Check the types of a stop rule and a generator, each of which may be None.
+def check_rules(stop: object, rng: object) -> tuple[Stop | None, np.random.Generator | None]:
+    """Check the types of a stop rule and a generator, each of which may be None; return them.
 
     Raises:
         InvalidInputError: naming the argument and the type that it must have.
     """
-    if stop is not None:
-        expect("stop", stop, Stop)  # type: ignore[type-abstract]
-    if rng is not None:
-        expect("rng", rng, np.random.Generator)
+    rule = None if stop is None else expect("stop", stop, Stop)  # type: ignore[type-abstract]
+    return rule, None if rng is None else expect("rng", rng, np.random.Generator)

@@ -12,7 +12,6 @@ from pushplan.geometry import (
     convex_distance,
     convex_overlap,
     convex_penetration,
-    point_in_polygon,
     polygon_area,
     polygon_centroid,
     polygon_inertia,
@@ -68,22 +67,6 @@ def test_inertia_equals_sum_over_triangles(v: np.ndarray) -> None:
         middles = [a / 2, b / 2, (a + b) / 2]  # exact for quadratics
         total += area * sum(m @ m for m in middles) / 3.0
     assert polygon_inertia(v) == pytest.approx(total / polygon_area(v), rel=1e-6)
-
-
-@given(convex_polygons(reach=1.0), st.integers(0, 2**32 - 1))
-@settings(max_examples=100, deadline=None)
-def test_point_in_polygon_equals_shapely(v: np.ndarray, seed: int) -> None:
-    shape = shapely.Polygon(v)
-    for x, y in np.random.default_rng(seed).uniform(-2.0, 2.0, (50, 2)):
-        point = shapely.Point(x, y)
-        if shape.exterior.distance(point) > 1e-9:
-            assert point_in_polygon(x, y, v) == shape.contains(point)
-
-
-def test_point_in_polygon_handles_nonconvex_outlines() -> None:
-    v = np.array([[0.0, 0.0], [4.0, 0.0], [4.0, 4.0], [2.0, 1.0], [0.0, 4.0]])
-    assert point_in_polygon(0.5, 2.0, v)
-    assert not point_in_polygon(2.0, 2.0, v)
 
 
 def test_transform_points_may_work_in_place() -> None:

@@ -6,7 +6,7 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from pushplan.geometry import Grid, clearance_field, fill_convex, fill_convex_parts, occupancy
+from pushplan.geometry import Grid, clearance_field, fill_convex, occupancy
 from pushplan.world import InvalidInputError, StaticMap
 
 
@@ -37,14 +37,6 @@ def test_fill_is_clipped_and_ignores_what_is_outside_or_broken() -> None:
     assert not image.any()
     fill_convex(image, np.array([[-1e9, -1e9], [1e9, -1e9], [1e9, 1e9], [-1e9, 1e9]]), True)
     assert image.all()
-
-
-def test_fill_parts_fills_each() -> None:
-    image = np.zeros((4, 4))
-    squares = np.array([[0, 0], [2, 0], [2, 2], [0, 2], [2, 2], [4, 2], [4, 4], [2, 4]], float)
-    fill_convex_parts(image, squares, np.array([0, 4, 8]), 1.5)
-    assert image.sum() == 8 * 1.5
-    assert image[0, 0] == image[3, 3] == 1.5
 
 
 def test_grid_geometry() -> None:

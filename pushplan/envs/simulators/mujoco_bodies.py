@@ -9,6 +9,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
+from pushplan.compiled import owned
 from pushplan.envs.simulators.base import Materials
 from pushplan.envs.simulators.mujoco_kernels import drag_damping, planar_rows, sleep_lists
 from pushplan.envs.simulators.mujoco_model import SceneKey, scene_model
@@ -121,7 +122,7 @@ class MujocoBodies:
             rates[:, :2], rates[:, 5] = twists[:, :2], twists[:, 2]
         quiet: BoolArray = np.logical_not(twists.any(axis=1))
         asleep = self._all_awake.copy()
-        rest_cycles(poses, *self._outlines, quiet, self._gap, asleep)
+        rest_cycles(owned(poses), *self._outlines, quiet, self._gap, asleep)
         self._load(world.time, qpos, qvel, asleep)
 
     def _put_robot(

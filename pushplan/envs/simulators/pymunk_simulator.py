@@ -178,7 +178,7 @@ class PymunkSimulator(Simulator):
     def _far_from_static(self, reach: float) -> bool:
         x, y = self._rows[0, 0], self._rows[0, 1]
         robot, shapes = self._world.robot, self._obstacles
-        gap = obstacle_distance(x, y, shapes.vertices, shapes.offsets, shapes.radii)
+        gap = obstacle_distance(x, y, shapes)
         if gap > robot.circumscribed_radius + reach:
             return True
         return reach < footprint_gap(

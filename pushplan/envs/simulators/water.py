@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pushplan.compiled import owned
 from pushplan.envs.simulators.water_kernels import flow_shapes
 from pushplan.geometry import polygon_area, polygon_centroid, polygon_inertia
 from pushplan.world import World
@@ -89,7 +90,7 @@ def _hull_inertia(world: World) -> float:
     """Polar second moment of the robot's footprint about its origin, per unit mass [m²]."""
     total = moment = 0.0
     for part in world.robot.parts:
-        area = polygon_area(part)
+        area = polygon_area(owned(part))
         x, y = polygon_centroid(part)
         total += area
         moment += area * (polygon_inertia(part) + x * x + y * y)

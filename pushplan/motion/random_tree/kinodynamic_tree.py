@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from ompl import base, control
@@ -23,8 +24,7 @@ from pushplan.world import NavigationGoal
 from pushplan.world.checks import FloatArray
 
 
-@dataclass(frozen=True)
-class TreeLimits:
+class TreeLimits(NamedTuple):
     """How the tree may grow."""
 
     max_curvature: float  # greatest |curvature| of an edge [1/m]
@@ -38,7 +38,7 @@ def steer(
     start: FloatArray,  # (3,)
     target: FloatArray,  # (3,)
     sampled: float,  # a random curvature [1/m]; the others are spread evenly or aim at the target
-    limits: tuple[float, float, float, float],  # as in `TreeLimits`
+    limits: TreeLimits,
     shape: Footprint,
     among: ConvexObstacles,
     scratch: FloatArray,  # memory for the footprint's corners
@@ -73,62 +73,20 @@ def steer(
     return best_curvature, best_length
 
 
-def grow_tree(
-    start: FloatArray,
-    goal: NavigationGoal,
-    targets: Callable[[], FloatArray],
-    limits: TreeLimits,
-    shape: Footprint,
-    among: ConvexObstacles,
-    seed: int,
-    done: Callable[[], bool],
-    stopped: Callable[[], bool],
-) -> FloatArray | None:
-    """Grow a tree from ``start`` until it reaches ``goal`` or ``done()`` says so.
+@dataclass(eq=False)
+class TreeGrowth:
+    """A tree that grows from ``start`` to ``goal``: the state behind OMPL's callbacks."""
 
-    Args:
-        start: (3,) pose.
-        goal: where to.
-        targets: gives the next (3,) pose to grow towards.
-        limits: of the edges.
-        shape: footprint of the robot.
-        among: what it must not touch.
-        seed: of OMPL's generator, positive.
-        done: asked once per iteration.
-        stopped: asked while another thread uses OMPL.
+    start: FloatArray  # (3,) pose
+    goal: NavigationGoal
+    targets: Callable[[], FloatArray]  # gives the next (3,) pose to grow towards
+    limits: TreeLimits  # of the edges
+    shape: Footprint  # of the robot
+    among: ConvexObstacles  # what it must not touch
 
-    Returns:
-        (E, 2) length [m] and curvature [1/m] of the arcs from start to goal, or None.
-    """
-    with seeded_ompl(seed, stopped) as ready:
-        if not ready:
-            return None
-        return _Growth(start, goal, targets, limits, shape, among).run(done)
-
-
-class _Growth:
-    """The state behind OMPL's callbacks for one tree."""
-
-    def __init__(
-        self,
-        start: FloatArray,
-        goal: NavigationGoal,
-        targets: Callable[[], FloatArray],
-        limits: TreeLimits,
-        shape: Footprint,
-        among: ConvexObstacles,
-    ) -> None:
-        self.start = np.array([start[0], start[1], _wrap(start[2])])
-        self.goal = goal
-        self.targets = targets
-        self.limits = (
-            limits.max_curvature,
-            limits.edge_length,
-            limits.spacing,
-            limits.turn_weight,
-        )
-        self.shape, self.among = shape, among
-        self.scratch = np.empty_like(shape.vertices)
+    def __post_init__(self) -> None:
+        self.start = np.array([self.start[0], self.start[1], _wrap(self.start[2])])
+        self.scratch = np.empty_like(self.shape.vertices)
         self.here, self.end, self.target = np.empty(3), np.empty(3), np.empty(3)
         self.moved = True  # OMPL asks whether the start is valid before anything moves
         self.reached: tuple[float, float, float] | None = None
@@ -137,7 +95,23 @@ class _Growth:
             tuple[float, float, float], tuple[tuple[float, float, float], float, float]
         ] = {}
 
-    def run(self, done: Callable[[], bool]) -> FloatArray | None:
+    def grow(
+        self, seed: int, done: Callable[[], bool], stopped: Callable[[], bool]
+    ) -> FloatArray | None:
+        """Grow until the goal is reached or ``done()`` says so, which is asked once an iteration.
+
+        Args:
+            seed: of OMPL's generator, positive.
+            done: whether to end.
+            stopped: asked while another thread uses OMPL.
+
+        Returns:
+            (E, 2) length [m] and curvature [1/m] of the arcs from start to goal, or None.
+        """
+        with seeded_ompl(seed, stopped) as ready:
+            return self._run(done) if ready else None
+
+    def _run(self, done: Callable[[], bool]) -> FloatArray | None:
         space = base.SE2StateSpace()
         bounds = base.RealVectorBounds(2)
         for axis in range(2):
@@ -146,8 +120,8 @@ class _Growth:
         space.setBounds(bounds)
         controls = control.RealVectorControlSpace(space, 1)
         curvatures = base.RealVectorBounds(1)
-        curvatures.setLow(-self.limits[0])
-        curvatures.setHigh(self.limits[0])
+        curvatures.setLow(-self.limits.max_curvature)
+        curvatures.setHigh(self.limits.max_curvature)
         controls.setBounds(curvatures)
         info = control.SpaceInformation(space, controls)
         info.setStatePropagator(self._propagate)
@@ -177,6 +151,7 @@ class _Growth:
         return self.target
 
     def satisfied(self, x: float, y: float, yaw: float) -> bool:
+        """Whether a pose is in the goal, which the tree has then reached by an edge to it."""
         if self.goal.distance(x, y) > 0.0:
             return False
         if (x, y, yaw) in self.edges:
@@ -225,7 +200,7 @@ class _Growth:
 class _Region(base.GoalSampleableRegion):
     """Hands OMPL our targets, and tells it when a state is in the goal."""
 
-    def __init__(self, info: control.SpaceInformation, growth: _Growth) -> None:
+    def __init__(self, info: control.SpaceInformation, growth: TreeGrowth) -> None:
         super().__init__(info)
         self.growth = growth
 

@@ -2,37 +2,27 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from pushplan.world.checks import FloatArray
 
 
+@dataclass(eq=False)
 class Targets:
-    """Draws the poses that a tree grows towards.
+    """Draws the poses that a tree grows towards."""
 
-    Args:
-        coarse: (N, 2) coarse path to the goal [m].
-        fraction: fraction of the targets that are near it; the others are uniform.
-        spread: standard deviation of those about it [m].
-        bounds: (4,) of the workspace.
-        rng: source of chance.
-    """
+    coarse: FloatArray  # (N, 2) coarse path to the goal [m]
+    fraction: float  # of the targets that are near it; the others are uniform
+    spread: float  # standard deviation of those about it [m]
+    bounds: FloatArray  # (4,) of the workspace
+    rng: np.random.Generator
 
-    def __init__(
-        self,
-        coarse: FloatArray,
-        fraction: float,
-        spread: float,
-        bounds: FloatArray,
-        rng: np.random.Generator,
-    ) -> None:
-        self.coarse, self.fraction, self.bounds, self.rng = coarse, fraction, bounds, rng
-        self.spread = spread
-        index = np.arange(len(coarse))
-        ahead, behind = (
-            coarse[np.minimum(index + 3, len(coarse) - 1)],
-            coarse[np.maximum(index - 3, 0)],
-        )
+    def __post_init__(self) -> None:
+        coarse, index = self.coarse, np.arange(len(self.coarse))
+        ahead = coarse[np.minimum(index + 3, len(coarse) - 1)]
+        behind = coarse[np.maximum(index - 3, 0)]
         self.headings = np.arctan2(ahead[:, 1] - behind[:, 1], ahead[:, 0] - behind[:, 0])
         self.block = np.empty((0, 3))
         self.used = 0

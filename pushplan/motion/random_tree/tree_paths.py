@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from pushplan.compiled import owned
@@ -10,19 +12,18 @@ from pushplan.motion.coarse_path import coarse_path, reachable
 from pushplan.motion.collision import is_free, obstacles
 from pushplan.motion.path_improver import Candidate, PathImprover
 from pushplan.motion.polyline import polyline_plan
-from pushplan.motion.random_tree.kinodynamic_tree import TreeLimits, grow_tree
+from pushplan.motion.random_tree.kinodynamic_tree import TreeGrowth, TreeLimits
 from pushplan.motion.random_tree.targets import Targets
 from pushplan.world.checks import FloatArray
 
 
 class TreePaths:
-    """Grows trees for a `PathImprover`, which keeps the clock and the best path.
+    """Grows trees for a `PathImprover`, which keeps the clock and the best path."""
 
-    Args:
-        improver: of this planning call.
-    """
-
-    def __init__(self, improver: PathImprover) -> None:
+    def __init__(
+        self,
+        improver: PathImprover,  # of this planning call
+    ) -> None:
         self._improver, self._fraction = improver, improver.config.coarse_path_fraction
         self._exact: FloatArray | None = None
         self.trees = 0
@@ -34,13 +35,25 @@ class TreePaths:
         self._fraction *= 0.5
         self._improver.relax()
 
-    def grow(self, push_weight: float, budget: int) -> Candidate | None:
-        """The path of a new tree.
+    def grow_two(self, push_weight: float) -> Iterator[Candidate]:
+        """Paths of two trees, around the objects and among them, until the stop rule fires."""
+        config = self._improver.config
+        for weight, budget in (
+            (np.inf, config.avoid_iterations),
+            (push_weight, config.tree_iterations),
+        ):
+            if self._improver.stopped():
+                return
+            candidate = self.grow(weight, budget)
+            if candidate is not None:
+                yield candidate
 
-        Args:
-            push_weight: of the coarse path; infinite treats objects as obstacles.
-            budget: iterations.
-        """
+    def grow(
+        self,
+        push_weight: float,  # of the coarse path; infinite treats objects as obstacles
+        budget: int,
+    ) -> Candidate | None:
+        """The path of a new tree."""
         improver, world, problem = self._improver, self._improver.world, self._improver.problem
         config, size = improver.config, improver.size
         self.trees += 1
@@ -74,17 +87,9 @@ class TreePaths:
             turn_weight=0.5 * size,
         )
         spread = config.coarse_path_spread * size
-        arcs = grow_tree(
-            world.robot_pose,
-            improver.goal,
-            Targets(coarse, self._fraction, spread, world.static.bounds, improver.rng),
-            limits,
-            shape,
-            among,
-            int(improver.rng.integers(1, 2**31)),
-            done,
-            improver.stopped,
-        )
+        targets = Targets(coarse, self._fraction, spread, world.static.bounds, improver.rng)
+        growth = TreeGrowth(world.robot_pose, improver.goal, targets, limits, shape, among)
+        arcs = growth.grow(int(improver.rng.integers(1, 2**31)), done, improver.stopped)
         if arcs is None:
             return None
         improver.nodes += len(arcs)

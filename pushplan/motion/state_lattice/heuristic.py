@@ -7,16 +7,15 @@ import numpy as np
 from pushplan.world.checks import FloatArray
 
 
-def dubins_to_line(distance: FloatArray, heading: FloatArray, radius: float) -> FloatArray:
+def dubins_to_line(
+    distance: FloatArray,  # from the line [m], not negative
+    heading: FloatArray,  # relative to the line's normal [rad]; broadcast with ``distance``
+    radius: float,  # least turning radius R [m]
+) -> FloatArray:
     """Length [m] of the shortest path of bounded curvature from a pose to a line.
 
     The robot turns towards the normal of the line until it faces it or is there, and then drives
     straight. While it turns from α to β it gets on by R (sin α - sin β).
-
-    Args:
-        distance: from the line [m], not negative.
-        heading: relative to the line's normal [rad]; broadcast with ``distance``.
-        radius: least turning radius R [m].
     """
     angle = np.abs((np.asarray(heading) + np.pi) % (2.0 * np.pi) - np.pi)
     gained = radius * np.sin(angle)
@@ -25,24 +24,3 @@ def dubins_to_line(distance: FloatArray, heading: FloatArray, radius: float) -> 
     turning = radius * (angle - left)
     length: FloatArray = np.where(distance >= gained, straight, np.maximum(turning, 0.0))
     return np.where(distance <= 0.0, 0.0, length)
-
-
-def row_bounds(
-    headings: FloatArray,
-    rows: FloatArray,
-    goal_row: float,
-    step: float,
-    radius: float,
-) -> FloatArray:
-    """(H, U) length [m] of the shortest path from each heading and row of a lattice.
-
-    Args:
-        headings: (H,) relative to the normal of the goal line [rad].
-        rows: (U,) rows of the lattice.
-        goal_row: row of the goal line, in steps.
-        step: of the lattice [m].
-        radius: least turning radius [m].
-    """
-    distance = np.maximum(goal_row - rows, 0.0) * step
-    lengths = dubins_to_line(distance[None], headings[:, None], radius)
-    return np.ascontiguousarray(lengths)

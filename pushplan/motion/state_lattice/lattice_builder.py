@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -11,7 +12,7 @@ import numpy as np
 from pushplan.motion.state_lattice.built_lattice import BuiltLattice
 from pushplan.motion.state_lattice.cost_map import FloeCosts
 from pushplan.motion.state_lattice.frame import Frame
-from pushplan.motion.state_lattice.heuristic import row_bounds
+from pushplan.motion.state_lattice.heuristic import dubins_to_line
 from pushplan.motion.state_lattice.lattice_config import LatticeConfig
 from pushplan.motion.state_lattice.lattice_map import LatticeMap
 from pushplan.motion.state_lattice.place_costs import LEAN, Window, place_costs
@@ -28,29 +29,18 @@ _MOST_NODES = 3_000_000
 _MOST_CELLS = 1_000_000
 
 
+@dataclass(eq=False)
 class LatticeBuilder:
-    """Makes the lattice of one planning call.
+    """Makes the lattice of one planning call."""
 
-    Args:
-        world: the snapshot.
-        config: parameters.
-        radius: least turning radius [m].
-        side: distance of the robot's origin from the bounds [m].
-        floe_costs: what floes cost; None where they cost nothing.
-    """
+    world: World
+    config: LatticeConfig
+    radius: float  # least turning radius [m]
+    side: float  # distance of the robot's origin from the bounds [m]
+    floe_costs: FloeCostFunction | None = None  # None where floes cost nothing
 
-    def __init__(
-        self,
-        world: World,
-        config: LatticeConfig,
-        *,
-        radius: float,
-        side: float,
-        floe_costs: FloeCostFunction | None = None,
-    ) -> None:
-        self.world, self.config, self.radius, self.side = world, config, radius, side
-        self._floe_costs = floe_costs
-        robot = world.robot
+    def __post_init__(self) -> None:
+        world, config, radius, robot = self.world, self.config, self.radius, self.world.robot
         # the radius is a whole number of steps, so that few sets of primitives are ever needed
         wanted = config.step * 2.0 * max(robot.inscribed_radius, 0.1 * robot.circumscribed_radius)
         ratio = float(min(max(round(radius / wanted), 2), 40))
@@ -158,9 +148,9 @@ class LatticeBuilder:
             inflation=self.config.inflation,
         )
         floes = self.world.movables
-        if self._floe_costs is None or not len(floes):
+        if self.floe_costs is None or not len(floes):
             return lattice, grid.no_costs()
-        return lattice, grid.cost_sums(floes, self._floe_costs(self.world, self.cell))
+        return lattice, grid.cost_sums(floes, self.floe_costs(self.world, self.cell))
 
     @property
     def _hull(self) -> int:
@@ -173,9 +163,8 @@ class LatticeBuilder:
             return lattice.row_bounds, lattice.place_costs
         cells, goal_row = self.cells, self.start[0] + self.ahead
         reach = int(lattice.corner[0])
-        lengths = row_bounds(
-            self.motions.angles, np.arange(float(self.rows)), goal_row, self.step, self.radius
-        )
+        distances = np.maximum(goal_row - np.arange(float(self.rows)), 0.0) * self.step
+        lengths = dubins_to_line(distances[None], self.motions.angles[:, None], self.radius)
         radius = self.world.robot.inscribed_radius / self.cell
         half = max(math.floor(radius - 1.0), 0)
         window = Window(half, self._hull, 0, 1, 1.0, self.cell, LEAN)
@@ -191,7 +180,7 @@ class LatticeBuilder:
             self._map.columns_between(self.world.static, self.side, reach, last),
             window,
         )
-        return lengths, costs
+        return np.ascontiguousarray(lengths), costs
 
     def _planes(self) -> FloatArray:
         """The bounds of the world as half planes for the robot's origin [steps]."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from pushplan.compiled import owned
 from pushplan.motion.dubins import along_arc, sample_pieces
 from pushplan.motion.goal_region import goal_numbers, in_goal
 from pushplan.motion.path_problem import SweptPath
@@ -22,7 +23,7 @@ def sample_arcs(
     capacity = int(arcs[:, 0].sum() / spacing + turn / 0.1) + 2 * len(arcs) + 8
     poses, curvatures = np.empty((capacity, 3)), np.zeros(capacity)
     poses[0] = start
-    count = 1 + sample_pieces(start, arcs, spacing, poses[1:], curvatures[1:])
+    count = 1 + sample_pieces(owned(start), arcs, spacing, poses[1:], curvatures[1:])
     return poses[:count], curvatures[:count]
 
 

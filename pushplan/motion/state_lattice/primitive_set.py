@@ -7,6 +7,7 @@ from dataclasses import asdict, dataclass
 
 import numpy as np
 
+from pushplan.compiled import owned
 from pushplan.motion.dubins import sample_pieces
 from pushplan.world.checks import ArrayRecord, FloatArray, IntArray, frozen, integer, known_keys
 from pushplan.world.checks import number as checked_number
@@ -74,7 +75,8 @@ class PrimitiveSet(ArrayRecord):
         poses, curvatures = np.empty((1000, 3)), np.empty(1000)
         for p in range(len(self)):
             start = np.array([0.0, 0.0, self.angles[self.heading_of(p)]])
-            count = sample_pieces(start, self.pieces[p], 0.02 * self.lengths[p], poses, curvatures)
+            pieces, spacing = owned(self.pieces[p]), 0.02 * self.lengths[p]
+            count = sample_pieces(start, pieces, spacing, poses, curvatures)
             path = np.concatenate([np.zeros((1, 2)), poses[:count, :2]])
             boxes[p] = path[:, 0].min(), path[:, 0].max(), path[:, 1].min(), path[:, 1].max()
         return frozen(boxes)

@@ -21,33 +21,21 @@ class Swaths(NamedTuple):
     runs: IntArray
 
 
-class _Key(NamedTuple):
-    """What swaths depend on, beside the primitives."""
-
-    vertices: bytes
-    offsets: bytes
-
-
 def swaths(
-    primitives: PrimitiveSet, vertices: FloatArray, offsets: IntArray, cells_per_step: int
+    primitives: PrimitiveSet,  # the set
+    vertices: FloatArray,  # (V, 2) convex parts of the footprint in lattice steps, body frame
+    offsets: IntArray,  # (Q + 1,) where each part starts
+    cells_per_step: int,  # how many cells of the map a lattice step is long
 ) -> Swaths:
-    """Swaths of all primitives of a set, cached by everything that they depend on.
-
-    Args:
-        primitives: the set.
-        vertices: (V, 2) convex parts of the footprint in lattice steps, body frame.
-        offsets: (Q + 1,) where each part starts.
-        cells_per_step: how many cells of the map a lattice step is long.
-    """
-    rounded = np.round(vertices, 9)
-    key = _Key(rounded.tobytes(), offsets.tobytes())
-    return _swaths(primitives, key, cells_per_step)
+    """Swaths of all primitives of a set, cached by everything that they depend on."""
+    shape = np.round(vertices, 9).tobytes()
+    return _swaths(primitives, shape, offsets.tobytes(), cells_per_step)
 
 
 @functools.lru_cache(maxsize=32)
-def _swaths(primitives: PrimitiveSet, key: _Key, cells_per_step: int) -> Swaths:
-    vertices = np.frombuffer(key.vertices).reshape(-1, 2) * cells_per_step
-    offsets = np.frombuffer(key.offsets, dtype=np.int64)
+def _swaths(primitives: PrimitiveSet, shape: bytes, starts: bytes, cells_per_step: int) -> Swaths:
+    vertices = np.frombuffer(shape).reshape(-1, 2) * cells_per_step
+    offsets = np.frombuffer(starts, dtype=np.int64)
     reach = float(np.hypot(vertices[:, 0], vertices[:, 1]).max())
     parts, first = [], [0]
     for p in range(len(primitives)):

@@ -11,9 +11,9 @@ from pushplan.world import Drive, GoalDisc, NavigationGoal, StaticMap, World
 from pushplan.world.checks import FloatArray
 
 _TOO_LONG = 7e-4
-"""Share by which a `VisibilityGraph` may exceed the shortest path, where that bends around arcs."""
+"""Fraction by which a `VisibilityGraph` may exceed the shortest path around arcs."""
 _SLIM = 1e-3
-"""Share by which the disc is less than the inscribed one: gaps of the robot's own width count."""
+"""Fraction by which the disc is less than the inscribed one: gaps as wide as the robot count."""
 _DIRECTIONS = 360
 _PARTS = 12
 _CORNERS = 120  # convex static parts, and their corners, up to which a visibility graph is made

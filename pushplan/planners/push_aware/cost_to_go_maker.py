@@ -29,22 +29,15 @@ class CostToGoMaker:
     """Makes one table in small steps, so that a planning call can stop in between.
 
     What is done is kept for the next call. Thread-safe.
-
-    Args:
-        robot: gives footprint and size.
-        static: the map.
-        goal: where to.
-        radius: least turning radius [m].
-        inset: how far into the goal paths end [m].
     """
 
     def __init__(
         self,
-        robot: RobotModel,
-        static: StaticMap,
+        robot: RobotModel,  # gives footprint and size
+        static: StaticMap,  # the map
         goal: NavigationGoal,
-        radius: float,
-        inset: float,
+        radius: float,  # least turning radius [m]
+        inset: float,  # how far into the goal paths end [m]
     ) -> None:
         size = robot.circumscribed_radius
         self._goal = goal_numbers(goal, inset)

@@ -22,16 +22,13 @@ _SHARP = 0.8
 
 
 def warm_start_arcs(
-    world: World, goal: NavigationGoal, clearance: float, radius: float, depth: float
+    world: World,  # gives the start and the walls
+    goal: NavigationGoal,
+    clearance: float,  # of the shortest path [m]
+    radius: float,  # least turning radius [m]
+    depth: float,  # how far into the goal the arcs end [m]
 ) -> FloatArray | None:
     """Arcs along the shortest homotopic path; they may touch walls and objects.
-
-    Args:
-        world: gives the start and the walls.
-        goal: where to.
-        clearance: of the shortest path [m].
-        radius: least turning radius [m].
-        depth: how far into the goal the arcs end [m].
 
     Returns:
         (E, 2) length [m] and curvature [1/m] of each arc, or None if there is no way.

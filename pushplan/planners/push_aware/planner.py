@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from dataclasses import dataclass, field
 from typing import ClassVar
 
@@ -11,12 +10,12 @@ import numpy as np
 from pushplan.interaction import InteractionModel, QuasiStatic
 from pushplan.motion.path_improver import PathImprover
 from pushplan.motion.speed_profile import turning_radius
-from pushplan.planners.arguments import check_call
 from pushplan.planners.push_aware.bound import lower_bound
 from pushplan.planners.push_aware.push_aware_config import PushAwareConfig
 from pushplan.planners.push_aware.search import PushAwareSearch
-from pushplan.world import Drive, PlanResult, PlanStats, PlanStatus, RobotModel, Stop, World
+from pushplan.world import Drive, PlanResult, RobotModel, Stop, World
 from pushplan.world.checks import expect
+from pushplan.world.planning_call import PlanningCall
 from pushplan.world.stop import DefaultBudget
 
 
@@ -66,11 +65,7 @@ class PushAware:
         expect("interaction", self.interaction, InteractionModel)  # type: ignore[type-abstract]
 
     def plan(
-        self,
-        world: World,
-        *,
-        stop: Stop | None = None,
-        rng: np.random.Generator | None = None,
+        self, world: World, *, stop: Stop | None = None, rng: np.random.Generator | None = None
     ) -> PlanResult:
         """Plan from ``world``; see `pushplan.world.Planner`.
 
@@ -79,22 +74,14 @@ class PushAware:
         Raises:
             InvalidInputError: if the world's goal is not one for the robot.
         """
-        began = time.perf_counter()
-        check_call(world, stop, rng)
-        stop = DefaultBudget(self.config.default_iterations) if stop is None else stop
-        rng = np.random.default_rng(0) if rng is None else rng
+        call = PlanningCall(world, stop, rng, DefaultBudget(self.config.default_iterations))
         radius = _least_radius(world.robot, self.config)
-        improver = PathImprover(
-            world, self.config, self.interaction, radius, stop.start(), rng, began
-        )
+        improver = PathImprover(call, self.config, self.interaction, radius)
         search = PushAwareSearch(improver, self.config)
         bound = lower_bound(world)  # before the search, so that it is within the time given
-        status = search.run()
-        if status is None:
-            status = PlanStatus.CANCELLED if stop.cancelled else PlanStatus.TIMED_OUT
+        status = search.run() or call.stopped_status
         detail = {
             "trees": float(search.trees.trees),
-            "tight": float(improver.tight),
             "searches": float(search.searches),
             "expansions": float(search.expansions),
             "random_arcs": float(search.random_arcs),
@@ -102,14 +89,7 @@ class PushAware:
         if status.has_plan:
             detail["cost"], detail["bound"] = float(improver.best_cost), bound
             detail["gap"] = _gap(float(improver.best_cost), bound)
-        stats = PlanStats(
-            wall_time_s=time.perf_counter() - began,
-            first_solution_s=improver.first_solution_s,
-            iterations=improver.iterations,
-            nodes=improver.nodes,
-            detail=detail,
-        )
-        return PlanResult(status, improver.plan() if status.has_plan else None, stats)
+        return improver.result(status, **detail)
 
 
 def _least_radius(robot: RobotModel, config: PushAwareConfig) -> float:

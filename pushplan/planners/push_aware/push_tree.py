@@ -29,16 +29,12 @@ class PushTree(NamedTuple):
 
 
 def make_push_tree(
-    count: int, objects: int, memory: float, cells: tuple[int, int, int, int] = (1, 1, 1, 1)
+    count: int,  # nodes at most
+    objects: int,  # number of objects
+    memory: float,  # for their poses [MiB]
+    cells: tuple[int, int, int, int] = (1, 1, 1, 1),  # shape of ``best``
 ) -> PushTree:
-    """Empty memory for a search.
-
-    Args:
-        count: nodes at most.
-        objects: number of objects.
-        memory: for their poses [MiB].
-        cells: shape of ``best``.
-    """
+    """Empty memory for a search."""
     rows = int(memory * 2**20 / (24 * max(objects, 1)))
     return PushTree(
         poses=np.empty((count, 3)),

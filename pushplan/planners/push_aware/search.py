@@ -37,14 +37,13 @@ class _SearchVariant:
 
 
 class PushAwareSearch:
-    """A first plan, then searches over poses and pushed objects, each under the best cost so far.
+    """A first plan, then searches over poses and pushed objects, each below the best cost."""
 
-    Args:
-        improver: keeps the best path.
-        config: parameters.
-    """
-
-    def __init__(self, improver: PathImprover, config: PushAwareConfig) -> None:
+    def __init__(
+        self,
+        improver: PathImprover,  # keeps the best path
+        config: PushAwareConfig,
+    ) -> None:
         self.improver, self.config, self.trees = improver, config, TreePaths(improver)
         self.world, self.rng, self.size = improver.world, improver.rng, improver.size
         self.expansions = self.searches = self.random_arcs = 0
@@ -231,17 +230,10 @@ class PushAwareSearch:
 
     def _one_round(self) -> None:
         """Paths of two trees: around the objects, and among them at a weight that varies."""
-        config, sigma = self.config, self.config.cost_sigma
+        sigma = self.config.cost_sigma
         factor = float(np.exp(sigma * self.rng.standard_normal())) if self.trees.trees else 1.0
-        for weight, budget in (
-            (np.inf, config.avoid_iterations),
-            (config.push_weight * factor, config.tree_iterations),
-        ):
-            if self.improver.stopped():
-                return
-            candidate = self.trees.grow(weight, budget)
-            if candidate is not None:
-                self._finish(candidate)
+        for candidate in self.trees.grow_two(self.config.push_weight * factor):
+            self._finish(candidate)
 
     def _finish(self, candidate: Candidate) -> None:
         """Shortcut a path for as long as that pays, and it may still become the best."""

@@ -34,14 +34,13 @@ _WEDGED = (-2.2, -0.985, 0.0)  # A box a little in one of the columns
 
 @functools.cache
 def warm_up_rearrangement() -> None:
-    """Solve, push and look for every kind of push in each kind of task."""
+    """Solve, push and look for every kind of push; no kernel is for one kind of task alone."""
     warm_up_solver(proof=False)
     warm_up_pushing(executor=False)
-    for world in _worlds():
-        scene = PushScene(world, RearrangementConfig())
-        extraction_primitives(PushSimulator(scene), 0)
-        pre_relocation_pushes(PushSimulator(scene), 0)
-        recovery_path(scene)
+    scene = PushScene(_worlds()[0], RearrangementConfig())
+    extraction_primitives(PushSimulator(scene), 0)
+    pre_relocation_pushes(PushSimulator(scene), 0)
+    recovery_path(scene)
 
 
 @functools.cache

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pushplan.compiled import owned
 from pushplan.geometry import VisibilityGraph, convex_penetration, goal_distances
 from pushplan.motion.collision import footprint, is_free, obstacles
 from pushplan.planners.rearrangement.object_paths import done_places
@@ -65,7 +66,7 @@ def is_done(world: World, k: int) -> bool:
     """
     goal = world.goal
     if isinstance(goal, ClearanceArea):
-        depth, _, _ = convex_penetration(world.movables.outline_world(k), goal.polygon)
+        depth, _, _ = convex_penetration(world.movables.outline_world(k), owned(goal.polygon))
         return bool(depth < 0.0)
     if isinstance(goal, Receptacle):
         return False

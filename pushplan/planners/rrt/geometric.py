@@ -2,32 +2,21 @@
 
 from __future__ import annotations
 
-import time
 from dataclasses import dataclass, field
 
 import numpy as np
 from ompl import base, geometric
 
-from pushplan.compiled import kernel
+from pushplan.compiled import kernel, owned
 from pushplan.geometry import core_distance
 from pushplan.motion.collision import ConvexObstacles, obstacles
 from pushplan.motion.polyline import polyline_plan
 from pushplan.motion.random_tree.ompl_lock import own_state, seeded_ompl
 from pushplan.motion.speed_profile import start_margin
-from pushplan.planners.arguments import check_call
-from pushplan.world import (
-    MaxIterations,
-    NavigationGoal,
-    Plan,
-    PlanResult,
-    PlanStats,
-    PlanStatus,
-    Stop,
-    StopCheck,
-    World,
-)
+from pushplan.world import MaxIterations, NavigationGoal, PlanResult, PlanStatus, Stop, World
 from pushplan.world.checked_fields import CheckedFields, Fraction, PositiveFloat, PositiveInt
 from pushplan.world.checks import FloatArray, expect
+from pushplan.world.planning_call import PlanningCall
 
 
 @dataclass(frozen=True)
@@ -71,25 +60,17 @@ class GeometricRRT:
         expect("config", self.config, GeometricRRTConfig)
 
     def plan(
-        self,
-        world: World,
-        *,
-        stop: Stop | None = None,
-        rng: np.random.Generator | None = None,
+        self, world: World, *, stop: Stop | None = None, rng: np.random.Generator | None = None
     ) -> PlanResult:
         """Plan from ``world``; see `pushplan.world.Planner`. One iteration is one sample."""
-        began = time.perf_counter()
-        check_call(world, stop, rng)
         config = self.config
-        stop = MaxIterations(4 * config.pass_iterations) if stop is None else stop
-        rng = np.random.default_rng(0) if rng is None else rng
-        check = stop.start()
+        call = PlanningCall(world, stop, rng, MaxIterations(4 * config.pass_iterations))
         objects = world.movables
         boxes = [objects.outline_world(k) for k in range(len(objects))]
-        iterations, status, plan = 0, PlanStatus.TIMED_OUT, None
+        iterations = 0
         if start_margin(world, 0.0) is None:
-            return _result(PlanStatus.START_BLOCKED, None, 0, time.perf_counter() - began)
-        start = np.ascontiguousarray(world.robot_pose[:2])
+            return call.result(PlanStatus.START_BLOCKED)
+        start = owned(world.robot_pose[:2])
         size = world.robot.circumscribed_radius
         wide, narrow = config.clearance * size, world.robot.inscribed_radius
         passes = [(boxes, wide), ([], wide), ([], min(size, wide)), ([], min(narrow, wide))]
@@ -97,31 +78,20 @@ class GeometricRRT:
             among = obstacles(world.static, blocked)
             if _near(start, among, radius):
                 continue  # the robot starts closer to something than this pass allows
-            points, used = self._grow(world, among, radius, check, iterations, rng)
+            points, used = self._grow(call, among, radius, iterations)
             iterations += used
             if points is not None:
-                plan, status = (
-                    polyline_plan(world, points, config.spacing * size),
-                    PlanStatus.SOLVED,
-                )
+                plan = polyline_plan(world, points, config.spacing * size)
+                return call.result(PlanStatus.SOLVED, plan, call.elapsed, iterations)
+            if call.check(iterations, np.inf):
                 break
-            if check(iterations, np.inf):
-                break
-        if plan is None and stop.cancelled:
-            status = PlanStatus.CANCELLED
-        return _result(status, plan, iterations, time.perf_counter() - began)
+        return call.result(call.stopped_status, iterations=iterations)
 
     def _grow(
-        self,
-        world: World,
-        among: ConvexObstacles,
-        radius: float,
-        check: StopCheck,
-        before: int,
-        rng: np.random.Generator,
+        self, call: PlanningCall, among: ConvexObstacles, radius: float, before: int
     ) -> tuple[FloatArray | None, int]:
         """One pass: the corners of a path, or None, and the samples that it took."""
-        config = self.config
+        config, world, check, rng = self.config, call.world, call.check, call.rng
         used = 0
 
         def done() -> bool:
@@ -214,8 +184,3 @@ def _near(point: FloatArray, among: ConvexObstacles, radius: float) -> bool:
         if core_distance(x, y, among.vertices, first, last) < radius:
             return True
     return False
-
-
-def _result(status: PlanStatus, plan: Plan | None, iterations: int, wall: float) -> PlanResult:
-    first = wall if plan is not None else float("nan")
-    return PlanResult(status, plan, PlanStats(wall, first, iterations))

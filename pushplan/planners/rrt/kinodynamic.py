@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-import time
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from pushplan.interaction import InteractionModel, QuasiStatic
-from pushplan.motion.path_improver import PathImprover
+from pushplan.motion.path_improver import Candidate, PathImprover
 from pushplan.motion.path_search_config import PathSearchConfig
+from pushplan.motion.random_tree.tree_paths import TreePaths
 from pushplan.motion.speed_profile import turning_radius
-from pushplan.planners.arguments import check_call
-from pushplan.planners.rrt.kinodynamic_search import KinodynamicSearch
-from pushplan.world import PlanResult, PlanStats, PlanStatus, Stop, World
+from pushplan.world import PlanResult, PlanStatus, Stop, World
 from pushplan.world.checks import expect
+from pushplan.world.planning_call import PlanningCall
 from pushplan.world.stop import DefaultBudget
 
 
@@ -51,11 +50,7 @@ class KinodynamicRRT:
         expect("interaction", self.interaction, InteractionModel)  # type: ignore[type-abstract]
 
     def plan(
-        self,
-        world: World,
-        *,
-        stop: Stop | None = None,
-        rng: np.random.Generator | None = None,
+        self, world: World, *, stop: Stop | None = None, rng: np.random.Generator | None = None
     ) -> PlanResult:
         """Plan from ``world``; see `pushplan.world.Planner`.
 
@@ -64,23 +59,35 @@ class KinodynamicRRT:
         Raises:
             InvalidInputError: if the world's goal is not one for the robot.
         """
-        began = time.perf_counter()
-        check_call(world, stop, rng)
-        stop = DefaultBudget(self.config.default_iterations) if stop is None else stop
-        rng = np.random.default_rng(0) if rng is None else rng
+        call = PlanningCall(world, stop, rng, DefaultBudget(self.config.default_iterations))
         radius = turning_radius(world.robot, self.config.turn_fraction)
-        improver = PathImprover(
-            world, self.config, self.interaction, radius, stop.start(), rng, began
-        )
-        search = KinodynamicSearch(improver)
-        status = search.run()
-        if status is None:
-            status = PlanStatus.CANCELLED if stop.cancelled else PlanStatus.TIMED_OUT
-        stats = PlanStats(
-            wall_time_s=time.perf_counter() - began,
-            first_solution_s=improver.first_solution_s,
-            iterations=improver.iterations,
-            nodes=improver.nodes,
-            detail={"trees": float(search.trees.trees), "tight": float(improver.tight)},
-        )
-        return PlanResult(status, improver.plan() if status.has_plan else None, stats)
+        improver = PathImprover(call, self.config, self.interaction, radius)
+        trees = TreePaths(improver)
+        status = improver.begin() or _search(improver, trees) or call.stopped_status
+        return improver.result(status, trees=float(trees.trees))
+
+
+def _search(improver: PathImprover, trees: TreePaths) -> PlanStatus | None:
+    """Grow and shortcut until the stop rule fires; None where there is no plan by then."""
+    while not improver.stopped():
+        _one_round(improver, trees)
+        if trees.sealed:
+            return PlanStatus.GOAL_UNREACHABLE
+        if not improver.solved:
+            trees.relax()
+    return PlanStatus.SOLVED if improver.solved else None
+
+
+def _one_round(improver: PathImprover, trees: TreePaths) -> None:
+    """A path around the objects and one among them; the cheaper is worked out further."""
+    config = improver.config
+    cheaper: Candidate | None = None
+    for candidate in trees.grow_two(config.push_weight):
+        improver.shortcut(candidate)
+        if cheaper is None or candidate.cost < cheaper.cost:
+            cheaper = candidate
+    while cheaper is not None and not improver.stopped():
+        before = cheaper.cost
+        improver.shortcut(cheaper)
+        if cheaper.cost > (1.0 - config.least_gain) * before:
+            return

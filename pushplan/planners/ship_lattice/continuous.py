@@ -27,18 +27,14 @@ class CostField(NamedTuple):
 
 
 def cost_field(
-    sums: FloatArray, stride: int, cells: int, cell: float, hull: int, origin: FloatArray
+    sums: FloatArray,  # flattened sums of each column of the map before each row
+    stride: int,  # entries of a column
+    cells: int,  # of the map in an entry of the field, along both axes
+    cell: float,  # side of a cell [m]
+    hull: int,  # beam of the hull [cells]
+    origin: FloatArray,  # (2,) row and column of the frame's origin on the map
 ) -> CostField:
-    """The cost of a metre with the hull's beam, smoothed, from the sums of a `PoseLattice`.
-
-    Args:
-        sums: flattened sums of each column of the map before each row.
-        stride: entries of a column.
-        cells: of the map in an entry of the field, along both axes.
-        cell: side of a cell [m].
-        hull: beam of the hull [cells].
-        origin: (2,) row and column of the frame's origin on the map.
-    """
+    """The cost of a metre with the hull's beam, smoothed, from the sums of a `PoseLattice`."""
     table = np.diff(sums.reshape(-1, stride), axis=1).T  # (rows, columns)
     rows, columns = (n // cells for n in table.shape)
     blocks = table[: rows * cells, : columns * cells].reshape(rows, cells, columns, cells)
@@ -91,25 +87,16 @@ def _solver(field: CostField, start: FloatArray, radius: float, count: int, limi
 
 
 def refine(
-    field: CostField,
-    arcs: FloatArray,
-    heading: float,
+    field: CostField,  # what a metre costs
+    arcs: FloatArray,  # (E, 2) length [m] and curvature [1/m] of the path to start from
+    heading: float,  # of the robot in the frame of the field [rad]; its place is the origin
     *,
-    radius: float,
-    goal: float,
-    sides: tuple[float, float],
-    iterations: int,
+    radius: float,  # least turning radius [m]
+    goal: float,  # how far ahead the path ends [m]
+    sides: tuple[float, float],  # least and greatest place across [m]
+    iterations: int,  # of the solver at most
 ) -> FloatArray | None:
     """Arcs of a cheaper path, or None where the solver finds none.
-
-    Args:
-        field: what a metre costs.
-        arcs: (E, 2) length [m] and curvature [1/m] of the path to start from.
-        heading: of the robot in the frame of the field [rad]; its place is the origin.
-        radius: least turning radius [m].
-        goal: how far ahead the path ends [m].
-        sides: least and greatest place across [m].
-        iterations: of the solver at most.
 
     Returns:
         (N, 2) lengths [m] and curvatures [1/m], within the turn limit.

@@ -12,14 +12,12 @@ from pushplan.world.outline import areas_and_centroids
 _SOFT = 0.05
 
 
-def floe_costs(config: ShipLatticeConfig, world: World, cell: float) -> FloeCosts:
-    """Costs of all floes of a world.
-
-    Args:
-        config: says what a floe costs.
-        world: the snapshot.
-        cell: side of a cell of the map [m].
-    """
+def floe_costs(
+    config: ShipLatticeConfig,  # says what a floe costs
+    world: World,
+    cell: float,  # side of a cell of the map [m]
+) -> FloeCosts:
+    """Costs of all floes of a world."""
     floes, robot = world.movables, world.robot
     half = max(robot.inscribed_radius, 0.1 * robot.circumscribed_radius)
     areas = areas_and_centroids(floes.vertices, floes.offsets)[0]

@@ -19,14 +19,13 @@ class NearbyObjects:
     which: BoolArray  # (K,) which of all objects they are
 
     @classmethod
-    def around(cls, world: World, normal: FloatArray, ahead: float) -> NearbyObjects:
-        """The objects from a little behind the robot to a little beyond what is swept.
-
-        Args:
-            world: the snapshot.
-            normal: (2,) direction towards the goal.
-            ahead: how far along a path is swept [m].
-        """
+    def around(
+        cls,
+        world: World,
+        normal: FloatArray,  # (2,) direction towards the goal
+        ahead: float,  # how far along a path is swept [m]
+    ) -> NearbyObjects:
+        """The objects from a little behind the robot to a little beyond what is swept."""
         size = world.robot.circumscribed_radius
         along = (world.movables.poses[:, :2] - world.robot_pose[:2]) @ normal
         reach = (1.0 + MARGIN) * size + world.movables.radii
@@ -42,14 +41,13 @@ class NearbyObjects:
         )
         return cls(near, which)
 
-    def everything(self, world: World, objects: FloatArray, missing: int) -> FloatArray:
-        """(M + missing, K, 3) poses of all objects of a world; those after the M given ones rest.
-
-        Args:
-            world: the whole world.
-            objects: (M, N, 3) poses of those that are near.
-            missing: how many more poses there are.
-        """
+    def everything(
+        self,
+        world: World,  # the whole world
+        objects: FloatArray,  # (M, N, 3) poses of those that are near
+        missing: int,  # how many more poses there are
+    ) -> FloatArray:
+        """(M + missing, K, 3) poses of all objects of a world; after the M given ones they rest."""
         count = len(objects)
         out = np.empty((count + missing, len(world.movables), 3))
         out[:] = world.movables.poses

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -10,11 +9,11 @@ import numpy as np
 from pushplan.interaction import InteractionModel
 from pushplan.motion.speed_profile import turning_radius
 from pushplan.motion.state_lattice.lattice_builder import LatticeBuilder
-from pushplan.planners.arguments import check_call
 from pushplan.planners.ship_lattice.ship_lattice_call import ShipLatticeCall
 from pushplan.planners.ship_lattice.ship_lattice_config import ShipLatticeConfig
-from pushplan.world import PlanResult, PlanStats, PlanStatus, Stop, World
+from pushplan.world import PlanResult, Stop, World
 from pushplan.world.checks import expect
+from pushplan.world.planning_call import PlanningCall
 
 
 @dataclass(frozen=True)
@@ -41,34 +40,25 @@ class ShipLattice:
             expect("interaction", self.interaction, InteractionModel)  # type: ignore[type-abstract]
 
     def plan(
-        self,
-        world: World,
-        *,
-        stop: Stop | None = None,
-        rng: np.random.Generator | None = None,
+        self, world: World, *, stop: Stop | None = None, rng: np.random.Generator | None = None
     ) -> PlanResult:
         """Plan from ``world``; see `pushplan.world.Planner`.
 
         Raises:
             InvalidInputError: if the world's goal is not one for the robot.
         """
-        began = time.perf_counter()
-        check_call(world, stop, rng)
-        check = None if stop is None else stop.start()
-        rng = np.random.default_rng(0) if rng is None else rng
-        call = ShipLatticeCall(world, self.config, self.interaction, check, rng, began)
-        status = call.run()
-        if status is None:
-            cancelled = stop is not None and stop.cancelled
-            status = PlanStatus.CANCELLED if cancelled else PlanStatus.TIMED_OUT
-        stats = PlanStats(
-            wall_time_s=time.perf_counter() - began,
-            first_solution_s=call.first_solution_s,
-            iterations=call.iterations,
-            nodes=call.expanded,
-            detail={"lattice_cost": call.lattice_cost, "shortcuts": float(call.shortcuts)},
+        call = PlanningCall(world, stop, rng)
+        search = ShipLatticeCall(call, self.config, self.interaction)
+        status = search.run() or call.stopped_status
+        return call.result(
+            status,
+            search.plan() if status.has_plan else None,
+            search.first_solution_s,
+            search.iterations,
+            search.expanded,
+            lattice_cost=search.lattice_cost,
+            shortcuts=float(search.shortcuts),
         )
-        return PlanResult(status, call.plan() if status.has_plan else None, stats)
 
     def prepare(self, world: World) -> None:
         """Make what depends on the ship alone, which the first call would do otherwise.

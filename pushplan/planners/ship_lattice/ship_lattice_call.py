@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-import time
 from functools import partial
 
 import numpy as np
 
+from pushplan.compiled import owned
 from pushplan.interaction import InteractionModel
 from pushplan.interaction.path_sweepers import path_sweeper
 from pushplan.motion.coarse_path import reachable
@@ -24,8 +24,9 @@ from pushplan.planners.ship_lattice.ship_lattice_config import ShipLatticeConfig
 from pushplan.planners.ship_lattice.ship_path_improver import ShipPathImprover
 from pushplan.planners.ship_lattice.shortcut_proposals import ShortcutProblem
 from pushplan.search.astar import FOUND, PAUSED
-from pushplan.world import GoalLine, Plan, PlanStatus, StopCheck, World
+from pushplan.world import GoalLine, Plan, PlanStatus
 from pushplan.world.checks import FloatArray
+from pushplan.world.planning_call import PlanningCall
 
 _SPREAD = 0.6  # typical sideways displacement of a shortcut [R]
 _MOST_TURN = 2.5  # greatest turn of one of its curves [rad]
@@ -33,29 +34,17 @@ _END_FRACTION = 0.15  # fraction of the shortcuts that move the end
 
 
 class ShipLatticeCall:
-    """Lattice, search and improvement of one planning call.
-
-    Args:
-        world: the snapshot.
-        config: parameters.
-        interaction: predicts what a path does.
-        check: armed stop rule, None for the planner's own budget.
-        rng: for the shortcuts.
-        began: when the call began, on the clock of `time.perf_counter`.
-    """
+    """Lattice, search and improvement of one planning call."""
 
     def __init__(
         self,
-        world: World,
+        call: PlanningCall,  # its world, clock, stop rule and source of chance
         config: ShipLatticeConfig,
         interaction: InteractionModel | None,
-        check: StopCheck | None,
-        rng: np.random.Generator,
-        began: float,
     ) -> None:
+        self.call, self.config, self.interaction = call, config, interaction
+        self.world = world = call.world
         check_turns(world.robot)
-        self.world, self.config, self.interaction = world, config, interaction
-        self.check, self.rng, self.began = check, rng, began
         self.goal = world.navigation_goal
         self.size = world.robot.circumscribed_radius
         self.iterations = self.expanded = self.shortcuts = 0
@@ -73,11 +62,11 @@ class ShipLatticeCall:
         """Plan until done or stopped; None where there is no plan by then."""
         world = self.world
         shape, walls = footprint(world.robot), obstacles(world.static)
-        if not is_free(world.robot_pose, shape, walls, np.empty_like(shape.vertices)):
+        if not is_free(owned(world.robot_pose), shape, walls, np.empty_like(shape.vertices)):
             return PlanStatus.START_BLOCKED
         if self.goal.distance(*(float(v) for v in world.robot_pose[:2])) <= 0.0:
             self.poses, self.curvatures = world.robot_pose[None].copy(), np.zeros(1)
-            self.first_solution_s = time.perf_counter() - self.began
+            self.first_solution_s = self.call.elapsed
             return PlanStatus.SOLVED
         for fraction, side in self._limits():
             if self.stopped():
@@ -111,7 +100,7 @@ class ShipLatticeCall:
 
     def stopped(self) -> bool:
         """Whether the stop rule fires now."""
-        return self.check is not None and self.check(self.iterations, self.cost)
+        return self.call.check(self.iterations, self.cost)
 
     def _search(self, builder: LatticeBuilder, factor: float) -> bool | None:
         """Whether a path was found; None if stopped before."""
@@ -133,7 +122,7 @@ class ShipLatticeCall:
             return False
         if self.built is None:
             self.built, self.lattice_cost = built, star.cost
-            self.first_solution_s = time.perf_counter() - self.began
+            self.first_solution_s = self.call.elapsed
             self.poses, self.curvatures = poses, curvatures
             self.cost = self.world.robot.mass * star.cost
         else:
@@ -194,7 +183,7 @@ class ShipLatticeCall:
         while self.shortcuts < config.shortcuts and self.improver.best.works[-1] > 0.0:
             if self.stopped():
                 return
-            self.improver.shortcut(self.rng)
+            self.improver.shortcut(self.call.rng)
             self.shortcuts += 1
             self.iterations += 1
             self.cost = self.improver.best.cost

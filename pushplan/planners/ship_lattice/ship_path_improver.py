@@ -26,55 +26,28 @@ class SweptCandidate:
     cost: float  # travel plus weighted work [kg m], as far as it is predicted
 
 
+@dataclass(eq=False)
 class ShipPathImprover:
-    """Finds the costs of paths by sweeps and changes paths at random.
+    """Finds the costs of paths by sweeps and changes paths at random."""
 
-    Args:
-        sweeper: carries the objects.
-        start: (K, 3) poses of the objects now.
-        robot_mass: [kg]
-        weight: w, cost of work.
-        problem: what changed paths have to keep to.
-        ahead: how far along a path it is swept [m].
-        stopped: whether to return now.
-        free: whether poses (N, 3) keep clear of walls and within the bounds.
-    """
-
-    def __init__(
-        self,
-        sweeper: PathSweeper,
-        start: FloatArray,
-        *,
-        robot_mass: float,
-        weight: float,
-        problem: ShortcutProblem,
-        ahead: float,
-        stopped: Callable[[], bool],
-        free: Callable[[FloatArray], bool],
-    ) -> None:
-        self.sweeper, self.start = sweeper, start
-        self.robot_mass, self.weight, self.ahead = robot_mass, weight, ahead
-        self.problem, self.stopped, self.free = problem, stopped, free
-        self.best: SweptCandidate | None = None
+    sweeper: PathSweeper  # carries the objects
+    start: FloatArray  # (K, 3) poses of the objects now
+    robot_mass: float  # [kg]
+    weight: float  # w, cost of work
+    problem: ShortcutProblem  # what changed paths have to keep to
+    ahead: float  # how far along a path it is swept [m]
+    stopped: Callable[[], bool]  # whether to return now
+    free: Callable[[FloatArray], bool]  # whether poses (N, 3) keep clear of walls and in bounds
+    best: SweptCandidate | None = None
 
     def consider(
         self,
-        poses: FloatArray,
-        curvatures: FloatArray,
-        first: int = 0,
-        base: SweptCandidate | None = None,
+        poses: FloatArray,  # (N, 3) the path
+        curvatures: FloatArray,  # (N,) that lead to its poses [1/m]
+        first: int = 0,  # last pose that it shares with ``base``
+        base: SweptCandidate | None = None,  # its prediction holds up to there
     ) -> bool:
-        """Find the cost of a path and keep it if it is the cheapest so far.
-
-        Args:
-            poses: (N, 3) the path.
-            curvatures: (N,) that lead to its poses [1/m].
-            first: last pose that it shares with ``base``.
-            base: a candidate whose prediction holds up to there.
-
-        Returns:
-            Whether it was kept; also False where the call was stopped in between.
-        """
+        """Find the cost of a path and keep it if it is the cheapest so far; whether it was kept."""
         moves = np.diff(poses[:, :2], axis=0)
         lengths = np.concatenate([[0.0], np.cumsum(np.sqrt((moves * moves).sum(axis=1)))])
         limit = np.inf if self.best is None else self.best.cost
@@ -98,7 +71,7 @@ class ShipPathImprover:
                 return False
             end = min(at + _PORTION, last - 1)
             added = works[at + 1 : end + 1]
-            if not self.sweeper.run(poses[at : end + 1], here, objects[at : end + 1], added):
+            if not self.sweeper(poses[at : end + 1], here, objects[at : end + 1], added):
                 return False
             added[:] = works[at] + np.cumsum(added)
             at = end

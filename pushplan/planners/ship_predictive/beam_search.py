@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from typing import Generic
 
 import numpy as np
@@ -20,33 +21,23 @@ SPACING = 0.05
 """Between the poses of a path, in hull lengths."""
 
 
+@dataclass(eq=False)
 class BeamSearch(Generic[Ice]):
     """Builds paths piece by piece and keeps the most promising ones.
 
     Each piece of each path is first judged by the costs to go; the best are predicted with the ice
     as the path has left it. Among paths that end at nearly the same place and heading only the
     cheapest is kept (as Zhong et al. 2025 do at lattice nodes).
-
-    Args:
-        view: what is searched.
-        config: parameters.
-        propagator: predicts.
-        check: an armed stop rule.
-        iterations: predictions that the call has made before.
     """
 
-    def __init__(
-        self,
-        view: ChannelView,
-        config: PredictiveConfig,
-        propagator: StatePropagator[Ice],
-        check: StopCheck,
-        iterations: int = 0,
-    ) -> None:
-        self.view, self.config, self.propagator, self.check = view, config, propagator, check
-        self.iterations, self.nodes = iterations, 0
-        self.best_cost = math.inf
-        self.stopped = False
+    view: ChannelView
+    config: PredictiveConfig
+    propagator: StatePropagator[Ice]
+    check: StopCheck  # the armed stop rule
+    iterations: int = 0  # predictions so far, of earlier searches of the call too
+    nodes: int = 0
+    best_cost: float = math.inf
+    stopped: bool = False
 
     def root(self) -> BeamNode[Ice]:
         """The path that has not begun."""
@@ -55,12 +46,7 @@ class BeamSearch(Generic[Ice]):
         return BeamNode(pose, arc, 0.0, 0.0, 0.0, self.propagator.start(), None)
 
     def search(self, root: BeamNode[Ice], width: int, horizon: float) -> BeamNode[Ice] | None:
-        """The most promising path of a beam.
-
-        Args:
-            root: where to begin.
-            width: paths kept from piece to piece.
-            horizon: how far ahead to look [m].
+        """The most promising path of a beam that looks ``horizon`` [m] ahead.
 
         Returns:
             None where no piece fits, or the stop rule fired before the horizon.

@@ -14,11 +14,7 @@ from pushplan.world.checks import FloatArray
 
 
 class FloePropagator:
-    """The ice as poses (N, K, 3) of the floes in reach, at each pose of the last piece of path.
-
-    Args:
-        view: what is searched.
-    """
+    """The ice as poses (N, K, 3) of the floes in reach, at each pose of the last piece of path."""
 
     batch = 1
 
@@ -36,13 +32,12 @@ class FloePropagator:
         """The floes along each piece of path, and the work on them [kg m]."""
         return [self.sweep(ice[-1], path) for ice, path in zip(ices, paths, strict=True)]
 
-    def sweep(self, floes: FloatArray, path: FloatArray) -> tuple[FloatArray, float]:
-        """(N, K, 3) poses of the floes at each pose (N, 3) of a path, and the work [kg m].
-
-        Args:
-            floes: (K, 3) where they are before.
-            path: (N, 3) poses of the ship.
-        """
+    def sweep(
+        self,
+        floes: FloatArray,  # (K, 3) where they are before
+        path: FloatArray,  # (N, 3) poses of the ship
+    ) -> tuple[FloatArray, float]:
+        """(N, K, 3) poses of the floes at each pose (N, 3) of a path, and the work [kg m]."""
         poses = floes.copy()
         out = np.empty((len(path), *poses.shape))
         return out, sweep_ice(np.ascontiguousarray(path), poses, self._problem, out)

@@ -19,12 +19,7 @@ _TRACED = 10  # poses that are swept between two looks at the stop rule
 
 
 class MapPropagator:
-    """The ice as a map (H, W) of covered fractions; a patch of it changes with each piece of path.
-
-    Args:
-        view: what is searched.
-        network: predicts the patches.
-    """
+    """The ice as a map (H, W) of covered fractions; each piece of path changes a patch of it."""
 
     batch = 8
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -16,71 +16,55 @@ from pushplan.planners.ship_predictive.beam_search import BeamSearch
 from pushplan.planners.ship_predictive.channel_view import ChannelView, channel_view
 from pushplan.planners.ship_predictive.predictive_config import PredictiveConfig
 from pushplan.planners.ship_predictive.turning import in_table, tight_turn, turned_start
-from pushplan.world import Plan, PlanResult, PlanStats, PlanStatus, Stop, World
+from pushplan.world import Plan, PlanResult, PlanStatus
 from pushplan.world.checks import FloatArray
+from pushplan.world.planning_call import PlanningCall
 from pushplan.world.polyline import step_lengths
 
 _TIGHTEST = 0.999  # fraction of the turn rate that is used where there is no path with less
 
 
 def plan_call(
-    world: World,
+    call: PlanningCall,
     config: PredictiveConfig,
     interaction: IceInteraction,
     make_propagator: Callable[[ChannelView], StatePropagator[Any]],
-    stop: Stop | None,
-    began: float,
 ) -> PlanResult:
-    """Plan with the usual turn rate, or with all of it where there is no path otherwise.
-
-    Args:
-        world: the snapshot.
-        config: parameters.
-        interaction: predicts the floes.
-        make_propagator: makes what keeps the ice along a path.
-        stop: ends the call.
-        began: when it began, on the clock of `time.perf_counter`.
-    """
-    check = (lambda iterations, cost: False) if stop is None else stop.start()
+    """Plan with the usual turn rate, or with all of it where there is no path otherwise."""
     iterations = nodes = 0
     for fraction in dict.fromkeys((config.turn_fraction, max(config.turn_fraction, _TIGHTEST))):
-        view = channel_view(world, replace(config, turn_fraction=fraction), interaction)
-        beam: BeamSearch[Any] = BeamSearch(view, config, make_propagator(view), check, iterations)
-        call = PredictiveCall(beam, widening=stop is not None)
-        status = call.run()
+        view = channel_view(call.world, replace(config, turn_fraction=fraction), interaction)
+        propagator = make_propagator(view)
+        beam: BeamSearch[Any] = BeamSearch(view, config, propagator, call.check, iterations)
+        search = PredictiveCall(beam, widening=call.has_rule)
+        status = search.run()
         iterations, nodes = beam.iterations, nodes + beam.nodes
         if status is not PlanStatus.GOAL_UNREACHABLE:
             break
-    if status is PlanStatus.TIMED_OUT and stop is not None and stop.cancelled:
-        status = PlanStatus.CANCELLED
-    stats = PlanStats(
-        wall_time_s=time.perf_counter() - began,
-        first_solution_s=call.first - began,
-        iterations=iterations,
-        nodes=nodes,
-        detail={"cost": beam.best_cost, "tight": float(fraction > config.turn_fraction)},
+    return call.result(
+        call.stopped_status if status is PlanStatus.TIMED_OUT else status,
+        search.plan(),
+        search.first - call.began,
+        iterations,
+        nodes,
+        cost=beam.best_cost,
+        tight=float(fraction > config.turn_fraction),
     )
-    return PlanResult(status, call.plan(), stats)
 
 
+@dataclass(eq=False)
 class PredictiveCall:
-    """Beams of growing width, and the best path of all.
+    """Beams of growing width, and the best path of all."""
 
-    Args:
-        beam: searches.
-        widening: whether to go on with wider beams.
-    """
-
-    def __init__(self, beam: BeamSearch[Any], widening: bool) -> None:
-        self._beam, self._widening = beam, widening
-        self._best: BeamNode[Any] | None = None
-        self._objects: FloatArray | None = None
-        self.first = math.nan
-        """When there was a plan, on the clock of `time.perf_counter`."""
+    beam: BeamSearch[Any]
+    widening: bool  # whether to go on with wider beams
+    first: float = math.nan  # when there was a plan, on the clock of `time.perf_counter`
+    _best: BeamNode[Any] | None = None
+    _objects: FloatArray | None = None
 
     def run(self) -> PlanStatus:
         """Search until done or stopped."""
-        beam, view = self._beam, self._beam.view
+        beam, view = self.beam, self.beam.view
         if not view.inside(view.start[None]):
             return PlanStatus.START_BLOCKED
         if view.away > view.channel.high[1]:
@@ -104,19 +88,19 @@ class PredictiveCall:
         return PlanStatus.SOLVED if view.channel.goal == view.away else PlanStatus.APPROXIMATE
 
     def _widen(self, root: BeamNode[Any]) -> None:
-        beam, config = self._beam, self._beam.config
+        beam, config = self.beam, self.beam.config
         width = config.beam_width(len(beam.view.near))
         while not beam.stopped:
             node = beam.search(root, width, config.horizon * beam.view.length)
             if node is not None:
                 self._consider(beam.finish(node))
             width *= 2
-            if not self._widening or width > config.widest:
+            if not self.widening or width > config.widest:
                 return
 
     def _consider(self, node: BeamNode[Any] | None) -> None:
         """Take up a path that is cheaper than the best, if there is time to say what it does."""
-        beam = self._beam
+        beam = self.beam
         if node is None or not node.total < beam.best_cost:
             return
         objects = beam.propagator.trace(node, lambda: beam.check(beam.iterations, beam.best_cost))
@@ -130,7 +114,7 @@ class PredictiveCall:
         """The best path at full speed, with what it does to the floes."""
         if self._best is None:
             return None
-        view, path = self._beam.view, self._best.path()
+        view, path = self.beam.view, self._best.path()
         world = view.world
         robot = world.robot
         poses = view.to_world(path[:, :3])

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import time
 from dataclasses import dataclass, field
 from typing import ClassVar
 
@@ -11,12 +10,12 @@ import numpy as np
 
 from pushplan.interaction.ice import IceInteraction
 from pushplan.interaction.network import IceNetwork
-from pushplan.planners.arguments import check_call
 from pushplan.planners.ship_predictive.channel_view import channel_view
 from pushplan.planners.ship_predictive.predictive_config import PredictiveConfig
 from pushplan.planners.ship_predictive.published_search import PublishedSearch, timed_path
-from pushplan.world import PlanResult, PlanStats, PlanStatus, Stop, World
+from pushplan.world import PlanResult, PlanStatus, Stop, World
 from pushplan.world.checks import expect, number
+from pushplan.world.planning_call import PlanningCall
 
 
 @dataclass(frozen=True)
@@ -54,37 +53,22 @@ class PredictivePublished:
             InvalidInputError: if the goal is no line, something static is in the water, or the
                 network cannot be read.
         """
-        began = time.perf_counter()
-        check_call(world, stop, rng)
+        call = PlanningCall(world, stop, rng)
         self.network.load()
-        check = (lambda iterations, cost: False) if stop is None else stop.start()
+        call.arm()
         view = channel_view(world, PredictiveConfig(margin=0.0), IceInteraction())
-        plan, expanded, first = None, 0, math.nan
         if not view.inside(view.start[None]):
-            status = PlanStatus.START_BLOCKED
-        elif view.away > view.channel.high[1]:
-            status = PlanStatus.GOAL_UNREACHABLE
-        elif view.away <= 0.0:
-            status, first = PlanStatus.SOLVED, time.perf_counter() - began
+            return call.result(PlanStatus.START_BLOCKED)
+        if view.away > view.channel.high[1]:
+            return call.result(PlanStatus.GOAL_UNREACHABLE)
+        if view.away <= 0.0:
             plan = timed_path(world, world.robot_pose[None], np.zeros(1))
-        else:
-            search = PublishedSearch(view, self.network, self.change_weight)
-            status = PlanStatus.SOLVED
-            while not search.arrived:
-                if check(expanded, math.inf):
-                    cancelled = stop is not None and stop.cancelled
-                    status = PlanStatus.CANCELLED if cancelled else PlanStatus.TIMED_OUT
-                    break
-                if not search.expand():
-                    status = PlanStatus.GOAL_UNREACHABLE
-                    break
-                expanded += 1
-            if search.arrived:
-                plan, first = search.plan(), time.perf_counter() - began
-        stats = PlanStats(
-            wall_time_s=time.perf_counter() - began,
-            first_solution_s=first,
-            iterations=expanded,
-            nodes=expanded,
-        )
-        return PlanResult(status, plan, stats)
+            return call.result(PlanStatus.SOLVED, plan, call.elapsed)
+        search, expanded = PublishedSearch(view, self.network, self.change_weight), 0
+        while not search.arrived:
+            if call.check(expanded, math.inf):
+                return call.result(call.stopped_status, None, math.nan, expanded, expanded)
+            if not search.expand():
+                return call.result(PlanStatus.GOAL_UNREACHABLE, None, math.nan, expanded, expanded)
+            expanded += 1
+        return call.result(PlanStatus.SOLVED, search.plan(), call.elapsed, expanded, expanded)

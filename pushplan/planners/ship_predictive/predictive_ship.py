@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-import time
 from dataclasses import dataclass, field
 from typing import ClassVar
 
 import numpy as np
 
 from pushplan.interaction.ice import IceInteraction
-from pushplan.planners.arguments import check_call
 from pushplan.planners.ship_predictive.floe_propagator import FloePropagator
 from pushplan.planners.ship_predictive.predictive_call import plan_call
 from pushplan.planners.ship_predictive.predictive_config import PredictiveConfig
 from pushplan.world import PlanResult, Stop, World
 from pushplan.world.checks import expect
+from pushplan.world.planning_call import PlanningCall
 
 
 @dataclass(frozen=True)
@@ -54,6 +53,5 @@ class PredictiveShip:
         Raises:
             InvalidInputError: if the goal is no line, or something static is in the water.
         """
-        began = time.perf_counter()
-        check_call(world, stop, rng)
-        return plan_call(world, self.config, self.interaction, FloePropagator, stop, began)
+        call = PlanningCall(world, stop, rng)
+        return plan_call(call, self.config, self.interaction, FloePropagator)

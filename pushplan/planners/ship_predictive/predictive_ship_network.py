@@ -2,21 +2,20 @@
 
 from __future__ import annotations
 
-import time
 from dataclasses import dataclass, field
+from functools import partial
 from typing import ClassVar
 
 import numpy as np
 
 from pushplan.interaction.ice import IceInteraction
 from pushplan.interaction.network import IceNetwork
-from pushplan.planners.arguments import check_call
-from pushplan.planners.ship_predictive.channel_view import ChannelView
 from pushplan.planners.ship_predictive.map_propagator import MapPropagator
 from pushplan.planners.ship_predictive.predictive_call import plan_call
 from pushplan.planners.ship_predictive.predictive_config import PredictiveConfig
 from pushplan.world import PlanResult, Stop, World
 from pushplan.world.checks import expect
+from pushplan.world.planning_call import PlanningCall
 
 
 @dataclass(frozen=True)
@@ -55,11 +54,8 @@ class PredictiveShipNetwork:
             InvalidInputError: if the goal is no line, something static is in the water, or the
                 network cannot be read.
         """
-        began = time.perf_counter()
-        check_call(world, stop, rng)
+        call = PlanningCall(world, stop, rng)
         self.network.load()
-
-        def propagator(view: ChannelView) -> MapPropagator:
-            return MapPropagator(view, self.network)
-
-        return plan_call(world, self.config, self.interaction, propagator, stop, began)
+        call.arm()
+        propagator = partial(MapPropagator, network=self.network)
+        return plan_call(call, self.config, self.interaction, propagator)

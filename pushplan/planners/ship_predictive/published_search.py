@@ -26,15 +26,14 @@ LATTICE = LatticeConfig.published()
 
 
 class PublishedSearch:
-    """A* with a map of the ice at every node, driven through `take` and `offer`.
+    """A* with a map of the ice at every node, driven through `take` and `offer`."""
 
-    Args:
-        view: what is searched.
-        network: predicts.
-        weight: factor on the mean squared change.
-    """
-
-    def __init__(self, view: ChannelView, network: IceNetwork, weight: float) -> None:
+    def __init__(
+        self,
+        view: ChannelView,
+        network: IceNetwork,
+        weight: float,  # factor on the mean squared change
+    ) -> None:
         world = view.world
         radius = turning_radius(world.robot, LATTICE.turn_fraction)
         builder = LatticeBuilder(world, LATTICE, radius=radius, side=_clearance(world))

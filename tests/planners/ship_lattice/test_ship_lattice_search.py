@@ -13,7 +13,7 @@ from scipy.sparse.csgraph import dijkstra
 from test_ship_lattice import ship_world
 
 from pushplan.interaction.ice import IceInteraction
-from pushplan.interaction.path_sweepers import IceSweeper
+from pushplan.interaction.path_sweepers import path_sweeper
 from pushplan.motion.speed_profile import turning_radius
 from pushplan.motion.state_lattice.built_lattice import BuiltLattice
 from pushplan.motion.state_lattice.lattice_builder import LatticeBuilder
@@ -183,11 +183,11 @@ def test_a_sweep_of_what_is_near_agrees_with_one_of_everything(floes: int) -> No
     assert plan is not None
     path = plan.poses.copy()
     whole = IceInteraction().sweep(world, path)
-    sweeper = IceSweeper(world, IceInteraction())
+    sweeper = path_sweeper(world, IceInteraction())
     here = world.movables.poses.copy()
     out, works = np.empty((len(path), len(here), 3)), np.zeros(len(path) - 1)
     for at in range(0, len(path) - 1, 8):
         end = min(at + 8, len(path) - 1)
-        assert sweeper.run(path[at : end + 1], here, out[at : end + 1], works[at:end])
+        assert sweeper(path[at : end + 1], here, out[at : end + 1], works[at:end])
     assert works.sum() == pytest.approx(whole.work, rel=0.02, abs=1e-9)
     assert out[0] == pytest.approx(world.movables.poses)

@@ -1,0 +1,75 @@
+"""What all planners do in a call: check what they are given, watch the clock, wrap up a result."""
+
+from __future__ import annotations
+
+import math
+import time
+
+import numpy as np
+
+from pushplan.world.checks import expect
+from pushplan.world.plan import Plan, PlanResult, PlanStats, PlanStatus
+from pushplan.world.scene import World
+from pushplan.world.stop import Stop, StopCheck, check_rules
+
+
+class PlanningCall:
+    """One call of a planner, from the time when this object is made.
+
+    Args:
+        world: as in `pushplan.world.Planner.plan`.
+        stop: likewise.
+        rng: likewise.
+        default: the stop rule where none is given; nothing ends the call where this is None too.
+
+    Raises:
+        InvalidInputError: naming the argument that has a wrong type.
+    """
+
+    def __init__(
+        self, world: object, stop: object, rng: object, default: Stop | None = None
+    ) -> None:
+        self.began = time.perf_counter()
+        self.world: World = expect("world", world, World)
+        given, generator = check_rules(stop, rng)
+        self.rng = np.random.default_rng(0) if generator is None else generator
+        self.has_rule = given is not None
+        """Whether the caller has given a stop rule."""
+        self._rule = default if given is None else given
+        self.arm()
+
+    def arm(self) -> None:
+        """Start the stop rule; again after what a process does in its first call only."""
+        self.check: StopCheck = _never if self._rule is None else self._rule.start()
+
+    @property
+    def elapsed(self) -> float:
+        """Time since the call began [s]."""
+        return time.perf_counter() - self.began
+
+    @property
+    def cancelled(self) -> bool:
+        """Whether a cancellation token in the stop rule has been used."""
+        return self._rule is not None and self._rule.cancelled
+
+    @property
+    def stopped_status(self) -> PlanStatus:
+        """The status of a call that was stopped before there was a plan."""
+        return PlanStatus.CANCELLED if self.cancelled else PlanStatus.TIMED_OUT
+
+    def result(
+        self,
+        status: PlanStatus,
+        plan: Plan | None = None,
+        first_solution_s: float = math.nan,
+        iterations: int = 0,
+        nodes: int = 0,
+        **detail: float,
+    ) -> PlanResult:
+        """The result of the call, which has taken the time up to now; see `PlanStats`."""
+        stats = PlanStats(self.elapsed, first_solution_s, iterations, nodes, detail)
+        return PlanResult(status, plan, stats)
+
+
+def _never(iterations: int, cost: float) -> bool:
+    return False
