@@ -6,8 +6,12 @@ from itertools import pairwise
 
 import numpy as np
 
-from pushplan.world import Plan, World
+from pushplan.geometry.angles import wrap_angle
+from pushplan.motion.collision import first_blocked, footprint, obstacles
+from pushplan.world import Plan, PlanStatus, World
 from pushplan.world.checks import FloatArray
+
+_FINE = 0.02  # distance of poses that are checked [circumscribed radii]
 
 
 def polyline_plan(world: World, points: FloatArray, spacing: float) -> Plan:
@@ -40,3 +44,26 @@ def polyline_plan(world: World, points: FloatArray, spacing: float) -> Plan:
         turn_rates=np.zeros(len(path)),
         travel_cost=world.robot.mass * float(lengths.sum()),
     )
+
+
+def polyline_status(world: World, plan: Plan) -> PlanStatus:
+    """Say whether the robot can drive a plan as it stands: `SOLVED`, or else `PATH_ONLY`.
+
+    It can where the plan begins at the robot's pose, turns no faster than the robot, and its
+    footprint, at poses a fiftieth of its circumscribed radius apart, touches nothing static.
+    """
+    robot, poses = world.robot, plan.poses
+    moves, off = np.diff(poses, axis=0), poses[0] - world.robot_pose
+    fast = np.abs(wrap_angle(moves[:, 2])) > robot.max_turn_rate * np.diff(plan.times) + 1e-9
+    if np.abs(off[:2]).max() > 1e-9 or abs(wrap_angle(off[2])) > 1e-9 or fast.any():
+        return PlanStatus.PATH_ONLY
+    step = _FINE * robot.circumscribed_radius
+    counts = np.maximum(np.ceil(np.hypot(moves[:, 0], moves[:, 1]) / step), 1.0).astype(np.int64)
+    first = np.repeat(np.arange(len(moves)), counts)
+    fraction = (np.arange(len(first)) - np.repeat(np.cumsum(counts) - counts, counts)) / counts[
+        first
+    ]
+    dense = np.concatenate([poses[first] + fraction[:, None] * moves[first], poses[-1:]])
+    walls, shape = obstacles(world.static), footprint(robot)
+    free = first_blocked(dense, len(dense), shape, walls, np.empty_like(shape.vertices))
+    return PlanStatus.SOLVED if free == len(dense) else PlanStatus.PATH_ONLY

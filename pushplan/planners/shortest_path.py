@@ -8,7 +8,7 @@ import numpy as np
 
 from pushplan.control import PurePursuit
 from pushplan.geometry import VisibilityGraph
-from pushplan.motion.polyline import polyline_plan
+from pushplan.motion.polyline import polyline_plan, polyline_status
 from pushplan.motion.speed_profile import start_margin
 from pushplan.planners.following.plan_follower import PlanFollower
 from pushplan.world import Planner, PlanResult, PlanStatus, Stop, World
@@ -36,7 +36,10 @@ class ShortestPath:
     def plan(
         self, world: World, *, stop: Stop | None = None, rng: np.random.Generator | None = None
     ) -> PlanResult:
-        """Plan from ``world``; exact and without chance, so ``stop`` and ``rng`` are not needed."""
+        """Plan from ``world``; exact and without chance, so ``stop`` and ``rng`` are not needed.
+
+        The status is `PATH_ONLY` where the robot cannot drive the path as it stands.
+        """
         call = PlanningCall(world, stop, rng)
         robot, goal = world.robot, world.navigation_goal
         start = world.robot_pose[:2]
@@ -45,7 +48,8 @@ class ShortestPath:
             if np.isfinite(path.length):
                 spacing = self.spacing * robot.circumscribed_radius
                 plan = polyline_plan(world, path.points, spacing)
-                return call.result(PlanStatus.SOLVED, plan, call.elapsed, 1)
+                status = polyline_status(world, plan)
+                return call.result(status, plan, call.elapsed, 1)
         blocked = start_margin(world, 0.0) is None
         return call.result(PlanStatus.START_BLOCKED if blocked else PlanStatus.GOAL_UNREACHABLE)
 

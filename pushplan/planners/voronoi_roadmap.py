@@ -13,7 +13,7 @@ from scipy.spatial import Delaunay, QhullError, cKDTree
 
 from pushplan.control import PurePursuit
 from pushplan.geometry import VisibilityGraph
-from pushplan.motion.polyline import polyline_plan
+from pushplan.motion.polyline import polyline_plan, polyline_status
 from pushplan.motion.speed_profile import start_margin
 from pushplan.planners.following.plan_follower import PlanFollower
 from pushplan.planners.following.replanning import Replanning
@@ -64,6 +64,8 @@ class Skeleton:
         30 ms in open water. Where the diagram leads nowhere, the shortest way around the walls is
         taken, which may take long among hundreds of obstacles.
 
+        The status is `PATH_ONLY` where the robot cannot drive the path as it stands.
+
         Raises:
             InvalidInputError: if the world's goal is not one for the robot.
         """
@@ -74,7 +76,7 @@ class Skeleton:
         if points is None:
             return call.result(status, iterations=1)
         plan = polyline_plan(world, points, self.spacing * world.robot.circumscribed_radius)
-        return call.result(status, plan, call.elapsed, 1)
+        return call.result(polyline_status(world, plan), plan, call.elapsed, 1)
 
     def _path(self, world: World, check: StopCheck) -> tuple[PlanStatus, FloatArray | None]:
         """Corners of the path (N, 2) [m] from the robot to the goal."""

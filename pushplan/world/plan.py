@@ -25,6 +25,12 @@ class PlanStatus(enum.Enum):
         "approximate",
         "The plan ends short of the goal: follow it and plan again from there, or allow more time.",
     )
+    PATH_ONLY = (
+        "path_only",
+        "The plan is a path for a point: the robot stands at another heading, turns slower than "
+        "the path, or touches something static on it. Let a controller follow it, or plan with "
+        "kinodynamic-rrt or push-aware.",
+    )
     TIMED_OUT = (
         "timed_out",
         "No plan was found before the stop rule fired: allow more time or iterations, "
@@ -49,7 +55,7 @@ class PlanStatus(enum.Enum):
     @property
     def has_plan(self) -> bool:
         """Whether a result of this status carries a plan."""
-        return self in (PlanStatus.SOLVED, PlanStatus.APPROXIMATE)
+        return self in (PlanStatus.SOLVED, PlanStatus.APPROXIMATE, PlanStatus.PATH_ONLY)
 
 
 @dataclass(frozen=True, eq=False)

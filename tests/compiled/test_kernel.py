@@ -1,9 +1,13 @@
 """Kernels without reference counts: what they may do and what is refused."""
 
+import ast
+from pathlib import Path
+
 import numpy as np
 import pytest
 from numba.core.errors import NumbaError
 
+import pushplan
 from pushplan.compiled import copy_into, kernel
 
 
@@ -35,3 +39,32 @@ def test_a_kernel_that_makes_an_array_is_refused_when_it_is_compiled():
 
     with pytest.raises(NumbaError):
         kernel(make)(3)
+
+
+REDUCTIONS = {"all", "any", "argmax", "argmin", "max", "mean", "min", "sum", "take"}
+"""Methods of arrays that Numba compiles with reference counts, unless it has done so before."""
+
+
+def kernels_of(path):
+    """Functions of a file that are kernels which make no arrays."""
+    for function in ast.walk(ast.parse(path.read_text())):
+        for mark in getattr(function, "decorator_list", []):
+            options = {key.arg for key in mark.keywords} if isinstance(mark, ast.Call) else set()
+            name = mark.func if isinstance(mark, ast.Call) else mark
+            if getattr(name, "id", "") == "kernel" and "allocates" not in options:
+                yield function
+
+
+def test_kernels_that_make_no_arrays_reduce_none():
+    """Whether such a kernel compiles would depend on what was compiled before it."""
+    files = sorted(Path(pushplan.__file__).parent.rglob("*.py"))
+    found, count = [], 0
+    for path in files:
+        for function in kernels_of(path):
+            count += 1
+            for call in ast.walk(function):
+                method = call.func if isinstance(call, ast.Call) else None
+                if isinstance(method, ast.Attribute) and method.attr in REDUCTIONS:
+                    found.append(f"{path.name}:{call.lineno}: {ast.unparse(call)}")
+    assert count > 100
+    assert not found

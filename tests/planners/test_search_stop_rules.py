@@ -84,7 +84,7 @@ class TestEveryPlanner:
         busy = time.thread_time()
         result = make_planner(name).plan(start(name), stop=Deadline(0.05))
         used = time.thread_time() - busy  # of the machine; the wall clock counts others' work too
-        assert result.status in (PlanStatus.SOLVED, PlanStatus.APPROXIMATE, PlanStatus.TIMED_OUT)
+        assert result.status.has_plan or result.status is PlanStatus.TIMED_OUT
         if name not in ONE_SHOT:
             assert used < 0.15
 

@@ -15,6 +15,7 @@ from pushplan.world import (
     GoalLine,
     MaxIterations,
     Movables,
+    PlanStatus,
     RobotModel,
     StaticMap,
     World,
@@ -92,14 +93,15 @@ def plan_in(seed: int, name: str):
     world = random_world(seed)
     result = make_planner(name).plan(world, stop=SOON, rng=np.random.default_rng(seed))
     assert (result.plan is not None) == result.status.has_plan
-    return world, result.plan
+    return world, result.plan, result.status
 
 
 def run(name: str, seeds: range, check, least: float) -> None:
+    """Check every plan that is called solved; so many of the worlds must have one."""
     solved = 0
     for seed in seeds:
-        world, plan = plan_in(seed, name)
-        if plan is not None:
+        world, plan, status = plan_in(seed, name)
+        if status is PlanStatus.SOLVED:
             solved += 1
             try:
                 check(world, plan)
@@ -117,3 +119,17 @@ def test_plans_can_be_driven(name):
 @pytest.mark.parametrize("name", ["push-aware", "kinodynamic-rrt"])
 def test_some_plans_can_be_driven(name):
     run(name, range(2000, 2100), check_drivable, least=0.2)
+
+
+@pytest.mark.parametrize("name", ["straight", "skeleton", "geometric-rrt"])
+def test_paths_for_a_point_are_called_solved_where_they_can_be_driven(name):
+    run(name, range(3000, 3100), check_drivable, least=0.0)
+    aligned = random_world(7)
+    free = StaticMap.build(bounds=[0, 0, 10, 10])
+    easy = World(aligned.robot, [2.0, 5.0, 0.0], free, Movables.empty(), GoalDisc([8.0, 5.0], 0.5))
+    if name == "straight":
+        result = make_planner(name).plan(easy)
+        assert result.status is PlanStatus.SOLVED
+        check_drivable(easy, result.plan)
+    turned = easy.moved(robot_pose=[2.0, 5.0, 1.0])
+    assert make_planner(name).plan(turned, stop=SOON).status is PlanStatus.PATH_ONLY

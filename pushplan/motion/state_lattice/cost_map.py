@@ -37,13 +37,22 @@ class PlacedFloes(NamedTuple):
 
 
 @kernel
+def _extent(outline: FloatArray, axis: int) -> tuple[float, float]:
+    """Least and greatest coordinate of corners (N, 2)."""
+    low = high = outline[0, axis]
+    for i in range(1, outline.shape[0]):
+        low, high = min(low, outline[i, axis]), max(high, outline[i, axis])
+    return low, high
+
+
+@kernel
 def add_floes(floes: PlacedFloes, grid: FloatArray) -> None:
     """Add the cost of each floe to the cells (rows, columns) whose centres it covers."""
     rows, columns = grid.shape
     exponent, soft = floes.costs.exponent, floes.costs.soft
     for k in range(floes.radii.shape[0]):
         outline = floes.outlines[floes.offsets[k] : floes.offsets[k + 1]]
-        top, bottom = outline[:, 0].min(), outline[:, 0].max()
+        top, bottom = _extent(outline, 0)
         cost = floes.costs.totals[k]
         if cost == 0.0 or bottom < 0.0 or top > rows - 1:
             continue
@@ -89,10 +98,12 @@ def block(
     for s in range(offsets.shape[0] - 1):
         outline = outlines[offsets[s] : offsets[s + 1]]
         count = outline.shape[0]
-        first = max(int(np.floor(outline[:, 0].min() - margin)), 0)
-        last = min(int(np.ceil(outline[:, 0].max() + margin)), rows - 1)
-        left = max(int(np.floor(outline[:, 1].min() - margin)), 0)
-        right = min(int(np.ceil(outline[:, 1].max() + margin)), columns - 1)
+        low, high = _extent(outline, 0)
+        first = max(int(np.floor(low - margin)), 0)
+        last = min(int(np.ceil(high + margin)), rows - 1)
+        low, high = _extent(outline, 1)
+        left = max(int(np.floor(low - margin)), 0)
+        right = min(int(np.ceil(high + margin)), columns - 1)
         for row in range(first, last + 1):
             for column in range(left, right + 1):
                 inside, near = True, np.inf

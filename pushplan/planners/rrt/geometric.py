@@ -10,7 +10,7 @@ from ompl import base, geometric
 from pushplan.compiled import kernel, owned
 from pushplan.geometry import core_distance
 from pushplan.motion.collision import ConvexObstacles, obstacles
-from pushplan.motion.polyline import polyline_plan
+from pushplan.motion.polyline import polyline_plan, polyline_status
 from pushplan.motion.random_tree.ompl_lock import own_state, seeded_ompl
 from pushplan.motion.speed_profile import start_margin
 from pushplan.world import MaxIterations, NavigationGoal, PlanResult, PlanStatus, Stop, World
@@ -62,7 +62,10 @@ class GeometricRRT:
     def plan(
         self, world: World, *, stop: Stop | None = None, rng: np.random.Generator | None = None
     ) -> PlanResult:
-        """Plan from ``world``; see `pushplan.world.Planner`. One iteration is one sample."""
+        """Plan from ``world``; see `pushplan.world.Planner`. One iteration is one sample.
+
+        The status is `PATH_ONLY` where the robot cannot drive the path as it stands.
+        """
         config = self.config
         call = PlanningCall(world, stop, rng, MaxIterations(4 * config.pass_iterations))
         objects = world.movables
@@ -82,7 +85,8 @@ class GeometricRRT:
             iterations += used
             if points is not None:
                 plan = polyline_plan(world, points, config.spacing * size)
-                return call.result(PlanStatus.SOLVED, plan, call.elapsed, iterations)
+                status = polyline_status(world, plan)
+                return call.result(status, plan, call.elapsed, iterations)
             if call.check(iterations, np.inf):
                 break
         return call.result(call.stopped_status, iterations=iterations)

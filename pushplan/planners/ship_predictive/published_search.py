@@ -56,6 +56,8 @@ class PublishedSearch:
     def _open(self, state: SearchState) -> None:
         """Begin at the robot's node, or where the short curves from the robot lead to."""
         nodes = state.heap[: state.counters[SIZE]].copy()
+        if not len(nodes):  # no place of the lattice is free
+            return
         if not self._curves:
             self._maps[int(nodes[0])] = self._propagator.start()
             self._star.start(int(nodes[0]))

@@ -219,19 +219,21 @@ def test_hostile_worlds(name: str) -> None:
 @pytest.mark.parametrize("name", NAMES)
 def test_crowds_of_every_kind(name: str) -> None:
     planner, stop = make_planner(name), MaxIterations(40)
+    paths = (PlanStatus.PATH_ONLY,) if name == "skeleton" else ()  # it knows no turning radius
+    ends = (PlanStatus.SOLVED, *paths)
     square = 0.5 * np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
     barrier = [square + np.array([x, 5.0]) for x in np.arange(0.5, 12.0, 1.0)]
     through = planner.plan(ship_world(0, movables=Movables.from_polygons(barrier)), stop=stop)
-    assert through.status is PlanStatus.SOLVED  # floes may be pushed
+    assert through.status in ends  # floes may be pushed
     crowd = ship_world(3, floes=700)
     assert len(crowd.movables) > 80
-    assert planner.plan(crowd, stop=stop).status is PlanStatus.SOLVED
+    assert planner.plan(crowd, stop=stop).status in ends
     small = [0.2 * square + spot for spot in np.random.default_rng(0).uniform(0.5, 11.5, (300, 2))]
     heap = ship_world(3, movables=Movables.from_polygons(small))  # they overlap one another
-    assert planner.plan(heap, stop=stop).status is PlanStatus.SOLVED
+    assert planner.plan(heap, stop=stop).status in ends
     on_top = ship_world(3, movables=Movables.from_polygons([square + heap.robot_pose[:2]]))
-    assert planner.plan(on_top, stop=stop).status is PlanStatus.SOLVED  # starts in a floe
-    assert planner.plan(ship_world(3, floes=0), stop=stop).status is PlanStatus.SOLVED
+    assert planner.plan(on_top, stop=stop).status in ends  # starts in a floe
+    assert planner.plan(ship_world(3, floes=0), stop=stop).status in ends
 
 
 def test_water_without_end() -> None:

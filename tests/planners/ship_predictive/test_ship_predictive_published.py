@@ -7,7 +7,17 @@ from ice_scenes import channel
 from pushplan.interaction.network import IceNetwork
 from pushplan.planners import make_planner
 from pushplan.planners.ship_predictive import PredictivePublished
-from pushplan.world import GoalDisc, InvalidInputError, MaxIterations, PlanStatus, World
+from pushplan.world import (
+    GoalDisc,
+    GoalLine,
+    InvalidInputError,
+    MaxIterations,
+    Movables,
+    PlanStatus,
+    RobotModel,
+    StaticMap,
+    World,
+)
 
 SQUARE = 0.5 * np.array([[1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0], [1.0, -1.0]])
 BLOCK = [(0.7 * SQUARE, [x, 4.5, 0.0]) for x in (-0.8, 0.0, 0.8)]
@@ -78,3 +88,19 @@ def test_other_goals_are_refused():
         PredictivePublished().plan(disc)
     with pytest.raises(InvalidInputError):
         PredictivePublished(change_weight=-1.0)
+
+
+def test_a_basin_smaller_than_the_ship_is_no_crash():
+    hull = 1.7 * np.array([[1.0, 0.3], [-1.0, 0.3], [-1.0, -0.3], [1.0, -0.3]])
+    ship = RobotModel.from_outline(
+        hull, mass=1.0, drive="constant_speed", max_speed=0.3, max_turn_rate=0.5
+    )
+    world = World(
+        ship,
+        [0.01, 0.04, 0.5],
+        StaticMap.build(bounds=[0.0, 0.0, 0.0174, 0.0878]),
+        Movables.empty(),
+        GoalLine([0.0087, 0.08], [0.0, 1.0]),
+    )
+    result = make_planner("ship-predictive-published").plan(world, stop=MaxIterations(50))
+    assert result.status is PlanStatus.GOAL_UNREACHABLE
