@@ -21,7 +21,7 @@ from pushplan.control.mpc.kernels import Track, Tuning, arc, assemble, errors, l
 from pushplan.control.mpc.mpc_config import MpcConfig
 from pushplan.control.pure_pursuit import PurePursuit
 from pushplan.world import Drive, Plan, RobotModel, Twist, World
-from pushplan.world.checks import FloatArray
+from pushplan.world.checks import FloatArray, expect
 
 _BACK = 0.25  # how far the place on the path may move back from one call to the next [R]
 _WINDOW = 2.0  # how far ahead of the last place the next one is looked for [R]
@@ -48,6 +48,7 @@ class MpcTracker:
     config: MpcConfig = field(default_factory=MpcConfig)
 
     def __post_init__(self) -> None:
+        expect("config", self.config, MpcConfig)
         self._robot: RobotModel | None = None
         self._plan: Plan | None = None
         self._track = Track(np.zeros((1, 3)), np.zeros(1), np.zeros(1))

@@ -7,7 +7,14 @@ from typing import Annotated
 
 from pushplan.motion.path_search_config import PathSearchConfig
 from pushplan.motion.speed_profile import TIGHTEST
-from pushplan.world.checked_fields import Limits, NonNegativeFloat, PositiveFloat, PositiveInt
+from pushplan.world.checked_fields import (
+    Fraction,
+    Limits,
+    NonNegativeFloat,
+    PositiveFloat,
+    PositiveFraction,
+    PositiveInt,
+)
 
 
 @dataclass(frozen=True)
@@ -41,10 +48,10 @@ class PushAwareConfig(PathSearchConfig):
             which finds, in the end, what the search cannot represent.
     """
 
-    push_weight: float = 2.5
-    turn_fraction: float = 0.98
-    margin: float = 0.08
-    default_iterations: int = 20_000
+    push_weight: NonNegativeFloat = 2.5
+    turn_fraction: PositiveFraction = 0.98
+    margin: Fraction = 0.08
+    default_iterations: PositiveInt = 20_000
     differential_radius: Annotated[float, Limits(TIGHTEST)] = 1.0
     heuristic_inflation: NonNegativeFloat = 1.05
     pruning_factor: NonNegativeFloat = 0.92
