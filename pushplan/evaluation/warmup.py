@@ -3,16 +3,21 @@
 from __future__ import annotations
 
 import time
-from typing import Any
+from collections.abc import Iterable
+from typing import TYPE_CHECKING, Any
 
 from pushplan.evaluation.episode import PolicyError, Recording
 from pushplan.evaluation.jobs import JobSettings
 from pushplan.evaluation.policies import PolicySpec, policy_names
 from pushplan.world import InvalidInputError, UnknownNameError
 
+if TYPE_CHECKING:
+    from pushplan.scenarios import Scenario
+
 _OTHERS = ("observations", "metrics")
 
 STEPS = 3
+_COLUMNS = "area-clearing-2d-10-walled-with-columns"  # for a network made for such rooms only
 
 
 def names() -> tuple[str, ...]:
@@ -62,7 +67,7 @@ def _metrics() -> None:
 
 
 def _record(policy: str, observation: Any = None) -> list[Recording]:
-    """The first steps of a policy in every smoke start that it is made for.
+    """The first steps of a policy in every smoke start that it is made for, or else among columns.
 
     Args:
         policy: a name.
@@ -70,8 +75,13 @@ def _record(policy: str, observation: Any = None) -> list[Recording]:
     """
     from pushplan.scenarios import suite
 
+    found = _record_in(suite("smoke").scenarios, policy, observation)
+    return found or _record_in(suite(_COLUMNS, episodes=1).scenarios, policy, observation)
+
+
+def _record_in(scenarios: Iterable[Scenario], policy: str, observation: Any) -> list[Recording]:
     recordings = []
-    for scenario in suite("smoke").scenarios:
+    for scenario in scenarios:
         runner = PolicySpec(policy, policy).make()
         if observation is not None:
             runner.observation = observation  # type: ignore[attr-defined]

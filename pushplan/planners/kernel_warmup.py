@@ -10,6 +10,7 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 
 from pushplan.planners.following.plan_follower import PlanFollower
+from pushplan.planners.following.renewing_follower import RenewingFollower
 from pushplan.planners.registry import make_policy, policy_names
 from pushplan.world import (
     Drive,
@@ -77,6 +78,8 @@ def _plan_and_follow(policy: PlanFollower, world: World) -> None:
         moved = world.moved(robot_pose=pose, time=0.1 * step)
         planner.plan(moved, stop=fewer)
         policy.act(moved)
+    if isinstance(policy, RenewingFollower):  # it compares plans, farther on than this
+        policy.interaction.sweep(world, np.array(_POSES))
 
 
 def _room() -> World:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from pushplan.envs.simulators.base import Materials, Simulator
@@ -18,7 +20,8 @@ def warm_up_simulator(simulator: Simulator, world: World, materials: Materials) 
     """
     robot = world.robot
     radius, ahead = robot.circumscribed_radius, Twist(robot.max_speed, 0.0)
-    worlds = [world]
+    alone = replace(world, movables=world.movables.select(np.zeros(0, dtype=np.int64)))
+    worlds = [world, alone]
     if len(world.movables):
         x, y, _ = world.movables.poses[0]
         gap = radius + float(world.movables.radii[0])

@@ -155,7 +155,7 @@ class PymunkSimulator(Simulator):
             reach,
             robot.vertices,
             robot.offsets,
-            self._rows[1:, :3],
+            np.ascontiguousarray(self._rows[1:, :3]),  # also where there is one object or none
             own,
             movables.vertices,
             movables.offsets,
