@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Callable
-from typing import Any
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from pushplan.world import Episode
 
 
 def add_command(
@@ -109,6 +112,15 @@ def check_folder(path: str | None) -> None:
 def say(text: str) -> None:
     """Write a line to standard output."""
     sys.stdout.write(text + "\n")
+
+
+def say_scores(episode: Episode, names: Sequence[str] | None = None, who: str = "") -> None:
+    """Write how an episode ended, and a line for each of its metrics."""
+    from pushplan.metrics import compute
+
+    say(f"{who}{'success' if episode.success else 'no success'} ({episode.reason})")
+    for name, value in compute(episode, names).items():
+        say(f"  {name:24s}{value:.6g}")
 
 
 def milliseconds(seconds: float) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
-from pushplan.cli.common import add_command, say
+from pushplan.cli.common import add_command, say_scores
 
 _EXAMPLES = """\
   pushplan score episode.npz
@@ -27,13 +27,10 @@ def add(commands: Any) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """One block of lines an episode."""
-    from pushplan.metrics import compute
     from pushplan.world import Episode
 
     names = options.metrics.split(",") if options.metrics else None
     for path in options.episodes:
         episode = Episode.load(path)
-        say(f"{path}: {'success' if episode.success else 'no success'} ({episode.reason})")
-        for name, value in compute(episode, names).items():
-            say(f"  {name:24s}{value:.6g}")
+        say_scores(episode, names, f"{path}: ")
     return 0

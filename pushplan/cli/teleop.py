@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING, Any
 
-from pushplan.cli.common import add_command, check_folder, positive, say
+from pushplan.cli.common import add_command, check_folder, positive, say, say_scores
 from pushplan.cli.scenario_options import add_scenario_options, scenario_of
 
 if TYPE_CHECKING:
@@ -58,35 +58,16 @@ def run(options: argparse.Namespace) -> int:
     keyboard = Keyboard()
     window = Window(f"pushplan {scenario.task}, seed {scenario.seed}", keyboard=keyboard)
     try:
-        episode = drive(env, scenario, _WindowDisplay(window, keyboard), speed=options.speed)
+        episode = drive(env, scenario, window, speed=options.speed)
     finally:
         window.close()
         env.close()
     if options.out:
         episode.save(options.out)
-    from pushplan.metrics import compute
-
-    say(f"{'success' if episode.success else 'no success'} ({episode.reason})")
-    for name, value in compute(episode).items():
-        say(f"  {name:24s}{value:.6g}")
+    say_scores(episode)
     if options.out:
         say(f"wrote {options.out}")
     return 0
-
-
-class _WindowDisplay:
-    """A window as the place where a person looks and types."""
-
-    def __init__(self, window: Any, keyboard: Any) -> None:
-        self.keyboard = keyboard
-        self._window = window
-        self.show = window.show
-        self.update = window.update
-
-    @property
-    def closed(self) -> bool:
-        closed: bool = self._window.closed
-        return closed
 
 
 def _environment(scenario: Scenario, action: str | None) -> Any:

@@ -4,22 +4,30 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from pushplan.control.drive_to import DriveTo
+from pushplan.control.episode_clock import EpisodeClock
+from pushplan.control.leg_follower import LegFollower, Legs
 from pushplan.control.limits import TwistLimiter, clamp_twist
 from pushplan.control.path_follower import PathFollower
+from pushplan.control.progress_checker import ProgressChecker, StallChecker
 from pushplan.control.pure_pursuit import PurePursuit
+from pushplan.control.retreat import Retreat
 from pushplan.control.tracking import Progress
 
 if TYPE_CHECKING:
     from pushplan.control.mpc import MpcConfig, MpcTracker
 
 __all__ = [
-    "DriveTo",
+    "EpisodeClock",
+    "LegFollower",
+    "Legs",
     "MpcConfig",
     "MpcTracker",
     "PathFollower",
     "Progress",
+    "ProgressChecker",
     "PurePursuit",
+    "Retreat",
+    "StallChecker",
     "TwistLimiter",
     "clamp_twist",
 ]

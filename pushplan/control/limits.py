@@ -6,7 +6,7 @@ import math
 
 from ruckig import ControlInterface, InputParameter, Ruckig, RuckigError, Trajectory
 
-from pushplan.world import Drive, RobotModel, Twist
+from pushplan.world import Drive, RobotModel, Twist, World
 from pushplan.world.checks import number
 
 
@@ -25,6 +25,22 @@ def clamp_twist(robot: RobotModel, linear: float, angular: float) -> Twist:
     return Twist(linear, angular)
 
 
+def arc_twist(robot: RobotModel, length: float, turn: float) -> Twist:
+    """The twist that drives an arc as fast as the robot's speed and turn limits allow.
+
+    Args:
+        robot: gives the limits.
+        length: of the arc, negative for back [m].
+        turn: on it [rad].
+    """
+    seconds = max(
+        length / robot.max_speed,
+        length / robot.min_speed if robot.min_speed < 0.0 else 0.0,
+        abs(turn) / robot.max_turn_rate,
+    )
+    return clamp_twist(robot, length / seconds, turn / seconds) if seconds else Twist(0.0, 0.0)
+
+
 def ramp_twist(
     robot: RobotModel, last: Twist, linear: float, angular: float, period: float
 ) -> Twist:
@@ -41,6 +57,14 @@ def ramp_twist(
     linear = min(max(linear, last.linear - dv), last.linear + dv)
     angular = min(max(angular, last.angular - dw), last.angular + dw)
     return clamp_twist(robot, linear, angular)
+
+
+def driven_twist(world: World) -> Twist:
+    """The twist that the robot has, within its limits."""
+    assert world.robot_twist is not None
+    vx, vy, omega = (float(value) for value in world.robot_twist)
+    theta = float(world.robot_pose[2])
+    return clamp_twist(world.robot, vx * math.cos(theta) + vy * math.sin(theta), omega)
 
 
 class TwistLimiter:

@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from pushplan.control.limits import TwistLimiter, clamp_twist
+from pushplan.control.episode_clock import EpisodeClock
+from pushplan.control.limits import TwistLimiter, clamp_twist, driven_twist
 from pushplan.control.tracking import Progress
 from pushplan.world import Drive, Plan, Twist, World
 from pushplan.world.checks import number
@@ -32,11 +33,13 @@ class PathFollower:
 
     def __post_init__(self) -> None:
         number("distance", self.distance, low=0.0, open_low=True)
-        number("period", self.period, low=0.0, open_low=True)
-        self._progress = Progress(window=1.0)
+        self._clock = EpisodeClock(self.period)
         self._limiter: TwistLimiter | None = None
-        self._held = self.period
-        self._last_time = math.inf
+
+    def reset(self, world: World) -> None:
+        """See `pushplan.world.Controller`."""
+        self._clock.reset()
+        self._limiter = None
 
     def command(self, world: World, plan: Plan) -> Twist:
         """See `pushplan.world.Controller`.
@@ -44,6 +47,11 @@ class PathFollower:
         Past the end of the plan a differential drive stops; a constant-speed robot drives on
         along the last heading.
         """
+        if self._clock.advance(world):
+            self._clock.command = self._follow(world, plan)
+        return self._clock.command
+
+    def _follow(self, world: World, plan: Plan) -> Twist:
         robot = world.robot
         size = robot.circumscribed_radius
         progress = self._prepare(world)
@@ -55,7 +63,7 @@ class PathFollower:
         over = along >= progress.total - 1e-9
         if over and robot.drive is Drive.DIFFERENTIAL:
             return self._limit(Twist(0.0, 0.0))
-        ahead = progress.index(min(along + 0.5 * self._held * speed, progress.total))
+        ahead = progress.index(min(along + 0.5 * self._clock.held * speed, progress.total))
         curvature = 0.0 if over else float(plan.turn_rates[ahead]) / max(plan.speeds[ahead], 1e-9)
         offset = math.cos(path_theta) * (y - path_y) - math.sin(path_theta) * (x - path_x)
         error = (theta - path_theta + math.pi) % (2.0 * math.pi) - math.pi
@@ -75,21 +83,15 @@ class PathFollower:
         return self._limit(Twist(speed, turn))
 
     def _prepare(self, world: World) -> Progress:
-        """Start afresh where the clock has been set back or the robot is another one."""
+        """Start afresh in a new episode, or where the robot is another one."""
         robot = world.robot
-        if self._limiter is None or world.time <= self._last_time or self._limiter.robot != robot:
+        if self._limiter is None or self._limiter.robot != robot:
             self._progress = Progress(window=2.0 * robot.circumscribed_radius)
             self._limiter = TwistLimiter(robot)
-            assert world.robot_twist is not None
-            vx, vy, omega = (float(value) for value in world.robot_twist)
-            theta = float(world.robot_pose[2])
-            self._limiter.reset(vx * math.cos(theta) + vy * math.sin(theta), omega)
-            self._held = self.period
-        else:
-            self._held = world.time - self._last_time
-        self._last_time = world.time
+            driven = driven_twist(world)
+            self._limiter.reset(driven.linear, driven.angular)
         return self._progress
 
     def _limit(self, wanted: Twist) -> Twist:
         assert self._limiter is not None
-        return self._limiter.step(wanted, self._held)
+        return self._limiter.step(wanted, self._clock.held)

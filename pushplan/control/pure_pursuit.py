@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from pushplan.control.episode_clock import EpisodeClock
 from pushplan.control.limits import clamp_twist
 from pushplan.control.tracking import Progress
 from pushplan.world import Drive, Plan, Twist, World
@@ -26,8 +27,12 @@ class PurePursuit:
 
     def __post_init__(self) -> None:
         number("lookahead", self.lookahead, low=0.0, open_low=True)
-        self._progress = Progress(window=1.0)
-        self._last_time = math.inf
+        self._clock = EpisodeClock(1.0)
+        self._progress = Progress(window=0.0)
+
+    def reset(self, world: World) -> None:
+        """See `pushplan.world.Controller`."""
+        self._clock.reset()
 
     def command(self, world: World, plan: Plan) -> Twist:
         """See `pushplan.world.Controller`.
@@ -35,11 +40,17 @@ class PurePursuit:
         Past the end of the plan a differential drive stops; a constant-speed robot drives on
         along the last heading.
         """
+        first = self._clock.is_first
+        if self._clock.advance(world):
+            if first:
+                reach = self.lookahead * world.robot.circumscribed_radius
+                self._progress = Progress(window=2.0 * reach)
+            self._clock.command = self._follow(world, plan)
+        return self._clock.command
+
+    def _follow(self, world: World, plan: Plan) -> Twist:
         robot = world.robot
         reach = self.lookahead * robot.circumscribed_radius
-        if world.time <= self._last_time:  # the clock was set back: another episode
-            self._progress = Progress(window=2.0 * reach)
-        self._last_time = world.time
         progress = self._progress
         x, y, theta = (float(value) for value in world.robot_pose)
         along = progress.update(plan, x, y)

@@ -14,11 +14,11 @@ from pushplan.envs.tasks.base import Task
 from pushplan.world import Action, InvalidInputError, Twist, UnknownNameError, WheelSpeeds, World
 from pushplan.world.checks import FloatArray
 
-Motion = Callable[[FloatArray, bool], tuple[Twist, float] | None]
-"""Asked while one action lasts, with the robot's pose (3,) and whether it has just been held: the
-next command and the number of control steps for which it may stand if the robot follows it exactly
-(less than one only for a command that has to be replaced before its step is over); None when the
-action is done."""
+Motion = Callable[[FloatArray, float, bool], tuple[Twist, float] | None]
+"""Asked while one action lasts, with the robot's pose (3,), the time [s] and whether
+something has just held it: the next command and the number of control steps for which it may stand
+if the robot follows it exactly (less than one only for a command that has to be replaced before its
+step is over); None when the action is done."""
 
 
 class ActionMode(ABC):
@@ -110,16 +110,16 @@ def chosen_action(task: type[Task], wanted: str | Sequence[str] | None) -> str:
 def _once(command: Twist) -> Motion:
     """A motion of one control step."""
     commands = iter(((command, 1),))
-    return lambda robot_pose, held: next(commands, None)
+    return lambda robot_pose, time, held: next(commands, None)
 
 
 def waiting(command: Twist, periods: float = 1.0, *, then: Motion | None = None) -> Motion:
     """A command for some time, one control step at most, and then another motion."""
     first = iter(((command, periods),))
 
-    def motion(robot_pose: FloatArray, held: bool) -> tuple[Twist, float] | None:
+    def motion(pose: FloatArray, time: float, held: bool) -> tuple[Twist, float] | None:
         wanted = next(first, None)
-        return then(robot_pose, held) if wanted is None and then is not None else wanted
+        return then(pose, time, held) if wanted is None and then is not None else wanted
 
     return motion
 

@@ -6,19 +6,25 @@ from typing import ClassVar, NoReturn
 
 import numpy as np
 
-from pushplan.control import DriveTo, clamp_twist
+from pushplan.control import LegFollower, Legs, clamp_twist
 from pushplan.envs.actions import ActionMode, Motion
 from pushplan.envs.tasks.base import Task
 from pushplan.geometry import VisibilityGraph
-from pushplan.world import InvalidInputError, Twist, World
+from pushplan.world import InvalidInputError, RobotModel, Twist, World
 from pushplan.world.checks import FloatArray
 from pushplan.world.outline import transform
 
+_ESCAPES = 2  # how often one action makes room for a turn
+_LONGEST = 5  # control steps for which a command may stand
 
-def _motion(driver: DriveTo) -> Motion:
-    def next_command(robot_pose: FloatArray, held: bool) -> tuple[Twist, float] | None:
-        command = driver.command(robot_pose, held=held)
-        return None if command is None else (command, driver.periods)
+
+def _motion(robot: RobotModel, points: FloatArray, period: float) -> Motion:
+    follower = LegFollower(robot, Legs.ahead(points), response=period, escapes=_ESCAPES)
+
+    def next_command(pose: FloatArray, time: float, held: bool) -> tuple[Twist, float] | None:
+        command = follower.command(pose, time, period, stopped=held)
+        steps = min(max(1, int(follower.steady / period + 1e-9)), _LONGEST)
+        return None if command is None else (command, steps)
 
     return next_command
 
@@ -61,7 +67,7 @@ class HeadingAction(_DriveAction):
         """Drive straight to the point at that heading and distance."""
         heading = float(action[0]) * np.pi
         target = self._step * np.array([[np.cos(heading), np.sin(heading)]])
-        return _motion(DriveTo(self.robot, transform(world.robot_pose, target), self._period))
+        return _motion(self.robot, transform(world.robot_pose, target), self._period)
 
 
 class WaypointAction(_DriveAction):
@@ -81,7 +87,7 @@ class WaypointAction(_DriveAction):
         target = transform(world.robot_pose, self._half * action[None, :])[0]
         low, high = world.static.bounds[:2], world.static.bounds[2:]
         points = self._way(world, np.clip(target, low, high))
-        return _motion(DriveTo(self.robot, points, self._period))
+        return _motion(self.robot, points, self._period)
 
     def _way(self, world: World, target: FloatArray) -> FloatArray:
         start = world.robot_pose[:2]

@@ -257,11 +257,13 @@ class PushEnv(gymnasium.Env[NDArray[Any], NDArray[Any]]):
         traces = []
         touched = held = now_held = False
         several = simulator.is_exact and not self.task.objects_leave
-        while (wanted := motion(simulator.robot_pose, now_held)) is not None:
+        now = before.time
+        while (wanted := motion(simulator.robot_pose, now, now_held)) is not None:
             command, periods = wanted
             duration = self.task.control_step * (periods if several else min(periods, 1))
             self._meanwhile = self._mode.afterwards(command)
             traces.append(roster.widen(simulator.step(command, duration)))
+            now = float(traces[-1].times[-1])
             touched |= simulator.touched_static
             now_held = simulator.held
             held |= now_held

@@ -67,6 +67,7 @@ class Window:
             raise MissingDependencyError(
                 f"no window can be opened here: it needs a display ({error})"
             ) from error
+        self.keyboard: Any = keyboard
         self._root.title(title)
         self._root.protocol("WM_DELETE_WINDOW", self.close)
         self._label: Any = tkinter.Label(self._root, borderwidth=0)

@@ -6,8 +6,9 @@ import logging
 import os
 import pickle
 from collections import deque
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, wait
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -165,7 +166,7 @@ class _Batch:
     def run(self, executor: Executor | None, window: int) -> None:
         """Through an executor, ``window`` jobs at a time; through our own pool if None."""
         if executor is None:
-            with _Closing(self._pool(window)) as pool:
+            with _closing(self._pool(window)) as pool:
                 # one job waits for each worker, so that none is idle while a row is stored
                 self._drain(pool, 2 * window, None)
         elif suspects := self._drain(executor, window, os.getpid()):
@@ -227,7 +228,7 @@ class _Batch:
     def _clear(self, suspects: Sequence[Job]) -> None:
         """Run jobs that were in flight when a process died each alone in a fresh process."""
         for job in suspects:
-            with _Closing(self._pool(1)) as pool:
+            with _closing(self._pool(1)) as pool:
                 future = _submit(pool, job, self._settings, None)
                 outcome = self._outcome(job, future, None)
                 assert outcome is not None
@@ -240,20 +241,15 @@ class _Batch:
             self._progress(self._total - self._left, self._total, outcome.row)
 
 
-class _Closing:
-    """Ends a pool in order after success and at once after an exception such as Ctrl-C."""
-
-    def __init__(self, pool: WorkerPool) -> None:
-        self._pool = pool
-
-    def __enter__(self) -> WorkerPool:
-        return self._pool
-
-    def __exit__(self, kind: type[BaseException] | None, *rest: object) -> None:
-        if kind is None:
-            self._pool.shutdown()
-        else:
-            self._pool.kill()
+@contextmanager
+def _closing(pool: WorkerPool) -> Iterator[WorkerPool]:
+    """End a pool in order after success and at once after an exception such as Ctrl-C."""
+    try:
+        yield pool
+    except BaseException:
+        pool.kill()
+        raise
+    pool.shutdown()
 
 
 def _submit(

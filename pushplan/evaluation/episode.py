@@ -98,7 +98,9 @@ class Recording:
         clock: Clock = time.perf_counter,
     ) -> None:
         self.policy = policy
-        self.latency_factor = checked_latency_factor(latency_factor)
+        self.latency_factor = (
+            None if latency_factor is None else number("latency_factor", latency_factor, low=0.0)
+        )
         self._clock = clock
         self.scenario = scenario
         self.label = label or type(policy).__name__
@@ -226,15 +228,6 @@ class Recording:
             raise
         except (Exception, SystemExit) as error:
             raise PolicyError(describe(error)) from error
-
-
-def checked_latency_factor(factor: float | None) -> float | None:
-    """The factor of latency-aware simulation, None where the world stands still meanwhile.
-
-    Raises:
-        InvalidInputError: if it is no number, negative or not finite.
-    """
-    return None if factor is None else number("latency_factor", factor, low=0.0)
 
 
 def blocking_time(policy: Policy, elapsed_s: float) -> float:

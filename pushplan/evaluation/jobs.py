@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import re
-import zlib
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
@@ -37,26 +35,12 @@ class Job:
         return (self.policy.label, str(self.scenario.key), int(self.scenario.seed))
 
     @property
-    def file_stem(self) -> str:
-        """Name, without ending, of the files that belong to the job."""
-        return file_stem(*self.id)
-
-    @property
     def title(self) -> str:
         """The scenario without its seed, in words."""
         data = self.scenario.to_dict()
         words = [str(data[key]) for key in ("task", "simulator", "preset") if key in data]
         extra = [f"{key}={value}" for key, value in data.get("variations", {}).items()]
         return " ".join([*words, *extra])
-
-
-def file_stem(policy: str, scenario: str, seed: int) -> str:
-    """Name, without ending, of the files that belong to a job."""
-    clean = re.sub(r"[^A-Za-z0-9_.+@=-]", "_", scenario)
-    if clean != scenario or len(clean) > 120:
-        clean = f"{clean[:110]}-{zlib.crc32(scenario.encode()):08x}"
-    ending = "" if re.search(rf"(^|[^0-9]){seed}$", clean) else f"--{seed}"
-    return f"{policy}--{clean}{ending}"
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,6 @@ import html
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from pushplan.evaluation.jobs import file_stem
 from pushplan.evaluation.rows import ResultRow
 from pushplan.evaluation.run_record import RunRecord
 from pushplan.evaluation.store import write_atomic
@@ -130,12 +129,11 @@ def _listing(run: RunRecord) -> str:
 
 
 def _row(row: ResultRow, run: Path | None) -> str:
-    stem = file_stem(row.policy, row.scenario, row.seed)
     links = [
         f'<a href="{html.escape(place)}">{word}</a>'
         for word, place in (
-            ("trace", f"episodes/{stem}.npz"),
-            ("traceback", f"failures/{stem}.txt"),
+            ("trace", row.trace_file),
+            ("traceback", f"failures/{row.file_stem}.txt"),
         )
         if run is not None and (run / place).is_file()
     ]

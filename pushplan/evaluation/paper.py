@@ -11,7 +11,7 @@ from typing import Any
 from pushplan.evaluation.batch import Progress, run_batch
 from pushplan.evaluation.benchmark import Given
 from pushplan.evaluation.compatibility import UnusablePolicyError, incompatibility, read_policies
-from pushplan.evaluation.jobs import Job, JobSettings, file_stem
+from pushplan.evaluation.jobs import Job, JobSettings
 from pushplan.evaluation.paper_tables import overview, paper_table, preface, training_cost
 from pushplan.evaluation.policies import PolicySpec, policy_names
 from pushplan.evaluation.published import PublishedTable, chosen_tables
@@ -192,8 +192,7 @@ def _to_goal_point(rows: Sequence[ResultRow], folder: Path) -> dict[tuple[str, s
             continue
         value = 0.0
         if row.success:
-            stem = file_stem(row.policy, row.scenario, row.seed)
-            episode = Episode.load(folder / "episodes" / f"{stem}.npz")
+            episode = Episode.load(folder / row.trace_file)
             value = compute(episode, [TO_GOAL_POINT])[TO_GOAL_POINT]
         values[row.policy, row.scenario, row.seed] = value
     return values

@@ -12,7 +12,6 @@ import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from pushplan.evaluation.jobs import file_stem
 from pushplan.evaluation.rows import ResultRow
 from pushplan.evaluation.run_record import RunRecord
 from pushplan.evaluation.statistics import estimate
@@ -176,8 +175,7 @@ def _planning_time(run: RunRecord) -> tuple[str, Figure] | None:
 
 def _calls(run: RunRecord, row: ResultRow) -> Any:
     """Times of all planning calls of an episode [s], from its trace where there is one."""
-    stem = file_stem(row.policy, row.scenario, row.seed)
-    if run.path is not None and (path := run.path / "episodes" / f"{stem}.npz").is_file():
+    if run.path is not None and (path := run.path / row.trace_file).is_file():
         with np.load(path, allow_pickle=False) as data:
             return np.maximum(data["plan_times_s"], 1e-6)
     return np.array([row.plan_time_median_s, row.plan_time_max_s])

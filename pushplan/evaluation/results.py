@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from pushplan.evaluation.jobs import file_stem
 from pushplan.evaluation.rows import ResultRow
 from pushplan.evaluation.run_record import RunRecord
 from pushplan.evaluation.statistics import estimate
@@ -69,8 +68,7 @@ class Results(RunRecord):
         for row in self.rows:
             if row.failed:
                 continue
-            stem = file_stem(row.policy, row.scenario, row.seed)
-            episode = Episode.load(self.path / "episodes" / f"{stem}.npz")
+            episode = Episode.load(self.path / row.trace_file)
             for name, value in compute(episode, metrics).items():
                 values.setdefault((row.setting, row.policy, name), []).append(value)
         estimates = {key: estimate(found) for key, found in values.items()}

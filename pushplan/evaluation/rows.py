@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import enum
+import re
+import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
 from typing import Any
@@ -96,6 +98,20 @@ class ResultRow:
     def setting(self) -> str:
         """The scenario without its seed: what episodes are averaged over."""
         return setting_of(self.scenario, self.seed)
+
+    @property
+    def file_stem(self) -> str:
+        """Name, without ending, of the files that belong to the job."""
+        clean = re.sub(r"[^A-Za-z0-9_.+@=-]", "_", self.scenario)
+        if clean != self.scenario or len(clean) > 120:
+            clean = f"{clean[:110]}-{zlib.crc32(self.scenario.encode()):08x}"
+        ending = "" if re.search(rf"(^|[^0-9]){self.seed}$", clean) else f"--{self.seed}"
+        return f"{self.policy}--{clean}{ending}"
+
+    @property
+    def trace_file(self) -> str:
+        """Where the recorded episode is in a run directory."""
+        return f"episodes/{self.file_stem}.npz"
 
     @property
     def failed(self) -> bool:

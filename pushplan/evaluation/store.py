@@ -13,7 +13,6 @@ from types import TracebackType
 from typing import Any
 
 from pushplan.evaluation.csv_text import csv_text
-from pushplan.evaluation.jobs import file_stem
 from pushplan.evaluation.rows import ResultRow, Status, columns
 from pushplan.metrics import METRICS
 from pushplan.world import InvalidInputError, SchemaError
@@ -134,11 +133,10 @@ class RunDirectory:
 
     def add(self, row: ResultRow, trace: bytes | None = None, detail: str = "") -> None:
         """Store what became of one job, in one transaction."""
-        stem = file_stem(row.policy, row.scenario, row.seed)
         if trace is not None:
-            write_atomic(self.episodes / f"{stem}.npz", trace)
+            write_atomic(self.path / row.trace_file, trace)
         if detail:
-            write_atomic(self.failures / f"{stem}.txt", detail.encode(errors="replace"))
+            write_atomic(self.failures / f"{row.file_stem}.txt", detail.encode(errors="replace"))
         marks = ", ".join("?" * len(columns()))
         names = ", ".join(f'"{name}"' for name in columns())
         values = [getattr(row, name) for name in columns()]

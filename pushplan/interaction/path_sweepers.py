@@ -62,7 +62,9 @@ def path_sweeper(world: World, interaction: InteractionModel | None = None) -> P
         return sweep_objects
 
     def ask_model(path: FloatArray, poses: FloatArray, out: FloatArray, works: FloatArray) -> bool:
-        swept = model.sweep(world.moved(robot_pose=path[0], movable_poses=poses), path)
+        swept = model.sweep(
+            world.moved(robot_pose=path[0], robot_twist=(0, 0, 0), movable_poses=poses), path
+        )
         out[:] = swept.object_poses
         poses[:] = out[-1]
         add_works(out, masses, works)

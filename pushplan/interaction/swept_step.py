@@ -48,7 +48,9 @@ class SweepCall(types.WrapperAddressProtocol):
 
     def _sweep(self, _: int) -> int:
         try:
-            here = self._world.moved(robot_pose=self.path[0].copy(), movable_poses=self.poses)
+            here = self._world.moved(
+                robot_pose=self.path[0].copy(), robot_twist=(0, 0, 0), movable_poses=self.poses
+            )
             swept = self._model.sweep(here, self.path.copy())
         except Exception as error:
             self._error = self._error or error

@@ -73,11 +73,19 @@ class Network:
         """
         limits = self._runtime.RunOptions()
         limits.log_severity_level = 4
-        timer = _Timer(limits)
+        over = threading.Event()
+
+        def stop() -> None:
+            over.set()
+            limits.terminate = True
+
+        timer = threading.Timer(LONGEST_DECISION_S, stop)
+        timer.daemon = True
+        timer.start()
         try:
             result: NDArray[Any] = self._session.run(None, {self.input.name: batch}, limits)[0]
         except Exception as error:
-            if timer.over:
+            if over.is_set():
                 raise NotOnnxError(
                     f"the network takes more than {LONGEST_DECISION_S:g} s for a decision"
                 ) from None
@@ -93,24 +101,6 @@ class Network:
         except Exception as error:
             raise NotOnnxError(f"the network cannot be run: {_short(error)}") from error
         return result
-
-
-class _Timer:
-    """Ends a run that takes too long."""
-
-    def __init__(self, options: Any) -> None:
-        self.over = False
-        self._options = options
-        self._timer = threading.Timer(LONGEST_DECISION_S, self._stop)
-        self._timer.daemon = True
-        self._timer.start()
-
-    def _stop(self) -> None:
-        self.over = True
-        self._options.terminate = True
-
-    def cancel(self) -> None:
-        self._timer.cancel()
 
 
 @functools.lru_cache(maxsize=1)

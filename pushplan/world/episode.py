@@ -102,6 +102,7 @@ class Episode(ArrayRecord):
         """The scene at recorded instant ``index``."""
         return self.world.moved(
             robot_pose=self.robot_poses[index],
+            robot_twist=(0.0, 0.0, 0.0),  # not recorded
             movable_poses=self.object_poses[index],
             time=float(self.times[index]),
         )

@@ -38,14 +38,22 @@ class Planner(Protocol):
 
 @runtime_checkable
 class Controller(Protocol):
-    """Follows a plan."""
+    """Follows a plan, step by step."""
+
+    def reset(self, world: World) -> None:
+        """Forget the last episode; ``world`` is the start of the next one."""
+        ...
 
     def command(self, world: World, plan: Plan) -> Twist:
         """The velocity to drive now, within the robot's limits.
 
         Args:
-            world: the snapshot now; its time says how far the plan has run.
+            world: the snapshot now. One with the time of the last gets the same command again.
             plan: the plan to follow.
+
+        Raises:
+            InvalidInputError: if the time went back since the last call, or stands still although
+                things have moved.
         """
         ...
 

@@ -116,13 +116,23 @@ class World(ArrayRecord):
         self,
         *,
         robot_pose: ArrayLike | None = None,
+        robot_twist: ArrayLike | None = None,
         movable_poses: ArrayLike | None = None,
         time: float | None = None,
     ) -> World:
-        """The same scene with the robot or the objects elsewhere, and at rest."""
+        """The same scene with the robot or the objects elsewhere, or at another time.
+
+        Args:
+            robot_pose: (3,) x, y [m], theta [rad]; where it is if None.
+            robot_twist: (3,) velocity in the world frame [m/s, m/s, rad/s]; as it is if None.
+            movable_poses: (K, 3) of the objects, which are at rest there; where they are if None.
+            time: [s]; as it is if None.
+        """
         changes: dict[str, Any] = {}
         if robot_pose is not None:
-            changes.update(robot_pose=robot_pose, robot_twist=None)
+            changes["robot_pose"] = robot_pose
+        if robot_twist is not None:
+            changes["robot_twist"] = robot_twist
         if movable_poses is not None:
             changes["movables"] = self.movables.moved_to(movable_poses)
         if time is not None:

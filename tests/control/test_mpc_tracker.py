@@ -135,6 +135,7 @@ def test_the_same_tracker_can_serve_another_episode():
     plan = arc_plan(world, S_CURVE)
     used = MpcTracker()
     drive(world, plan, used, 0.8, 30)
+    used.reset(world)
     again, _ = drive(world, plan, used, 0.8, 30)
     fresh, _ = drive(world, plan, MpcTracker(), 0.8, 30)
     assert again.tobytes() == fresh.tobytes()

@@ -41,9 +41,10 @@ def driven(name, action, pose, static=ROOM):
     m = mode(name)
     world = World(m.robot, np.array(pose), static, Movables.empty(), GoalDisc((2.5, 2.5), 0.1))
     motion = m.start(m.read(action), world)
-    poses = [np.array(pose, dtype=float)]
-    while (wanted := motion(poses[-1], False)) is not None:
+    poses, time = [np.array(pose, dtype=float)], 0.0
+    while (wanted := motion(poses[-1], time, False)) is not None:
         poses.append(advanced(poses[-1], wanted[0], 0.15 * wanted[1]))
+        time += 0.15 * wanted[1]
     return np.array(poses)
 
 
@@ -55,9 +56,9 @@ def advanced(pose, twist, h):
 
 def command(m, values):
     motion = m.start(m.read(values), None)
-    twist, periods = motion(None, False)
+    twist, periods = motion(None, 0.0, False)
     assert periods == 1
-    assert motion(None, False) is None  # these modes last one control step
+    assert motion(None, 0.0, False) is None  # these modes last one control step
     return twist
 
 
@@ -137,7 +138,7 @@ def test_waypoint_that_cannot_be_reached_ends_where_the_robot_is_stopped():
     world = World(m.robot, np.zeros(3), ROOM, Movables.empty(), GoalDisc((2.5, 2.5), 0.1))
     motion = m.start(m.read([0.55, 0.0]), world)  # inside the column
     calls = 0
-    while motion(np.zeros(3), False) is not None:  # something holds the robot
+    while motion(np.zeros(3), 0.15 * calls, False) is not None:  # something holds the robot
         calls += 1
     assert calls < 10
 

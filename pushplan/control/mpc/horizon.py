@@ -7,24 +7,15 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from pushplan.control.limits import clamp_twist
 from pushplan.control.mpc.kernels import Track
 from pushplan.control.mpc.solver import QuadraticProgram
-from pushplan.world import Plan, RobotModel, Twist, World
+from pushplan.world import Plan, RobotModel
 from pushplan.world.checks import FloatArray, IntArray
 
 
 def track_of(plan: Plan) -> Track:
     """The path of a plan as the kernels read it."""
     return Track(plan.poses, plan.arc_lengths, plan.speeds)
-
-
-def driven_twist(world: World) -> Twist:
-    """The twist that the robot has, within its limits."""
-    assert world.robot_twist is not None
-    vx, vy, omega = (float(value) for value in world.robot_twist)
-    theta = float(world.robot_pose[2])
-    return clamp_twist(world.robot, vx * math.cos(theta) + vy * math.sin(theta), omega)
 
 
 def time_grid(count: int, span: float, held: float) -> FloatArray:

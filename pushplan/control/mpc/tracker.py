@@ -9,10 +9,10 @@ from itertools import pairwise
 
 import numpy as np
 
-from pushplan.control.limits import clamp_twist, ramp_twist
+from pushplan.control.episode_clock import EpisodeClock
+from pushplan.control.limits import clamp_twist, driven_twist, ramp_twist
 from pushplan.control.mpc.horizon import (
     RecedingHorizon,
-    driven_twist,
     shifted_index,
     time_grid,
     track_of,
@@ -56,9 +56,14 @@ class MpcTracker:
         self._solution: FloatArray | None = None
         self._solution_steps: FloatArray = self._steps
         self._sent: deque[tuple[float, Twist]] = deque()
-        self._last_time = math.inf
+        self._clock = EpisodeClock(self.config.period)
         self.fallbacks = 0
         """Calls since the start of the episode in which the solver gave no solution."""
+
+    def reset(self, world: World) -> None:
+        """See `pushplan.world.Controller`."""
+        self._clock.reset()
+        self._robot = None
 
     def command(self, world: World, plan: Plan) -> Twist:
         """See `pushplan.world.Controller`.
@@ -66,6 +71,11 @@ class MpcTracker:
         Past the end of the plan a differential drive stops; a constant-speed robot drives on
         along the last heading.
         """
+        if self._clock.advance(world):
+            self._clock.command = self._follow(world, plan)
+        return self._clock.command
+
+    def _follow(self, world: World, plan: Plan) -> Twist:
         self._prepare(world, plan)
         robot, track = world.robot, self._track
         pose = self._pose_at_effect(world)
@@ -91,21 +101,18 @@ class MpcTracker:
         return self._send(world, twist, solution)
 
     def _prepare(self, world: World, plan: Plan) -> None:
-        """Start afresh where the clock has been set back or the robot is another one."""
+        """Start afresh in a new episode, or where the robot is another one."""
         robot, config = world.robot, self.config
-        if world.time <= self._last_time or self._robot != robot:
+        if self._robot != robot:
             self._robot, self._plan = robot, None
             self._tuning = _tuning(robot, config)
             self._program = _program(robot, config)
             self._pursuit = PurePursuit()
-            self._held, self._missed, self.fallbacks = config.period, 0, 0
+            self._missed = self.fallbacks = 0
             self._sent = deque()
             self._last = driven_twist(world)
-        else:
-            self._held = world.time - self._last_time
-        self._last_time = world.time
         span = config.reach * robot.circumscribed_radius / robot.max_speed
-        self._steps = time_grid(config.horizon, span, self._held)
+        self._steps = time_grid(config.horizon, span, self._clock.held)
         if plan is not self._plan:
             self._plan, self._along = plan, 0.0
             self._track = track_of(plan)
@@ -116,7 +123,7 @@ class MpcTracker:
     def _shift(self) -> None:
         """Move the last solution on by the time that has passed since."""
         assert self._solution is not None
-        index = shifted_index(self._solution_steps, self._steps, self._held)
+        index = shifted_index(self._solution_steps, self._steps, self._clock.held)
         shifted = np.full((len(self._steps), 2), np.nan)
         known = index < len(self._solution_steps)
         shifted[known] = self._solution[index[known]]
@@ -168,7 +175,7 @@ class MpcTracker:
         return pose
 
     def _ramped(self, world: World, linear: float, angular: float) -> Twist:
-        return ramp_twist(world.robot, self._last, linear, angular, self._held)
+        return ramp_twist(world.robot, self._last, linear, angular, self._clock.held)
 
     def _fall_back(self, world: World, plan: Plan) -> Twist:
         """The last solution, moved on; pure pursuit where it has run out."""

@@ -70,22 +70,14 @@ class Materials:
 
 @dataclass(frozen=True, eq=False)
 class SimulatorState(ArrayRecord):
-    """Everything that decides what a simulator does next.
+    """Everything that decides what a simulator does next."""
 
-    Args:
-        time: [s].
-        robot_pose: (3,) x, y [m], theta [rad].
-        robot_twist: (3,) velocity in the world frame [m/s, m/s, rad/s].
-        object_poses: (K, 3).
-        object_twists: (K, 3).
-        hidden: what else the engine has to remember, in an order of its own.
-    """
-
-    time: float
-    robot_pose: FloatArray
-    robot_twist: FloatArray
-    object_poses: FloatArray
-    object_twists: FloatArray
+    time: float  # [s]
+    robot_pose: FloatArray  # (3,) x, y [m], theta [rad]
+    robot_twist: FloatArray  # (3,) velocity in the world frame [m/s, m/s, rad/s]
+    object_poses: FloatArray  # (K, 3)
+    object_twists: FloatArray  # (K, 3)
+    # what else the engine has to remember, in an order of its own
     hidden: FloatArray = field(default_factory=lambda: frozen(np.zeros(0)))
 
 

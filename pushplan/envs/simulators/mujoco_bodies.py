@@ -73,7 +73,8 @@ class MujocoBodies:
 
     def _find_layout(self) -> None:
         model, data = self.model, self.data
-        self._qpos, self._qvel = data.qpos, data.qvel
+        self.qpos: FloatArray = data.qpos  # all positions and velocities, the engine's own arrays
+        self.qvel: FloatArray = data.qvel
         self.ctrl, self._damping = data.ctrl, model.dof_damping
         self._asleep, self._touch = data.tree_asleep, data.sensordata
         # copied: compiled loops want arrays of one kind, and those of the model are read-only
@@ -93,8 +94,8 @@ class MujocoBodies:
         first = 3 if self.afloat else 9
         self._first_q, self._first_v = first, 3 if self.afloat else 8
         size_q, size_v = (3, 3) if self.afloat else (7, 6)
-        self._objects_q = self._qpos[first:].reshape(-1, size_q)
-        self._objects_v = self._qvel[self._first_v :].reshape(-1, size_v)
+        self._objects_q = self.qpos[first:].reshape(-1, size_q)
+        self._objects_v = self.qvel[self._first_v :].reshape(-1, size_v)
         self.hidden_size = model.nq + model.nv + model.ntree
 
     # ---------------------------------------------------------------- rows of planar states
@@ -151,12 +152,12 @@ class MujocoBodies:
 
     def poses(self) -> FloatArray:
         """(1 + K, 3) poses now."""
-        rows: FloatArray = self.planar(self._qpos[None])[0]
+        rows: FloatArray = self.planar(self.qpos[None])[0]
         return rows
 
     def robot_pose(self) -> FloatArray:
         """(3,) pose of the robot now."""
-        q = self._qpos
+        q = self.qpos
         if self.afloat:
             return np.array(q[:3])
         w, x, y, z = (float(value) for value in q[3:7])
@@ -166,28 +167,16 @@ class MujocoBodies:
     def twists(self) -> FloatArray:
         """(1 + K, 3) velocities now, world frame."""
         if self.afloat:
-            return np.array(self._qvel).reshape(-1, 3)
+            return np.array(self.qvel).reshape(-1, 3)
         rows = np.empty((1 + self.count, 6))
-        rows[0], rows[1:] = self._qvel[:6], self._qvel[8:].reshape(-1, 6)
+        rows[0], rows[1:] = self.qvel[:6], self.qvel[8:].reshape(-1, 6)
         return np.ascontiguousarray(rows[:, [0, 1, 5]])
-
-    @property
-    def qpos(self) -> FloatArray:
-        """All positions, the engine's own array."""
-        positions: FloatArray = self._qpos
-        return positions
-
-    @property
-    def qvel(self) -> FloatArray:
-        """All velocities, the engine's own array."""
-        velocities: FloatArray = self._qvel
-        return velocities
 
     # ---------------------------------------------------------------- state
 
     def hidden(self) -> FloatArray:
         """Positions, velocities and who sleeps, in one array."""
-        return np.concatenate([self._qpos, self._qvel, self._asleep])
+        return np.concatenate([self.qpos, self.qvel, self._asleep])
 
     def hidden_without(self, gone: IntArray) -> FloatArray:
         """What `hidden` would return without some of the objects, given by index."""
@@ -196,9 +185,9 @@ class MujocoBodies:
         asleep = np.full(len(kept), _AWAKE)  # who rests is found out anew
         return np.concatenate(
             [
-                self._qpos[: self._first_q],
+                self.qpos[: self._first_q],
                 positions.ravel(),
-                self._qvel[: self._first_v],
+                self.qvel[: self._first_v],
                 velocities.ravel(),
                 self._asleep[:1],
                 asleep,
@@ -259,8 +248,8 @@ class MujocoBodies:
         model, data = self.model, self.data
         mujoco.mj_resetData(model, data)
         data.time = time
-        self._qpos[:] = qpos
-        self._qvel[:] = qvel
+        self.qpos[:] = qpos
+        self.qvel[:] = qvel
         mujoco.mj_kinematics(model, data)
         mujoco.mj_comPos(model, data)
         mujoco.mj_crb(model, data)
@@ -286,7 +275,7 @@ class MujocoBodies:
             mujoco.mj_step(model, data, steps)
             return
         most = max(1, int(self._options.drag_interval / model.opt.timestep))
-        velocities, damping = self._qvel.reshape(-1, 3), self._damping.reshape(-1, 3)
+        velocities, damping = self.qvel.reshape(-1, 3), self._damping.reshape(-1, 3)
         while steps > 0:
             drag_damping(velocities, self._drag, damping)
             mujoco.mj_step(model, data, min(most, steps))
@@ -309,7 +298,7 @@ class MujocoBodies:
         Raises:
             DivergedError: then.
         """
-        if not np.abs(self._qvel).max() < _FASTEST:  # false for NaN, too
+        if not np.abs(self.qvel).max() < _FASTEST:  # false for NaN, too
             raise DivergedError(
                 "the MuJoCo simulation has diverged: bodies may overlap deeply at the start, or "
                 "the time step be too long for the masses and forces of this scene"

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
 
 import mujoco
 import numpy as np
@@ -145,11 +144,12 @@ class MujocoSimulator(Simulator):
     def follow(self, path: ArrayLike) -> Interaction:
         """Drive the robot through poses at its full speed."""
         poses = checked_path(path)
-        start = self.world().moved(robot_pose=poses[0])
+        twist = np.zeros(3)
         if self._scene.afloat and len(poses) > 1:  # a ship is long in getting under way
             along = poses[1, :2] - poses[0, :2]
-            speed = start.robot.max_speed / max(float(np.hypot(*along)), 1e-9)
-            start = replace(start, robot_twist=np.array([*(speed * along), 0.0]))
+            speed = self._world.robot.max_speed / max(float(np.hypot(*along)), 1e-9)
+            twist[:2] = speed * along
+        start = self.world().moved(robot_pose=poses[0], robot_twist=twist)
         self.build(start, self._materials)
         found, jammed = follow_path(self, self._world.robot, poses)
         return Interaction(found, self._world.movables.masses, jammed)

@@ -25,28 +25,19 @@ class Water(CheckedFields):
     rest exponentially, where a quadratic law alone would let it creep for ever.
 
     The robot is a hull whose low-speed model is linear: its speed decays with a time constant.
-
-    Args:
-        density: of the water [kg/m³].
-        object_draught: how deep an object reaches [m].
-        object_form_drag: C_d of an edge, on mean width times draught.
-        object_skin_drag: C_w of the underside, ``F = density C_w area v²``.
-        ambient_speed: u0 [m/s].
-        robot_draught: how deep the robot reaches [m].
-        robot_surge_time: time constant of the robot's speed when nothing drives it [s].
-        robot_yaw_time: of its turn rate [s].
     """
 
     field_prefix = "water "
 
-    density: PositiveFloat = 1025.0
-    object_draught: NonNegativeFloat = 1.05
-    object_form_drag: NonNegativeFloat = 1.1
-    object_skin_drag: NonNegativeFloat = 0.0055
-    ambient_speed: NonNegativeFloat = 0.05
-    robot_draught: NonNegativeFloat = 5.0
+    density: PositiveFloat = 1025.0  # of the water [kg/m³]
+    object_draught: NonNegativeFloat = 1.05  # how deep an object reaches [m]
+    object_form_drag: NonNegativeFloat = 1.1  # C_d of an edge, on mean width times draught
+    object_skin_drag: NonNegativeFloat = 0.0055  # C_w of the underside, ``F = density C_w area v²``
+    ambient_speed: NonNegativeFloat = 0.05  # u0 [m/s]
+    robot_draught: NonNegativeFloat = 5.0  # how deep the robot reaches [m]
+    # time constant of the robot's speed when nothing drives it [s]
     robot_surge_time: PositiveFloat = 88.0
-    robot_yaw_time: PositiveFloat = 11.6
+    robot_yaw_time: PositiveFloat = 11.6  # of its turn rate [s]
 
     def coefficients(self, world: World) -> FloatArray:
         """Drag of the robot, then of each object.

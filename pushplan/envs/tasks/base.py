@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -73,6 +74,8 @@ class Task(ABC):
     robot: RobotModel
     reach: float
     """No coordinate and no distance that is observed exceeds this [m]."""
+    slowness: float
+    """How much longer an episode may take than the preset allows, for a slower robot."""
     heading_step: float = 0.0
     """How far a heading action drives [m], where the task has it."""
     waypoint_window: float = 0.0
@@ -102,6 +105,20 @@ class Task(ABC):
     def _prepare(self) -> None:
         """Set what is the same in every start: the robot, the materials, the times, the goal."""
         raise NotImplementedError(f"task {self.name!r} has neither __init__ nor _prepare")
+
+    def _drive(self, robot: RobotModel) -> None:
+        """Set robot, control step and slowness, from the preset and what departs from it."""
+        preset, wanted = self.preset, self.variations
+        self.robot = wanted.limit(robot)
+        self.control_step = wanted.control_step or preset.control_step
+        speed, turn = robot.max_speed, robot.max_turn_rate
+        self.slowness = max(1.0, speed / self.robot.max_speed, turn / self.robot.max_turn_rate)
+
+    @property
+    def _max_steps(self) -> int:
+        """Control steps that last as long as those of the preset, or longer for a slower robot."""
+        seconds: float = self.preset.max_steps * self.preset.control_step * self.slowness
+        return math.ceil(seconds / self.control_step - 1e-9)
 
     @abstractmethod
     def start(self, rng: np.random.Generator) -> World:

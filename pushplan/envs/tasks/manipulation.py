@@ -109,12 +109,13 @@ class ManipulationTask(Task):
 
     def _prepare(self) -> None:
         dimensions, wanted = self.preset, self.variations
-        self.robot = self._make_robot()
+        robot = self._make_robot()
+        self._drive(robot)
         self.materials = self._make_materials()
-        self.control_step = dimensions.control_step
         self.heading_step = dimensions.heading_step
         self.waypoint_window = dimensions.windows[wanted.layout]
-        self.idle_time = self.idle_limits["heading"] * self.heading_step / self.robot.max_speed
+        step_time = self.slowness * self.heading_step / robot.max_speed
+        self.idle_time = self.idle_limits["heading"] * step_time
         self.box_size = wanted.box_size or dimensions.box_size
         least = LEAST_SIZE * dimensions.box_size
         if self.box_size < least:

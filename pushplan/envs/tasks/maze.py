@@ -43,7 +43,7 @@ _IMAGE_CHANNELS = ("footprint", "movable", "static", "goal_distance")
 _START_TRIES = 2000
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class MazeVariations(TaskVariations):
     """What may depart from a preset; None leaves the preset's value."""
 
@@ -84,10 +84,10 @@ class MazeTask(Task):
 
     def _prepare(self) -> None:
         try:
-            self.robot = self.preset.robot(drive_of(self.action), self.variations.bumper)
+            robot = self.preset.robot(drive_of(self.action), self.variations.bumper)
         except InvalidInputError as error:
             raise ScenarioError(f"maze, preset {self.preset_name!r}: {error}") from error
-        self.control_step = self.preset.control_step
+        self._drive(robot)
         friction = self.variations.bumper_friction
         self.materials = (
             self.preset.materials
@@ -199,7 +199,7 @@ class MazeTask(Task):
             return StepOutcome(reward + WALL_REWARD, False, "wall", True, False)
         if self.goal.distance(x1, y1) == 0.0:
             return StepOutcome(reward + SUCCESS_REWARD, True, "goal", True, False)
-        late = self._steps >= self.preset.max_steps
+        late = self._steps >= self._max_steps
         return StepOutcome(reward, False, "time_limit" if late else "", False, late)
 
     def observation(self, name: str) -> ObservationBuilder:

@@ -39,7 +39,7 @@ _START_TRIES = 500
 _UP = 0.5 * math.pi
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class ShipIceVariations(TaskVariations):
     """What may depart from a preset; None leaves the preset's value."""
 
@@ -85,8 +85,7 @@ class ShipIceTask(Task):
     variation_class = ShipIceVariations
 
     def _prepare(self) -> None:
-        self.robot = self.preset.robot()
-        self.control_step = self.preset.control_step
+        self._drive(self.preset.robot())
         self.materials = self.preset.materials
         bounds = self.preset.bounds
         self.static = StaticMap.build(bounds=bounds)
@@ -199,7 +198,7 @@ class ShipIceTask(Task):
             return StepOutcome(reward + OUTSIDE_REWARD, False, "left_channel", True, False)
         if self.goal.distance(x, y) == 0.0:
             return StepOutcome(reward + SUCCESS_REWARD, True, "goal", True, False)
-        late = self._steps >= self.preset.max_steps
+        late = self._steps >= self._max_steps
         return StepOutcome(reward, False, "time_limit" if late else "", False, late)
 
     def observation(self, name: str) -> ObservationBuilder:

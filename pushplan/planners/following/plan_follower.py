@@ -10,7 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from pushplan.control import PathFollower, clamp_twist
+from pushplan.control import EpisodeClock, PathFollower, clamp_twist
+from pushplan.control.limits import driven_twist, ramp_twist
 from pushplan.control.tracking import Progress
 from pushplan.interaction import InteractionModel, QuasiStatic
 from pushplan.planners.following.recovery import recovery_twist
@@ -35,6 +36,7 @@ from pushplan.world import (
 from pushplan.world.checks import number
 from pushplan.world.polyline import path_lengths
 
+_PERIOD = 0.1  # for which the first command is taken to be held [s]
 _REMEMBERED = 5  # planning calls whose times say how long the next one will take
 
 
@@ -92,6 +94,8 @@ class PlanFollower:
     def reset(self, world: World, rng: np.random.Generator) -> None:
         """Forget the last episode; planning takes no time until `simulate_latency` is called."""
         self._forget(rng)
+        self.controller.reset(world)
+        self._clock.command = driven_twist(world)
         self._progress = Progress(window=2.0 * world.robot.circumscribed_radius)
 
     def simulate_latency(
@@ -103,7 +107,7 @@ class PlanFollower:
             factor: seconds of the world's clock for one of ``clock``.
             clock: returns seconds.
         """
-        self._factor, self._clock = number("factor", factor, low=0.0), clock
+        self._factor, self._stopwatch = number("factor", factor, low=0.0), clock
 
     def _forget(self, rng: np.random.Generator) -> None:
         self.plan_log: list[PlanResult] = []
@@ -111,7 +115,9 @@ class PlanFollower:
         self.current_plan: Plan | None = None
         self.background_s = 0.0
         """How much of the last call of `act` a robot would do beside driving [s]."""
-        self._factor, self._clock = 0.0, time.perf_counter
+        self._factor, self._stopwatch = 0.0, time.perf_counter
+        self._clock = EpisodeClock(_PERIOD)
+        self._recovering = False
         self._took: deque[float] = deque(maxlen=_REMEMBERED)
         self._pending: _PendingPlan | None = None
         self._rng = rng
@@ -126,6 +132,13 @@ class PlanFollower:
         if self._progress is None:
             self.reset(world, self._rng)
         self.background_s = 0.0
+        if self._clock.advance(world):
+            wanted = self._act(world)
+            last, held = self._clock.command, self._clock.held
+            self._clock.command = ramp_twist(world.robot, last, wanted.linear, wanted.angular, held)
+        return self._clock.command
+
+    def _act(self, world: World) -> Twist:
         self._receive(world)
         if self._pending is None:
             reason = self._needs_plan(world)
@@ -137,9 +150,13 @@ class PlanFollower:
         if self.current_plan is None or self._no_progress > 3:
             away = recovery_twist(world)
             if away is not None:
+                self._recovering = True
                 return away
         if self.current_plan is None:
             return clamp_twist(world.robot, 0.0, 0.0)
+        if self._recovering:  # from what the robot does now, not from the controller's last command
+            self._recovering = False
+            self.controller.reset(world)
         return self.controller.command(world, self.current_plan)
 
     def _ask(self, world: World, reason: Reason) -> None:
@@ -148,9 +165,9 @@ class PlanFollower:
         start, stretch = world_ahead(
             world, self.current_plan, self._progress.along, self._latency(), self.interaction
         )
-        began = self._clock()
+        began = self._stopwatch()
         result = self.planner.plan(start, stop=self.stop, rng=self._rng)
-        took = self._clock() - began
+        took = self._stopwatch() - began
         self.plan_log.append(result)
         if self._factor > 0.0:
             self.background_s = took

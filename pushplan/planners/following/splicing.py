@@ -48,10 +48,10 @@ def world_ahead(
     speed, turn = twists[-1]
     theta = float(poses[-1, 2])
     ahead = world.moved(
-        robot_pose=poses[-1], movable_poses=swept.object_poses[-1], time=world.time + latency
-    )
-    ahead = replace(
-        ahead, robot_twist=np.array([speed * math.cos(theta), speed * math.sin(theta), turn])
+        robot_pose=poses[-1],
+        robot_twist=[speed * math.cos(theta), speed * math.sin(theta), turn],
+        movable_poses=swept.object_poses[-1],
+        time=world.time + latency,
     )
     return ahead, Plan(
         times=times,

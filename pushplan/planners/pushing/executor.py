@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, fields
 
 import numpy as np
 
-from pushplan.control import clamp_twist
+from pushplan.control import EpisodeClock, LegFollower, Legs, ProgressChecker, Retreat, clamp_twist
 from pushplan.planners.pushing import contact_kernels
 from pushplan.planners.pushing.approach import find_approach
 from pushplan.planners.pushing.clearance import Clearance
@@ -16,19 +16,19 @@ from pushplan.planners.pushing.mpc import PushingMpc
 from pushplan.planners.pushing.observers import PoseObserver
 from pushplan.planners.pushing.path import PushPath
 from pushplan.planners.pushing.pushing_config import PushingConfig
-from pushplan.planners.pushing.waypoint_follower import WaypointFollower
 from pushplan.world import Drive, InvalidInputError, Plan, StaticMap, Twist, World
 from pushplan.world.checks import FloatArray, expect, integer, number
 
 _NOWHERE = contact_kernels.Contact(0.1, 0.1, 0.0, 0.1, -0.1, 0.1, 0.1, 0.0)
 """A box for a robot that pushes none."""
 _GAP = 1e9
-_ESCAPES = ((-1.0, 0.0), (-0.5, 1.0), (-0.5, -1.0), (0.0, 1.0), (0.0, -1.0), (0.5, 0.0))
-"""Speed and turn rate, as fractions of the greatest, that are tried in turn to get away."""
 _MOVED, _TWISTED = 0.2, 0.35
 """A box that was moved by more while the robot drove up to it [R, rad] is approached anew."""
 _DETOURS = 4
-_TURNED = 0.7  # A turn after which it has got away [rad]
+_END = 1e-3  # length of a path that is not worth another push [circumscribed radii]
+_PROGRESS = 0.02  # by which a push has to get on within its patience [circumscribed radii]
+_LOOK = 0.2
+"""Time for which an approach must stay clear of static things, at least [s]."""
 
 
 class PushPhase(enum.Enum):
@@ -145,21 +145,27 @@ class PushExecutor:
         """The controller of the push, with its estimate of the box on the bumper."""
         self._task: PushTask | None = None
         self._phase, self._reason = PushPhase.APPROACH, ""
-        self._time = -math.inf
+        self._clock = EpisodeClock(self.config.mpc.period)
         self._observer = PoseObserver(self.config.mpc.observer_gain, self.config.mpc.delay)
         self._forget()
 
+    def reset(self, world: World) -> None:
+        """Forget the last episode; ``world`` is the start of the next one."""
+        self._task = None
+        self._clock.reset()
+        self._observer = PoseObserver(self.config.mpc.observer_gain, self.config.mpc.delay)
+        self.mpc.reset(world)
+
     def _forget(self) -> None:
         self._attempts, self._left, self._left_then = 0, math.inf, math.inf
-        self._driver: WaypointFollower | None = None
+        self._driver: LegFollower | None = None
         self._stopped = False
         self._detours = self._failed_ways = 0
         self._box_then: FloatArray = np.zeros(3)
         self._plan: Plan | None = None
         self._static: StaticMap | None = None
-        self._retreat_from: FloatArray = np.zeros(3)
-        self._escapes: list[tuple[float, float]] = []
-        self._rest: tuple[FloatArray, float] = (np.zeros(3), -math.inf)
+        self._retreat: Retreat | None = None
+        self._progress: ProgressChecker | None = None
 
     @property
     def status(self) -> PushStatus:
@@ -180,16 +186,15 @@ class PushExecutor:
         expect("task", task, PushTask)
         if expect("world", world, World).robot.drive is not Drive.DIFFERENTIAL:
             raise InvalidInputError("pushing along a path needs a differential drive")
-        if task is not self._task or world.time <= self._time:
-            if world.time <= self._time:
-                self._observer = PoseObserver(self.config.mpc.observer_gain, self.config.mpc.delay)
+        if self._clock.advance(world):
+            self._clock.command = self._execute(world, task)
+        return self._clock.command
+
+    def _execute(self, world: World, task: PushTask) -> Twist:
+        if task is not self._task:
             self._forget()
             self._task = task
             self._phase, self._reason = PushPhase.APPROACH, ""
-        self._held = world.time - self._time
-        if not 0.0 < self._held < 5.0:
-            self._held = self.config.mpc.period
-        self._time = world.time
         size = world.robot.circumscribed_radius
         pose = self._observer.observe(world.robot_pose, world.time, size)
         k = np.flatnonzero(world.movables.ids == task.box_id)
@@ -221,20 +226,20 @@ class PushExecutor:
         """Drive behind the box."""
         if self._driver is None:
             self._driver = self._set_out(world, task, k)
-            self._rest = (pose, world.time)
         elif self._was_moved(world, k) and self._detours < _DETOURS:
             self._detours += 1
             self._attempts -= 1
             self._driver = self._set_out(world, task, k)
         if self._driver is None:
             return None
-        command = self._driver.command(pose, world.time, self._held, self._stopped)
+        command = self._driver.command(pose, world.time, self._clock.held, stopped=self._stopped)
         self._stopped = False
         if command is None:
             arrived = self._driver.arrived
             self._driver, self._detours = None, 0
             self.mpc.forget()
-            self._rest = (pose, world.time)
+            least = _PROGRESS * world.robot.circumscribed_radius
+            self._progress = ProgressChecker(least, self.config.patience)
             if arrived:
                 self._phase = PushPhase.PUSH
             else:
@@ -245,7 +250,7 @@ class PushExecutor:
         self._stopped = fraction < 0.05
         return clamp_twist(world.robot, fraction * command.linear, fraction * command.angular)
 
-    def _set_out(self, world: World, task: PushTask, k: int) -> WaypointFollower | None:
+    def _set_out(self, world: World, task: PushTask, k: int) -> LegFollower | None:
         """The path behind the box; None if there is nothing to do, or no path."""
         robot, config = world.robot, self.config
         size = robot.circumscribed_radius
@@ -265,13 +270,12 @@ class PushExecutor:
             return None
         self._box_then = world.movables.poses[k]
         noisy = config.mpc.observer_gain < 1.0
-        return WaypointFollower(
+        return LegFollower(
             robot,
-            found.points,
-            float(found.pose[2]),
+            Legs.ahead(found.points, float(found.pose[2])),
             near=(0.06 if noisy else 0.02) * size,
             aligned=math.radians(5.0 if noisy else 2.0),
-            patience=2.0 * config.patience,
+            escapes=2,
         )
 
     def _was_moved(self, world: World, k: int) -> bool:
@@ -291,7 +295,7 @@ class PushExecutor:
             return twist
         size = world.robot.circumscribed_radius
         self._left = max(self._plan.length - mpc.along, 0.0)
-        if self._left <= max(task.tolerance, 1e-9):
+        if self._left <= max(task.tolerance, _END * size):
             self._end(PushPhase.DONE, "end")
             return None
         if self._left < self._left_then - config.progress * size:
@@ -305,7 +309,8 @@ class PushExecutor:
         if abs(mpc.lateral) > config.astray * size:
             self._give_up(world, "astray", pose)
             return None
-        if self._is_stuck(world, pose):
+        assert self._progress is not None
+        if not self._progress.update(self._left, world.time):
             self._give_up(world, "blocked" if mpc.slowed < 0.5 else "stuck", pose)
             return None
         return twist
@@ -313,26 +318,22 @@ class PushExecutor:
     def _give_up(self, world: World, reason: str, pose: FloatArray) -> None:
         """Back off before the next attempt."""
         self._phase, self._reason = PushPhase.RECOVER, reason
-        self._retreat_from = pose.copy()
-        self._escapes = list(_ESCAPES)
-        self._rest = (pose, world.time)
+        far = self.config.retreat * world.robot.circumscribed_radius
+        self._retreat = Retreat(world.robot, pose, far)
 
     def _recover(self, world: World, task: PushTask, k: int, pose: FloatArray) -> Twist | None:
         """Drive straight back, or away however there is room."""
-        robot = world.robot
-        away = math.hypot(*(pose[:2] - self._retreat_from[:2]).tolist())
-        turned = abs(float(pose[2] - self._retreat_from[2]))
-        if away >= self.config.retreat * robot.circumscribed_radius or turned > _TURNED:
-            self._escapes = []
-        while self._escapes:
-            speed, turn = self._escapes[0]
-            command = clamp_twist(robot, speed * robot.max_speed, turn * robot.max_turn_rate)
+        assert self._retreat is not None
+        held, stopped = self._clock.held, False
+        while (
+            command := self._retreat.command(pose, world.time, held, stopped=stopped)
+        ) is not None:
             fraction = self._free(world, pose, command)
-            stuck = self._is_stuck(world, pose)
-            if fraction >= 0.25 and not stuck and (command.linear or command.angular):
-                return clamp_twist(robot, fraction * command.linear, fraction * command.angular)
-            self._escapes = self._escapes[1:]
-            self._rest = (pose, world.time)
+            if fraction >= 0.25:
+                return clamp_twist(
+                    world.robot, fraction * command.linear, fraction * command.angular
+                )
+            stopped = True
         self._phase, self._driver = PushPhase.APPROACH, None
         return None
 
@@ -341,7 +342,7 @@ class PushExecutor:
         path = task.path
         box = world.movables.poses[k, :2]
         along, away = path.nearest(box)
-        if along >= path.length - max(task.tolerance, 1e-6):
+        if along >= path.length - max(task.tolerance, _END * world.robot.circumscribed_radius):
             return None
         size = world.robot.circumscribed_radius
         joint = path.length
@@ -367,16 +368,5 @@ class PushExecutor:
             least = self.config.mpc.clearance * robot.circumscribed_radius
             self._clearance = Clearance(robot, world.static, least)
         state = np.array([*pose, 0.0, 0.0, _GAP])
-        look = 2.0 * self._held
+        look = max(2.0 * self._clock.held, _LOOK)
         return self._clearance.free_fraction(_NOWHERE, state, command.linear, command.angular, look)
-
-    def _is_stuck(self, world: World, pose: FloatArray) -> bool:
-        """Whether the robot has hardly moved for long."""
-        then = self._rest[0]
-        size = world.robot.circumscribed_radius
-        moved = math.hypot(*(pose[:2] - then[:2]).tolist()) / size
-        if max(moved, abs(float(pose[2] - then[2]))) > 0.03 + 0.1 * (
-            self.config.mpc.observer_gain < 1.0
-        ):
-            self._rest = (pose, world.time)
-        return world.time - self._rest[1] >= self.config.patience

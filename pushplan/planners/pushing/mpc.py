@@ -7,10 +7,10 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from pushplan.control.limits import ramp_twist
+from pushplan.control.episode_clock import EpisodeClock
+from pushplan.control.limits import driven_twist, ramp_twist
 from pushplan.control.mpc.horizon import (
     RecedingHorizon,
-    driven_twist,
     shifted_index,
     time_grid,
     track_of,
@@ -30,7 +30,9 @@ from pushplan.world.checks import FloatArray, expect
 
 _BACK, _WINDOW = 0.5, 2.0
 """How far the box's place may move back or ahead from one call to the next [L]."""
-_LEAST = 0.4  # least speed of a push that has not ended, as a fraction of the greatest
+_LEAST = 0.4
+"""Least speed of a push that has not ended, as a fraction of the greatest, or of that at which the
+robot can turn within the distance to the box."""
 _LOOK = 4.0
 """Periods for which a command must stay clear of static things, or it is driven more slowly."""
 _BESIDE, _AHEAD = 1.5, 2.0
@@ -62,7 +64,7 @@ class PushingMpc:
         expect("config", self.config, PushingConfig)
         self._robot: RobotModel | None = None
         self._plan: Plan | None = None
-        self._last_time = -math.inf
+        self._clock = EpisodeClock(self.config.period)
         self._last = Twist(0.0, 0.0)
         self._missed = 0
         self._nominal: FloatArray | None = None
@@ -81,12 +83,23 @@ class PushingMpc:
         self.value = math.nan
         """Cost of the nominal commands of the last call, see `PushingConfig`."""
 
+    def reset(self, world: World) -> None:
+        """See `pushplan.world.Controller`."""
+        self._clock.reset()
+        self._robot = None
+
     def command(self, world: World, plan: Plan) -> Twist:
         """See `pushplan.world.Controller`; stops at the end of the path, or if the box has gone.
 
         Raises:
             InvalidInputError: if the plan names no box, or the robot cannot stop.
         """
+        expect("plan", plan, Plan)
+        if self._clock.advance(expect("world", world, World)):
+            self._clock.command = self._follow(world, plan)
+        return self._clock.command
+
+    def _follow(self, world: World, plan: Plan) -> Twist:
         k = self._prepare(world, plan)
         if k is None:
             self._row = None
@@ -118,21 +131,18 @@ class PushingMpc:
         self._plan = None
 
     def _prepare(self, world: World, plan: Plan) -> int | None:
-        """Start afresh where the clock, the robot or the plan has changed; index of the box."""
-        robot, config = expect("world", world, World).robot, self.config
-        expect("plan", plan, Plan)
+        """Start afresh where the episode, the robot or the plan has changed; index of the box."""
+        robot, config = world.robot, self.config
         if robot.drive is not Drive.DIFFERENTIAL:
             raise InvalidInputError("pushing along a path needs a differential drive")
         if not plan.subtasks or not plan.subtasks[0].object_ids:
             raise InvalidInputError(
                 "the plan must name the box in its first sub-task, as PushPath.plan does"
             )
-        afresh = world.time <= self._last_time
-        if afresh:
+        if self._robot != robot:
             self._observer = PushObserver(config.observer_gain, config.delay)
-        if afresh or self._robot != robot:
             self._robot, self._plan = robot, None
-            self._held, self.fallbacks = config.period, 0
+            self.fallbacks = 0
             self._program = RecedingHorizon(
                 robot,
                 (0, 1),
@@ -141,9 +151,6 @@ class PushingMpc:
                 iterations=config.solver_iterations,
             )
             self._last = driven_twist(world)
-        else:
-            self._held = world.time - self._last_time
-        self._last_time = world.time
         self.slowed = 1.0
         k = np.flatnonzero(world.movables.ids == plan.subtasks[0].object_ids[0])
         if len(k) == 0:
@@ -236,7 +243,7 @@ class PushingMpc:
         """(N,) how long each step is [s]."""
         assert self.model is not None
         span = self.config.reach * self.model.reach / robot.max_speed
-        return time_grid(self.config.horizon, span, self._held)
+        return time_grid(self.config.horizon, span, self._clock.held)
 
     def _problem(self, start: FloatArray, steps: FloatArray) -> PushingProblem:
         assert self.model is not None
@@ -254,12 +261,14 @@ class PushingMpc:
 
     def _bounds(self, robot: RobotModel, steps: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Bounds of the commands and of their changes, in the units of the problem."""
+        assert self.model is not None
         spans = np.full(self.config.moves, float(steps.min()))
         spans[0] = steps[0]
         low, high = self._program.bounds(spans, (self._last.linear, self._last.angular))
         # a push goes forwards; where the robot cannot be that fast yet it gets there as it can
         reach = robot.max_acceleration / robot.max_speed * float(steps[0])
-        low[: self.config.moves] = min(_LEAST, self._last.linear / robot.max_speed + reach)
+        least = _LEAST * min(1.0, robot.max_turn_rate * self.model.reach / robot.max_speed)
+        low[: self.config.moves] = min(least, self._last.linear / robot.max_speed + reach)
         return low, high
 
     def _shifted(self, steps: FloatArray) -> FloatArray | None:
@@ -267,7 +276,7 @@ class PushingMpc:
         if self._nominal is None:
             return None
         first = np.searchsorted(self._groups, np.arange(self.config.moves))
-        at = shifted_index(self._solution_steps, steps, self._held)[first]
+        at = shifted_index(self._solution_steps, steps, self._clock.held)[first]
         at = np.minimum(at, len(self._solution_steps) - 1)
         return np.ascontiguousarray(self._nominal[self._groups[at]])
 
@@ -282,7 +291,7 @@ class PushingMpc:
                 robot, world.static, least, self.model.outline, self._guard_face
             )
         brake = 2.0 * abs(v) / robot.max_acceleration
-        look = max(_LOOK * self._held, brake)
+        look = max(_LOOK * self._clock.held, brake)
         contact, speed = self.model.contact, max(abs(v), abs(w) * self.model.reach)
         self.slowed = self._clearance.free_fraction(contact, start, v, w, look)
         for turn in _ASIDE if self.slowed < _BLOCKED else ():
@@ -296,11 +305,11 @@ class PushingMpc:
 
     def _send(self, world: World, v: float, w: float) -> Twist:
         """Within the accelerations, and remembered."""
-        twist = ramp_twist(world.robot, self._last, v, w, self._held)
+        twist = ramp_twist(world.robot, self._last, v, w, self._clock.held)
         self.note(world.time, twist)
         return twist
 
     def note(self, time: float, twist: Twist) -> None:
         """Remember a command that was sent at a time [s], by whomever."""
-        self._last, self._last_time = twist, time
+        self._last = twist
         self._observer.send(time, twist)

@@ -14,6 +14,8 @@ from pushplan.world import InvalidInputError, Plan, RobotModel, SubTask
 from pushplan.world.checks import ArrayRecord, FloatArray, array, expect, integer, number
 from pushplan.world.polyline import arc_lengths, step_lengths
 
+_TURN_FRACTION = 0.8
+"""Fraction of the greatest turn rate that a plan uses."""
 _PIECES = 24  # least number of poses along a path of one piece
 _GREATEST_TURN = 0.05  # greatest turn between two poses [rad]
 
@@ -137,7 +139,8 @@ class PushPath(ArrayRecord):
     def plan(self, robot: RobotModel, box_id: int, speed: float | None = None) -> Plan:
         """The path as a `pushplan.world.Plan` for `PushingMpc`.
 
-        Its poses are those of the box, and its one sub-task names the box.
+        Its poses are those of the box, and its one sub-task names the box. It is slower where the
+        path turns faster than the robot can, with something left over for the controller.
 
         Args:
             robot: gives the speed limit.
@@ -153,12 +156,14 @@ class PushPath(ArrayRecord):
         lengths = self.lengths
         turns = np.array([math.remainder(t, math.tau) for t in np.diff(self.poses[:, 2]).tolist()])
         steps = np.maximum(np.diff(lengths), 1e-9)
-        rates = np.clip(speed_limit * turns / steps, -robot.max_turn_rate, robot.max_turn_rate)
+        curvatures = turns / steps
+        fastest = _TURN_FRACTION * robot.max_turn_rate / np.maximum(np.abs(curvatures), 1e-9)
+        speeds = np.minimum(speed_limit, fastest)
         return Plan(
-            times=lengths / speed_limit,
+            times=np.concatenate([[0.0], np.cumsum(steps / speeds)]),
             poses=self.poses,
-            speeds=np.full(count, speed_limit),
-            turn_rates=np.concatenate([rates, [0.0]]),
+            speeds=np.append(speeds, speeds[-1]),
+            turn_rates=np.append(speeds * curvatures, 0.0),
             travel_cost=robot.mass * float(lengths[-1]),
             subtasks=(SubTask((integer("box_id", box_id),), 0, count - 1),),
         )

@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from pushplan.control import DriveTo, clamp_twist
+from pushplan.control import EpisodeClock, LegFollower, Legs, Retreat, StallChecker
+from pushplan.control.limits import arc_twist
 from pushplan.planners.arguments import check_pusher
 from pushplan.planners.rearrangement.line_up import (
     LineUp,
@@ -18,13 +19,12 @@ from pushplan.planners.rearrangement.line_up import (
     line_up,
     unit,
 )
+from pushplan.planners.rearrangement.pose_follower import PoseFollower
+from pushplan.planners.rearrangement.recovery import recovery_path
 from pushplan.world import Twist, World
 from pushplan.world.checks import FloatArray, expect, number
 
-_RETREATS = ((-1.0, 0.0), (-0.5, 1.0), (-0.5, -1.0), (1.0, 0.0), (0.5, 1.0), (0.5, -1.0))
-"""Speed and turn rate, as fractions of the greatest, that are tried in turn to get away."""
 _OPTIONS = 8  # how many directions to push a box are tried before the first comes again
-_MOVED = 0.03  # less than this is no motion [circumscribed radii]
 _ASTRAY = 0.8  # difference between heading and push at which the robot lines up anew [rad]
 
 
@@ -33,7 +33,8 @@ class GreedyConfig:
     """Settings of `GreedyPusher`. Lengths are in units of the robot's circumscribed radius.
 
     Args:
-        period: time for which a command is held [s].
+        response: time in which an error of heading or place is driven off [s]; longer than the
+            robot's delay.
         slack: clearance between bumper and box when the robot lines up.
         retreat: how far it backs off after a push.
         detour: how far it pushes in a direction other than that of the shortest path.
@@ -42,7 +43,7 @@ class GreedyConfig:
         patience: time without moving after which it gives up [s].
     """
 
-    period: float = 0.2
+    response: float = 0.2
     slack: float = 0.08
     retreat: float = 0.6
     detour: float = 1.5
@@ -60,7 +61,7 @@ class _Attempt:
 
     box: int
     push: LineUp
-    driver: DriveTo
+    driver: LegFollower
     heading: float
     begun_at: FloatArray | None = None
 
@@ -81,26 +82,25 @@ class GreedyPusher:
 
     def __init__(self, config: GreedyConfig | None = None) -> None:
         self.config = expect("config", config or GreedyConfig(), GreedyConfig)
-        self._forget(0.0)
+        self._forget()
 
-    def _forget(self, time: float) -> None:
+    def _forget(self) -> None:
         self._attempt: _Attempt | None = None
         self._failures: dict[int, int] = {}
-        self._retreats: list[tuple[float, float]] = []
-        self._retreat_pose: FloatArray = np.zeros(3)
-        self._attempt_pose: FloatArray = np.zeros(3)
+        self._away: Retreat | PoseFollower | None = None
+        self._stall: StallChecker | None = None
         self._wait_until = -math.inf
-        self._last_time = math.inf
-        self._note(np.zeros(3), time)
+        self._clock = EpisodeClock(self.config.response)
 
     def reset(self, world: World, rng: np.random.Generator) -> None:
         """Forget the last episode."""
-        self._forget(world.time)
+        self._forget()
 
     def warm_up(self) -> None:
         """Load the kernels that an episode may need."""
         from pushplan.planners.rearrangement import kernel_warmup
 
+        kernel_warmup.warm_up_recovery()
         kernel_warmup.drive_in_small_worlds(GreedyPusher)
 
     def act(self, world: World, observation: Any = None) -> Twist:
@@ -110,9 +110,11 @@ class GreedyPusher:
             InvalidInputError: if the goal is one for the robot, or the robot cannot stop.
         """
         check_pusher(world, "the greedy pusher")
-        if world.time <= self._last_time:
-            self._forget(world.time)
-        self._last_time = world.time
+        if self._clock.advance(world):
+            self._clock.command = self._act(world)
+        return self._clock.command
+
+    def _act(self, world: World) -> Twist:
         if self._attempt is not None and self._is_over(world, self._attempt):
             self._attempt = None
             self._back_off(world)
@@ -123,19 +125,21 @@ class GreedyPusher:
         """The next command of the attempt in hand or of a new one; None where it has ended."""
         if self._attempt is None and world.time >= self._wait_until:
             self._attempt = self._choose(world)
-            self._note(world.robot_pose, world.time)
             self._wait_until = world.time + (self.config.patience if self._attempt is None else 0.0)
         attempt = self._attempt
         if attempt is None:
             return None
         if attempt.begun_at is None:
-            command = attempt.driver.command(world.robot_pose)
+            command = attempt.driver.command(world.robot_pose, world.time, self._clock.held)
             if command is not None:
                 return command
             if attempt.driver.arrived:
                 attempt.begun_at = world.robot_pose
-        sound = attempt.begun_at is not None and not self._is_stuck(world, self.config.patience)
+                self._stall = StallChecker(world.robot, self.config.patience)
+        sound = attempt.begun_at is not None and not self._is_stuck(world)
         command = self._push(world, attempt) if sound else None
+        if command is not None and self._stall is not None:
+            self._stall.send(command)
         if command is None:
             if not sound:  # it is the box's fault, which comes last from now on
                 self._failures[attempt.box] = self._failures.get(attempt.box, 0) + 1
@@ -157,7 +161,8 @@ class GreedyPusher:
         for k in sorted(left, key=lambda k: (self._failures.get(ids[k], 0), away[k], k)):
             push = line_up(world, k, slack, skip=self._failures.get(ids[k], 0) % _OPTIONS)
             if push is not None:
-                driver = DriveTo(world.robot, push.points, self.config.period)
+                legs = Legs.ahead(push.points)
+                driver = LegFollower(world.robot, legs, response=self.config.response)
                 return _Attempt(ids[k], push, driver, push.heading)
             self._failures[ids[k]] = self._failures.get(ids[k], 0) + 1
         return None
@@ -180,45 +185,30 @@ class GreedyPusher:
         if lost or abs(error) > _ASTRAY or not 0.0 < float(gap @ u) < reach:
             return None
         wanted = error - math.atan((left - shift * half) / size)
-        return clamp_twist(robot, robot.max_speed, 1.5 * wanted * robot.max_speed / size)
+        return arc_twist(robot, size, 1.5 * wanted)
 
     def _back_off(self, world: World) -> None:
-        self._retreats = list(_RETREATS)
-        self._retreat_pose = self._attempt_pose = world.robot_pose
-        self._note(world.robot_pose, world.time)
+        far = self.config.retreat * world.robot.circumscribed_radius
+        self._away = Retreat(world.robot, world.robot_pose, far)
 
     def _retreat(self, world: World) -> Twist | None:
-        """Get away from where the last attempt ended: straight back, or however it goes."""
-        robot = world.robot
-        far = self.config.retreat * robot.circumscribed_radius
-        turned = abs(float(world.robot_pose[2] - self._retreat_pose[2]))
-        if _distance(world.robot_pose, self._retreat_pose) >= far or turned > 1.0:
-            self._retreats = []
-        if self._retreats and self._is_stuck(world, 2.5 * self.config.period):
-            got_away = _moved(world, self._attempt_pose) > _MOVED and len(self._retreats) > 1
-            self._retreats = ([_RETREATS[0]] if got_away else []) + self._retreats[1:]
-            self._attempt_pose = world.robot_pose
-            self._note(world.robot_pose, world.time)
-        if not self._retreats:
-            return None
-        speed, turn = self._retreats[0]
-        return clamp_twist(robot, speed * robot.max_speed, turn * robot.max_turn_rate)
+        """Get away from where the last attempt ended."""
+        command = None
+        if self._away is not None:
+            command = self._away.command(world.robot_pose, world.time, self._clock.held)
+            if command is None and isinstance(self._away, Retreat) and not self._away.got_away:
+                path = recovery_path(world, 0.0)
+                if path is not None:
+                    self._away = PoseFollower(world.robot, path, self.config.response)
+                    return self._retreat(world)
+            if command is None:
+                self._away = None
+        return command
 
-    def _note(self, pose: FloatArray, time: float) -> None:
-        self._rest_pose, self._moved_at = pose, time
-
-    def _is_stuck(self, world: World, patience: float) -> bool:
-        """Whether the robot has hardly moved for so long [s]."""
-        if _moved(world, self._rest_pose) > _MOVED:
-            self._note(world.robot_pose, world.time)
-        return world.time - self._moved_at >= patience - 1e-9
-
-
-def _moved(world: World, pose: FloatArray) -> float:
-    """How far the robot, or its rim, is from a pose, in circumscribed radii."""
-    size = world.robot.circumscribed_radius
-    turned = abs(float(world.robot_pose[2] - pose[2]))
-    return max(_distance(world.robot_pose, pose) / size, turned)
+    def _is_stuck(self, world: World) -> bool:
+        """Whether something stops the robot."""
+        assert self._stall is not None
+        return self._stall.update(world.robot_pose, world.time)
 
 
 def _distance(a: FloatArray, b: FloatArray | None) -> float:

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from pushplan.control import clamp_twist
+from pushplan.control import EpisodeClock, Retreat
 from pushplan.planners.rearrangement.greedy import GreedyPusher
 from pushplan.planners.rearrangement.pose_follower import PoseFollower
 from pushplan.planners.rearrangement.push import Push, signature
@@ -22,9 +22,11 @@ from pushplan.planners.rearrangement.rollout_cache import RolloutCache
 from pushplan.world import InvalidInputError, Twist, World
 from pushplan.world.checks import FloatArray, expect
 
-_FALLBACK = 60.0
-"""How long the fallback works where nothing is found [circumscribed radii at full speed]."""
+_FALLBACK = 45.0
+"""How long the fallback works where nothing is found [times in which the robot drives a
+circumscribed radius and turns by half a radian]."""
 _TRIES = 6  # how often it does so without progress before what is left is given up
+_RETREAT = 0.3  # how far it backs off where it is stuck [circumscribed radii]
 _PENALTY = 3.0  # what is added to the cost of a push that has failed [circumscribed radii]
 _TABU_AFTER = 3  # after so many failures a push is tabu until something else has been done
 
@@ -70,8 +72,8 @@ class GtspMpc:
         self._failures = 0
         self._recovery: PoseFollower | None = None
         self._recovered_from: FloatArray | None = None
-        self._back_off: list[tuple[float, float]] = []
-        self._last_time = math.inf
+        self._retreat: Retreat | None = None
+        self._clock = EpisodeClock(self.config.response)
         self._fallback = GreedyPusher()
         self._fallback_until, self._left, self._no_progress = -math.inf, -1, 0
         self._stopped_at: PushScene | None = None
@@ -97,9 +99,11 @@ class GtspMpc:
             InvalidInputError: if the goal is one for the robot, or the robot cannot stop.
         """
         check_world(world)
-        if world.time <= self._last_time != math.inf:
-            self._forget()
-        self._last_time = world.time
+        if self._clock.advance(world):
+            self._clock.command = self._act(world)
+        return self._clock.command
+
+    def _act(self, world: World) -> Twist:
         scene = self._scene(world)
         left = int((~scene.done).sum())
         if left != self._left:  # something was done, or has come back
@@ -114,7 +118,7 @@ class GtspMpc:
         if self._stopped_at is not None and _alike(scene, self._stopped_at):
             return Twist(0.0, 0.0)
         if world.time < self._fallback_until:
-            return self._fallback.act(world, observation)
+            return self._fallback.act(world)
         return self._decide(scene) or self._fall_back(scene)
 
     def _scene(self, world: World) -> PushScene:
@@ -125,13 +129,15 @@ class GtspMpc:
 
     def _decide(self, scene: PushScene) -> Twist | None:
         """The next command of a push; None if none is found."""
-        world, chosen = scene.world, None
+        world, chosen, held = scene.world, None, self._clock.held
         for _ in range(4):
-            if self._back_off:
-                speed, turn = self._back_off.pop(0)
-                return clamp_twist(world.robot, speed, turn)
+            if self._retreat is not None:
+                away = self._retreat.command(world.robot_pose, world.time, held)
+                if away is not None:
+                    return away
+                self._retreat = None
             if self._recovery is not None:
-                recovering = self._recovery.command(world.robot_pose)
+                recovering = self._recovery.command(world.robot_pose, world.time, held)
                 if recovering is not None:
                     return recovering
                 self._recovery = None
@@ -150,10 +156,10 @@ class GtspMpc:
                     world,
                     push,
                     chosen.first.route,
-                    self.config.period,
+                    self.config.response,
                     predictive=self.config.mpc and signature(push) not in self._penalties,
                 )
-            command = self._execution.command(scene)
+            command = self._execution.command(scene, held)
             if isinstance(command, Twist):
                 return command
             self._close(scene, self._execution, command)
@@ -161,14 +167,15 @@ class GtspMpc:
 
     def _recover(self, scene: PushScene) -> Twist | None:
         """Without a push: get out of a tight place, or else plan with the optimistic model."""
-        here, path = scene.world.robot_pose, recovery_path(scene)
+        margin = 0.5 * self.config.margin * scene.size
+        here, path = scene.world.robot_pose, recovery_path(scene.world, margin)
         tried = self._recovered_from is not None and bool(
             np.abs(self._recovered_from - here).max() < 0.02 * scene.size
         )
         if path is not None and not tried:  # else it has not moved since
             self._recovered_from = here
-            self._recovery = PoseFollower(scene.world.robot, path, self.config.period)
-            return self._recovery.command(here)
+            self._recovery = PoseFollower(scene.world.robot, path, self.config.response)
+            return self._recovery.command(here, scene.world.time, self._clock.held)
         self._optimistic = not self._optimistic
         return Twist(0.0, 0.0) if self._optimistic else None
 
@@ -185,7 +192,10 @@ class GtspMpc:
                 self._tabu.add(key)
         if end is ExecutionEnd.STUCK:
             self._failures += 1
-            self._back_off = _back_off_commands(scene, self._failures)
+            pose = scene.world.robot_pose
+            self._retreat = Retreat(
+                scene.world.robot, pose, _RETREAT * scene.size, self._failures - 1
+            )
 
     def _fall_back(self, scene: PushScene) -> Twist:
         """Let the greedy pusher work for a while; stop where that has made no progress either."""
@@ -199,7 +209,9 @@ class GtspMpc:
             self._penalties.clear()
             self._tabu.clear()
         self._no_progress += 1
-        self._fallback_until = world.time + _FALLBACK * scene.size / world.robot.max_speed
+        robot = world.robot
+        seconds = scene.size / robot.max_speed + 0.5 / robot.max_turn_rate
+        self._fallback_until = world.time + _FALLBACK * seconds
         return self._fallback.act(world)
 
 
@@ -207,11 +219,3 @@ def _alike(one: PushScene, other: PushScene) -> bool:
     """Whether nothing has moved in between."""
     same = np.array_equal(one.world.movables.ids, other.world.movables.ids)
     return same and bool(np.hypot(*(one.poses - other.poses)[:, :2].T).max() < 0.05 * one.size)
-
-
-def _back_off_commands(scene: PushScene, tries: int) -> list[tuple[float, float]]:
-    """A few commands that get the robot away from where it is stuck."""
-    robot = scene.world.robot
-    fraction = ((-1.0, 0.0), (-0.5, 1.0), (-0.5, -1.0), (0.7, 0.0))[tries % 4]
-    steps = max(2, int(0.3 * scene.size / (robot.max_speed * scene.config.period)))
-    return [(fraction[0] * robot.max_speed, fraction[1] * robot.max_turn_rate)] * steps

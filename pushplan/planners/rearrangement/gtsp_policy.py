@@ -7,18 +7,15 @@ from typing import Any
 
 import numpy as np
 
-from pushplan.control import clamp_twist
+from pushplan.control import EpisodeClock, LegFollower, clamp_twist
 from pushplan.geometry import VisibilityGraph
 from pushplan.gtsp import solve_gtsp
 from pushplan.planners.rearrangement.push_poses import pose_behind
 from pushplan.planners.rearrangement.push_scene import PushScene, check_world
 from pushplan.planners.rearrangement.rearrangement_config import RearrangementConfig
 from pushplan.planners.rearrangement.route import Route
-from pushplan.planners.rearrangement.route_follower import RouteFollower
 from pushplan.world import ClearanceArea, MaxIterations, Receptacle, Twist, World
 from pushplan.world.checks import FloatArray, expect
-
-_PATIENCE = 5  # commands without motion after which the rest of a leg is left out
 
 
 class Gtsp:
@@ -40,10 +37,8 @@ class Gtsp:
         self._forget()
 
     def _forget(self) -> None:
-        self._route_follower: RouteFollower | None = None
-        self._last: FloatArray | None = None
-        self._still = 0
-        self._last_time = math.inf
+        self._route_follower: LegFollower | None = None
+        self._clock = EpisodeClock(self.config.response)
 
     def reset(self, world: World, rng: np.random.Generator) -> None:
         """Forget the last episode."""
@@ -63,20 +58,20 @@ class Gtsp:
             InvalidInputError: if the goal is one for the robot, or the robot cannot stop.
         """
         check_world(world)
-        if self._route_follower is None or world.time <= self._last_time != math.inf:
-            self._forget()
-            self._route_follower = RouteFollower(world.robot, self._path(world), self.config.period)
-        self._last_time = world.time
-        pose = world.robot_pose
-        if self._last is not None:
-            turned = abs(math.remainder(float(pose[2] - self._last[2]), 2.0 * math.pi))
-            moved = math.dist(pose[:2], self._last[:2]) / world.robot.circumscribed_radius + turned
-            self._still = self._still + 1 if moved < 1e-3 else 0
-        self._last = pose
-        if self._still >= _PATIENCE:
-            self._route_follower.skip()
-            self._still = 0
-        command = self._route_follower.command(pose)
+        if self._clock.advance(world):
+            self._clock.command = self._act(world)
+        return self._clock.command
+
+    def _act(self, world: World) -> Twist:
+        if self._route_follower is None:
+            self._route_follower = LegFollower(
+                world.robot, self._path(world), response=self.config.response
+            )
+        pose, follower = world.robot_pose, self._route_follower
+        command = follower.command(pose, world.time, self._clock.held)
+        while command is None and not follower.arrived:
+            follower.skip()
+            command = follower.command(pose, world.time, self._clock.held)
         return clamp_twist(world.robot, 0.0, 0.0) if command is None else command
 
     def _path(self, world: World) -> Route:

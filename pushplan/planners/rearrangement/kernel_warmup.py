@@ -40,7 +40,13 @@ def warm_up_rearrangement() -> None:
     scene = PushScene(_worlds()[0], RearrangementConfig())
     extraction_primitives(PushSimulator(scene), 0)
     pre_relocation_pushes(PushSimulator(scene), 0)
-    recovery_path(scene)
+    warm_up_recovery()
+
+
+@functools.cache
+def warm_up_recovery() -> None:
+    """Look for a drive out of a tight place."""
+    recovery_path(_worlds()[0], 0.0)
 
 
 @functools.cache

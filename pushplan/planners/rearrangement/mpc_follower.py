@@ -12,8 +12,8 @@ from pushplan.world import Twist, World
 
 _ALIGNED = math.radians(20.0)
 """A push that begins farther off the object's path is left to the geometric controller."""
-_BLOCKED = 0.2  # share of a command that is driven, below which the push does not get on
-_PATIENCE = 4  # commands for which it may be so
+_BLOCKED = 0.2  # fraction of a command that is driven, below which the push does not get on
+_PATIENCE = 0.8  # time for which it may be so [s]
 
 
 def suits_mpc(scene: PushScene, push: Push) -> bool:
@@ -29,20 +29,20 @@ class MpcFollower:
 
     Args:
         scene: in which the push begins.
-        push: a push that `suits`.
+        push: a push that `suits_mpc`.
+        held: for how long the first command will be held [s].
     """
 
-    def __init__(self, scene: PushScene, push: Push) -> None:
-        config = PushingConfig(
-            parameters=PushParameters(scene.config.friction), period=scene.config.period
-        )
+    def __init__(self, scene: PushScene, push: Push, held: float) -> None:
+        config = PushingConfig(parameters=PushParameters(scene.config.friction), period=held)
         self._mpc = PushingMpc(config)
         robot = scene.world.robot
         self._plan = PushPath.through(push.object_path, radius=scene.size).plan(robot, push.target)
-        self._blocked = 0
+        self._going_since = scene.world.time
 
     def command(self, world: World) -> Twist | None:
         """The velocity to drive now; None where something static is in the way for good."""
         twist = self._mpc.command(world, self._plan)
-        self._blocked = self._blocked + 1 if self._mpc.slowed < _BLOCKED else 0
-        return None if self._blocked > _PATIENCE else twist
+        if self._mpc.slowed >= _BLOCKED:
+            self._going_since = world.time
+        return None if world.time - self._going_since > _PATIENCE else twist

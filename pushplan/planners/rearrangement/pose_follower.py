@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import math
 
-from pushplan.control import clamp_twist
+from pushplan.control import ProgressChecker, StallChecker, clamp_twist
 from pushplan.world import RobotModel, Twist
 from pushplan.world.checks import FloatArray
+
+_PATIENCE = 3.0
+"""Time that may pass without getting on, in times that a step takes at full speed."""
 
 
 class PoseFollower:
@@ -15,30 +18,52 @@ class PoseFollower:
     Args:
         robot: its limits.
         poses: (N, 3) where to go.
-        period: time between two commands [s].
+        response: time in which an error is driven off [s].
     """
 
-    def __init__(self, robot: RobotModel, poses: FloatArray, period: float) -> None:
-        self._robot, self._poses, self._period = robot, poses, period
-        self._next, self._tries = 1, 0
+    def __init__(self, robot: RobotModel, poses: FloatArray, response: float) -> None:
+        self._robot, self._poses, self._response = robot, poses, response
+        self._next = 1
+        self._stall = StallChecker(robot)
+        self._progress: ProgressChecker | None = None
 
-    def command(self, pose: FloatArray) -> Twist | None:
-        """The velocity to drive now; None when it is there, or does not get there."""
+    def command(self, pose: FloatArray, time: float, held: float) -> Twist | None:
+        """The velocity to drive now; None when it is there, or does not get there.
+
+        Args:
+            pose: (3,) of the robot.
+            time: [s].
+            held: for how long the command will be held [s].
+        """
         robot, size = self._robot, self._robot.circumscribed_radius
+        if self._stall.update(pose, time):
+            return None
+        seconds = max(held, self._response)
         while self._next < len(self._poses):
             before, target = self._poses[self._next - 1], self._poses[self._next]
             c, s = math.cos(float(pose[2])), math.sin(float(pose[2]))
             dx, dy = (float(value) for value in target[:2] - pose[:2])
             ahead, aside = c * dx + s * dy, c * dy - s * dx
-            turn = math.remainder(float(target[2] - pose[2]), 2.0 * math.pi)
+            turn = math.remainder(float(target[2] - pose[2]), math.tau)
             moves = float(c * (target[0] - before[0]) + s * (target[1] - before[1]))
-            step = abs(moves) + size * abs(float(target[2] - before[2]))
+            turns = abs(float(target[2] - before[2]))
             off = ahead * math.copysign(1.0, moves) if moves else size * abs(turn)
-            if off < 0.3 * step or self._tries > 8:
+            if self._progress is None:
+                lasts = abs(moves) / robot.max_speed + turns / robot.max_turn_rate
+                patience = _PATIENCE * max(lasts, 2.0 * seconds)
+                self._progress = ProgressChecker(0.01 * size, patience)
+            if off < 0.3 * (abs(moves) + size * turns) or not self._progress.update(off, time):
                 self._next += 1
-                self._tries = 0
+                self._progress = None
                 continue
-            self._tries += 1
             turn += (aside / size) * math.copysign(1.0, ahead) if moves else 0.0
-            return clamp_twist(robot, ahead / self._period, turn / self._period)
+            command = clamp_twist(robot, *_together(robot, ahead, turn, seconds))
+            self._stall.send(command)
+            return command
         return None
+
+
+def _together(robot: RobotModel, ahead: float, turn: float, seconds: float) -> tuple[float, float]:
+    """Speed and turn rate that make a step and a turn in the same time."""
+    seconds = max(seconds, abs(ahead) / robot.max_speed, abs(turn) / robot.max_turn_rate)
+    return ahead / seconds, turn / seconds

@@ -7,7 +7,8 @@ import math
 
 import numpy as np
 
-from pushplan.control import clamp_twist
+from pushplan.control import LegFollower, StallChecker
+from pushplan.control.limits import arc_twist
 from pushplan.planners.rearrangement.controller_kernels import steer_push
 from pushplan.planners.rearrangement.mpc_follower import MpcFollower, suits_mpc
 from pushplan.planners.rearrangement.pose_follower import PoseFollower
@@ -15,11 +16,11 @@ from pushplan.planners.rearrangement.push import Push
 from pushplan.planners.rearrangement.push_scene import PushScene
 from pushplan.planners.rearrangement.push_simulator import PushSimulator
 from pushplan.planners.rearrangement.route import Route
-from pushplan.planners.rearrangement.route_follower import RouteFollower
 from pushplan.world import Twist, World
 from pushplan.world.checks import FloatArray
 
-_PATIENCE = 4  # commands without motion after which the robot counts as stuck
+_ALIGNED = math.radians(0.4)  # error of a heading that is left where a push begins
+_NEAR = 0.004  # the same of the place [circumscribed radii]
 
 
 class ExecutionEnd(enum.Enum):
@@ -42,7 +43,7 @@ class PushExecution:
         world: the snapshot in which it begins.
         push: the push.
         route: to its start.
-        period: time between two commands [s].
+        response: time in which an error is driven off [s].
         predictive: whether to push by predictive control where that suits.
 
     Attributes:
@@ -52,69 +53,82 @@ class PushExecution:
     """
 
     def __init__(
-        self, world: World, push: Push, route: Route, period: float, *, predictive: bool = True
+        self, world: World, push: Push, route: Route, response: float, *, predictive: bool = True
     ) -> None:
         self.push, self.route, self.pushing = push, route, False
         self._predictive = predictive
-        self._route_follower = RouteFollower(world.robot, route, period)
+        self._route_follower = LegFollower(
+            world.robot,
+            route,
+            near=_NEAR * world.robot.circumscribed_radius,
+            aligned=_ALIGNED,
+            response=response,
+        )
         self._mpc_follower: MpcFollower | None = None
         self._pose_follower: PoseFollower | None = None
-        self._driven = self._reached = self._commanded = 0.0
-        self._last: FloatArray | None = None
-        self._still = 0
+        self._stall = StallChecker(world.robot)
+        self._driven = self._reached = 0.0
+        self._sent_at = self._speed = 0.0
 
-    def command(self, scene: PushScene) -> Twist | ExecutionEnd:
-        """The velocity to drive now, or how it ended."""
-        world, period = scene.world, scene.config.period
-        if self._is_stuck(world):
-            return ExecutionEnd.STUCK
-        twist: Twist | ExecutionEnd | None = None
+    def command(self, scene: PushScene, held: float) -> Twist | ExecutionEnd:
+        """The velocity to drive now, or how it ended.
+
+        Args:
+            scene: as it is now.
+            held: for how long the command will be held [s].
+        """
+        world = scene.world
         if not self.pushing:
             if self._is_obsolete(scene):
                 return ExecutionEnd.OBSOLETE
-            twist = self._route_follower.command(world.robot_pose)
-            if twist is None:
-                twist = self._begin(scene)
-        if twist is None:
-            twist = self._push(scene)
-        if isinstance(twist, Twist):
-            radius = world.robot.circumscribed_radius
-            self._commanded = period * (abs(twist.linear) + abs(twist.angular) * radius)
-            self._last = world.robot_pose
-        return twist
+            approach = self._route_follower
+            twist = approach.command(world.robot_pose, world.time, held)
+            if twist is not None:
+                return twist
+            if not approach.arrived:
+                return ExecutionEnd.STUCK
+            if not self._begin(scene, held):
+                return ExecutionEnd.FAILED
+        if self._stall.update(world.robot_pose, world.time):
+            return ExecutionEnd.STUCK
+        pushed = self._push(scene, held)
+        if isinstance(pushed, Twist):
+            self._stall.send(pushed)
+            self._speed = pushed.linear
+        return pushed
 
     def _is_obsolete(self, scene: PushScene) -> bool:
         """Whether the object to be pushed has gone, or is where it belongs already."""
         target = np.flatnonzero(scene.world.movables.ids == self.push.target)
         return not len(target) or bool(scene.done[target[0]])
 
-    def _begin(self, scene: PushScene) -> ExecutionEnd | None:
-        """Look again at what the push would do from here."""
+    def _begin(self, scene: PushScene, held: float) -> bool:
+        """Look again at what the push would do from here; whether it is good for anything."""
         push, world = self.push, scene.world
         ends = PushSimulator(scene).resimulate(push, world.robot_pose)
         good = [end for end in ends if push.pre_relocates or set(push.delivers) & set(end.delivers)]
         if not good:
-            return ExecutionEnd.FAILED
+            return False
         self.push = max(
             good, key=lambda end: (len(set(end.delivers) & set(push.delivers)), -end.length)
         )
-        self.pushing, self._still = True, 0
+        self.pushing = True
         if self.push.is_primitive:
-            self._pose_follower = PoseFollower(world.robot, self.push.poses, scene.config.period)
+            self._pose_follower = PoseFollower(world.robot, self.push.poses, scene.config.response)
         if self._predictive and suits_mpc(scene, self.push):
-            self._mpc_follower = MpcFollower(scene, self.push)
-        return None
+            self._mpc_follower = MpcFollower(scene, self.push, held)
+        return True
 
-    def _push(self, scene: PushScene) -> Twist | ExecutionEnd:
+    def _push(self, scene: PushScene, held: float) -> Twist | ExecutionEnd:
         push, world, pose = self.push, scene.world, scene.world.robot_pose
         ids = world.movables.ids
         left = np.isin(ids, push.delivers) & ~scene.done
         if not push.pre_relocates and not left.any():
             return ExecutionEnd.DONE
         if self._pose_follower is not None:
-            return self._pose_follower.command(pose) or ExecutionEnd.DONE
-        if self._last is not None:
-            self._driven += math.dist(pose[:2], self._last[:2])
+            return self._pose_follower.command(pose, world.time, held) or ExecutionEnd.DONE
+        self._driven += (world.time - self._sent_at) * self._speed
+        self._sent_at, self._speed = world.time, 0.0
         longest = push.length if push.pre_relocates else 1.1 * push.length + 0.4 * scene.size
         if self._driven > longest - 1e-6:
             return ExecutionEnd.DONE if push.pre_relocates else ExecutionEnd.FAILED
@@ -132,17 +146,7 @@ class PushExecution:
                 return ExecutionEnd.FAILED
             if self._mpc_follower is not None:
                 return self._mpc_follower.command(world) or ExecutionEnd.FAILED
-        period = scene.config.period
-        return clamp_twist(world.robot, step / period, turn / period)
-
-    def _is_stuck(self, world: World) -> bool:
-        """Whether the robot has hardly moved for some commands."""
-        if self._last is not None and self._commanded > 0.0:
-            pose, radius = world.robot_pose, world.robot.circumscribed_radius
-            turned = abs(math.remainder(float(pose[2] - self._last[2]), 2.0 * math.pi))
-            moved = math.dist(pose[:2], self._last[:2]) + turned * radius
-            self._still = self._still + 1 if moved < 0.1 * self._commanded else 0
-        return self._still >= _PATIENCE
+        return arc_twist(world.robot, step, turn)
 
 
 def _line_turn(start: FloatArray, pose: FloatArray, size: float) -> float:

@@ -36,7 +36,8 @@ from pushplan.planners.rearrangement.rollout_cache import RolloutCache
 from pushplan.world import ClearanceArea, Goal, Receptacle, RobotModel, StaticMap, World
 from pushplan.world.checks import BoolArray, FloatArray, IntArray, frozen
 
-_STEP = 0.12  # longest step between two commands of a push [circumscribed radii]
+_STEP = 0.08  # distance between two commands of a push [circumscribed radii]
+_CURVATURE = 1.5  # of the robot's path where it steers most [1 / circumscribed radius]
 _ARM = 0.8  # how far a turn by one radian carries an object along [circumscribed radii]
 _GOAL_SLACK = 0.012
 """By how much an object has to be clear of its goal's edge [circumscribed radii]."""
@@ -172,10 +173,10 @@ class PushScene:
     @cached_property
     def controller(self) -> PushingController:
         """Parameters of the pushing controller for this robot."""
-        robot, period = self.world.robot, self.config.period
+        step = _STEP * self.size
         return PushingController(
-            step=min(robot.max_speed * period, _STEP * self.size),
-            turn=robot.max_turn_rate * period,
+            step=step,
+            turn=_CURVATURE * step / self.size,
             size=self.size,
             half=self.half,
             front=self.front,

@@ -27,7 +27,8 @@ class RearrangementConfig:
         per_object: how many pushes are kept for each object.
         max_pushes: how many are kept for all together, by which the time of a plan is bounded.
         max_simulations: how many pushes are simulated before one is chosen.
-        period: time between two commands [s].
+        response: time in which an error of heading or place is driven off [s]; longer than the
+            robot's delay.
         mpc: whether a push of one object along its path is driven by `PushingMpc`; else by the
             controller of its prediction, as all other pushes are.
     """
@@ -46,7 +47,7 @@ class RearrangementConfig:
     per_object: int = 16
     max_pushes: int = 80
     max_simulations: int = 30
-    period: float = 0.2
+    response: float = 0.2
     mpc: bool = True
 
     def __post_init__(self) -> None:
@@ -56,7 +57,7 @@ class RearrangementConfig:
             number(f"rearrangement {name}", getattr(self, name), low=0.0, high=1.0)
         for name in ("cell", "coarse_cell"):
             number(f"rearrangement {name}", getattr(self, name), low=0.05, high=2.0)
-        for name in ("gyration_scale", "period"):
+        for name in ("gyration_scale", "response"):
             number(f"rearrangement {name}", getattr(self, name), low=0.0, high=1e3, open_low=True)
         integer("rearrangement per_object", self.per_object, low=1, high=1000)
         integer("rearrangement max_pushes", self.max_pushes, low=1, high=10000)

@@ -8,12 +8,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pushplan.control import Legs
+from pushplan.control.leg_follower import turn_to
 from pushplan.motion.collision import footprint, obstacles
 from pushplan.planners.rearrangement.approach import ApproachTree, arrival_poses
 from pushplan.planners.rearrangement.pose_grid import pose_at
 from pushplan.planners.rearrangement.push_scene import TARGET_COST, PushScene
-from pushplan.planners.rearrangement.route_kernels import LITTLE_TURN, RouteProblem, cheapest_legs
-from pushplan.world.checks import ArrayRecord, FloatArray
+from pushplan.planners.rearrangement.route_kernels import RouteProblem, cheapest_legs
+from pushplan.world.checks import FloatArray
 
 _MOST = 14  # corners of the lattice's path that a route may have corners at
 _LONGEST = 6
@@ -23,22 +25,14 @@ _AWAY = (0.3, -0.3, 0.6, -0.6, 1.0, -1.0)
 
 
 @dataclass(frozen=True, eq=False)
-class Route(ArrayRecord):
-    """Legs of a drive.
+class Route(Legs):
+    """Legs to the start of a push.
 
     Args:
-        points: (N, 2) where each leg ends [m].
-        signs: (N,) 1 ahead, -1 back.
-        turns: (N + 1,) how to turn on the spot before each leg, and at the end: 1 to the left, -1
-            to the right, 0 the shorter way.
-        heading: to turn to at the end [rad].
+        points, signs, turns, heading: see `pushplan.control.Legs`.
         cost: length, and what is pushed about on the way [m].
     """
 
-    points: FloatArray
-    signs: FloatArray
-    turns: FloatArray
-    heading: float
     cost: float
 
 
@@ -109,6 +103,7 @@ class RoutePlanner:
                 found.append(_turned(here, math.atan2(dy, dx), turn))
                 here = np.array([point[0], point[1], found[-1][-1, 2]])
                 found.append(here[None])
+        assert route.heading is not None
         found.append(_turned(here, route.heading, float(route.turns[-1])))
         return np.concatenate(found)
 
@@ -145,20 +140,6 @@ def _cheapest(
         end,
         cost,
     )
-
-
-def turn_to(heading: float, to: float, turn: float) -> float:
-    """The turn [rad] that is still to be made from one heading to another, the way it is meant.
-
-    Args:
-        heading: [rad].
-        to: [rad].
-        turn: as in `Route`; the last bit of a turn is made the shorter way in any case.
-    """
-    left = math.remainder(to - heading, 2.0 * math.pi)
-    if left * turn < 0.0 and abs(left) > 0.5 * LITTLE_TURN:
-        left += math.copysign(2.0 * math.pi, turn)
-    return left
 
 
 def _turned(here: FloatArray, to: float, turn: float) -> FloatArray:

@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from pushplan.compiled import kernel
+from pushplan.control.leg_follower import LITTLE_TURN
 from pushplan.geometry import convex_penetration
 from pushplan.geometry.angles import wrap_angle
 from pushplan.geometry.transforms import transform_points
@@ -17,8 +18,6 @@ from pushplan.world.checks import FloatArray, IntArray
 
 SURE_TURN = math.radians(170.0)
 """Up to here a turn is made the shorter way if nothing is said."""
-LITTLE_TURN = 0.6
-"""A turn by less is not made the longer way [rad]."""
 _TIGHT_COST = 25.0
 """Cost of driving on, where the robot begins nearer to something static than it should be."""
 

@@ -45,43 +45,29 @@ class ActionChoice:
 
 @dataclass(frozen=True)
 class TrainingConfig(CheckedFields):
-    """What is trained on what. The same configuration, seed and machine give the same policy.
+    """What is trained on what. The same configuration, seed and machine give the same policy."""
 
-    Args:
-        algorithm: ``"ppo"``, ``"sac"``, ``"sam"`` or ``"bc"``.
-        task: name of the task.
-        scenarios: variations of the task; each episode draws one of them.
-        observation: of the network, as in a specification (``kind`` and its options).
-        action: how it acts.
-        options: of the algorithm.
-        simulator: name of the simulator.
-        preset: of the task; the first for the simulator by default.
-        steps: decisions to learn from.
-        seed: of weights, exploration and starts.
-        envs: environments that run side by side.
-        chunk: decisions between two checkpoints, each with a validation. Every chunk starts with
-            fresh episodes and generators of its own, so that a resumed training continues exactly.
-        reward_scale: factor of the task's reward.
-        limit: decisions after which a training episode is cut off, 0 for the task's own end.
-        validation: episodes of each validation.
-        suites: on which the result is scored, with scenarios that training never draws.
-    """
-
-    algorithm: Annotated[str, OneOf(ALGORITHMS)]
-    task: str
+    algorithm: Annotated[str, OneOf(ALGORITHMS)]  # ``"ppo"``, ``"sac"``, ``"sam"`` or ``"bc"``
+    task: str  # name of the task
+    # variations of the task; each episode draws one of them
     scenarios: tuple[Mapping[str, Any], ...]
+    # of the network, as in a specification (``kind`` and its options)
     observation: Mapping[str, Any]
-    action: ActionChoice
-    options: Options
-    simulator: str = "pymunk"
-    preset: str | None = None
-    steps: PositiveInt = 100_000
-    seed: NonNegativeInt = 0
-    envs: PositiveInt = 4
+    action: ActionChoice  # how it acts
+    options: Options  # of the algorithm
+    simulator: str = "pymunk"  # name of the simulator
+    preset: str | None = None  # of the task; the first for the simulator by default
+    steps: PositiveInt = 100_000  # decisions to learn from
+    seed: NonNegativeInt = 0  # of weights, exploration and starts
+    envs: PositiveInt = 4  # environments that run side by side
+    # decisions between two checkpoints, each with a validation. Every chunk starts with fresh
+    # episodes and generators of its own, so that a resumed training continues exactly.
     chunk: PositiveInt = 10_000
-    reward_scale: PositiveFloat = 1.0
+    reward_scale: PositiveFloat = 1.0  # factor of the task's reward
+    # decisions after which a training episode is cut off, 0 for the task's own end
     limit: NonNegativeInt = 0
-    validation: NonNegativeInt = 20
+    validation: NonNegativeInt = 20  # episodes of each validation
+    # on which the result is scored, with scenarios that training never draws
     suites: tuple[str, ...] = field(default_factory=tuple)
 
     def __post_init__(self) -> None:

@@ -104,10 +104,11 @@ def test_the_same_again():
     one = push("pymunk", AREA, 1.0, S_SHAPE[:2], 0.0, config, seed=1)[2]
     two = push("pymunk", AREA, 1.0, S_SHAPE[:2], 0.0, config, seed=1)[2]
     assert np.array_equal(one.robot_poses, two.robot_poses)
-    # and one controller for two episodes, by the clock going back
+    # and one controller for two episodes
     mpc = PushingMpc(config)
     for _ in range(2):
         again = push("pymunk", AREA, 1.0, S_SHAPE[:2], 0.0, config, seed=1, controller=mpc)[2]
+        mpc.reset(again.world)
         assert np.array_equal(one.robot_poses, again.robot_poses)
 
 

@@ -97,10 +97,10 @@ def test_it_clears_the_area(layout):
 
 
 def test_it_delivers_most_boxes_and_the_same_each_time():
-    _, info = run("box_delivery", "benchmark", 1, 2500)
+    _, info = run("box_delivery", "benchmark", 2, 2500)
     assert info["completed"].sum() >= 8
     assert (
-        run("box_delivery", "benchmark", 1, 300)[0] == run("box_delivery", "benchmark", 1, 300)[0]
+        run("box_delivery", "benchmark", 2, 300)[0] == run("box_delivery", "benchmark", 2, 300)[0]
     )
 
 
@@ -127,8 +127,8 @@ def test_what_it_cannot_do_is_refused():
         GreedyPusher().act(scene([(0.0, 0.0, 0.0)], drive="constant_speed"))
     with pytest.raises(InvalidInputError, match="greedy patience"):
         GreedyConfig(patience=float("nan"))
-    with pytest.raises(InvalidInputError, match="greedy period"):
-        GreedyConfig(period=0.0)
+    with pytest.raises(InvalidInputError, match="greedy response"):
+        GreedyConfig(response=0.0)
 
 
 @pytest.mark.parametrize(

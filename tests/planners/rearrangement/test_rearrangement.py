@@ -46,6 +46,10 @@ COLUMN = [(-0.5, 0.0), (0.5, 0.0), (0.5, 1.0), (-0.5, 1.0)]
 AREA = [(-3.0, -3.0), (3.0, -3.0), (3.0, 3.0), (-3.0, 3.0)]
 
 
+def way_out(here):
+    return recovery_path(here.world, 0.015 * here.size)
+
+
 def scene(boxes, goal=CORNER, extra=(), pose=(-3.0, -3.0, 0.0), **config):
     world = World(
         robot=box_delivery_robot(),
@@ -246,10 +250,10 @@ def test_a_box_in_a_tight_place_is_brought_out_of_it(pose, extra, drive_back):
 
 def test_the_recovery_path_of_a_gap_touches_nothing():
     tight = small_box((0.0, 0.25, 0.0), GAP, robot=(0.0, -0.35, -0.5 * math.pi))
-    path = recovery_path(tight)
+    path = way_out(tight)
     assert path is not None and path[-1, 1] < -0.8
     assert PushSimulator(tight).simulate_primitive(path, 0)[0].work == 0.0
-    assert recovery_path(small_box((0.0, 0.8, 0.0), GAP)) is None
+    assert way_out(small_box((0.0, 0.8, 0.0), GAP)) is None
 
 
 def test_the_recovery_path_from_between_two_columns_is_to_and_fro():
@@ -257,7 +261,7 @@ def test_the_recovery_path_from_between_two_columns_is_to_and_fro():
     columns = [[(0.0, y), (1.0, y), (1.0, y + 1.0), (0.0, y + 1.0)] for y in (0.0, 2.0)]
     for pose in ((0.8, 1.47, -1.57), (0.4, 1.5, 1.4)):
         tight = scene([(4.0, -4.0, 0.0)], extra=columns, pose=pose)
-        path = recovery_path(tight)
+        path = way_out(tight)
         assert path is not None and len(path) > 20
         moves = np.diff(path, axis=0)
         assert np.abs(moves[:, 2]).max() < 0.1 and np.hypot(*moves[:, :2].T).max() < 0.1
@@ -270,14 +274,14 @@ def test_the_recovery_path_from_between_two_columns_is_to_and_fro():
         ]
         assert shapely.area(shapely.intersection(walls, bodies)).max() < 1e-3
         assert shapely.distance(walls, shapely.Point(path[-1, :2])) > tight.size
-        assert np.array_equal(path, recovery_path(tight))
+        assert np.array_equal(path, way_out(tight))
 
 
 def test_there_is_no_recovery_path_out_of_a_cell():
     sides = [[(-1, -1), (1, -1), (1, -0.9), (-1, -0.9)], [(-1, 0.9), (1, 0.9), (1, 1), (-1, 1)]]
     sides += [[(-1, -1), (-0.9, -1), (-0.9, 1), (-1, 1)], [(0.9, -1), (1, -1), (1, 1), (0.9, 1)]]
     cell = [1.4 * 0.45 * np.array(side) for side in sides]
-    assert recovery_path(scene([(4.0, -4.0, 0.0)], extra=cell, pose=(0.0, 0.0, 0.0))) is None
+    assert way_out(scene([(4.0, -4.0, 0.0)], extra=cell, pose=(0.0, 0.0, 0.0))) is None
 
 
 def test_an_object_that_cannot_be_got_to_later_does_not_keep_the_others_waiting():
@@ -300,7 +304,7 @@ def test_an_object_that_cannot_be_got_to_later_does_not_keep_the_others_waiting(
 def test_a_bumper_that_hooks_on_a_corner_is_driven_ahead():
     column = [(-0.75, 0.47), (0.25, 0.47), (0.25, 1.47), (-0.75, 1.47)]
     hooked = scene([(4.0, -4.0, 0.0)], extra=[column], pose=(0.0, 0.0, 0.0))
-    path = recovery_path(hooked)
+    path = way_out(hooked)
     assert path is not None and path[1, 0] > 0.0
     parts = [
         shapely.Polygon(transform(pose, part)) for pose in path for part in hooked.world.robot.parts
@@ -317,8 +321,8 @@ def test_a_path_is_traced_ahead_back_and_round():
         steps.append(pose)
     path = np.array([[0.3, -0.2, 2.9], *steps])
     at, tracer = np.array([0.31, -0.21, 2.95]), PoseFollower(robot, path, 0.2)
-    for _ in range(60):
-        twist = tracer.command(at)
+    for step in range(60):
+        twist = tracer.command(at, 0.2 * step, 0.2)
         if twist is None:
             break
         middle = at[2] + 0.1 * twist.angular
@@ -395,7 +399,7 @@ def test_the_search_is_that_of_dijkstra():
         {"slack": 2.0},
         {"per_object": 0},
         {"max_simulations": 2.5},
-        {"period": "soon"},
+        {"response": "soon"},
         {"mpc": 1},
     ],
 )

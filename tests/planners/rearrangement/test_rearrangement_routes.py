@@ -7,10 +7,10 @@ import pytest
 import shapely
 from conftest import make_boxes
 
+from pushplan.control import LegFollower
 from pushplan.planners.rearrangement import PushScene, RearrangementConfig
 from pushplan.planners.rearrangement.approach import approach_tree
 from pushplan.planners.rearrangement.route import RoutePlanner
-from pushplan.planners.rearrangement.route_follower import RouteFollower
 from pushplan.world import Receptacle, StaticMap, World, box_delivery_robot
 from pushplan.world.outline import transform
 
@@ -41,10 +41,12 @@ def among_columns(pose):
 
 def driven(scene, route):
     """Poses of a robot that does exactly as it is told."""
-    pose, period = np.array(scene.world.robot_pose), scene.config.period
-    driver, found = RouteFollower(scene.world.robot, route, period), [pose.copy()]
-    for _ in range(1000):
-        twist = driver.command(pose)
+    pose, period = np.array(scene.world.robot_pose), 0.2
+    near = 0.004 * scene.size
+    driver = LegFollower(scene.world.robot, route, near=near, aligned=math.radians(0.4))
+    found = [pose.copy()]
+    for step in range(1000):
+        twist = driver.command(pose, step * period, period)
         if twist is None:
             return np.array(found)
         for _ in range(5):

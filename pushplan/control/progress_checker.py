@@ -1,0 +1,86 @@
+"""Whether a robot gets on, in metres and seconds, whatever the control rate."""
+
+from __future__ import annotations
+
+import math
+
+from pushplan.world import RobotModel, Twist
+from pushplan.world.checks import FloatArray
+
+_FRACTION = 0.1
+"""A robot that moves less than this fraction of what it was told to is being stopped."""
+_LEAST = 0.1
+"""Commanded motion below which nothing is concluded [circumscribed radii]."""
+
+
+class ProgressChecker:
+    """Watches a quantity that has to become less.
+
+    Args:
+        least: by how much it has to become less to count as progress.
+        patience: time without progress that is allowed [s].
+    """
+
+    def __init__(self, least: float, patience: float) -> None:
+        self._least, self._patience = least, patience
+        self.reset()
+
+    def reset(self) -> None:
+        """Begin anew, with another thing to do."""
+        self._best, self._since = math.inf, math.inf
+
+    def update(self, left: float, time: float) -> bool:
+        """Take what is left to do at a time [s]; returns whether it gets on."""
+        if left < self._best - self._least or self._best == math.inf:
+            self._best, self._since = left, time
+        return time - self._since <= self._patience
+
+
+class StallChecker:
+    """Compares how far the robot has got with what it was told to drive.
+
+    Turns count as the path of the robot's rim. The measure is net motion, so that noise in the
+    pose does not add up to progress.
+
+    Args:
+        robot: whose size is the unit.
+        patience: time that a stop has to last [s].
+    """
+
+    def __init__(self, robot: RobotModel, patience: float = 0.8) -> None:
+        self._size, self._patience = robot.circumscribed_radius, patience
+        self.reset()
+
+    def reset(self) -> None:
+        """Begin anew, for instance after driving another way."""
+        self._from: FloatArray | None = None
+        self._since = self._time = self._told = 0.0
+        self._command = Twist(0.0, 0.0)
+
+    def update(self, pose: FloatArray, time: float) -> bool:
+        """Take the pose (3,) at a time [s]; returns whether something stops the robot."""
+        if self._from is not None:
+            seconds = time - self._time
+            self._told += seconds * self._path(self._command.linear, self._command.angular)
+        self._time = time
+        if self._from is None:
+            self._begin(pose, time)
+            return False
+        away = pose - self._from
+        turn = math.remainder(float(away[2]), math.tau)
+        moved = self._path(math.hypot(float(away[0]), float(away[1])), turn)
+        if moved >= max(_FRACTION * self._told, _FRACTION * _LEAST * self._size):
+            if self._told >= _LEAST * self._size:
+                self._begin(pose, time)
+            return False
+        return self._told >= _LEAST * self._size and time - self._since >= self._patience - 1e-9
+
+    def send(self, command: Twist) -> None:
+        """Take the command that is driven until the next call of `update`."""
+        self._command = command
+
+    def _begin(self, pose: FloatArray, time: float) -> None:
+        self._from, self._since, self._told = pose.copy(), time, 0.0
+
+    def _path(self, length: float, turn: float) -> float:
+        return abs(length) + self._size * abs(turn)
