@@ -247,6 +247,8 @@ def memory(names: list[str], calls: int, controllers: bool) -> None:
 
         def command(number: int, controller: Controller = controller) -> object:
             step = number % 200
+            if step == 0:
+                controller.reset(world)
             along = plan.poses[step % len(plan.poses)]
             return controller.command(world.moved(time=0.1 * step, robot_pose=along), plan)
 
