@@ -16,7 +16,7 @@ import pytest
 from turnstile import Turnstile
 
 import pushplan
-from pushplan.world import Drive, GoalDisc, Movables, RobotModel, StaticMap, World
+from pushplan.world import Drive, GoalDisc, Movables, PlanStatus, RobotModel, StaticMap, World
 
 LEARN = ("torch", "stable_baselines3", "onnx", "minari", "h5py", "tensorboard")
 MISSING = [name for name in LEARN if find_spec(name) is None]
@@ -72,6 +72,12 @@ def make_u_maze(box_poses: object = (), **changes: object) -> World:
     }
     fields.update(changes)
     return World(**fields)  # type: ignore[arg-type]
+
+
+def solved_by(name: str) -> tuple[PlanStatus, ...]:
+    """What a planner says of a plan that arrives; those for a point may know only a path."""
+    paths = ("straight", "skeleton", "geometric-rrt")
+    return (PlanStatus.SOLVED, *((PlanStatus.PATH_ONLY,) if name in paths else ()))
 
 
 def scattered_boxes(count: int, seed: int) -> np.ndarray:

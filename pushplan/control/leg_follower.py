@@ -98,7 +98,7 @@ class LegFollower:
         self._stall = StallChecker(robot)
         self._progress = ProgressChecker(0.01 * size, _PATIENCE)
         self._aiming = ProgressChecker(0.5 * self._aligned, _PATIENCE)
-        self._next, self._left_out = 0, False
+        self._next = 0
         self._away: list[tuple[float, float]] = []
         self._take_up()
         self.arrived = False

@@ -25,15 +25,17 @@ def clamp_twist(robot: RobotModel, linear: float, angular: float) -> Twist:
     return Twist(linear, angular)
 
 
-def arc_twist(robot: RobotModel, length: float, turn: float) -> Twist:
+def arc_twist(robot: RobotModel, length: float, turn: float, least: float = 0.0) -> Twist:
     """The twist that drives an arc as fast as the robot's speed and turn limits allow.
 
     Args:
         robot: gives the limits.
         length: of the arc, negative for back [m].
         turn: on it [rad].
+        least: time that it takes at least [s].
     """
     seconds = max(
+        least,
         length / robot.max_speed,
         length / robot.min_speed if robot.min_speed < 0.0 else 0.0,
         abs(turn) / robot.max_turn_rate,

@@ -8,7 +8,7 @@ import time
 
 import numpy as np
 import pytest
-from conftest import make_u_maze, scattered_boxes
+from conftest import make_u_maze, scattered_boxes, solved_by
 from ice_scenes import channel
 
 from pushplan.motion import time_slicing
@@ -84,7 +84,8 @@ class TestEveryPlanner:
         busy = time.thread_time()
         result = make_planner(name).plan(start(name), stop=Deadline(0.05))
         used = time.thread_time() - busy  # of the machine; the wall clock counts others' work too
-        assert result.status.has_plan or result.status is PlanStatus.TIMED_OUT
+        others = (PlanStatus.APPROXIMATE, PlanStatus.TIMED_OUT)
+        assert result.status in (*solved_by(name), *others)
         if name not in ONE_SHOT:
             assert used < 0.15
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 
-from pushplan.control import ProgressChecker, StallChecker, clamp_twist
+from pushplan.control import ProgressChecker, StallChecker
+from pushplan.control.limits import arc_twist
 from pushplan.world import RobotModel, Twist
 from pushplan.world.checks import FloatArray
 
@@ -57,13 +58,7 @@ class PoseFollower:
                 self._progress = None
                 continue
             turn += (aside / size) * math.copysign(1.0, ahead) if moves else 0.0
-            command = clamp_twist(robot, *_together(robot, ahead, turn, seconds))
+            command = arc_twist(robot, ahead, turn, seconds)
             self._stall.send(command)
             return command
         return None
-
-
-def _together(robot: RobotModel, ahead: float, turn: float, seconds: float) -> tuple[float, float]:
-    """Speed and turn rate that make a step and a turn in the same time."""
-    seconds = max(seconds, abs(ahead) / robot.max_speed, abs(turn) / robot.max_turn_rate)
-    return ahead / seconds, turn / seconds

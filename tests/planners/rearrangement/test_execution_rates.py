@@ -39,9 +39,14 @@ def reach(policy, turn_rate, period):
 
 
 @pytest.mark.parametrize("period", [0.02, 0.2])
-@pytest.mark.parametrize("turn_rate", [0.05, 0.5])
+@pytest.mark.parametrize(
+    "turn_rate", [0.05, 0.5, *(pytest.param(rate, marks=pytest.mark.slow) for rate in (0.1, 1.5))]
+)
 @pytest.mark.parametrize("policy", [GreedyPusher, Gtsp, GtspMpc])
 def test_a_box_behind_the_robot_is_reached(policy, turn_rate, period):
     seconds, driven = reach(policy(), turn_rate, period)
+    print(
+        f"{policy.__name__}, {turn_rate} rad/s, every {period} s: {seconds:.1f} s, {driven:.1f} m"
+    )
     assert driven < 5.0
     assert seconds < 30.0 + 5.0 / turn_rate

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from conftest import solved_by
 from shapely import Polygon
 from shapely.ops import unary_union
 
@@ -219,8 +220,7 @@ def test_hostile_worlds(name: str) -> None:
 @pytest.mark.parametrize("name", NAMES)
 def test_crowds_of_every_kind(name: str) -> None:
     planner, stop = make_planner(name), MaxIterations(40)
-    paths = (PlanStatus.PATH_ONLY,) if name == "skeleton" else ()  # it knows no turning radius
-    ends = (PlanStatus.SOLVED, *paths)
+    ends = solved_by(name)
     square = 0.5 * np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
     barrier = [square + np.array([x, 5.0]) for x in np.arange(0.5, 12.0, 1.0)]
     through = planner.plan(ship_world(0, movables=Movables.from_polygons(barrier)), stop=stop)
