@@ -11,12 +11,11 @@ import numpy as np
 from pushplan.gtsp import warm_up_solver
 from pushplan.planners.pushing import warm_up as warm_up_pushing
 from pushplan.planners.rearrangement.arc_kernels import arc_step
-from pushplan.planners.rearrangement.extraction import extraction_primitives
-from pushplan.planners.rearrangement.pre_relocation import pre_relocation_pushes
 from pushplan.planners.rearrangement.push_scene import PushScene
 from pushplan.planners.rearrangement.push_simulator import PushSimulator
 from pushplan.planners.rearrangement.rearrangement_config import RearrangementConfig
 from pushplan.planners.rearrangement.recovery import recovery_path
+from pushplan.planners.rearrangement.relocation import relocating_pushes
 from pushplan.world import (
     ClearanceArea,
     Movables,
@@ -38,8 +37,7 @@ def warm_up_rearrangement() -> None:
     warm_up_solver(proof=False)
     warm_up_pushing(executor=False)
     scene = PushScene(_worlds()[0], RearrangementConfig())
-    extraction_primitives(PushSimulator(scene), 0)
-    pre_relocation_pushes(PushSimulator(scene), 0)
+    relocating_pushes(PushSimulator(scene), 0)
     warm_up_recovery()
 
 

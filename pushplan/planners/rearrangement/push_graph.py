@@ -13,13 +13,12 @@ from pushplan.planners.rearrangement.approach import (
     arrivals_at,
     search_approaches,
 )
-from pushplan.planners.rearrangement.candidates import simple_pushes
-from pushplan.planners.rearrangement.extraction import extraction_primitives
+from pushplan.planners.rearrangement.candidates import delivering_pushes
 from pushplan.planners.rearrangement.pose_search_kernels import least_costs
-from pushplan.planners.rearrangement.pre_relocation import pre_relocation_pushes
 from pushplan.planners.rearrangement.push import Push, signature
 from pushplan.planners.rearrangement.push_scene import PushScene
 from pushplan.planners.rearrangement.push_simulator import PushSimulator
+from pushplan.planners.rearrangement.relocation import relocating_pushes
 from pushplan.world.checks import FloatArray
 
 PRE_RELOCATIONS = 2
@@ -83,15 +82,14 @@ def candidate_pushes(
     scene: PushScene, simulator: PushSimulator, pre_relocations: int = 0
 ) -> list[Push]:
     """All candidates of a scene; ``pre_relocations`` see `build_push_graph`."""
-    pushes = simple_pushes(simulator)
+    away = np.hypot(*(scene.poses[:, :2] - scene.world.robot_pose[:2]).T)
+    objects = sorted(simulator.left.tolist(), key=lambda k: (float(away[k]), k))
+    pushes = delivering_pushes(simulator, objects)
     # what is hard to get at is often freed by what is done before
     if pre_relocations or not pushes:
         relocated = 0
-        away = np.hypot(*(scene.poses[:, :2] - scene.world.robot_pose[:2]).T)
-        for k in sorted(simulator.left.tolist(), key=lambda k: (float(away[k]), k)):
-            found, frees = pre_relocation_pushes(simulator, k)
-            if not frees:  # an extraction primitive takes longer to find
-                found += extraction_primitives(simulator, k)
+        for k in objects:
+            found = relocating_pushes(simulator, k)
             pushes += found
             relocated += bool(found)
             if relocated >= max(pre_relocations, PRE_RELOCATIONS):

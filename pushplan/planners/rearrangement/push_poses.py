@@ -14,9 +14,6 @@ from pushplan.planners.rearrangement.push_scene import PushScene
 from pushplan.world import StaticMap
 from pushplan.world.checks import FloatArray
 
-SHIFTS = (0.0, 0.4, -0.4, 0.75, -0.75)
-"""Places of the robot's middle beside the object, in half widths of the bumper."""
-
 
 def heading_axes(heading: float) -> tuple[FloatArray, FloatArray]:
     """Unit vectors (2,) along a heading [rad] and to the left of it."""

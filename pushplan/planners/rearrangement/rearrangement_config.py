@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from pushplan.planners.rearrangement.primitives import PRIMITIVES, PushPrimitive
 from pushplan.world.checks import expect, integer, number
 
 
@@ -49,6 +50,7 @@ class RearrangementConfig:
     max_simulations: int = 30
     response: float = 0.2
     mpc: bool = True
+    primitives: tuple[PushPrimitive, ...] = PRIMITIVES
 
     def __post_init__(self) -> None:
         for name in ("work_weight", "friction", "static_friction", "turn_cost", "contact_cost"):
