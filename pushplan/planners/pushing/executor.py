@@ -186,9 +186,7 @@ class PushExecutor:
         expect("task", task, PushTask)
         if expect("world", world, World).robot.drive is not Drive.DIFFERENTIAL:
             raise InvalidInputError("pushing along a path needs a differential drive")
-        if self._clock.advance(world):
-            self._clock.command = self._execute(world, task)
-        return self._clock.command
+        return self._clock.command_for(world, lambda _: self._execute(world, task))
 
     def _execute(self, world: World, task: PushTask) -> Twist:
         if task is not self._task:
