@@ -95,9 +95,8 @@ class PushingMpc:
             InvalidInputError: if the plan names no box, or the robot cannot stop.
         """
         expect("plan", plan, Plan)
-        if self._clock.advance(expect("world", world, World)):
-            self._clock.command = self._follow(world, plan)
-        return self._clock.command
+        expect("world", world, World)
+        return self._clock.command_for(world, lambda _: self._follow(world, plan))
 
     def _follow(self, world: World, plan: Plan) -> Twist:
         k = self._prepare(world, plan)

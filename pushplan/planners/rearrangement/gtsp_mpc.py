@@ -95,9 +95,7 @@ class GtspMpc:
             InvalidInputError: if the goal is one for the robot, or the robot cannot stop.
         """
         check_world(world)
-        if self._clock.advance(world):
-            self._clock.command = self._act(world)
-        return self._clock.command
+        return self._clock.command_for(world, self._act)
 
     def _act(self, world: World) -> Twist:
         scene = self._scene(world)
