@@ -132,13 +132,14 @@ class PlanFollower:
         if self._progress is None:
             self.reset(world, self._rng)
         self.background_s = 0.0
-        if self._clock.advance(world):
-            wanted = self._act(world)
-            last, held = self._clock.command, self._clock.held
-            self._clock.command = ramp_twist(world.robot, last, wanted.linear, wanted.angular, held)
-        return self._clock.command
+        return self._clock.command_for(world, self._act)
 
     def _act(self, world: World) -> Twist:
+        wanted = self._choose(world)
+        last, held = self._clock.command, self._clock.held
+        return ramp_twist(world.robot, last, wanted.linear, wanted.angular, held)
+
+    def _choose(self, world: World) -> Twist:
         self._receive(world)
         if self._pending is None:
             reason = self._needs_plan(world)

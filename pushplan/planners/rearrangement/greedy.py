@@ -110,9 +110,7 @@ class GreedyPusher:
             InvalidInputError: if the goal is one for the robot, or the robot cannot stop.
         """
         check_pusher(world, "the greedy pusher")
-        if self._clock.advance(world):
-            self._clock.command = self._act(world)
-        return self._clock.command
+        return self._clock.command_for(world, self._act)
 
     def _act(self, world: World) -> Twist:
         if self._attempt is not None and self._is_over(world, self._attempt):

@@ -35,7 +35,7 @@ _WEDGED = (-2.2, -0.985, 0.0)  # A box a little in one of the columns
 def warm_up_rearrangement() -> None:
     """Solve, push and look for every kind of push; no kernel is for one kind of task alone."""
     warm_up_solver(proof=False)
-    warm_up_pushing(executor=False)
+    warm_up_pushing()
     scene = PushScene(_worlds()[0], RearrangementConfig())
     relocating_pushes(PushSimulator(scene), 0)
     warm_up_recovery()
