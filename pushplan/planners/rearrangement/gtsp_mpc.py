@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
+from collections import Counter
 from typing import Any
 
 import numpy as np
 
 from pushplan.control import EpisodeClock, Retreat
-from pushplan.planners.rearrangement.greedy import GreedyPusher
 from pushplan.planners.rearrangement.pose_follower import PoseFollower
 from pushplan.planners.rearrangement.push import Push, signature
 from pushplan.planners.rearrangement.push_execution import ExecutionEnd, PushExecution
@@ -22,21 +21,17 @@ from pushplan.planners.rearrangement.rollout_cache import RolloutCache
 from pushplan.world import InvalidInputError, Twist, World
 from pushplan.world.checks import FloatArray, expect
 
-_FALLBACK = 45.0
-"""How long the fallback works where nothing is found [times in which the robot drives a
-circumscribed radius and turns by half a radian]."""
-_TRIES = 6  # how often it does so without progress before what is left is given up
+_ROUNDS = 6  # how often pushes that have failed are tried anew before what is left is given up
 _RETREAT = 0.3  # how far it backs off where it is stuck [circumscribed radii]
 _PENALTY = 3.0  # what is added to the cost of a push that has failed [circumscribed radii]
-_TABU_AFTER = 3  # after so many failures a push is tabu until something else has been done
+_MOST_FAILURES = 3  # after so many a push waits until something else has been done
 
 
 class GtspMpc:
     """Clears or delivers objects: which next, from which side, together with which others.
 
     After every push the push graph is built anew from what is seen, and the order of pushes
-    solved anew; the first of them is carried out. Where no push is found, a `GreedyPusher` works
-    until one more object is done. No chance is involved.
+    solved anew; the first of them is carried out. No chance is involved.
 
     Args:
         config: settings.
@@ -56,23 +51,17 @@ class GtspMpc:
         if config is None:
             config = RearrangementConfig.of(**overrides)
         self.config = expect("config", config, RearrangementConfig)
-        self._optimistic_config = replace(config, static_friction=0.0)
         self._forget()
 
     def _forget(self) -> None:
         self._execution: PushExecution | None = None
-        self._caches = RolloutCache(), RolloutCache()
-        self._optimistic = False
-        self._penalties: dict[tuple[object, ...], float] = {}
-        self._tabu: set[tuple[object, ...]] = set()
-        self._failures = 0
-        self._recovery: PoseFollower | None = None
+        self._away: Retreat | PoseFollower | None = None
+        self._cache = RolloutCache()
+        self._failures: Counter[tuple[object, ...]] = Counter()
+        self._left, self._rounds, self._stuck = -1, 0, 0
         self._recovered_from: FloatArray | None = None
-        self._retreat: Retreat | None = None
-        self._clock = EpisodeClock(self.config.response)
-        self._fallback = GreedyPusher()
-        self._fallback_until, self._left, self._no_progress = -math.inf, -1, 0
         self._stopped_at: PushScene | None = None
+        self._clock = EpisodeClock(self.config.response)
         self.given_up: dict[int, str] = {}
         self.plan: tuple[Push, ...] = ()
         self.graph: PushGraph | None = None
@@ -98,115 +87,83 @@ class GtspMpc:
         return self._clock.command_for(world, self._act)
 
     def _act(self, world: World) -> Twist:
-        scene = self._scene(world)
+        scene = PushScene(world, self.config, self._cache)
         left = int((~scene.done).sum())
         if left != self._left:  # something was done, or has come back
-            self._left, self._no_progress, self._fallback_until = left, 0, -math.inf
-            self._stopped_at, self._optimistic = None, False
-            self._tabu.clear()
-            for cache in self._caches:
-                cache.searches = 0
+            self._left, self._rounds, self._stopped_at = left, 0, None
+            self._failures = Counter(
+                {key: min(n, _MOST_FAILURES - 1) for key, n in self._failures.items()}
+            )
         if not left:
             self._execution, self.given_up, self.plan = None, {}, ()
             return Twist(0.0, 0.0)
         if self._stopped_at is not None and _alike(scene, self._stopped_at):
             return Twist(0.0, 0.0)
-        if world.time < self._fallback_until:
-            return self._fallback.act(world)
-        return self._decide(scene) or self._fall_back(scene)
-
-    def _scene(self, world: World) -> PushScene:
-        """The scene to plan in; in the optimistic model objects slide along walls."""
-        if self._optimistic:
-            return PushScene(world, self._optimistic_config, self._caches[1])
-        return PushScene(world, self.config, self._caches[0])
-
-    def _decide(self, scene: PushScene) -> Twist | None:
-        """The next command of a push; None if none is found."""
-        world, chosen, held = scene.world, None, self._clock.held
-        for _ in range(4):
-            if self._retreat is not None:
-                away = self._retreat.command(world.robot_pose, world.time, held)
+        searched, held = False, self._clock.held
+        for _ in range(4):  # jobs that end at once
+            if self._away is not None:
+                away = self._away.command(world.robot_pose, world.time, held)
                 if away is not None:
                     return away
-                self._retreat = None
-            if self._recovery is not None:
-                recovering = self._recovery.command(world.robot_pose, world.time, held)
-                if recovering is not None:
-                    return recovering
-                self._recovery = None
+                self._away = None
             if self._execution is None:
-                if chosen is not None:  # one search a step is enough
+                if searched or not self._choose(scene):  # one search a step is enough
                     break
-                self._caches[self._optimistic].age()
-                tabu = dict.fromkeys(self._tabu, math.inf)
-                chosen = select_push(scene, self._penalties | tabu)
-                self.graph, self.plan = chosen.graph, chosen.plan
-                self.given_up = dict(chosen.graph.infeasible)
-                if chosen.first is None:
-                    return self._recover(scene)
-                push = chosen.first.push
-                self._execution = PushExecution(
-                    world,
-                    push,
-                    chosen.first.route,
-                    self.config.response,
-                    predictive=self.config.mpc and signature(push) not in self._penalties,
-                )
-            command = self._execution.command(scene, held)
-            if isinstance(command, Twist):
-                return command
-            self._close(scene, self._execution, command)
+                searched = True
+            if self._execution is not None:
+                command = self._execution.command(scene, held)
+                if isinstance(command, Twist):
+                    return command
+                self._close(scene, self._execution, command)
         return Twist(0.0, 0.0)
 
-    def _recover(self, scene: PushScene) -> Twist | None:
-        """Without a push: get out of a tight place, or else plan with the optimistic model."""
-        margin = 0.5 * self.config.margin * scene.size
-        here, path = scene.world.robot_pose, recovery_path(scene.world, margin)
-        tried = self._recovered_from is not None and bool(
-            np.abs(self._recovered_from - here).max() < 0.02 * scene.size
-        )
-        if path is not None and not tried:  # else it has not moved since
+    def _choose(self, scene: PushScene) -> bool:
+        """Take up the best push, or else leave a tight place; whether there is anything to do."""
+        self._cache.age()
+        chosen = select_push(scene, self._penalties(scene))
+        self.graph, self.plan = chosen.graph, chosen.plan
+        self.given_up = dict(chosen.graph.infeasible)
+        if chosen.first is not None:
+            push, route = chosen.first.push, chosen.first.route
+            predictive = self.config.mpc and signature(push) not in self._failures
+            self._execution = PushExecution(
+                scene.world, push, route, self.config.response, predictive=predictive
+            )
+            return True
+        path = recovery_path(scene.world, 0.5 * self.config.margin * scene.size)
+        here, before = scene.world.robot_pose, self._recovered_from
+        moved = before is None or bool(np.abs(before - here).max() > 0.02 * scene.size)
+        if path is not None and moved:
             self._recovered_from = here
-            self._recovery = PoseFollower(scene.world.robot, path, self.config.response)
-            return self._recovery.command(here, scene.world.time, self._clock.held)
-        self._optimistic = not self._optimistic
-        return Twist(0.0, 0.0) if self._optimistic else None
+            self._away = PoseFollower(scene.world.robot, path, self.config.response)
+            return True
+        if self._failures and self._rounds < _ROUNDS:
+            self._failures.clear()
+            self._rounds += 1
+            return True
+        self._stopped_at = scene
+        return False
+
+    def _penalties(self, scene: PushScene) -> dict[tuple[object, ...], float]:
+        """What is added to the cost of pushes that have failed [m]."""
+        each = _PENALTY * scene.size
+        return {
+            key: math.inf if count >= _MOST_FAILURES else count * each
+            for key, count in self._failures.items()
+        }
 
     def _close(self, scene: PushScene, execution: PushExecution, end: ExecutionEnd) -> None:
         """Draw the conclusions from how an execution ended."""
         self._execution = None
         if end is ExecutionEnd.DONE and not execution.push.pre_relocates:
-            self._failures = 0
+            self._stuck = 0
             return
-        if end is not ExecutionEnd.OBSOLETE:  # also a pre-relocation, so that another comes next
-            key = signature(execution.push)
-            penalty = self._penalties[key] = self._penalties.get(key, 0.0) + _PENALTY * scene.size
-            if penalty > (_TABU_AFTER - 0.5) * _PENALTY * scene.size:
-                self._tabu.add(key)
+        if end is not ExecutionEnd.OBSOLETE:  # also a relocation, so that another comes next
+            self._failures[signature(execution.push)] += 1
         if end is ExecutionEnd.STUCK:
-            self._failures += 1
-            pose = scene.world.robot_pose
-            self._retreat = Retreat(
-                scene.world.robot, pose, _RETREAT * scene.size, self._failures - 1
-            )
-
-    def _fall_back(self, scene: PushScene) -> Twist:
-        """Let the greedy pusher work for a while; stop where that has made no progress either."""
-        world, ids = scene.world, scene.world.movables.ids
-        if self._no_progress >= _TRIES:
-            why = "neither a push for it was found, nor has simple pushing moved it on"
-            self.given_up = {int(i): why for i in ids[~scene.done]}
-            self._stopped_at = scene
-            return Twist(0.0, 0.0)
-        if self._no_progress == 0:
-            self._penalties.clear()
-            self._tabu.clear()
-        self._no_progress += 1
-        robot = world.robot
-        seconds = scene.size / robot.max_speed + 0.5 / robot.max_turn_rate
-        self._fallback_until = world.time + _FALLBACK * seconds
-        return self._fallback.act(world)
+            robot, pose = scene.world.robot, scene.world.robot_pose
+            self._away = Retreat(robot, pose, _RETREAT * scene.size, self._stuck)
+            self._stuck += 1
 
 
 def _alike(one: PushScene, other: PushScene) -> bool:

@@ -10,6 +10,7 @@ import numpy as np
 
 from pushplan.gtsp import warm_up_solver
 from pushplan.planners.pushing import warm_up as warm_up_pushing
+from pushplan.planners.rearrangement.approach import approach_tree
 from pushplan.planners.rearrangement.arc_kernels import arc_step
 from pushplan.planners.rearrangement.push_scene import PushScene
 from pushplan.planners.rearrangement.push_simulator import PushSimulator
@@ -37,7 +38,7 @@ def warm_up_rearrangement() -> None:
     warm_up_solver(proof=False)
     warm_up_pushing()
     scene = PushScene(_worlds()[0], RearrangementConfig())
-    relocating_pushes(PushSimulator(scene), 0)
+    relocating_pushes(PushSimulator(scene), 0, approach_tree(scene))
     warm_up_recovery()
 
 

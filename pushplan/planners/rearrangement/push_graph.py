@@ -61,7 +61,7 @@ def build_push_graph(
     """
     approach = approach_tree(scene)
     simulator = PushSimulator(scene)
-    pushes = candidate_pushes(scene, simulator, pre_relocations)
+    pushes = candidate_pushes(scene, simulator, approach, pre_relocations)
     row = least_costs(approach.costs, arrivals_at(scene.fine, pushes))
     extra = np.array([(penalties or {}).get(signature(push), 0.0) for push in pushes])
     pushes, keep = _best(scene, pushes, row + extra)
@@ -79,7 +79,7 @@ def build_push_graph(
 
 
 def candidate_pushes(
-    scene: PushScene, simulator: PushSimulator, pre_relocations: int = 0
+    scene: PushScene, simulator: PushSimulator, approach: ApproachTree, pre_relocations: int = 0
 ) -> list[Push]:
     """All candidates of a scene; ``pre_relocations`` see `build_push_graph`."""
     away = np.hypot(*(scene.poses[:, :2] - scene.world.robot_pose[:2]).T)
@@ -89,7 +89,7 @@ def candidate_pushes(
     if pre_relocations or not pushes:
         relocated = 0
         for k in objects:
-            found = relocating_pushes(simulator, k)
+            found = relocating_pushes(simulator, k, approach)
             pushes += found
             relocated += bool(found)
             if relocated >= max(pre_relocations, PRE_RELOCATIONS):

@@ -18,13 +18,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from pushplan.planners.rearrangement.approach import ApproachTree, arrival_poses
 from pushplan.planners.rearrangement.arc_kernels import sweep_arcs
 from pushplan.planners.rearrangement.candidates import can_deliver
 from pushplan.planners.rearrangement.goal_kernels import REMOVED
+from pushplan.planners.rearrangement.primitives import SHIFTS
 from pushplan.planners.rearrangement.push import Push
+from pushplan.planners.rearrangement.push_pose_kernels import first_free
 from pushplan.planners.rearrangement.push_poses import (
-    distance_to_bounds,
-    distance_to_obstacles,
+    heading_axes,
     initial_heading,
     pose_behind,
     pose_distance,
@@ -39,33 +41,36 @@ _STARTS = 300  # from how many places round the object a drive may begin
 _DRAWS = 3000  # how many places are looked at for that
 _LENGTH = 1.6  # of an arc [circumscribed radii]
 _DEPTH = 3  # how many arcs follow one another at most
-_EXPANSIONS = 120  # how many states are driven on from
+_EXPANSIONS = 400  # how many states are driven on from
 _ALIKE = 3  # from how many states with the object in the same place
-_TRIALS = 45
-"""In how many places it is looked whether the object can be pushed home."""
-_ENOUGH = 3  # after so many places that an object can be delivered from no more are looked for
+_ENOUGH = 8  # after so many sides from which a drive helps no more are looked for
 _SIDES = 20  # how many drives are kept, all sides from which they begin counted
-_SHAKEN = ((0.0, 0.0, 0.0), (0.08, 0.08, 0.15), (-0.08, 0.08, -0.15), (0.0, -0.1, 0.0))
-"""Errors of the prediction with which that has to succeed [circumscribed radii, rad]."""
+_ERRORS = ((0.0, 0.0, 0.0), (0.08, 0.08, 0.15), (-0.08, 0.08, -0.15), (0.0, -0.1, 0.0))
+"""Errors of the prediction that a push home afterwards stands [circumscribed radii, rad]."""
+_MARGINS = (1.0, 2.0, 3.0)
+"""Factors on them; a drive costs a circumscribed radius more for each that it does not stand."""
 _LEAST = 0.15  # by how much an object has to be moved for it to count [circumscribed radii]
-_NEARLY = (0.0, 0.6, -0.6)
+_NEARLY = tuple(math.radians(turn) for turn in (0, 30, -30, 60, -60))
 """Directions in which a push brings an object nearer to its goal, against the way there [rad]."""
+_LACKING = 3.0  # cost of clearance that the robot lacks behind the object
+_GAIN = 0.3  # by how much less has to be left to be done for a drive to help [circumscribed radii]
 _NEAR = 8.0  # what is farther from the object does not count for a search [circumscribed radii]
 _CURVATURES = (0.0, 0.7, -0.7, 1.6, -1.6)  # of the arcs, times the robot's circumscribed radius
 _SPREAD = np.array([0.8191725134, 0.6710436067, 0.5497004779])
 """Steps of an additive recurrence that fills a cube evenly (Roberts 2018)."""
 
 
-def relocating_pushes(simulator: PushSimulator, k: int) -> list[Push]:
+def relocating_pushes(simulator: PushSimulator, k: int, approach: ApproachTree) -> list[Push]:
     """Drives after which object ``k`` can be pushed home, or else lies better than now."""
     scene, found = simulator.scene, None
     movables = scene.world.movables
     near = np.hypot(*(scene.poses[:, :2] - scene.poses[k, :2]).T) < _NEAR * scene.size
-    key = movables.ids[near].tobytes() + scene.poses[near].tobytes()
+    robot = np.round(scene.world.robot_pose[:2] / (2.0 * scene.size))
+    key = movables.ids[near].tobytes() + scene.poses[near].tobytes() + robot.tobytes()
     if scene.cache is not None:
         found = scene.cache.primitives(int(movables.ids[k]), key)
     if found is None:
-        found = _RelocationSearch(scene, k).run()
+        found = _RelocationSearch(scene, k, approach).run()
         if scene.cache is not None:
             scene.cache.keep_primitives(int(movables.ids[k]), key, found)
     return [
@@ -83,25 +88,25 @@ class _State:
         path: (N, 3) of the robot, from the start on.
         poses: (K, 3) of the objects.
         depth: how many arcs that were.
-        lack: clearance that the object lacks there [m].
-        left: how far it has to go from there [m].
+        away: what it costs to get to the start [m].
+        rest: what is left to be done with the object [m].
         cost: of the drive, and of what it leaves to be done [m].
     """
 
     path: FloatArray
     poses: FloatArray
     depth: int
-    lack: float = math.inf
-    left: float = math.inf
+    away: float = 0.0
+    rest: float = math.inf
     cost: float = math.inf
 
 
 class _RelocationSearch:
     """The search for one object of a scene."""
 
-    def __init__(self, scene: PushScene, k: int) -> None:
-        self._scene, self._k = scene, k
-        self._ways: dict[tuple[int, int], tuple[float, float]] = {}
+    def __init__(self, scene: PushScene, k: int, approach: ApproachTree) -> None:
+        self._scene, self._k, self._approach = scene, k, approach
+        self._rests: dict[tuple[int, ...], float] = {}
         self._arcs = _arcs(scene)
         self._steps = max(2, math.ceil(_LENGTH * scene.size / scene.controller.step))
         self._open: list[tuple[float, int, _State]] = []
@@ -112,52 +117,57 @@ class _RelocationSearch:
         """Drives, each with the cost of what it leaves to be done [m]."""
         scene, k = self._scene, self._k
         root = self._rated([_State(np.zeros((1, 3)), scene.poses, 0)])[0]
-        batches = iter((self._behind, self._around))
-        self._push(root)
-        tried: dict[tuple[int, ...], bool] = {}
+        for start in itertools.chain(self._behind(), self._around()):
+            away = self._approach_cost(start)
+            if math.isfinite(away):
+                state = replace(root, path=start[None], away=away, cost=root.cost + away)
+                heapq.heappush(self._open, (state.cost, next(self._order), state))
+        tried: dict[tuple[int, ...], int] = {}
         expanded: Counter[tuple[int, ...]] = Counter()
-        while self._open and expanded.total() < _EXPANSIONS:
+        sides: set[tuple[int, ...]] = set()
+        while self._open and expanded.total() < _EXPANSIONS and len(sides) < _ENOUGH:
             state = heapq.heappop(self._open)[2]
-            if state is root:
-                starts = next(batches, None)
-                if starts is not None:
-                    for start in starts():
-                        self._expand(_State(start[None], scene.poses, 0))
-                    self._push(root)
+            if not state.depth:
+                expanded[()] += 1
+                self._expand(state)
                 continue
             place = self._cell(state.poses[k], 0.2, 0.5)
             if not self._has_moved(state) or expanded[place] >= _ALIKE:
                 continue
             if place not in tried:
-                if len(tried) == _TRIALS:
-                    break
-                tried[place] = all(self._delivers(state, by) for by in _SHAKEN)
-                if sum(tried.values()) == _ENOUGH:
-                    break
-            if not tried[place] and state.depth < _DEPTH:
+                tried[place] = self._margins_left(state)
+            if not tried[place]:
+                sides.add(self._side(state))
+            elif state.depth < _DEPTH:
                 expanded[place] += 1
                 self._expand(state)
-        self.tried, self.n = tried, expanded.total()
         self._states.sort(key=lambda state: state.cost)
-        good = [state for state in self._states if tried.get(self._cell(state.poses[k], 0.2, 0.5))]
+        good = []
+        for state in self._states:
+            margins = tried.get(self._cell(state.poses[k], 0.2, 0.5), len(_MARGINS))
+            if margins < len(_MARGINS):
+                good.append((margins * scene.size, state))
         if good:
-            return [(state.path, 0.0) for state in self._from_all_sides(good)]
-        better = [
-            state
-            for state in self._states
-            if state.lack < root.lack - 0.08 * scene.size
-            or (
-                state.lack < root.lack + 0.02 * scene.size
-                and state.left < root.left - 0.3 * scene.size
-            )
-        ]
+            good.sort(key=lambda entry: entry[0] + entry[1].cost)
+            extra = {id(state): more for more, state in good}
+            return [
+                (state.path, extra[id(state)])
+                for state in self._from_all_sides(state for _, state in good)
+            ]
+        better = [state for state in self._states if state.rest < root.rest - _GAIN * scene.size]
         return [
-            (state.path, 3.0 * state.lack + 2.0 * scene.size)
+            (state.path, state.rest - self._left(state) + 2.0 * scene.size)
             for state in self._from_all_sides(better)
         ]
 
-    def _push(self, state: _State) -> None:
-        heapq.heappush(self._open, (state.cost, next(self._order), state))
+    def _left(self, state: _State) -> float:
+        """Shortest path of the object from where a state has it [m]."""
+        return float(self._scene.remaining(state.poses[[self._k]])[0])
+
+    def _approach_cost(self, start: FloatArray) -> float:
+        """What it costs to get to a start (3,) [m]."""
+        nodes, extra = arrival_poses(self._scene.fine, start)
+        return float((self._approach.costs[nodes] + extra).min()) if len(nodes) else math.inf
 
     def _expand(self, state: _State) -> None:
         """Drive on from a state along every arc; each place that the object gets to is a state."""
@@ -168,7 +178,12 @@ class _RelocationSearch:
             start, before, self._arcs, self._steps, scene.bodies, scene.settings
         )
         found = [
-            _State(np.concatenate([state.path, track[1 : end + 1]]), after[end], state.depth + 1)
+            _State(
+                np.concatenate([state.path, track[1 : end + 1]]),
+                after[end],
+                state.depth + 1,
+                state.away,
+            )
             for track, after, count in zip(tracks, poses, reached, strict=True)
             for end in _news(after[:count, k], scene.size)
         ]
@@ -176,34 +191,35 @@ class _RelocationSearch:
             return
         for rated in self._rated(found):
             self._states.append(rated)
-            self._push(rated)
+            heapq.heappush(self._open, (rated.cost, next(self._order), rated))
 
     def _rated(self, states: list[_State]) -> list[_State]:
         """States, with what they leave to be done and what they cost."""
-        step, points = self._scene.controller.step, np.array([s.poses[self._k, :2] for s in states])
-        ways = [self._way_from(point) for point in points]
-        lacks = self._lacks(points, np.array([towards for towards, _ in ways])).tolist()
-        return [
-            replace(
-                state,
-                lack=lack,
-                left=left,
-                cost=3.0 * lack + left + step * (len(state.path) - 1),
-            )
-            for state, lack, (_, left) in zip(states, lacks, ways, strict=True)
-        ]
+        step, found = self._scene.controller.step, []
+        for state in states:
+            rest = self._rest(state.poses[self._k])
+            driven = step * (len(state.path) - 1)
+            found.append(replace(state, rest=rest, cost=state.away + driven + rest))
+        return found
 
     def _has_moved(self, state: _State) -> bool:
         scene, k = self._scene, self._k
         return pose_distance(state.poses[k], scene.poses[k], scene.size) >= _LEAST
 
-    def _delivers(self, state: _State, by: tuple[float, float, float]) -> bool:
+    def _margins_left(self, state: _State) -> int:
+        """How many of the margins for errors a push home from where a state has the object lacks."""
+        for n, margin in enumerate(_MARGINS):
+            if not all(self._delivers(state, margin * np.array(by)) for by in _ERRORS[n > 0 :]):
+                return len(_MARGINS) - n
+        return 0
+
+    def _delivers(self, state: _State, by: FloatArray) -> bool:
         """Whether a push gets the object home from where it is in a state, moved by an error."""
         scene, k = self._scene, self._k
         there = state.poses[:, 0] < 0.5 * REMOVED
         world, index = scene.world, int(there[:k].sum())
         moved = state.poses[there]
-        moved[index] += np.array(by) * np.array([scene.size, scene.size, 1.0])
+        moved[index] += by * np.array([scene.size, scene.size, 1.0])
         movables = world.movables.select(there).moved_to(moved)
         after = PushScene(
             replace(world, movables=movables, robot_pose=state.path[-1]), scene.config
@@ -218,55 +234,47 @@ class _RelocationSearch:
         """The first few states with drives that begin in different places."""
         sides: dict[tuple[int, ...], _State] = {}
         for state in states:
-            sides.setdefault(self._cell(state.path[0], 0.8, 0.8), state)
+            sides.setdefault(self._side(state), state)
             if len(sides) == _SIDES:
                 break
         return list(sides.values())
+
+    def _side(self, state: _State) -> tuple[int, ...]:
+        """The box of poses that a drive begins in."""
+        return self._cell(state.path[0], 0.8, 0.8)
 
     def _cell(self, pose: FloatArray, side: float, turn: float) -> tuple[int, ...]:
         """A box of poses, sides in circumscribed radii and [rad]."""
         units = (side * self._scene.size, side * self._scene.size, turn)
         return tuple(round(float(value) / unit) for value, unit in zip(pose, units, strict=True))
 
-    def _lacks(self, points: FloatArray, towards: FloatArray) -> FloatArray:
-        """The clearance that the robot lacks for work on the object at points (N, 2) [m].
+    def _rest(self, pose: FloatArray) -> float:
+        """What is left to be done with the object at a pose (3,), or near it [m].
 
-        Between columns that is clearance on every side; at the walls, clearance behind the object,
-        that is where the robot would push it towards its goal from, or nearly so.
+        Its shortest path, and clearance that the robot lacks behind it: how much farther along its
+        path, or nearly so, the object would have to be for the robot to fit there.
         """
-        scene = self._scene
-        static = scene.world.static
-        depth = scene.front + float(scene.world.movables.radii[self._k])
-        missing = np.full(len(points), np.inf)
-        for turn in _NEARLY:
-            u = np.column_stack([np.cos(towards + turn), np.sin(towards + turn)])
-            clearance = np.minimum(
-                distance_to_bounds(static, points - depth * u) / (1.05 * scene.half),
-                distance_to_bounds(static, points - (depth + scene.front) * u) / scene.size,
-            )
-            missing = np.minimum(missing, scene.size * np.maximum(1.0 - clearance, 0.0))
-        between = 1.05 * scene.half - distance_to_obstacles(static, points)
-        out: FloatArray = missing + np.maximum(between, 0.0)
-        return out
-
-    def _way_from(self, point: FloatArray) -> tuple[float, float]:
-        """Direction [rad] and length [m] of the object's path from a point (2,) or near it."""
-        unit = 0.1 * self._scene.size
-        key = round(float(point[0]) / unit), round(float(point[1]) / unit)
-        if key not in self._ways:
-            path = self._scene.object_path(self._k, 0.0, pose=np.array([*point, 0.0]))
+        scene, k = self._scene, self._k
+        key = self._cell(pose, 0.1, 0.5)
+        if key not in self._rests:
+            path = scene.object_path(k, 0.0, pose=pose)
             if path is None:
-                self._ways[key] = math.nan, 0.0
-            else:
-                self._ways[key] = initial_heading(path, 0.5 * self._scene.size), path_length(path)
-        return self._ways[key]
+                return _LACKING * 1.5 * scene.size
+            towards, lack = initial_heading(path, scene.size), 1.5 * scene.size
+            for turn, shift in itertools.product(_NEARLY, SHIFTS):
+                u, _ = heading_axes(towards + turn)
+                start = pose_behind(scene, k, towards + turn, shift * scene.half, pose)
+                lack = min(lack, float(first_free(start, u, 0.1 * scene.size, lack, *scene.fit)))
+            self._rests[key] = _LACKING * lack + path_length(path)
+        return self._rests[key]
 
     def _behind(self) -> Iterator[FloatArray]:
         """Poses (3,) behind and beside the object, by the rows of arcs of the table."""
         scene, k = self._scene, self._k
-        towards, _ = self._way_from(scene.poses[k, :2])
-        if not math.isfinite(towards):
+        path = scene.object_path(k, 0.0)
+        if path is None:
             return
+        towards = initial_heading(path, 0.5 * scene.size)
         for row in scene.config.primitives:
             if row.controller == "arc":
                 for lean, shift in itertools.product(row.leans, row.shifts):
