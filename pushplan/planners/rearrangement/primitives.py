@@ -20,7 +20,7 @@ class PushPrimitive(CheckedFields):
             ``"path"`` steers the object along its shortest path to the goal; ``"arc"`` drives short
             arcs, ahead and back, that only relocate the object.
         leans: headings of the robot against the edge's normal, or the start of the path [deg].
-        shifts: places of the robot's middle to the left of the object's [half widths of the bumper].
+        shifts: places of the robot's middle left of the object's [half widths of the bumper].
         gains: of the pushing controller that follows the path.
         clearance: distance that the path keeps from what is static [half widths of the bumper]; 0
             for 0.75 radii of the object.

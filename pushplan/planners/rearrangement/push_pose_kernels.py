@@ -48,3 +48,26 @@ def first_free(
             return n * step
         n += 1
     return np.inf
+
+
+@kernel(allocates=True)
+def missing_clearance(
+    pose: FloatArray,  # (3,) of the object
+    outline: FloatArray,  # (N, 2) in its frame [m]
+    headings: FloatArray,  # (H,) in which it may be pushed [rad]
+    shifts: FloatArray,  # (S,) of the robot's middle to the left [m]
+    distance: float,  # of the robot's middle from the outline [m]
+    limit: float,
+    shape: Footprint,
+    among: ConvexObstacles,
+    scratch: FloatArray,
+) -> float:
+    """How much farther on an object would have to be for the robot to fit behind it [m]."""
+    least = limit
+    u = np.empty(2)
+    for heading in headings:
+        u[0], u[1] = math.cos(heading), math.sin(heading)
+        for shift in shifts:
+            start = pose_behind_outline(pose, outline, heading, shift, distance)
+            least = min(least, first_free(start, u, limit / 15.0, least, shape, among, scratch))
+    return least

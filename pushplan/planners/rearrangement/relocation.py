@@ -24,9 +24,8 @@ from pushplan.planners.rearrangement.candidates import can_deliver
 from pushplan.planners.rearrangement.goal_kernels import REMOVED
 from pushplan.planners.rearrangement.primitives import SHIFTS
 from pushplan.planners.rearrangement.push import Push
-from pushplan.planners.rearrangement.push_pose_kernels import first_free
+from pushplan.planners.rearrangement.push_pose_kernels import missing_clearance
 from pushplan.planners.rearrangement.push_poses import (
-    heading_axes,
     initial_heading,
     pose_behind,
     pose_distance,
@@ -50,8 +49,10 @@ _ERRORS = ((0.0, 0.0, 0.0), (0.08, 0.08, 0.15), (-0.08, 0.08, -0.15), (0.0, -0.1
 _MARGINS = (1.0, 2.0, 3.0)
 """Factors on them; a drive costs a circumscribed radius more for each that it does not stand."""
 _LEAST = 0.15  # by how much an object has to be moved for it to count [circumscribed radii]
-_NEARLY = tuple(math.radians(turn) for turn in (0, 30, -30, 60, -60))
+_NEARLY = np.radians([0.0, 30.0, -30.0, 60.0, -60.0])
 """Directions in which a push brings an object nearer to its goal, against the way there [rad]."""
+_BESIDE = np.array(SHIFTS)
+_NEWS = 0.05  # how far an object moves on until it is looked at anew [circumscribed radii]
 _LACKING = 3.0  # cost of clearance that the robot lacks behind the object
 _GAIN = 0.3  # by how much less has to be left to be done for a drive to help [circumscribed radii]
 _NEAR = 8.0  # what is farther from the object does not count for a search [circumscribed radii]
@@ -96,9 +97,9 @@ class _State:
     path: FloatArray
     poses: FloatArray
     depth: int
-    away: float = 0.0
-    rest: float = math.inf
-    cost: float = math.inf
+    away: float
+    rest: float
+    cost: float
 
 
 class _RelocationSearch:
@@ -116,11 +117,11 @@ class _RelocationSearch:
     def run(self) -> list[Primitive]:
         """Drives, each with the cost of what it leaves to be done [m]."""
         scene, k = self._scene, self._k
-        root = self._rated([_State(np.zeros((1, 3)), scene.poses, 0)])[0]
+        now = self._rest(scene.poses[k])
         for start in itertools.chain(self._behind(), self._around()):
             away = self._approach_cost(start)
             if math.isfinite(away):
-                state = replace(root, path=start[None], away=away, cost=root.cost + away)
+                state = _State(start[None], scene.poses, 0, away, now, away + now)
                 heapq.heappush(self._open, (state.cost, next(self._order), state))
         tried: dict[tuple[int, ...], int] = {}
         expanded: Counter[tuple[int, ...]] = Counter()
@@ -154,7 +155,7 @@ class _RelocationSearch:
                 (state.path, extra[id(state)])
                 for state in self._from_all_sides(state for _, state in good)
             ]
-        better = [state for state in self._states if state.rest < root.rest - _GAIN * scene.size]
+        better = [state for state in self._states if state.rest < now - _GAIN * scene.size]
         return [
             (state.path, state.rest - self._left(state) + 2.0 * scene.size)
             for state in self._from_all_sides(better)
@@ -174,40 +175,31 @@ class _RelocationSearch:
         scene, k = self._scene, self._k
         # copies may be written to: one kernel for all
         start, before = np.array(state.path[-1]), np.array(state.poses)
-        tracks, poses, reached = sweep_arcs(
-            start, before, self._arcs, self._steps, scene.bodies, scene.settings
+        tracks, poses, marks = sweep_arcs(
+            start,
+            before,
+            self._arcs,
+            self._steps,
+            k,
+            scene.size,
+            _NEWS,
+            scene.bodies,
+            scene.settings,
         )
-        found = [
-            _State(
-                np.concatenate([state.path, track[1 : end + 1]]),
-                after[end],
-                state.depth + 1,
-                state.away,
-            )
-            for track, after, count in zip(tracks, poses, reached, strict=True)
-            for end in _news(after[:count, k], scene.size)
-        ]
-        if not found:
-            return
-        for rated in self._rated(found):
-            self._states.append(rated)
-            heapq.heappush(self._open, (rated.cost, next(self._order), rated))
-
-    def _rated(self, states: list[_State]) -> list[_State]:
-        """States, with what they leave to be done and what they cost."""
-        step, found = self._scene.controller.step, []
-        for state in states:
-            rest = self._rest(state.poses[self._k])
-            driven = step * (len(state.path) - 1)
-            found.append(replace(state, rest=rest, cost=state.away + driven + rest))
-        return found
+        for a, end in marks.tolist():
+            path, after = np.concatenate([state.path, tracks[a, 1 : end + 1]]), poses[a, end]
+            rest = self._rest(after[k])
+            cost = state.away + scene.controller.step * (len(path) - 1) + rest
+            found = _State(path, after, state.depth + 1, state.away, rest, cost)
+            self._states.append(found)
+            heapq.heappush(self._open, (cost, next(self._order), found))
 
     def _has_moved(self, state: _State) -> bool:
         scene, k = self._scene, self._k
         return pose_distance(state.poses[k], scene.poses[k], scene.size) >= _LEAST
 
     def _margins_left(self, state: _State) -> int:
-        """How many of the margins for errors a push home from where a state has the object lacks."""
+        """How many of the margins a push home from where a state has the object does not stand."""
         for n, margin in enumerate(_MARGINS):
             if not all(self._delivers(state, margin * np.array(by)) for by in _ERRORS[n > 0 :]):
                 return len(_MARGINS) - n
@@ -260,11 +252,18 @@ class _RelocationSearch:
             path = scene.object_path(k, 0.0, pose=pose)
             if path is None:
                 return _LACKING * 1.5 * scene.size
-            towards, lack = initial_heading(path, scene.size), 1.5 * scene.size
-            for turn, shift in itertools.product(_NEARLY, SHIFTS):
-                u, _ = heading_axes(towards + turn)
-                start = pose_behind(scene, k, towards + turn, shift * scene.half, pose)
-                lack = min(lack, float(first_free(start, u, 0.1 * scene.size, lack, *scene.fit)))
+            towards = initial_heading(path, scene.size)
+            outline = scene.world.movables.outline(k)
+            reach, limit = scene.front + scene.config.slack * scene.size, 1.5 * scene.size
+            lack = missing_clearance(
+                np.array(pose),
+                outline,
+                towards + _NEARLY,
+                scene.half * _BESIDE,
+                reach,
+                limit,
+                *scene.fit,
+            )
             self._rests[key] = _LACKING * lack + path_length(path)
         return self._rests[key]
 
@@ -306,13 +305,3 @@ def _arcs(scene: PushScene) -> FloatArray:
     out = np.array([*arcs, (0.0, 0.1), (0.0, -0.1)])
     out[:, 1] = np.clip(out[:, 1], -scene.controller.turn, scene.controller.turn)
     return out
-
-
-def _news(poses: FloatArray, size: float) -> list[int]:
-    """Indices at which an object (N, 3) has moved on since the last of them."""
-    found, last = [], poses[0]
-    for n in range(1, len(poses)):
-        if pose_distance(poses[n], last, size) >= 0.05:
-            found.append(n)
-            last = poses[n]
-    return found
