@@ -57,7 +57,7 @@ def _vias(corners: FloatArray, radius: float, depth: float) -> FloatArray:
     """Poses (V, 3) on a polyline: some at each bend, one ``depth`` [m] past its end."""
     legs = np.diff(corners, axis=0)
     lengths = np.hypot(legs[:, 0], legs[:, 1])
-    keep = lengths > 1e-9
+    keep = lengths > 1e-9 * radius
     if not keep.any():
         return np.zeros((0, 3))
     legs, lengths = legs[keep], lengths[keep]
