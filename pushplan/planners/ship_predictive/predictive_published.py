@@ -10,6 +10,7 @@ import numpy as np
 
 from pushplan.interaction.ice import IceInteraction
 from pushplan.interaction.network import IceNetwork
+from pushplan.motion.time_slicing import Stopped
 from pushplan.planners.ship_predictive.channel_view import channel_view
 from pushplan.planners.ship_predictive.predictive_config import PredictiveConfig
 from pushplan.planners.ship_predictive.published_search import PublishedSearch, timed_path
@@ -64,7 +65,13 @@ class PredictivePublished:
         if view.away <= 0.0:
             plan = timed_path(world, world.robot_pose[None], np.zeros(1))
             return call.result(PlanStatus.SOLVED, plan, call.elapsed)
-        search, expanded = PublishedSearch(view, self.network, self.change_weight), 0
+        expanded = 0
+        try:
+            search = PublishedSearch(
+                view, self.network, self.change_weight, lambda: call.check(0, math.inf)
+            )
+        except Stopped:
+            return call.result(call.stopped_status)
         while not search.arrived:
             if call.check(expanded, math.inf):
                 return call.result(call.stopped_status, None, math.nan, expanded, expanded)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 
@@ -33,10 +34,12 @@ class PublishedSearch:
         view: ChannelView,
         network: IceNetwork,
         weight: float,  # factor on the mean squared change
+        stopped: Callable[[], bool],  # ends this with `Stopped`
     ) -> None:
         world = view.world
         radius = turning_radius(world.robot, LATTICE.turn_fraction)
-        builder = LatticeBuilder(world, LATTICE, radius=radius, side=_clearance(world))
+        side = _clearance(world)
+        builder = LatticeBuilder(world, LATTICE, radius=radius, side=side, stopped=stopped)
         self._view, self._weight = view, weight
         self._propagator = MapPropagator(view, network)
         self._built = builder.build()
