@@ -19,7 +19,7 @@ from pushplan.motion.state_lattice.built_lattice import BuiltLattice
 from pushplan.motion.state_lattice.lattice_builder import LatticeBuilder
 from pushplan.motion.state_lattice.lattice_path import bare_path, lay_path
 from pushplan.motion.state_lattice.lattice_search import open_search, path_arcs
-from pushplan.motion.time_slicing import Stopped
+from pushplan.motion.time_slicing import Pace, Stopped
 from pushplan.planners.ship_lattice.floe_costs import floe_costs
 from pushplan.planners.ship_lattice.nearby_objects import NearbyObjects
 from pushplan.planners.ship_lattice.ship_lattice_config import ShipLatticeConfig
@@ -56,6 +56,7 @@ class ShipLatticeCall:
         self.side = 0.0
         self.near: NearbyObjects | None = None
         self.improver: ShipPathImprover | None = None
+        self._pace = Pace()
         self.cost = math.inf
         self.poses: FloatArray = np.zeros((0, 3))
         self.curvatures: FloatArray = np.zeros(0)
@@ -115,8 +116,12 @@ class ShipLatticeCall:
         """Whether a path was found; None if stopped before."""
         built = builder.build(factor)
         star, curves = open_search(built, builder)
+        result = PAUSED
         while not self.stopped():
-            result = star.run(self.config.batch)
+            for first, last in self._pace.pieces(self.config.batch, self.stopped):
+                result = star.run(last - first)
+                if result != PAUSED:
+                    break
             self.iterations += 1
             if result != PAUSED:
                 break

@@ -68,14 +68,13 @@ class PredictivePublished:
         expanded = 0
         try:
             search = PublishedSearch(
-                view, self.network, self.change_weight, lambda: call.check(0, math.inf)
+                view, self.network, self.change_weight, lambda: call.check(expanded, math.inf)
             )
+            while not search.arrived:
+                if not search.expand():
+                    status = PlanStatus.GOAL_UNREACHABLE
+                    return call.result(status, None, math.nan, expanded, expanded)
+                expanded += 1
         except Stopped:
-            return call.result(call.stopped_status)
-        while not search.arrived:
-            if call.check(expanded, math.inf):
-                return call.result(call.stopped_status, None, math.nan, expanded, expanded)
-            if not search.expand():
-                return call.result(PlanStatus.GOAL_UNREACHABLE, None, math.nan, expanded, expanded)
-            expanded += 1
+            return call.result(call.stopped_status, None, math.nan, expanded, expanded)
         return call.result(PlanStatus.SOLVED, search.plan(), call.elapsed, expanded, expanded)
