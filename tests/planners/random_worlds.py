@@ -6,14 +6,17 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
-from conftest import OCTAGON, SQUARE
 
 from pushplan.planners.registry import OPEN_WATER
 from pushplan.world import GoalDisc, GoalLine, Movables, RobotModel, StaticMap, World
 from pushplan.world.outline import transform
 
+SQUARE = np.array([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]])
+CUT = ((0.7, 0.3), (0.4, 0.6))  # a corner that is cut off
 HULLS = {
-    "octagon": OCTAGON,
+    "octagon": np.array(
+        [(x * a, y * b) for x, y in ((1, 1), (-1, 1), (-1, -1), (1, -1)) for a, b in CUT[:: x * y]]
+    ),
     "plank": SQUARE * [1.4, 0.2],
     "cart": 0.5 * SQUARE + [0.25, 0.0],  # turns about the middle of its rear edge
     "tractor": 0.5 * SQUARE + [0.6, 0.0],  # turns about a point outside of it
