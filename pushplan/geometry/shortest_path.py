@@ -240,9 +240,15 @@ def _distances(
 
 def _ends_on_rims(static: StaticMap, clearance: float, regions: Regions) -> FloatArray:
     """Where a path may end at the rim (N, 2) [m] of what covers a part of the goal."""
-    rim = np.concatenate([contour_edges(contours_of(static, clearance)), box_edges(static.bounds)])
-    ends = region_crossings(regions, rim)
-    shapes = obstacles_of(static, clearance)
+    shapes, contours = obstacles_of(static, clearance), contours_of(static, clearance)
+    rims = [contour_edges(contours), box_edges(static.bounds)]
+    if not len(regions.lines):  # only obstacles near it can cover a part of it
+        around = np.concatenate([regions.discs[:, :2], regions.corners])
+        reach = regions.discs[:, 2].max(initial=0.0) + standoff_of(static, clearance)
+        low, high = around.min(axis=0) - reach, around.max(axis=0) + reach
+        near = ((shapes.boxes[:, :2] <= high) & (shapes.boxes[:, 2:] >= low)).all(axis=1)
+        rims[0] = rims[0][near[contours.owner]]
+    ends = region_crossings(regions, np.concatenate(rims))
     return ends[free_points(ends, shapes, static.bounds, gap_of(static))]
 
 
@@ -432,7 +438,7 @@ class VisibilityGraph:
         self, origin: FloatArray, free: FloatArray, target: Target, stopped: Callable[[], bool]
     ) -> Path:
         search = _visibility_search(self.static, self.clearance, target, free)
-        frontier = new_frontier(2 * len(search.done) + 64)
+        frontier = new_frontier(8 * len(search.done) + 64)
         expand(search, frontier, START, 0.0)
         outcome = PAUSED
         while outcome in (PAUSED, FULL):

@@ -50,10 +50,20 @@ def footprint(robot: RobotModel, margin: float = 0.0) -> Footprint:
 
 def obstacles(static: StaticMap, outlines: Sequence[FloatArray] = ()) -> ConvexObstacles:
     """Everything static, and further convex outlines in the world frame."""
-    parts = (*static.convex_parts, *outlines)
+    return _obstacles(static, (*static.convex_parts, *outlines)) if outlines else _walls(static)
+
+
+@functools.lru_cache(maxsize=32)
+def _walls(static: StaticMap) -> ConvexObstacles:
+    return _obstacles(static, static.convex_parts)
+
+
+def _obstacles(static: StaticMap, parts: Sequence[FloatArray]) -> ConvexObstacles:
     vertices, offsets = flatten(parts)
-    corners = [np.concatenate([part.min(axis=0), part.max(axis=0)]) for part in parts]
-    boxes = np.array(corners).reshape(-1, 4)
+    boxes = np.zeros((len(parts), 4))
+    if len(parts):
+        boxes[:, :2] = np.minimum.reduceat(vertices, offsets[:-1])
+        boxes[:, 2:] = np.maximum.reduceat(vertices, offsets[:-1])
     return ConvexObstacles(owned(vertices), owned(offsets), boxes, owned(static.bounds))
 
 

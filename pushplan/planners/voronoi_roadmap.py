@@ -62,8 +62,8 @@ class Skeleton:
         """Plan from ``world``; exact and without chance, so ``rng`` is not needed.
 
         The stop rule is looked at before the diagram is made, which cannot be interrupted: 5 to
-        30 ms in open water. Where the diagram leads nowhere, the shortest way around the walls is
-        taken, which may take long among hundreds of obstacles.
+        30 ms in open water. Where the diagram leads nowhere, the shortest path around the walls is
+        taken, with looks at it.
 
         The status is `PATH_ONLY` where the robot cannot drive the path as it stands.
 
@@ -93,9 +93,17 @@ class Skeleton:
         points = self._along(world, sites, owners) if len(set(owners.tolist())) > 1 else None
         if points is not None:
             return PlanStatus.SOLVED, points
-        direct = VisibilityGraph(world.static, world.robot.inscribed_radius).to_goal(start, goal)
+        late = False
+
+        def stopped() -> bool:
+            nonlocal late
+            late = check(1, math.inf)
+            return late
+
+        graph = VisibilityGraph(world.static, world.robot.inscribed_radius)
+        direct = graph.to_goal(start, goal, stopped)
         if not np.isfinite(direct.length):
-            return PlanStatus.GOAL_UNREACHABLE, None
+            return PlanStatus.TIMED_OUT if late else PlanStatus.GOAL_UNREACHABLE, None
         return PlanStatus.SOLVED, direct.points
 
     def _sites(self, world: World) -> tuple[FloatArray, IntArray]:
