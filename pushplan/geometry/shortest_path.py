@@ -245,7 +245,8 @@ def _ends_on_rims(static: StaticMap, clearance: float, regions: Regions) -> Floa
     if not len(regions.lines):  # only obstacles near it can cover a part of it
         around = np.concatenate([regions.discs[:, :2], regions.corners])
         reach = regions.discs[:, 2].max(initial=0.0) + standoff_of(static, clearance)
-        low, high = around.min(axis=0) - reach, around.max(axis=0) + reach
+        low = around.min(axis=0, initial=np.inf) - reach
+        high = around.max(axis=0, initial=-np.inf) + reach
         near = ((shapes.boxes[:, :2] <= high) & (shapes.boxes[:, 2:] >= low)).all(axis=1)
         rims[0] = rims[0][near[contours.owner]]
     ends = region_crossings(regions, np.concatenate(rims))
