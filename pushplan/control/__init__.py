@@ -8,6 +8,7 @@ from pushplan.control.episode_clock import EpisodeClock
 from pushplan.control.leg_follower import LegFollower, Legs
 from pushplan.control.limits import TwistLimiter, clamp_twist
 from pushplan.control.path_follower import PathFollower
+from pushplan.control.pose_follower import PoseFollower
 from pushplan.control.progress_checker import ProgressChecker, StallChecker
 from pushplan.control.pure_pursuit import PurePursuit
 from pushplan.control.retreat import Retreat
@@ -23,6 +24,7 @@ __all__ = [
     "MpcConfig",
     "MpcTracker",
     "PathFollower",
+    "PoseFollower",
     "Progress",
     "ProgressChecker",
     "PurePursuit",

@@ -8,8 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from pushplan.control import EpisodeClock, LegFollower, Legs, Retreat, StallChecker
+from pushplan.control import EpisodeClock, LegFollower, Legs, PoseFollower, Retreat, StallChecker
 from pushplan.control.limits import arc_twist
+from pushplan.motion.recovery_path import recovery_path
 from pushplan.planners.arguments import check_pusher
 from pushplan.planners.rearrangement.line_up import (
     LineUp,
@@ -19,8 +20,6 @@ from pushplan.planners.rearrangement.line_up import (
     line_up,
     unit,
 )
-from pushplan.planners.rearrangement.pose_follower import PoseFollower
-from pushplan.planners.rearrangement.recovery import recovery_path
 from pushplan.world import Twist, World
 from pushplan.world.checks import FloatArray, expect, number
 
