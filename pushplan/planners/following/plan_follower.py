@@ -130,6 +130,11 @@ class PlanFollower:
         self._planned_ids = np.zeros(0, dtype=np.int64)
         self._tight = False
 
+    @property
+    def stuck(self) -> bool:
+        """Whether all recoveries at this place are used up; plans are still made and driven."""
+        return self._progress is not None and self._recovery.stuck
+
     def act(self, world: World, observation: Any = None) -> Twist:
         """The twist for this step; plans first where that is necessary."""
         if self._progress is None:
@@ -143,24 +148,26 @@ class PlanFollower:
         return ramp_twist(world.robot, last, wanted.linear, wanted.angular, held)
 
     def _choose(self, world: World) -> Twist:
-        if self._recovery.is_on:
+        away = self._recover(world) if self._recovery.is_on else None
+        if away is None:
+            self._update_plan(world)
+            if self._is_waiting(world):
+                self._recovery.wait()
             away = self._recover(world)
-            if away is not None:
-                return away
+        if away is not None:
+            return away
+        if self.current_plan is None:
+            return clamp_twist(world.robot, 0.0, 0.0)
+        return self.controller.command(world, self.current_plan)
+
+    def _update_plan(self, world: World) -> None:
+        """Ask for a plan where one is wanted, and take up the one that is there."""
         self._receive(world)
         if self._pending is None:
             reason = self._needs_plan(world)
             if reason is not None:
                 self._ask(world, reason)
                 self._receive(world)
-        if self._is_waiting(world):
-            self._recovery.wait()
-        away = self._recover(world)
-        if away is not None:
-            return away
-        if self.current_plan is None:
-            return clamp_twist(world.robot, 0.0, 0.0)
-        return self.controller.command(world, self.current_plan)
 
     def _is_waiting(self, world: World) -> bool:
         """Whether the robot need not get on: it is there, or a plan is on its way."""
@@ -173,7 +180,7 @@ class PlanFollower:
     def _recover(self, world: World) -> Twist | None:
         """The next velocity of a recovery, after which nothing is left of the old plan."""
         away = self._recovery.command(world, self._clock.held)
-        if away is not None and self.current_plan is not None:
+        if away is not None:
             self.current_plan = self._pending = None
             self.controller.reset(world)
         return away

@@ -174,14 +174,14 @@ def test_without_a_plan_it_recovers_a_few_times_and_is_stuck():
         twist = policy.act(robot.world)
         began += [robot.world.time] if policy._recovery.is_on and not was_on else []
         robot.drive(twist)
-    assert policy._recovery.stuck and twist == Twist(0.0, 0.0)
+    assert policy.stuck and twist == Twist(0.0, 0.0)
     assert 1 <= len(began) <= 6 and began[-1] < 100.0
     assert len(policy.plan_log) < 120  # it goes on to look for a plan, ever less often
     policy.planner.left = 0
     robot.effect = 1.0
     while robot.world.time < 240.0 and not robot.arrived:
         robot.drive(policy.act(robot.world))
-    assert robot.arrived and not policy._recovery.stuck
+    assert robot.arrived and not policy.stuck
 
 
 def test_a_new_place_is_a_new_start():
@@ -217,7 +217,7 @@ def test_a_plan_is_driven_where_all_recoveries_are_used_up():
     policy, time = PlanFollower(AheadOnly()), 0.0
     policy.reset(world, np.random.default_rng(0))
     seen = [policy.act(world.moved(time=(time := time + 0.5))).linear for _ in range(1200)]
-    assert policy._recovery.stuck
+    assert policy.stuck
     assert min(seen) < 0.0 and seen[-1] == world.robot.max_speed
 
 
@@ -246,5 +246,5 @@ def test_a_robot_without_a_plan_does_not_run_away():
             first = first or (twist if twist != Twist(0.0, 0.0) else None)
             robot.drive(twist)
         assert first is not None and (first.linear < 0.0) == backwards
-        assert policy._recovery.stuck and twist == Twist(0.0, 0.0)
+        assert policy.stuck and twist == Twist(0.0, 0.0)
         assert np.hypot(*(robot.world.robot_pose[:2] - pose[:2])) < 6.0
