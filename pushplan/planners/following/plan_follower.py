@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
@@ -14,6 +13,7 @@ from pushplan.control import EpisodeClock, PathFollower, clamp_twist
 from pushplan.control.limits import driven_twist, ramp_twist
 from pushplan.control.tracking import Progress
 from pushplan.interaction import InteractionModel, QuasiStatic
+from pushplan.planners.following.planning_time import PlanningTime
 from pushplan.planners.following.recovery import RecoveryRule
 from pushplan.planners.following.replanning import (
     Reason,
@@ -35,12 +35,10 @@ from pushplan.world import (
     Twist,
     World,
 )
-from pushplan.world.checks import number
 from pushplan.world.polyline import path_lengths
 
 _PERIOD = 0.1  # for which the first command is taken to be held [s]
 _PAUSE = 0.1  # between two plans, of the time for which the robot has not got on
-_REMEMBERED = 5  # planning calls whose times say how long the next one will take
 
 
 @dataclass(frozen=True)
@@ -112,7 +110,7 @@ class PlanFollower:
             factor: seconds of the world's clock for one of ``clock``.
             clock: returns seconds.
         """
-        self._factor, self._stopwatch = number("factor", factor, low=0.0), clock
+        self._planning_time.simulate(factor, clock)
 
     def _forget(self, rng: np.random.Generator) -> None:
         self.plan_log: list[PlanResult] = []
@@ -120,9 +118,8 @@ class PlanFollower:
         self.current_plan: Plan | None = None
         self.background_s = 0.0
         """How much of the last call of `act` a robot would do beside driving [s]."""
-        self._factor, self._stopwatch = 0.0, time.perf_counter
+        self._planning_time = PlanningTime()
         self._clock = EpisodeClock(_PERIOD)
-        self._took: deque[float] = deque(maxlen=_REMEMBERED)
         self._pending: _PendingPlan | None = None
         self._rng = rng
         self._planned_at = -np.inf
@@ -188,31 +185,20 @@ class PlanFollower:
     def _ask(self, world: World, reason: Reason) -> None:
         """Call the planner; its plan is there after the time that the call takes."""
         assert self._progress is not None
+        latency = self.replanning.latency
+        if latency is None:
+            latency = self._planning_time.expected(self.stop)
         start, stretch = world_ahead(
-            world, self.current_plan, self._progress.along, self._latency(), self.interaction
+            world, self.current_plan, self._progress.along, latency, self.interaction
         )
-        began = self._stopwatch()
-        result = self.planner.plan(start, stop=self.stop, rng=self._rng)
-        took = self._stopwatch() - began
+        result, took = self._planning_time.measure(
+            lambda: self.planner.plan(start, stop=self.stop, rng=self._rng)
+        )
+        self.background_s = self._planning_time.own
         self.plan_log.append(result)
-        if self._factor > 0.0:
-            self.background_s = took
-            self._took.append(took)
         self._planned_at, self._planned_from = world.time, world.robot_pose[:2]
         self._planned_ids = world.movables.ids
-        ready = world.time + self._factor * took
-        self._pending = _PendingPlan(result, stretch, reason, world.time, ready)
-
-    def _latency(self) -> float:
-        """How long the next planning call is expected to take, by the clock of the world [s]."""
-        if self.replanning.latency is not None:
-            return self.replanning.latency
-        if self._factor == 0.0:
-            return 0.0
-        budget = np.inf if self.stop is None else self.stop.seconds
-        if self._took:
-            return self._factor * min(budget, max(self._took))
-        return self._factor * budget if np.isfinite(budget) else 0.0
+        self._pending = _PendingPlan(result, stretch, reason, world.time, world.time + took)
 
     def _receive(self, world: World) -> None:
         """Take up a plan that has been waited for long enough."""
