@@ -3,16 +3,18 @@
 Usage::
 
     python benchmarks/manipulation.py [--episodes 50] [--workers 2] [--only area-clearing-2d]
-        [--policies greedy,gtsp,gtsp-mpc] [--weights 40,200] [--seed 0] [--out runs/manipulation]
+        [--policies greedy,gtsp,gtsp-mpc] [--with mpc=false,work_weight=40] [--seed 0]
+        [--out runs/manipulation]
     python benchmarks/manipulation.py --figure docs/images/gtsp-mpc.png
 
 Prints one row of a Markdown table for each suite and policy: means with bootstrap intervals of
 95 %, the fraction of episodes with everything done, the paired difference to the first policy, and
 the longest decision of an episode: the median over the episodes, and the longest of all. With
-``--weights`` `gtsp-mpc` runs at these weights of work too. Below the table it names each episode in
-which something was left undone. With ``--out`` the episodes are kept, a folder for each suite, and
-a run that was interrupted goes on. With ``--figure`` it only draws what `gtsp-mpc` plans first in
-some scenes.
+``--with`` `gtsp-mpc` also runs once with each of these settings in place of its own, which is an
+ablation: ``--policies gtsp-mpc --with mpc=false``. Below the table it names each episode in which
+something was left undone. With ``--out`` the episodes are kept, a folder for each suite, and a run
+that was interrupted goes on. With ``--figure`` it only draws what `gtsp-mpc` plans first in some
+scenes.
 """
 
 from __future__ import annotations
@@ -23,6 +25,7 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
+from yaml import safe_load
 
 from pushplan.drawing import draw_sequence, save_image
 from pushplan.envs import make
@@ -43,7 +46,7 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--only", default="", help="a suite, or all whose names hold this text")
     parser.add_argument("--policies", default="greedy,gtsp,gtsp-mpc")
-    parser.add_argument("--weights", default="", help="of work, for gtsp-mpc, besides its own")
+    parser.add_argument("--with", dest="ablations", default="", help="settings of gtsp-mpc to try")
     parser.add_argument("--figure", default="", help="draw planned orders to this file instead")
     parser.add_argument("--out", default="", help="keep the episodes in this folder")
     options = parser.parse_args()
@@ -51,10 +54,11 @@ def main() -> None:
         figure(options.figure, options.seed)
         return
     specs = [PolicySpec(name, name) for name in options.policies.split(",")]
-    for weight in options.weights.split(",") if options.weights else ():
-        specs.append(PolicySpec(f"gtsp-mpc-{weight}", "gtsp-mpc", {"work_weight": float(weight)}))
+    for given in filter(None, options.ablations.split(",")):
+        field, _, value = given.partition("=")
+        specs.append(PolicySpec(f"gtsp-mpc@{field}-{value}", "gtsp-mpc", {field: safe_load(value)}))
     policies = [spec.label for spec in specs]
-    columns = "suite policy episodes done S E I E-first I-first decision,s".split()
+    columns = "suite policy episodes done S E I S-first E-first I-first decision,s".split()
     print(f"| {' | '.join(columns)} |\n|{'---|' * len(columns)}", flush=True)
     failed: list[str] = []
     for name in suite_names():
@@ -85,7 +89,7 @@ def line(name: str, policy: str, mine: Sequence[ResultRow], first: Sequence[Resu
     """One row of the table."""
     done = sum(row.success for row in mine) / max(1, len(mine))
     cells = [interval(values(mine, score)) for score in SCORES]
-    for score in SCORES[1:]:
+    for score in SCORES:
         other = {row.seed: getattr(row, score) for row in first}
         pairs = [
             getattr(row, score) - other[row.seed]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from pushplan.world import InvalidInputError, Twist, World
@@ -27,14 +29,23 @@ class EpisodeClock:
         """Forget the episode."""
         self._seen: World | None = None
         self.command = Twist(0.0, 0.0)
-        """What was sent last; whoever drives sets it."""
+        """What was sent last."""
         self.held = self._period
         """Time from the snapshot before the present one to that [s]."""
 
-    @property
-    def is_first(self) -> bool:
-        """Whether there has been no snapshot since the last reset."""
-        return self._seen is None
+    def command_for(self, world: World, choose: Callable[[World], Twist]) -> Twist:
+        """The command for a snapshot: chosen at a later instant, else the same again.
+
+        Args:
+            world: the scene now.
+            choose: chooses a command for it; `command` and `held` tell of the one before.
+
+        Raises:
+            InvalidInputError: as `advance`.
+        """
+        if self.advance(world):
+            self.command = choose(world)
+        return self.command
 
     def advance(self, world: World) -> bool:
         """Take a snapshot.

@@ -28,11 +28,12 @@ class PurePursuit:
     def __post_init__(self) -> None:
         number("lookahead", self.lookahead, low=0.0, open_low=True)
         self._clock = EpisodeClock(1.0)
-        self._progress = Progress(window=0.0)
+        self._progress: Progress | None = None
 
     def reset(self, world: World) -> None:
         """See `pushplan.world.Controller`."""
         self._clock.reset()
+        self._progress = None
 
     def command(self, world: World, plan: Plan) -> Twist:
         """See `pushplan.world.Controller`.
@@ -40,18 +41,12 @@ class PurePursuit:
         Past the end of the plan a differential drive stops; a constant-speed robot drives on
         along the last heading.
         """
-        first = self._clock.is_first
-        if self._clock.advance(world):
-            if first:
-                reach = self.lookahead * world.robot.circumscribed_radius
-                self._progress = Progress(window=2.0 * reach)
-            self._clock.command = self._follow(world, plan)
-        return self._clock.command
+        return self._clock.command_for(world, lambda _: self._follow(world, plan))
 
     def _follow(self, world: World, plan: Plan) -> Twist:
         robot = world.robot
         reach = self.lookahead * robot.circumscribed_radius
-        progress = self._progress
+        progress = self._progress = self._progress or Progress(window=2.0 * reach)
         x, y, theta = (float(value) for value in world.robot_pose)
         along = progress.update(plan, x, y)
         if robot.drive is Drive.DIFFERENTIAL and along >= progress.total - 1e-9:

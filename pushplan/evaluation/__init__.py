@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     from pushplan.evaluation.paper import Comparison, bench_paper
     from pushplan.evaluation.policies import PolicySpec, parse_policies, parse_policy
     from pushplan.evaluation.pool import WorkerPool
-    from pushplan.evaluation.push_plots import push_figure
     from pushplan.evaluation.results import Results, compare
     from pushplan.evaluation.rows import TIMING_COLUMNS, ResultRow, Status, columns
     from pushplan.evaluation.statistics import Estimate, Proportion, bootstrap_interval, wilson
@@ -49,7 +48,6 @@ __all__ = [
     "compare",
     "parse_policies",
     "parse_policy",
-    "push_figure",
     "run_batch",
     "run_episode",
     "wilson",
@@ -66,7 +64,6 @@ __getattr__, __dir__ = lazy_names(
         "paper": "Comparison bench_paper",
         "policies": "PolicySpec parse_policies parse_policy",
         "pool": "WorkerPool",
-        "push_plots": "push_figure",
         "results": "Results compare",
         "rows": "TIMING_COLUMNS ResultRow Status columns",
         "statistics": "Estimate Proportion bootstrap_interval wilson",

@@ -10,7 +10,7 @@ import numpy as np
 from shapely import Polygon
 
 from pushplan.compiled import kernel, owned
-from pushplan.geometry import convex_overlap
+from pushplan.geometry import convex_overlap, convex_penetration
 from pushplan.geometry.transforms import transform_points
 from pushplan.world import RobotModel, StaticMap
 from pushplan.world.checks import FloatArray, IntArray
@@ -103,3 +103,20 @@ def first_blocked(
         if not is_free(poses[i], shape, among, scratch):
             return i
     return count
+
+
+@kernel
+def static_depth(
+    pose: FloatArray, shape: Footprint, among: ConvexObstacles, scratch: FloatArray
+) -> float:
+    """How deep the footprint is in what is static [m]; 0 where it is free."""
+    deepest = 0.0
+    if is_free(pose, shape, among, scratch):
+        return deepest
+    transform_points(pose, shape.vertices, scratch)
+    for s in range(among.boxes.shape[0]):
+        obstacle = among.vertices[among.offsets[s] : among.offsets[s + 1]]
+        for p in range(shape.offsets.shape[0] - 1):
+            part = scratch[shape.offsets[p] : shape.offsets[p + 1]]
+            deepest = max(deepest, convex_penetration(part, obstacle)[0])
+    return deepest

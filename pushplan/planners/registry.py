@@ -92,8 +92,9 @@ def make_policy(name: str, **options: Any) -> Policy:
 
 def _made(kind: str, name: str, table: dict[str, str], options: dict[str, Any]) -> Any:
     factory = look_up(kind, table, name)
-    signature = inspect.signature(factory)
-    for option in options:
-        if option not in signature.parameters:
-            raise UnknownNameError(f"option of {kind} {name!r}", option, signature.parameters)
+    known = inspect.signature(factory).parameters
+    checks_itself = any(p.kind is p.VAR_KEYWORD for p in known.values())
+    for option in () if checks_itself else options:
+        if option not in known:
+            raise UnknownNameError(f"option of {kind} {name!r}", option, known)
     return factory(**options)

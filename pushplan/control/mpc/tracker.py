@@ -72,9 +72,7 @@ class MpcTracker:
         Past the end of the plan a differential drive stops; a constant-speed robot drives on
         along the last heading.
         """
-        if self._clock.advance(world):
-            self._clock.command = self._follow(world, plan)
-        return self._clock.command
+        return self._clock.command_for(world, lambda _: self._follow(world, plan))
 
     def _follow(self, world: World, plan: Plan) -> Twist:
         self._prepare(world, plan)

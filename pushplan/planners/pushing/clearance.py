@@ -24,7 +24,7 @@ class Clearance:
         robot: its footprint.
         static: what must not be touched.
         least: distance to keep [m].
-        outline: (N, 2) corners of the box [m]; None for the robot alone.
+        outline: (N, 2) corners of the box [m].
         face: direction of the pushed face's normal in the box's frame [rad].
     """
 
@@ -33,13 +33,12 @@ class Clearance:
         robot: RobotModel,
         static: StaticMap,
         least: float,
-        outline: FloatArray | None = None,
-        face: float = 0.0,
+        outline: FloatArray,
+        face: float,
     ) -> None:
-        parts = list(robot.parts)
-        if outline is not None:
-            c, s = math.cos(face), math.sin(face)
-            parts.append(outline @ np.array([[c, -s], [s, c]]))  # in the frame of the face
+        c, s = math.cos(face), math.sin(face)
+        turned = outline @ np.array([[c, -s], [s, c]])  # in the frame of the face
+        parts = [*robot.parts, turned]
         vertices, offsets = flatten(parts)
         reach = np.hypot(vertices[:, 0], vertices[:, 1])
         self._problem = ClearanceProblem(
@@ -51,10 +50,6 @@ class Clearance:
             _NEARER * robot.circumscribed_radius,
             obstacles_of(static),
         )
-
-    def now(self, contact: Contact, state: FloatArray) -> float:
-        """Least distance [m] of robot and box from static things, negative inside one."""
-        return float(min(clearance_kernels.gaps(contact, state, self._problem)))
 
     def free_fraction(
         self, contact: Contact, state: FloatArray, v: float, w: float, duration: float

@@ -258,17 +258,6 @@ def rollout(
         advance(contact, states[k + 1], twists[k, 0], twists[k, 1], steps[k], details[k])
 
 
-@kernel(allocates=True)
-def predicted(
-    contact: Contact, start: FloatArray, twists: FloatArray, steps: FloatArray
-) -> tuple[float, float]:
-    """Offset [m] and angle [rad] after twists (N, 2) held for steps (N,) [s]."""
-    state, detail = start.copy(), np.empty(6)
-    for k in range(steps.shape[0]):
-        advance(contact, state, twists[k, 0], twists[k, 1], steps[k], detail)
-    return state[3], state[4]
-
-
 @kernel
 def observe(
     contact: Contact, normal: float, robot: FloatArray, box: FloatArray, out: FloatArray

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import enum
-import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,24 +11,9 @@ from pushplan.planners.pushing import contact_kernels
 from pushplan.planners.pushing.bumper import Bumper, Face, contact_of, face_towards
 from pushplan.planners.pushing.contact_kernels import Contact
 from pushplan.planners.pushing.parameters import PushParameters, stable_curvature
-from pushplan.world import InvalidInputError, RobotModel, Twist
+from pushplan.world import InvalidInputError, RobotModel
 from pushplan.world.checks import ArrayRecord, FloatArray, array, expect, number
 from pushplan.world.outline import centroid, convex_outline
-
-
-class ContactMode(enum.Enum):
-    """How bumper and box touch."""
-
-    FREE = contact_kernels.FREE
-    """Not at all; the box stands."""
-    STICK = contact_kernels.STICK
-    """Along a line, without sliding."""
-    SLIDE = contact_kernels.SLIDE
-    """Along a line, and the box slides along the bumper."""
-    CORNER_STICK = contact_kernels.CORNER_STICK
-    """At one point, about which the box turns."""
-    CORNER_SLIDE = contact_kernels.CORNER_SLIDE
-    """At one point that slides."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,27 +46,6 @@ class PushState(ArrayRecord):
     def from_row(cls, row: FloatArray) -> PushState:
         """The inverse of `row`."""
         return cls(row[:3], float(row[3]), float(row[4]), float(row[5]))
-
-
-@dataclass(frozen=True)
-class ContactReport:
-    """What a command does to the box now.
-
-    Args:
-        mode: of contact.
-        velocity: forward and leftward speed of the box [m/s] and its turn rate [rad/s], in the
-            frame of the pushed face.
-        pressure: centre of pressure on the face, left of the box's centre [m].
-        shear: tangential over normal force, beyond what the bumper's shape gives.
-        margin: 1 - |turn rate| / (the greatest with which the box sticks): fraction of the friction
-            cone and of the line of contact that is not used; negative where the box slips.
-    """
-
-    mode: ContactMode
-    velocity: tuple[float, float, float]
-    pressure: float
-    shear: float
-    margin: float
 
 
 class PushModel:
@@ -145,23 +107,24 @@ class PushModel:
 
     def box_pose(self, state: PushState) -> FloatArray:
         """(3,) pose of the box."""
-        return self._box_of(state.row())
+        pose = np.empty(3)
+        contact_kernels.box_pose(self.contact, state.row(), pose)
+        pose[2] -= self.face.normal
+        return pose
 
-    def predict(self, state: PushState, twists: ArrayLike, dt: ArrayLike | float) -> FloatArray:
-        """(N + 1, 6) poses of the robot and of the box under commands.
+    def rows(
+        self, state: PushState, twists: ArrayLike, dt: ArrayLike | float
+    ) -> tuple[FloatArray, FloatArray]:
+        """Predict states under commands.
 
         Args:
             state: where it begins.
             twists: (N, 2) forward speeds [m/s] and turn rates [rad/s].
             dt: how long each is held [s], one number or (N,).
-        """
-        states = self.rows(state, twists, dt)[0]
-        return np.array([np.concatenate([row[:3], self._box_of(row)]) for row in states])
 
-    def rows(
-        self, state: PushState, twists: ArrayLike, dt: ArrayLike | float
-    ) -> tuple[FloatArray, FloatArray]:
-        """States (N + 1, 6) as `PushState.row`, and (N, 6) details as `contact_velocity` has."""
+        Returns:
+            States (N + 1, 6) as `PushState.row`, and (N, 6) details as `contact_velocity` has.
+        """
         commands = array("twists", twists, (None, 2))
         count = len(commands)
         steps = array("dt", dt, (count,)) if np.ndim(dt) else np.full(count, number("dt", dt))
@@ -171,29 +134,3 @@ class PushModel:
         states, details = np.empty((count + 1, 6)), np.empty((count, 6))
         contact_kernels.rollout(self.contact, row, commands, steps, states, details)
         return states, details
-
-    def report(self, state: PushState, twist: Twist) -> ContactReport:
-        """What a command does to the box now, if the box touches the bumper."""
-        expect("state", state, PushState)
-        v, w = expect("twist", twist, Twist).linear, twist.angular
-        out = np.zeros(6)
-        if v > 0.0 or w != 0.0:
-            length = 0.05 * self.reach / max(abs(v), abs(w) * self.reach)
-            contact_kernels.contact_velocity(
-                self.contact, state.offset, state.angle, v, w, length, out
-            )
-        bound = self.stable_curvature(state.offset) * max(v, 0.0)
-        used = abs(w) / bound if bound > 0.0 else (0.0 if w == 0.0 else math.inf)
-        return ContactReport(
-            ContactMode(int(out[4])),
-            (float(out[0]), float(out[1]), float(out[2])),
-            float(out[3]),
-            float(out[5]),
-            max(1.0 - used, -9.0),
-        )
-
-    def _box_of(self, row: FloatArray) -> FloatArray:
-        pose = np.empty(3)
-        contact_kernels.box_pose(self.contact, row, pose)
-        pose[2] -= self.face.normal
-        return pose

@@ -21,9 +21,9 @@ from pushplan.planners.pushing.clearance import Clearance
 from pushplan.planners.pushing.contact_kernels import box_pose, observe
 from pushplan.planners.pushing.cost_kernels import ROWS, Memory, PushingProblem
 from pushplan.planners.pushing.model import PushModel, PushState
-from pushplan.planners.pushing.observers import PushObserver
 from pushplan.planners.pushing.problem import groups_of, weights_of
 from pushplan.planners.pushing.problem_kernels import assemble
+from pushplan.planners.pushing.push_observer import PushObserver
 from pushplan.planners.pushing.pushing_config import PushingConfig
 from pushplan.world import Drive, InvalidInputError, Plan, RobotModel, StaticMap, Twist, World
 from pushplan.world.checks import FloatArray, expect
@@ -95,9 +95,8 @@ class PushingMpc:
             InvalidInputError: if the plan names no box, or the robot cannot stop.
         """
         expect("plan", plan, Plan)
-        if self._clock.advance(expect("world", world, World)):
-            self._clock.command = self._follow(world, plan)
-        return self._clock.command
+        expect("world", world, World)
+        return self._clock.command_for(world, lambda _: self._follow(world, plan))
 
     def _follow(self, world: World, plan: Plan) -> Twist:
         k = self._prepare(world, plan)
@@ -125,10 +124,6 @@ class PushingMpc:
     def state(self) -> PushState | None:
         """Robot and box as estimated at the last call; None if the box had gone."""
         return None if self._row is None else PushState.from_row(self._row)
-
-    def forget(self) -> None:
-        """Start afresh with the next call, but remember the commands that are on their way."""
-        self._plan = None
 
     def _prepare(self, world: World, plan: Plan) -> int | None:
         """Start afresh where the episode, the robot or the plan has changed; index of the box."""
@@ -306,10 +301,6 @@ class PushingMpc:
     def _send(self, world: World, v: float, w: float) -> Twist:
         """Within the accelerations, and remembered."""
         twist = ramp_twist(world.robot, self._last, v, w, self._clock.held)
-        self.note(world.time, twist)
-        return twist
-
-    def note(self, time: float, twist: Twist) -> None:
-        """Remember a command that was sent at a time [s], by whomever."""
         self._last = twist
-        self._observer.send(time, twist)
+        self._observer.send(world.time, twist)
+        return twist

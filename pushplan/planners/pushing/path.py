@@ -111,20 +111,6 @@ class PushPath(ArrayRecord):
         """[m]."""
         return float(self.lengths[-1])
 
-    def rest_from(self, along: float) -> PushPath | None:
-        """What is left of it after the first ``along`` metres; None if nothing is."""
-        lengths, along = self.lengths, number("along", along)
-        if along >= lengths[-1] - 1e-9:
-            return None
-        if along <= 0.0:
-            return self
-        i = int(np.searchsorted(lengths, along, side="right")) - 1
-        fraction = (along - lengths[i]) / (lengths[i + 1] - lengths[i])
-        a, b = self.poses[i], self.poses[i + 1]
-        turn = math.remainder(float(b[2] - a[2]), math.tau)
-        first = np.array([*(a[:2] + fraction * (b[:2] - a[:2])), a[2] + fraction * turn])
-        return PushPath(np.concatenate([first[None], self.poses[i + 1 :]]))
-
     def nearest(self, point: ArrayLike) -> tuple[float, float]:
         """Length [m] up to the point of the path nearest to (2,) a point, and its distance [m]."""
         at = array("point", point, (2,))

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
 from pushplan.compiled import copy_into, kernel
+from pushplan.geometry.transforms import arc_step
 from pushplan.interaction.kernels import (
     Bodies,
     Scratch,
@@ -16,14 +15,6 @@ from pushplan.interaction.kernels import (
     robot_held,
 )
 from pushplan.world.checks import FloatArray, IntArray
-
-
-@kernel
-def arc_step(pose: FloatArray, distance: float, turn: float, out: FloatArray) -> None:
-    """Fill ``out`` (3,) with the pose that a step [m] with a turn [rad] leads to from ``pose``."""
-    out[0] = pose[0] + distance * math.cos(pose[2] + 0.5 * turn)
-    out[1] = pose[1] + distance * math.sin(pose[2] + 0.5 * turn)
-    out[2] = pose[2] + turn
 
 
 @kernel

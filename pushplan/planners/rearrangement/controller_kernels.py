@@ -58,6 +58,15 @@ def along_path(
 
 
 @kernel
+def is_on_bumper(robot: FloatArray, target: FloatArray, controller: PushingController) -> bool:
+    """Whether the middle of an object at a pose (3,) is in front of the bumper."""
+    gx, gy = target[0] - robot[0], target[1] - robot[1]
+    c, s = math.cos(robot[2]), math.sin(robot[2])
+    side, forward = c * gy - s * gx, c * gx + s * gy
+    return bool(abs(side) < 0.95 * controller.half and forward > 0.5 * controller.front)
+
+
+@kernel
 def steer_push(
     robot: FloatArray,  # (3,) pose
     target: FloatArray,  # (3,) pose of the target object
@@ -73,10 +82,7 @@ def steer_push(
     gx, gy = target[0] - robot[0], target[1] - robot[1]
     ux, uy = math.cos(heading), math.sin(heading)
     left = gx * uy - gy * ux
-    c, s = math.cos(robot[2]), math.sin(robot[2])
-    side, forward = -s * gx + c * gy, c * gx + s * gy
-    on_bumper = abs(side) < 0.95 * controller.half and forward > 0.5 * controller.front
-    holds = on_bumper and abs(error) < 1.75
+    holds = is_on_bumper(robot, target, controller) and abs(error) < 1.75
     correction = error - math.atan((left - shift) / controller.size)
     wanted = controller.gain * correction * controller.step / controller.size
     return controller.step, min(max(wanted, -controller.turn), controller.turn), at, holds

@@ -8,16 +8,15 @@ from typing import Any
 
 import numpy as np
 
-from pushplan.control import EpisodeClock, Retreat
+from pushplan.control import EpisodeClock, PoseFollower, Retreat
+from pushplan.motion.recovery_path import recovery_path
 from pushplan.planners.rearrangement.greedy import GreedyPusher
-from pushplan.planners.rearrangement.pose_follower import PoseFollower
 from pushplan.planners.rearrangement.push import Push, signature
 from pushplan.planners.rearrangement.push_execution import ExecutionEnd, PushExecution
 from pushplan.planners.rearrangement.push_graph import PushGraph
 from pushplan.planners.rearrangement.push_scene import PushScene, check_world
 from pushplan.planners.rearrangement.push_selection import select_push
 from pushplan.planners.rearrangement.rearrangement_config import RearrangementConfig
-from pushplan.planners.rearrangement.recovery import recovery_path
 from pushplan.planners.rearrangement.rollout_cache import RolloutCache
 from pushplan.world import InvalidInputError, Twist, World
 from pushplan.world.checks import FloatArray, expect
@@ -40,7 +39,7 @@ class GtspMpc:
 
     Args:
         config: settings.
-        work_weight: of a config that is the default one but for it; not together with ``config``.
+        overrides: fields of the default config to change, in place of ``config``.
 
     Attributes:
         given_up: why nothing more is tried with an object, by id.
@@ -50,15 +49,11 @@ class GtspMpc:
 
     actions = ("velocity",)
 
-    def __init__(
-        self, config: RearrangementConfig | None = None, work_weight: float | None = None
-    ) -> None:
-        if config is not None and work_weight is not None:
-            raise InvalidInputError("give either a config or a work_weight, not both")
+    def __init__(self, config: RearrangementConfig | None = None, **overrides: Any) -> None:
+        if config is not None and overrides:
+            raise InvalidInputError("give either a config or fields of one, not both")
         if config is None:
-            config = RearrangementConfig()
-        if work_weight is not None:
-            config = RearrangementConfig(work_weight=work_weight)
+            config = RearrangementConfig.of(**overrides)
         self.config = expect("config", config, RearrangementConfig)
         self._optimistic_config = replace(config, static_friction=0.0)
         self._forget()
@@ -99,9 +94,7 @@ class GtspMpc:
             InvalidInputError: if the goal is one for the robot, or the robot cannot stop.
         """
         check_world(world)
-        if self._clock.advance(world):
-            self._clock.command = self._act(world)
-        return self._clock.command
+        return self._clock.command_for(world, self._act)
 
     def _act(self, world: World) -> Twist:
         scene = self._scene(world)

@@ -58,9 +58,7 @@ class Gtsp:
             InvalidInputError: if the goal is one for the robot, or the robot cannot stop.
         """
         check_world(world)
-        if self._clock.advance(world):
-            self._clock.command = self._act(world)
-        return self._clock.command
+        return self._clock.command_for(world, self._act)
 
     def _act(self, world: World) -> Twist:
         if self._route_follower is None:

@@ -8,15 +8,15 @@ from typing import Any
 
 import numpy as np
 
+from pushplan.geometry.transforms import arc_step
 from pushplan.gtsp import warm_up_solver
+from pushplan.motion.recovery_path import recovery_path
 from pushplan.planners.pushing import warm_up as warm_up_pushing
-from pushplan.planners.rearrangement.arc_kernels import arc_step
 from pushplan.planners.rearrangement.extraction import extraction_primitives
 from pushplan.planners.rearrangement.pre_relocation import pre_relocation_pushes
 from pushplan.planners.rearrangement.push_scene import PushScene
 from pushplan.planners.rearrangement.push_simulator import PushSimulator
 from pushplan.planners.rearrangement.rearrangement_config import RearrangementConfig
-from pushplan.planners.rearrangement.recovery import recovery_path
 from pushplan.world import (
     ClearanceArea,
     Movables,
@@ -36,7 +36,7 @@ _WEDGED = (-2.2, -0.985, 0.0)  # A box a little in one of the columns
 def warm_up_rearrangement() -> None:
     """Solve, push and look for every kind of push; no kernel is for one kind of task alone."""
     warm_up_solver(proof=False)
-    warm_up_pushing(executor=False)
+    warm_up_pushing()
     scene = PushScene(_worlds()[0], RearrangementConfig())
     extraction_primitives(PushSimulator(scene), 0)
     pre_relocation_pushes(PushSimulator(scene), 0)

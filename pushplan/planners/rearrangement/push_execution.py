@@ -7,12 +7,13 @@ import math
 
 import numpy as np
 
-from pushplan.control import LegFollower, StallChecker
+from pushplan.control import LegFollower, PoseFollower, ProgressChecker, StallChecker
 from pushplan.control.limits import arc_twist
-from pushplan.planners.rearrangement.controller_kernels import steer_push
-from pushplan.planners.rearrangement.mpc_follower import MpcFollower, suits_mpc
-from pushplan.planners.rearrangement.pose_follower import PoseFollower
+from pushplan.planners.pushing import PushingConfig, PushingMpc, PushParameters, PushPath
+from pushplan.planners.rearrangement.controller_kernels import is_on_bumper
+from pushplan.planners.rearrangement.geometric_pusher import GeometricPusher
 from pushplan.planners.rearrangement.push import Push
+from pushplan.planners.rearrangement.push_poses import initial_heading
 from pushplan.planners.rearrangement.push_scene import PushScene
 from pushplan.planners.rearrangement.push_simulator import PushSimulator
 from pushplan.planners.rearrangement.route import Route
@@ -21,6 +22,10 @@ from pushplan.world.checks import FloatArray
 
 _ALIGNED = math.radians(0.4)  # error of a heading that is left where a push begins
 _NEAR = 0.004  # the same of the place [circumscribed radii]
+_TOWARDS = math.radians(20.0)
+"""A push that begins farther off the object's path is left to the geometric controller."""
+_PROGRESS = 0.05  # by which an object has to get on within the time below [circumscribed radii]
+_PATIENCE = 1.0  # time in which the robot could drive so far [circumscribed radii]
 
 
 class ExecutionEnd(enum.Enum):
@@ -64,10 +69,10 @@ class PushExecution:
             aligned=_ALIGNED,
             response=response,
         )
-        self._mpc_follower: MpcFollower | None = None
+        self._pusher: GeometricPusher | PushingMpc | None = None
         self._pose_follower: PoseFollower | None = None
         self._stall = StallChecker(world.robot)
-        self._driven = self._reached = 0.0
+        self._driven = 0.0
         self._sent_at = self._speed = 0.0
 
     def command(self, scene: PushScene, held: float) -> Twist | ExecutionEnd:
@@ -115,9 +120,24 @@ class PushExecution:
         self.pushing = True
         if self.push.is_primitive:
             self._pose_follower = PoseFollower(world.robot, self.push.poses, scene.config.response)
-        if self._predictive and suits_mpc(scene, self.push):
-            self._mpc_follower = MpcFollower(scene, self.push, held)
+        if self.push.follows_path:
+            self._choose_pusher(scene, held)
         return True
+
+    def _choose_pusher(self, scene: PushScene, held: float) -> None:
+        """Predictive control where that suits, else the controller of the prediction."""
+        push, config = self.push, scene.config
+        size, robot = scene.size, scene.world.robot
+        predictive = self._predictive and suits_mpc(scene, push)
+        path = PushPath.through(push.object_path, radius=size if predictive else 0.0)
+        self._plan = path.plan(robot, push.target)
+        self._progress = ProgressChecker(_PROGRESS * size, _PATIENCE * size / robot.max_speed)
+        if predictive:
+            parameters = PushParameters(config.friction)
+            self._pusher = PushingMpc(PushingConfig(parameters=parameters, period=held))
+        else:
+            controller = scene.controller._replace(gain=push.gain)
+            self._pusher = GeometricPusher(controller, push.shift)
 
     def _push(self, scene: PushScene, held: float) -> Twist | ExecutionEnd:
         push, world, pose = self.push, scene.world, scene.world.robot_pose
@@ -132,21 +152,25 @@ class PushExecution:
         longest = push.length if push.pre_relocates else 1.1 * push.length + 0.4 * scene.size
         if self._driven > longest - 1e-6:
             return ExecutionEnd.DONE if push.pre_relocates else ExecutionEnd.FAILED
-        controller = scene.controller._replace(gain=push.gain)
+        if self._pusher is None:
+            turn = _line_turn(push.start, pose, scene.size)
+            return arc_twist(world.robot, scene.controller.step, turn)
+        twist = self._pusher.command(world, self._plan)
         target = np.flatnonzero((ids == push.target) & ~scene.done)
-        step, turn = controller.step, 0.0
-        if not push.follows_path:
-            turn = _line_turn(push.start, pose, controller.size)
-        elif len(target):
-            box = np.array(scene.poses[target[0]])
-            step, turn, self._reached, holds = steer_push(
-                np.array(pose), box, push.object_path, self._reached, push.shift, controller
-            )
-            if not holds:
+        if len(target):
+            on_bumper = is_on_bumper(np.array(pose), scene.poses[target[0]], scene.controller)
+            rest = self._plan.length - self._pusher.along
+            if not (on_bumper and self._progress.update(rest, world.time)):
                 return ExecutionEnd.FAILED
-            if self._mpc_follower is not None:
-                return self._mpc_follower.command(world) or ExecutionEnd.FAILED
-        return arc_twist(world.robot, step, turn)
+        return twist
+
+
+def suits_mpc(scene: PushScene, push: Push) -> bool:
+    """Whether the contact model of `PushingMpc` describes a push: of one object, along its path."""
+    if push.pre_relocates or push.delivers != (push.target,):
+        return False
+    away = initial_heading(push.object_path, 0.5 * scene.size) - float(scene.world.robot_pose[2])
+    return abs(math.remainder(away, math.tau)) < _TOWARDS
 
 
 def _line_turn(start: FloatArray, pose: FloatArray, size: float) -> float:

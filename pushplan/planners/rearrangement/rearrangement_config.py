@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
+from typing import Any
 
+from pushplan.world import UnknownNameError
 from pushplan.world.checks import expect, integer, number
 
 
@@ -63,3 +65,16 @@ class RearrangementConfig:
         integer("rearrangement max_pushes", self.max_pushes, low=1, high=10000)
         integer("rearrangement max_simulations", self.max_simulations, low=1, high=1000)
         expect("rearrangement mpc", self.mpc, bool)
+
+    @classmethod
+    def of(cls, **changes: Any) -> RearrangementConfig:
+        """The default settings with some fields changed.
+
+        Raises:
+            UnknownNameError: if there is no such field.
+        """
+        names = [field.name for field in fields(cls)]
+        for name in changes:
+            if name not in names:
+                raise UnknownNameError("setting of rearrangement", name, names)
+        return cls(**changes)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 
 import numpy as np
@@ -9,7 +10,7 @@ import numpy as np
 from pushplan.envs.registry import SIMULATORS
 from pushplan.envs.simulators.base import Materials, Simulator
 from pushplan.envs.tasks.materials import SOLIDS
-from pushplan.planners.pushing import PushModel, PushState
+from pushplan.planners.pushing import PushModel, PushPath, PushState, contact_kernels
 from pushplan.world import Episode, Movables, Receptacle, RobotModel, StaticMap, Twist, World
 from pushplan.world.lazy_names import look_up
 
@@ -48,6 +49,32 @@ def in_front(
     model = PushModel(robot, side * SQUARE)
     box = model.box_pose(PushState(np.zeros(3), offset, angle))
     return make_world(robot, np.zeros(3), [box], side, mass=mass), model
+
+
+def best_offset(model: PushModel, path: PushPath, speed: float) -> float:
+    """Offset at which to begin, so that sliding in the path's turns leaves the box on the bumper.
+
+    The middle of the range that it slides over lies on the middle of the bumper; of a path that
+    needs too much of it only the beginning counts.
+    """
+    state, out = np.zeros(6), np.zeros(6)
+    low = high = 0.0
+    half = model.bumper.half
+    lengths = path.lengths
+    for i in range(1, len(path.poses)):
+        length = float(lengths[i] - lengths[i - 1])
+        if length < 1e-9:
+            continue
+        turn = math.remainder(float(path.poses[i, 2] - path.poses[i - 1, 2]), math.tau)
+        contact_kernels.advance(
+            model.contact, state, speed, turn * speed / length, length / speed, out
+        )
+        if max(high, state[3]) - min(low, state[3]) > 1.2 * half:
+            break
+        low, high = min(low, float(state[3])), max(high, float(state[3]))
+        state[3] = min(max(state[3], -half), half)
+    offset = -0.5 * (low + high)
+    return min(max(offset, -0.6 * half), 0.6 * half)
 
 
 def make_simulator(name: str, world: World, friction: float) -> Simulator:

@@ -9,18 +9,11 @@ from pushing_scenes import SQUARE, make_world
 from pushplan.planners.pushing import (
     Bumper,
     Face,
-    PushExecutor,
     PushingMpc,
     PushModel,
     PushParameters,
     PushPath,
-    PushTask,
-    best_offset,
     face_towards,
-    find_approach,
-    fit_push_model,
-    identify,
-    push_log,
 )
 from pushplan.world import InvalidInputError, Twist, area_clearing_robot
 
@@ -37,19 +30,8 @@ WRONG = {
     "a pose that is no number": (lambda: PushPath([[0, 0, 0], [math.nan, 0, 0]]), "finite"),
     "no pieces": (lambda: PushPath.arcs([0, 0, 0], None), "pieces"),
     "pieces without curvature": (lambda: PushPath.arcs([0, 0, 0], [1.0]), "pieces"),
-    "rest from nan": (lambda: PATH.rest_from(math.nan), "along"),
     "plan without robot": (lambda: PATH.plan(None, 0), "RobotModel"),
     "plan of no box": (lambda: PATH.plan(ROBOT, "x"), "box_id"),
-    "index beyond": (lambda: find_approach(WORLD, 5, PATH, FRICTION, 0.1), "k must"),
-    "index below": (lambda: find_approach(WORLD, -1, PATH, FRICTION, 0.1), "k must"),
-    "path of points": (lambda: find_approach(WORLD, 0, [[0, 0]], FRICTION, 0.1), "PushPath"),
-    "friction alone": (lambda: find_approach(WORLD, 0, PATH, 0.4, 0.1), "PushParameters"),
-    "slack below": (lambda: find_approach(WORLD, 0, PATH, FRICTION, -1.0), "slack"),
-    "no world": (lambda: find_approach(None, 0, PATH, FRICTION, 0.1), "World"),
-    "offset at a stand": (lambda: best_offset(MODEL, PATH, 0.0), "speed"),
-    "offset of nothing": (lambda: best_offset(None, PATH, 1.0), "PushModel"),
-    "executor config": (lambda: PushExecutor(3), "ExecutorConfig"),
-    "executor world": (lambda: PushExecutor().command(None, PushTask(0, PATH)), "World"),
     "controller config": (lambda: PushingMpc(3), "PushingConfig"),
     "controller world": (lambda: PushingMpc().command(None, PATH.plan(ROBOT, 0)), "World"),
     "controller path": (lambda: PushingMpc().command(WORLD, PATH), "Plan"),
@@ -58,19 +40,14 @@ WRONG = {
     "model face": (lambda: PushModel(ROBOT, SQUARE, FRICTION, 3), "Face"),
     "model outline": (lambda: PushModel(ROBOT, SQUARE + 5.0), "centroid"),
     "offset nan": (lambda: MODEL.stable_curvature(math.nan), "offset"),
-    "predict from nothing": (lambda: MODEL.predict(None, [[1, 0]], 0.1), "PushState"),
-    "steps that do not match": (lambda: MODEL.predict(STATE, [[1, 0]], [0.1, 0.2]), "dt"),
-    "report of a number": (lambda: MODEL.report(STATE, 1.0), "Twist"),
-    "report of nothing": (lambda: MODEL.report(None, Twist(1.0, 0.0)), "PushState"),
+    "predict from nothing": (lambda: MODEL.rows(None, [[1, 0]], 0.1), "PushState"),
+    "steps that do not match": (lambda: MODEL.rows(STATE, [[1, 0]], [0.1, 0.2]), "dt"),
     "bumper without width": (lambda: Bumper(0.3, 0.0, 0.0), "half"),
     "bumper nan": (lambda: Bumper(math.nan, 1.0, 0.0), "front"),
     "bumper of nothing": (lambda: Bumper.of(None), "RobotModel"),
     "face without width": (lambda: Face(0.0, 0.5, 0.0, 0.0), "high"),
     "face of a point": (lambda: face_towards(np.zeros((1, 2)), 0.0), "outline"),
     "face towards nan": (lambda: face_towards(SQUARE, math.nan), "direction"),
-    "log of nothing": (lambda: push_log(None, 0), "Episode"),
-    "recordings": (lambda: identify(None), "episodes"),
-    "a recording": (lambda: fit_push_model([1]), "Episode"),
 }
 
 
@@ -82,5 +59,4 @@ def test_it_is_refused(name):
 
 
 def test_boxes_that_are_not_there_are_left_alone():
-    assert PushExecutor().command(WORLD, PushTask(77, PATH)) == Twist(0.0, 0.0)
     assert PushingMpc().command(WORLD, PATH.plan(ROBOT, 77)) == Twist(0.0, 0.0)

@@ -184,6 +184,8 @@ def test_settings_of_the_policies_are_checked():
         make_policy("gtsp-mpc", work_weight=-1.0)
     with pytest.raises(UnknownNameError):
         make_policy("gtsp-mpc", prize=1.0)
+    policy = make_policy("gtsp-mpc", mpc=False, friction=0.4)
+    assert policy.config == RearrangementConfig(mpc=False, friction=0.4)
 
 
 def test_a_sequence_is_drawn():

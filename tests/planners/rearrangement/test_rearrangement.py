@@ -10,7 +10,9 @@ import pytest
 import shapely
 from conftest import SQUARE, make_boxes
 
+from pushplan.control import PoseFollower
 from pushplan.gtsp import solve_gtsp
+from pushplan.motion.recovery_path import recovery_path
 from pushplan.planners.rearrangement import (
     PushScene,
     RearrangementConfig,
@@ -21,13 +23,11 @@ from pushplan.planners.rearrangement.cost_to_go_kernels import cost_to_go
 from pushplan.planners.rearrangement.extraction import extraction_primitives
 from pushplan.planners.rearrangement.goal_kernels import all_done
 from pushplan.planners.rearrangement.gtsp_reduction import parts_of, reduce_to_gtsp
-from pushplan.planners.rearrangement.pose_follower import PoseFollower
 from pushplan.planners.rearrangement.pose_grid_kernels import LENGTHS, MOVES, TURNS, near_poses
 from pushplan.planners.rearrangement.pose_search_kernels import PoseSearchProblem, search_poses
 from pushplan.planners.rearrangement.push import signature
 from pushplan.planners.rearrangement.push_graph import candidate_pushes
 from pushplan.planners.rearrangement.push_simulator import PushSimulator
-from pushplan.planners.rearrangement.recovery import recovery_path
 from pushplan.planners.rearrangement.rollout_cache import RolloutCache
 from pushplan.world import (
     ClearanceArea,

@@ -1,7 +1,6 @@
 """`NonlinearPushingMpc`: the same problem, solved to the end by CasADi and IPOPT.
 
-For tests and benchmarks: it says how much the quadratic program gives away, and takes a hundred
-times as long.
+It says how much the quadratic program gives away, and takes a hundred times as long.
 """
 
 from __future__ import annotations
