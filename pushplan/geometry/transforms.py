@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from pushplan.compiled import kernel
@@ -26,3 +28,11 @@ def transform_outlines(
     for k in range(poses.shape[0]):
         a, b = offsets[k], offsets[k + 1]
         transform_points(poses[k], vertices[a:b], out[a:b])
+
+
+@kernel
+def arc_step(pose: FloatArray, distance: float, turn: float, out: FloatArray) -> None:
+    """Fill ``out`` (3,) with the pose that a step [m] with a turn [rad] leads to from ``pose``."""
+    out[0] = pose[0] + distance * math.cos(pose[2] + 0.5 * turn)
+    out[1] = pose[1] + distance * math.sin(pose[2] + 0.5 * turn)
+    out[2] = pose[2] + turn

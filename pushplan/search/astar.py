@@ -99,6 +99,23 @@ def new_state(size: int) -> SearchState:
     )
 
 
+_spare: list[SearchState] = []
+"""Memory of the last search that has ended, as fresh pages take longer than a search."""
+
+
+def _borrowed(size: int) -> SearchState:
+    """Memory for an empty search over at least ``size`` nodes."""
+    try:
+        state = _spare.pop()
+    except IndexError:
+        return new_state(size)
+    if len(state.known) < size:
+        return new_state(size)
+    state.known[:size] = False
+    state.counters[:] = 0, 0, 0, -1
+    return state
+
+
 @kernel
 def offer(state: SearchState, node: int, cost: float, bound: float, parent: int, edge: int) -> None:
     """Take note of a path to ``node``; it is opened if none as cheap was known."""
@@ -165,10 +182,17 @@ class AStar:
 
     def __init__(self, lattice: Any, size: int, branching: int) -> None:
         self.lattice = lattice
-        self.state = new_state(size)
+        self._memory = _borrowed(size)
+        parts = (values[:size] for values in self._memory[:-1])
+        self.state = SearchState._make((*parts, self._memory.counters))
         self._nodes = np.empty(branching, dtype=np.int64)
         self._costs = np.empty(branching)
         self._edges = np.empty(branching, dtype=np.int64)
+
+    def __del__(self) -> None:
+        """Leave the memory to the next search."""
+        if not _spare and hasattr(self, "_memory"):
+            _spare.append(self._memory)
 
     def start(self, node: int, *, cost: float = 0.0, bound: float = 0.0, edge: int = -1) -> None:
         """Open a node from which paths may begin."""

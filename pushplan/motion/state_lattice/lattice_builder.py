@@ -20,6 +20,7 @@ from pushplan.motion.state_lattice.pose_lattice import PoseLattice
 from pushplan.motion.state_lattice.primitive_set import PrimitiveConfig
 from pushplan.motion.state_lattice.primitives import primitives
 from pushplan.motion.state_lattice.swaths import flat_runs, swaths
+from pushplan.motion.time_slicing import go_on, never
 from pushplan.world import GoalDisc, World
 from pushplan.world.checks import FloatArray
 
@@ -38,6 +39,7 @@ class LatticeBuilder:
     radius: float  # least turning radius [m]
     side: float  # distance of the robot's origin from the bounds [m]
     floe_costs: FloeCostFunction | None = None  # None where floes cost nothing
+    stopped: Callable[[], bool] = never  # ends the work with `Stopped`
 
     def __post_init__(self) -> None:
         world, config, radius, robot = self.world, self.config, self.radius, self.world.robot
@@ -50,7 +52,7 @@ class LatticeBuilder:
             steps = math.hypot(*(goal.center - world.robot_pose[:2])) / self.step
             self.step *= steps / math.floor(steps) if steps >= 1.0 else 1.0
         self.motions = primitives(
-            PrimitiveConfig(config.headings, ratio, config.variants, config.shifts)
+            PrimitiveConfig(config.headings, ratio, config.variants, config.shifts), self.stopped
         )
         self.frame = Frame.towards_goal(world)
         self.heading = self.frame.heading(float(world.robot_pose[2]))
@@ -103,6 +105,7 @@ class LatticeBuilder:
         lattice, sums = self._common
         if factor != 1.0:
             sums = factor * sums
+        go_on(self.stopped)
         lengths, costs = self._heuristic(sums, lattice)
         lattice = lattice._replace(cost_sums=sums.ravel(), row_bounds=lengths, place_costs=costs)
         if not sums.any():  # inflated, lane changes would come first where nothing is to avoid
@@ -124,7 +127,8 @@ class LatticeBuilder:
     def _common(self) -> tuple[PoseLattice, FloatArray]:
         """A lattice without costs of floes, and the sums of those costs."""
         robot, step, grid = self.world.robot, self.step, self._map
-        covered = swaths(self.motions, robot.vertices / step, robot.offsets, self.cells)
+        outlines = robot.vertices / step
+        covered = swaths(self.motions, outlines, robot.offsets, self.cells, self.stopped)
         stride = grid.shape[0] + 1
         lattice = PoseLattice(
             rows=self.rows,
@@ -139,7 +143,7 @@ class LatticeBuilder:
             run_first=covered.first,
             runs=flat_runs(covered.runs, stride),
             cost_sums=np.zeros(0),
-            blocked_sums=grid.blocked_sums(self.world.static),
+            blocked_sums=grid.blocked_sums(self.world.static, self.stopped),
             stride=stride,
             planes=self._planes(),
             goal=self._goal(),
@@ -150,7 +154,8 @@ class LatticeBuilder:
         floes = self.world.movables
         if self.floe_costs is None or not len(floes):
             return lattice, grid.no_costs()
-        return lattice, grid.cost_sums(floes, self.floe_costs(self.world, self.cell))
+        costs = self.floe_costs(self.world, self.cell)
+        return lattice, grid.cost_sums(floes, costs, self.stopped)
 
     @property
     def _hull(self) -> int:

@@ -13,6 +13,7 @@ from pushplan.motion.state_lattice.pose_lattice import bound_at, swath_sum, with
 from pushplan.motion.state_lattice.primitives import connections
 from pushplan.motion.state_lattice.swath_kernels import sweep_cells
 from pushplan.motion.state_lattice.swaths import flat_runs
+from pushplan.motion.time_slicing import go_on
 from pushplan.search.astar import AStar
 from pushplan.world.checks import FloatArray, IntArray
 
@@ -42,6 +43,7 @@ def open_search(built: BuiltLattice, builder: LatticeBuilder) -> tuple[AStar, li
     reach = robot.circumscribed_radius / builder.cell
     curves: list[FloatArray] = []
     for h in np.argsort(turns, kind="stable")[:_NEAREST].tolist():
+        go_on(builder.stopped)
         for length, u, v, *arcs in connections(
             heading, float(motions.angles[h]), motions.config, _SLACK
         )[:_PATHS]:

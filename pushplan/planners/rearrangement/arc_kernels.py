@@ -8,6 +8,7 @@ import numpy as np
 
 from pushplan.compiled import copy_into, kernel
 from pushplan.geometry.angles import wrap_angle
+from pushplan.geometry.transforms import arc_step
 from pushplan.interaction.kernels import (
     Bodies,
     Scratch,
@@ -17,14 +18,6 @@ from pushplan.interaction.kernels import (
     robot_held,
 )
 from pushplan.world.checks import FloatArray, IntArray
-
-
-@kernel
-def arc_step(pose: FloatArray, distance: float, turn: float, out: FloatArray) -> None:
-    """Fill ``out`` (3,) with the pose that a step [m] with a turn [rad] leads to from ``pose``."""
-    out[0] = pose[0] + distance * math.cos(pose[2] + 0.5 * turn)
-    out[1] = pose[1] + distance * math.sin(pose[2] + 0.5 * turn)
-    out[2] = pose[2] + turn
 
 
 @kernel

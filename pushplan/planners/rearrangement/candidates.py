@@ -96,7 +96,7 @@ def _line_pushes(simulator: PushSimulator, k: int, row: PushPrimitive) -> Iterat
 def _paths(
     simulator: PushSimulator, k: int, row: PushPrimitive
 ) -> Iterator[tuple[FloatArray, float | None, tuple[int, ...]]]:
-    """Paths of object ``k`` by a row, each with the shift if it gives one [m], and what it delivers."""
+    """Paths of object ``k``, with the shift where it is given [m] and what is to be delivered."""
     scene = simulator.scene
     radius = float(scene.world.movables.radii[k])
     away = row.clearance * scene.half if row.clearance > 0.0 else 0.75 * radius

@@ -8,15 +8,14 @@ from typing import Any
 
 import numpy as np
 
-from pushplan.control import EpisodeClock, Retreat
-from pushplan.planners.rearrangement.pose_follower import PoseFollower
+from pushplan.control import EpisodeClock, PoseFollower, Retreat
+from pushplan.motion.recovery_path import recovery_path
 from pushplan.planners.rearrangement.push import Push, signature
 from pushplan.planners.rearrangement.push_execution import ExecutionEnd, PushExecution
 from pushplan.planners.rearrangement.push_graph import PushGraph
 from pushplan.planners.rearrangement.push_scene import PushScene, check_world
 from pushplan.planners.rearrangement.push_selection import select_push
 from pushplan.planners.rearrangement.rearrangement_config import RearrangementConfig
-from pushplan.planners.rearrangement.recovery import recovery_path
 from pushplan.planners.rearrangement.rollout_cache import RolloutCache
 from pushplan.world import InvalidInputError, Twist, World
 from pushplan.world.checks import FloatArray, expect

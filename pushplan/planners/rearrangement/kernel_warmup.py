@@ -8,14 +8,14 @@ from typing import Any
 
 import numpy as np
 
+from pushplan.geometry.transforms import arc_step
 from pushplan.gtsp import warm_up_solver
+from pushplan.motion.recovery_path import recovery_path
 from pushplan.planners.pushing import warm_up as warm_up_pushing
 from pushplan.planners.rearrangement.approach import approach_tree
-from pushplan.planners.rearrangement.arc_kernels import arc_step
 from pushplan.planners.rearrangement.push_scene import PushScene
 from pushplan.planners.rearrangement.push_simulator import PushSimulator
 from pushplan.planners.rearrangement.rearrangement_config import RearrangementConfig
-from pushplan.planners.rearrangement.recovery import recovery_path
 from pushplan.planners.rearrangement.relocation import relocating_pushes
 from pushplan.world import (
     ClearanceArea,

@@ -7,12 +7,11 @@ import math
 
 import numpy as np
 
-from pushplan.control import LegFollower, ProgressChecker, StallChecker
+from pushplan.control import LegFollower, PoseFollower, ProgressChecker, StallChecker
 from pushplan.control.limits import arc_twist
 from pushplan.planners.pushing import PushingConfig, PushingMpc, PushParameters, PushPath
 from pushplan.planners.rearrangement.controller_kernels import is_on_bumper
 from pushplan.planners.rearrangement.geometric_pusher import GeometricPusher
-from pushplan.planners.rearrangement.pose_follower import PoseFollower
 from pushplan.planners.rearrangement.push import Push
 from pushplan.planners.rearrangement.push_poses import initial_heading
 from pushplan.planners.rearrangement.push_scene import PushScene

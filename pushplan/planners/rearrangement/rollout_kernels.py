@@ -11,8 +11,9 @@ from typing import NamedTuple
 import numpy as np
 
 from pushplan.compiled import copy_into, kernel
+from pushplan.geometry.transforms import arc_step
 from pushplan.interaction.kernels import Bodies, Scratch, Settings, make_scratch
-from pushplan.planners.rearrangement.arc_kernels import arc_step, push_to
+from pushplan.planners.rearrangement.arc_kernels import push_to
 from pushplan.planners.rearrangement.controller_kernels import PushingController, steer_push
 from pushplan.planners.rearrangement.goal_kernels import REMOVED, ObjectGoal, is_done
 from pushplan.world.checks import BoolArray, FloatArray

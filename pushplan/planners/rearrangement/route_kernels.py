@@ -13,7 +13,7 @@ from pushplan.geometry import convex_penetration
 from pushplan.geometry.angles import wrap_angle
 from pushplan.geometry.transforms import transform_points
 from pushplan.interaction.kernels import Bodies
-from pushplan.motion.collision import ConvexObstacles, Footprint, is_free
+from pushplan.motion.collision import ConvexObstacles, Footprint, is_free, static_depth
 from pushplan.world.checks import FloatArray, IntArray
 
 SURE_TURN = math.radians(170.0)
@@ -60,23 +60,6 @@ def _object_depth(pose: FloatArray, problem: RouteProblem, body: FloatArray) -> 
             total += deepest
             touch += problem.weights[k]
     return total, touch
-
-
-@kernel
-def static_depth(
-    pose: FloatArray, shape: Footprint, among: ConvexObstacles, scratch: FloatArray
-) -> float:
-    """How deep the footprint is in what is static [m]; 0 where it is free."""
-    deepest = 0.0
-    if is_free(pose, shape, among, scratch):
-        return deepest
-    transform_points(pose, shape.vertices, scratch)
-    for s in range(among.boxes.shape[0]):
-        obstacle = among.vertices[among.offsets[s] : among.offsets[s + 1]]
-        for p in range(shape.offsets.shape[0] - 1):
-            part = scratch[shape.offsets[p] : shape.offsets[p + 1]]
-            deepest = max(deepest, convex_penetration(part, obstacle)[0])
-    return deepest
 
 
 @kernel(allocates=True)

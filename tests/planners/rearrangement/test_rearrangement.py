@@ -10,24 +10,25 @@ import pytest
 import shapely
 from conftest import SQUARE, make_boxes
 
+from pushplan.control import PoseFollower
 from pushplan.gtsp import solve_gtsp
+from pushplan.motion.recovery_path import recovery_path
 from pushplan.planners.rearrangement import (
     PushScene,
     RearrangementConfig,
     build_push_graph,
     push_order,
 )
+from pushplan.planners.rearrangement.approach import approach_tree
 from pushplan.planners.rearrangement.cost_to_go_kernels import cost_to_go
-from pushplan.planners.rearrangement.extraction import extraction_primitives
 from pushplan.planners.rearrangement.goal_kernels import all_done
 from pushplan.planners.rearrangement.gtsp_reduction import parts_of, reduce_to_gtsp
-from pushplan.planners.rearrangement.pose_follower import PoseFollower
 from pushplan.planners.rearrangement.pose_grid_kernels import LENGTHS, MOVES, TURNS, near_poses
 from pushplan.planners.rearrangement.pose_search_kernels import PoseSearchProblem, search_poses
 from pushplan.planners.rearrangement.push import signature
 from pushplan.planners.rearrangement.push_graph import candidate_pushes
 from pushplan.planners.rearrangement.push_simulator import PushSimulator
-from pushplan.planners.rearrangement.recovery import recovery_path
+from pushplan.planners.rearrangement.relocation import relocating_pushes
 from pushplan.planners.rearrangement.rollout_cache import RolloutCache
 from pushplan.world import (
     ClearanceArea,
@@ -230,7 +231,7 @@ def test_a_box_in_a_tight_place_is_brought_out_of_it(pose, extra, drive_back):
     if not drive_back:
         ahead = replace(here.world.robot, min_speed=0.0)
         here = PushScene(replace(here.world, robot=ahead), here.config)
-    found = extraction_primitives(PushSimulator(here), 0)
+    found = relocating_pushes(PushSimulator(here), 0, approach_tree(here))
     assert found or not drive_back
     walls = [shapely.Polygon(part).buffer(-0.01) for part in here.world.static.convex_parts]
     for push in found:
@@ -341,7 +342,10 @@ def test_what_is_remembered_comes_to_the_same():
         fresh = PushScene(first.world.moved(movable_poses=boxes), first.config)
         kept = replace(fresh, cache=cache)
         before = len(cache)
-        one, other = (candidate_pushes(here, PushSimulator(here)) for here in (fresh, kept))
+        one, other = (
+            candidate_pushes(here, PushSimulator(here), approach_tree(here))
+            for here in (fresh, kept)
+        )
         known += len(one) > len(cache) - before
         assert len(one) == len(other)
         for a, b in zip(one, other, strict=True):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from pushplan.motion.collision import footprint, obstacles
-from pushplan.planners.rearrangement.recovery_kernels import (
+from pushplan.motion.recovery_kernels import (
     STEP,
     RecoveryProblem,
     can_turn,

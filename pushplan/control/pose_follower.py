@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 
-from pushplan.control import ProgressChecker, StallChecker
 from pushplan.control.limits import arc_twist
+from pushplan.control.progress_checker import ProgressChecker, StallChecker
 from pushplan.world import RobotModel, Twist
 from pushplan.world.checks import FloatArray
 

@@ -9,9 +9,8 @@ import numpy as np
 
 from pushplan.compiled import copy_into, kernel
 from pushplan.geometry import core_distance
-from pushplan.motion.collision import ConvexObstacles, Footprint
-from pushplan.planners.rearrangement.arc_kernels import arc_step
-from pushplan.planners.rearrangement.route_kernels import static_depth
+from pushplan.geometry.transforms import arc_step
+from pushplan.motion.collision import ConvexObstacles, Footprint, static_depth
 from pushplan.world.checks import FloatArray, IntArray
 
 STEP = 0.08
