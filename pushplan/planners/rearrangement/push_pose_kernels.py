@@ -69,5 +69,5 @@ def missing_clearance(
         u[0], u[1] = math.cos(heading), math.sin(heading)
         for shift in shifts:
             start = pose_behind_outline(pose, outline, heading, shift, distance)
-            least = min(least, first_free(start, u, limit / 15.0, least, shape, among, scratch))
+            least = min(least, first_free(start, u, limit / 40.0, least, shape, among, scratch))
     return least

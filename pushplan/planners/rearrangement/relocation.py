@@ -54,6 +54,7 @@ _NEARLY = np.radians([0.0, 30.0, -30.0, 60.0, -60.0])
 _BESIDE = np.array(SHIFTS)
 _NEWS = 0.05  # how far an object moves on until it is looked at anew [circumscribed radii]
 _LACKING = 3.0  # cost of clearance that the robot lacks behind the object
+_FARTHEST = 4.0  # clearance is looked for so far [circumscribed radii]
 _GAIN = 0.3  # by how much less has to be left to be done for a drive to help [circumscribed radii]
 _NEAR = 8.0  # what is farther from the object does not count for a search [circumscribed radii]
 _CURVATURES = (0.0, 0.7, -0.7, 1.6, -1.6)  # of the arcs, times the robot's circumscribed radius
@@ -251,10 +252,10 @@ class _RelocationSearch:
         if key not in self._rests:
             path = scene.object_path(k, 0.0, pose=pose)
             if path is None:
-                return _LACKING * 1.5 * scene.size
+                return _LACKING * _FARTHEST * scene.size
             towards = initial_heading(path, scene.size)
             outline = scene.world.movables.outline(k)
-            reach, limit = scene.front + scene.config.slack * scene.size, 1.5 * scene.size
+            reach, limit = scene.front + scene.config.slack * scene.size, _FARTHEST * scene.size
             lack = missing_clearance(
                 np.array(pose),
                 outline,
