@@ -49,9 +49,9 @@ _ERRORS = ((0.0, 0.0, 0.0), (0.08, 0.08, 0.15), (-0.08, 0.08, -0.15), (0.0, -0.1
 _MARGINS = (1.0, 2.0, 3.0)
 """Factors on them; a drive costs a circumscribed radius more for each that it does not stand."""
 _LEAST = 0.15  # by how much an object has to be moved for it to count [circumscribed radii]
-_NEARLY = np.radians([0.0, 30.0, -30.0, 60.0, -60.0])
+_NEARLY = np.radians([0.0, 30.0, -30.0])
 """Directions in which a push brings an object nearer to its goal, against the way there [rad]."""
-_BESIDE = np.array(SHIFTS)
+_BESIDE = np.array(SHIFTS[:3])
 _NEWS = 0.05  # how far an object moves on until it is looked at anew [circumscribed radii]
 _LACKING = 3.0  # cost of clearance that the robot lacks behind the object
 _FARTHEST = 4.0  # clearance is looked for so far [circumscribed radii]
