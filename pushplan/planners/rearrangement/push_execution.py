@@ -12,6 +12,7 @@ from pushplan.control.limits import arc_twist
 from pushplan.planners.pushing import PushingConfig, PushingMpc, PushParameters, PushPath
 from pushplan.planners.rearrangement.controller_kernels import is_on_bumper
 from pushplan.planners.rearrangement.geometric_pusher import GeometricPusher
+from pushplan.planners.rearrangement.predicted_path import predicted_path
 from pushplan.planners.rearrangement.push import Push
 from pushplan.planners.rearrangement.push_poses import initial_heading
 from pushplan.planners.rearrangement.push_scene import PushScene
@@ -24,6 +25,9 @@ _ALIGNED = math.radians(0.4)  # error of a heading that is left where a push beg
 _NEAR = 0.004  # the same of the place [circumscribed radii]
 _TOWARDS = math.radians(20.0)
 """A push that begins farther off the object's path is left to the geometric controller."""
+_OFFSET = 1.0
+"""Cost of another offset on the bumper than the predicted one: with it the robot keeps to the ground
+that the prediction has found free."""
 _PROGRESS = 0.05  # by which an object has to get on within the time below [circumscribed radii]
 _PATIENCE = 1.0  # time in which the robot could drive so far [circumscribed radii]
 
@@ -128,16 +132,18 @@ class PushExecution:
         """Predictive control where that suits, else the controller of the prediction."""
         push, config = self.push, scene.config
         size, robot = scene.size, scene.world.robot
-        predictive = self._predictive and suits_mpc(scene, push)
-        path = PushPath.through(push.object_path, radius=size if predictive else 0.0)
-        self._plan = path.plan(robot, push.target)
         self._progress = ProgressChecker(_PROGRESS * size, _PATIENCE * size / robot.max_speed)
-        if predictive:
+        if self._predictive and suits_mpc(scene, push):
+            path, offsets = predicted_path(scene, push)
             parameters = PushParameters(config.friction)
-            self._pusher = PushingMpc(PushingConfig(parameters=parameters, period=held))
+            self._pusher = PushingMpc(
+                PushingConfig(parameters=parameters, period=held, offset=_OFFSET), offsets
+            )
         else:
+            path = PushPath.through(push.object_path)
             controller = scene.controller._replace(gain=push.gain)
             self._pusher = GeometricPusher(controller, push.shift)
+        self._plan = path.plan(robot, push.target)
 
     def _push(self, scene: PushScene, held: float) -> Twist | ExecutionEnd:
         push, world, pose = self.push, scene.world, scene.world.robot_pose
