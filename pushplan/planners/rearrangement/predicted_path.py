@@ -11,6 +11,7 @@ from pushplan.planners.pushing import PushPath
 from pushplan.planners.rearrangement.push import Push
 from pushplan.planners.rearrangement.push_scene import PushScene
 from pushplan.world.checks import FloatArray
+from pushplan.world.polyline import arc_lengths
 
 _SPACING = 0.2  # between two poses of the path [circumscribed radii]
 _BEYOND = 1.0  # by which the path goes on straight beyond its end [circumscribed radii]
@@ -34,22 +35,19 @@ def predicted_path(scene: PushScene, push: Push) -> tuple[PushPath, FloatArray]:
     swept = np.empty((len(robots), len(scene.poses), 3))
     sweep_path(robots, scene.poses.copy(), scene.bodies, scene.settings, swept)
     places = swept[:, k, :2]
-    chosen = [0]
-    for i in range(1, len(places)):
-        if np.hypot(*(places[i] - places[chosen[-1]])) >= _SPACING * scene.size:
-            chosen.append(i)
-    if len(chosen) > 1:
-        chosen[-1] = max(len(places) - 1, chosen[-1]) if len(chosen) > 2 else chosen[-1]
-    points, poses = places[chosen], robots[chosen]
-    away = points - poses[:, :2]
-    offsets = np.cos(poses[:, 2]) * away[:, 1] - np.sin(poses[:, 2]) * away[:, 0]
-    if len(points) < 2:  # it is done as soon as it is touched
-        last = float(robots[-1, 2])
-    else:
-        last = math.atan2(*(points[-1] - points[-2])[::-1].tolist())
-    beyond = _BEYOND * scene.size * np.array([math.cos(last), math.sin(last)])
-    points = np.concatenate([points, (points[-1] + np.outer([0.5, 1.0], beyond))])
-    offsets = np.concatenate([offsets, offsets[-1:], offsets[-1:]])
+    away = places - robots[:, :2]
+    offsets = np.cos(robots[:, 2]) * away[:, 1] - np.sin(robots[:, 2]) * away[:, 0]
+    lengths = arc_lengths(places)
+    count = round(float(lengths[-1]) / (_SPACING * scene.size))
+    at = np.linspace(0.0, lengths[-1], count + 1)
+    points = np.column_stack([np.interp(at, lengths, places[:, axis]) for axis in (0, 1)])
+    offsets = np.interp(at, lengths, offsets)
+    heading = float(robots[-1, 2])  # of an object that is done as soon as it is touched
+    if count:
+        heading = math.atan2(*(points[-1] - points[-2])[::-1].tolist())
+    beyond = _BEYOND * scene.size * np.array([math.cos(heading), math.sin(heading)])
+    points = np.concatenate([points, points[-1] + np.outer([0.5, 1.0], beyond)])
+    offsets = np.append(offsets, [offsets[-1], offsets[-1]])
     ahead = np.gradient(points, axis=0)
     headings = np.unwrap(np.arctan2(ahead[:, 1], ahead[:, 0]))
     return PushPath(np.column_stack([points, headings])), offsets

@@ -26,7 +26,7 @@ _NEAR = 0.004  # the same of the place [circumscribed radii]
 _TOWARDS = math.radians(20.0)
 """A push that begins farther off the object's path is left to the geometric controller."""
 _OFFSET = 1.0
-"""Cost of another offset on the bumper than the predicted one: with it the robot keeps to the ground
+"""Cost of another offset on the bumper than the predicted one, which keeps the robot on the ground
 that the prediction has found free."""
 _PROGRESS = 0.05  # by which an object has to get on within the time below [circumscribed radii]
 _PATIENCE = 1.0  # time in which the robot could drive so far [circumscribed radii]
