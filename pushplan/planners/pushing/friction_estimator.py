@@ -10,7 +10,8 @@ from pushplan.world.checks import FloatArray
 
 _FRICTIONS = np.array([0.0, 0.03, 0.06, 0.1, 0.15, 0.2, 0.3, 0.4, 0.6, 0.8])
 _MEMORY = 0.95  # fraction of the errors so far that counts after another observation
-_PRIOR = 0.005
+_TELLING = 1e-3  # difference of predicted offsets below which an observation says nothing [L]
+_PRIOR = 0.001
 """Square of an error of prediction [L²] that speaks as much as a friction that is off by 1."""
 
 
@@ -43,9 +44,13 @@ class FrictionEstimator:
             time: of the observation [s].
             size: L [m].
         """
+        offsets = np.empty(len(self._frictions))
         for j, friction in enumerate(self._frictions.tolist()):
             state = observer.predict(contact._replace(friction=friction), time)
             if state is None or state[5] > 0.0:  # the box does not touch the bumper
                 return
-            self._errors[j] = _MEMORY * self._errors[j] + ((seen[3] - state[3]) / size) ** 2
+            offsets[j] = state[3]
+        if np.ptp(offsets) < _TELLING * size:
+            return
+        self._errors = _MEMORY * self._errors + ((seen[3] - offsets) / size) ** 2
         self.friction = float(self._frictions[np.argmin(self._errors + self._prior)])
