@@ -42,7 +42,6 @@ class PushingProblem(NamedTuple):
 
     contact: Contact  # Bumper, face and friction
     track: Track  # The box's path
-    offsets: FloatArray  # (M,) where it is meant to be on the bumper at each pose of it [m]
     weights: Weights
     start: FloatArray  # (6,) state when the first command takes effect
     along: float  # Path length of the box's place [m]
@@ -65,7 +64,6 @@ class Memory(NamedTuple):
 @kernel
 def residuals(
     weights: Weights,
-    wanted: float,  # offset that the box is meant to have [m]
     lateral: float,  # distance of the box from its path, left positive [m]
     error: float,  # direction of the push against the path's [rad]
     state: FloatArray,  # (6,) after the step
@@ -81,7 +79,7 @@ def residuals(
     beyond = max(abs(fraction) - weights.safe, 0.0)
     out[0] = root * lateral / weights.length
     out[1] = root * np.sqrt(weights.heading) * error
-    out[2] = root * np.sqrt(weights.offset) * (fraction - wanted / weights.half)
+    out[2] = root * np.sqrt(weights.offset) * fraction
     out[3] = root * np.sqrt(weights.rim) * (beyond if fraction > 0.0 else -beyond)
     out[4] = root * np.sqrt(weights.angle) * (state[4] - flush)
     out[5] = 0.0

@@ -57,12 +57,9 @@ class PushingMpc:
 
     Args:
         config: parameters.
-        offsets: (N,) where the box is meant to be on the bumper at each pose of the plan, left of
-            its middle [m]; at the middle if None.
     """
 
     config: PushingConfig = field(default_factory=PushingConfig)
-    offsets: FloatArray | None = None
 
     def __post_init__(self) -> None:
         expect("config", self.config, PushingConfig)
@@ -163,13 +160,6 @@ class PushingMpc:
         config = self.config
         self._plan = plan
         self._track = track_of(plan)
-        count = len(plan.poses)
-        self._offsets = np.zeros(count) if self.offsets is None else self.offsets
-        if self._offsets.shape != (count,):
-            raise InvalidInputError(
-                f"offsets must be one for each of the {count} poses of the plan, got shape "
-                f"{self._offsets.shape}"
-            )
         self._estimator = FrictionEstimator(config.parameters.friction)
         self._take_face(world, k)
         self._observer.forget()
@@ -272,7 +262,6 @@ class PushingMpc:
         return PushingProblem(
             self.model.contact,
             self._track,
-            self._offsets,
             self._weights,
             start,
             self.along,

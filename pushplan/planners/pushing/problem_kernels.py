@@ -111,7 +111,7 @@ def _propagate(
 @kernel(allocates=True)
 def assemble(problem: PushingProblem, nominal: FloatArray, memory: Memory) -> float:
     """Fill P and q over z = (v_0 .. v_M-1, w_0 .. w_M-1) in ``units``; returns the nominal cost."""
-    contact, track, offsets, weights, start, along, _, units, steps, groups = problem
+    contact, track, weights, start, along, _, units, steps, groups = problem
     jacobian, residual, hessian, gradient, states = memory
     count, moves = steps.shape[0], nominal.shape[0]
     n = 2 * moves
@@ -155,9 +155,7 @@ def assemble(problem: PushingProblem, nominal: FloatArray, memory: Memory) -> fl
         flush = flush_angle(contact, here[3])
         factor = tau * (weights.terminal if k == count - 1 else 1.0)
         block = residual[ROWS * k : ROWS * (k + 1)]
-        after = min(index + 1, offsets.shape[0] - 1)
-        offset = offsets[index] + fraction * (offsets[after] - offsets[index])
-        residuals(weights, offset, lateral, error, here, flush, v, w, factor, block)
+        residuals(weights, lateral, error, here, flush, v, w, factor, block)
         differentiate(
             contact, weights, here, heading, curvature, lateral, rows, factor, jacobian[ROWS * k :]
         )

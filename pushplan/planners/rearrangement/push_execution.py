@@ -12,7 +12,6 @@ from pushplan.control.limits import arc_twist
 from pushplan.planners.pushing import PushingConfig, PushingMpc, PushParameters, PushPath
 from pushplan.planners.rearrangement.controller_kernels import is_on_bumper
 from pushplan.planners.rearrangement.geometric_pusher import GeometricPusher
-from pushplan.planners.rearrangement.predicted_path import predicted_path
 from pushplan.planners.rearrangement.push import Push
 from pushplan.planners.rearrangement.push_poses import initial_heading
 from pushplan.planners.rearrangement.push_scene import PushScene
@@ -25,9 +24,6 @@ _ALIGNED = math.radians(0.4)  # error of a heading that is left where a push beg
 _NEAR = 0.004  # the same of the place [circumscribed radii]
 _TOWARDS = math.radians(20.0)
 """A push that begins farther off the object's path is left to the geometric controller."""
-_OFFSET = 1.0
-"""Cost of another offset on the bumper than the predicted one, which keeps the robot on the ground
-that the prediction has found free."""
 _PROGRESS = 0.05  # by which an object has to get on within the time below [circumscribed radii]
 _PATIENCE = 1.0  # time in which the robot could drive so far [circumscribed radii]
 
@@ -133,14 +129,12 @@ class PushExecution:
         push, config = self.push, scene.config
         size, robot = scene.size, scene.world.robot
         self._progress = ProgressChecker(_PROGRESS * size, _PATIENCE * size / robot.max_speed)
-        if self._predictive and suits_mpc(scene, push):
-            path, offsets = predicted_path(scene, push)
+        predictive = self._predictive and suits_mpc(scene, push)
+        path = PushPath.through(push.object_path, radius=size if predictive else 0.0)
+        if predictive:
             parameters = PushParameters(config.friction)
-            self._pusher = PushingMpc(
-                PushingConfig(parameters=parameters, period=held, offset=_OFFSET), offsets
-            )
+            self._pusher = PushingMpc(PushingConfig(parameters=parameters, period=held))
         else:
-            path = PushPath.through(push.object_path)
             controller = scene.controller._replace(gain=push.gain)
             self._pusher = GeometricPusher(controller, push.shift)
         self._plan = path.plan(robot, push.target)
