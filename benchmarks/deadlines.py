@@ -1,6 +1,7 @@
 """How well planning calls keep their stop rules, and whether they keep memory.
 
     python benchmarks/deadlines.py [CALLS] [--planners NAME ...]
+    python benchmarks/deadlines.py --worlds [CALLS] [--planners NAME ...]
     python benchmarks/deadlines.py --growth [CALLS] [--planners NAME ...] [--controllers]
 
 The first calls every planner CALLS times with a deadline of 50 ms on ten starts of its task and
@@ -9,7 +10,11 @@ writes when the calls returned. The wall clock also runs while the machine does 
 an upper bound of its lateness on a machine of its own. *gc* is the longest time that Python's
 garbage collector took within a call.
 
-The second calls every planner CALLS times on a small start with a budget of a few iterations, and
+The second calls every planner once in each of CALLS random worlds, each with another robot and
+another map of which nothing is prepared, and writes the CPU time of the calls. The deadline is one
+of CPU time too, so that what else the machine does changes nothing.
+
+The third calls every planner CALLS times on a small start with a budget of a few iterations, and
 the controllers as often along a path, and writes how memory grows after the first tenth of the
 calls: the pages of the process, and what is in use of the heap of the C library, which compiled
 code and libraries allocate from (where that can be asked, as in glibc); then a hundredth of the
@@ -28,6 +33,7 @@ import time
 import tracemalloc
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 
 import numpy as np
 
@@ -41,12 +47,17 @@ from pushplan.world import (
     MaxIterations,
     Movables,
     Planner,
+    Stop,
     StopCheck,
     World,
 )
 from pushplan.world.checks import FloatArray
 
+sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "planners"))
+from random_worlds import random_world
+
 BUDGET_S = 0.05
+_FIRST = 30  # worlds before those that are measured, for what a process does once
 MAZE = ("straight", "geometric-rrt", "kinodynamic-rrt", "push-aware")
 SHIP = (
     "skeleton",
@@ -109,6 +120,23 @@ class Watched(Deadline):
         return check
 
 
+@dataclass(frozen=True)
+class CpuDeadline(Stop):
+    """A deadline on the CPU time of the thread."""
+
+    budget_s: float
+
+    @property
+    def seconds(self) -> float:
+        """The budget [s]."""
+        return self.budget_s
+
+    def start(self) -> StopCheck:
+        """Arm the rule."""
+        end = time.thread_time() + self.budget_s
+        return lambda iterations, cost: time.thread_time() >= end
+
+
 class Collections:
     """Time that the garbage collector takes."""
 
@@ -158,6 +186,26 @@ def deadlines(names: list[str], calls: int) -> None:
         numbers = [*np.percentile(wall, [50, 95, 99, 99.9, 100])]
         numbers += [*np.percentile(own, [99.9, 100]), collector.max()]
         write(f"| `{name}` | " + " | ".join(f"{value:.1f}" for value in numbers) + " |")
+
+
+def any_world(names: list[str], calls: int) -> None:
+    """One row for each planner: CPU time of calls in worlds that were never seen."""
+    write(f"CPU time with a deadline of {1e3 * BUDGET_S:.0f} ms, {calls} random worlds [ms]", "")
+    write("| planner | p50 | p99 | p99.9 | worst | over 65 ms |", "|---|---|---|---|---|---|")
+    for name in names:
+        warm_up(name)
+        planner, took = make_planner(name), np.empty(calls)
+        for seed in range(-_FIRST, calls):
+            world, rng = random_world(seed % 2**32, name), np.random.default_rng(abs(seed))
+            began = time.thread_time()
+            planner.plan(world, stop=CpuDeadline(BUDGET_S), rng=rng)
+            if seed >= 0:
+                took[seed] = 1e3 * (time.thread_time() - began)
+            elif seed == -1:
+                gc.collect()
+                gc.freeze()
+        numbers = " | ".join(f"{v:.1f}" for v in np.percentile(took, [50, 99, 99.9, 100]))
+        write(f"| `{name}` | {numbers} | {(took > 65.0).sum()} |")
 
 
 def resident() -> float:
@@ -266,15 +314,18 @@ def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    known = (*MAZE[1:], *SHIP)
+    known = (*MAZE, *SHIP)
     parser.add_argument("calls", nargs="?", type=int, help="default: 10000, with --growth 100000")
+    parser.add_argument("--worlds", action="store_true", help="random worlds instead of tasks")
     parser.add_argument("--planners", nargs="*", choices=known, default=list(known))
     parser.add_argument("--growth", action="store_true", help="memory instead of deadlines")
     parser.add_argument("--controllers", action="store_true", help="with --growth: them as well")
     options = parser.parse_args()
     if options.calls is not None and options.calls < 10:
         parser.error(f"calls must be at least 10, got {options.calls}")
-    if options.growth:
+    if options.worlds:
+        any_world(options.planners, options.calls or 10_000)
+    elif options.growth:
         memory(options.planners, options.calls or 100_000, options.controllers)
     else:
         deadlines(options.planners, options.calls or 10_000)

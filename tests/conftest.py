@@ -94,6 +94,11 @@ def scattered_boxes(count: int, seed: int) -> np.ndarray:
     return np.array(found).reshape(-1, 3)
 
 
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """Let a command ask for more random worlds."""
+    parser.addoption("--worlds", type=int, help="number of worlds of tests over random worlds")
+
+
 def pytest_configure(config: pytest.Config) -> None:
     """Share a folder of locks and one kernel cache with the workers and the tests' processes."""
     if not hasattr(config, "workerinput"):  # of xdist

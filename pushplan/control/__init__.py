@@ -9,8 +9,9 @@ from pushplan.control.leg_follower import LegFollower, Legs
 from pushplan.control.limits import TwistLimiter, clamp_twist
 from pushplan.control.path_follower import PathFollower
 from pushplan.control.pose_follower import PoseFollower
-from pushplan.control.progress_checker import ProgressChecker, StallChecker
+from pushplan.control.progress_checker import PoseProgressChecker, ProgressChecker, StallChecker
 from pushplan.control.pure_pursuit import PurePursuit
+from pushplan.control.recovery import Recovery
 from pushplan.control.retreat import Retreat
 from pushplan.control.tracking import Progress
 
@@ -25,9 +26,11 @@ __all__ = [
     "MpcTracker",
     "PathFollower",
     "PoseFollower",
+    "PoseProgressChecker",
     "Progress",
     "ProgressChecker",
     "PurePursuit",
+    "Recovery",
     "Retreat",
     "StallChecker",
     "TwistLimiter",

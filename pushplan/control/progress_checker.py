@@ -11,6 +11,9 @@ _FRACTION = 0.1
 """A robot that moves less than this fraction of what it was told to is being stopped."""
 _LEAST = 0.1
 """Commanded motion below which nothing is concluded [circumscribed radii]."""
+_MOVED = 0.25  # that counts as getting on [circumscribed radii], or [rad]
+_TURN = 0.5  # for which a robot that gets on is given time [rad]
+_RESPONSE = 0.5  # that delays and slow motors may take [s]
 
 
 class ProgressChecker:
@@ -34,6 +37,43 @@ class ProgressChecker:
         if left < self._best - self._least or self._best == math.inf:
             self._best, self._since = left, time
         return time - self._since <= self._patience
+
+
+class PoseProgressChecker:
+    """Watches whether a robot gets away from where it was, whatever it is told to drive.
+
+    Going by a quarter of the circumscribed radius, or turning by a quarter of a radian, is getting
+    on: the `PoseProgressChecker` of Nav2, with a time that goes with the robot.
+
+    Args:
+        robot: its size, speeds and accelerations.
+    """
+
+    def __init__(self, robot: RobotModel) -> None:
+        self._size = robot.circumscribed_radius
+        going = self._size / robot.max_speed + robot.max_speed / robot.max_acceleration
+        turning = _TURN / robot.max_turn_rate + robot.max_turn_rate / robot.max_turn_acceleration
+        self.patience = going + turning + _RESPONSE
+        """Time in which it could go by its radius, and turn [s]."""
+        self.reset()
+
+    def reset(self) -> None:
+        """Begin anew, for instance after waiting for something."""
+        self._from: FloatArray | None = None
+        self.idle = 0.0
+        """Time for which it has not got on [s]."""
+
+    def update(self, pose: FloatArray, time: float) -> bool:
+        """Take the pose (3,) at a time [s]; returns whether the robot gets on."""
+        if self._from is None or self._has_moved(pose):
+            self._from, self._since = pose.copy(), time
+        self.idle = time - self._since
+        return self.idle <= self.patience
+
+    def _has_moved(self, pose: FloatArray) -> bool:
+        assert self._from is not None
+        turn = math.remainder(float(pose[2] - self._from[2]), math.tau)
+        return math.dist(pose[:2], self._from[:2]) >= _MOVED * self._size or abs(turn) >= _MOVED
 
 
 class StallChecker:

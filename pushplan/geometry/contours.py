@@ -51,25 +51,13 @@ def _diagonal(static: StaticMap) -> float:
 @lru_cache(maxsize=64)
 def contours_of(static: StaticMap, clearance: float = 0.0) -> Contours:
     """Polygons around the obstacles grown by ``clearance`` [m]: nowhere inside, tangent to arcs."""
-    shapes = obstacles_of(static, clearance)
-    diagonal = _diagonal(static)
-    loops = []
-    for k, radius in enumerate(shapes.radii.tolist()):
-        core = shapes.vertices[shapes.offsets[k] : shapes.offsets[k + 1]]
-        small = math.sqrt(max(1.0, SMALL_RADIUS * diagonal / max(radius, 1e-300)))
-        step = min(math.pi / 2.0, ARC_STEP * small)
-        loops.append(_loop(core, radius + 2.0 * gap_of(static), step))
-    corners, following, owner, start = [], [], [], 0
-    for k, loop in enumerate(loops):
-        corners.append(loop)
-        following.append(start + np.roll(np.arange(len(loop)), -1))
-        owner.append(np.full(len(loop), k))
-        start += len(loop)
-    if not loops:
-        none = np.zeros(0, dtype=np.int64)
-        empty = frozen(np.zeros((0, 2)))
-        return Contours(empty, empty, empty, frozen(none), frozen(none))
-    points, after = np.concatenate(corners), np.concatenate(following)
+    shapes, diagonal = obstacles_of(static, clearance), _diagonal(static)
+    small = SMALL_RADIUS * diagonal / np.maximum(shapes.radii, 1e-300)
+    steps = np.minimum(math.pi / 2.0, ARC_STEP * np.sqrt(np.maximum(1.0, small)))
+    points, owner = _outlines(shapes, shapes.radii + 2.0 * gap_of(static), steps)
+    ends = np.flatnonzero(np.diff(owner, append=-1)) + 1
+    after = np.arange(1, len(owner) + 1)
+    after[ends - 1] = np.concatenate([[0], ends[:-1]]) if len(ends) else ends
     outgoing = points[after] - points
     outgoing /= np.hypot(outgoing[:, 0], outgoing[:, 1])[:, None]
     incoming = np.empty_like(outgoing)
@@ -78,32 +66,34 @@ def contours_of(static: StaticMap, clearance: float = 0.0) -> Contours:
         frozen(points),
         frozen(incoming),
         frozen(outgoing),
-        frozen(np.concatenate(owner).astype(np.int64)),
+        frozen(owner.astype(np.int64)),
         frozen(after.astype(np.int64)),
     )
 
 
-def _loop(core: FloatArray, radius: float, step: float) -> FloatArray:
-    """Corners (N, 2) [m] of a polygon tangent to the outline ``radius`` around a convex core."""
-    edges = np.roll(core, -1, axis=0) - core
-    if len(core) == 2 and not edges.any():
-        normals, turns, core = np.zeros(1), np.array([2.0 * math.pi]), core[:1]
-    else:
-        normals = np.arctan2(-edges[:, 0], edges[:, 1])  # outward, of the edge that leaves
-        before = np.roll(normals, 1)
-        turns = (normals - before) % (2.0 * math.pi)
-        turns = np.where(turns > 1.5 * math.pi, 0.0, turns)  # rounding of a straight corner
-        normals = before
-    points = []
-    for corner, first, turn in zip(core, normals.tolist(), turns.tolist(), strict=True):
-        count = math.ceil(turn / step - 1e-9)
-        if count == 0:
-            continue
-        part = turn / count
-        angles = first + part * (np.arange(count) + 0.5)
-        reach = radius / math.cos(part / 2.0)
-        points.append(corner + reach * np.stack([np.cos(angles), np.sin(angles)], axis=1))
-    return np.ascontiguousarray(np.concatenate(points))
+def _outlines(
+    shapes: Obstacles, radii: FloatArray, steps: FloatArray
+) -> tuple[FloatArray, IntArray]:
+    """Corners (V, 2) [m] of polygons tangent to the outlines at ``radii`` around convex cores."""
+    cores, offsets = shapes.vertices, shapes.offsets
+    sizes = np.diff(offsets)
+    core = np.repeat(np.arange(len(sizes)), sizes)  # of each corner of the cores
+    after, before = np.arange(1, len(cores) + 1), np.arange(-1, len(cores) - 1)
+    after[offsets[1:] - 1], before[offsets[:-1]] = offsets[:-1], offsets[1:] - 1
+    edges = cores[after] - cores
+    normals = np.arctan2(-edges[:, 0], edges[:, 1])  # outward, of the edge that leaves
+    turns = (normals - normals[before]) % (2.0 * math.pi)
+    turns = np.where(turns > 1.5 * math.pi, 0.0, turns)  # rounding of a straight corner
+    points = np.flatnonzero((sizes == 2) & ~edges[offsets[:-1]].any(axis=1))
+    turns[offsets[points]], turns[offsets[points] + 1] = 2.0 * math.pi, 0.0
+    counts = np.ceil(turns / steps[core] - 1e-9).astype(np.int64)
+    source = np.repeat(np.arange(len(cores)), counts)
+    part = (turns / np.maximum(counts, 1))[source]
+    place = np.arange(len(source)) - np.repeat(np.cumsum(counts) - counts, counts)
+    angles = normals[before][source] + part * (place + 0.5)
+    reach = radii[core[source]] / np.cos(part / 2.0)
+    ray = np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    return np.ascontiguousarray(cores[source] + reach[:, None] * ray), core[source]
 
 
 @kernel(allocates=True)

@@ -37,9 +37,9 @@ def obstacles_of(static: StaticMap, clearance: float = 0.0) -> Obstacles:
     vertices, offsets = flatten(cores)
     radii = np.concatenate([np.zeros(len(static.polygons)), static.radii]) + clearance
     boxes = np.zeros((len(cores), 4))
-    for box, core, radius in zip(boxes, cores, radii, strict=True):
-        box[:2] = core.min(axis=0) - radius
-        box[2:] = core.max(axis=0) + radius
+    if len(cores):
+        boxes[:, :2] = np.minimum.reduceat(vertices, offsets[:-1]) - radii[:, None]
+        boxes[:, 2:] = np.maximum.reduceat(vertices, offsets[:-1]) + radii[:, None]
     return Obstacles(vertices, offsets, frozen(radii), frozen(boxes))
 
 
@@ -97,37 +97,46 @@ def _segments_closer(
 
 
 @kernel
+def crosses_obstacle(
+    px: float, py: float, qx: float, qy: float, obstacles: Obstacles, k: int, margin: float
+) -> bool:
+    """Whether the segment p-q comes closer than ``margin`` [m] to obstacle ``k``."""
+    vertices, offsets, radii, boxes = obstacles
+    if (
+        max(px, qx) < boxes[k, 0] - margin
+        or min(px, qx) > boxes[k, 2] + margin
+        or max(py, qy) < boxes[k, 1] - margin
+        or min(py, qy) > boxes[k, 3] + margin
+    ):
+        return False
+    dx, dy = qx - px, qy - py
+    length = math.sqrt(dx * dx + dy * dy)
+    ux, uy = (dx / length, dy / length) if length > 0.0 else (1.0, 0.0)
+    reach = max(0.0, radii[k] + margin)
+    first, last = offsets[k], offsets[k + 1]
+    low, high = math.inf, -math.inf  # extent of the core across the line
+    for i in range(first, last):
+        side = ux * (vertices[i, 1] - py) - uy * (vertices[i, 0] - px)
+        low = min(low, side)
+        high = max(high, side)
+    if low >= reach or high <= -reach:
+        return False
+    if last - first > 2 and core_distance(px, py, vertices, first, last) < 0.0:
+        return True
+    for i in range(first, last):
+        j = i + 1 if i + 1 < last else first
+        ax, ay, bx, by = vertices[i, 0], vertices[i, 1], vertices[j, 0], vertices[j, 1]
+        if _segments_closer(px, py, qx, qy, ax, ay, bx, by, reach * reach):
+            return True
+    return False
+
+
+@kernel
 def line_of_sight(
     px: float, py: float, qx: float, qy: float, obstacles: Obstacles, margin: float
 ) -> bool:
     """Whether the segment p-q stays ``margin`` [m], at least, away from all obstacles."""
-    vertices, offsets, radii, boxes = obstacles
-    dx, dy = qx - px, qy - py
-    length = math.sqrt(dx * dx + dy * dy)
-    ux, uy = (dx / length, dy / length) if length > 0.0 else (1.0, 0.0)
-    x_low, x_high, y_low, y_high = min(px, qx), max(px, qx), min(py, qy), max(py, qy)
-    for k in range(radii.shape[0]):
-        if (
-            x_high < boxes[k, 0] - margin
-            or x_low > boxes[k, 2] + margin
-            or y_high < boxes[k, 1] - margin
-            or y_low > boxes[k, 3] + margin
-        ):
-            continue
-        reach = max(0.0, radii[k] + margin)
-        first, last = offsets[k], offsets[k + 1]
-        low, high = math.inf, -math.inf  # extent of the core across the line
-        for i in range(first, last):
-            side = ux * (vertices[i, 1] - py) - uy * (vertices[i, 0] - px)
-            low = min(low, side)
-            high = max(high, side)
-        if low >= reach or high <= -reach:
-            continue
-        if last - first > 2 and core_distance(px, py, vertices, first, last) < 0.0:
+    for k in range(obstacles.radii.shape[0]):
+        if crosses_obstacle(px, py, qx, qy, obstacles, k, margin):
             return False
-        for i in range(first, last):
-            j = i + 1 if i + 1 < last else first
-            ax, ay, bx, by = vertices[i, 0], vertices[i, 1], vertices[j, 0], vertices[j, 1]
-            if _segments_closer(px, py, qx, qy, ax, ay, bx, by, reach * reach):
-                return False
     return True

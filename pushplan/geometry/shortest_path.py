@@ -20,6 +20,7 @@ from pushplan.geometry.contours import (
     free_points,
     gap_of,
     segment_crossings,
+    standoff_of,
 )
 from pushplan.geometry.obstacles import Obstacles, line_of_sight, obstacle_distance, obstacles_of
 from pushplan.geometry.regions import (
@@ -96,19 +97,6 @@ def bends_of(static: StaticMap, clearance: float = 0.0) -> tuple[Contours, Float
     return graph.contours, frozen(between)
 
 
-@lru_cache(maxsize=32)
-def _ways_out(static: StaticMap, clearance: float) -> FloatArray:
-    """Corners (N, 2) of the free space between two outlines, or an outline and the bounds [m]."""
-    contours = contours_of(static, clearance)
-    edges = contour_edges(contours)
-    found = [segment_crossings(box_edges(static.bounds), edges)]
-    for k in range(int(contours.owner.max()) if len(contours.owner) else 0):
-        found.append(segment_crossings(edges[contours.owner == k], edges[contours.owner > k]))
-    points = np.ascontiguousarray(np.concatenate(found))
-    keep = free_points(points, obstacles_of(static, clearance), static.bounds, gap_of(static))
-    return points[keep]
-
-
 @kernel(allocates=True)
 def _first_legs(points: FloatArray, scene: GoalScene) -> FloatArray:
     """Distance to the goal and nearest goal point for each point (N, 2) that sees it."""
@@ -116,6 +104,22 @@ def _first_legs(points: FloatArray, scene: GoalScene) -> FloatArray:
     for i in range(points.shape[0]):
         out[i, 0], out[i, 1], out[i, 2] = goal_leg(points[i, 0], points[i, 1], scene)
     return out
+
+
+def with_way_out(
+    origin: FloatArray, free: FloatArray, gap: float, found: tuple[float, list[FloatArray]]
+) -> Path:
+    """A path from ``free``, led there from where the robot is."""
+    length, points = found
+    away = float(np.hypot(*(free - origin)))
+    if away > 2.5 * gap:
+        points = [origin, *points]
+        length += away
+    elif points:
+        points[0] = origin
+    if not math.isfinite(length):
+        return Path(math.inf)
+    return Path(length, np.array(points))
 
 
 @dataclass(frozen=True, eq=False)
@@ -160,16 +164,7 @@ class GoalDistances:
         free = leave_inflation(self.static, self.clearance, origin)
         if free is None:
             return Path(math.inf)
-        length, points = self._from_free(free)
-        away = float(np.hypot(*(free - origin)))
-        if away > 2.5 * self.gap:
-            points = [origin, *points]
-            length += away
-        elif points:
-            points[0] = origin
-        if not math.isfinite(length):
-            return Path(math.inf)
-        return Path(length, np.array(points))
+        return with_way_out(origin, free, self.gap, self._from_free(free))
 
     def _from_free(self, start: FloatArray) -> tuple[float, list[FloatArray]]:
         x, y = start.tolist()
@@ -196,10 +191,7 @@ def _distances(
     regions = regions_of(target, to_center=to_center)
     graph, shapes = _graph_of(static, clearance), obstacles_of(static, clearance)
     gap = gap_of(static)
-    # where the goal is partly covered, a path may end at the rim of what covers it
-    rim = np.concatenate([contour_edges(contours_of(static, clearance)), box_edges(static.bounds)])
-    ends = region_crossings(regions, rim)
-    ends = ends[free_points(ends, shapes, static.bounds, gap)]
+    ends = ends_on_rims(static, clearance, regions)
     corners = graph.contours
     count = len(corners.corners)
     scene = GoalScene(regions, shapes, static.bounds, gap)
@@ -229,6 +221,21 @@ def _distances(
     exits = np.concatenate([legs[:, 1:], ends])[order]
     ways = rank[parents[order]]
     return GoalDistances(static, clearance, target, regions, shapes, nodes, ways, exits)
+
+
+def ends_on_rims(static: StaticMap, clearance: float, regions: Regions) -> FloatArray:
+    """Where a path may end at the rim (N, 2) [m] of what covers a part of the goal."""
+    shapes, contours = obstacles_of(static, clearance), contours_of(static, clearance)
+    rims = [contour_edges(contours), box_edges(static.bounds)]
+    if not len(regions.lines):  # only obstacles near it can cover a part of it
+        around = np.concatenate([regions.discs[:, :2], regions.corners])
+        reach = regions.discs[:, 2].max(initial=0.0) + standoff_of(static, clearance)
+        low = around.min(axis=0, initial=np.inf) - reach
+        high = around.max(axis=0, initial=-np.inf) + reach
+        near = ((shapes.boxes[:, :2] <= high) & (shapes.boxes[:, 2:] >= low)).all(axis=1)
+        rims[0] = rims[0][near[contours.owner]]
+    ends = region_crossings(regions, np.concatenate(rims))
+    return ends[free_points(ends, shapes, static.bounds, gap_of(static))]
 
 
 def _pack(target: Target) -> tuple[object, ...]:
@@ -280,22 +287,40 @@ def leave_inflation(static: StaticMap, clearance: float, point: FloatArray) -> F
         return None
     if obstacle_distance(x, y, grown) >= gap:
         return point
-    found = [_ways_out(static, clearance), _pushed_out(point, grown, 2.0 * gap)]
-    places = np.ascontiguousarray(np.concatenate(found))
-    places = places[free_points(places, grown, static.bounds, gap)]
-    steps = np.hypot(*(places - point).T)
-    for i in np.argsort(steps, kind="stable").tolist():
-        px, py = places[i].tolist()
-        if line_of_sight(x, y, px, py, raw, -2.0 * gap):
-            place: FloatArray = places[i]
-            return place
-    return None
+    away = np.maximum(np.maximum(grown.boxes[:, :2] - point, point - grown.boxes[:, 2:]), 0.0)
+    distances = np.hypot(away[:, 0], away[:, 1])
+    reach = 2.0 * float(grown.radii.max()) + gap
+    while True:  # among the obstacles nearby, or among all
+        near = np.flatnonzero(distances <= reach)
+        found = [_ways_out(static, clearance, near), _pushed_out(point, grown, near, 2.0 * gap)]
+        places = np.ascontiguousarray(np.concatenate(found))
+        places = places[free_points(places, grown, static.bounds, gap)]
+        steps = np.hypot(*(places - point).T)
+        for i in np.argsort(steps, kind="stable").tolist():
+            px, py = places[i].tolist()
+            if steps[i] <= reach and line_of_sight(x, y, px, py, raw, -2.0 * gap):
+                place: FloatArray = places[i]
+                return place
+        if len(near) == len(distances) and not (steps > reach).any():
+            return None
+        reach *= 2.0
 
 
-def _pushed_out(point: FloatArray, shapes: Obstacles, extra: float) -> FloatArray:
-    """The point (2,) carried straight to ``extra`` [m] outside each obstacle, as (C, 2)."""
-    found = np.empty((len(shapes.radii), 2))
-    for k, radius in enumerate(shapes.radii.tolist()):
+def _ways_out(static: StaticMap, clearance: float, near: IntArray) -> FloatArray:
+    """Where outlines of the obstacles ``near`` cross each other or the bounds, (N, 2) [m]."""
+    contours = contours_of(static, clearance)
+    edges = contour_edges(contours)[np.isin(contours.owner, near)]
+    owner = contours.owner[np.isin(contours.owner, near)]
+    found = [segment_crossings(box_edges(static.bounds), edges)]
+    found += [segment_crossings(edges[owner == k], edges[owner > k]) for k in near.tolist()]
+    return np.ascontiguousarray(np.concatenate(found))
+
+
+def _pushed_out(point: FloatArray, shapes: Obstacles, near: IntArray, extra: float) -> FloatArray:
+    """The point (2,) carried straight to ``extra`` [m] outside obstacles ``near``, as (C, 2)."""
+    found = np.empty((len(near), 2))
+    for i, k in enumerate(near.tolist()):
+        radius = float(shapes.radii[k])
         core = shapes.vertices[shapes.offsets[k] : shapes.offsets[k + 1]]
         edges = np.roll(core, -1, axis=0) - core
         fraction = ((point - core) * edges).sum(axis=1) / np.maximum((edges**2).sum(axis=1), 1e-300)
@@ -307,40 +332,5 @@ def _pushed_out(point: FloatArray, shapes: Obstacles, extra: float) -> FloatArra
             direction = np.array([edges[nearest, 1], -edges[nearest, 0]])
         size = float(np.hypot(*direction))
         unit = direction / size if size > 0.0 else np.array([1.0, 0.0])
-        found[k] = feet[nearest] + (radius + extra) * unit
+        found[i] = feet[nearest] + (radius + extra) * unit
     return found
-
-
-class VisibilityGraph:
-    """Shortest paths for a disc-shaped robot among the obstacles of one map.
-
-    Straight walls and polygons are exact; where a path bends around an arc (a thick segment's end,
-    a corner at a clearance), that arc comes out at most 0.07 % too long. Paths stay inside
-    ``static.bounds`` and may touch obstacles; obstacles that touch each other leave no passage.
-    The graph is kept for the maps used last, so making this object again costs nothing.
-
-    Args:
-        static: obstacles and bounds.
-        clearance: distance that paths keep from obstacles [m], such as the robot's radius.
-
-    Raises:
-        InvalidInputError: if the clearance is negative.
-    """
-
-    def __init__(self, static: StaticMap, clearance: float = 0.0) -> None:
-        self.static = static
-        self.clearance = number("clearance", clearance, low=0.0)
-
-    def shortest_path(self, start: ArrayLike, goal: ArrayLike) -> Path:
-        """The shortest path between two points (2,) [m].
-
-        From a start that is too close to an obstacle but not inside, the path first leaves by the
-        shortest way. A goal that is too close to an obstacle cannot be reached.
-        """
-        end: FloatArray = array("goal", goal, (2,))
-        return self.to_goal(start, [np.stack([end, end])])
-
-    def to_goal(self, start: ArrayLike, goal: Goal | Sequence[ArrayLike]) -> Path:
-        """The shortest path from a point (2,) [m] to the nearest point that counts as the goal."""
-        distances = goal_distances(self.static, goal, clearance=self.clearance)
-        return distances.path_from(start)

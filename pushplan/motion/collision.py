@@ -16,6 +16,9 @@ from pushplan.world import RobotModel, StaticMap
 from pushplan.world.checks import FloatArray, IntArray
 from pushplan.world.outline import convex_outline, flatten
 
+GROUP = 16
+"""Polygons whose boxes are looked at together."""
+
 
 class Footprint(NamedTuple):
     """Convex parts of a robot in its body frame."""
@@ -26,11 +29,12 @@ class Footprint(NamedTuple):
 
 
 class ConvexObstacles(NamedTuple):
-    """Convex polygons in the world frame."""
+    """Convex polygons in the world frame, in groups of neighbours."""
 
     vertices: FloatArray  # (X, 2) [m]
     offsets: IntArray  # (S + 1,)
     boxes: FloatArray  # (S, 4) x_min, y_min, x_max, y_max of each [m]
+    groups: FloatArray  # (ceil(S / GROUP), 4) the same of each group of `GROUP` polygons
     bounds: FloatArray  # (4,) the workspace; a pose outside is not free
 
 
@@ -50,11 +54,51 @@ def footprint(robot: RobotModel, margin: float = 0.0) -> Footprint:
 
 def obstacles(static: StaticMap, outlines: Sequence[FloatArray] = ()) -> ConvexObstacles:
     """Everything static, and further convex outlines in the world frame."""
-    parts = (*static.convex_parts, *outlines)
+    return _obstacles(static, (*static.convex_parts, *outlines)) if outlines else _walls(static)
+
+
+@functools.lru_cache(maxsize=32)
+def _walls(static: StaticMap) -> ConvexObstacles:
+    return _obstacles(static, static.convex_parts)
+
+
+def _obstacles(static: StaticMap, parts: Sequence[FloatArray]) -> ConvexObstacles:
+    if len(parts) > GROUP:
+        parts = [parts[k] for k in _packed(np.array([part[0] for part in parts]))]
     vertices, offsets = flatten(parts)
-    corners = [np.concatenate([part.min(axis=0), part.max(axis=0)]) for part in parts]
-    boxes = np.array(corners).reshape(-1, 4)
-    return ConvexObstacles(owned(vertices), owned(offsets), boxes, owned(static.bounds))
+    boxes = _boxes(vertices, offsets[:-1])
+    groups = np.zeros((0, 4))
+    if len(parts):
+        first = np.arange(0, len(parts), GROUP)
+        groups = np.hstack(
+            [np.minimum.reduceat(boxes[:, :2], first), np.maximum.reduceat(boxes[:, 2:], first)]
+        )
+    return ConvexObstacles(
+        owned(vertices), owned(offsets), boxes, np.ascontiguousarray(groups), owned(static.bounds)
+    )
+
+
+def _boxes(vertices: FloatArray, first: IntArray) -> FloatArray:
+    """(S, 4) boxes around the points from each first one to the next."""
+    if not len(first):
+        return np.zeros((0, 4))
+    low, high = np.minimum.reduceat(vertices, first), np.maximum.reduceat(vertices, first)
+    return np.ascontiguousarray(np.hstack([low, high]))
+
+
+def _packed(places: FloatArray) -> list[int]:
+    """An order of places (S, 2) in which groups lie near each other, as in a packed R-tree.
+
+    Leutenegger, Lopez and Edgington, "STR: a simple and efficient algorithm for R-tree packing",
+    1997: vertical slices, each sorted along y.
+    """
+    by_x = np.argsort(places[:, 0], kind="stable")
+    slices = int(np.ceil(np.sqrt(len(places) / GROUP)))
+    size = GROUP * int(np.ceil(len(places) / (slices * GROUP)))
+    rank = np.empty(len(places), dtype=np.int64)
+    rank[by_x] = np.arange(len(places)) // size
+    order: list[int] = np.lexsort((places[:, 1], rank)).tolist()
+    return order
 
 
 @kernel
@@ -70,17 +114,21 @@ def is_free(
     if not (bounds[0] <= x <= bounds[2] and bounds[1] <= y <= bounds[3]):
         return False
     placed = False
-    for s in range(among.boxes.shape[0]):
-        box = among.boxes[s]
+    for g in range(among.groups.shape[0]):
+        box = among.groups[g]
         if x + r <= box[0] or x - r >= box[2] or y + r <= box[1] or y - r >= box[3]:
             continue
-        if not placed:
-            transform_points(pose, shape.vertices, scratch)
-            placed = True
-        obstacle = among.vertices[among.offsets[s] : among.offsets[s + 1]]
-        for p in range(shape.offsets.shape[0] - 1):
-            if convex_overlap(scratch[shape.offsets[p] : shape.offsets[p + 1]], obstacle):
-                return False
+        for s in range(g * GROUP, min((g + 1) * GROUP, among.boxes.shape[0])):
+            box = among.boxes[s]
+            if x + r <= box[0] or x - r >= box[2] or y + r <= box[1] or y - r >= box[3]:
+                continue
+            if not placed:
+                transform_points(pose, shape.vertices, scratch)
+                placed = True
+            obstacle = among.vertices[among.offsets[s] : among.offsets[s + 1]]
+            for p in range(shape.offsets.shape[0] - 1):
+                if convex_overlap(scratch[shape.offsets[p] : shape.offsets[p + 1]], obstacle):
+                    return False
     return True
 
 

@@ -119,7 +119,7 @@ def sample_pieces(
     here = start
     for i in range(pieces.shape[0]):
         length, curvature = pieces[i, 0], pieces[i, 1]
-        if length < 1e-9:
+        if length < 1e-8 * spacing:
             continue
         steps = int(np.ceil(length / step_along(curvature, spacing)))
         if count + steps > out.shape[0]:

@@ -34,7 +34,8 @@ class PathSearchConfig(CheckedFields):
         coarse_path_spread: standard deviation of those targets about it [R].
         avoid_iterations: tree iterations that treat objects as obstacles, before they count as
             things that may be pushed.
-        tree_iterations: iterations after which a tree is given up for a new one.
+        tree_iterations: iterations after which a tree is given up for a new one; both numbers are
+            for paths of up to 30 edges and grow with the length of the coarse path beyond.
         shortcuts: shortcuts tried on a path before its gain is looked at.
         least_gain: fraction of its cost that a path must lose over ``shortcuts`` of them to be
             worked on further; otherwise new trees are grown.

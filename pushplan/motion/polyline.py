@@ -29,7 +29,7 @@ def polyline_plan(world: World, points: FloatArray, spacing: float) -> Plan:
     path = np.concatenate(pieces)
     moves = np.diff(path, axis=0)
     lengths = np.hypot(moves[:, 0], moves[:, 1])
-    keep = np.concatenate([[True], lengths > 1e-9])
+    keep = np.concatenate([[True], lengths > 1e-8 * spacing])
     path, moves, lengths = path[keep], moves[keep[1:]], lengths[keep[1:]]
     if len(moves):
         headings = np.arctan2(moves[:, 1], moves[:, 0])
@@ -55,7 +55,8 @@ def polyline_status(world: World, plan: Plan) -> PlanStatus:
     robot, poses = world.robot, plan.poses
     moves, off = np.diff(poses, axis=0), poses[0] - world.robot_pose
     fast = np.abs(wrap_angle(moves[:, 2])) > robot.max_turn_rate * np.diff(plan.times) + 1e-9
-    if np.abs(off[:2]).max() > 1e-9 or abs(wrap_angle(off[2])) > 1e-9 or fast.any():
+    near = 1e-9 * robot.circumscribed_radius
+    if np.abs(off[:2]).max() > near or abs(wrap_angle(off[2])) > 1e-9 or fast.any():
         return PlanStatus.PATH_ONLY
     step = _FINE * robot.circumscribed_radius
     counts = np.maximum(np.ceil(np.hypot(moves[:, 0], moves[:, 1]) / step), 1.0).astype(np.int64)

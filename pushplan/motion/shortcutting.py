@@ -35,7 +35,8 @@ def _new_end(
         end[0] = goal[1] + 0.999 * goal[3] * np.cos(angle)
         end[1] = goal[2] + 0.999 * goal[3] * np.sin(angle)
     else:
-        behind = (last[0] - goal[1]) * goal[3] + (last[1] - goal[2]) * goal[4] - 1e-6
+        behind = (last[0] - goal[1]) * goal[3] + (last[1] - goal[2]) * goal[4]
+        behind -= 1e-5 * problem.spacing
         shift = problem.displacement * draw[0]
         end[0] = last[0] - behind * goal[3] - shift * goal[4]
         end[1] = last[1] - behind * goal[4] + shift * goal[3]

@@ -8,6 +8,25 @@ from collections.abc import Callable, Iterator
 _PIECE_S = 0.001  # time between two looks [s]
 
 
+class Stopped(Exception):
+    """The stop rule fired within work that gives nothing before it is done."""
+
+
+def never() -> bool:
+    """No stop rule."""
+    return False
+
+
+def go_on(stopped: Callable[[], bool]) -> None:
+    """Ask a stop rule within such work.
+
+    Raises:
+        Stopped: if it fires.
+    """
+    if stopped():
+        raise Stopped
+
+
 class Pace:
     """Cuts work into pieces of about a millisecond."""
 

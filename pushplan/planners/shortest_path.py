@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -36,20 +37,29 @@ class ShortestPath:
     def plan(
         self, world: World, *, stop: Stop | None = None, rng: np.random.Generator | None = None
     ) -> PlanResult:
-        """Plan from ``world``; exact and without chance, so ``stop`` and ``rng`` are not needed.
+        """Plan from ``world``; exact and without chance, so ``rng`` is not needed.
 
-        The status is `PATH_ONLY` where the robot cannot drive the path as it stands.
+        An iteration is about a millisecond of the search. The status is `PATH_ONLY` where the
+        robot cannot drive the path as it stands.
         """
         call = PlanningCall(world, stop, rng)
         robot, goal = world.robot, world.navigation_goal
-        start = world.robot_pose[:2]
+        start, looks, late = world.robot_pose[:2], 0, False
+
+        def stopped() -> bool:
+            nonlocal looks, late
+            late, looks = call.check(looks, math.inf), looks + 1
+            return late
+
         for clearance in (robot.circumscribed_radius, robot.inscribed_radius):
-            path = VisibilityGraph(world.static, clearance).to_goal(start, goal)
+            path = VisibilityGraph(world.static, clearance).to_goal(start, goal, stopped)
+            if late:
+                return call.result(call.stopped_status, iterations=looks)
             if np.isfinite(path.length):
                 spacing = self.spacing * robot.circumscribed_radius
                 plan = polyline_plan(world, path.points, spacing)
                 status = polyline_status(world, plan)
-                return call.result(status, plan, call.elapsed, 1)
+                return call.result(status, plan, call.elapsed, looks)
         blocked = start_margin(world, 0.0) is None
         return call.result(PlanStatus.START_BLOCKED if blocked else PlanStatus.GOAL_UNREACHABLE)
 

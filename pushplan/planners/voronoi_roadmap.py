@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import shapely
 from scipy.sparse import csr_matrix
-from scipy.sparse.csgraph import dijkstra
+from scipy.sparse.csgraph import connected_components, dijkstra
 from scipy.spatial import Delaunay, QhullError, cKDTree
 
 from pushplan.control import PurePursuit
@@ -31,6 +31,7 @@ from pushplan.world.planning_call import PlanningCall
 
 _MOST_SITES = 2000
 """Points on outlines at most, but for three on each: the time of a call grows with them."""
+_SAME = 1e-6  # distance of corners of the diagram that differ by rounding only [R]
 
 
 @dataclass(frozen=True)
@@ -61,8 +62,8 @@ class Skeleton:
         """Plan from ``world``; exact and without chance, so ``rng`` is not needed.
 
         The stop rule is looked at before the diagram is made, which cannot be interrupted: 5 to
-        30 ms in open water. Where the diagram leads nowhere, the shortest way around the walls is
-        taken, which may take long among hundreds of obstacles.
+        30 ms in open water. Where the diagram leads nowhere, the shortest path around the walls is
+        taken, with looks at it.
 
         The status is `PATH_ONLY` where the robot cannot drive the path as it stands.
 
@@ -92,9 +93,17 @@ class Skeleton:
         points = self._along(world, sites, owners) if len(set(owners.tolist())) > 1 else None
         if points is not None:
             return PlanStatus.SOLVED, points
-        direct = VisibilityGraph(world.static, world.robot.inscribed_radius).to_goal(start, goal)
+        late = False
+
+        def stopped() -> bool:
+            nonlocal late
+            late = check(1, math.inf)
+            return late
+
+        graph = VisibilityGraph(world.static, world.robot.inscribed_radius)
+        direct = graph.to_goal(start, goal, stopped)
         if not np.isfinite(direct.length):
-            return PlanStatus.GOAL_UNREACHABLE, None
+            return PlanStatus.TIMED_OUT if late else PlanStatus.GOAL_UNREACHABLE, None
         return PlanStatus.SOLVED, direct.points
 
     def _sites(self, world: World) -> tuple[FloatArray, IntArray]:
@@ -120,33 +129,37 @@ class Skeleton:
 
     def _along(self, world: World, sites: FloatArray, owners: IntArray) -> FloatArray | None:
         """The cheapest path along the diagram, None where it does not lead to the goal."""
+        # about the robot, in units of its size: the same diagram wherever the world is
+        start, size = world.robot_pose[:2], world.robot.circumscribed_radius
+        sites = (sites - start) / size
         try:
             triangles = Delaunay(sites)
         except QhullError:
             return None  # all points on one line
-        # its dual: corners of the diagram are circumcentres, and neighbours fraction a ridge
+        # its dual: corners of the diagram are circumcentres, and neighbours share a ridge
         corners = _circumcentres(sites[triangles.simplices])
         first, opposite = np.nonzero(triangles.neighbors > np.arange(len(corners))[:, None])
         ridges = np.column_stack([first, triangles.neighbors[first, opposite]])
         turn = np.array([[1, 2], [2, 0], [0, 1]])[opposite]
         between = owners[np.take_along_axis(triangles.simplices[first], turn, axis=1)]
-        low, high = world.static.bounds[:2], world.static.bounds[2:]
+        low, high = (world.static.bounds - np.tile(start, 2)).reshape(2, 2) / size
         inside: BoolArray = np.all((corners >= low) & (corners <= high), axis=1)
         corners[~inside] = low  # some are infinitely far; no ridge that stays leads to them
         ridges = ridges[(between[:, 0] != between[:, 1]) & inside[ridges].all(axis=1)]
+        ridges = _merged(corners, ridges)
         if len(ridges) == 0:
             return None
-        goal, start = world.navigation_goal, world.robot_pose[:2]
-        vertices = np.concatenate([corners, start[None]])
+        goal = world.navigation_goal
+        vertices = np.concatenate([corners, np.zeros((1, 2))])
         # the robot enters the diagram by the nearest vertices
         known = np.unique(ridges)
-        _, nearest = cKDTree(corners[known]).query(start, k=min(8, len(known)))
+        _, nearest = cKDTree(corners[known]).query(np.zeros(2), k=min(8, len(known)))
         entry = known[np.atleast_1d(nearest)]
         ways = np.column_stack([np.full(len(entry), len(vertices) - 1), entry])
         edges = np.concatenate([ridges, ways])
-        walls = _walls(world)
-        edges = edges[_is_clear(walls, vertices[edges[:, 0]], vertices[edges[:, 1]])]
-        half = max(world.robot.inscribed_radius, 0.1 * world.robot.circumscribed_radius)
+        walls, places = _walls(world), start + size * vertices
+        edges = edges[_is_clear(walls, places[edges[:, 0]], places[edges[:, 1]])]
+        half = max(world.robot.inscribed_radius / size, 0.1)
         clear = np.asarray(cKDTree(sites).query(vertices)[0])
         a, b = edges[:, 0], edges[:, 1]
         lengths = np.hypot(*(vertices[a] - vertices[b]).T)
@@ -159,24 +172,24 @@ class Skeleton:
         best, before = table[0], previous[0]
         # the last stretch is straight ahead to the goal
         if isinstance(goal, GoalDisc):
-            gap = np.hypot(*(vertices - goal.center).T) - goal.radius
-            towards = goal.center - vertices
-            towards /= np.maximum(np.hypot(*towards.T), 1e-12)[:, None]
+            towards = goal.center - places
+            away = np.hypot(*towards.T)
+            gap = away - goal.radius
+            towards /= np.maximum(away, 1e-12 * size)[:, None]
         else:
-            gap = (goal.point - vertices) @ goal.normal
-            towards = np.broadcast_to(goal.normal, vertices.shape)
+            gap = (goal.point - places) @ goal.normal
+            towards = np.broadcast_to(goal.normal, places.shape)
         gap = np.maximum(gap, 0.0)
-        size = world.robot.circumscribed_radius
-        ends = vertices + (gap + 0.02 * size)[:, None] * towards
-        best = np.where(np.isfinite(best) & _is_clear(walls, vertices, ends), best, np.inf)
-        total = best + gap * (1.0 + self.narrow * (gap > size))
+        ends = places + (gap + 0.02 * size)[:, None] * towards
+        best = np.where(np.isfinite(best) & _is_clear(walls, places, ends), best, np.inf)
+        total = best + gap / size * (1.0 + self.narrow * (gap > size))
         end = int(np.argmin(total))
         if not np.isfinite(total[end]):
             return None
         chain = [end]
         while before[chain[-1]] >= 0:
             chain.append(int(before[chain[-1]]))
-        path = vertices[chain[::-1]]
+        path = places[chain[::-1]]
         return np.concatenate([path, ends[end][None]])
 
 
@@ -196,6 +209,19 @@ def _is_clear(walls: shapely.Geometry | None, a: FloatArray, b: FloatArray) -> B
         return np.ones(len(a), dtype=np.bool_)
     lines = shapely.linestrings(np.stack([a, b], axis=1))
     return np.asarray(~shapely.intersects(walls, lines), dtype=np.bool_)
+
+
+def _merged(corners: FloatArray, ridges: IntArray) -> IntArray:
+    """Ridges (M, 2) between different corners: four sites on one circle make the same one twice."""
+    known, named = np.unique(ridges, return_inverse=True)
+    pairs = cKDTree(corners[known]).query_pairs(_SAME, output_type="ndarray")
+    shape = (len(known), len(known))
+    same = csr_matrix((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=shape)
+    _, group = connected_components(same, directed=False)
+    _, first = np.unique(group, return_index=True)
+    merged: IntArray = known[first[group[named.reshape(-1, 2)]]]
+    different: BoolArray = merged[:, 0] != merged[:, 1]
+    return np.ascontiguousarray(merged[different])
 
 
 def _circumcentres(triangles: FloatArray) -> FloatArray:

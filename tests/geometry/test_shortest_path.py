@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import math
+import time
 
 import networkx as nx
 import numpy as np
@@ -10,7 +11,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from shapely.ops import nearest_points
 
-from pushplan.geometry import Grid, VisibilityGraph, clearance_field, geodesic_field
+from pushplan.geometry import (
+    Grid,
+    VisibilityGraph,
+    clearance_field,
+    geodesic_field,
+    goal_distances,
+)
 from pushplan.world import GoalDisc, GoalLine, InvalidInputError, StaticMap
 
 U_WALLS = [
@@ -339,3 +346,41 @@ def test_bounds_that_cells_do_not_fill_leave_the_rest_unreached() -> None:
     assert field.grid == Grid(np.zeros(2), 0.1, (10, 11))
     assert np.isinf(field.values[:, -1]).all()
     assert np.isfinite(field.values[:, :-1]).all()
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_the_lazy_search_finds_what_the_complete_graph_holds(seed: int) -> None:
+    rng = np.random.default_rng(200 + seed)
+    static, clearance = random_map(rng), float(rng.choice([0.0, 0.3]))
+    goals = [
+        GoalDisc(rng.uniform(0, 10, 2), float(rng.uniform(0.2, 2.0))),
+        GoalLine(np.array([5.0, 8.0]), np.array([0.2, 1.0])),
+        [np.array([[6.0, 1.0], [9.0, 2.0], [8.0, 3.0]]), np.array([[0.0, 0.0], [1.0, 0.0]])],
+    ]
+    for goal in goals:
+        complete = goal_distances(static, goal, clearance=clearance)
+        for start in rng.uniform(0, 10, (8, 2)):
+            path = VisibilityGraph(static, clearance).to_goal(start, goal)
+            expected = complete.path_from(start)
+            assert path.length == pytest.approx(expected.length, rel=3e-7)  # within the gap
+            if math.isfinite(path.length):
+                assert np.hypot(*np.diff(path.points, axis=0).T).sum() == pytest.approx(path.length)
+
+
+def test_a_search_among_ten_thousand_walls_can_be_stopped() -> None:
+    rng = np.random.default_rng(0)
+    ends = rng.uniform(0, 300, (10_000, 2))
+    static = StaticMap.build(
+        segments=np.hstack([ends, ends + rng.normal(0, 1, ends.shape)]), bounds=[0, 0, 300, 300]
+    )
+    looks: list[float] = []
+
+    def stopped() -> bool:
+        looks.append(time.thread_time())
+        return len(looks) >= 40
+
+    path = VisibilityGraph(static, 0.2).to_goal(
+        (150.0, 150.0), GoalDisc((299.0, 299.0), 0.5), stopped
+    )
+    assert math.isinf(path.length) and len(looks) == 40
+    assert np.median(np.diff(looks)) < 0.01

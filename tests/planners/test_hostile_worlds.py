@@ -16,7 +16,6 @@ from pushplan.control import TwistLimiter
 from pushplan.interaction import QuasiStatic
 from pushplan.motion.dubins import along_arc
 from pushplan.planners import make_planner, make_policy, planner_names, policy_for
-from pushplan.planners.following.recovery import recovery_twist
 from pushplan.planners.rrt import GeometricRRT, GeometricRRTConfig, KinodynamicRRT
 from pushplan.world import (
     Deadline,
@@ -296,16 +295,10 @@ class NoPlan:
         return PlanResult(PlanStatus.TIMED_OUT, None, PlanStats(0.0))
 
 
-def test_a_robot_without_a_plan_does_not_run_away():
+def test_a_robot_without_a_plan_stands_at_first():
     assert (
         policy_for(NoPlan()).act(make_u_maze(robot=make_robot(drive="differential"))).linear == 0.0
     )
-    # one that can reverse backs off only where there is room behind
-    reversing = make_robot(drive="differential", min_speed=-0.1)
-    cornered = make_u_maze(robot=reversing, robot_pose=[1.3, 5.0, 0.0])
-    assert policy_for(NoPlan()).act(cornered).linear == 0.0
-    assert recovery_twist(make_u_maze(robot=reversing)) == Twist(-0.1, 0.0)
-    assert recovery_twist(make_u_maze()) is None
 
 
 def test_objects_may_come_and_go():

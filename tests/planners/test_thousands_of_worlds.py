@@ -1,135 +1,119 @@
-"""A plan never touches a wall and keeps the turn limit, in any world; else there is a status."""
+"""What a status says of a plan is true in any world, and does not depend on where that lies.
+
+    python -m pytest tests/planners/test_thousands_of_worlds.py -m slow --worlds 3000
+
+asks every planner in so many worlds; `random_worlds` makes them and `plan_checks` judges the plans.
+"""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
-import shapely
-from conftest import OCTAGON, SQUARE
-from shapely import Polygon
+from plan_checks import check_plan
+from random_worlds import random_world, similar
 
-from pushplan.planners import make_planner
+from pushplan.planners import make_planner, planner_names
 from pushplan.world import (
     FirstSolution,
     GoalDisc,
-    GoalLine,
     MaxIterations,
     Movables,
+    PlanResult,
     PlanStatus,
-    RobotModel,
     StaticMap,
     World,
 )
-from pushplan.world.outline import transform
 
 pytestmark = pytest.mark.warm("push-aware", "kinodynamic-rrt")
 
-HULLS = {
-    "octagon": OCTAGON,
-    "plank": SQUARE * [1.4, 0.2],
-    "cart": 0.5 * SQUARE + [0.25, 0.0],  # turns about the middle of its rear edge
-    "tractor": 0.5 * SQUARE + [0.6, 0.0],  # turns about a point outside of it
-}
-SOON = FirstSolution() | MaxIterations(400)
-BETWEEN = np.array([0.0, 0.25, 0.5, 0.75])
+CHANCE = ("geometric-rrt", "kinodynamic-rrt", "push-aware")
+"""Planners that draw places between the bounds: turned, they draw others."""
+AS_PUBLISHED = "ship-lattice-published"
+"""Its cost adds kilograms to metres, so that another unit of length gives another path."""
+ITERATIONS = {"ship-predictive-published": 40}
+PLANNERS = [pytest.param(name, marks=pytest.mark.warm(name)) for name in planner_names()]
+COUNTS = [20, pytest.param(400, marks=pytest.mark.slow)]
+FEW = [6, pytest.param(100, marks=pytest.mark.slow)]
 
 
-def random_world(seed: int) -> World:
-    """Ten metres of posts, slivers and walls; starts and goals may lie in them."""
-    rng = np.random.default_rng(seed)
-    hull = rng.choice(list(HULLS))
-    robot = RobotModel.from_outline(
-        HULLS[hull] * rng.uniform(0.3, 1.0),
-        mass=10 ** rng.uniform(-2, 2),
-        drive=str(rng.choice(["constant_speed", "differential"])),
-        max_speed=0.15,
-        max_turn_rate=10 ** rng.uniform(-1.5, 0.5),
-    )
-    posts = [
-        SQUARE * rng.uniform(0.01, 0.8, 2) + spot
-        for spot in rng.uniform(0, 10, (rng.integers(0, 16), 2))
-    ]
-    ends = rng.uniform(0, 10, (rng.integers(0, 4), 4))
-    if rng.random() < 0.1:
-        ends = np.array([[0, 5, 10, 5.0]])  # from side to side
-    few = int(rng.integers(0, 10)) if rng.random() < 0.99 else 200
-    boxes = [SQUARE * 10 ** rng.uniform(-3, 0, 2) for _ in range(few)]
-    poses = np.column_stack([rng.uniform(0, 10, (few, 2)), rng.uniform(-3, 3, few)])
-    goal = GoalDisc(rng.uniform(0, 10, 2), float(rng.uniform(0.05, 1.5)))
-    return World(
-        robot,
-        [*rng.uniform(0, 10, 2), rng.uniform(-3, 3)],
-        StaticMap.build(polygons=posts, segments=ends, radii=0.05, bounds=[0, 0, 10, 10]),
-        Movables.from_outlines(boxes, poses.reshape(-1, 3)),
-        goal if rng.random() < 0.7 else GoalLine([5.0, 8.5], [0.0, 1.0]),
-    )
+@pytest.fixture
+def worlds(request: pytest.FixtureRequest, count: int) -> int:
+    """How many worlds to look at: the test's own number, or what the command asks for."""
+    return int(request.config.getoption("--worlds") or count)
 
 
-def walls_of(world: World) -> shapely.Geometry:
-    return shapely.union_all([Polygon(part) for part in world.static.convex_parts])
-
-
-def check_drivable(world: World, plan) -> None:
-    """Free of walls at the poses and between them, and within the limits of the robot."""
-    robot, walls, size = world.robot, walls_of(world), world.robot.circumscribed_radius
-    shapely.prepare(walls)
-    assert np.allclose(plan.poses[0], world.robot_pose, atol=1e-9)
-    assert world.goal.distance(*plan.poses[-1, :2]) <= 1e-6
-    steps, moved = np.diff(plan.times), np.diff(plan.poses, axis=0)
-    assert np.all(np.abs(moved[:, 2]) <= robot.max_turn_rate * steps + 1e-6)
-    assert np.all(np.hypot(moved[:, 0], moved[:, 1]) <= robot.max_speed * steps + 1e-6)
-    shares = np.append((np.arange(len(moved))[:, None] + BETWEEN).ravel(), len(moved))
-    for share in shares:
-        k = min(int(share), len(moved) - 1)
-        pose = plan.poses[k] + (share - k) * moved[k] if len(moved) else plan.poses[0]
-        for part in robot.parts:
-            outline = Polygon(transform(pose, part))
-            if walls.intersects(outline):
-                graze = 1e-9 if share == int(share) else (0.02 * size) ** 2
-                assert outline.intersection(walls).area < graze
-
-
-def plan_in(seed: int, name: str):
-    world = random_world(seed)
-    result = make_planner(name).plan(world, stop=SOON, rng=np.random.default_rng(seed))
+def planned(name: str, world: World, seed: int) -> PlanResult:
+    """A short call, whose plan is checked."""
+    stop = FirstSolution() | MaxIterations(ITERATIONS.get(name, 400))
+    result = make_planner(name).plan(world, stop=stop, rng=np.random.default_rng(seed))
     assert (result.plan is not None) == result.status.has_plan
-    return world, result.plan, result.status
+    if result.plan is not None:
+        check_plan(world, result.plan, result.status)
+    return result
 
 
-def run(name: str, seeds: range, check, least: float) -> None:
-    """Check every plan that is called solved; so many of the worlds must have one."""
-    solved = 0
-    for seed in seeds:
-        world, plan, status = plan_in(seed, name)
-        if status is PlanStatus.SOLVED:
-            solved += 1
-            try:
-                check(world, plan)
-            except AssertionError as error:
-                raise AssertionError(f"world {seed}: {error}") from error
-    assert solved >= least * len(seeds)
+def cost(result: PlanResult) -> float:
+    """Travel of the plan [kg m], 0 where there is none."""
+    return 0.0 if result.plan is None else result.plan.travel_cost
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("name", ["push-aware", "kinodynamic-rrt"])
-def test_plans_can_be_driven(name):
-    run(name, range(1000), check_drivable, least=0.2)
+@pytest.mark.parametrize("count", COUNTS)
+@pytest.mark.parametrize("name", PLANNERS)
+def test_a_plan_is_what_its_status_says(name: str, worlds: int) -> None:
+    found, wrong = 0, []
+    for seed in range(worlds):
+        try:
+            found += planned(name, random_world(seed, name), seed).status.has_plan
+        except AssertionError as error:
+            wrong.append(f"world {seed}: {error}")
+    assert not wrong, "\n".join(wrong)
+    assert found >= 0.3 * worlds
 
 
-@pytest.mark.parametrize("name", ["push-aware", "kinodynamic-rrt"])
-def test_some_plans_can_be_driven(name):
-    run(name, range(2000, 2100), check_drivable, least=0.2)
+@pytest.mark.parametrize("count", FEW)
+@pytest.mark.parametrize("name", PLANNERS)
+def test_another_unit_of_length_changes_nothing(name: str, worlds: int) -> None:
+    """Powers of two scale without rounding, so that statuses and costs are exactly the same."""
+    for seed in range(worlds):
+        world = random_world(seed, name)
+        first = planned(name, world, seed)
+        for scale in (2.0**-10, 2.0**10):
+            again = planned(name, similar(world, scale=scale), seed)
+            if name != AS_PUBLISHED:
+                assert again.status is first.status, f"world {seed} times {scale}"
+                assert cost(again) == pytest.approx(scale * cost(first), rel=1e-9), f"world {seed}"
 
 
-@pytest.mark.parametrize("name", ["straight", "skeleton", "geometric-rrt"])
-def test_paths_for_a_point_are_called_solved_where_they_can_be_driven(name):
-    run(name, range(3000, 3100), check_drivable, least=0.0)
-    aligned = random_world(7)
+@pytest.mark.parametrize("count", FEW)
+@pytest.mark.parametrize("name", PLANNERS)
+def test_another_origin_or_north_changes_nothing(name: str, worlds: int) -> None:
+    """Coordinates round, and what is nearly equal may change places: costs only nearly agree."""
+    others = costlier = 0
+    for seed in range(worlds):
+        rng = np.random.default_rng([seed, 1])
+        world, angle = random_world(seed, name), rng.uniform(0.0, 2.0 * np.pi)
+        away = 10.0 ** rng.uniform(3.0, 6.0)
+        shift = (away * np.cos(angle), away * np.sin(angle))
+        first = planned(name, world, seed)
+        moved = planned(name, similar(world, shift=shift), seed)
+        turned = planned(name, similar(world, turns=int(rng.integers(1, 4))), seed)
+        for again in (moved, turned):
+            if again is turned and name in CHANCE:
+                known = {PlanStatus.START_BLOCKED, PlanStatus.GOAL_UNREACHABLE}
+                assert (again.status in known) == (first.status in known), f"world {seed}"
+                others += again.status.has_plan is not first.status.has_plan
+                continue
+            others += again.status is not first.status
+            costlier += abs(cost(again) - cost(first)) > 0.03 * cost(first)
+    assert others <= (0.1 if name in CHANCE else 0.01) * worlds
+    assert costlier <= 0.02 * worlds
+
+
+def test_a_path_for_a_point_is_solved_only_where_the_robot_can_drive_it() -> None:
     free = StaticMap.build(bounds=[0, 0, 10, 10])
-    easy = World(aligned.robot, [2.0, 5.0, 0.0], free, Movables.empty(), GoalDisc([8.0, 5.0], 0.5))
-    if name == "straight":
-        result = make_planner(name).plan(easy)
-        assert result.status is PlanStatus.SOLVED
-        check_drivable(easy, result.plan)
-    turned = easy.moved(robot_pose=[2.0, 5.0, 1.0])
-    assert make_planner(name).plan(turned, stop=SOON).status is PlanStatus.PATH_ONLY
+    robot, goal = random_world(7).robot, GoalDisc([8.0, 5.0], 0.5)
+    ahead = World(robot, [2.0, 5.0, 0.0], free, Movables.empty(), goal)
+    assert planned("straight", ahead, 0).status is PlanStatus.SOLVED
+    for name in ("straight", "skeleton", "geometric-rrt"):
+        turned = ahead.moved(robot_pose=[2.0, 5.0, 1.0])
+        assert planned(name, turned, 0).status is PlanStatus.PATH_ONLY

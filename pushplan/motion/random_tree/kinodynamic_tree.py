@@ -4,7 +4,9 @@ OMPL owns the tree, the nearest-neighbour search and the loop; it calls back for
 motion towards them, and for the goal. Its Python binding offers no constructor for a directed
 control sampler, so the sampling of several controls, of which the one that gets nearest to the
 target is kept, happens inside the propagator: OMPL's own sample is one of them, and the edges are
-written down here, because the control that OMPL stores is only the sample.
+written down here, because the control that OMPL stores is only the sample. OMPL counts from the
+start, in units in which its distance between two poses is that of `steer`: so its tree is the same
+wherever and however large the world is.
 """
 
 from __future__ import annotations
@@ -31,6 +33,10 @@ class TreeLimits(NamedTuple):
     edge_length: float  # longest edge [m]
     spacing: float  # distance between collision checks [m]
     turn_weight: float  # what a radian of heading error is worth in metres
+
+
+_OMPL_TURN_WEIGHT = 0.5  # what a radian is worth in the distance of its SE(2)
+_State = tuple[float, float, float]
 
 
 @kernel(allocates=True)
@@ -86,14 +92,20 @@ class TreeGrowth:
 
     def __post_init__(self) -> None:
         self.start = np.array([self.start[0], self.start[1], _wrap(self.start[2])])
+        self.unit = self.limits.turn_weight / _OMPL_TURN_WEIGHT
+        self.root = self.state_of(self.start)
+        self.poses = {self.root: self.start}
         self.scratch = np.empty_like(self.shape.vertices)
-        self.here, self.end, self.target = np.empty(3), np.empty(3), np.empty(3)
+        self.end, self.target = np.empty(3), np.empty(3)
         self.moved = True  # OMPL asks whether the start is valid before anything moves
-        self.reached: tuple[float, float, float] | None = None
+        self.reached: _State | None = None
         # end of each edge -> its start, length and curvature
-        self.edges: dict[
-            tuple[float, float, float], tuple[tuple[float, float, float], float, float]
-        ] = {}
+        self.edges: dict[_State, tuple[_State, float, float]] = {}
+
+    def state_of(self, pose: FloatArray) -> _State:
+        """A pose (3,) as OMPL has it."""
+        x, y, yaw = (float(value) for value in pose)
+        return (x - self.start[0]) / self.unit, (y - self.start[1]) / self.unit, yaw
 
     def grow(
         self, seed: int, done: Callable[[], bool], stopped: Callable[[], bool]
@@ -114,9 +126,10 @@ class TreeGrowth:
     def _run(self, done: Callable[[], bool]) -> FloatArray | None:
         space = base.SE2StateSpace()
         bounds = base.RealVectorBounds(2)
+        limits = (self.among.bounds - np.tile(self.start[:2], 2)) / self.unit
         for axis in range(2):
-            bounds.setLow(axis, float(self.among.bounds[axis]))
-            bounds.setHigh(axis, float(self.among.bounds[axis + 2]))
+            bounds.setLow(axis, float(limits[axis]))
+            bounds.setHigh(axis, float(limits[axis + 2]))
         space.setBounds(bounds)
         controls = control.RealVectorControlSpace(space, 1)
         curvatures = base.RealVectorBounds(1)
@@ -131,9 +144,7 @@ class TreeGrowth:
         info.setup()
         problem = base.ProblemDefinition(info)
         state = own_state(base.SE2StateSpace)
-        state.setX(float(self.start[0]))
-        state.setY(float(self.start[1]))
-        state.setYaw(float(self.start[2]))
+        _write(self.root, state)
         problem.addStartState(state)
         region = _Region(info, self)
         problem.setGoal(region)
@@ -150,20 +161,19 @@ class TreeGrowth:
         self.target[:] = self.targets()
         return self.target
 
-    def satisfied(self, x: float, y: float, yaw: float) -> bool:
-        """Whether a pose is in the goal, which the tree has then reached by an edge to it."""
-        if self.goal.distance(x, y) > 0.0:
-            return False
-        if (x, y, yaw) in self.edges:
-            self.reached = (x, y, yaw)
-        return True
+    def distance(self, state: _State) -> float:
+        """Distance [m] of a state of the tree to the goal, which is then reached where it is 0."""
+        away = float(self.goal.distance(*self.poses[state][:2]))
+        if away == 0.0 and state in self.edges:
+            self.reached = state
+        return away
 
     def _propagate(
         self, state: base.State, action: control.Control, duration: float, result: base.State
     ) -> None:
-        self.here[0], self.here[1], self.here[2] = state.getX(), state.getY(), state.getYaw()
+        origin = _read(state)
         curvature, length = steer(
-            self.here,
+            self.poses[origin],
             self.target,
             action[0],
             self.limits,
@@ -176,13 +186,11 @@ class TreeGrowth:
         if not self.moved:
             return
         self.end[2] = _wrap(self.end[2])
-        x, y, yaw = float(self.end[0]), float(self.end[1]), float(self.end[2])
-        result.setX(x)
-        result.setY(y)
-        result.setYaw(yaw)
-        origin = (float(self.here[0]), float(self.here[1]), float(self.here[2]))
-        if (x, y, yaw) not in self.edges and (x, y, yaw) != origin:
-            self.edges[x, y, yaw] = (origin, length, curvature)
+        end = self.state_of(self.end)
+        _write(end, result)
+        if end not in self.poses:
+            self.poses[end] = self.end.copy()
+            self.edges[end] = (origin, length, curvature)
 
     def _is_valid(self, state: base.State) -> bool:
         return self.moved
@@ -190,8 +198,7 @@ class TreeGrowth:
     def _trace(self) -> FloatArray:
         arcs: list[tuple[float, float]] = []
         at = self.reached
-        root = (float(self.start[0]), float(self.start[1]), float(self.start[2]))
-        while at is not None and at != root:
+        while at is not None and at != self.root:
             at, length, curvature = self.edges[at]
             arcs.append((length, curvature))
         return np.array(arcs[::-1]).reshape(-1, 2)
@@ -205,17 +212,23 @@ class _Region(base.GoalSampleableRegion):
         self.growth = growth
 
     def sampleGoal(self, state: base.State) -> None:
-        target = self.growth.sample()
-        state.setX(float(target[0]))
-        state.setY(float(target[1]))
-        state.setYaw(float(target[2]))
+        _write(self.growth.state_of(self.growth.sample()), state)
 
     def maxSampleCount(self) -> int:
         return 1_000_000_000
 
     def distanceGoal(self, state: base.State) -> float:
-        inside = self.growth.satisfied(state.getX(), state.getY(), state.getYaw())
-        return 0.0 if inside else self.growth.goal.distance(state.getX(), state.getY())
+        return self.growth.distance(_read(state))
+
+
+def _read(state: base.State) -> _State:
+    return state.getX(), state.getY(), state.getYaw()
+
+
+def _write(values: _State, state: base.State) -> None:
+    state.setX(values[0])
+    state.setY(values[1])
+    state.setYaw(values[2])
 
 
 def _wrap(angle: float) -> float:

@@ -15,6 +15,10 @@ from pushplan.motion.polyline import polyline_plan
 from pushplan.motion.random_tree.kinodynamic_tree import TreeGrowth, TreeLimits
 from pushplan.motion.random_tree.targets import Targets
 from pushplan.world.checks import FloatArray
+from pushplan.world.polyline import path_length
+
+_EDGES = 30
+"""Edges along a coarse path up to which a tree gets its budget; in proportion more beyond."""
 
 
 class TreePaths:
@@ -74,7 +78,8 @@ class TreePaths:
                     return None
                 self._exact = self._around_walls()
             coarse = self._exact
-        last = improver.iterations + budget
+        edges = path_length(coarse) / (config.edge * size)
+        last = improver.iterations + int(budget * max(1.0, edges / _EDGES))
 
         def done() -> bool:
             improver.iterations += 1
@@ -99,7 +104,8 @@ class TreePaths:
         """A path around the walls alone, where the coarse grid misses a narrow passage."""
         world = self._improver.world
         graph = VisibilityGraph(world.static, world.robot.inscribed_radius)
-        corners = graph.to_goal(world.robot_pose[:2], self._improver.goal).points
+        start, improver = world.robot_pose[:2], self._improver
+        corners = graph.to_goal(start, improver.goal, improver.stopped).points
         if len(corners) == 0:
             return world.robot_pose[None, :2]
         return polyline_plan(world, corners, self._improver.size).poses[:, :2]

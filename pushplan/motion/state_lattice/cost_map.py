@@ -87,6 +87,26 @@ def add_floes(floes: PlacedFloes, grid: FloatArray) -> None:
 
 
 @kernel
+def _columns_near(outline: FloatArray, row: float, margin: float) -> tuple[float, float]:
+    """Least and greatest column of a convex outline within ``margin`` of a row; (0, -1): none."""
+    least, most, count = np.inf, -np.inf, outline.shape[0]
+    for i in range(count):
+        j = i + 1 if i + 1 < count else 0
+        a, b = outline[i, 0] - row, outline[j, 0] - row
+        low, high = 0.0, 1.0
+        if a != b:
+            u, v = (-margin - a) / (b - a), (margin - a) / (b - a)
+            low, high = max(low, min(u, v)), min(high, max(u, v))
+        elif abs(a) > margin:
+            continue
+        if low <= high:
+            along = outline[j, 1] - outline[i, 1]
+            least = min(least, outline[i, 1] + min(low * along, high * along))
+            most = max(most, outline[i, 1] + max(low * along, high * along))
+    return (least, most) if least <= most else (0.0, -1.0 - 2.0 * margin)
+
+
+@kernel
 def block(
     outlines: FloatArray,  # (V, 2) corners of convex outlines [cells], counter-clockwise
     offsets: IntArray,  # (S + 1,) where each outline starts
@@ -101,10 +121,10 @@ def block(
         low, high = _extent(outline, 0)
         first = max(int(np.floor(low - margin)), 0)
         last = min(int(np.ceil(high + margin)), rows - 1)
-        low, high = _extent(outline, 1)
-        left = max(int(np.floor(low - margin)), 0)
-        right = min(int(np.ceil(high + margin)), columns - 1)
         for row in range(first, last + 1):
+            low, high = _columns_near(outline, float(row), margin)
+            left = max(int(np.floor(low - margin)), 0)
+            right = min(int(np.ceil(high + margin)), columns - 1)
             for column in range(left, right + 1):
                 inside, near = True, np.inf
                 for i in range(count):

@@ -20,6 +20,7 @@ from pushplan.motion.state_lattice.pose_lattice import PoseLattice
 from pushplan.motion.state_lattice.primitive_set import PrimitiveConfig
 from pushplan.motion.state_lattice.primitives import primitives
 from pushplan.motion.state_lattice.swaths import flat_runs, swaths
+from pushplan.motion.time_slicing import go_on, never
 from pushplan.world import GoalDisc, World
 from pushplan.world.checks import FloatArray
 
@@ -27,6 +28,7 @@ FloeCostFunction = Callable[[World, float], FloeCosts]
 """Costs of the floes of a world on a map whose cells have a side [m]."""
 _MOST_NODES = 3_000_000
 _MOST_CELLS = 1_000_000
+_FEW_COLUMNS = 256  # of the map, between two looks at a stop rule
 
 
 @dataclass(eq=False)
@@ -38,6 +40,7 @@ class LatticeBuilder:
     radius: float  # least turning radius [m]
     side: float  # distance of the robot's origin from the bounds [m]
     floe_costs: FloeCostFunction | None = None  # None where floes cost nothing
+    stopped: Callable[[], bool] = never  # ends the work with `Stopped`
 
     def __post_init__(self) -> None:
         world, config, radius, robot = self.world, self.config, self.radius, self.world.robot
@@ -50,7 +53,7 @@ class LatticeBuilder:
             steps = math.hypot(*(goal.center - world.robot_pose[:2])) / self.step
             self.step *= steps / math.floor(steps) if steps >= 1.0 else 1.0
         self.motions = primitives(
-            PrimitiveConfig(config.headings, ratio, config.variants, config.shifts)
+            PrimitiveConfig(config.headings, ratio, config.variants, config.shifts), self.stopped
         )
         self.frame = Frame.towards_goal(world)
         self.heading = self.frame.heading(float(world.robot_pose[2]))
@@ -102,13 +105,23 @@ class LatticeBuilder:
         """The lattice, with a factor on the costs of all floes."""
         lattice, sums = self._common
         if factor != 1.0:
-            sums = factor * sums
+            for first in range(0, len(sums), _FEW_COLUMNS):
+                go_on(self.stopped)
+                few = slice(first, first + _FEW_COLUMNS)
+                np.multiply(factor, sums[few], out=self._scaled[few])
+            sums = self._scaled
+        go_on(self.stopped)
         lengths, costs = self._heuristic(sums, lattice)
         lattice = lattice._replace(cost_sums=sums.ravel(), row_bounds=lengths, place_costs=costs)
         if not sums.any():  # inflated, lane changes would come first where nothing is to avoid
             lattice = lattice._replace(inflation=1.0)
         start = (*self.start, self.heading)
         return BuiltLattice(lattice, self.frame, self.motions, start, self.arrives)
+
+    @cached_property
+    def _scaled(self) -> FloatArray:
+        """Memory for sums with a factor, of one search at a time."""
+        return np.empty_like(self._common[1])
 
     @cached_property
     def _map(self) -> LatticeMap:
@@ -124,7 +137,8 @@ class LatticeBuilder:
     def _common(self) -> tuple[PoseLattice, FloatArray]:
         """A lattice without costs of floes, and the sums of those costs."""
         robot, step, grid = self.world.robot, self.step, self._map
-        covered = swaths(self.motions, robot.vertices / step, robot.offsets, self.cells)
+        outlines = robot.vertices / step
+        covered = swaths(self.motions, outlines, robot.offsets, self.cells, self.stopped)
         stride = grid.shape[0] + 1
         lattice = PoseLattice(
             rows=self.rows,
@@ -139,7 +153,7 @@ class LatticeBuilder:
             run_first=covered.first,
             runs=flat_runs(covered.runs, stride),
             cost_sums=np.zeros(0),
-            blocked_sums=grid.blocked_sums(self.world.static),
+            blocked_sums=grid.blocked_sums(self.world.static, self.stopped),
             stride=stride,
             planes=self._planes(),
             goal=self._goal(),
@@ -150,7 +164,8 @@ class LatticeBuilder:
         floes = self.world.movables
         if self.floe_costs is None or not len(floes):
             return lattice, grid.no_costs()
-        return lattice, grid.cost_sums(floes, self.floe_costs(self.world, self.cell))
+        costs = self.floe_costs(self.world, self.cell)
+        return lattice, grid.cost_sums(floes, costs, self.stopped)
 
     @property
     def _hull(self) -> int:

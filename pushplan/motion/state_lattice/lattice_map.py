@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,12 +17,16 @@ from pushplan.motion.state_lattice.cost_map import (
     prefix_sums,
 )
 from pushplan.motion.state_lattice.frame import Frame
+from pushplan.motion.time_slicing import go_on, never
 from pushplan.world import Movables, StaticMap
 from pushplan.world.checks import FloatArray, IntArray
 from pushplan.world.outline import flatten
 
 _BLOCKED_MARGIN = 0.8
 """Cells nearer to an obstacle than this are blocked [cells]: more than half their diagonal."""
+
+
+_FEW = 2  # outlines that are drawn between two looks at a stop rule
 
 
 @dataclass(frozen=True)
@@ -38,7 +43,9 @@ class LatticeMap:
         points: FloatArray = self.frame.from_world(points_world) / self.cell + self.origin
         return points
 
-    def cost_sums(self, floes: Movables, costs: FloeCosts) -> FloatArray:
+    def cost_sums(
+        self, floes: Movables, costs: FloeCosts, stopped: Callable[[], bool] = never
+    ) -> FloatArray:
         """(columns, rows + 1) sums of the costs of each column before each row [m]."""
         corners = np.empty_like(floes.vertices)
         transform_outlines(floes.poses, floes.vertices, floes.offsets, corners)
@@ -50,20 +57,33 @@ class LatticeMap:
             costs,
         )
         grid = np.zeros(self.shape)
-        add_floes(placed, grid)
+        for first in range(0, len(floes), _FEW):
+            go_on(stopped)
+            few = slice(first, first + _FEW)
+            part = costs._replace(totals=costs.totals[few], areas=costs.areas[few])
+            offsets = placed.offsets[first : first + _FEW + 1]
+            add_floes(
+                PlacedFloes(placed.outlines, offsets, placed.centres[few], placed.radii[few], part),
+                grid,
+            )
+        go_on(stopped)
         return prefix_sums(grid)
 
     def no_costs(self) -> FloatArray:
         """`cost_sums` where there is nothing."""
         return np.zeros((self.shape[1], self.shape[0] + 1))
 
-    def blocked_sums(self, static: StaticMap) -> FloatArray:
+    def blocked_sums(self, static: StaticMap, stopped: Callable[[], bool] = never) -> FloatArray:
         """Flattened sums of the blocked cells of each column before each row; (0,) without any."""
         if not static.convex_parts:
             return np.zeros(0)
         vertices, offsets = flatten(static.convex_parts)
         grid = np.zeros(self.shape)
-        block(np.ascontiguousarray(self.to_cells(vertices)), offsets, _BLOCKED_MARGIN, grid)
+        outlines = np.ascontiguousarray(self.to_cells(vertices))
+        for first in range(0, len(offsets) - 1, _FEW):
+            go_on(stopped)
+            block(outlines, offsets[first : first + _FEW + 1], _BLOCKED_MARGIN, grid)
+        go_on(stopped)
         return prefix_sums(grid).ravel()
 
     def columns_between(

@@ -40,7 +40,7 @@ def lay_path(
     goal = world.navigation_goal
     if isinstance(goal, GoalLine):
         point, normal = built.finish(world)
-        inside = np.flatnonzero((poses[:, :2] - point) @ normal >= -1e-9)
+        inside = np.flatnonzero((poses[:, :2] - point) @ normal >= -1e-9 * size)
     else:
         numbers = goal_numbers(goal, config.inset * size)
         inside = np.flatnonzero([in_goal(x, y, numbers) for x, y in poses[:, :2]])

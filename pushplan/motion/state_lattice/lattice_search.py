@@ -13,6 +13,7 @@ from pushplan.motion.state_lattice.pose_lattice import bound_at, swath_sum, with
 from pushplan.motion.state_lattice.primitives import connections
 from pushplan.motion.state_lattice.swath_kernels import sweep_cells
 from pushplan.motion.state_lattice.swaths import flat_runs
+from pushplan.motion.time_slicing import go_on
 from pushplan.search.astar import AStar
 from pushplan.world.checks import FloatArray, IntArray
 
@@ -45,6 +46,7 @@ def open_search(built: BuiltLattice, builder: LatticeBuilder) -> tuple[AStar, li
         for length, u, v, *arcs in connections(
             heading, float(motions.angles[h]), motions.config, _SLACK
         )[:_PATHS]:
+            go_on(builder.stopped)
             to_row, to_column = row + round(u), column + round(v)
             if not (0 <= to_row < lattice.rows and 0 <= to_column < lattice.columns):
                 continue

@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass
 
 import numpy as np
 
-from pushplan.compiled import owned
+from pushplan.compiled import kernel, owned
 from pushplan.motion.dubins import sample_pieces
 from pushplan.world.checks import ArrayRecord, FloatArray, IntArray, frozen, integer, known_keys
 from pushplan.world.checks import number as checked_number
@@ -71,15 +71,8 @@ class PrimitiveSet(ArrayRecord):
     @functools.cached_property
     def boxes(self) -> FloatArray:
         """(P, 4) least and greatest x and y along each primitive [steps]."""
-        boxes = np.empty((len(self), 4))
-        poses, curvatures = np.empty((1000, 3)), np.empty(1000)
-        for p in range(len(self)):
-            start = np.array([0.0, 0.0, self.angles[self.heading_of(p)]])
-            pieces, spacing = owned(self.pieces[p]), 0.02 * self.lengths[p]
-            count = sample_pieces(start, pieces, spacing, poses, curvatures)
-            path = np.concatenate([np.zeros((1, 2)), poses[:count, :2]])
-            boxes[p] = path[:, 0].min(), path[:, 0].max(), path[:, 1].min(), path[:, 1].max()
-        return frozen(boxes)
+        headings = np.repeat(self.angles, np.diff(self.first))
+        return frozen(_boxes(headings, owned(self.pieces), owned(self.lengths)))
 
     @functools.cached_property
     def bulge(self) -> int:
@@ -129,6 +122,22 @@ class PrimitiveSet(ArrayRecord):
             frozen(pieces),
         )
         return cls(config, *arrays)
+
+
+@kernel(allocates=True)
+def _boxes(headings: FloatArray, pieces: FloatArray, lengths: FloatArray) -> FloatArray:
+    """(P, 4) least and greatest x and y along arcs (P, 3, 2) from the origin."""
+    boxes = np.zeros((headings.shape[0], 4))
+    poses, curvatures, start = np.empty((1000, 3)), np.empty(1000), np.zeros(3)
+    for p in range(headings.shape[0]):
+        start[2] = headings[p]
+        count = sample_pieces(start, pieces[p], 0.02 * lengths[p], poses, curvatures)
+        for i in range(count):
+            boxes[p, 0] = min(boxes[p, 0], poses[i, 0])
+            boxes[p, 1] = max(boxes[p, 1], poses[i, 0])
+            boxes[p, 2] = min(boxes[p, 2], poses[i, 1])
+            boxes[p, 3] = max(boxes[p, 3], poses[i, 1])
+    return boxes
 
 
 def directions(headings: int) -> IntArray:

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import functools
 import json
+from collections.abc import Callable
 from importlib import resources
 
 import numpy as np
@@ -22,6 +23,7 @@ from pushplan.motion.state_lattice.primitive_set import (
     directions,
     lattice_angles,
 )
+from pushplan.motion.time_slicing import go_on, never
 from pushplan.world.checks import FloatArray, IntArray, frozen
 
 _MOST_TURN = 1.3  # greatest change of heading along one primitive [rad]
@@ -38,10 +40,14 @@ def connections(heading: float, target: float, config: PrimitiveConfig, slack: f
     return rows[order]
 
 
-def _turning(heading: float, target: float, along: IntArray, config: PrimitiveConfig) -> FloatArray:
+@functools.lru_cache(maxsize=2048)
+def _turning(heading: int, target: int, config: PrimitiveConfig) -> FloatArray:
     """Primitives from a heading to another one: the shortest that no straight step leads to."""
+    angles, along = lattice_angles(config.headings), directions(config.headings)[[heading, target]]
+    if heading == target or abs(wrap_angle(angles[target] - angles[heading])) > _MOST_TURN:
+        return np.zeros((0, 9))
     kept: list[FloatArray] = []
-    for row in connections(heading, target, config, _SLACK):
+    for row in connections(float(angles[heading]), float(angles[target]), config, _SLACK):
         steps = [np.hypot(*vector) for vector in along]
         composed = any(
             np.array_equal(row[1:3], old[1:3] + vector) and row[0] > old[0] + step - 1e-6
@@ -52,7 +58,7 @@ def _turning(heading: float, target: float, along: IntArray, config: PrimitiveCo
             kept.append(row)
         if len(kept) == config.variants:
             break
-    return np.array(kept).reshape(-1, 9)
+    return frozen(np.array(kept).reshape(-1, 9))
 
 
 def _shifting(heading: float, along: IntArray, config: PrimitiveConfig) -> FloatArray:
@@ -79,10 +85,7 @@ def generate(config: PrimitiveConfig) -> PrimitiveSet:
         rows = [np.array([[step, *along, step, 0.0, 0.0, 0.0, 0.0, 0.0]])]
         targets = [np.array([h])]
         for other in range(config.headings):
-            change = abs(wrap_angle(angles[other] - angles[h]))
-            if other == h or change > _MOST_TURN:
-                continue
-            made = _turning(angles[h], angles[other], vectors[[h, other]], config)
+            made = _turning(h, other, config)
             rows.append(made)
             targets.append(np.full(len(made), other))
         made = _shifting(angles[h], along, config)
@@ -110,12 +113,30 @@ def generate(config: PrimitiveConfig) -> PrimitiveSet:
     return PrimitiveSet(config, *arrays)
 
 
+def primitives(config: PrimitiveConfig, stopped: Callable[[], bool] = never) -> PrimitiveSet:
+    """The set for a configuration: from the file that ships with it, else made now.
+
+    Raises:
+        Stopped: if the stop rule fires before it is there; what is done is kept.
+    """
+    stored = _stored(config)
+    if stored is not None:
+        return stored
+    for heading in range(config.headings // 4):
+        for target in range(config.headings):
+            go_on(stopped)
+            _turning(heading, target, config)
+    return _made(config)
+
+
+_made = functools.lru_cache(maxsize=32)(generate)
+
+
 @functools.lru_cache(maxsize=32)
-def primitives(config: PrimitiveConfig) -> PrimitiveSet:
-    """The set for a configuration: from the file that ships with it, else made now."""
+def _stored(config: PrimitiveConfig) -> PrimitiveSet | None:
     file = resources.files("pushplan.motion.state_lattice") / "data" / f"{config.key}.json"
     if file.is_file():
         stored = PrimitiveSet.from_json(json.loads(file.read_text(encoding="utf-8")))
         if stored.config == config:
             return stored
-    return generate(config)
+    return None

@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 import functools
+import threading
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
 
 from pushplan.motion.state_lattice.primitive_set import PrimitiveSet
 from pushplan.motion.state_lattice.swath_kernels import sweep_cells
+from pushplan.motion.time_slicing import go_on, never
 from pushplan.world.checks import FloatArray, IntArray
+
+_FEW = 8  # primitives between two looks at a stop rule
 
 
 class Swaths(NamedTuple):
@@ -26,24 +31,59 @@ def swaths(
     vertices: FloatArray,  # (V, 2) convex parts of the footprint in lattice steps, body frame
     offsets: IntArray,  # (Q + 1,) where each part starts
     cells_per_step: int,  # how many cells of the map a lattice step is long
+    stopped: Callable[[], bool] = never,
 ) -> Swaths:
-    """Swaths of all primitives of a set, cached by everything that they depend on."""
+    """Swaths of all primitives of a set, cached by everything that they depend on.
+
+    What is done when the stop rule fires is kept for the next time.
+
+    Raises:
+        Stopped: if the stop rule fires before they are all there.
+    """
     shape = np.round(vertices, 9).tobytes()
-    return _swaths(primitives, shape, offsets.tobytes(), cells_per_step)
+    return _maker(primitives, shape, offsets.tobytes(), cells_per_step).make(stopped)
+
+
+class _SwathMaker:
+    """Swaths of which some are there; thread-safe."""
+
+    def __init__(
+        self, primitives: PrimitiveSet, vertices: FloatArray, offsets: IntArray, cells: int
+    ) -> None:
+        self._cells = cells
+        self._primitives, self._vertices, self._offsets = primitives, vertices, offsets
+        self._reach = float(np.hypot(vertices[:, 0], vertices[:, 1]).max())
+        self._parts: list[IntArray] = []
+        self._lock = threading.Lock()
+
+    def make(self, stopped: Callable[[], bool]) -> Swaths:
+        """Work until all are there."""
+        while len(self._parts) < len(self._primitives):
+            go_on(stopped)
+            with self._lock:
+                for p in range(len(self._parts), len(self._primitives))[:_FEW]:
+                    self._parts.append(self._one(p))
+        return self._swaths
+
+    def _one(self, p: int) -> IntArray:
+        cells, primitives = self._cells, self._primitives
+        pieces = primitives.pieces[p] * np.array([cells, 1.0 / cells])
+        heading = float(primitives.angles[primitives.heading_of(p)])
+        return sweep_cells(heading, pieces, self._vertices, self._offsets, self._reach, 0.5)
+
+    @functools.cached_property
+    def _swaths(self) -> Swaths:
+        first = np.cumsum([0, *(len(part) for part in self._parts)])
+        return Swaths(first.astype(np.int64), np.concatenate(self._parts))
 
 
 @functools.lru_cache(maxsize=32)
-def _swaths(primitives: PrimitiveSet, shape: bytes, starts: bytes, cells_per_step: int) -> Swaths:
+def _maker(
+    primitives: PrimitiveSet, shape: bytes, starts: bytes, cells_per_step: int
+) -> _SwathMaker:
     vertices = np.frombuffer(shape).reshape(-1, 2) * cells_per_step
     offsets = np.frombuffer(starts, dtype=np.int64)
-    reach = float(np.hypot(vertices[:, 0], vertices[:, 1]).max())
-    parts, first = [], [0]
-    for p in range(len(primitives)):
-        pieces = primitives.pieces[p] * np.array([cells_per_step, 1.0 / cells_per_step])
-        heading = float(primitives.angles[primitives.heading_of(p)])
-        parts.append(sweep_cells(heading, pieces, vertices, offsets, reach, 0.5))
-        first.append(first[-1] + len(parts[-1]))
-    return Swaths(np.array(first, dtype=np.int64), np.concatenate(parts))
+    return _SwathMaker(primitives, vertices, offsets, cells_per_step)
 
 
 def flat_runs(runs: IntArray, stride: int) -> IntArray:

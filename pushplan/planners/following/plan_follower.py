@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
@@ -14,7 +13,8 @@ from pushplan.control import EpisodeClock, PathFollower, clamp_twist
 from pushplan.control.limits import driven_twist, ramp_twist
 from pushplan.control.tracking import Progress
 from pushplan.interaction import InteractionModel, QuasiStatic
-from pushplan.planners.following.recovery import recovery_twist
+from pushplan.planners.following.planning_time import PlanningTime
+from pushplan.planners.following.recovery import RecoveryRule
 from pushplan.planners.following.replanning import (
     Reason,
     Replanning,
@@ -25,6 +25,8 @@ from pushplan.planners.following.replanning import (
 from pushplan.planners.following.splicing import joined, passed, world_ahead
 from pushplan.world import (
     Controller,
+    GoalDisc,
+    GoalLine,
     InvalidInputError,
     Plan,
     Planner,
@@ -33,11 +35,10 @@ from pushplan.world import (
     Twist,
     World,
 )
-from pushplan.world.checks import number
 from pushplan.world.polyline import path_lengths
 
 _PERIOD = 0.1  # for which the first command is taken to be held [s]
-_REMEMBERED = 5  # planning calls whose times say how long the next one will take
+_PAUSE = 0.1  # between two plans, of the time for which the robot has not got on
 
 
 @dataclass(frozen=True)
@@ -58,8 +59,8 @@ class PlanFollower:
 
     At every step the rest of the plan is swept again from where everything is now; where that
     costs more than was predicted, or jams, or the robot has left the path, or the plan is used
-    up, a new plan is made. If none is found the old one is kept. A differential drive that has no
-    plan, or makes no progress with its plans, shows a recovery behaviour.
+    up, a new plan is made. If none is found the old one is kept. A differential drive that does
+    not get on, with a plan or without, recovers (`pushplan.control.Recovery`) and plans anew.
 
     In latency-aware simulation (`simulate_latency`) planning goes on beside driving: a plan is
     there only after the time that it took, and the old one is driven until then.
@@ -89,6 +90,7 @@ class PlanFollower:
         self.interaction = QuasiStatic() if interaction is None else interaction
         self.stop = stop
         self._progress: Progress | None = None
+        self._recovery: RecoveryRule
         self._forget(np.random.default_rng(0))
 
     def reset(self, world: World, rng: np.random.Generator) -> None:
@@ -97,6 +99,7 @@ class PlanFollower:
         self.controller.reset(world)
         self._clock.command = driven_twist(world)
         self._progress = Progress(window=2.0 * world.robot.circumscribed_radius)
+        self._recovery = RecoveryRule(world)
 
     def simulate_latency(
         self, factor: float, clock: Callable[[], float] = time.perf_counter
@@ -107,7 +110,7 @@ class PlanFollower:
             factor: seconds of the world's clock for one of ``clock``.
             clock: returns seconds.
         """
-        self._factor, self._stopwatch = number("factor", factor, low=0.0), clock
+        self._planning_time.simulate(factor, clock)
 
     def _forget(self, rng: np.random.Generator) -> None:
         self.plan_log: list[PlanResult] = []
@@ -115,17 +118,19 @@ class PlanFollower:
         self.current_plan: Plan | None = None
         self.background_s = 0.0
         """How much of the last call of `act` a robot would do beside driving [s]."""
-        self._factor, self._stopwatch = 0.0, time.perf_counter
+        self._planning_time = PlanningTime()
         self._clock = EpisodeClock(_PERIOD)
-        self._recovering = False
-        self._took: deque[float] = deque(maxlen=_REMEMBERED)
         self._pending: _PendingPlan | None = None
         self._rng = rng
         self._planned_at = -np.inf
         self._planned_from = np.full(2, np.nan)
         self._planned_ids = np.zeros(0, dtype=np.int64)
         self._tight = False
-        self._no_progress = 0
+
+    @property
+    def stuck(self) -> bool:
+        """Whether all recoveries at this place are used up; plans are still made and driven."""
+        return self._progress is not None and self._recovery.stuck
 
     def act(self, world: World, observation: Any = None) -> Twist:
         """The twist for this step; plans first where that is necessary."""
@@ -140,57 +145,60 @@ class PlanFollower:
         return ramp_twist(world.robot, last, wanted.linear, wanted.angular, held)
 
     def _choose(self, world: World) -> Twist:
+        away = self._recover(world) if self._recovery.is_on else None
+        if away is None:
+            self._update_plan(world)
+            if self._is_waiting(world):
+                self._recovery.wait()
+            away = self._recover(world)
+        if away is not None:
+            return away
+        if self.current_plan is None:
+            return clamp_twist(world.robot, 0.0, 0.0)
+        return self.controller.command(world, self.current_plan)
+
+    def _update_plan(self, world: World) -> None:
+        """Ask for a plan where one is wanted, and take up the one that is there."""
         self._receive(world)
         if self._pending is None:
             reason = self._needs_plan(world)
             if reason is not None:
                 self._ask(world, reason)
                 self._receive(world)
-        if self.current_plan is None and self._pending is not None:
-            return clamp_twist(world.robot, 0.0, 0.0)
-        if self.current_plan is None or self._no_progress > 3:
-            away = recovery_twist(world)
-            if away is not None:
-                self._recovering = True
-                return away
+
+    def _is_waiting(self, world: World) -> bool:
+        """Whether the robot need not get on: it is there, or a plan is on its way."""
         if self.current_plan is None:
-            return clamp_twist(world.robot, 0.0, 0.0)
-        if self._recovering:  # from what the robot does now, not from the controller's last command
-            self._recovering = False
+            return self._pending is not None
+        goal, (x, y, _) = world.goal, world.robot_pose
+        there = isinstance(goal, GoalDisc | GoalLine) and goal.distance(float(x), float(y)) == 0.0
+        return there or self.replanning.never
+
+    def _recover(self, world: World) -> Twist | None:
+        """The next velocity of a recovery, after which nothing is left of the old plan."""
+        away = self._recovery.command(world, self._clock.held)
+        if away is not None:
+            self.current_plan = self._pending = None
             self.controller.reset(world)
-        return self.controller.command(world, self.current_plan)
+        return away
 
     def _ask(self, world: World, reason: Reason) -> None:
         """Call the planner; its plan is there after the time that the call takes."""
         assert self._progress is not None
+        latency = self.replanning.latency
+        if latency is None:
+            latency = self._planning_time.expected(self.stop)
         start, stretch = world_ahead(
-            world, self.current_plan, self._progress.along, self._latency(), self.interaction
+            world, self.current_plan, self._progress.along, latency, self.interaction
         )
-        began = self._stopwatch()
-        result = self.planner.plan(start, stop=self.stop, rng=self._rng)
-        took = self._stopwatch() - began
+        result, took = self._planning_time.measure(
+            lambda: self.planner.plan(start, stop=self.stop, rng=self._rng)
+        )
+        self.background_s = self._planning_time.own
         self.plan_log.append(result)
-        if self._factor > 0.0:
-            self.background_s = took
-            self._took.append(took)
-        moved = float(np.hypot(*(world.robot_pose[:2] - self._planned_from)))
-        stuck = moved < 0.05 * world.robot.circumscribed_radius and reason is not Reason.PERIOD
-        self._no_progress = self._no_progress + 1 if stuck or result.plan is None else 0
         self._planned_at, self._planned_from = world.time, world.robot_pose[:2]
         self._planned_ids = world.movables.ids
-        ready = world.time + self._factor * took
-        self._pending = _PendingPlan(result, stretch, reason, world.time, ready)
-
-    def _latency(self) -> float:
-        """How long the next planning call is expected to take, by the clock of the world [s]."""
-        if self.replanning.latency is not None:
-            return self.replanning.latency
-        if self._factor == 0.0:
-            return 0.0
-        budget = np.inf if self.stop is None else self.stop.seconds
-        if self._took:
-            return self._factor * min(budget, max(self._took))
-        return self._factor * budget if np.isfinite(budget) else 0.0
+        self._pending = _PendingPlan(result, stretch, reason, world.time, world.time + took)
 
     def _receive(self, world: World) -> None:
         """Take up a plan that has been waited for long enough."""
@@ -235,8 +243,8 @@ class PlanFollower:
         size = world.robot.circumscribed_radius
         waited = world.time - self._planned_at
         # a robot that stays stuck thinks less and less often, so that the episode ends in time
-        patience: float = rule.interval * 2 ** min(max(self._no_progress - 20, 0), 6)
-        rested = waited >= patience * size / world.robot.max_speed - 1e-9
+        pause = max(rule.interval * size / world.robot.max_speed, _PAUSE * self._recovery.idle)
+        rested = waited >= pause - 1e-9
         if plan is None:
             return Reason.NO_PLAN if rested else None
         if rule.never:
@@ -252,7 +260,7 @@ class PlanFollower:
             return Reason.OFFSET
         if along >= self._progress.total - 1e-9:
             return Reason.USED_UP if rested else None
-        if self._tight and waited >= 4.0 * patience * size / world.robot.max_speed:
+        if self._tight and waited >= 4.0 * pause:
             return Reason.TIGHT  # there may be a plan that keeps its distance
         driven = np.hypot(*(world.robot_pose[:2] - self._planned_from))
         if waited >= rule.every_seconds - 1e-9 or driven >= rule.every_metres:
@@ -272,7 +280,7 @@ class PlanFollower:
             return None
         now, _ = sweep_rest(world, plan, part.start, self.interaction, part.stop)
         if now.jammed_at >= 0:
-            at_once = now.jammed_at <= 3 and self._no_progress < 20
+            at_once = now.jammed_at <= 3 and self._recovery.idle <= self._recovery.patience
             return Reason.JAM if rested or at_once else None
         expected = float(path_lengths(predicted[part]) @ world.movables.masses)
         allowed = surprise * world.robot.circumscribed_radius * world.robot.mass

@@ -1,36 +1,76 @@
-"""The recovery behaviour: out of a place from which there is no plan forward."""
+"""`RecoveryRule`: when a robot that follows plans recovers, and when it gives that up."""
 
 from __future__ import annotations
 
-import numpy as np
+import math
 
-from pushplan.motion.collision import footprint, is_free, obstacles
+from pushplan.control import PoseProgressChecker, Recovery
 from pushplan.world import Drive, Twist, World
 
-_REACH = 0.5
-"""How far behind the robot has to be free of walls for it to back up [circumscribed radii]."""
+_DISTANCE = 1.0  # by which a recovery takes the robot away [circumscribed radii]
+_PLACE = 2.0  # recoveries that are no farther apart are at the same place [circumscribed radii]
+_MOST = 6  # recoveries at one place
 
 
-def recovery_twist(world: World) -> Twist | None:
-    """A twist that takes a differential drive out of a corner, or None if it has to stay.
+class RecoveryRule:
+    """Begins a recovery where the robot does not get on, each time in another way at one place.
 
-    It reverses where there is room behind, else it turns on the spot where its footprint allows.
-    Objects are not looked at: backing away from them is what frees a jam.
+    A robot that has recovered as often as there are ways, and is still at the same place, is
+    `stuck`: it stays with its plans alone until they bring it elsewhere. A constant-speed robot
+    cannot recover.
+
+    Args:
+        world: at the start of the episode.
     """
-    robot = world.robot
-    if robot.drive is not Drive.DIFFERENTIAL:
-        return None
-    walls, shape = obstacles(world.static), footprint(robot)
-    scratch = np.empty_like(shape.vertices)
-    x, y, theta = world.robot_pose
-    heading = np.array([np.cos(theta), np.sin(theta)])
-    if robot.min_speed < 0.0:
-        steps = np.linspace(0.0, _REACH * robot.circumscribed_radius, 6)[1:]
-        behind = [np.array([*([x, y] - step * heading), theta]) for step in steps]
-        if all(is_free(pose, shape, walls, scratch) for pose in behind):
-            return Twist(robot.min_speed, 0.0)
-    for side in (1.0, -1.0):
-        turned = [np.array([x, y, theta + side * turn]) for turn in np.linspace(0.0, 0.5, 6)[1:]]
-        if all(is_free(pose, shape, walls, scratch) for pose in turned):
-            return Twist(0.0, side * robot.max_turn_rate)
-    return None
+
+    def __init__(self, world: World) -> None:
+        self._checker = PoseProgressChecker(world.robot)
+        self._recovery: Recovery | None = None
+        self._place = world.robot_pose
+        self._count = 0
+
+    @property
+    def idle(self) -> float:
+        """Time for which the robot has not got on [s]."""
+        return self._checker.idle
+
+    @property
+    def patience(self) -> float:
+        """Time without getting on after which a recovery begins [s]."""
+        return self._checker.patience
+
+    @property
+    def stuck(self) -> bool:
+        """Whether all recoveries at this place are used up."""
+        return self._count >= _MOST
+
+    @property
+    def is_on(self) -> bool:
+        """Whether a recovery is going on."""
+        return self._recovery is not None
+
+    def wait(self) -> None:
+        """Take it that the robot stands because it has to: that is no lack of progress."""
+        self._checker.reset()
+
+    def command(self, world: World, held: float) -> Twist | None:
+        """The velocity of a recovery; None where there is none, or it has just ended.
+
+        Args:
+            world: the scene now.
+            held: for how long the command will be held [s].
+        """
+        size = world.robot.circumscribed_radius
+        if math.dist(world.robot_pose[:2], self._place[:2]) > _PLACE * size:
+            self._place, self._count = world.robot_pose, 0
+        gets_on = self._checker.update(world.robot_pose, world.time)
+        if self._recovery is None:
+            if gets_on or self.stuck or world.robot.drive is not Drive.DIFFERENTIAL:
+                return None
+            self._recovery = Recovery(world, _DISTANCE * size, skip=self._count)
+            self._count += 1
+        command = self._recovery.command(world, held)
+        if command is None:
+            self._recovery = None
+            self._checker.reset()
+        return command

@@ -161,7 +161,7 @@ def _successors(
         return 0
     if tree.parents[node] >= 0:
         there = _best_there(tree, node, table, lattice.problem.contacts.radii)
-        if tree.costs[node] > there + 1e-12:
+        if tree.costs[node] > there * (1.0 + 1e-12):
             return 0  # a cheaper node has taken its cell since
     cost = tree.costs[node] + m0 * length
     one = tree.best.shape[3] == 1

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from pushplan.geometry import VisibilityGraph
@@ -15,24 +17,22 @@ _TOO_LONG = 7e-4
 _SLIM = 1e-3
 """Fraction by which the disc is less than the inscribed one: gaps as wide as the robot count."""
 _DIRECTIONS = 360
-_PARTS = 12
-_CORNERS = 120  # convex static parts, and their corners, up to which a visibility graph is made
 
 
-def lower_bound(world: World) -> float:
+def lower_bound(world: World, stopped: Callable[[], bool] = lambda: False) -> float:
     """A cost that no plan can undercut [kg m].
 
     Every path is at least as long as the shortest one of the robot's inscribed disc around the
     walls, and as the shortest one under its turn limit without walls; objects only add to that.
-    The former counts as nothing on a map of many parts, where it would take too long to know, and
-    where the robot starts too near to a wall.
+    The former counts as nothing where the robot starts too near to a wall, or the stop rule fires.
     """
     goal = world.navigation_goal
     around = 0.0
     clearance = (1.0 - _SLIM) * world.robot.inscribed_radius
     start = world.robot_pose[:2]
-    if graph_is_quick(world.static) and _is_clear(world.static, start, clearance):
-        length = float(VisibilityGraph(world.static, clearance).to_goal(start, goal).length)
+    if _is_clear(world.static, start, clearance):
+        path = VisibilityGraph(world.static, clearance).to_goal(start, goal, stopped)
+        length = float(path.length)
         around = length / (1.0 + _TOO_LONG) if np.isfinite(length) else 0.0
     radius = world.robot.turning_radius
     if world.robot.drive is Drive.DIFFERENTIAL:
@@ -40,12 +40,6 @@ def lower_bound(world: World) -> float:
     radius = max(radius, TIGHTEST * world.robot.circumscribed_radius)
     turning = turning_length(world.robot_pose, goal, radius)
     return world.robot.mass * max(around, turning)
-
-
-def graph_is_quick(static: StaticMap) -> bool:
-    """Whether a visibility graph of this map takes milliseconds: its time grows as corners³."""
-    parts = static.convex_parts
-    return len(parts) <= _PARTS and sum(len(part) for part in parts) <= _CORNERS
 
 
 def _is_clear(static: StaticMap, point: FloatArray, clearance: float) -> bool:

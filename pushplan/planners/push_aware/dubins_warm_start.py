@@ -6,15 +6,14 @@ tangents there, and from place to place on the shortest curve of bounded curvatu
 
 from __future__ import annotations
 
-from functools import lru_cache
+from collections.abc import Callable
 
 import numpy as np
 
 from pushplan.compiled import owned
 from pushplan.geometry import VisibilityGraph
 from pushplan.motion.dubins import dubins
-from pushplan.planners.push_aware.bound import graph_is_quick
-from pushplan.world import NavigationGoal, StaticMap, World
+from pushplan.world import NavigationGoal, World
 from pushplan.world.checks import FloatArray
 
 _SHARP = 0.8
@@ -27,6 +26,7 @@ def warm_start_arcs(
     clearance: float,  # of the shortest path [m]
     radius: float,  # least turning radius [m]
     depth: float,  # how far into the goal the arcs end [m]
+    stopped: Callable[[], bool],  # ends the search of the path
 ) -> FloatArray | None:
     """Arcs along the shortest homotopic path; they may touch walls and objects.
 
@@ -34,9 +34,7 @@ def warm_start_arcs(
         (E, 2) length [m] and curvature [1/m] of each arc, or None if there is no way.
     """
     start = world.robot_pose[:2]
-    # on a map of many parts only the straight way is quick to find
-    static = world.static if graph_is_quick(world.static) else _without_walls(world.static)
-    corners = VisibilityGraph(static, clearance).to_goal(start, goal).points
+    corners = VisibilityGraph(world.static, clearance).to_goal(start, goal, stopped).points
     if len(corners) < 2:
         return None
     vias = _vias(corners, radius, depth)
@@ -48,16 +46,11 @@ def warm_start_arcs(
     return arcs
 
 
-@lru_cache(maxsize=16)
-def _without_walls(static: StaticMap) -> StaticMap:
-    return StaticMap.build(bounds=static.bounds)
-
-
 def _vias(corners: FloatArray, radius: float, depth: float) -> FloatArray:
     """Poses (V, 3) on a polyline: some at each bend, one ``depth`` [m] past its end."""
     legs = np.diff(corners, axis=0)
     lengths = np.hypot(legs[:, 0], legs[:, 1])
-    keep = lengths > 1e-9
+    keep = lengths > 1e-9 * radius
     if not keep.any():
         return np.zeros((0, 3))
     legs, lengths = legs[keep], lengths[keep]

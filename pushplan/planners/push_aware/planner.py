@@ -78,7 +78,9 @@ class PushAware:
         radius = _least_radius(world.robot, self.config)
         improver = PathImprover(call, self.config, self.interaction, radius)
         search = PushAwareSearch(improver, self.config)
-        bound = lower_bound(world)  # before the search, so that it is within the time given
+        bound = lower_bound(
+            world, improver.stopped
+        )  # before the search, so that it is within the time given
         status = search.run() or call.stopped_status
         detail = {
             "trees": float(search.trees.trees),

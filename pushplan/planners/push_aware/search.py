@@ -104,7 +104,9 @@ class PushAwareSearch:
             depth = improver.goal.radius - 0.99 * float(problem.goal[3])
         radius = problem.turning_radius
         for clearance in (max(1.25 * self.size, 1.02 * radius), 1.1 * self.size):
-            arcs = warm_start_arcs(self.world, improver.goal, clearance, radius, depth)
+            arcs = warm_start_arcs(
+                self.world, improver.goal, clearance, radius, depth, improver.stopped
+            )
             if arcs is None:
                 continue
             if improver.candidate(arcs, improver.jam_cost, free=False) is not None:

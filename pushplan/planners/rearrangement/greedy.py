@@ -8,9 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from pushplan.control import EpisodeClock, LegFollower, Legs, PoseFollower, Retreat, StallChecker
+from pushplan.control import EpisodeClock, LegFollower, Legs, Recovery, StallChecker
 from pushplan.control.limits import arc_twist
-from pushplan.motion.recovery_path import recovery_path
 from pushplan.planners.arguments import check_pusher
 from pushplan.planners.rearrangement.line_up import (
     LineUp,
@@ -86,7 +85,7 @@ class GreedyPusher:
     def _forget(self) -> None:
         self._attempt: _Attempt | None = None
         self._failures: dict[int, int] = {}
-        self._away: Retreat | PoseFollower | None = None
+        self._away: Recovery | None = None
         self._stall: StallChecker | None = None
         self._wait_until = -math.inf
         self._clock = EpisodeClock(self.config.response)
@@ -186,20 +185,14 @@ class GreedyPusher:
 
     def _back_off(self, world: World) -> None:
         far = self.config.retreat * world.robot.circumscribed_radius
-        self._away = Retreat(world.robot, world.robot_pose, far)
+        response = self.config.response
+        self._away = Recovery(world, far, response=response, looks=False)
 
     def _retreat(self, world: World) -> Twist | None:
         """Get away from where the last attempt ended."""
-        command = None
-        if self._away is not None:
-            command = self._away.command(world.robot_pose, world.time, self._clock.held)
-            if command is None and isinstance(self._away, Retreat) and not self._away.got_away:
-                path = recovery_path(world, 0.0)
-                if path is not None:
-                    self._away = PoseFollower(world.robot, path, self.config.response)
-                    return self._retreat(world)
-            if command is None:
-                self._away = None
+        command = None if self._away is None else self._away.command(world, self._clock.held)
+        if command is None:
+            self._away = None
         return command
 
     def _is_stuck(self, world: World) -> bool:

@@ -155,7 +155,7 @@ class _GoalRegion(base.GoalSampleableRegion):
     ) -> None:
         super().__init__(info)
         self.goal, self.bounds, self.rng = goal, bounds, rng
-        self.setThreshold(1e-9)
+        self.setThreshold(np.finfo(np.float64).tiny)  # only a distance of 0 is below
 
     def sampleGoal(self, state: base.State) -> None:
         low, high = self.bounds[:2], self.bounds[2:]

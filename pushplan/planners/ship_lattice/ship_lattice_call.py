@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from contextlib import suppress
 from functools import partial
 
 import numpy as np
@@ -18,6 +19,7 @@ from pushplan.motion.state_lattice.built_lattice import BuiltLattice
 from pushplan.motion.state_lattice.lattice_builder import LatticeBuilder
 from pushplan.motion.state_lattice.lattice_path import bare_path, lay_path
 from pushplan.motion.state_lattice.lattice_search import open_search, path_arcs
+from pushplan.motion.time_slicing import Pace, Stopped
 from pushplan.planners.ship_lattice.floe_costs import floe_costs
 from pushplan.planners.ship_lattice.nearby_objects import NearbyObjects
 from pushplan.planners.ship_lattice.ship_lattice_config import ShipLatticeConfig
@@ -54,12 +56,18 @@ class ShipLatticeCall:
         self.side = 0.0
         self.near: NearbyObjects | None = None
         self.improver: ShipPathImprover | None = None
+        self._pace = Pace()
         self.cost = math.inf
         self.poses: FloatArray = np.zeros((0, 3))
         self.curvatures: FloatArray = np.zeros(0)
 
     def run(self) -> PlanStatus | None:
         """Plan until done or stopped; None where there is no plan by then."""
+        with suppress(Stopped):
+            return self._run()
+        return None
+
+    def _run(self) -> PlanStatus | None:
         world = self.world
         shape, walls = footprint(world.robot), obstacles(world.static)
         if not is_free(owned(world.robot_pose), shape, walls, np.empty_like(shape.vertices)):
@@ -78,6 +86,7 @@ class ShipLatticeCall:
                 radius=radius,
                 side=side,
                 floe_costs=partial(floe_costs, self.config),
+                stopped=self.stopped,
             )
             self.side = side
             found = self._search(builder, self.config.searches[0])
@@ -85,11 +94,12 @@ class ShipLatticeCall:
                 return None
             if found:
                 if self.config.sweep_horizon > 0.0:
-                    self._improve(builder)
+                    with suppress(Stopped):
+                        self._improve(builder)
                 assert self.built is not None
                 return PlanStatus.SOLVED if self.built.arrives else PlanStatus.APPROXIMATE
         # the lattice is coarse: where it leads nowhere there may be a path nevertheless
-        return None if reachable(world) else PlanStatus.GOAL_UNREACHABLE
+        return None if self.stopped() or reachable(world) else PlanStatus.GOAL_UNREACHABLE
 
     def _limits(self) -> list[tuple[float, float]]:
         """Fractions of the turn rate and distances from the bounds [m] to try in turn."""
@@ -106,8 +116,12 @@ class ShipLatticeCall:
         """Whether a path was found; None if stopped before."""
         built = builder.build(factor)
         star, curves = open_search(built, builder)
+        result = PAUSED
         while not self.stopped():
-            result = star.run(self.config.batch)
+            for first, last in self._pace.pieces(self.config.batch, self.stopped):
+                result = star.run(last - first)
+                if result != PAUSED:
+                    break
             self.iterations += 1
             if result != PAUSED:
                 break

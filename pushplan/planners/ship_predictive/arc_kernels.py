@@ -41,7 +41,7 @@ def steer_on(
             heading = theta + curvatures[b] * step
             cost = step * (costs.mass + costs.weight * mass_ahead(costs, nx, ny, heading))
             cost += cost_to_go(costs, nx, ny, heading)
-            cost += 1e-6 * abs(curvatures[b])
+            cost += 1e-7 * costs.mass * step * abs(curvatures[b]) * costs.radius  # a tie-break
             if cost < best:
                 best, chosen = cost, b
         middle = theta + 0.5 * curvatures[chosen] * step

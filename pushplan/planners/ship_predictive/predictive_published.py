@@ -10,6 +10,7 @@ import numpy as np
 
 from pushplan.interaction.ice import IceInteraction
 from pushplan.interaction.network import IceNetwork
+from pushplan.motion.time_slicing import Stopped
 from pushplan.planners.ship_predictive.channel_view import channel_view
 from pushplan.planners.ship_predictive.predictive_config import PredictiveConfig
 from pushplan.planners.ship_predictive.published_search import PublishedSearch, timed_path
@@ -64,11 +65,16 @@ class PredictivePublished:
         if view.away <= 0.0:
             plan = timed_path(world, world.robot_pose[None], np.zeros(1))
             return call.result(PlanStatus.SOLVED, plan, call.elapsed)
-        search, expanded = PublishedSearch(view, self.network, self.change_weight), 0
-        while not search.arrived:
-            if call.check(expanded, math.inf):
-                return call.result(call.stopped_status, None, math.nan, expanded, expanded)
-            if not search.expand():
-                return call.result(PlanStatus.GOAL_UNREACHABLE, None, math.nan, expanded, expanded)
-            expanded += 1
+        expanded = 0
+        try:
+            search = PublishedSearch(
+                view, self.network, self.change_weight, lambda: call.check(expanded, math.inf)
+            )
+            while not search.arrived:
+                if not search.expand():
+                    status = PlanStatus.GOAL_UNREACHABLE
+                    return call.result(status, None, math.nan, expanded, expanded)
+                expanded += 1
+        except Stopped:
+            return call.result(call.stopped_status, None, math.nan, expanded, expanded)
         return call.result(PlanStatus.SOLVED, search.plan(), call.elapsed, expanded, expanded)

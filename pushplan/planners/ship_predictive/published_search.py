@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 
@@ -15,6 +16,7 @@ from pushplan.motion.state_lattice.lattice_config import LatticeConfig
 from pushplan.motion.state_lattice.lattice_path import bare_path, lay_path, sample_arcs
 from pushplan.motion.state_lattice.lattice_search import open_search, path_arcs
 from pushplan.motion.state_lattice.pose_lattice import bound_at, place_of, reached, successors
+from pushplan.motion.time_slicing import go_on
 from pushplan.planners.ship_predictive.beam_search import SPACING
 from pushplan.planners.ship_predictive.channel_view import ChannelView
 from pushplan.planners.ship_predictive.map_propagator import MapPropagator
@@ -33,11 +35,13 @@ class PublishedSearch:
         view: ChannelView,
         network: IceNetwork,
         weight: float,  # factor on the mean squared change
+        stopped: Callable[[], bool],  # ends this with `Stopped`
     ) -> None:
         world = view.world
         radius = turning_radius(world.robot, LATTICE.turn_fraction)
-        builder = LatticeBuilder(world, LATTICE, radius=radius, side=_clearance(world))
-        self._view, self._weight = view, weight
+        side = _clearance(world)
+        builder = LatticeBuilder(world, LATTICE, radius=radius, side=side, stopped=stopped)
+        self._view, self._weight, self._stopped = view, weight, stopped
         self._propagator = MapPropagator(view, network)
         self._built = builder.build()
         # in half hull lengths, so that lengths count the same against changes for every ship
@@ -74,7 +78,12 @@ class PublishedSearch:
         return bool(state.counters[SIZE] and reached(self._built.lattice, state.heap[0]))
 
     def expand(self) -> bool:
-        """Predict all edges from the most promising node; False where none is open."""
+        """Predict all edges from the most promising node; False where none is open.
+
+        Raises:
+            Stopped: if the stop rule fires.
+        """
+        go_on(self._stopped)
         lattice, motions = self._built.lattice, self._built.motions
         node = int(take(self._star.state))
         if node < 0:
@@ -100,7 +109,11 @@ class PublishedSearch:
         """Open the ends of edges from a node; what they do to its ice takes one network call."""
         state, lattice = self._star.state, self._built.lattice
         before = 0.0 if parent < 0 else float(state.costs[parent])
-        made = self._propagator.advance([ice] * len(paths), paths)
+        made: list[tuple[Patch, float]] = []
+        for first in range(0, len(paths), self._propagator.batch):
+            go_on(self._stopped)
+            few = paths[first : first + self._propagator.batch]
+            made += self._propagator.advance([ice] * len(few), few)
         for node, length, edge, (after, _) in zip(nodes, lengths, edges, made, strict=True):
             change = float(np.square(after - ice).sum()) / PATCH_CELLS**2
             cost = before + self._weight * change + length / self._unit

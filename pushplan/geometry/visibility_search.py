@@ -1,0 +1,226 @@
+"""Lazy A* over the visibility graph: edges are tested when they are about to be used.
+
+A node is a corner of a contour. When one is reached, its successors are the corners that a common
+tangent leads to; they are put into the heap untested, and whether nothing lies between is found
+out for the cheapest entry only (Dellin and Srinivasa, "A unifying formalism for shortest path
+problems with expensive edge evaluations", 2016). Most of the graph is never made.
+"""
+
+from __future__ import annotations
+
+import math
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+
+from pushplan.compiled import kernel
+from pushplan.geometry.obstacle_grid import ObstacleGrid, sees
+from pushplan.geometry.obstacles import core_distance
+from pushplan.geometry.regions import nearest_in_region
+from pushplan.geometry.visibility import GoalScene, is_tangent
+from pushplan.search.heap import pop_least, push_or_lift
+from pushplan.world.checks import BoolArray, FloatArray, IntArray
+
+FOUND, EXHAUSTED, PAUSED, FULL = 0, 1, 2, 3
+"""What `search` returns: there, no path exists, its budget is used up, more memory is needed."""
+START = -1
+"""Index of the start among the nodes."""
+_USED, _TESTED, _END = 1, 2, 3
+
+
+class Corners(NamedTuple):
+    """Corners by obstacle, then points where the goal's rim leaves an obstacle."""
+
+    points: FloatArray  # (V + E, 2) [m]
+    incoming: FloatArray  # (V, 2) as in `Contours`
+    outgoing: FloatArray  # (V, 2)
+    owner: IntArray  # (V,) obstacle
+    first: IntArray  # (C + 1,) where the corners of each obstacle start
+    middles: FloatArray  # (C, 2) of the boxes around the contours [m]
+    halves: FloatArray  # (C, 2) half their sides [m]
+
+
+class Frontier(NamedTuple):
+    """Entries of the heap: ways of getting to a node, most of them not tested yet."""
+
+    keys: FloatArray  # (M,) in heap order, length plus bound [m]
+    lengths: FloatArray  # (M,) length of the path to the node [m]
+    heap: IntArray  # (M,)
+    places: IntArray  # (M,)
+    nodes: IntArray  # (M,)
+    before: IntArray  # (M,) the node before, `START` for none
+
+    def larger(self) -> Frontier:
+        """Twice the memory, with the same entries."""
+        return Frontier(*(np.concatenate([part, np.empty_like(part)]) for part in self))
+
+
+class VisibilitySearch(NamedTuple):
+    """A search from one start to one goal, which can be taken up again."""
+
+    start: FloatArray  # (2,) [m]
+    corners: Corners
+    scene: GoalScene
+    grid: ObstacleGrid
+    sliver: float  # a place this close to an obstacle may be inside of its contour [m]
+    done: BoolArray  # (V + E,)
+    parents: IntArray  # (V + E,)
+    counters: IntArray  # (4,) size of the heap, entries used, lines tested, last node or `START`
+    seen: IntArray  # (C + 1,) memory of `sees`
+
+
+@kernel
+def _bound(x: float, y: float, scene: GoalScene) -> float:
+    """Straight distance [m] to the goal."""
+    best, regions = math.inf, scene.regions
+    count = regions.discs.shape[0] + regions.lines.shape[0] + regions.offsets.shape[0] - 1
+    for k in range(count):
+        qx, qy = nearest_in_region(k, x, y, regions)
+        best = min(best, math.hypot(qx - x, qy - y))
+    return best
+
+
+@kernel
+def exit_leg(x: float, y: float, search: VisibilitySearch) -> tuple[float, float, float]:
+    """The straight way to the nearest region that can be seen: length [m] (inf) and its end."""
+    scene = search.scene
+    regions, box, gap = scene.regions, scene.box, scene.gap
+    best, bx, by = math.inf, x, y
+    count = regions.discs.shape[0] + regions.lines.shape[0] + regions.offsets.shape[0] - 1
+    for k in range(count):
+        qx, qy = nearest_in_region(k, x, y, regions)
+        length = math.hypot(qx - x, qy - y)
+        if (
+            length < best
+            and box[0] - gap <= qx <= box[2] + gap
+            and box[1] - gap <= qy <= box[3] + gap
+            and sees(x, y, qx, qy, scene.obstacles, gap, search.grid, search.seen)
+        ):
+            best, bx, by = length, qx, qy
+    return best, bx, by
+
+
+@kernel
+def _offer(
+    search: VisibilitySearch,
+    frontier: Frontier,
+    node: int,
+    length: float,
+    bound: float,
+    before: int,
+) -> None:
+    """Put a way of getting to a node into the heap."""
+    entry = search.counters[_USED]
+    search.counters[_USED] = entry + 1
+    frontier.lengths[entry], frontier.nodes[entry] = length, node
+    frontier.before[entry], frontier.places[entry] = before, -1
+    keys, heap, places = frontier.keys, frontier.heap, frontier.places
+    push_or_lift(keys, heap, places, search.counters, entry, length + bound)
+
+
+@kernel
+def expand(search: VisibilitySearch, frontier: Frontier, at: int, length: float) -> None:
+    """Offer the goal and all corners that a common tangent leads to from node ``at``."""
+    corners, scene, gap = search.corners, search.scene, search.scene.gap
+    count, box, point = corners.owner.shape[0], scene.box, corners.points
+    x, y, own = search.start[0], search.start[1], -1
+    ix = iy = ox = oy = 0.0
+    if at >= 0:
+        x, y, own = point[at, 0], point[at, 1], corners.owner[at]
+        ix, iy = corners.incoming[at, 0], corners.incoming[at, 1]
+        ox, oy = corners.outgoing[at, 0], corners.outgoing[at, 1]
+    leg, _, _ = exit_leg(x, y, search)
+    if leg < math.inf:
+        _offer(search, frontier, point.shape[0], length + leg, 0.0, at)
+    for j in range(count, point.shape[0]):
+        dx, dy = point[j, 0] - x, point[j, 1] - y
+        if at < 0 or is_tangent(dx, dy, corners.incoming, corners.outgoing, at, gap):
+            _offer(search, frontier, j, length + math.hypot(dx, dy), 0.0, at)
+    obstacles = scene.obstacles
+    for k in range(corners.middles.shape[0]):
+        first, last = corners.first[k], corners.first[k + 1]
+        every = k == own
+        if at < 0:
+            away = core_distance(
+                x, y, obstacles.vertices, obstacles.offsets[k], obstacles.offsets[k + 1]
+            )
+            every = away - obstacles.radii[k] <= search.sliver
+        elif not every:  # the box around it must reach into where tangents at this corner lead
+            mx, my = corners.middles[k, 0] - x, corners.middles[k, 1] - y
+            hx, hy = corners.halves[k, 0], corners.halves[k, 1]
+            before, after = ix * my - iy * mx, ox * my - oy * mx
+            b, a = abs(ix) * hy + abs(iy) * hx + gap, abs(ox) * hy + abs(oy) * hx + gap
+            if not ((before >= -b and after <= a) or (before <= b and after >= -a)):
+                continue
+        for j in range(first, last):
+            if search.done[j]:
+                continue
+            px, py = point[j, 0], point[j, 1]
+            if not (box[0] - gap <= px <= box[2] + gap and box[1] - gap <= py <= box[3] + gap):
+                continue
+            dx, dy = px - x, py - y
+            if not every and not is_tangent(-dx, -dy, corners.incoming, corners.outgoing, j, gap):
+                continue
+            if at >= 0 and not is_tangent(dx, dy, corners.incoming, corners.outgoing, at, gap):
+                continue
+            _offer(search, frontier, j, length + math.hypot(dx, dy), _bound(px, py, scene), at)
+
+
+@kernel
+def search_on(search: VisibilitySearch, frontier: Frontier, budget: int) -> int:
+    """Take up the search for about ``budget`` corners looked at, or lines tested."""
+    corners, scene, counters = search.corners, search.scene, search.counters
+    most, count = corners.points.shape[0] + 1, corners.owner.shape[0]
+    while budget > 0:
+        if counters[0] == 0:
+            return EXHAUSTED
+        if counters[_USED] + most > frontier.nodes.shape[0]:
+            return FULL
+        entry = pop_least(frontier.keys, frontier.heap, frontier.places, counters)
+        node, before = frontier.nodes[entry], frontier.before[entry]
+        budget -= 1
+        if node == corners.points.shape[0]:  # its line has been tested
+            counters[_END] = before
+            return FOUND
+        if search.done[node]:
+            continue
+        x, y = search.start[0], search.start[1]
+        if before >= 0:
+            x, y = corners.points[before, 0], corners.points[before, 1]
+        counters[_TESTED] += 1
+        budget -= 8
+        qx, qy = corners.points[node, 0], corners.points[node, 1]
+        if not sees(x, y, qx, qy, scene.obstacles, scene.gap, search.grid, search.seen):
+            continue
+        search.done[node], search.parents[node] = True, before
+        if node >= count:
+            counters[_END] = node
+            return FOUND
+        expand(search, frontier, node, frontier.lengths[entry])
+        budget -= corners.middles.shape[0] + 8
+    return PAUSED
+
+
+def new_frontier(capacity: int) -> Frontier:
+    """Memory for entries."""
+    numbers = [np.empty(capacity, dtype=np.int64) for _ in range(4)]
+    return Frontier(np.empty(capacity), np.empty(capacity), *numbers)
+
+
+def path_found(search: VisibilitySearch) -> tuple[float, list[FloatArray]]:
+    """Length [m] and points (2,) [m] of the path that a search has found, from its start."""
+    points, at = search.corners.points, int(search.counters[_END])
+    total, path = 0.0, []
+    if at < len(search.corners.owner):  # it goes on into the goal
+        x, y = (search.start if at == START else points[at]).tolist()
+        total, qx, qy = exit_leg(x, y, search)
+        if total > 0.0:
+            path.append(np.array([qx, qy]))
+    while at != START:
+        path.append(points[at])
+        at = int(search.parents[at])
+    path.append(search.start)
+    for here, there in pairwise(path[1 if total > 0.0 else 0 :]):
+        total += math.hypot(*(there - here))
+    return total, path[::-1]

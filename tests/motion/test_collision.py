@@ -1,0 +1,28 @@
+"""The test of footprints against many obstacles agrees with Shapely, however they are grouped."""
+
+import numpy as np
+import pytest
+import shapely
+from conftest import SQUARE
+
+from pushplan.motion.collision import footprint, is_free, obstacles
+from pushplan.world import RobotModel, StaticMap
+from pushplan.world.outline import transform
+
+
+@pytest.mark.parametrize("count", [0, 1, 16, 17, 300, 1000])
+def test_free_poses_are_those_that_shapely_finds(count: int) -> None:
+    rng = np.random.default_rng(count)
+    plank = SQUARE * [1.2, 0.5]
+    robot = RobotModel.from_outline(
+        plank, mass=1.0, drive="differential", max_speed=1.0, max_turn_rate=1.0
+    )
+    posts = [SQUARE * rng.uniform(0.05, 0.8, 2) + at for at in rng.uniform(0, 30, (count, 2))]
+    static = StaticMap.build(posts, bounds=[0, 0, 30, 30])
+    shape, among = footprint(robot), obstacles(static)
+    walls = shapely.union_all([shapely.Polygon(post) for post in posts])
+    scratch = np.empty_like(shape.vertices)
+    for pose in rng.uniform([-1, -1, -3], [31, 31, 3], (300, 3)):
+        inside = bool(np.all((pose[:2] >= 0.0) & (pose[:2] <= 30.0)))
+        hull = shapely.Polygon(transform(pose, plank))
+        assert is_free(pose, shape, among, scratch) == (inside and not hull.intersects(walls))

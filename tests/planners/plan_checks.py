@@ -1,0 +1,72 @@
+"""An independent checker of plans: Shapely, dense samples, tolerances that scale with the world."""
+
+from __future__ import annotations
+
+import numpy as np
+import shapely
+
+from pushplan.world import Drive, Plan, PlanStatus, World
+from pushplan.world.outline import transform
+
+FRACTIONS = np.array([0.0, 0.25, 0.5, 0.75])
+GRAZE = 0.02  # side of the square that a corner may cut off between two poses [R]
+
+
+def check_plan(world: World, plan: Plan, status: PlanStatus) -> None:
+    """What a status says of its plan: a path from the robot's place, or one that it can drive."""
+    size = world.robot.circumscribed_radius
+    rounding = 1e-9 * size + 8.0 * np.spacing(np.abs(world.static.bounds).max())
+    assert np.abs(plan.poses[0, :2] - world.robot_pose[:2]).max() <= rounding, "start"
+    assert np.diff(plan.times).min(initial=0.0) >= 0.0, "times"
+    if status is not PlanStatus.APPROXIMATE:
+        x, y = plan.poses[-1, :2].tolist()
+        assert world.goal.distance(x, y) <= 1e-6 * size + rounding, "goal"
+    if status is not PlanStatus.PATH_ONLY:
+        _check_motion(world, plan, rounding)
+        _check_walls(world, plan, rounding)
+
+
+def _check_motion(world: World, plan: Plan, rounding: float) -> None:
+    """Starts at the robot's heading, drives forward, and keeps speed and turn rate."""
+    robot, moved, steps = world.robot, np.diff(plan.poses, axis=0), np.diff(plan.times)
+    size = robot.circumscribed_radius
+    off = np.remainder(plan.poses[0, 2] - world.robot_pose[2] + np.pi, 2.0 * np.pi) - np.pi
+    assert abs(off) <= 1e-9, f"heading {off}"
+    turns = np.abs(moved[:, 2])
+    most = 1e-6 + rounding / size
+    assert np.all(turns <= robot.max_turn_rate * steps * (1.0 + 1e-6) + most), "turn rate"
+    lengths = np.hypot(moved[:, 0], moved[:, 1])
+    assert np.all(lengths <= robot.max_speed * steps * (1.0 + 1e-6) + 2.0 * rounding), "speed"
+    assert np.all(np.abs(plan.turn_rates) <= robot.max_turn_rate * (1.0 + 1e-6)), "turn rates"
+    assert np.all(plan.speeds <= robot.max_speed * (1.0 + 1e-6)), "speeds"
+    if robot.drive is Drive.CONSTANT_SPEED:
+        assert np.all(plan.speeds >= robot.max_speed * (1.0 - 1e-6)), "constant speed"
+    far = lengths > 1e-3 * size + 1e3 * rounding
+    ahead = np.arctan2(moved[far, 1], moved[far, 0]) - plan.poses[:-1][far, 2]
+    aside = np.abs(np.sin(ahead - 0.5 * moved[far, 2]))
+    assert aside.max(initial=0.0) <= 0.01, f"drives aside by {aside.max()} rad"
+
+
+def _check_walls(world: World, plan: Plan, rounding: float) -> None:
+    """The footprint touches nothing static, nor its origin the bounds, at poses and between."""
+    poses, size = plan.poses, world.robot.circumscribed_radius
+    low, high = world.static.bounds[:2], world.static.bounds[2:]
+    assert np.all(poses[:, :2] >= low - 1e-5 * size - rounding), "bounds"
+    assert np.all(poses[:, :2] <= high + 1e-5 * size + rounding), "bounds"
+    if not world.static.convex_parts:
+        return
+    moved = np.diff(poses, axis=0, append=poses[-1:])
+    dense = (poses[:, None] + FRACTIONS[:, None] * moved[:, None]).reshape(-1, 3)
+    # about the middle of the plan, so that Shapely's own rounding does not count
+    middle = poses[0, :2]
+    walls = shapely.union_all([shapely.Polygon(p - middle) for p in world.static.convex_parts])
+    shapely.prepare(walls)
+    dense[:, :2] -= middle
+    for part in world.robot.parts:
+        hulls = shapely.polygons([transform(pose, part) for pose in dense])
+        touching = np.flatnonzero(shapely.intersects(walls, hulls))
+        areas = shapely.area(shapely.intersection(hulls[touching], walls))
+        at_pose = touching % len(FRACTIONS) == 0
+        allowed = np.where(at_pose, size * (1e-6 * size + rounding), (GRAZE * size) ** 2)
+        deepest = float((areas - allowed).max(initial=0.0))
+        assert deepest <= 0.0, f"overlaps a wall by {np.sqrt(areas.max()) / size:.2g} R"
