@@ -3,9 +3,8 @@
     python benchmarks/pushing.py [--seeds 20] [--only disturbed|time] [--setting Burger]
 
 "Geometric" is the controller that the predictions of pushes assume, `GeometricPusher`; "predictive"
-is `PushingMpc`; "given" is the same without its estimate of friction; "told" knows the delay, and
-has an observer gain of 0.3 where poses are noisy. All begin at the same places and meet the same
-noise. A box is
+is `PushingMpc` as `gtsp-mpc` uses it; "told" is the same with the delay, and with an observer gain
+of 0.3 where poses are noisy. All begin at the same places and meet the same noise. A box is
 lost when its centre has left the bumper, it is 0.4 L ahead of it, or it does not get to the end of
 its path in twice the time that the path takes. L is the distance from the robot's axle to the
 centre of a box on its bumper. Times are processor time of the thread, so that other processes on
@@ -230,16 +229,12 @@ def predictive(setting: Setting, off: Disturbance, world: World, **changes: Any)
     return PushingMpc(PushingConfig(parameters=parameters, period=PERIOD, **changes))
 
 
-def given(setting: Setting, off: Disturbance, world: World) -> Controller:
-    return predictive(setting, off, world, adapts=False)
-
-
 def told(setting: Setting, off: Disturbance, world: World) -> Controller:
     delay, gain = DELAY if off.late else 0.0, 0.3 if off.noisy else 1.0
     return predictive(setting, off, world, delay=delay, observer_gain=gain)
 
 
-CONTROLLERS = {"geometric": geometric, "given": given, "predictive": predictive, "told": told}
+CONTROLLERS = {"geometric": geometric, "predictive": predictive, "told": told}
 
 
 def disturbed(chosen: list[Setting], seeds: int) -> None:

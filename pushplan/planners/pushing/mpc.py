@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -16,11 +16,10 @@ from pushplan.control.mpc.horizon import (
     track_of,
 )
 from pushplan.control.mpc.kernels import locate
-from pushplan.planners.pushing.bumper import Face, face_towards
+from pushplan.planners.pushing.bumper import face_towards
 from pushplan.planners.pushing.clearance import Clearance
 from pushplan.planners.pushing.contact_kernels import box_pose, observe
 from pushplan.planners.pushing.cost_kernels import ROWS, Memory, PushingProblem
-from pushplan.planners.pushing.friction_estimator import FrictionEstimator
 from pushplan.planners.pushing.model import PushModel, PushState
 from pushplan.planners.pushing.problem import groups_of, weights_of
 from pushplan.planners.pushing.problem_kernels import assemble
@@ -160,7 +159,6 @@ class PushingMpc:
         config = self.config
         self._plan = plan
         self._track = track_of(plan)
-        self._estimator = FrictionEstimator(config.parameters.friction)
         self._take_face(world, k)
         self._observer.forget()
         self.along, self._missed = 0.0, 0
@@ -178,15 +176,11 @@ class PushingMpc:
 
     def _take_face(self, world: World, k: int) -> None:
         """Push the face that the robot faces now."""
-        outline = world.movables.outline(k)
+        robot, outline = world.robot, world.movables.outline(k)
         direction = float(world.robot_pose[2] - world.movables.poses[k, 2])
-        self._set_model(world, k, face_towards(outline, direction))
-
-    def _set_model(self, world: World, k: int, face: Face) -> None:
-        """Take a face of the box, and the friction as it is known now."""
-        parameters = replace(self.config.parameters, friction=self._estimator.friction)
-        self.model = PushModel(world.robot, world.movables.outline(k), parameters, face)
-        self._weights = weights_of(self.config, self.model, world.robot)
+        face = face_towards(outline, direction)
+        self.model = PushModel(robot, outline, self.config.parameters, face)
+        self._weights = weights_of(self.config, self.model, robot)
         self._static: StaticMap | None = None
         self._guard_face = face.normal
 
@@ -200,7 +194,6 @@ class PushingMpc:
             self._take_face(world, k)
             self._observer.forget()
             observe(self.model.contact, self._guard_face, pose, box, seen)
-        self._adapt(world, k, seen)
         contact, size = self.model.contact, self.model.reach
         self._row = self._observer.observe(contact, seen, world.time, size)
         ahead = self._observer.at_effect(contact)
@@ -213,16 +206,6 @@ class PushingMpc:
             (at[1] - path[1]) * math.cos(path[2]) - (at[0] - path[0]) * math.sin(path[2])
         )
         return ahead
-
-    def _adapt(self, world: World, k: int, seen: FloatArray) -> None:
-        """Take up another friction where the box slides as if it had it."""
-        assert self.model is not None
-        if not self.config.adapts:
-            return
-        model, estimator = self.model, self._estimator
-        estimator.update(self._observer, model.contact, seen, world.time, model.reach)
-        if estimator.friction != model.parameters.friction:
-            self._set_model(world, k, model.face)
 
     def _near(self, start: FloatArray) -> FloatArray:
         """A state with the box no farther away than the model means anything for."""

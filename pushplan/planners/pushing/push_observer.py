@@ -55,8 +55,8 @@ class PushObserver:
             (6,) the state now.
         """
         found = seen.copy()
-        guess = self.predict(contact, time) if self._gain < 1.0 else None
-        if guess is not None:
+        if self.row is not None and self._gain < 1.0 and time > self._time:
+            guess = self._moved(contact, self.row, self._time, time)
             change = seen - guess
             change[2] = math.remainder(change[2], math.tau)
             change[4] = math.remainder(change[4], math.tau)
@@ -66,12 +66,6 @@ class PushObserver:
         found[5] = max(found[5], 0.0)
         self.row, self._time = found, time
         return found
-
-    def predict(self, contact: Contact, time: float) -> FloatArray | None:
-        """(6,) the state at a later time [s] by the commands sent; None before an observation."""
-        if self.row is None or time <= self._time:
-            return None
-        return self._moved(contact, self.row, self._time, time)
 
     def at_effect(self, contact: Contact) -> FloatArray:
         """(6,) the state when a command of now takes effect."""

@@ -35,8 +35,6 @@ class PushingConfig:
         smoothness: cost of changing speed and turn rate.
         terminal: factor on the cost of the last step.
         parameters: friction.
-        adapts: whether the friction between bumper and box is estimated while the box is pushed,
-            from the one in ``parameters`` on.
         delay: known time between a command and its effect [s].
         period: time for which the first command is held [s]; later ones are held for as long as
             the clock of the world shows.
@@ -65,7 +63,6 @@ class PushingConfig:
     smoothness: float = 0.01
     terminal: float = 3.0
     parameters: PushParameters = field(default_factory=PushParameters)
-    adapts: bool = True
     delay: float = 0.0
     period: float = 0.1
     observer_gain: float = 1.0
@@ -86,7 +83,6 @@ class PushingConfig:
         number("margin", self.margin, low=0.0, high=1.0, open_low=True)
         number("terminal", self.terminal, low=1.0)
         number("observer_gain", self.observer_gain, low=0.0, high=1.0, open_low=True)
-        expect("adapts", self.adapts, bool)
         expect("parameters", self.parameters, PushParameters)
         for name in ("iterations", "first_iterations", "solver_iterations"):
             integer(name, getattr(self, name), low=1)

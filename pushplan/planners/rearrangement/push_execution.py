@@ -128,16 +128,16 @@ class PushExecution:
         """Predictive control where that suits, else the controller of the prediction."""
         push, config = self.push, scene.config
         size, robot = scene.size, scene.world.robot
-        self._progress = ProgressChecker(_PROGRESS * size, _PATIENCE * size / robot.max_speed)
         predictive = self._predictive and suits_mpc(scene, push)
         path = PushPath.through(push.object_path, radius=size if predictive else 0.0)
+        self._plan = path.plan(robot, push.target)
+        self._progress = ProgressChecker(_PROGRESS * size, _PATIENCE * size / robot.max_speed)
         if predictive:
             parameters = PushParameters(config.friction)
             self._pusher = PushingMpc(PushingConfig(parameters=parameters, period=held))
         else:
             controller = scene.controller._replace(gain=push.gain)
             self._pusher = GeometricPusher(controller, push.shift)
-        self._plan = path.plan(robot, push.target)
 
     def _push(self, scene: PushScene, held: float) -> Twist | ExecutionEnd:
         push, world, pose = self.push, scene.world, scene.world.robot_pose

@@ -250,23 +250,3 @@ def test_what_it_cannot_do_is_refused():
     gone = replace(world, movables=Movables.empty(), time=1.0)
     mpc = PushingMpc()
     assert mpc.command(gone, plan) == Twist(0.0, 0.0) and mpc.state is None
-
-
-@pytest.mark.parametrize(("assumed", "true"), [(0.4, 0.0), (0.0, 0.4), (0.3, 0.15)])
-def test_friction_is_estimated_from_how_the_box_slides(assumed, true):
-    shape = [(1.0, 0.0), (1.6, 0.8), (1.6, -0.8)]
-    errors = {}
-    for adapts in (True, False):
-        config = PushingConfig(parameters=PushParameters(assumed), period=0.2, adapts=adapts)
-        found = push("pymunk", AREA, 1.0, shape, true, config)
-        errors[adapts], mpc = found[0], found[3]
-        friction = mpc.model.parameters.friction
-        assert abs(friction - true) < 0.06 if adapts else friction == assumed
-    rms = {adapts: np.sqrt((away**2).mean()) for adapts, away in errors.items()}
-    assert rms[True] < 0.8 * rms[False]
-
-
-def test_a_box_that_sticks_says_nothing_about_friction():
-    config = PushingConfig(parameters=PushParameters(0.5), period=0.2)
-    mpc = push("pymunk", AREA, 1.0, [(3.0, 0.0)], 0.7, config)[3]
-    assert mpc.model.parameters.friction == 0.5
