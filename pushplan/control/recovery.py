@@ -90,7 +90,7 @@ class Recovery:
 def warm_up_recovery() -> None:
     """Load the kernels of a recovery: that of a robot between two columns, with no room to turn."""
     square = np.array([[0.1, 0.1], [-0.1, 0.1], [-0.1, -0.1], [0.1, -0.1]])
-    columns = [square + (-2.2, y) for y in (-2.7, -1.3)]
+    columns = [square + np.array([-2.2, y]) for y in (-2.7, -1.3)]
     world = World(
         robot=box_delivery_robot(),
         robot_pose=np.array([-2.2, -2.0, 0.0]),
