@@ -71,12 +71,12 @@ class Recovery:
 
     def _is_closed(self, pose: FloatArray, way: Twist) -> bool:
         """Whether a way leads deeper into what is static than the robot is."""
-        size, there = self._shape.radius, np.empty(3)
+        size, here, there = self._shape.radius, np.array(pose), np.empty(3)
         x_min, y_min, x_max, y_max = self._walls.bounds
         seconds = _LOOK * size / (abs(way.linear) + size * abs(way.angular))
-        allowed = self._depth(np.array(pose)) + _DEEPER * size
+        allowed = self._depth(here) + _DEEPER * size
         for part in np.linspace(0.0, seconds, _POSES + 1)[1:]:
-            arc_step(pose, way.linear * part, way.angular * part, there)
+            arc_step(here, way.linear * part, way.angular * part, there)
             inside = x_min <= there[0] <= x_max and y_min <= there[1] <= y_max
             if not inside or self._depth(there) > allowed:
                 return True
