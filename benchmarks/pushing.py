@@ -4,7 +4,7 @@
 
 "Geometric" is the controller that the predictions of pushes assume, `GeometricPusher`; "predictive"
 is `PushingMpc` as `gtsp-mpc` uses it; "told" is the same with the delay, and with an observer gain
-of 0.3 where poses are noisy. All three begin at the same places and meet the same noise. A box is
+of 0.3 where poses are noisy. All begin at the same places and meet the same noise. A box is
 lost when its centre has left the bumper, it is 0.4 L ahead of it, or it does not get to the end of
 its path in twice the time that the path takes. L is the distance from the robot's axle to the
 centre of a box on its bumper. Times are processor time of the thread, so that other processes on
@@ -20,6 +20,7 @@ import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -60,8 +61,8 @@ ELSEWHERE = Receptacle(SQUARE + 90.0)
 PERIOD, DELAY = 0.2, 0.1
 NOISE = np.array([0.02, 0.02, math.radians(3.0)])
 CURVES = {
-    "curve": [(2.0, 0.0), (4.0, 0.3)],
     "S": [(1.0, 0.0), (2.5, 0.4), (2.5, -0.4), (1.0, 0.0)],
+    "sharp S": [(0.5, 0.0), (1.4, 0.9), (1.4, -0.9), (1.0, 0.0)],
 }
 """Lengths [L] and curvatures [1/L]."""
 
@@ -222,9 +223,9 @@ def geometric(setting: Setting, off: Disturbance, world: World) -> Controller:
     return GeometricPusher(PushScene(world, RearrangementConfig()).controller)
 
 
-def predictive(setting: Setting, off: Disturbance, world: World, **changes: float) -> Controller:
-    parameters = setting.parameters
-    parameters = replace(parameters, spread=parameters.spread / off.spread)
+def predictive(setting: Setting, off: Disturbance, world: World, **changes: Any) -> Controller:
+    spread = setting.parameters.spread / off.spread
+    parameters = replace(setting.parameters, spread=spread)
     return PushingMpc(PushingConfig(parameters=parameters, period=PERIOD, **changes))
 
 
@@ -237,9 +238,15 @@ CONTROLLERS = {"geometric": geometric, "predictive": predictive, "told": told}
 
 
 def disturbed(chosen: list[Setting], seeds: int) -> None:
-    """Print errors, losses and lengths of each controller under each disturbance."""
+    """Print what becomes of each controller under each disturbance.
+
+    Each cell: boxes lost, rms distance from the path and mean distance from its end of those that
+    were not lost [% of L], and the mean length that the robot drove [L].
+    """
     columns = " | ".join(f"{curve}: {name}" for curve in CURVES for name in CONTROLLERS)
-    print(f"| setting | disturbance | {columns} |\n|{'---|' * (2 + 6)}")
+    print(
+        f"| setting | disturbance | {columns} |\n|{'---|' * (2 + len(CURVES) * len(CONTROLLERS))}"
+    )
     for setting in chosen:
         for off in DISTURBANCES:
             cells = []

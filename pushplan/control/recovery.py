@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import functools
+
 import numpy as np
 
 from pushplan.control.pose_follower import PoseFollower
@@ -9,7 +11,7 @@ from pushplan.control.retreat import Retreat
 from pushplan.geometry.transforms import arc_step
 from pushplan.motion.collision import footprint, obstacles, static_depth
 from pushplan.motion.recovery_path import recovery_path
-from pushplan.world import Twist, World
+from pushplan.world import GoalDisc, Movables, StaticMap, Twist, World, box_delivery_robot
 from pushplan.world.checks import FloatArray
 
 _LOOK, _POSES = 0.3, 3  # how far ahead walls are looked for [circumscribed radii], and how often
@@ -69,12 +71,12 @@ class Recovery:
 
     def _is_closed(self, pose: FloatArray, way: Twist) -> bool:
         """Whether a way leads deeper into what is static than the robot is."""
-        size, there = self._shape.radius, np.empty(3)
+        size, here, there = self._shape.radius, np.array(pose), np.empty(3)
         x_min, y_min, x_max, y_max = self._walls.bounds
         seconds = _LOOK * size / (abs(way.linear) + size * abs(way.angular))
-        allowed = self._depth(np.array(pose)) + _DEEPER * size
+        allowed = self._depth(here) + _DEEPER * size
         for part in np.linspace(0.0, seconds, _POSES + 1)[1:]:
-            arc_step(pose, way.linear * part, way.angular * part, there)
+            arc_step(here, way.linear * part, way.angular * part, there)
             inside = x_min <= there[0] <= x_max and y_min <= there[1] <= y_max
             if not inside or self._depth(there) > allowed:
                 return True
@@ -82,3 +84,19 @@ class Recovery:
 
     def _depth(self, pose: FloatArray) -> float:
         return float(static_depth(pose, self._shape, self._walls, self._scratch))
+
+
+@functools.cache
+def warm_up_recovery() -> None:
+    """Load the kernels of a recovery: that of a robot between two columns, with no room to turn."""
+    square = np.array([[0.1, 0.1], [-0.1, 0.1], [-0.1, -0.1], [0.1, -0.1]])
+    columns = [square + np.array([-2.2, y]) for y in (-2.7, -1.3)]
+    world = World(
+        robot=box_delivery_robot(),
+        robot_pose=np.array([-2.2, -2.0, 0.0]),
+        static=StaticMap.build(polygons=columns, bounds=(-3.0, -3.0, 3.0, 3.0)),
+        movables=Movables.from_outlines([2.2 * square], [(-2.2, -0.985, 0.0)]),
+        goal=GoalDisc(np.zeros(2), 0.5),
+    )
+    Recovery(world, world.robot.circumscribed_radius).command(world, 0.1)
+    recovery_path(world, 0.0)

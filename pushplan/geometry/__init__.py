@@ -6,8 +6,9 @@ from pushplan.geometry.grid import Grid, clearance_field, occupancy
 from pushplan.geometry.obstacles import core_distance
 from pushplan.geometry.polygon import polygon_area, polygon_centroid, polygon_inertia
 from pushplan.geometry.raster import fill_convex
-from pushplan.geometry.shortest_path import GoalDistances, Path, VisibilityGraph, goal_distances
+from pushplan.geometry.shortest_path import GoalDistances, Path, goal_distances
 from pushplan.geometry.transforms import transform_outlines, transform_points
+from pushplan.geometry.visibility_graph import VisibilityGraph
 
 __all__ = [
     "GeodesicField",

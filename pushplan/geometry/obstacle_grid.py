@@ -15,7 +15,7 @@ from pushplan.world.checks import FloatArray, IntArray, frozen
 
 _PER_OBSTACLE = 4  # cells for each obstacle
 _MOST = 65_536  # cells at most
-_NONE = np.zeros(0, dtype=np.int64)
+_NONE = frozen(np.zeros(0, dtype=np.int64))
 
 
 class ObstacleGrid(NamedTuple):
@@ -34,7 +34,7 @@ def obstacle_grid(static: StaticMap, clearance: float, margin: float) -> Obstacl
     """The grid over obstacles grown by ``clearance`` and ``margin`` [m]."""
     boxes = obstacles_of(static, clearance).boxes
     if not len(boxes):
-        return ObstacleGrid(np.zeros(2), 1.0, 0, 0, np.zeros(1, dtype=np.int64), _NONE)
+        return ObstacleGrid(frozen(np.zeros(2)), 1.0, 0, 0, frozen(np.zeros(1, np.int64)), _NONE)
     low, high = boxes[:, :2].min(axis=0) - margin, boxes[:, 2:].max(axis=0) + margin
     extent = np.maximum(high - low, 1e-9 * float((high - low).max()))
     cells = min(_PER_OBSTACLE * len(boxes), _MOST)

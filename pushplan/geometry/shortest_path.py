@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import Any, NamedTuple
@@ -22,7 +22,6 @@ from pushplan.geometry.contours import (
     segment_crossings,
     standoff_of,
 )
-from pushplan.geometry.obstacle_grid import obstacle_grid
 from pushplan.geometry.obstacles import Obstacles, line_of_sight, obstacle_distance, obstacles_of
 from pushplan.geometry.regions import (
     Regions,
@@ -42,22 +41,8 @@ from pushplan.geometry.visibility import (
     relax,
     visible_pairs,
 )
-from pushplan.geometry.visibility_search import (
-    EXHAUSTED,
-    FULL,
-    PAUSED,
-    START,
-    Corners,
-    VisibilitySearch,
-    expand,
-    new_frontier,
-    path_found,
-    search_on,
-)
 from pushplan.world import Goal, StaticMap
 from pushplan.world.checks import ArrayRecord, FloatArray, IntArray, array, frozen, number
-
-_BUDGET = 20_000  # work of a search between two looks at a stop rule: about a millisecond
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,7 +106,7 @@ def _first_legs(points: FloatArray, scene: GoalScene) -> FloatArray:
     return out
 
 
-def _with_way_out(
+def with_way_out(
     origin: FloatArray, free: FloatArray, gap: float, found: tuple[float, list[FloatArray]]
 ) -> Path:
     """A path from ``free``, led there from where the robot is."""
@@ -179,7 +164,7 @@ class GoalDistances:
         free = leave_inflation(self.static, self.clearance, origin)
         if free is None:
             return Path(math.inf)
-        return _with_way_out(origin, free, self.gap, self._from_free(free))
+        return with_way_out(origin, free, self.gap, self._from_free(free))
 
     def _from_free(self, start: FloatArray) -> tuple[float, list[FloatArray]]:
         x, y = start.tolist()
@@ -206,7 +191,7 @@ def _distances(
     regions = regions_of(target, to_center=to_center)
     graph, shapes = _graph_of(static, clearance), obstacles_of(static, clearance)
     gap = gap_of(static)
-    ends = _ends_on_rims(static, clearance, regions)
+    ends = ends_on_rims(static, clearance, regions)
     corners = graph.contours
     count = len(corners.corners)
     scene = GoalScene(regions, shapes, static.bounds, gap)
@@ -238,7 +223,7 @@ def _distances(
     return GoalDistances(static, clearance, target, regions, shapes, nodes, ways, exits)
 
 
-def _ends_on_rims(static: StaticMap, clearance: float, regions: Regions) -> FloatArray:
+def ends_on_rims(static: StaticMap, clearance: float, regions: Regions) -> FloatArray:
     """Where a path may end at the rim (N, 2) [m] of what covers a part of the goal."""
     shapes, contours = obstacles_of(static, clearance), contours_of(static, clearance)
     rims = [contour_edges(contours), box_edges(static.bounds)]
@@ -251,42 +236,6 @@ def _ends_on_rims(static: StaticMap, clearance: float, regions: Regions) -> Floa
         rims[0] = rims[0][near[contours.owner]]
     ends = region_crossings(regions, np.concatenate(rims))
     return ends[free_points(ends, shapes, static.bounds, gap_of(static))]
-
-
-@lru_cache(maxsize=32)
-def _corners_of(static: StaticMap, clearance: float) -> Corners:
-    """The corners of all contours, without ends."""
-    contours = contours_of(static, clearance)
-    points, count = contours.corners, len(obstacles_of(static, clearance).radii)
-    first = np.searchsorted(contours.owner, np.arange(count + 1)).astype(np.int64)
-    low = np.minimum.reduceat(points, first[:-1]) if count else points
-    high = np.maximum.reduceat(points, first[:-1]) if count else points
-    return Corners(
-        *(points, contours.incoming, contours.outgoing, contours.owner, frozen(first)),
-        frozen(0.5 * (low + high)),
-        frozen(0.5 * (high - low)),
-    )
-
-
-def _visibility_search(
-    static: StaticMap, clearance: float, target: Target, start: FloatArray
-) -> VisibilitySearch:
-    """A search that knows nothing yet but the map and where it begins and ends."""
-    regions, gap = regions_of(target), gap_of(static)
-    shapes, corners = obstacles_of(static, clearance), _corners_of(static, clearance)
-    ends = _ends_on_rims(static, clearance, regions)
-    points = np.concatenate([corners.points, ends])
-    return VisibilitySearch(
-        start=owned(start),
-        corners=corners._replace(points=points),
-        scene=GoalScene(regions, shapes, static.bounds, gap),
-        grid=obstacle_grid(static, clearance, gap),
-        sliver=standoff_of(static, clearance),
-        done=np.zeros(len(points), dtype=np.bool_),
-        parents=np.full(len(points), START, dtype=np.int64),
-        counters=np.array([0, 0, 0, START]),
-        seen=np.zeros(len(shapes.radii) + 1, dtype=np.int64),
-    )
 
 
 def _pack(target: Target) -> tuple[object, ...]:
@@ -385,69 +334,3 @@ def _pushed_out(point: FloatArray, shapes: Obstacles, near: IntArray, extra: flo
         unit = direction / size if size > 0.0 else np.array([1.0, 0.0])
         found[i] = feet[nearest] + (radius + extra) * unit
     return found
-
-
-class VisibilityGraph:
-    """Shortest paths for a disc-shaped robot among the obstacles of one map.
-
-    Straight walls and polygons are exact; where a path bends around an arc (a thick segment's end,
-    a corner at a clearance), that arc comes out at most 0.07 % too long. Paths stay inside
-    ``static.bounds`` and may touch obstacles; obstacles that touch each other leave no passage.
-    Only what a path may need of the graph is made. `goal_distances` makes all of it, and pays where
-    many paths lead to one goal.
-
-    Args:
-        static: obstacles and bounds.
-        clearance: distance that paths keep from obstacles [m], such as the robot's radius.
-
-    Raises:
-        InvalidInputError: if the clearance is negative.
-    """
-
-    def __init__(self, static: StaticMap, clearance: float = 0.0) -> None:
-        self.static = static
-        self.clearance = number("clearance", clearance, low=0.0)
-
-    def shortest_path(self, start: ArrayLike, goal: ArrayLike) -> Path:
-        """The shortest path between two points (2,) [m].
-
-        From a start that is too close to an obstacle but not inside, the path first leaves by the
-        shortest way. A goal that is too close to an obstacle cannot be reached.
-        """
-        end: FloatArray = array("goal", goal, (2,))
-        return self.to_goal(start, [np.stack([end, end])])
-
-    def to_goal(
-        self,
-        start: ArrayLike,
-        goal: Goal | Sequence[ArrayLike],
-        stopped: Callable[[], bool] = lambda: False,
-    ) -> Path:
-        """The shortest path from a point (2,) [m] to the nearest point that counts as the goal.
-
-        There is none either where ``stopped``, which is asked about every millisecond, ends the
-        search.
-        """
-        origin: FloatArray = array("start", start, (2,))
-        target = as_target(goal)
-        if outside_area(target, origin):
-            return Path(0.0, origin[None])
-        free = leave_inflation(self.static, self.clearance, origin)
-        return Path(math.inf) if free is None else self._search(origin, free, target, stopped)
-
-    def _search(
-        self, origin: FloatArray, free: FloatArray, target: Target, stopped: Callable[[], bool]
-    ) -> Path:
-        search = _visibility_search(self.static, self.clearance, target, free)
-        frontier = new_frontier(8 * len(search.done) + 64)
-        expand(search, frontier, START, 0.0)
-        outcome = PAUSED
-        while outcome in (PAUSED, FULL):
-            if stopped():
-                return Path(math.inf)
-            outcome = search_on(search, frontier, _BUDGET)
-            if outcome == FULL:
-                frontier = frontier.larger()
-        if outcome == EXHAUSTED:
-            return Path(math.inf)
-        return _with_way_out(origin, free, gap_of(self.static), path_found(search))

@@ -9,6 +9,7 @@ from typing import Protocol, runtime_checkable
 
 import numpy as np
 
+from pushplan.control.recovery import warm_up_recovery
 from pushplan.planners.following.plan_follower import PlanFollower
 from pushplan.planners.following.renewing_follower import RenewingFollower
 from pushplan.planners.registry import make_policy, policy_names
@@ -62,6 +63,7 @@ def _warm_up(name: str) -> None:
     if isinstance(policy, WarmsUp):
         policy.warm_up()
     elif isinstance(policy, PlanFollower):
+        warm_up_recovery()
         for world in (_room(), _water()):
             with contextlib.suppress(InvalidInputError):  # another planner's world
                 _plan_and_follow(policy, world)

@@ -170,8 +170,10 @@ class Skeleton:
             graph, directed=False, indices=[len(vertices) - 1], return_predecessors=True
         )
         best, before = table[0], previous[0]
-        # the last stretch is straight ahead to the goal
+        # the last stretch is straight ahead to the goal, and a little into it
+        depth = 0.02 * size
         if isinstance(goal, GoalDisc):
+            depth = min(depth, goal.radius)
             towards = goal.center - places
             away = np.hypot(*towards.T)
             gap = away - goal.radius
@@ -180,7 +182,7 @@ class Skeleton:
             gap = (goal.point - places) @ goal.normal
             towards = np.broadcast_to(goal.normal, places.shape)
         gap = np.maximum(gap, 0.0)
-        ends = places + (gap + 0.02 * size)[:, None] * towards
+        ends = places + (gap + depth)[:, None] * towards
         best = np.where(np.isfinite(best) & _is_clear(walls, places, ends), best, np.inf)
         total = best + gap / size * (1.0 + self.narrow * (gap > size))
         end = int(np.argmin(total))

@@ -9,6 +9,8 @@ not consistent, so the cost found is optimal whenever the estimate is admissible
 
 from __future__ import annotations
 
+import mmap
+from contextlib import suppress
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -86,17 +88,38 @@ class SearchState(NamedTuple):
 
 def new_state(size: int) -> SearchState:
     """An empty search over nodes 0 to ``size`` - 1."""
+    flags = [_sparse(size, np.bool_) for _ in range(2)]
+    lengths = [_sparse(size, np.float64) for _ in range(2)]
+    numbers = [_sparse(size, np.int64) for _ in range(4)]
     return SearchState(
-        known=np.zeros(size, dtype=np.bool_),
-        costs=np.empty(size),
-        parents=np.empty(size, dtype=np.int64),
-        edges=np.empty(size, dtype=np.int64),
-        closed=np.empty(size, dtype=np.bool_),
-        keys=np.empty(size),
-        heap=np.empty(size, dtype=np.int64),
-        places=np.empty(size, dtype=np.int64),
+        known=flags[0],
+        costs=lengths[0],
+        parents=numbers[0],
+        edges=numbers[1],
+        closed=flags[1],
+        keys=lengths[1],
+        heap=numbers[2],
+        places=numbers[3],
         counters=np.array([0, 0, 0, -1], dtype=np.int64),
     )
+
+
+def _sparse(size: int, kind: type[np.generic]) -> NDArray[Any]:
+    """Zeros of which few will be used: in small pages, as the first use of a large one takes 1 ms.
+
+    NumPy asks Linux for pages of 2 MiB.
+    """
+    wanted = size * np.dtype(kind).itemsize
+    if wanted < _LARGE:
+        return np.zeros(size, dtype=kind)
+    memory = mmap.mmap(-1, wanted)
+    if hasattr(mmap, "MADV_NOHUGEPAGE"):
+        with suppress(OSError):  # a system without large pages
+            memory.madvise(mmap.MADV_NOHUGEPAGE)
+    return np.frombuffer(memory, dtype=kind)
+
+
+_LARGE = 2**22  # from here on NumPy asks for large pages [bytes]
 
 
 _spare: list[SearchState] = []

@@ -28,6 +28,7 @@ FloeCostFunction = Callable[[World, float], FloeCosts]
 """Costs of the floes of a world on a map whose cells have a side [m]."""
 _MOST_NODES = 3_000_000
 _MOST_CELLS = 1_000_000
+_FEW_COLUMNS = 256  # of the map, between two looks at a stop rule
 
 
 @dataclass(eq=False)
@@ -104,7 +105,11 @@ class LatticeBuilder:
         """The lattice, with a factor on the costs of all floes."""
         lattice, sums = self._common
         if factor != 1.0:
-            sums = factor * sums
+            for first in range(0, len(sums), _FEW_COLUMNS):
+                go_on(self.stopped)
+                few = slice(first, first + _FEW_COLUMNS)
+                np.multiply(factor, sums[few], out=self._scaled[few])
+            sums = self._scaled
         go_on(self.stopped)
         lengths, costs = self._heuristic(sums, lattice)
         lattice = lattice._replace(cost_sums=sums.ravel(), row_bounds=lengths, place_costs=costs)
@@ -112,6 +117,11 @@ class LatticeBuilder:
             lattice = lattice._replace(inflation=1.0)
         start = (*self.start, self.heading)
         return BuiltLattice(lattice, self.frame, self.motions, start, self.arrives)
+
+    @cached_property
+    def _scaled(self) -> FloatArray:
+        """Memory for sums with a factor, of one search at a time."""
+        return np.empty_like(self._common[1])
 
     @cached_property
     def _map(self) -> LatticeMap:

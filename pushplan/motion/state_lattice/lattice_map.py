@@ -26,7 +26,7 @@ _BLOCKED_MARGIN = 0.8
 """Cells nearer to an obstacle than this are blocked [cells]: more than half their diagonal."""
 
 
-_FEW = 10  # outlines that are drawn between two looks at a stop rule
+_FEW = 2  # outlines that are drawn between two looks at a stop rule
 
 
 @dataclass(frozen=True)

@@ -43,10 +43,10 @@ def open_search(built: BuiltLattice, builder: LatticeBuilder) -> tuple[AStar, li
     reach = robot.circumscribed_radius / builder.cell
     curves: list[FloatArray] = []
     for h in np.argsort(turns, kind="stable")[:_NEAREST].tolist():
-        go_on(builder.stopped)
         for length, u, v, *arcs in connections(
             heading, float(motions.angles[h]), motions.config, _SLACK
         )[:_PATHS]:
+            go_on(builder.stopped)
             to_row, to_column = row + round(u), column + round(v)
             if not (0 <= to_row < lattice.rows and 0 <= to_column < lattice.columns):
                 continue

@@ -10,7 +10,7 @@ from pushplan.world.checks import expect, integer, number
 
 @dataclass(frozen=True)
 class PushingConfig:
-    """Parameters of `PushingMpc` and `NonlinearPushingMpc`.
+    """Parameters of `PushingMpc`.
 
     L is the distance from the robot's axle to the centre of the box on its bumper, T = L / speed.
     The cost is the integral over time, in units of T, of the squares below, with the box's

@@ -40,9 +40,8 @@ class GeometricPusher:
     def command(self, world: World, plan: Plan) -> Twist:
         """See `pushplan.world.Controller`; the plan is one of `PushPath.plan`."""
         expect("plan", plan, Plan)
-        if self._clock.advance(expect("world", world, World)):
-            self._clock.command = self._follow(world, plan)
-        return self._clock.command
+        world = expect("world", world, World)
+        return self._clock.command_for(world, lambda _: self._follow(world, plan))
 
     def _follow(self, world: World, plan: Plan) -> Twist:
         if plan is not self._plan:

@@ -10,6 +10,7 @@ import numpy as np
 
 from pushplan.control import EpisodeClock, LegFollower, Legs, Recovery, StallChecker
 from pushplan.control.limits import arc_twist
+from pushplan.control.recovery import warm_up_recovery
 from pushplan.planners.arguments import check_pusher
 from pushplan.planners.rearrangement.line_up import (
     LineUp,
@@ -98,7 +99,7 @@ class GreedyPusher:
         """Load the kernels that an episode may need."""
         from pushplan.planners.rearrangement import kernel_warmup
 
-        kernel_warmup.warm_up_recovery()
+        warm_up_recovery()
         kernel_warmup.drive_in_small_worlds(GreedyPusher)
 
     def act(self, world: World, observation: Any = None) -> Twist:

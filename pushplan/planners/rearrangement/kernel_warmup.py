@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
+from pushplan.control.recovery import warm_up_recovery
 from pushplan.geometry.transforms import arc_step
 from pushplan.gtsp import warm_up_solver
-from pushplan.motion.recovery_path import recovery_path
 from pushplan.planners.pushing import warm_up as warm_up_pushing
 from pushplan.planners.rearrangement.approach import approach_tree
 from pushplan.planners.rearrangement.push_scene import PushScene
@@ -40,12 +40,6 @@ def warm_up_rearrangement() -> None:
     scene = PushScene(_worlds()[0], RearrangementConfig())
     relocating_pushes(PushSimulator(scene), 0, approach_tree(scene))
     warm_up_recovery()
-
-
-@functools.cache
-def warm_up_recovery() -> None:
-    """Look for a drive out of a tight place."""
-    recovery_path(_worlds()[0], 0.0)
 
 
 @functools.cache

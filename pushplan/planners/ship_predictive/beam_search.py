@@ -91,7 +91,7 @@ class BeamSearch(Generic[Ice]):
         count = max(1, round(self.config.arc / SPACING))
         step = SPACING * view.length
         arc: FloatArray = arc_ahead(view.channel, pose, curvature, step, count)
-        return arc
+        return arc[:0] if view.askew and not view.inside(arc) else arc
 
     def _cost(self, length: float, work: float, arc: FloatArray, done: float | None) -> float:
         """Cost up to the end of a piece plus what the costs to go expect of the rest."""

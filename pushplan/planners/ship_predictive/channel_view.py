@@ -54,9 +54,19 @@ class ChannelView:
         )
 
     def inside(self, poses: FloatArray) -> bool:
-        """Whether the ship's origin is in the channel at all (N, 3) poses."""
+        """Whether the ship's origin is in the channel, and in bounds, at all (N, 3) poses."""
         at = poses[:, :2]
-        return bool((at >= self.channel.low).all() and (at <= self.channel.high).all())
+        fits = bool((at >= self.channel.low).all() and (at <= self.channel.high).all())
+        if not fits or not self.askew:
+            return fits
+        at, bounds = self.to_world(poses[:, :3])[:, :2], self.world.static.bounds
+        slack = 1e-9 * self.length
+        return bool((at >= bounds[:2] - slack).all() and (at <= bounds[2:] + slack).all())
+
+    @property
+    def askew(self) -> bool:
+        """Whether no side of the bounds is parallel to the goal line, so that the box is larger."""
+        return abs(math.sin(2.0 * self.turn)) > 1e-9
 
 
 def channel_view(world: World, config: PredictiveConfig, model: IceInteraction) -> ChannelView:
