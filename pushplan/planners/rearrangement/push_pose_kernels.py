@@ -8,7 +8,8 @@ import numpy as np
 
 from pushplan.compiled import kernel
 from pushplan.motion.collision import ConvexObstacles, Footprint, is_free
-from pushplan.world.checks import FloatArray
+from pushplan.planners.rearrangement.pose_grid_kernels import HEADINGS
+from pushplan.world.checks import BoolArray, FloatArray
 
 
 @kernel(allocates=True)
@@ -31,43 +32,29 @@ def pose_behind_outline(
 
 
 @kernel(allocates=True)
-def first_free(
-    start: FloatArray,
-    u: FloatArray,  # (2,) direction
-    step: float,
-    limit: float,
+def pushable_moves(
+    middles: FloatArray,  # (rows, cols, 2) of cells [m]
+    is_open: BoolArray,  # (rows, cols) where an object may be
+    shifts: FloatArray,  # (S,) of the robot's middle to the left of the object [m]
+    distance: float,  # of the robot's middle behind the object's [m]
     shape: Footprint,
     among: ConvexObstacles,
-    scratch: FloatArray,
-) -> float:
-    """How far along ``u`` a free pose is [m]; inf if there is none nearer than the limit."""
-    pose, n = start.copy(), 0
-    while n * step < limit:
-        pose[0], pose[1] = start[0] + n * step * u[0], start[1] + n * step * u[1]
-        if is_free(pose, shape, among, scratch):
-            return n * step
-        n += 1
-    return np.inf
-
-
-@kernel(allocates=True)
-def missing_clearance(
-    pose: FloatArray,  # (3,) of the object
-    outline: FloatArray,  # (N, 2) in its frame [m]
-    headings: FloatArray,  # (H,) in which it may be pushed [rad]
-    shifts: FloatArray,  # (S,) of the robot's middle to the left [m]
-    distance: float,  # of the robot's middle from the outline [m]
-    limit: float,
-    shape: Footprint,
-    among: ConvexObstacles,
-    scratch: FloatArray,
-) -> float:
-    """How much farther on an object would have to be for the robot to fit behind it [m]."""
-    least = limit
-    u = np.empty(2)
-    for heading in headings:
-        u[0], u[1] = math.cos(heading), math.sin(heading)
-        for shift in shifts:
-            start = pose_behind_outline(pose, outline, heading, shift, distance)
-            least = min(least, first_free(start, u, limit / 40.0, least, shape, among, scratch))
-    return least
+) -> BoolArray:
+    """(16, rows, cols) whether the robot fits behind an object to push it along each heading."""
+    rows, cols = is_open.shape
+    out = np.zeros((HEADINGS.shape[0], rows, cols), dtype=np.bool_)
+    pose, scratch = np.empty(3), np.empty_like(shape.vertices)
+    for t in range(HEADINGS.shape[0]):
+        c, s = math.cos(HEADINGS[t]), math.sin(HEADINGS[t])
+        pose[2] = HEADINGS[t]
+        for i in range(rows):
+            for j in range(cols):
+                if not is_open[i, j]:
+                    continue
+                for shift in shifts:
+                    pose[0] = middles[i, j, 0] - distance * c - shift * s
+                    pose[1] = middles[i, j, 1] - distance * s + shift * c
+                    if is_free(pose, shape, among, scratch):
+                        out[t, i, j] = True
+                        break
+    return out

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import functools
 import math
 from dataclasses import dataclass
@@ -31,6 +32,7 @@ from pushplan.planners.rearrangement.pose_grid_kernels import (
     add_layers,
     contact_depths,
 )
+from pushplan.planners.rearrangement.push_cost_to_go import PushCostToGo, push_cost_to_go
 from pushplan.planners.rearrangement.rearrangement_config import RearrangementConfig
 from pushplan.planners.rearrangement.rollout_cache import RolloutCache
 from pushplan.world import ClearanceArea, Goal, Receptacle, RobotModel, StaticMap, World
@@ -123,6 +125,17 @@ class PushScene:
 
     def __post_init__(self) -> None:
         check_world(self.world)
+
+    def with_objects_at(self, poses: FloatArray) -> PushScene:
+        """The same with the objects at poses (K, 3), as far as rolling out pushes goes.
+
+        The world, and with it where the robot is, stays as it is.
+        """
+        moved = copy.copy(self)
+        for name in ("done", "remaining_now", "fine", "coarse"):
+            moved.__dict__.pop(name, None)
+        moved.__dict__.update(poses=np.ascontiguousarray(poses), cache=None)
+        return moved
 
     @property
     def size(self) -> float:
@@ -261,6 +274,14 @@ class PushScene:
         """
         point = (self.poses[k] if pose is None else pose)[:2]
         return self.object_paths.path(point, float(self.world.movables.radii[k]), clearance, deep)
+
+    def push_cost_to_go(self, radius: float) -> PushCostToGo:
+        """What it costs to push objects of a radius [m] to their goal."""
+        world, slack = self.world, self.config.slack * self.size
+        margin = 0.3 * self.config.margin * self.size
+        return push_cost_to_go(
+            world.robot, world.static, world.goal, round(radius, 6), slack, margin
+        )
 
     @cached_property
     def fit(self) -> tuple[Footprint, ConvexObstacles, FloatArray]:

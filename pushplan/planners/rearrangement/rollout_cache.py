@@ -50,25 +50,25 @@ class RolloutCache:
     """Rollouts of the plans before, by what was rolled out.
 
     A rollout counts again if the same objects lie in the same places wherever it came near one.
-
-    Attributes:
-        searches: how often extraction primitives have been searched since something was done.
     """
 
     def __init__(self) -> None:
         self._entries: dict[object, _Entry] = {}
-        self._primitives: dict[int, tuple[bytes, list[Primitive]]] = {}
-        self.searches = 0
+        self._primitives: dict[int, tuple[bytes, bytes, list[Primitive] | None]] = {}
 
-    def primitives(self, target: int, around: bytes) -> list[Primitive] | None:
-        """Extraction primitives found for an object, if that was with the same around it."""
-        known = self._primitives.get(target)
-        return known[1] if known is not None and known[0] == around else None
+    def primitives(self, target: int, around: bytes, robot: bytes) -> list[Primitive] | None:
+        """Drives found for an object, if that was with the same around it.
 
-    def keep_primitives(self, target: int, around: bytes, found: list[Primitive]) -> None:
-        """Keep the extraction primitives found for an object."""
-        self._primitives[target] = around, found
-        self.searches += 1
+        That there are none counts only for the robot in the same place: it may get to others.
+        """
+        then, where, found = self._primitives.get(target, (b"", b"", None))
+        return found if then == around and (found or where == robot) else None
+
+    def keep_primitives(
+        self, target: int, around: bytes, robot: bytes, found: list[Primitive]
+    ) -> None:
+        """Keep the drives found for an object."""
+        self._primitives[target] = around, robot, found
 
     def __len__(self) -> int:
         return len(self._entries)

@@ -1,0 +1,128 @@
+"""`PushCostToGo`: what it costs to push an object to its goal, by place, on one map."""
+
+from __future__ import annotations
+
+import functools
+
+import numpy as np
+import shapely
+from scipy.ndimage import distance_transform_edt, map_coordinates
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import dijkstra
+
+from pushplan.motion.collision import footprint, obstacles
+from pushplan.planners.rearrangement.line_up import bumper_half
+from pushplan.planners.rearrangement.object_paths import done_places
+from pushplan.planners.rearrangement.pose_grid_kernels import LENGTHS, MOVES
+from pushplan.planners.rearrangement.primitives import SHIFTS
+from pushplan.planners.rearrangement.push_pose_kernels import pushable_moves
+from pushplan.world import Goal, Receptacle, RobotModel, StaticMap
+from pushplan.world.checks import FloatArray
+
+_CELL = 0.125  # side of a cell [circumscribed radii]
+_MOST = 160  # cells along the longer side of a map
+_DRAG = 10.0
+"""What a metre costs along which the robot does not fit behind the object, in metres pushed."""
+
+
+class PushCostToGo:
+    """Cost of the cheapest way of an object to its goal [m], by the place of its middle.
+
+    The way leads from cell to cell in sixteen directions. A metre of it costs a metre where the
+    robot fits behind the object among what is static, and more where the object has to be brought
+    on in another way: out of corners and gaps, and away from walls. Other objects do not count.
+
+    Args:
+        robot: which pushes.
+        static: walls and columns.
+        goal: of the object.
+        radius: of the object [m].
+        slack: clearance between bumper and object [m].
+        margin: that the robot keeps from what is static [m].
+    """
+
+    def __init__(
+        self,
+        robot: RobotModel,
+        static: StaticMap,
+        goal: Goal,
+        radius: float,
+        slack: float,
+        margin: float,
+    ) -> None:
+        low, high = static.bounds[:2], static.bounds[2:]
+        sides = high - low
+        self._step = max(_CELL * robot.circumscribed_radius, float(sides.max()) / _MOST)
+        cols, rows = (int(side) for side in np.floor(sides / self._step) + 1)
+        self._low = low + 0.5 * (sides - self._step * np.array([cols - 1, rows - 1]))
+        x = self._low[0] + self._step * np.arange(cols)
+        y = self._low[1] + self._step * np.arange(rows)
+        middles = shapely.points(*np.meshgrid(x, y))
+        walls = shapely.union_all([shapely.Polygon(part) for part in static.convex_parts])
+        open_cells = np.ones((rows, cols), dtype=np.bool_)
+        if not walls.is_empty:
+            shapely.prepare(walls)
+            open_cells = shapely.distance(walls, middles) > 0.5 * radius
+        half = bumper_half(robot)
+        pushable = pushable_moves(
+            np.stack(np.meshgrid(x, y), axis=2),
+            open_cells,
+            np.array(SHIFTS) * half,
+            float(robot.vertices[:, 0].max()) + slack + 0.85 * radius,
+            footprint(robot, margin),
+            obstacles(static),
+        )
+        costs = self._search(open_cells, pushable, _is_goal(goal, radius, middles, self._step))
+        away, (i, j) = distance_transform_edt(~np.isfinite(costs), return_indices=True)
+        self._costs: FloatArray = costs[i, j] + _DRAG * self._step * away
+
+    def _search(self, is_open: FloatArray, pushable: FloatArray, goal: FloatArray) -> FloatArray:
+        """(rows, cols) cost of the way from each cell [m]."""
+        rows, cols = is_open.shape
+        i, j = np.nonzero(is_open)
+        starts, ends, costs = [], [], []
+        for t, (dx, dy) in enumerate(MOVES.tolist()):
+            inside = (0 <= i + dy) & (i + dy < rows) & (0 <= j + dx) & (j + dx < cols)
+            a, b = i[inside], j[inside]
+            there = is_open[a + dy, b + dx]
+            a, b = a[there], b[there]
+            starts.append(a * cols + b)
+            ends.append((a + dy) * cols + b + dx)
+            length = LENGTHS[t] * self._step
+            costs.append(np.where(pushable[t, a, b], length, _DRAG * length))
+        # backward: from the goal against the moves
+        where = np.concatenate(ends), np.concatenate(starts)
+        graph = csr_array((np.concatenate(costs), where), shape=(rows * cols, rows * cols))
+        seeds = np.flatnonzero(goal & is_open)
+        if not len(seeds):
+            return np.zeros((rows, cols))
+        out: FloatArray = dijkstra(graph, indices=seeds, min_only=True).reshape(rows, cols)
+        return out
+
+    def at(self, points: FloatArray) -> FloatArray:
+        """(N,) cost from places (N, 2) of the object's middle [m]."""
+        cells = (points - self._low) / self._step
+        out: FloatArray = map_coordinates(
+            self._costs, cells[:, ::-1].T, order=1, mode="nearest", prefilter=False
+        )
+        return out
+
+
+def _is_goal(goal: Goal, radius: float, middles: FloatArray, step: float) -> FloatArray:
+    """(rows, cols) in which cells an object is done, or about to be."""
+    places = done_places(goal, radius, 1.0)
+    if places is None:
+        assert isinstance(goal, Receptacle)
+        places = [goal.polygon.mean(axis=0)[None]]
+    shapes = shapely.union_all([shapely.MultiPoint(place).convex_hull for place in places])
+    shapely.prepare(shapes)
+    out: FloatArray = shapely.distance(shapes, middles) <= 0.75 * step
+    return out
+
+
+@functools.lru_cache(maxsize=16)
+def push_cost_to_go(
+    robot: RobotModel, static: StaticMap, goal: Goal, radius: float, slack: float, margin: float
+) -> PushCostToGo:
+    """See `PushCostToGo`; kept for the maps used last."""
+    return PushCostToGo(robot, static, goal, radius, slack, margin)
