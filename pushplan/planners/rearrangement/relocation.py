@@ -36,6 +36,7 @@ from pushplan.world.checks import FloatArray
 _STARTS = 300  # from how many places round the object a drive may begin
 _DRAWS = 3000  # how many places are looked at for that
 _LENGTH = 1.6  # of an arc [circumscribed radii]
+_ALIKE = 3  # from how many states with the object in the same place it is driven on
 _DEPTH = 3  # how many arcs follow one another at most
 _EXPANSIONS = 400  # how many states are driven on from, starts not counted
 _ENOUGH = 24  # margins, over all sides from which a drive helps, after which it ends
@@ -138,7 +139,7 @@ class _RelocationSearch:
             away = self._approach_cost(start)
             if math.isfinite(away):
                 self._put(_State(None, start[None], scene.poses, 0, away, now))
-        expansions, sides = Counter[bool](), Counter[_Cell]()
+        expansions, sides, alike = Counter[bool](), Counter[_Cell](), Counter[_Cell]()
         while self._open and expansions[True] < _EXPANSIONS and sides.total() < _ENOUGH:
             state = heapq.heappop(self._open)[2]
             if state.depth and not self._has_moved(state):
@@ -149,8 +150,9 @@ class _RelocationSearch:
                     self._failing[place] = self._failing_margins(state)
                 stands = len(_MARGINS) - self._failing.get(place, len(_MARGINS))
                 sides[side] = max(sides[side], stands)
-                if stands or state.depth == _DEPTH:
+                if stands or state.depth == _DEPTH or alike[place] >= _ALIKE:
                     continue
+                alike[place] += 1
             expansions[state.depth > 0] += 1
             self._expand(state)
         return self._delivering() or self._better(now)
