@@ -17,9 +17,6 @@ from pushplan.world import ClearanceArea
 from pushplan.world.checks import FloatArray
 from pushplan.world.polyline import path_length
 
-_HARD = 3  # so many objects that no simple push gets home, the nearest ones, are looked at closely
-_DETOUR = 1.3  # how much farther than the nearest edge one may be that an object is pushed across
-
 
 def delivering_pushes(simulator: PushSimulator, objects: Sequence[int]) -> list[Push]:
     """Pushes after which an object is where it belongs, row by row of the table.
@@ -31,11 +28,12 @@ def delivering_pushes(simulator: PushSimulator, objects: Sequence[int]) -> list[
     ids = simulator.scene.world.movables.ids.tolist()
     found: list[Push] = []
     counts: Counter[int] = Counter()
+    hard = simulator.scene.config.hard_objects
     for row in simulator.scene.config.primitives:
         if row.controller == "arc":
             continue
         few = [k for k in objects if counts[ids[k]] < row.below]
-        for k in few[:_HARD] if row.below == 1 and found else few:
+        for k in few[:hard] if row.below == 1 and found else few:
             pushes = list(pushes_with(simulator, k, row))
             found += pushes
             counts.update(i for push in pushes for i in push.delivers)
@@ -73,7 +71,7 @@ def _line_pushes(simulator: PushSimulator, k: int, row: PushPrimitive) -> Iterat
         along = (b - a) / np.hypot(*(b - a))
         normal = np.array([along[1], -along[0]])
         far = float((a - box) @ normal)
-        if not is_open or far > _DETOUR * nearest + 2.0 * scene.size:
+        if not is_open or far > scene.config.detour * nearest + 2.0 * scene.size:
             continue
         for lean in row.leans:
             heading = math.atan2(normal[1], normal[0]) + math.radians(lean)

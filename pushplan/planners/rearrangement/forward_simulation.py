@@ -41,7 +41,7 @@ def simulate_push(
         return SimulatedPush(np.inf, route, push)
     length = path_length(path[:, :2])
     ends = simulator.resimulate(push, path[-1], poses=poses, spent=path_lengths(out))
-    good = [end for end in ends if push.pre_relocates or set(push.delivers) <= set(end.delivers)]
+    good = [end for end in ends if push.relocates or set(push.delivers) <= set(end.delivers)]
     if not good:
         return SimulatedPush(np.inf, route, push)
     return SimulatedPush(length + good[0].cost, route, good[0])

@@ -20,11 +20,6 @@ from pushplan.planners.rearrangement.rollout_cache import RolloutCache
 from pushplan.world import InvalidInputError, Twist, World
 from pushplan.world.checks import FloatArray, expect
 
-_ROUNDS = 6  # how often pushes that have failed are tried anew before what is left is given up
-_RETREAT = 0.3  # how far it backs off where it is stuck [circumscribed radii]
-_PENALTY = 3.0  # what is added to the cost of a push that has failed [circumscribed radii]
-_MOST_FAILURES = 3  # after so many a push waits until something else has been done
-
 
 class GtspMpc:
     """Clears or delivers objects: which next, from which side, together with which others.
@@ -91,7 +86,7 @@ class GtspMpc:
         if left != self._left:  # something was done, or has come back
             self._left, self._rounds, self._stopped_at = left, 0, None
             self._failures = Counter(
-                {key: min(n, _MOST_FAILURES - 1) for key, n in self._failures.items()}
+                {key: min(n, self.config.max_failures - 1) for key, n in self._failures.items()}
             )
         if not left:
             self._execution, self.given_up, self.plan = None, {}, ()
@@ -136,32 +131,33 @@ class GtspMpc:
             self._recovered_from = here
             self._away = PoseFollower(scene.world.robot, path, self.config.response)
             return True
-        if self._failures and self._rounds < _ROUNDS:
+        if self._failures and self._rounds < self.config.max_rounds:
             self._failures.clear()
             self._rounds += 1
             return True
-        self._stopped_at = scene
+        if self._cache.searches < self.config.max_searches:  # else the search goes on
+            self._stopped_at = scene
         return False
 
     def _penalties(self, scene: PushScene) -> dict[tuple[object, ...], float]:
         """What is added to the cost of pushes that have failed [m]."""
-        each = _PENALTY * scene.size
+        each = self.config.failure_cost * scene.size
         return {
-            key: math.inf if count >= _MOST_FAILURES else count * each
+            key: math.inf if count >= self.config.max_failures else count * each
             for key, count in self._failures.items()
         }
 
     def _close(self, scene: PushScene, execution: PushExecution, end: ExecutionEnd) -> None:
         """Draw the conclusions from how an execution ended."""
         self._execution = None
-        if end is ExecutionEnd.DONE and not execution.push.pre_relocates:
+        if end is ExecutionEnd.DONE and not execution.push.relocates:
             self._stuck = 0
             return
         if end is not ExecutionEnd.OBSOLETE:  # also a relocation, so that another comes next
             self._failures[signature(execution.push)] += 1
         if end is ExecutionEnd.STUCK:
             robot, pose = scene.world.robot, scene.world.robot_pose
-            self._away = Retreat(robot, pose, _RETREAT * scene.size, self._stuck)
+            self._away = Retreat(robot, pose, self.config.retreat * scene.size, self._stuck)
             self._stuck += 1
 
 

@@ -16,8 +16,10 @@ class Push(ArrayRecord):
 
     Args:
         delivers: ids of the objects that are done by it.
-        target: id of the object that follows a path, or that a line push begins behind.
-        follows_path: whether it follows ``object_path``; else the robot drives straight ahead.
+        target: id of the object that it begins at.
+        controller: how the robot drives, as in `PushPrimitive`: ``"line"`` straight ahead,
+            ``"path"`` so that the target follows ``object_path``, ``"arc"`` along ``poses``
+            themselves, ahead, back and on the spot.
         poses: (N, 3) the robot's path, from the start of the push on.
         length: of that path [m].
         work: sum of mass times path length over all objects [kg m].
@@ -26,14 +28,11 @@ class Push(ArrayRecord):
         object_path: (M, 2) of the target object [m].
         shift: how far the robot's middle is to the left of the target object [m].
         gain: of the pushing controller, see `PushingController`.
-        pre_relocates: whether it only brings the object to where it can be pushed from.
-        is_primitive: whether it is an extraction primitive: the robot follows ``poses`` themselves,
-            ahead, back and on the spot.
     """
 
     delivers: tuple[int, ...]
     target: int
-    follows_path: bool
+    controller: str
     poses: FloatArray
     length: float
     work: float
@@ -42,8 +41,11 @@ class Push(ArrayRecord):
     object_path: FloatArray = field(default_factory=lambda: np.zeros((0, 2)))
     shift: float = 0.0
     gain: float = 1.5
-    pre_relocates: bool = False
-    is_primitive: bool = False
+
+    @property
+    def relocates(self) -> bool:
+        """Whether it only brings its target to where it can be pushed home from."""
+        return self.controller == "arc"
 
     @property
     def serves(self) -> tuple[int, ...]:
@@ -66,6 +68,6 @@ class Push(ArrayRecord):
 def signature(push: Push) -> tuple[object, ...]:
     """What a push is known by when it has failed."""
     heading = math.remainder(float(push.start[2]), 2.0 * math.pi)
-    if push.is_primitive:
-        return push.target, push.is_primitive, round(heading / 0.6)
-    return push.target, push.follows_path, round(heading / 0.3), round(push.shift, 2), push.gain
+    if push.relocates:
+        return push.target, push.controller, round(heading / 0.6)
+    return push.target, push.controller, round(heading / 0.3), round(push.shift, 2), push.gain

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+from typing import Any
 
 import numpy as np
 import shapely
@@ -16,13 +17,11 @@ from pushplan.planners.rearrangement.object_paths import done_places
 from pushplan.planners.rearrangement.pose_grid_kernels import LENGTHS, MOVES
 from pushplan.planners.rearrangement.primitives import SHIFTS
 from pushplan.planners.rearrangement.push_pose_kernels import pushable_moves
+from pushplan.planners.rearrangement.relocation_config import RelocationConfig
 from pushplan.world import Goal, Receptacle, RobotModel, StaticMap
-from pushplan.world.checks import FloatArray
+from pushplan.world.checks import BoolArray, FloatArray
 
-_CELL = 0.125  # side of a cell [circumscribed radii]
 _MOST = 160  # cells along the longer side of a map
-_DRAG = 10.0
-"""What a metre costs along which the robot does not fit behind the object, in metres pushed."""
 
 
 class PushCostToGo:
@@ -39,6 +38,7 @@ class PushCostToGo:
         radius: of the object [m].
         slack: clearance between bumper and object [m].
         margin: that the robot keeps from what is static [m].
+        config: side of a cell, and the cost where the robot does not fit.
     """
 
     def __init__(
@@ -46,13 +46,16 @@ class PushCostToGo:
         robot: RobotModel,
         static: StaticMap,
         goal: Goal,
+        *,
         radius: float,
         slack: float,
         margin: float,
+        config: RelocationConfig,
     ) -> None:
+        self._drag_cost = config.drag_cost
         low, high = static.bounds[:2], static.bounds[2:]
         sides = high - low
-        self._step = max(_CELL * robot.circumscribed_radius, float(sides.max()) / _MOST)
+        self._step = max(config.cell * robot.circumscribed_radius, float(sides.max()) / _MOST)
         cols, rows = (int(side) for side in np.floor(sides / self._step) + 1)
         self._low = low + 0.5 * (sides - self._step * np.array([cols - 1, rows - 1]))
         x = self._low[0] + self._step * np.arange(cols)
@@ -74,9 +77,9 @@ class PushCostToGo:
         )
         costs = self._search(open_cells, pushable, _is_goal(goal, radius, middles, self._step))
         away, (i, j) = distance_transform_edt(~np.isfinite(costs), return_indices=True)
-        self._costs: FloatArray = costs[i, j] + _DRAG * self._step * away
+        self._costs: FloatArray = costs[i, j] + self._drag_cost * self._step * away
 
-    def _search(self, is_open: FloatArray, pushable: FloatArray, goal: FloatArray) -> FloatArray:
+    def _search(self, is_open: BoolArray, pushable: BoolArray, goal: BoolArray) -> FloatArray:
         """(rows, cols) cost of the way from each cell [m]."""
         rows, cols = is_open.shape
         i, j = np.nonzero(is_open)
@@ -89,7 +92,7 @@ class PushCostToGo:
             starts.append(a * cols + b)
             ends.append((a + dy) * cols + b + dx)
             length = LENGTHS[t] * self._step
-            costs.append(np.where(pushable[t, a, b], length, _DRAG * length))
+            costs.append(np.where(pushable[t, a, b], length, self._drag_cost * length))
         # backward: from the goal against the moves
         where = np.concatenate(ends), np.concatenate(starts)
         graph = csr_array((np.concatenate(costs), where), shape=(rows * cols, rows * cols))
@@ -108,7 +111,7 @@ class PushCostToGo:
         return out
 
 
-def _is_goal(goal: Goal, radius: float, middles: FloatArray, step: float) -> FloatArray:
+def _is_goal(goal: Goal, radius: float, middles: Any, step: float) -> BoolArray:
     """(rows, cols) in which cells an object is done, or about to be."""
     places = done_places(goal, radius, 1.0)
     if places is None:
@@ -116,13 +119,9 @@ def _is_goal(goal: Goal, radius: float, middles: FloatArray, step: float) -> Flo
         places = [goal.polygon.mean(axis=0)[None]]
     shapes = shapely.union_all([shapely.MultiPoint(place).convex_hull for place in places])
     shapely.prepare(shapes)
-    out: FloatArray = shapely.distance(shapes, middles) <= 0.75 * step
+    out: BoolArray = shapely.distance(shapes, middles) <= 0.75 * step
     return out
 
 
-@functools.lru_cache(maxsize=16)
-def push_cost_to_go(
-    robot: RobotModel, static: StaticMap, goal: Goal, radius: float, slack: float, margin: float
-) -> PushCostToGo:
-    """See `PushCostToGo`; kept for the maps used last."""
-    return PushCostToGo(robot, static, goal, radius, slack, margin)
+push_cost_to_go = functools.lru_cache(maxsize=16)(PushCostToGo)
+"""`PushCostToGo`, kept for the maps used last."""

@@ -22,10 +22,6 @@ from pushplan.world.checks import FloatArray
 
 _ALIGNED = math.radians(0.4)  # error of a heading that is left where a push begins
 _NEAR = 0.004  # the same of the place [circumscribed radii]
-_TOWARDS = math.radians(20.0)
-"""A push that begins farther off the object's path is left to the geometric controller."""
-_PROGRESS = 0.05  # by which an object has to get on within the time below [circumscribed radii]
-_PATIENCE = 1.0  # time in which the robot could drive so far [circumscribed radii]
 
 
 class ExecutionEnd(enum.Enum):
@@ -111,16 +107,16 @@ class PushExecution:
         """Look again at what the push would do from here; whether it is good for anything."""
         push, world = self.push, scene.world
         ends = PushSimulator(scene).resimulate(push, world.robot_pose)
-        good = [end for end in ends if push.pre_relocates or set(push.delivers) & set(end.delivers)]
+        good = [end for end in ends if push.relocates or set(push.delivers) & set(end.delivers)]
         if not good:
             return False
         self.push = max(
             good, key=lambda end: (len(set(end.delivers) & set(push.delivers)), -end.length)
         )
         self.pushing = True
-        if self.push.is_primitive:
+        if self.push.relocates:
             self._pose_follower = PoseFollower(world.robot, self.push.poses, scene.config.response)
-        if self.push.follows_path:
+        if self.push.controller == "path":
             self._choose_pusher(scene, held)
         return True
 
@@ -131,7 +127,7 @@ class PushExecution:
         predictive = self._predictive and suits_mpc(scene, push)
         path = PushPath.through(push.object_path, radius=size if predictive else 0.0)
         self._plan = path.plan(robot, push.target)
-        self._progress = ProgressChecker(_PROGRESS * size, _PATIENCE * size / robot.max_speed)
+        self._progress = ProgressChecker(config.progress * size, size / robot.max_speed)
         if predictive:
             parameters = PushParameters(config.friction)
             self._pusher = PushingMpc(PushingConfig(parameters=parameters, period=held))
@@ -143,15 +139,14 @@ class PushExecution:
         push, world, pose = self.push, scene.world, scene.world.robot_pose
         ids = world.movables.ids
         left = np.isin(ids, push.delivers) & ~scene.done
-        if not push.pre_relocates and not left.any():
+        if not push.relocates and not left.any():
             return ExecutionEnd.DONE
         if self._pose_follower is not None:
             return self._pose_follower.command(pose, world.time, held) or ExecutionEnd.DONE
         self._driven += (world.time - self._sent_at) * self._speed
         self._sent_at, self._speed = world.time, 0.0
-        longest = push.length if push.pre_relocates else 1.1 * push.length + 0.4 * scene.size
-        if self._driven > longest - 1e-6:
-            return ExecutionEnd.DONE if push.pre_relocates else ExecutionEnd.FAILED
+        if self._driven > 1.1 * push.length + 0.4 * scene.size - 1e-6:
+            return ExecutionEnd.FAILED
         if self._pusher is None:
             turn = _line_turn(push.start, pose, scene.size)
             return arc_twist(world.robot, scene.controller.step, turn)
@@ -167,10 +162,10 @@ class PushExecution:
 
 def suits_mpc(scene: PushScene, push: Push) -> bool:
     """Whether the contact model of `PushingMpc` describes a push: of one object, along its path."""
-    if push.pre_relocates or push.delivers != (push.target,):
+    if push.delivers != (push.target,):
         return False
     away = initial_heading(push.object_path, 0.5 * scene.size) - float(scene.world.robot_pose[2])
-    return abs(math.remainder(away, math.tau)) < _TOWARDS
+    return abs(math.remainder(away, math.tau)) < math.radians(scene.config.mpc_heading)
 
 
 def _line_turn(start: FloatArray, pose: FloatArray, size: float) -> float:

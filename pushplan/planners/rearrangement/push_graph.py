@@ -21,11 +21,6 @@ from pushplan.planners.rearrangement.push_simulator import PushSimulator
 from pushplan.planners.rearrangement.relocation import relocating_pushes
 from pushplan.world.checks import FloatArray
 
-PRE_RELOCATIONS = 2
-"""For how many objects, the nearest ones, pre-relocation pushes are looked for without others."""
-
-_FAR = 5.0  # cost of getting to what cannot be got to later [diagonals of the map]
-
 
 @dataclass(frozen=True, eq=False)
 class PushGraph:
@@ -49,19 +44,19 @@ def build_push_graph(
     scene: PushScene,
     penalties: dict[tuple[object, ...], float] | None = None,
     *,
-    pre_relocations: int = 0,
+    relocations: int = 0,
 ) -> PushGraph:
     """Make the candidate pushes of a scene and their costs.
 
     Args:
         scene: the scene.
         penalties: what to add to the cost of a push, by `signature` [m].
-        pre_relocations: for how many objects, the nearest ones first, pushes that only bring them
-            to where they can be pushed from are wanted too; without others they are in any case.
+        relocations: for how many objects, the nearest ones first, drives that only bring them to
+            where they can be pushed home from are wanted too.
     """
     approach = approach_tree(scene)
     simulator = PushSimulator(scene)
-    pushes = candidate_pushes(scene, simulator, approach, pre_relocations)
+    pushes = candidate_pushes(scene, simulator, approach, relocations)
     row = least_costs(approach.costs, arrivals_at(scene.fine, pushes))
     extra = np.array([(penalties or {}).get(signature(push), 0.0) for push in pushes])
     pushes, keep = _best(scene, pushes, row + extra)
@@ -79,21 +74,18 @@ def build_push_graph(
 
 
 def candidate_pushes(
-    scene: PushScene, simulator: PushSimulator, approach: ApproachTree, pre_relocations: int = 0
+    scene: PushScene, simulator: PushSimulator, approach: ApproachTree, relocations: int = 0
 ) -> list[Push]:
-    """All candidates of a scene; ``pre_relocations`` see `build_push_graph`."""
+    """All candidates of a scene; ``relocations`` see `build_push_graph`."""
     away = np.hypot(*(scene.poses[:, :2] - scene.world.robot_pose[:2]).T)
     objects = sorted(simulator.left.tolist(), key=lambda k: (float(away[k]), k))
     pushes = delivering_pushes(simulator, objects)
-    # what is hard to get at is often freed by what is done before
-    if pre_relocations or not pushes:
-        relocated = 0
-        for k in objects:
-            found = relocating_pushes(simulator, k, approach)
-            pushes += found
-            relocated += bool(found)
-            if relocated >= max(pre_relocations, PRE_RELOCATIONS):
-                break
+    for k in objects:
+        if not relocations:
+            break
+        found = relocating_pushes(simulator, k, approach)
+        pushes += found
+        relocations -= bool(found)
     return pushes
 
 
@@ -125,7 +117,7 @@ def _between(scene: PushScene, pushes: Sequence[Push]) -> FloatArray:
     """
     contact_grid, ids = scene.coarse, scene.world.movables.ids
     bounds = scene.world.static.bounds
-    far = _FAR * float(np.hypot(*(bounds[2:] - bounds[:2])))
+    far = scene.config.far * float(np.hypot(*(bounds[2:] - bounds[:2])))
     arrivals = arrivals_at(contact_grid, pushes)
     out = np.full((len(pushes), len(pushes)), np.inf)
     known: dict[tuple[object, ...], FloatArray] = {}

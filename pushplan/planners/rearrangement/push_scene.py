@@ -38,14 +38,6 @@ from pushplan.planners.rearrangement.rollout_cache import RolloutCache
 from pushplan.world import ClearanceArea, Goal, Receptacle, RobotModel, StaticMap, World
 from pushplan.world.checks import BoolArray, FloatArray, IntArray, frozen
 
-_STEP = 0.08  # distance between two commands of a push [circumscribed radii]
-_CURVATURE = 1.5  # of the robot's path where it steers most [1 / circumscribed radius]
-_ARM = 0.8  # how far a turn by one radian carries an object along [circumscribed radii]
-_GOAL_SLACK = 0.012
-"""By how much an object has to be clear of its goal's edge [circumscribed radii]."""
-TARGET_COST = 5.0
-"""What is added to the cost of carrying along an object that is to be pushed afterwards."""
-
 
 @functools.lru_cache(maxsize=8)
 def _fit_of(
@@ -85,11 +77,13 @@ class ContactGrid:
         grid: the lattice.
         layers: (K, 16, rows, columns) depth in each object [m].
         weights: (K,) cost of carrying each object along.
+        target_cost: what is added to that of an object that is to be pushed afterwards.
     """
 
     grid: PoseGrid
     layers: Layers
     weights: FloatArray
+    target_cost: float
 
     def contacts(
         self, fraction: float = 1.0, without: IntArray | None = None, target: int = -1
@@ -105,7 +99,7 @@ class ContactGrid:
         if without is not None:
             weights[without] = 0.0
         if target >= 0:
-            weights[target] += TARGET_COST
+            weights[target] += self.target_cost
         return add_layers(self.layers, weights)
 
 
@@ -181,15 +175,17 @@ class PushScene:
     @cached_property
     def object_goal(self) -> ObjectGoal:
         """When objects are done."""
-        return make_object_goal(self.world.goal, self.world.static, _GOAL_SLACK * self.size)
+        return make_object_goal(
+            self.world.goal, self.world.static, self.config.goal_slack * self.size
+        )
 
     @cached_property
     def controller(self) -> PushingController:
         """Parameters of the pushing controller for this robot."""
-        step = _STEP * self.size
+        step = self.config.step * self.size
         return PushingController(
             step=step,
-            turn=_CURVATURE * step / self.size,
+            turn=self.config.curvature * step / self.size,
             size=self.size,
             half=self.half,
             front=self.front,
@@ -210,7 +206,7 @@ class PushScene:
     @property
     def arm(self) -> float:
         """How far a turn carries an object along [m/rad]."""
-        return _ARM * self.size
+        return self.config.arm * self.size
 
     @cached_property
     def weights(self) -> FloatArray:
@@ -243,7 +239,7 @@ class PushScene:
         grid = make_pose_grid(world.robot, world.static, step, self.config.margin * size)
         shape = footprint(world.robot, self.config.margin * size)
         layers = contact_depths(grid, shape, self.poses, self.bodies)
-        return ContactGrid(grid, layers, self.contact_weights)
+        return ContactGrid(grid, layers, self.contact_weights, self.config.target_cost)
 
     def remaining(self, poses: FloatArray) -> FloatArray:
         """(K,) shortest path [m] of each object's middle to the goal from poses (K, 3)."""
@@ -277,10 +273,15 @@ class PushScene:
 
     def push_cost_to_go(self, radius: float) -> PushCostToGo:
         """What it costs to push objects of a radius [m] to their goal."""
-        world, slack = self.world, self.config.slack * self.size
-        margin = 0.3 * self.config.margin * self.size
+        world, config = self.world, self.config
         return push_cost_to_go(
-            world.robot, world.static, world.goal, round(radius, 6), slack, margin
+            world.robot,
+            world.static,
+            world.goal,
+            radius=round(radius, 6),
+            slack=config.slack * self.size,
+            margin=0.3 * config.margin * self.size,
+            config=config.relocation,
         )
 
     @cached_property

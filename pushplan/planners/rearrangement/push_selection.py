@@ -10,7 +10,7 @@ import numpy as np
 from pushplan.planners.rearrangement.approach import ApproachTree, approach_tree
 from pushplan.planners.rearrangement.forward_simulation import SimulatedPush, simulate_push
 from pushplan.planners.rearrangement.push import Push, signature
-from pushplan.planners.rearrangement.push_graph import PRE_RELOCATIONS, PushGraph, build_push_graph
+from pushplan.planners.rearrangement.push_graph import PushGraph, build_push_graph
 from pushplan.planners.rearrangement.push_scene import PushScene
 from pushplan.planners.rearrangement.push_simulator import PushSimulator
 from pushplan.planners.rearrangement.route import RoutePlanner
@@ -48,14 +48,11 @@ def select_push(scene: PushScene, penalties: dict[tuple[object, ...], float]) ->
         penalties: what to add to the cost of a push, by `signature` [m].
     """
     selection = _select(scene, build_push_graph(scene, penalties), penalties)
-    pre_relocates = any(push.pre_relocates for push in selection.graph.pushes)
-    for pre_relocations in (PRE_RELOCATIONS, int((~scene.done).sum())):
-        if selection.first is None and not (pre_relocates and pre_relocations <= PRE_RELOCATIONS):
-            selection = _select(
-                scene,
-                build_push_graph(scene, penalties, pre_relocations=pre_relocations),
-                penalties,
-            )
+    left = int((~scene.done).sum())
+    for relocations in sorted({min(scene.config.relocation.objects, left), left}):
+        if selection.first is None:
+            graph = build_push_graph(scene, penalties, relocations=relocations)
+            selection = _select(scene, graph, penalties)
     return selection
 
 

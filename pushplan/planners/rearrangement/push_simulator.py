@@ -55,7 +55,6 @@ class PushSimulator:
         limit: float | None = None,
         wanted: Sequence[int] = (),
         gain: float = 1.5,
-        pre_relocates: bool = False,
         poses: FloatArray | None = None,
         spent: FloatArray | None = None,
     ) -> list[Push]:
@@ -69,7 +68,6 @@ class PushSimulator:
             limit: of the length [m].
             wanted: indices of the objects after which to stop; ``target`` alone by default.
             gain: of the pushing controller.
-            pre_relocates: whether to keep the end where nothing is done.
             poses: (K, 3) where the objects are when the push begins; where they are now by default.
             spent: (K,) path lengths that getting there has cost them [m].
         """
@@ -89,10 +87,7 @@ class PushSimulator:
         )
         rollout = self._roll_out(start, target, problem, scene.poses if poses is None else poses)
         stages = range(len(rollout.steps))
-        found = (
-            self._push_of(rollout, s, target, problem, pre_relocates, spent)
-            for s in (stages[-1:] if pre_relocates else stages)
-        )
+        found = (self._push_of(rollout, s, target, problem, spent) for s in stages)
         return [push for push in found if push is not None]
 
     def _roll_out(
@@ -133,7 +128,6 @@ class PushSimulator:
         s: int,
         target: int,
         problem: RolloutProblem,
-        pre_relocates: bool,
         spent: FloatArray | None,
     ) -> Push | None:
         """The push up to stage ``s`` of a rollout; None where nothing is won by it."""
@@ -144,7 +138,7 @@ class PushSimulator:
         follows_path = len(problem.path) > 0
         if (scene.done & ~done).any():
             return None  # something came back
-        if not pre_relocates and (not len(delivers) or (follows_path and target not in delivers)):
+        if not len(delivers) or (follows_path and target not in delivers):
             return None
         track = rollout.track[: int(rollout.steps[s])]
         length = (len(track) - 1) * scene.controller.step
@@ -152,7 +146,7 @@ class PushSimulator:
         return Push(
             delivers=tuple(movables.ids[delivers].tolist()),
             target=int(movables.ids[target]),
-            follows_path=follows_path,
+            controller="path" if follows_path else "line",
             poses=track,
             length=length,
             work=float(movables.masses @ lengths),
@@ -161,7 +155,6 @@ class PushSimulator:
             object_path=problem.path,
             shift=problem.shift,
             gain=problem.controller.gain,
-            pre_relocates=pre_relocates,
         )
 
     def simulate_primitive(
@@ -195,14 +188,12 @@ class PushSimulator:
             Push(
                 delivers=tuple(ids[np.flatnonzero(done & ~scene.done)].tolist()),
                 target=int(ids[target]),
-                follows_path=False,
+                controller="arc",
                 poses=path,
                 length=length,
                 work=float(masses @ lengths),
                 cost=cost + self._effort(after, lengths, done),
                 object_poses=after,
-                pre_relocates=True,
-                is_primitive=True,
             )
         ]
 
@@ -225,7 +216,7 @@ class PushSimulator:
         scene = self.scene
         ids = scene.world.movables.ids
         target = int(np.flatnonzero(ids == push.target)[0])
-        if push.is_primitive:
+        if push.relocates:
             path = np.vstack([start, push.poses[1:]])
             path[:, 2] = np.unwrap(path[:, 2])
             ends = self.simulate_primitive(path, target, poses, spent)
@@ -236,12 +227,10 @@ class PushSimulator:
         return self.simulate(
             start,
             target,
-            path=push.object_path if push.follows_path else None,
+            path=push.object_path if push.controller == "path" else None,
             shift=push.shift,
-            limit=push.length if push.pre_relocates else None,
             wanted=np.flatnonzero(np.isin(ids, push.delivers) & ~scene.done).tolist(),
             gain=push.gain,
-            pre_relocates=push.pre_relocates,
             poses=poses,
             spent=spent,
         )

@@ -3,15 +3,25 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
-from typing import Any
+from typing import Annotated, Any, ClassVar
 
 from pushplan.planners.rearrangement.primitives import PRIMITIVES, PushPrimitive
+from pushplan.planners.rearrangement.relocation_config import RELOCATION, RelocationConfig
 from pushplan.world import UnknownNameError
-from pushplan.world.checks import expect, integer, number
+from pushplan.world.checked_fields import (
+    CheckedFields,
+    Fraction,
+    Limits,
+    NonNegativeFloat,
+    NonNegativeInt,
+    PositiveFloat,
+    PositiveFraction,
+    PositiveInt,
+)
 
 
 @dataclass(frozen=True)
-class RearrangementConfig:
+class RearrangementConfig(CheckedFields):
     """Settings of candidate pushes and their costs. Lengths are in circumscribed radii.
 
     Args:
@@ -20,53 +30,79 @@ class RearrangementConfig:
         friction: Coulomb coefficient between robot and objects, for the prediction.
         static_friction: the same between objects and walls.
         gyration_scale: see `QuasiStatic`.
+        step: distance between two commands of a predicted push.
+        curvature: of the robot's path where it steers most [1 / circumscribed radius].
+        goal_slack: by how much an object has to be clear of its goal's edge.
         cell: side of a cell of the lattice on which approaches are planned.
         coarse_cell: the same for the cost of approaches between pushes.
         later_fraction: of the cost of contacts in those, as objects will have gone by then.
+        far: cost of getting to what cannot be got to later [diagonals of the map].
         contact_cost: least cost of carrying an object along on an approach, however light it is.
+        target_cost: what is added to it for the object that is to be pushed.
+        arm: how far a turn by one radian carries an object along.
         slack: clearance between the bumper and the object where a push begins.
         margin: distance that approaches keep from what is static.
         turn_cost: cost of a turn by one radian on the spot, so that needless ones are left out.
+        detour: how much farther than the nearest edge of an area one may be that an object is
+            pushed across [times the distance].
+        hard_objects: so many objects that no simple push gets home, the nearest ones, are looked at
+            closely.
         per_object: how many pushes are kept for each object.
         max_pushes: how many are kept for all together, by which the time of a plan is bounded.
         max_simulations: how many pushes are simulated before one is chosen.
+        max_searches: how many objects relocations are searched for before one is chosen.
         response: time in which an error of heading or place is driven off [s]; longer than the
             robot's delay.
         mpc: whether a push of one object along its path is driven by `PushingMpc`; else by the
             controller of its prediction, as all other pushes are.
+        mpc_heading: a push that begins farther off the object's path is left to the latter
+            [degrees].
+        progress: by which an object has to get on in the time in which the robot could drive a
+            radius.
+        retreat: how far the robot backs off where it is stuck.
+        failure_cost: what is added to the cost of a push for each time that it has failed.
+        max_failures: after so many a push waits until something else has been done.
+        max_rounds: how often pushes that have failed are tried anew before what is left is given
+            up.
+        primitives: the table of pushes that are tried.
+        relocation: settings of the search for relocations.
     """
 
-    work_weight: float = 12.0
-    friction: float = 0.2
-    static_friction: float = 0.45
-    gyration_scale: float = 1.0
-    cell: float = 0.2
-    coarse_cell: float = 0.3
-    later_fraction: float = 0.5
-    contact_cost: float = 1.0
-    slack: float = 0.05
-    margin: float = 0.03
-    turn_cost: float = 0.03
-    per_object: int = 16
-    max_pushes: int = 80
-    max_simulations: int = 30
-    response: float = 0.2
+    work_weight: Annotated[float, Limits(0.0, 1e6)] = 12.0
+    friction: Annotated[float, Limits(0.0, 1e6)] = 0.2
+    static_friction: Annotated[float, Limits(0.0, 1e6)] = 0.0
+    gyration_scale: Annotated[float, Limits(0.0, 1e3, open_low=True)] = 1.0
+    step: PositiveFraction = 0.08
+    curvature: PositiveFloat = 1.5
+    goal_slack: Fraction = 0.012
+    cell: Annotated[float, Limits(0.05, 2.0)] = 0.2
+    coarse_cell: Annotated[float, Limits(0.05, 2.0)] = 0.3
+    later_fraction: Fraction = 0.5
+    far: PositiveFloat = 5.0
+    contact_cost: Annotated[float, Limits(0.0, 1e6)] = 1.0
+    target_cost: NonNegativeFloat = 5.0
+    arm: NonNegativeFloat = 0.8
+    slack: Fraction = 0.05
+    margin: Fraction = 0.03
+    turn_cost: Annotated[float, Limits(0.0, 1e6)] = 0.03
+    detour: Annotated[float, Limits(1.0)] = 1.3
+    hard_objects: PositiveInt = 3
+    per_object: Annotated[int, Limits(1, 1000)] = 16
+    max_pushes: Annotated[int, Limits(1, 10_000)] = 80
+    max_simulations: Annotated[int, Limits(1, 1000)] = 30
+    max_searches: PositiveInt = 6
+    response: Annotated[float, Limits(0.0, 1e3, open_low=True)] = 0.2
     mpc: bool = True
+    mpc_heading: Annotated[float, Limits(0.0, 180.0)] = 20.0
+    progress: PositiveFloat = 0.05
+    retreat: PositiveFloat = 0.3
+    failure_cost: NonNegativeFloat = 3.0
+    max_failures: PositiveInt = 3
+    max_rounds: NonNegativeInt = 6
     primitives: tuple[PushPrimitive, ...] = PRIMITIVES
+    relocation: RelocationConfig = RELOCATION
 
-    def __post_init__(self) -> None:
-        for name in ("work_weight", "friction", "static_friction", "turn_cost", "contact_cost"):
-            number(f"rearrangement {name}", getattr(self, name), low=0.0, high=1e6)
-        for name in ("slack", "margin", "later_fraction"):
-            number(f"rearrangement {name}", getattr(self, name), low=0.0, high=1.0)
-        for name in ("cell", "coarse_cell"):
-            number(f"rearrangement {name}", getattr(self, name), low=0.05, high=2.0)
-        for name in ("gyration_scale", "response"):
-            number(f"rearrangement {name}", getattr(self, name), low=0.0, high=1e3, open_low=True)
-        integer("rearrangement per_object", self.per_object, low=1, high=1000)
-        integer("rearrangement max_pushes", self.max_pushes, low=1, high=10000)
-        integer("rearrangement max_simulations", self.max_simulations, low=1, high=1000)
-        expect("rearrangement mpc", self.mpc, bool)
+    field_prefix: ClassVar[str] = "rearrangement "
 
     @classmethod
     def of(cls, **changes: Any) -> RearrangementConfig:

@@ -33,24 +33,9 @@ from pushplan.planners.rearrangement.push_simulator import PushSimulator
 from pushplan.planners.rearrangement.rollout_cache import Primitive
 from pushplan.world.checks import FloatArray
 
-_STARTS = 300  # from how many places round the object a drive may begin
-_DRAWS = 3000  # how many places are looked at for that
-_LENGTH = 1.6  # of an arc [circumscribed radii]
-_ALIKE = 3  # from how many states with the object in the same place it is driven on
-_DEPTH = 3  # how many arcs follow one another at most
-_EXPANSIONS = 400  # how many states are driven on from, starts not counted
-_ENOUGH = 24  # margins, over all sides from which a drive helps, after which it ends
-_SIDES = 20  # how many drives are kept, all sides from which they begin counted
-_ERRORS = ((0.0, 0.0, 0.0), (0.08, 0.08, 0.15), (-0.08, 0.08, -0.15), (0.0, -0.1, 0.0))
-"""Errors of the prediction that a push home afterwards stands [circumscribed radii, rad]."""
-_MARGINS = (1.0, 2.0, 3.0)
-"""Factors on them; a drive costs a circumscribed radius more for each that it does not stand."""
-_LEAST = 0.15  # by how much an object has to be moved for it to count [circumscribed radii]
-_NEWS = 0.05  # how far an object moves on until it is looked at anew [circumscribed radii]
-_GAIN = 1.0  # by how much less has to be left to be done for a drive to help [circumscribed radii]
-_NEAR = 8.0  # what is farther from the object does not count for a search [circumscribed radii]
-_CURVATURES = (0.0, 0.7, -0.7, 1.6, -1.6)  # of the arcs, times the robot's circumscribed radius
 _Cell = tuple[float, ...]
+_DRAWS = 10  # so many places are looked at for each start
+_PLACE, _TURN = 0.2, 0.5  # sides of a box of like poses of the object [circumscribed radii, rad]
 _SPREAD = np.array([0.8191725134, 0.6710436067, 0.5497004779])
 """Steps of an additive recurrence that fills a cube evenly (Roberts 2018)."""
 
@@ -58,19 +43,19 @@ _SPREAD = np.array([0.8191725134, 0.6710436067, 0.5497004779])
 def relocating_pushes(simulator: PushSimulator, k: int, approach: ApproachTree) -> list[Push]:
     """Drives after which object ``k`` can be pushed home, or else lies better than now."""
     scene, found = simulator.scene, None
-    movables = scene.world.movables
-    near = np.hypot(*(scene.poses[:, :2] - scene.poses[k, :2]).T) < _NEAR * scene.size
+    movables, cache = scene.world.movables, scene.cache
+    away = np.hypot(*(scene.poses[:, :2] - scene.poses[k, :2]).T)
+    near = away < scene.config.relocation.near * scene.size
     robot = np.round(scene.world.robot_pose[:2] / (2.0 * scene.size))
     around = movables.ids[near].tobytes() + scene.poses[near].tobytes()
-    if scene.cache is not None:
-        found = scene.cache.primitives(int(movables.ids[k]), around, robot.tobytes())
+    if cache is not None:
+        found = cache.primitives(int(movables.ids[k]), around, robot.tobytes())
+        if found is None and cache.searches >= scene.config.max_searches:
+            return []
     if found is None:
         found = _RelocationSearch(scene, k, approach).run()
-        if not found:  # objects may slide along walls more easily than is assumed
-            sliding = replace(scene, config=replace(scene.config, static_friction=0.0), cache=None)
-            found = _RelocationSearch(sliding, k, approach).run()
-        if scene.cache is not None:
-            scene.cache.keep_primitives(int(movables.ids[k]), around, robot.tobytes(), found)
+        if cache is not None:
+            cache.keep_primitives(int(movables.ids[k]), around, robot.tobytes(), found)
     return [
         replace(push, cost=push.cost + extra)
         for path, extra in found
@@ -122,9 +107,12 @@ class _RelocationSearch:
 
     def __init__(self, scene: PushScene, k: int, approach: ApproachTree) -> None:
         self._scene, self._k, self._approach = scene, k, approach
+        self._config = scene.config.relocation
         self._cost_to_go = scene.push_cost_to_go(float(scene.world.movables.radii[k]))
         self._arcs = _arcs(scene)
-        self._steps = max(2, math.ceil(_LENGTH * scene.size / scene.controller.step))
+        self._steps = max(
+            2, math.ceil(self._config.arc_length * scene.size / scene.controller.step)
+        )
         self._open: list[tuple[float, int, _State]] = []
         self._seen: set[_Cell] = set()
         self._states: list[_State] = []
@@ -133,24 +121,25 @@ class _RelocationSearch:
 
     def run(self) -> list[Primitive]:
         """Drives, each with the cost of what it leaves to be done [m]."""
-        scene, k = self._scene, self._k
+        scene, k, config = self._scene, self._k, self._config
         now = float(self._rest(scene.poses[[k]])[0])
         for start in itertools.chain(self._behind(), self._around()):
             away = self._approach_cost(start)
             if math.isfinite(away):
                 self._put(_State(None, start[None], scene.poses, 0, away, now))
+        most = len(config.margins)
         expansions, sides, alike = Counter[bool](), Counter[_Cell](), Counter[_Cell]()
-        while self._open and expansions[True] < _EXPANSIONS and sides.total() < _ENOUGH:
+        while self._open and expansions[True] < config.expansions and sides.total() < config.enough:
             state = heapq.heappop(self._open)[2]
             if state.depth and not self._has_moved(state):
                 continue
             if state.depth:
                 side, place = self._side(state), self._place(state)
-                if sides[side] < len(_MARGINS) and place not in self._failing:
+                if sides[side] < most and place not in self._failing:
                     self._failing[place] = self._failing_margins(state)
-                stands = len(_MARGINS) - self._failing.get(place, len(_MARGINS))
+                stands = most - self._failing.get(place, most)
                 sides[side] = max(sides[side], stands)
-                if stands or state.depth == _DEPTH or alike[place] >= _ALIKE:
+                if stands or state.depth == config.depth or alike[place] >= config.alike:
                     continue
                 alike[place] += 1
             expansions[state.depth > 0] += 1
@@ -163,10 +152,11 @@ class _RelocationSearch:
 
     def _delivering(self) -> list[Primitive]:
         """Drives after which the object can be pushed home."""
+        most = len(self._config.margins)
         found: list[tuple[float, _State]] = []
         for state in self._states:
-            failing = self._failing.get(self._place(state), len(_MARGINS))
-            if state.depth and failing < len(_MARGINS):
+            failing = self._failing.get(self._place(state), most)
+            if state.depth and failing < most:
                 found.append((failing * self._scene.size, state))
         return self._from_all_sides(found)
 
@@ -175,7 +165,7 @@ class _RelocationSearch:
         size = self._scene.size
         found: list[tuple[float, _State]] = []
         for state in self._states:
-            if state.rest < now - _GAIN * size:
+            if state.rest < now - self._config.gain * size:
                 left = float(self._scene.remaining(state.poses[[self._k]])[0])
                 found.append((state.rest - left + 2.0 * size, state))
         return self._from_all_sides(found)
@@ -187,7 +177,7 @@ class _RelocationSearch:
             side = self._side(state)
             if side not in sides:
                 sides[side] = state.path(), extra
-            if len(sides) == _SIDES:
+            if len(sides) == self._config.sides:
                 break
         return list(sides.values())
 
@@ -208,12 +198,12 @@ class _RelocationSearch:
             self._steps,
             k,
             scene.size,
-            _NEWS,
+            self._config.spacing,
             scene.bodies,
             scene.settings,
         )
         arcs, ends = marks.T
-        places = self._cells(poses[arcs, ends, k], 0.2, 0.5)
+        places = self._cells(poses[arcs, ends, k], _PLACE, _TURN)
         robots = self._cells(tracks[arcs, ends], 0.3, 0.5)
         rests = self._rest(poses[arcs, ends, k]).tolist()
         for (a, end), place, robot, rest in zip(marks.tolist(), places, robots, rests, strict=True):
@@ -239,13 +229,16 @@ class _RelocationSearch:
 
     def _has_moved(self, state: _State) -> bool:
         scene, k = self._scene, self._k
-        return pose_distance(state.poses[k], scene.poses[k], scene.size) >= _LEAST
+        return pose_distance(state.poses[k], scene.poses[k], scene.size) >= self._config.least
 
     def _failing_margins(self, state: _State) -> int:
         """How many of the margins a push home from where a state has the object does not stand."""
-        for n, margin in enumerate(_MARGINS):
-            if not all(self._delivers(state, margin * np.array(by)) for by in _ERRORS[n > 0 :]):
-                return len(_MARGINS) - n
+        config = self._config
+        if not self._delivers(state, np.zeros(3)):
+            return len(config.margins)
+        for n, margin in enumerate(config.margins):
+            if not all(self._delivers(state, margin * np.array(by)) for by in config.errors):
+                return len(config.margins) - n
         return 0
 
     def _delivers(self, state: _State, by: FloatArray) -> bool:
@@ -265,7 +258,7 @@ class _RelocationSearch:
 
     def _place(self, state: _State) -> _Cell:
         """The box of poses that a drive gets the object to."""
-        return self._cells(state.poses[[self._k]], 0.2, 0.5)[0]
+        return self._cells(state.poses[[self._k]], _PLACE, _TURN)[0]
 
     def _cells(self, poses: FloatArray, side: float, turn: float) -> list[_Cell]:
         """The boxes of poses (N, 3), sides in circumscribed radii and [rad]."""
@@ -291,21 +284,23 @@ class _RelocationSearch:
         """Poses (3,) round the object that touch nothing, evenly spread."""
         scene = self._scene
         box, radius = scene.poses[self._k], float(scene.world.movables.radii[self._k])
-        fraction = np.mod(0.5 + np.outer(np.arange(1, _DRAWS + 1), _SPREAD), 1.0)
+        fraction = np.mod(
+            0.5 + np.outer(np.arange(1, _DRAWS * self._config.starts + 1), _SPREAD), 1.0
+        )
         away = 0.3 * radius + scene.size * (0.2 + 1.1 * fraction[:, 0])
         bearing, heading = 2.0 * np.pi * fraction[:, 1], 2.0 * np.pi * fraction[:, 2] - np.pi
         x, y = box[0] + away * np.cos(bearing), box[1] + away * np.sin(bearing)
         poses = np.column_stack([x, y, heading])
         free = (pose for pose in poses if scene.fits(pose) and scene.is_clear(pose))
-        return itertools.islice(free, _STARTS)
+        return itertools.islice(free, self._config.starts)
 
 
 def _arcs(scene: PushScene) -> FloatArray:
     """(A, 2) distance [m], negative backward, and turn [rad] of one step of each arc."""
-    step = scene.controller.step
+    step, curvatures = scene.controller.step, scene.config.relocation.curvatures
     signs = (1.0, -1.0) if scene.world.robot.min_speed != 0.0 else (1.0,)
     arcs = [
-        (sign * step, curvature * step / scene.size) for sign in signs for curvature in _CURVATURES
+        (sign * step, curvature * step / scene.size) for sign in signs for curvature in curvatures
     ]
     out = np.array([*arcs, (0.0, 0.1), (0.0, -0.1)])
     out[:, 1] = np.clip(out[:, 1], -scene.controller.turn, scene.controller.turn)

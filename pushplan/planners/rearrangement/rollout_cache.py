@@ -50,11 +50,15 @@ class RolloutCache:
     """Rollouts of the plans before, by what was rolled out.
 
     A rollout counts again if the same objects lie in the same places wherever it came near one.
+
+    Attributes:
+        searches: how often drives have been searched for the plan in hand.
     """
 
     def __init__(self) -> None:
         self._entries: dict[object, _Entry] = {}
         self._primitives: dict[int, tuple[bytes, bytes, list[Primitive] | None]] = {}
+        self.searches = 0
 
     def primitives(self, target: int, around: bytes, robot: bytes) -> list[Primitive] | None:
         """Drives found for an object, if that was with the same around it.
@@ -69,12 +73,14 @@ class RolloutCache:
     ) -> None:
         """Keep the drives found for an object."""
         self._primitives[target] = around, robot, found
+        self.searches += 1
 
     def __len__(self) -> int:
         return len(self._entries)
 
     def age(self) -> None:
-        """Forget what has not been asked for in the last few plans."""
+        """Forget what has not been asked for in the last few plans; another plan begins."""
+        self.searches = 0
         for entry in self._entries.values():
             entry.age += 1
         self._entries = {key: entry for key, entry in self._entries.items() if entry.age < _OLD}

@@ -13,7 +13,7 @@ from pushplan.control.leg_follower import turn_to
 from pushplan.motion.collision import footprint, obstacles
 from pushplan.planners.rearrangement.approach import ApproachTree, arrival_poses
 from pushplan.planners.rearrangement.pose_grid import pose_at
-from pushplan.planners.rearrangement.push_scene import TARGET_COST, PushScene
+from pushplan.planners.rearrangement.push_scene import PushScene
 from pushplan.planners.rearrangement.route_kernels import RouteProblem, cheapest_legs
 from pushplan.world.checks import FloatArray
 
@@ -112,7 +112,7 @@ class RoutePlanner:
         if target < 0:
             return self._problem
         weights = self._problem.weights.copy()
-        weights[target] += TARGET_COST
+        weights[target] += self.scene.config.target_cost
         return self._problem._replace(weights=weights)
 
 
