@@ -149,6 +149,19 @@ def _path_pushes(
         if not scene.fits(start):
             continue
         for gain in row.gains:
-            yield from simulator.simulate(
-                start, k, path=path, shift=aside, limit=limit, gain=gain, wanted=wanted
-            )
+
+            def simulated(friction: float | None, gain: float = gain) -> list[Push]:
+                return simulator.simulate(
+                    start,
+                    k,
+                    path=path,
+                    shift=aside,
+                    limit=limit,
+                    gain=gain,
+                    friction=friction,
+                    wanted=wanted,
+                )
+
+            found = simulated(None)
+            if found and all(simulated(friction) for friction in row.frictions):
+                yield from found

@@ -27,6 +27,8 @@ class PushPrimitive(CheckedFields):
         deep: whether the path goes to the middle of a receptacle instead of its nearest place.
         partners: by how many of its neighbours, the nearest ones, the path leads past, to take one
             along.
+        frictions: coefficients between robot and object with which it has to succeed as well, see
+            `RearrangementConfig`.
         below: an object that has so many pushes already is left out.
     """
 
@@ -37,6 +39,7 @@ class PushPrimitive(CheckedFields):
     clearance: NonNegativeFloat = 1.08
     deep: bool = False
     partners: NonNegativeInt = 0
+    frictions: tuple[float, ...] = ()
     below: NonNegativeInt = 2
 
     field_prefix: ClassVar[str] = "push primitive "
@@ -52,7 +55,14 @@ PRIMITIVES = (
     PushPrimitive("path", deep=True, shifts=(0.0,), below=_ANY),
     PushPrimitive("path", partners=4, below=_ANY),
     *(
-        PushPrimitive("path", (lean, -lean), gains=(0.5, 1.5), clearance=clearance, below=1)
+        PushPrimitive(
+            "path",
+            (lean, -lean),
+            gains=(0.5, 1.5),
+            clearance=clearance,
+            frictions=(0.0, 0.4),
+            below=1,
+        )
         for lean in (20.0, 40.0, 60.0, 80.0)
         for clearance in (1.08, 0.0)
     ),

@@ -55,6 +55,7 @@ class PushSimulator:
         limit: float | None = None,
         wanted: Sequence[int] = (),
         gain: float = 1.5,
+        friction: float | None = None,
         poses: FloatArray | None = None,
         spent: FloatArray | None = None,
     ) -> list[Push]:
@@ -68,12 +69,16 @@ class PushSimulator:
             limit: of the length [m].
             wanted: indices of the objects after which to stop; ``target`` alone by default.
             gain: of the pushing controller.
+            friction: coefficient between robot and objects; that of the config by default.
             poses: (K, 3) where the objects are when the push begins; where they are now by default.
             spent: (K,) path lengths that getting there has cost them [m].
         """
         scene = self.scene
         flags = np.zeros(len(scene.poses), dtype=np.bool_)
         flags[list(wanted) or [target]] = True
+        settings = scene.settings
+        if friction is not None:
+            settings = settings._replace(friction=friction)
         problem = RolloutProblem(
             target=target if path is not None and len(path) else -1,
             path=_NO_PATH if path is None else path,
@@ -82,7 +87,7 @@ class PushSimulator:
             wanted=flags,
             controller=scene.controller._replace(gain=gain),
             bodies=scene.bodies,
-            settings=scene.settings,
+            settings=settings,
             goal=scene.object_goal,
         )
         rollout = self._roll_out(start, target, problem, scene.poses if poses is None else poses)
@@ -103,6 +108,7 @@ class PushSimulator:
             problem.shift,
             problem.limit,
             problem.controller.gain,
+            problem.settings.friction,
             movables.ids[wanted].tobytes(),
         )
         if poses is not scene.poses or (wanted & scene.done).any():

@@ -127,10 +127,12 @@ class _RelocationSearch:
             away = self._approach_cost(start)
             if math.isfinite(away):
                 self._put(_State(None, start[None], scene.poses, 0, away, now))
-        most = len(config.margins)
+        most, best = len(config.margins), math.inf
         expansions, sides, alike = Counter[bool](), Counter[_Cell](), Counter[_Cell]()
         while self._open and expansions[True] < config.expansions and sides.total() < config.enough:
             state = heapq.heappop(self._open)[2]
+            if state.cost > best + config.slack * scene.size:
+                break
             if state.depth and not self._has_moved(state):
                 continue
             if state.depth:
@@ -139,6 +141,8 @@ class _RelocationSearch:
                     self._failing[place] = self._failing_margins(state)
                 stands = most - self._failing.get(place, most)
                 sides[side] = max(sides[side], stands)
+                if stands:
+                    best = min(best, state.cost + (most - stands) * scene.size)
                 if stands or state.depth == config.depth or alike[place] >= config.alike:
                     continue
                 alike[place] += 1

@@ -29,6 +29,7 @@ class RelocationConfig(CheckedFields):
         depth: how many arcs follow one another at most.
         expansions: how many states are driven on from, starts not counted.
         alike: from how many states with the object in the same place it is driven on.
+        slack: how much more than the best drive found others may cost that are still looked for.
         enough: margins, over all sides from which a drive helps, after which the search ends.
         sides: how many drives are kept, each from another side.
         errors: of the prediction, that a push home afterwards has to stand: along x and y
@@ -50,6 +51,7 @@ class RelocationConfig(CheckedFields):
     depth: PositiveInt = 3
     expansions: PositiveInt = 400
     alike: PositiveInt = 3
+    slack: NonNegativeFloat = 2.0
     enough: PositiveInt = 24
     sides: PositiveInt = 20
     errors: tuple[tuple[float, float, float], ...] = (
