@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -52,6 +53,7 @@ class GtspMpc:
         self._away: Retreat | PoseFollower | None = None
         self._cache = RolloutCache()
         self._failures: Counter[tuple[object, ...]] = Counter()
+        self._relocations: Counter[int] = Counter()
         self._left, self._rounds, self._stuck = -1, 0, 0
         self._recovered_from: FloatArray | None = None
         self._stopped_at: PushScene | None = None
@@ -85,6 +87,7 @@ class GtspMpc:
         left = int((~scene.done).sum())
         if left != self._left:  # something was done, or has come back
             self._left, self._rounds, self._stopped_at = left, 0, None
+            self._relocations.clear()
             self._failures = Counter(
                 {key: min(n, self.config.max_failures - 1) for key, n in self._failures.items()}
             )
@@ -114,7 +117,7 @@ class GtspMpc:
     def _choose(self, scene: PushScene) -> bool:
         """Take up the best push, or else leave a tight place; whether there is anything to do."""
         self._cache.age()
-        chosen = select_push(scene, self._penalties(scene))
+        chosen = select_push(scene, partial(self._penalty, scene.size))
         self.graph, self.plan = chosen.graph, chosen.plan
         self.given_up = dict(chosen.graph.infeasible)
         if chosen.first is not None:
@@ -139,22 +142,32 @@ class GtspMpc:
             self._stopped_at = scene
         return False
 
-    def _penalties(self, scene: PushScene) -> dict[tuple[object, ...], float]:
-        """What is added to the cost of pushes that have failed [m]."""
-        each = self.config.failure_cost * scene.size
-        return {
-            key: math.inf if count >= self.config.max_failures else count * each
-            for key, count in self._failures.items()
-        }
+    def _penalty(self, size: float, push: Push) -> float:
+        """What is added to the cost of a push for what has failed [m]."""
+        failures, config = self._failures[signature(push)], self.config
+        relocations = self._relocations[push.target] if push.relocates else 0
+        if failures >= config.max_failures or relocations >= config.max_relocations:
+            return math.inf
+        cost = failures * config.failure_cost + relocations * config.relocation_cost
+        return cost * size
 
     def _close(self, scene: PushScene, execution: PushExecution, end: ExecutionEnd) -> None:
         """Draw the conclusions from how an execution ended."""
-        self._execution = None
-        if end is ExecutionEnd.DONE and not execution.push.relocates:
+        self._execution, push = None, execution.push
+        if end is ExecutionEnd.DONE and not push.relocates:
             self._stuck = 0
             return
         if end is not ExecutionEnd.OBSOLETE:  # also a relocation, so that another comes next
-            self._failures[signature(execution.push)] += 1
+            self._failures[signature(push)] += 1
+        if end is ExecutionEnd.DONE:  # what has failed before may succeed from here
+            self._relocations[push.target] += 1
+            self._failures = Counter(
+                {
+                    key: count
+                    for key, count in self._failures.items()
+                    if key[0] != push.target or key[1] == push.controller
+                }
+            )
         if end is ExecutionEnd.STUCK:
             robot, pose = scene.world.robot, scene.world.robot_pose
             self._away = Retreat(robot, pose, self.config.retreat * scene.size, self._stuck)

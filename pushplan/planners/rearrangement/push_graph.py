@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,7 +15,7 @@ from pushplan.planners.rearrangement.approach import (
 )
 from pushplan.planners.rearrangement.candidates import delivering_pushes
 from pushplan.planners.rearrangement.pose_search_kernels import least_costs
-from pushplan.planners.rearrangement.push import Push, signature
+from pushplan.planners.rearrangement.push import Push
 from pushplan.planners.rearrangement.push_scene import PushScene
 from pushplan.planners.rearrangement.push_simulator import PushSimulator
 from pushplan.planners.rearrangement.relocation import relocating_pushes
@@ -40,9 +40,14 @@ class PushGraph:
     infeasible: dict[int, str]
 
 
+def no_penalty(push: Push) -> float:
+    """Nothing."""
+    return 0.0
+
+
 def build_push_graph(
     scene: PushScene,
-    penalties: dict[tuple[object, ...], float] | None = None,
+    penalty: Callable[[Push], float] = no_penalty,
     *,
     relocations: int = 0,
 ) -> PushGraph:
@@ -50,7 +55,7 @@ def build_push_graph(
 
     Args:
         scene: the scene.
-        penalties: what to add to the cost of a push, by `signature` [m].
+        penalty: what to add to the cost of a push [m].
         relocations: for how many objects, the nearest ones first, drives that only bring them to
             where they can be pushed home from are wanted too.
     """
@@ -58,7 +63,7 @@ def build_push_graph(
     simulator = PushSimulator(scene)
     pushes = candidate_pushes(scene, simulator, approach, relocations)
     row = least_costs(approach.costs, arrivals_at(scene.fine, pushes))
-    extra = np.array([(penalties or {}).get(signature(push), 0.0) for push in pushes])
+    extra = np.array([penalty(push) for push in pushes])
     pushes, keep = _best(scene, pushes, row + extra)
     row = row[keep]
     push_costs = np.array([push.cost for push in pushes]) + extra[keep]

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
 from pushplan.planners.rearrangement.approach import ApproachTree, approach_tree
 from pushplan.planners.rearrangement.forward_simulation import SimulatedPush, simulate_push
-from pushplan.planners.rearrangement.push import Push, signature
+from pushplan.planners.rearrangement.push import Push
 from pushplan.planners.rearrangement.push_graph import PushGraph, build_push_graph
 from pushplan.planners.rearrangement.push_scene import PushScene
 from pushplan.planners.rearrangement.push_simulator import PushSimulator
@@ -37,7 +38,7 @@ class Selection:
         return tuple(self.graph.pushes[n] for n in self.order)
 
 
-def select_push(scene: PushScene, penalties: dict[tuple[object, ...], float]) -> Selection:
+def select_push(scene: PushScene, penalty: Callable[[Push], float]) -> Selection:
     """Sequence anew: the pushes to make, and the first of them with the route to it.
 
     Where no push can be carried out, those that only free an object are looked at too: first those
@@ -45,20 +46,18 @@ def select_push(scene: PushScene, penalties: dict[tuple[object, ...], float]) ->
 
     Args:
         scene: the scene.
-        penalties: what to add to the cost of a push, by `signature` [m].
+        penalty: what to add to the cost of a push [m].
     """
-    selection = _select(scene, build_push_graph(scene, penalties), penalties)
+    selection = _select(scene, build_push_graph(scene, penalty), penalty)
     left = int((~scene.done).sum())
     for relocations in sorted({min(scene.config.relocation.objects, left), left}):
         if selection.first is None:
-            graph = build_push_graph(scene, penalties, relocations=relocations)
-            selection = _select(scene, graph, penalties)
+            graph = build_push_graph(scene, penalty, relocations=relocations)
+            selection = _select(scene, graph, penalty)
     return selection
 
 
-def _select(
-    scene: PushScene, graph: PushGraph, penalties: dict[tuple[object, ...], float]
-) -> Selection:
+def _select(scene: PushScene, graph: PushGraph, penalty: Callable[[Push], float]) -> Selection:
     known: dict[int, SimulatedPush] = {}
     forward = _ForwardSimulator(scene, graph.approach)
 
@@ -68,7 +67,7 @@ def _select(
         if found is None:
             return math.inf, ()
         known[n] = found
-        return found.cost + penalties.get(signature(push), 0.0), found.push.delivers
+        return found.cost + penalty(push), found.push.delivers
 
     order = sequence_pushes(graph, simulated_cost, scene.config.max_simulations)
     return Selection(graph, tuple(order), known[order[0]] if order else None)

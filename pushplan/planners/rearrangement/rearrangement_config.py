@@ -62,6 +62,9 @@ class RearrangementConfig(CheckedFields):
         retreat: how far the robot backs off where it is stuck.
         failure_cost: what is added to the cost of a push for each time that it has failed.
         max_failures: after so many a push waits until something else has been done.
+        relocation_cost: what is added to that of a relocation for each one that its object has had
+            since something was done.
+        max_relocations: after so many an object waits until something else has been done.
         max_rounds: how often pushes that have failed are tried anew before what is left is given
             up.
         primitives: the table of pushes that are tried.
@@ -98,6 +101,8 @@ class RearrangementConfig(CheckedFields):
     retreat: PositiveFloat = 0.3
     failure_cost: NonNegativeFloat = 3.0
     max_failures: PositiveInt = 3
+    relocation_cost: NonNegativeFloat = 1.0
+    max_relocations: PositiveInt = 12
     max_rounds: NonNegativeInt = 6
     primitives: tuple[PushPrimitive, ...] = PRIMITIVES
     relocation: RelocationConfig = RELOCATION

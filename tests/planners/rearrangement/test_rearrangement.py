@@ -205,7 +205,7 @@ def test_a_walled_in_box_is_infeasible():
 
 def test_a_box_at_a_wall_is_pre_relocated():
     here = scene([(0.0, -4.49, 0.0)])
-    graph = build_push_graph(here, pre_relocations=1)
+    graph = build_push_graph(here, relocations=1)
     assert graph.pushes and not graph.infeasible
 
 
@@ -235,7 +235,7 @@ def test_a_box_in_a_tight_place_is_brought_out_of_it(pose, extra, drive_back):
     assert found or not drive_back
     walls = [shapely.Polygon(part).buffer(-0.01) for part in here.world.static.convex_parts]
     for push in found:
-        assert push.pre_relocates and push.is_primitive and here.is_clear(push.start)
+        assert push.relocates and here.is_clear(push.start)
         assert math.dist(push.object_poses[0, :2], pose[:2]) > 0.02
         assert np.abs(np.diff(push.poses, axis=0)).max() < 0.3 * here.size
         for robot_pose in push.poses:
