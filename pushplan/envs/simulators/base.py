@@ -14,8 +14,8 @@ from pushplan.envs.simulators.water import Water
 from pushplan.envs.trace import Trace
 from pushplan.interaction.model import Interaction
 from pushplan.world import InvalidInputError, Twist, World
-from pushplan.world.checked_fields import CheckedFields, PositiveFloat
-from pushplan.world.checks import ArrayRecord, FloatArray, IntArray, array, frozen, number
+from pushplan.world.checked_fields import CheckedFields, NonNegativeFloat, PositiveFloat
+from pushplan.world.checks import ArrayRecord, FloatArray, IntArray, array, frozen
 
 
 @dataclass(frozen=True)
@@ -30,7 +30,7 @@ class Solids(CheckedFields):
 
 
 @dataclass(frozen=True)
-class Materials:
+class Materials(CheckedFields):
     """How bodies grip, roll and float, in terms that every engine understands.
 
     Args:
@@ -46,26 +46,15 @@ class Materials:
             refuse it.
     """
 
-    robot_object: float = 0.0
-    object_object: float = 0.0
-    object_static: float = 0.0
-    rolling_time: float = 1.0
-    object_ground: float = 0.4
+    field_prefix = "materials."
+
+    robot_object: NonNegativeFloat = 0.0
+    object_object: NonNegativeFloat = 0.0
+    object_static: NonNegativeFloat = 0.0
+    rolling_time: PositiveFloat = 1.0
+    object_ground: NonNegativeFloat = 0.4
     water: Water | None = None
     solids: Solids | None = None
-
-    def __post_init__(self) -> None:
-        for key in ("robot_object", "object_object", "object_static", "object_ground"):
-            value = number(f"friction {key}", getattr(self, key), low=0.0)
-            object.__setattr__(self, key, value)
-        for key, kind in (("water", Water), ("solids", Solids)):
-            part = getattr(self, key)
-            if part is not None and not isinstance(part, kind):
-                raise InvalidInputError(
-                    f"{key} must be a {kind.__name__} or None, got {part!r:.60}"
-                )
-        rolling = number("rolling_time", self.rolling_time, low=0.0, open_low=True)
-        object.__setattr__(self, "rolling_time", rolling)
 
 
 @dataclass(frozen=True, eq=False)
