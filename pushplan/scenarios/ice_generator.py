@@ -10,10 +10,9 @@ from scipy.spatial import cKDTree
 
 from pushplan.geometry import polygon_area
 from pushplan.scenarios.disc_kernels import place_discs
-from pushplan.scenarios.floe_kernels import Discs, Outlines, cut_cells, fit_floes
+from pushplan.scenarios.floe_kernels import Discs, IceWater, Outlines, cut_cells, fit_floes
 from pushplan.scenarios.floe_sizes import MARGIN, FloeSizes
 from pushplan.scenarios.ice_field import IceField
-from pushplan.scenarios.ice_water import IceWater
 from pushplan.world import InvalidInputError, ScenarioError
 from pushplan.world.checks import FloatArray, IntArray, checked_bounds, number
 from pushplan.world.outline import convex_outline, flatten, unflatten
