@@ -72,4 +72,3 @@ class InteractionModel(Protocol):
         Raises:
             InvalidInputError: if the path is not (N, 3), empty, or not finite.
         """
-        ...

@@ -104,7 +104,6 @@ class OccupancyPredictor(Protocol):
         Raises:
             InvalidInputError: if the batch lacks what this predictor needs.
         """
-        ...
 
 
 class NoMotion:

@@ -31,7 +31,6 @@ class StopCheck(Protocol):
             cost: what the planner minimises, for its best plan so far, such as travel plus weighted
                 interaction [kg m]; infinite while there is none.
         """
-        ...
 
 
 class Stop(ABC):
