@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from pushplan.control import EpisodeClock, LegFollower, Legs, Recovery
+from pushplan.control import EpisodeClock, LegFollower, Recovery
 from pushplan.control.recovery import warm_up_recovery
 from pushplan.planners.rearrangement.geometric_pusher import GeometricPusher
 from pushplan.planners.rearrangement.line_up import line_up
@@ -30,14 +30,12 @@ class GreedyConfig:
             robot's delay.
         slack: clearance between bumper and box when the robot lines up.
         retreat: how far it backs off after a push.
-        detour: how far it pushes in a direction other than that of the shortest path.
         patience: time after which it looks again where it can get at no box [s].
     """
 
     response: float = 0.2
     slack: float = 0.08
     retreat: float = 0.6
-    detour: float = 1.5
     patience: float = 1.5
 
     def __post_init__(self) -> None:
@@ -59,7 +57,7 @@ class GreedyPusher:
     """Takes the nearest box that is not done, drives behind it and pushes until it is done.
 
     Behind means opposite to the box's shortest path around static things to its goal; where the
-    robot does not fit there it stands aside or pushes at an angle, along a wall for instance.
+    robot does not fit there it stands aside or begins at an angle, beside a wall for instance.
     Other boxes are not looked at. A box that cannot be got at or got on with is put off until the
     others have had their turn. No chance is involved.
 
@@ -135,16 +133,15 @@ class GreedyPusher:
 
     def _choose(self, scene: PushScene) -> _Attempt | None:
         """The nearest box that the robot can get behind, of those that failed least often."""
-        world, size, failures = scene.world, scene.size, self._failures
+        world, failures = scene.world, self._failures
         left = np.flatnonzero(~scene.done).tolist()
         away = np.hypot(*(scene.poses[:, :2] - world.robot_pose[:2]).T)
         ids = world.movables.ids.tolist()
         for k in sorted(left, key=lambda k: (failures.get(ids[k], 0), away[k], k)):
             skip = failures.get(ids[k], 0) % _OPTIONS
-            place = line_up(scene, k, self.config.detour * size, skip)
+            place = line_up(scene, k, skip)
             if place is not None:
-                legs = Legs.ahead(place.points)
-                driver = LegFollower(world.robot, legs, response=self.config.response)
+                driver = LegFollower(world.robot, place.legs, response=self.config.response)
                 pusher = GeometricPusher(scene.controller, place.shift)
                 return _Attempt(ids[k], driver, PathPush(scene, ids[k], place.path, pusher))
             failures[ids[k]] = failures.get(ids[k], 0) + 1

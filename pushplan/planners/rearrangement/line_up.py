@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pushplan.control import Legs
 from pushplan.geometry import VisibilityGraph
 from pushplan.planners.pushing import PushPath
 from pushplan.planners.rearrangement.push_poses import heading_axes, initial_heading, pose_behind
@@ -38,12 +39,12 @@ class LineUp:
     Args:
         path: of the object.
         shift: of the robot's middle to the left of the object's [m].
-        points: (N, 2) that lead there; driving to the last one turns the robot to the heading [m].
+        legs: that lead there.
     """
 
     path: PushPath
     shift: float
-    points: FloatArray
+    legs: Legs
 
 
 def shortest_path(scene: PushScene, k: int) -> FloatArray | None:
@@ -56,13 +57,12 @@ def shortest_path(scene: PushScene, k: int) -> FloatArray | None:
     return next((path for path in found if path is not None), None)
 
 
-def line_up(scene: PushScene, k: int, detour: float, skip: int = 0) -> LineUp | None:
+def line_up(scene: PushScene, k: int, skip: int = 0) -> LineUp | None:
     """A place behind object ``k``, for the best option to push it that allows one.
 
     Args:
         scene: the scene.
         k: index of the object.
-        detour: how far to push in a direction other than that of the shortest path [m].
         skip: how many of the best options to pass over, because they have failed before; it begins
             anew where there are no more.
 
@@ -82,11 +82,9 @@ def line_up(scene: PushScene, k: int, detour: float, skip: int = 0) -> LineUp | 
         for turn, fraction in _OPTIONS:
             heading, shift = towards + turn, fraction * scene.half
             start = pose_behind(scene, k, heading, shift)
-            points = _approach(scene, around, start, clearance)
-            if points is not None:
-                straight = path[0] + np.outer([0.0, detour], heading_axes(heading)[0])
-                way = PushPath.through(path if turn == 0.0 else straight)
-                found.append(LineUp(way, shift, points))
+            legs = _approach(scene, around, start, clearance)
+            if legs is not None:
+                found.append(LineUp(PushPath.through(path), shift, legs))
             if len(found) > skip:
                 return found[skip]
         if found:
@@ -96,8 +94,8 @@ def line_up(scene: PushScene, k: int, detour: float, skip: int = 0) -> LineUp | 
 
 def _approach(
     scene: PushScene, around: StaticMap, start: FloatArray, clearance: float
-) -> FloatArray | None:
-    """Points (N, 2) that lead to a pose (3,).
+) -> Legs | None:
+    """Legs that lead to a pose (3,).
 
     The last leg is straight, from where the robot can turn. Beside a wall it may come from
     farther out, and the robot turns at the end by as much.
@@ -115,6 +113,5 @@ def _approach(
             continue
         path = VisibilityGraph(around, clearance).shortest_path(scene.world.robot_pose[:2], stop)
         if math.isfinite(path.length):
-            facing = behind + 0.03 * scene.size * heading_axes(heading)[0]
-            return np.concatenate([path.points[1:], stop[None], behind[None], facing[None]])
+            return Legs.ahead(np.concatenate([path.points[1:], [stop, behind]]), heading)
     return None
