@@ -18,7 +18,7 @@ from pushplan.planners.rearrangement.rearrangement_config import RearrangementCo
 from pushplan.world import Twist, World
 from pushplan.world.checks import expect, number
 
-_OPTIONS = 8  # how many directions to push a box are tried before the first comes again
+_OPTIONS = 8  # how many places to push a box from are tried before the first comes again
 
 
 @dataclass(frozen=True)

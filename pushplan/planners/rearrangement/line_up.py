@@ -23,7 +23,7 @@ _OPTIONS = sorted(
     ),
     key=lambda option: 2.0 * abs(option[0]) + abs(option[1]),
 )
-"""Options to push, in order of preference: turn against the shortest path [rad], and how far the
+"""Where to begin, in order of preference: turn against the shortest path [rad], and how far the
 robot's middle is to the left of the object's, as a fraction of half the bumper's width."""
 _PATHS = ((0.7, False), (0.0, False), (0.0, True))
 """Paths of an object: the clearance that it keeps where there is room [radii of the object], and
