@@ -12,8 +12,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any
 
-from pushplan.evaluation.csv_text import csv_text
-from pushplan.evaluation.rows import ResultRow, Status, columns
+from pushplan.evaluation.rows import ResultRow, Status, columns, csv_text
 from pushplan.metrics import METRICS
 from pushplan.world import InvalidInputError, SchemaError
 

@@ -11,8 +11,7 @@ import numpy as np
 from pushplan.geometry import geodesic_field
 from pushplan.geometry.shadows import bend_distances
 from pushplan.observation.rays import draw_ray, fill_hidden
-from pushplan.observation.view import View
-from pushplan.observation.view_kernels import Image
+from pushplan.observation.view import Image, View
 from pushplan.world import Goal, StaticMap
 from pushplan.world.checks import FloatArray, IntArray, frozen
 from pushplan.world.outline import flatten, transform

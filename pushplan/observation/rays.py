@@ -9,8 +9,7 @@ import numpy as np
 
 from pushplan.compiled import kernel
 from pushplan.geometry.shadows import BendDistances, Table, fill_shadows
-from pushplan.observation.view import View
-from pushplan.observation.view_kernels import Image, to_pixels
+from pushplan.observation.view import Image, View, to_pixels
 from pushplan.world.checks import FloatArray, IntArray
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from abc import abstractmethod
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
@@ -9,14 +10,15 @@ from typing import Annotated, Any, ClassVar
 
 import numpy as np
 
+from pushplan.compiled import kernel
 from pushplan.envs.simulators.base import Materials
 from pushplan.envs.tasks.base import Task, drive_of
-from pushplan.envs.tasks.box_kernels import sample_at
 from pushplan.envs.tasks.layout import FreeSpace, footprint_at, square_boxes
 from pushplan.envs.tasks.materials import SOLIDS
 from pushplan.envs.tasks.reach import Reach
 from pushplan.envs.tasks.variations import TaskVariations, Yaw
 from pushplan.geometry import GeodesicField, geodesic_field
+from pushplan.geometry.distance_field import sample_values
 from pushplan.observation import ImageObservation, ObservationBuilder, StateObservation
 from pushplan.world import (
     BUMPERS,
@@ -36,6 +38,24 @@ from pushplan.world.checked_fields import (
     PositiveInt,
 )
 from pushplan.world.checks import FloatArray, choice
+
+
+@kernel(allocates=True)
+def sample_at(
+    values: FloatArray,  # (rows, columns) distances [m], inf where no path leads to the goal
+    ox: float,  # least x and y of the grid [m]
+    oy: float,
+    step: float,  # side of a cell [m]
+    farthest: float,  # in place of inf [m]
+    poses: FloatArray,  # (K, 3)
+) -> FloatArray:
+    """(K,) goal distance of each object [m], from a grid."""
+    out = np.empty(poses.shape[0])
+    for k in range(poses.shape[0]):
+        found = sample_values(values, ox, oy, step, poses[k, 0], poses[k, 1])
+        out[k] = found if found < math.inf else farthest
+    return out
+
 
 LEAST_SIZE = 0.01
 """Least size of boxes, as a fraction of the preset's."""

@@ -58,8 +58,6 @@ class ShipIceVariations(TaskVariations):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if self.ice_file is not None and not isinstance(self.ice_file, str):
-            raise InvalidInputError(f"ice_file must be a path as text, got {self.ice_file!r}")
         if self.concentration is not None and self.ice_file is not None:
             raise InvalidInputError("concentration and ice_file exclude each other")
 
