@@ -7,11 +7,11 @@ import math
 
 import numpy as np
 
-from pushplan.control import LegFollower, PoseFollower, ProgressChecker, StallChecker
+from pushplan.control import LegFollower, PoseFollower, StallChecker
 from pushplan.control.limits import arc_twist
 from pushplan.planners.pushing import PushingConfig, PushingMpc, PushParameters, PushPath
-from pushplan.planners.rearrangement.controller_kernels import is_on_bumper
 from pushplan.planners.rearrangement.geometric_pusher import GeometricPusher
+from pushplan.planners.rearrangement.path_push import PathPush
 from pushplan.planners.rearrangement.push import Push
 from pushplan.planners.rearrangement.push_poses import initial_heading
 from pushplan.planners.rearrangement.push_scene import PushScene
@@ -24,8 +24,6 @@ _ALIGNED = math.radians(0.4)  # error of a heading that is left where a push beg
 _NEAR = 0.004  # the same of the place [circumscribed radii]
 _TOWARDS = math.radians(20.0)
 """A push that begins farther off the object's path is left to the geometric controller."""
-_PROGRESS = 0.05  # by which an object has to get on within the time below [circumscribed radii]
-_PATIENCE = 1.0  # time in which the robot could drive so far [circumscribed radii]
 
 
 class ExecutionEnd(enum.Enum):
@@ -69,7 +67,7 @@ class PushExecution:
             aligned=_ALIGNED,
             response=response,
         )
-        self._pusher: GeometricPusher | PushingMpc | None = None
+        self._path_push: PathPush | None = None
         self._pose_follower: PoseFollower | None = None
         self._stall = StallChecker(world.robot)
         self._driven = 0.0
@@ -121,23 +119,20 @@ class PushExecution:
         if self.push.is_primitive:
             self._pose_follower = PoseFollower(world.robot, self.push.poses, scene.config.response)
         if self.push.follows_path:
-            self._choose_pusher(scene, held)
+            self._path_push = self._choose_pusher(scene, held)
         return True
 
-    def _choose_pusher(self, scene: PushScene, held: float) -> None:
+    def _choose_pusher(self, scene: PushScene, held: float) -> PathPush:
         """Predictive control where that suits, else the controller of the prediction."""
         push, config = self.push, scene.config
-        size, robot = scene.size, scene.world.robot
-        predictive = self._predictive and suits_mpc(scene, push)
-        path = PushPath.through(push.object_path, radius=size if predictive else 0.0)
-        self._plan = path.plan(robot, push.target)
-        self._progress = ProgressChecker(_PROGRESS * size, _PATIENCE * size / robot.max_speed)
-        if predictive:
+        if self._predictive and suits_mpc(scene, push):
+            path = PushPath.through(push.object_path, radius=scene.size)
             parameters = PushParameters(config.friction)
-            self._pusher = PushingMpc(PushingConfig(parameters=parameters, period=held))
-        else:
-            controller = scene.controller._replace(gain=push.gain)
-            self._pusher = GeometricPusher(controller, push.shift)
+            mpc = PushingMpc(PushingConfig(parameters=parameters, period=held))
+            return PathPush(scene, push.target, path, mpc)
+        controller = scene.controller._replace(gain=push.gain)
+        path = PushPath.through(push.object_path)
+        return PathPush(scene, push.target, path, GeometricPusher(controller, push.shift))
 
     def _push(self, scene: PushScene, held: float) -> Twist | ExecutionEnd:
         push, world, pose = self.push, scene.world, scene.world.robot_pose
@@ -152,17 +147,10 @@ class PushExecution:
         longest = push.length if push.pre_relocates else 1.1 * push.length + 0.4 * scene.size
         if self._driven > longest - 1e-6:
             return ExecutionEnd.DONE if push.pre_relocates else ExecutionEnd.FAILED
-        if self._pusher is None:
-            turn = _line_turn(push.start, pose, scene.size)
-            return arc_twist(world.robot, scene.controller.step, turn)
-        twist = self._pusher.command(world, self._plan)
-        target = np.flatnonzero((ids == push.target) & ~scene.done)
-        if len(target):
-            on_bumper = is_on_bumper(np.array(pose), scene.poses[target[0]], scene.controller)
-            rest = self._plan.length - self._pusher.along
-            if not (on_bumper and self._progress.update(rest, world.time)):
-                return ExecutionEnd.FAILED
-        return twist
+        if self._path_push is not None:
+            return self._path_push.command(scene) or ExecutionEnd.FAILED
+        turn = _line_turn(push.start, pose, scene.size)
+        return arc_twist(world.robot, scene.controller.step, turn)
 
 
 def suits_mpc(scene: PushScene, push: Push) -> bool:
