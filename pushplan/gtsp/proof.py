@@ -65,14 +65,7 @@ def _room_for(size: int) -> Paths:
 
 def _only(paths: Paths, which: slice | NDArray[np.bool_]) -> Paths:
     """A copy of some of them."""
-    sets, ends, values, rests, parents = paths
-    return Paths(
-        sets[which].copy(),
-        ends[which].copy(),
-        values[which].copy(),
-        rests[which].copy(),
-        parents[which].copy(),
-    )
+    return Paths._make(part[which].copy() for part in paths)
 
 
 def _first_paths(walks: Walks) -> Paths:

@@ -43,7 +43,7 @@ class Stop(ABC):
     def __or__(self, other: Stop) -> Stop:
         if not isinstance(other, Stop):
             return NotImplemented
-        return AnyOf((*_rules(self), *_rules(other)))
+        return AnyOf((*rules_of(self), *rules_of(other)))
 
     @property
     def seconds(self) -> float:
@@ -164,7 +164,8 @@ class AnyOf(Stop):
         return lambda iterations, cost: any(check(iterations, cost) for check in checks)
 
 
-def _rules(stop: Stop) -> tuple[Stop, ...]:
+def rules_of(stop: Stop) -> tuple[Stop, ...]:
+    """The rules that one is made of."""
     return stop.rules if isinstance(stop, AnyOf) else (stop,)
 
 
