@@ -9,7 +9,7 @@ from pathlib import Path
 from pushplan.evaluation.rows import ResultRow
 from pushplan.evaluation.run_record import RunRecord
 from pushplan.evaluation.statistics import estimate
-from pushplan.evaluation.store import DATABASE, open_results, rows_csv, write_atomic
+from pushplan.evaluation.store import DATABASE, open_results, rows_csv
 from pushplan.evaluation.summary import (
     PairedDifference,
     PolicySummary,
@@ -28,6 +28,7 @@ from pushplan.evaluation.tables import (
 )
 from pushplan.metrics import compute
 from pushplan.world import Episode, InvalidInputError
+from pushplan.world.files import write_atomic
 
 
 @dataclass(frozen=True)
