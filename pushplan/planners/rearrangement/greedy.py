@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -16,31 +16,11 @@ from pushplan.planners.rearrangement.path_push import PathPush
 from pushplan.planners.rearrangement.push_scene import PushScene, check_world
 from pushplan.planners.rearrangement.rearrangement_config import RearrangementConfig
 from pushplan.world import Twist, World
-from pushplan.world.checks import expect, number
+from pushplan.world.checks import expect
 
 _OPTIONS = 8  # how many places to push a box from are tried before the first comes again
-
-
-@dataclass(frozen=True)
-class GreedyConfig:
-    """Settings of `GreedyPusher`. Lengths are in units of the robot's circumscribed radius.
-
-    Args:
-        response: time in which an error of heading or place is driven off [s]; longer than the
-            robot's delay.
-        slack: clearance between bumper and box when the robot lines up.
-        retreat: how far it backs off after a push.
-        patience: time after which it looks again where it can get at no box [s].
-    """
-
-    response: float = 0.2
-    slack: float = 0.08
-    retreat: float = 0.6
-    patience: float = 1.5
-
-    def __post_init__(self) -> None:
-        for item in fields(self):
-            number(f"greedy {item.name}", getattr(self, item.name), low=0.0, open_low=True)
+_RETREAT = 0.6  # how far the robot backs off after a push [circumscribed radii]
+_WAIT = 1.5  # time after which it looks again where it can get at no box [s]
 
 
 @dataclass
@@ -62,14 +42,13 @@ class GreedyPusher:
     others have had their turn. No chance is involved.
 
     Args:
-        config: settings.
+        config: settings; of these, ``slack`` and ``response`` count.
     """
 
     actions = ("velocity",)
 
-    def __init__(self, config: GreedyConfig | None = None) -> None:
-        self.config = expect("config", config or GreedyConfig(), GreedyConfig)
-        self._settings = RearrangementConfig(slack=self.config.slack)
+    def __init__(self, config: RearrangementConfig | None = None) -> None:
+        self.config = expect("config", config or RearrangementConfig(), RearrangementConfig)
         self._forget()
 
     def _forget(self) -> None:
@@ -100,40 +79,39 @@ class GreedyPusher:
         return self._clock.command_for(world, self._act)
 
     def _act(self, world: World) -> Twist:
-        scene = PushScene(world, self._settings)
-        left = world.movables.ids[~scene.done]
-        if self._attempt is not None and self._attempt.box not in left:
-            self._attempt = None
-            self._back_off(world)
-        command = self._retreat(world) or self._work(scene)
+        command = self._retreat(world) or self._work(PushScene(world, self.config))
         return command or self._retreat(world) or Twist(0.0, 0.0)
 
     def _work(self, scene: PushScene) -> Twist | None:
         """The next command of the attempt in hand or of a new one; None where it has ended."""
-        world = scene.world
-        if self._attempt is None and world.time >= self._wait_until:
-            self._attempt = self._choose(scene)
-            self._wait_until = world.time + (self.config.patience if self._attempt is None else 0.0)
-        attempt = self._attempt
+        world, response = scene.world, self.config.response
+        self._attempt = attempt = self._attempt or self._choose(scene)
         if attempt is None:
             return None
-        command = None
-        if not attempt.pushing:
-            command = attempt.driver.command(world.robot_pose, world.time, self._clock.held)
-            attempt.pushing = attempt.driver.arrived
-        over = attempt.push.remaining <= 0.0
-        if attempt.pushing and not over:
-            command = attempt.push.command(scene)
+        done = attempt.box not in world.movables.ids[~scene.done]
+        command = None if done else self._drive(attempt, scene)
         if command is None:
-            if not over:  # it is the box's fault, which comes last from now on
+            if not done:  # it is the box's fault, which comes last from now on
                 self._failures[attempt.box] = self._failures.get(attempt.box, 0) + 1
             self._attempt = None
-            self._back_off(world)
+            self._away = Recovery(world, _RETREAT * scene.size, response=response, looks=False)
         return command
+
+    def _drive(self, attempt: _Attempt, scene: PushScene) -> Twist | None:
+        """Get behind the box, and then push it; None where that fails."""
+        if not attempt.pushing:
+            pose, time = scene.world.robot_pose, scene.world.time
+            command = attempt.driver.command(pose, time, self._clock.held)
+            attempt.pushing = attempt.driver.arrived
+            if not attempt.pushing:
+                return command
+        return attempt.push.command(scene)
 
     def _choose(self, scene: PushScene) -> _Attempt | None:
         """The nearest box that the robot can get behind, of those that failed least often."""
         world, failures = scene.world, self._failures
+        if world.time < self._wait_until:
+            return None
         left = np.flatnonzero(~scene.done).tolist()
         away = np.hypot(*(scene.poses[:, :2] - world.robot_pose[:2]).T)
         ids = world.movables.ids.tolist()
@@ -145,12 +123,8 @@ class GreedyPusher:
                 pusher = GeometricPusher(scene.controller, place.shift)
                 return _Attempt(ids[k], driver, PathPush(scene, ids[k], place.path, pusher))
             failures[ids[k]] = failures.get(ids[k], 0) + 1
+        self._wait_until = world.time + _WAIT
         return None
-
-    def _back_off(self, world: World) -> None:
-        far = self.config.retreat * world.robot.circumscribed_radius
-        response = self.config.response
-        self._away = Recovery(world, far, response=response, looks=False)
 
     def _retreat(self, world: World) -> Twist | None:
         """Get away from where the last attempt ended."""

@@ -34,11 +34,6 @@ class PathPush:
             _PROGRESS * scene.size, _PATIENCE * scene.size / robot.max_speed
         )
 
-    @property
-    def remaining(self) -> float:
-        """What is left of the path [m]."""
-        return self._plan.length - self._pusher.along
-
     def command(self, scene: PushScene) -> Twist | None:
         """The velocity to drive now; None where the object has been lost or does not get on.
 
@@ -47,8 +42,9 @@ class PathPush:
         world = scene.world
         twist = self._pusher.command(world, self._plan)
         target = self._plan.subtasks[0].object_ids[0]
+        remaining = self._plan.length - self._pusher.along
         for k in np.flatnonzero((world.movables.ids == target) & ~scene.done):
             holds = is_on_bumper(np.array(world.robot_pose), scene.poses[k], scene.controller)
-            if not (holds and self._progress.update(self.remaining, world.time)):
+            if not (holds and self._progress.update(remaining, world.time)):
                 return None
         return twist

@@ -57,6 +57,7 @@ def check_world(world: World) -> None:
     check_pusher(world, "pushing objects")
 
 
+@functools.lru_cache(maxsize=8)
 def make_object_goal(goal: Goal, static: StaticMap, slack: float) -> ObjectGoal:
     """The goal for kernels. Sides of a receptacle that lie on the bounds do not count."""
     assert isinstance(goal, ClearanceArea | Receptacle)
