@@ -65,7 +65,7 @@ def compare(options: argparse.Namespace, out: str, progress: Callable[..., None]
 def show(comparison: Comparison, out: str, markdown: str | None) -> None:
     """Print the tables, write the page of the run, say where everything is."""
     from pushplan.evaluation import Results
-    from pushplan.evaluation.store import write_atomic
+    from pushplan.world.files import write_atomic
 
     say(comparison.table())
     say(f"page:     {Results.load(out).report()}")

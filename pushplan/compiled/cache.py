@@ -6,6 +6,7 @@ processes could write at once, and a kernel is compiled anew when one that it ca
 
 from __future__ import annotations
 
+import contextlib
 import pickle
 import sys
 import time
@@ -113,7 +114,8 @@ class KernelCache(_Cache):
         for folder in self._folders.read:
             content = read(folder / name)
             if content is not None:
-                return rebuilt(pickle.loads(content), target_context)
+                with contextlib.suppress(ImportError, AttributeError):  # a class moved since then
+                    return rebuilt(pickle.loads(content), target_context)
         return None
 
     def _wait(self) -> bool:

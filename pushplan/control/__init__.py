@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from pushplan.control.episode_clock import EpisodeClock
 from pushplan.control.leg_follower import LegFollower, Legs
@@ -14,6 +14,7 @@ from pushplan.control.pure_pursuit import PurePursuit
 from pushplan.control.recovery import Recovery
 from pushplan.control.retreat import Retreat
 from pushplan.control.tracking import Progress
+from pushplan.world.lazy_names import lazy_names
 
 if TYPE_CHECKING:
     from pushplan.control.mpc import MpcConfig, MpcTracker
@@ -37,11 +38,4 @@ __all__ = [
     "clamp_twist",
 ]
 
-
-def __getattr__(name: str) -> Any:
-    """Import the predictive tracker, with its compiled kernels, when it is first asked for."""
-    if name not in ("MpcConfig", "MpcTracker"):
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    import pushplan.control.mpc
-
-    return getattr(pushplan.control.mpc, name)
+__getattr__, __dir__ = lazy_names(__name__, {"mpc": "MpcConfig MpcTracker"})

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 from pushplan.envs.push_env import PushEnv
 from pushplan.observation import ObservationBuilder
 from pushplan.scenarios import Scenario
+
+_OWN = ("simulator", "preset", "observation", "action", "render_mode")
 
 
 def make(
@@ -37,23 +40,7 @@ def make(
     )
 
 
-def make_env(
-    *,
-    task: str,
-    simulator: str = "pymunk",
-    preset: str | None = None,
-    observation: str | ObservationBuilder | None = None,
-    action: str | None = None,
-    render_mode: str | None = None,
-    **variations: object,
-) -> PushEnv:
-    """What ``gymnasium.make`` calls: variations are keyword arguments of their own."""
-    return PushEnv(
-        task=task,
-        simulator=simulator,
-        preset=preset,
-        variations=variations,
-        observation=observation,
-        action=action,
-        render_mode=render_mode,
-    )
+def make_env(*, task: str, **options: Any) -> PushEnv:
+    """What ``gymnasium.make`` calls: variations are keyword arguments beside those of `PushEnv`."""
+    own = {name: options.pop(name) for name in _OWN if name in options}
+    return PushEnv(task=task, variations=options, **own)

@@ -17,8 +17,7 @@ from pushplan.envs.actions import ActionMode, Motion, chosen_action, waiting
 from pushplan.envs.registry import ACTIONS, SIMULATORS, TASKS, default_preset
 from pushplan.envs.rendering import Renderer
 from pushplan.envs.roster import Roster
-from pushplan.envs.simulators.base import Simulator
-from pushplan.envs.simulators.kernel_warmup import warm_up_simulator
+from pushplan.envs.simulators.base import Simulator, warm_up_simulator
 from pushplan.envs.tasks.base import StepOutcome, Task
 from pushplan.envs.trace import Trace
 from pushplan.observation import ObservationBuilder

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from pushplan.evaluation.paper import Comparison, bench_paper
     from pushplan.evaluation.policies import PolicySpec, parse_policies, parse_policy
     from pushplan.evaluation.pool import WorkerPool
-    from pushplan.evaluation.results import Results, compare
+    from pushplan.evaluation.results import Results
     from pushplan.evaluation.rows import TIMING_COLUMNS, ResultRow, Status, columns
     from pushplan.evaluation.statistics import Estimate, Proportion, bootstrap_interval, wilson
     from pushplan.evaluation.summary import PairedDifference, PolicySummary
@@ -45,7 +45,6 @@ __all__ = [
     "bench_paper",
     "bootstrap_interval",
     "columns",
-    "compare",
     "parse_policies",
     "parse_policy",
     "run_batch",
@@ -64,7 +63,7 @@ __getattr__, __dir__ = lazy_names(
         "paper": "Comparison bench_paper",
         "policies": "PolicySpec parse_policies parse_policy",
         "pool": "WorkerPool",
-        "results": "Results compare",
+        "results": "Results",
         "rows": "TIMING_COLUMNS ResultRow Status columns",
         "statistics": "Estimate Proportion bootstrap_interval wilson",
         "summary": "PairedDifference PolicySummary",

@@ -39,7 +39,6 @@ class AdaptsActions(Protocol):
 
     def take_velocities(self) -> bool:
         """Change to such a mode for the next reset; False where there is nothing to change."""
-        ...
 
 
 class PolicyError(PushplanError):

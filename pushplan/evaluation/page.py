@@ -9,8 +9,8 @@ from pathlib import Path
 
 from pushplan.evaluation.rows import ResultRow
 from pushplan.evaluation.run_record import RunRecord
-from pushplan.evaluation.store import write_atomic
 from pushplan.evaluation.tables import Table
+from pushplan.world.files import write_atomic
 
 LISTED = 200
 """At most so many rows are listed in full."""

@@ -17,10 +17,10 @@ from pushplan.evaluation.policies import PolicySpec, policy_names
 from pushplan.evaluation.published import PublishedTable, chosen_tables
 from pushplan.evaluation.results import Results
 from pushplan.evaluation.rows import ResultRow, setting_of
-from pushplan.evaluation.store import write_atomic
 from pushplan.evaluation.tables import Table, markdown, text
 from pushplan.metrics import compute
 from pushplan.world import Episode
+from pushplan.world.files import write_atomic
 
 TO_GOAL_POINT = "E_nav_to_goal_point"
 EPISODES = 100

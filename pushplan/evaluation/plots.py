@@ -15,10 +15,10 @@ from matplotlib.figure import Figure
 from pushplan.evaluation.rows import ResultRow
 from pushplan.evaluation.run_record import RunRecord
 from pushplan.evaluation.statistics import estimate
-from pushplan.evaluation.store import write_atomic
 from pushplan.evaluation.summary import values_of
 from pushplan.evaluation.tables import heading
 from pushplan.metrics import Role, metric_names
+from pushplan.world.files import write_atomic
 
 # Okabe and Ito's colours, told apart by colour-blind readers too
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000", "#8C6D31")

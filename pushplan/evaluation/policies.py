@@ -132,8 +132,7 @@ def policy_names() -> tuple[str, ...]:
 
 def _network_file(source: str) -> Path | None:
     """The file of a network, if a source names one."""
-    from pushplan.learned.loading import LEARNED_PREFIXES, learned_file
-    from pushplan.learned.shipped import learned_names, weights_of
+    from pushplan.learned.loading import LEARNED_PREFIXES, learned_file, learned_names, weights_of
 
     if source.startswith(LEARNED_PREFIXES):
         return learned_file(source)

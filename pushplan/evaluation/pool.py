@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
+import contextlib
+import itertools
 import math
 import os
 import pickle
+import queue
 import signal
 import subprocess
 import sys
 import threading
 import time
-from collections import deque
 from collections.abc import Callable, Sequence
 from concurrent.futures import BrokenExecutor, Executor, Future
-from dataclasses import dataclass
 from multiprocessing import Pipe
-from multiprocessing.connection import Connection, wait
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +23,7 @@ from pushplan.evaluation.worker import THREAD_VARIABLES, WORKER_VARIABLE, Reply,
 from pushplan.world import PushplanError
 
 _POLL_S = 0.2
-_STARTS = 2  # so many workers in a row may end before they are ready until the pool gives up
+_STARTS = 2  # so many workers in a row may end before they are ready until a call gives up
 _LOG_TAIL = 6000
 _TRACE_S = 0.2  # time that a worker has to write where it hangs before it is ended
 
@@ -44,26 +44,77 @@ class WorkerOverranError(WorkerDiedError):
     """The process that ran a call was ended because the call took too long."""
 
 
-@dataclass
-class _Submission:
-    future: Future[Any]
-    payload: bytes
-
-
-@dataclass
 class _Worker:
-    process: subprocess.Popen[bytes]
-    connection: Connection
-    log: Path | None
-    ready: bool = False
-    call: _Submission | None = None
-    since: float = 0.0
-    log_start: int = 0
+    """A process that answers one call after the other, and writes into a log."""
 
-    def tail(self) -> str:
-        if self.log is None or not self.log.exists():
+    def __init__(self, setup: WorkerSetup, log: Path | None) -> None:
+        self._log, self._log_start = log, 0
+        self._connection, theirs = Pipe(duplex=True)
+        environment = {**os.environ, WORKER_VARIABLE: "1", "PYTHONUNBUFFERED": "1"}
+        environment.update(dict.fromkeys(THREAD_VARIABLES, "1"))
+        code = (
+            f"import sys; sys.path[:] = {sys.path!r}\n"
+            f"from pushplan.evaluation.worker import main; main({theirs.fileno()})"
+        )
+        with theirs, open(log or os.devnull, "wb") as output:
+            self.process = subprocess.Popen(
+                [sys.executable, "-c", code],
+                stdin=subprocess.DEVNULL,
+                stdout=output,
+                stderr=output,
+                env=environment,
+                pass_fds=(theirs.fileno(),),
+            )
+        self._connection.send_bytes(pickle.dumps(setup))
+
+    def ask(self, payload: bytes, limit_s: float) -> Reply:
+        """The answer to a call.
+
+        Raises:
+            WorkerDiedError: if it has ended, or was ended because it took too long.
+        """
+        self._log_start = self._log.stat().st_size if self._log else 0
+        with contextlib.suppress(OSError):  # it has died: `receive` finds out how
+            self._connection.send_bytes(payload)
+        answer = self.receive(limit_s)
+        try:
+            reply: Reply = pickle.loads(answer)
+        except Exception as error:  # an exception that pickles but does not unpickle
+            return Reply(error=RuntimeError(f"a reply cannot be read: {error}"))
+        return reply
+
+    def receive(self, limit_s: float) -> bytes:
+        """What it sends next; see `ask`."""
+        until = time.monotonic() + limit_s + _TRACE_S
+        try:
+            while not self._connection.poll(_POLL_S):
+                # it may die without closing its socket
+                if self.process.poll() is not None and not self._connection.poll():
+                    raise EOFError
+                if time.monotonic() > until:
+                    log = self._tail()
+                    self.end(force=True)
+                    raise WorkerOverranError(f"not done after {limit_s:g} s", log)
+            return self._connection.recv_bytes()
+        except (EOFError, OSError):
+            self.end()
+            raise WorkerDiedError(_describe_exit(self.process.returncode), self._tail()) from None
+
+    def end(self, *, force: bool = False) -> None:
+        """Let it finish, or not; its log stays if there is something in it."""
+        self._connection.close()
+        try:
+            self.process.wait(0.0 if force else 1.0)
+        except subprocess.TimeoutExpired:
+            self.process.kill()
+            self.process.wait()
+        if self._log is not None and self._log.exists() and self._log.stat().st_size == 0:
+            self._log.unlink()
+
+    def _tail(self) -> str:
+        if self._log is None or not self._log.exists():
             return ""
-        text = self.log.read_bytes()[self.log_start :]
+        text = self._log.read_bytes()[self._log_start :]
         return text[-_LOG_TAIL:].decode(errors="replace")
 
 
@@ -92,10 +143,6 @@ class WorkerPool(Executor):
         preload: Sequence[str] = (),
         log_dir: Path | None = None,
     ) -> None:
-        self._max_workers = workers
-        self._limit_s = limit_s
-        self._end_after_s = math.inf if limit_s is None else limit_s + _TRACE_S
-        self._log_dir = log_dir
         main = getattr(sys.modules.get("__main__"), "__file__", None)
         self._setup = WorkerSetup(
             main=None if main is None else os.path.abspath(main),
@@ -103,191 +150,92 @@ class WorkerPool(Executor):
             memory_limit_mb=memory_limit_mb,
             trace_after_s=limit_s,
         )
-        self._queue: deque[_Submission] = deque()
-        self._workers: list[_Worker] = []
+        self._most, self._log_dir = workers, log_dir
+        self._limit_s = math.inf if limit_s is None else limit_s
+        self._calls: queue.SimpleQueue[tuple[Future[Any], bytes] | None] = queue.SimpleQueue()
+        self._threads: list[threading.Thread] = []  # one for each worker
+        self._workers: list[_Worker] = []  # all that were ever started
         self._lock = threading.Lock()
-        self._closing = False
-        self._killed = False
-        self._awake = False
-        self._failed_starts = 0
-        self._started = 0
-        self._wake_read, self._wake_write = Pipe(duplex=False)
-        self._thread = threading.Thread(target=self._manage, name="pushplan-pool", daemon=True)
-        self._thread.start()
+        self._closing = self._killed = False
+        self._numbers = itertools.count(1)
 
     def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
         """Queue one call. Arguments and result have to be picklable."""
-        call = _Submission(Future(), pickle.dumps((fn, args, kwargs)))
+        future: Future[Any] = Future()
+        payload = pickle.dumps((fn, args, kwargs))
         with self._lock:
             if self._closing:
                 raise RuntimeError("cannot submit to a pool that has been shut down")
-            self._queue.append(call)
-        self._wake()
-        return call.future
+            self._calls.put((future, payload))
+            if len(self._threads) < self._most:
+                self._threads.append(threading.Thread(target=self._serve, daemon=True))
+                self._threads[-1].start()
+        return future
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
         """Finish the queue, or drop it, and end the workers."""
         with self._lock:
             self._closing = True
             if cancel_futures:
-                while self._queue:
-                    self._queue.popleft().future.cancel()
-        self._wake()
-        if wait and threading.current_thread() is not self._thread:
-            self._thread.join()
+                with contextlib.suppress(queue.Empty):
+                    while True:
+                        if (call := self._calls.get_nowait()) is not None:
+                            call[0].cancel()
+            for _ in self._threads:
+                self._calls.put(None)
+        for thread in self._threads if wait else ():
+            thread.join()
 
     def kill(self) -> None:
         """End the workers at once, whatever they are doing."""
-        self._killed = True
+        with self._lock:
+            self._killed = True
+            for worker in self._workers:
+                worker.process.kill()
         self.shutdown(cancel_futures=True)
 
-    def _wake(self) -> None:
-        with self._lock:
-            if not self._awake and not self._wake_write.closed:
-                self._awake = True
-                self._wake_write.send_bytes(b"w")
-
-    def _manage(self) -> None:
-        try:
-            while not self._finished():
-                self._assign()
-                connections = [worker.connection for worker in self._workers]
-                for ready in wait([self._wake_read, *connections], _POLL_S):
-                    if ready is self._wake_read:
-                        with self._lock:
-                            self._awake = False
-                            self._wake_read.recv_bytes()
-                    else:
-                        self._receive(next(w for w in self._workers if w.connection is ready))
-                self._check()
-        finally:
-            for worker in list(self._workers):
-                self._end(worker, force=self._killed)
-            with self._lock:
-                self._closing = True
-                self._wake_read.close()
-                self._wake_write.close()
-
-    def _finished(self) -> bool:
-        busy = any(worker.call is not None for worker in self._workers)
-        with self._lock:
-            return self._killed or (self._closing and not self._queue and not busy)
-
-    def _assign(self) -> None:
-        """Give queued calls to idle workers; start workers while there is need."""
-        idle = [w for w in self._workers if w.ready and w.call is None]
-        while idle:
-            with self._lock:
-                call = self._queue.popleft() if self._queue else None
-            if call is None:
-                return
-            if not call.future.set_running_or_notify_cancel():
+    def _serve(self) -> None:
+        """Hand calls to a worker of this thread's own until there are no more."""
+        worker: _Worker | None = None
+        while (call := self._calls.get()) is not None:
+            future, payload = call
+            if not future.set_running_or_notify_cancel():
                 continue
-            worker = idle.pop()
-            worker.call, worker.since = call, time.monotonic()
-            worker.log_start = worker.log.stat().st_size if worker.log else 0
             try:
-                worker.connection.send_bytes(call.payload)
-            except OSError:
-                self._lost(worker)
-        coming = sum(not worker.ready for worker in self._workers)
-        wanted = min(self._max_workers - len(self._workers), len(self._queue) - coming)
-        for _ in range(wanted):
-            self._workers.append(self._start())
+                if worker is None or worker.process.poll() is not None:
+                    worker = self._start()
+                reply = worker.ask(payload, self._limit_s)
+            except Exception as error:
+                worker = None
+                future.set_exception(error)
+                continue
+            if reply.last:
+                worker.end()
+                worker = None
+            if reply.error is not None:
+                future.set_exception(reply.error)
+            else:
+                future.set_result(reply.result)
+        if worker is not None:
+            worker.end(force=self._killed)
 
     def _start(self) -> _Worker:
-        ours, theirs = Pipe(duplex=True)
-        environment = {**os.environ, WORKER_VARIABLE: "1", "PYTHONUNBUFFERED": "1"}
-        environment.update(dict.fromkeys(THREAD_VARIABLES, "1"))
-        self._started += 1
-        log = None
-        output: Any = subprocess.DEVNULL
-        if self._log_dir is not None:
-            log = self._log_dir / f"worker-{os.getpid()}-{self._started}.log"
-            output = log.open("wb")
-        code = (
-            f"import sys; sys.path[:] = {sys.path!r}\n"
-            f"from pushplan.evaluation.worker import main; main({theirs.fileno()})"
-        )
-        try:
-            process = subprocess.Popen(
-                [sys.executable, "-c", code],
-                stdin=subprocess.DEVNULL,
-                stdout=output,
-                stderr=output,
-                env=environment,
-                pass_fds=(theirs.fileno(),),
-            )
-        finally:
-            theirs.close()
-            if log is not None:
-                output.close()
-        ours.send_bytes(pickle.dumps(self._setup))
-        return _Worker(process, ours, log)
-
-    def _receive(self, worker: _Worker) -> None:
-        try:
-            message = pickle.loads(worker.connection.recv_bytes())
-        except (EOFError, OSError):
-            self._lost(worker)
-            return
-        except Exception as error:  # an exception that pickles but does not unpickle
-            message = Reply(error=RuntimeError(f"a reply cannot be read: {error}"))
-        if not worker.ready:
-            worker.ready = True
-            self._failed_starts = 0
-            return
-        assert isinstance(message, Reply) and worker.call is not None
-        call, worker.call = worker.call, None
-        if message.last:
-            self._end(worker)
-        if message.error is not None:
-            call.future.set_exception(message.error)
-        else:
-            call.future.set_result(message.result)
-
-    def _check(self) -> None:
-        """Find workers that died without closing their socket, and calls that overran."""
-        now = time.monotonic()
-        for worker in list(self._workers):
-            if worker.process.poll() is not None and not worker.connection.poll():
-                self._lost(worker)
-            elif worker.call and now > worker.since + self._end_after_s:
-                call, log = worker.call, worker.tail()
-                self._end(worker, force=True)
-                call.future.set_exception(
-                    WorkerOverranError(f"not done after {self._limit_s:g} s", log)
-                )
-
-    def _lost(self, worker: _Worker) -> None:
-        self._end(worker)
-        ending = _describe_exit(worker.process.returncode)
-        if worker.call is not None:
-            worker.call.future.set_exception(WorkerDiedError(ending, worker.tail()))
-        elif not worker.ready:
-            self._failed_starts += 1
-            if self._failed_starts >= _STARTS:
-                self._give_up(f"{ending} while it started: {worker.tail()[-500:]}")
-
-    def _give_up(self, reason: str) -> None:
-        with self._lock:
-            self._closing = True
-            calls, self._queue = list(self._queue), deque()
-        for call in calls:
-            if call.future.set_running_or_notify_cancel():
-                call.future.set_exception(BrokenExecutor(reason))
-
-    def _end(self, worker: _Worker, *, force: bool = False) -> None:
-        if worker in self._workers:
-            self._workers.remove(worker)
-        worker.connection.close()
-        try:
-            worker.process.wait(0.0 if force else 1.0)
-        except subprocess.TimeoutExpired:
-            worker.process.kill()
-            worker.process.wait()
-        if worker.log is not None and worker.log.exists() and worker.log.stat().st_size == 0:
-            worker.log.unlink()
+        """A worker that is ready."""
+        ending = ""
+        for _ in range(_STARTS):
+            name = f"worker-{os.getpid()}-{next(self._numbers)}.log"
+            worker = _Worker(self._setup, None if self._log_dir is None else self._log_dir / name)
+            with self._lock:
+                self._workers.append(worker)
+                if self._killed:
+                    worker.process.kill()
+            try:
+                worker.receive(math.inf)
+            except WorkerDiedError as error:
+                ending = f"{error} while it started: {error.log[-500:]}"
+            else:
+                return worker
+        raise BrokenExecutor(ending)
 
 
 def _describe_exit(code: int | None) -> str:

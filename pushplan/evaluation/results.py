@@ -6,10 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from pushplan.evaluation.rows import ResultRow
 from pushplan.evaluation.run_record import RunRecord
 from pushplan.evaluation.statistics import estimate
-from pushplan.evaluation.store import DATABASE, open_results, rows_csv, write_atomic
+from pushplan.evaluation.store import DATABASE, open_results, rows_csv
 from pushplan.evaluation.summary import (
     PairedDifference,
     PolicySummary,
@@ -28,6 +27,7 @@ from pushplan.evaluation.tables import (
 )
 from pushplan.metrics import compute
 from pushplan.world import Episode, InvalidInputError
+from pushplan.world.files import write_atomic
 
 
 @dataclass(frozen=True)
@@ -124,8 +124,3 @@ class Results(RunRecord):
                 f"{len(self.rows)} of these results: report to another folder, or report that run "
                 f"with Results.load({str(folder)!r}).report()"
             )
-
-
-def compare(rows: Sequence[ResultRow] | Results) -> list[PairedDifference]:
-    """Paired differences of all policies on the same scenarios."""
-    return rows.compare() if isinstance(rows, Results) else paired_differences(rows)

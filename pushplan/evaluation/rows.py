@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import csv
 import enum
+import io
 import re
 import zlib
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
@@ -14,6 +16,15 @@ import numpy as np
 from pushplan.envs.registry import goal_kind
 from pushplan.metrics import METRICS, Role, compute, metric_names
 from pushplan.world import Episode
+
+
+def csv_text(header: Sequence[str], lines: Iterable[Sequence[object]]) -> str:
+    """Lines under a header; floats are written so that they read back the same."""
+    buffer = io.StringIO()
+    writer = csv.writer(buffer, lineterminator="\n")
+    writer.writerow(header)
+    writer.writerows(lines)
+    return buffer.getvalue()
 
 
 class Status(enum.StrEnum):

@@ -5,17 +5,16 @@ from __future__ import annotations
 import contextlib
 import fcntl
 import json
-import os
 import sqlite3
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from types import TracebackType
 from typing import Any
 
-from pushplan.evaluation.csv_text import csv_text
-from pushplan.evaluation.rows import ResultRow, Status, columns
+from pushplan.evaluation.rows import ResultRow, Status, columns, csv_text
 from pushplan.metrics import METRICS
 from pushplan.world import InvalidInputError, SchemaError
+from pushplan.world.files import write_atomic
 
 SCHEMA = "pushplan-run/1"
 DATABASE = "results.db"
@@ -222,13 +221,6 @@ def rows_csv(rows: Iterable[ResultRow]) -> str:
     """The rows as CSV with a header."""
     names = columns()
     return csv_text(names, ([_cell(getattr(row, name)) for name in names] for row in rows))
-
-
-def write_atomic(path: Path, data: bytes) -> None:
-    """Write a file so that it is never seen half written."""
-    temporary = path.with_name(path.name + ".tmp")
-    temporary.write_bytes(data)
-    os.replace(temporary, path)
 
 
 def _cell(value: object) -> object:

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from pushplan.evaluation.csv_text import csv_text
+from pushplan.evaluation.rows import csv_text
 from pushplan.evaluation.statistics import Estimate
 from pushplan.evaluation.summary import PairedDifference, PolicySummary
 from pushplan.metrics import METRICS, Role, metric_names

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -11,11 +12,12 @@ from numpy.typing import ArrayLike
 from pushplan.compiled import kernel
 from pushplan.geometry.obstacles import Obstacles, obstacle_distance, obstacles_of
 from pushplan.world import InvalidInputError, StaticMap
+from pushplan.world.checked_fields import CheckedFields, PositiveFloat, Shape
 from pushplan.world.checks import (
     ArrayRecord,
     BoolArray,
     FloatArray,
-    array,
+    checked_bounds,
     frozen,
     integer,
     number,
@@ -25,7 +27,7 @@ MAX_CELLS = 50_000_000
 
 
 @dataclass(frozen=True, eq=False)
-class Grid(ArrayRecord):
+class Grid(ArrayRecord, CheckedFields):
     """Square cells; row i runs along y, column j along x.
 
     The centre of cell (i, j) is at ``origin + ((j + 0.5), (i + 0.5)) * resolution``.
@@ -36,15 +38,14 @@ class Grid(ArrayRecord):
         shape: rows, columns.
     """
 
-    origin: FloatArray
-    resolution: float
+    field_prefix = "grid."
+
+    origin: Annotated[FloatArray, Shape(2)]
+    resolution: PositiveFloat
     shape: tuple[int, int]
 
     def __post_init__(self) -> None:
-        put = object.__setattr__
-        put(self, "origin", array("grid.origin", self.origin, (2,)))
-        step = number("grid.resolution", self.resolution, low=0.0, open_low=True)
-        put(self, "resolution", step)
+        super().__post_init__()
         if len(self.shape) != 2:
             raise InvalidInputError(f"grid.shape must be (rows, columns), got {self.shape!r}")
         rows, cols = (integer("grid.shape", n, low=1) for n in self.shape)
@@ -53,17 +54,13 @@ class Grid(ArrayRecord):
                 f"a grid may have at most {MAX_CELLS} cells, {rows} x {cols} are too many: "
                 "use a coarser resolution"
             )
-        put(self, "shape", (rows, cols))
+        object.__setattr__(self, "shape", (rows, cols))
 
     @classmethod
     def cover(cls, bounds: ArrayLike, resolution: float) -> Grid:
         """The smallest grid from the lower corner of ``bounds`` (4,) [m] that covers them."""
-        box: FloatArray = array("bounds", bounds, (4,))
+        box = checked_bounds("bounds", bounds)
         step = number("resolution", resolution, low=0.0, open_low=True)
-        if (box[:2] >= box[2:]).any():
-            raise InvalidInputError(
-                f"bounds must be x_min, y_min, x_max, y_max with min < max, got {box.tolist()}"
-            )
         # a width of 15.000000000001 cells is 15 cells
         cols, rows = (max(1, math.ceil(w / step - 1e-9)) for w in (box[2:] - box[:2]).tolist())
         return cls(box[:2], step, (rows, cols))

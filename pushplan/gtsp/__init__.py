@@ -4,8 +4,7 @@ from pushplan.gtsp.gtsp_config import GtspConfig
 from pushplan.gtsp.gtsplib import read_gtsp
 from pushplan.gtsp.gtsplib_write import read_tour, write_gtsp, write_tour
 from pushplan.gtsp.instance import GtspInstance
-from pushplan.gtsp.kernel_warmup import warm_up_solver
-from pushplan.gtsp.solve import solve_gtsp
+from pushplan.gtsp.solve import solve_gtsp, warm_up_solver
 from pushplan.gtsp.tour import Tour, TourStats, TourStatus
 
 __all__ = [

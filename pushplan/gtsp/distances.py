@@ -17,31 +17,13 @@ def _nearest(values: FloatArray) -> FloatArray:
     return result
 
 
-def _euclidean(steps: FloatArray) -> FloatArray:
+def _length(steps: FloatArray) -> FloatArray:
     length: FloatArray = np.sqrt(steps[..., 0] ** 2 + steps[..., 1] ** 2)
     return length
 
 
-def _euc_2d(at: FloatArray) -> FloatArray:
-    return _nearest(_euclidean(at[:, None] - at[None]))
-
-
-def _ceil_2d(at: FloatArray) -> FloatArray:
-    result: FloatArray = np.ceil(_euclidean(at[:, None] - at[None]))
-    return result
-
-
-def _man_2d(at: FloatArray) -> FloatArray:
-    return _nearest(np.abs(at[:, None] - at[None]).sum(-1))
-
-
-def _max_2d(at: FloatArray) -> FloatArray:
-    result: FloatArray = np.max(_nearest(np.abs(at[:, None] - at[None])), axis=-1)
-    return result
-
-
-def _att(at: FloatArray) -> FloatArray:
-    exact = np.sqrt(((at[:, None] - at[None]) ** 2).sum(-1) / 10.0)
+def _att(steps: FloatArray) -> FloatArray:
+    exact = np.sqrt((steps**2).sum(-1) / 10.0)
     rounded = _nearest(exact)
     result: FloatArray = np.where(rounded < exact, rounded + 1.0, rounded)
     return result
@@ -62,14 +44,13 @@ def _geo(at: FloatArray) -> FloatArray:
 
 _RULES: dict[str, Callable[[FloatArray], FloatArray]] = {
     "ATT": _att,
-    "CEIL_2D": _ceil_2d,
-    "EUC_2D": _euc_2d,
-    "GEO": _geo,
-    "MAN_2D": _man_2d,
-    "MAX_2D": _max_2d,
+    "CEIL_2D": lambda steps: np.ceil(_length(steps)),
+    "EUC_2D": lambda steps: _nearest(_length(steps)),
+    "MAN_2D": lambda steps: _nearest(np.abs(steps).sum(-1)),
+    "MAX_2D": lambda steps: np.max(_nearest(np.abs(steps)), axis=-1),
 }
-
-COORDINATE_TYPES = tuple(_RULES)
+"""Rules for the steps (N, N, 2) from each point to each other."""
+COORDINATE_TYPES = tuple(sorted({*_RULES, "GEO"}))
 """The weight types that need coordinates."""
 
 
@@ -79,5 +60,6 @@ def distances(coordinates: FloatArray, weight_type: str) -> FloatArray:
     Raises:
         InvalidInputError: if there is no such rule.
     """
-    rule = _RULES[choice("weight type", weight_type, COORDINATE_TYPES)]
-    return rule(coordinates)
+    if choice("weight type", weight_type, COORDINATE_TYPES) == "GEO":
+        return _geo(coordinates)
+    return _RULES[weight_type](coordinates[:, None] - coordinates[None])

@@ -12,7 +12,7 @@ from pushplan.gtsp.node_choice_kernels import SPARE, best_nodes
 from pushplan.gtsp.problem import Problem
 from pushplan.gtsp.ruin_recreate_kernels import TourProblem, TourState, search_tours
 from pushplan.world.checks import FloatArray, IntArray
-from pushplan.world.stop import AnyOf, MaxIterations, Stop, StopCheck
+from pushplan.world.stop import MaxIterations, Stop, StopCheck, rules_of
 
 MOST_ROUNDS = 2000
 
@@ -35,7 +35,9 @@ class Budget:
         began = time.perf_counter()
         if stop is None:
             stop = MaxIterations(iterations)
-        rounds = float(min((r.limit for r in _rules(stop)), default=np.inf))
+        rounds = float(
+            min((r.limit for r in rules_of(stop) if isinstance(r, MaxIterations)), default=np.inf)
+        )
         if stop.seconds == np.inf and rounds == np.inf:
             rounds = float(iterations)
         return Budget(stop.start(), began, stop.seconds, rounds)
@@ -59,11 +61,6 @@ class Budget:
     def stopped(self) -> bool:
         """Whether to return now."""
         return self.used >= self.rounds or self.check(self.used, self.cost)
-
-
-def _rules(stop: Stop) -> list[MaxIterations]:
-    rules = stop.rules if isinstance(stop, AnyOf) else (stop,)
-    return [rule for rule in rules if isinstance(rule, MaxIterations)]
 
 
 @dataclass

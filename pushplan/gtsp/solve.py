@@ -19,7 +19,7 @@ from pushplan.gtsp.search import Budget, search
 from pushplan.gtsp.tour import Tour, TourStats, TourStatus
 from pushplan.world.checks import IntArray
 from pushplan.world.errors import InvalidInputError
-from pushplan.world.stop import Stop, check_rules
+from pushplan.world.stop import MaxIterations, Stop, check_rules
 
 NODES_PER_ROOT_SECOND = 4000.0
 """A search holds no more nodes than this times the root of its seconds, so that it can begin."""
@@ -208,3 +208,16 @@ class _Call:
     def _stats(self) -> TourStats:
         budget = self.budget
         return TourStats(budget.elapsed, budget.best_s, budget.used, self.method, self.detail)
+
+
+def warm_up_solver(proof: bool = True) -> None:
+    """Solve a small instance in every way, so that later calls find compiled kernels.
+
+    Args:
+        proof: whether also with a lower bound.
+    """
+    costs = np.random.default_rng(0).random((14, 14))
+    clusters = [range(2 * c, 2 * c + 2) for c in range(7)]
+    solve_gtsp(costs, clusters)
+    config = GtspConfig(method="search", lower_bound=proof)
+    solve_gtsp(costs, clusters, stop=MaxIterations(50), config=config)

@@ -22,7 +22,6 @@ class CompiledInteraction(InteractionModel, Protocol):
 
     def compiled(self, world: World) -> Any:
         """The model for the shapes of this world as a named tuple, with memory for one thread."""
-        ...
 
 
 @KernelByType

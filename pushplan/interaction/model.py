@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol, runtime_checkable
+from typing import Annotated, Protocol, runtime_checkable
 
 from numpy.typing import ArrayLike
 
 from pushplan.compiled import owned
 from pushplan.world import InvalidInputError, World
-from pushplan.world.checks import ArrayRecord, FloatArray, array, integer
+from pushplan.world.checked_fields import CheckedFields, Limits, Shape
+from pushplan.world.checks import ArrayRecord, FloatArray, array
 from pushplan.world.polyline import path_lengths
 
 
@@ -26,7 +27,7 @@ def checked_path(path: ArrayLike) -> FloatArray:
 
 
 @dataclass(frozen=True, eq=False)
-class Interaction(ArrayRecord):
+class Interaction(ArrayRecord, CheckedFields):
     """Predicted effect of sweeping the robot along a path of N poses among K objects.
 
     Args:
@@ -38,16 +39,11 @@ class Interaction(ArrayRecord):
             were from there on.
     """
 
-    object_poses: FloatArray
-    masses: FloatArray
-    jammed_at: int = -1
+    field_prefix = "interaction."
 
-    def __post_init__(self) -> None:
-        put = object.__setattr__
-        put(self, "masses", array("interaction.masses", self.masses, (None,)))
-        shape = (None, len(self.masses), 3)
-        put(self, "object_poses", array("interaction.object_poses", self.object_poses, shape))
-        put(self, "jammed_at", integer("interaction.jammed_at", self.jammed_at, low=-1))
+    object_poses: Annotated[FloatArray, Shape(None, "K", 3)]
+    masses: Annotated[FloatArray, Shape("K")]
+    jammed_at: Annotated[int, Limits(-1)] = -1
 
     @property
     def lengths(self) -> FloatArray:
@@ -76,4 +72,3 @@ class InteractionModel(Protocol):
         Raises:
             InvalidInputError: if the path is not (N, 3), empty, or not finite.
         """
-        ...

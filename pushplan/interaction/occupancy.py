@@ -11,14 +11,15 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol, runtime_checkable
+from typing import Annotated, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from pushplan.interaction.occupancy_kernels import Patch, cover_objects, cover_sweep
 from pushplan.world import World
-from pushplan.world.checks import ArrayRecord, FloatArray, array, number
+from pushplan.world.checked_fields import CheckedFields, PositiveFloat, Shape
+from pushplan.world.checks import ArrayRecord, FloatArray, array
 from pushplan.world.errors import InvalidInputError
 from pushplan.world.outline import next_corner
 
@@ -30,52 +31,47 @@ CHANNELS = ("occupancy", "footprint", "swath")
 
 
 @dataclass(frozen=True, eq=False)
-class Passage(ArrayRecord):
+class Passage(ArrayRecord, CheckedFields):
     """A path through the objects: a world, and the poses that the robot sweeps through."""
 
+    field_prefix = "passage."
+
     world: World  # the snapshot; of the robot only the footprint is used
-    path: FloatArray  # (N, 3) robot poses x, y [m], theta [rad], N at least 2
+    # robot poses x, y [m], theta [rad], N at least 2
+    path: Annotated[FloatArray, Shape(None, 3)]
 
     def __post_init__(self) -> None:
-        if not isinstance(self.world, World):
-            raise InvalidInputError(
-                f"passage.world must be a World, got {type(self.world).__name__}"
-            )
-        object.__setattr__(self, "path", array("passage.path", self.path, (None, 3)))
+        super().__post_init__()
         if len(self.path) < 2:
             raise InvalidInputError(f"passage.path needs at least 2 poses, got {len(self.path)}")
 
 
 @dataclass(frozen=True, eq=False)
-class PassageBatch:
+class PassageBatch(CheckedFields):
     """Passages as a predictor reads them.
 
     Raises:
         InvalidInputError: if a shape is wrong or a value is not a fraction.
     """
 
+    field_prefix = "batch."
+
     # (B, 3, 40, 40) covered fraction of each cell: occupancy, footprint at the start, swath. Rows
     # count up ahead (towards the goal), columns to the right.
-    patches: Patch
-    cell: float  # side of a cell [m]
-    density: float = 1.0  # mass over area of the objects [kg/m²]
+    patches: Annotated[Patch, Shape("B", len(CHANNELS), PATCH_CELLS, PATCH_CELLS)]
+    cell: PositiveFloat  # side of a cell [m]
+    density: PositiveFloat = 1.0  # mass over area of the objects [kg/m²]
     # (B, 3) where each patch lies, as in `occupancy_kernels`; None where the patches come from a
     # map and predictors that need none are asked
-    frames: FloatArray | None = None
+    frames: Annotated[FloatArray, Shape("B", 3)] | None = None
     # the worlds, for predictors that follow single objects; () where there are none
     passages: tuple[Passage, ...] = ()
 
     def __post_init__(self) -> None:
-        put = object.__setattr__
-        shape = (None, len(CHANNELS), PATCH_CELLS, PATCH_CELLS)
-        patches = array("batch.patches", self.patches, shape, dtype=np.float32)
-        put(self, "patches", patches)
+        super().__post_init__()
+        patches = self.patches
         if patches.size and (patches.min() < 0.0 or patches.max() > 1.0):
             raise InvalidInputError("batch.patches must hold fractions of cells, from 0 to 1")
-        put(self, "cell", number("batch.cell", self.cell, low=0.0, open_low=True))
-        put(self, "density", number("batch.density", self.density, low=0.0, open_low=True))
-        if self.frames is not None:
-            put(self, "frames", array("batch.frames", self.frames, (len(patches), 3)))
         if self.passages and (len(self.passages) != len(patches) or self.frames is None):
             raise InvalidInputError(
                 f"a batch of {len(patches)} patches needs as many passages, and frames; got "
@@ -87,17 +83,15 @@ class PassageBatch:
 
 
 @dataclass(frozen=True, eq=False)
-class OccupancyForecast:
+class OccupancyForecast(CheckedFields):
     """What a predictor expects of each passage of a batch."""
 
-    after: Patch  # (B, 40, 40) covered fraction of each cell once the robot has passed
-    work: FloatArray  # (B,) sum of mass times path length over the objects [kg m]
+    field_prefix = "forecast."
 
-    def __post_init__(self) -> None:
-        put = object.__setattr__
-        shape = (None, PATCH_CELLS, PATCH_CELLS)
-        put(self, "after", array("forecast.after", self.after, shape, dtype=np.float32))
-        put(self, "work", array("forecast.work", self.work, (len(self.after),)))
+    # covered fraction of each cell once the robot has passed
+    after: Annotated[Patch, Shape("B", PATCH_CELLS, PATCH_CELLS)]
+    # sum of mass times path length over the objects [kg m]
+    work: Annotated[FloatArray, Shape("B")]
 
 
 @runtime_checkable
@@ -110,7 +104,6 @@ class OccupancyPredictor(Protocol):
         Raises:
             InvalidInputError: if the batch lacks what this predictor needs.
         """
-        ...
 
 
 class NoMotion:

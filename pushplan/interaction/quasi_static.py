@@ -5,15 +5,23 @@ from __future__ import annotations
 import functools
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pushplan.compiled import owned
+from pushplan.compiled import kernel, owned
 from pushplan.geometry import polygon_inertia
-from pushplan.interaction.kernels import Bodies, Settings, make_scratch, sweep_path
+from pushplan.interaction.advance import advance_objects
+from pushplan.interaction.kernels import (
+    Bodies,
+    Scratch,
+    Settings,
+    advance,
+    make_scratch,
+    sweep_path,
+)
 from pushplan.interaction.model import Interaction, checked_path
-from pushplan.interaction.quasi_static_step import QuasiStaticContacts
 from pushplan.world import Movables, RobotModel, StaticMap, World
 from pushplan.world.checked_fields import (
     CheckedFields,
@@ -22,8 +30,36 @@ from pushplan.world.checked_fields import (
     PositiveFraction,
     PositiveInt,
 )
-from pushplan.world.checks import FloatArray
+from pushplan.world.checks import FloatArray, IntArray
 from pushplan.world.outline import flatten
+
+
+class QuasiStaticContacts(NamedTuple):
+    """`QuasiStatic` in compiled form, with memory for one thread."""
+
+    inverse_masses: FloatArray  # (K,)
+    radii: FloatArray  # (K,) circumscribed radii [m]
+    tests: IntArray  # (1,) pairs of outlines that were tested so far
+    bodies: Bodies
+    settings: Settings
+    scratch: Scratch
+
+
+@kernel
+def _step(
+    model: QuasiStaticContacts,
+    robot_from: FloatArray,
+    robot_to: FloatArray,
+    poses: FloatArray,
+    moved: FloatArray,
+) -> bool:
+    """Drive the robot a step by the contact kernels."""
+    return bool(
+        advance(robot_from, robot_to, poses, moved, model.bodies, model.settings, model.scratch)
+    )
+
+
+advance_objects.add(QuasiStaticContacts, _step)
 
 
 @dataclass(frozen=True)

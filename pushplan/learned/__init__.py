@@ -12,13 +12,12 @@ from pushplan.world.lazy_names import lazy_names
 
 if TYPE_CHECKING:
     from pushplan.learned.features import FeatureObservation
-    from pushplan.learned.loading import LEARNED_PREFIXES, load_policy
+    from pushplan.learned.loading import LEARNED_PREFIXES, learned_names, load_policy
     from pushplan.learned.network_policy import NetworkPolicy
     from pushplan.learned.objects import ObjectPolicy
     from pushplan.learned.onnx_policy import OnnxPolicy
     from pushplan.learned.outputs import ActionSpec
     from pushplan.learned.sb3_policy import Sb3Policy
-    from pushplan.learned.shipped import learned_names
     from pushplan.learned.specification import RobotSpec, Specification
 
 __all__ = [
@@ -39,13 +38,12 @@ __getattr__, __dir__ = lazy_names(
     __name__,
     {
         "features": "FeatureObservation",
-        "loading": "LEARNED_PREFIXES load_policy",
+        "loading": "LEARNED_PREFIXES learned_names load_policy",
         "network_policy": "NetworkPolicy",
         "objects": "ObjectPolicy",
         "onnx_policy": "OnnxPolicy",
         "outputs": "ActionSpec",
         "sb3_policy": "Sb3Policy",
-        "shipped": "learned_names",
         "specification": "RobotSpec Specification",
     },
 )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping
 from dataclasses import asdict, fields
 from typing import Any
@@ -30,16 +31,9 @@ def builder_to_dict(builder: ObservationBuilder) -> dict[str, Any]:
     """
     for kind, known in KINDS.items():
         if type(builder) is known:
-            own = {
-                key: list(value) if isinstance(value, tuple) else value
-                for key, value in asdict(builder).items()  # type: ignore[call-overload]
-            }
-            return {
-                "kind": kind,
-                **own,
-                "shape": list(builder.shape),
-                "dtype": builder.dtype.name,
-            }
+            data = asdict(builder) | {"shape": builder.shape}  # type: ignore[call-overload]
+            own: dict[str, Any] = json.loads(json.dumps(data))  # tuples as lists
+            return {"kind": kind, **own, "dtype": builder.dtype.name}
     raise InvalidInputError(
         f"an observation in a file is one of {', '.join(KINDS)}, got {type(builder).__name__}"
     )

@@ -2,17 +2,41 @@
 
 from __future__ import annotations
 
+import functools
+from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from pushplan.learned.shipped import weights_of
-from pushplan.world import InvalidInputError
+from pushplan.world import InvalidInputError, UnknownNameError
 
 if TYPE_CHECKING:
     from pushplan.learned.network_policy import NetworkPolicy
 
+
 LEARNED_PREFIXES = ("onnx:", "sb3:")
 _ENDINGS = {"onnx": ".onnx", "sb3": ".zip"}
+
+
+@functools.lru_cache(maxsize=1)
+def _shipped() -> dict[str, Path]:
+    folder = Path(str(resources.files("pushplan.learned"))) / "weights"
+    return {path.stem: path for path in sorted(folder.glob("*.onnx"), key=lambda path: path.stem)}
+
+
+def learned_names() -> tuple[str, ...]:
+    """The names of the shipped networks, such as ``maze-ppo``."""
+    return tuple(_shipped())
+
+
+def weights_of(name: str) -> Path:
+    """The file of a shipped network.
+
+    Raises:
+        UnknownNameError: if there is none of that name.
+    """
+    if name not in _shipped():
+        raise UnknownNameError("learned policy", name, learned_names())
+    return _shipped()[name]
 
 
 def load_policy(source: str, label: str | None = None, **options: Any) -> NetworkPolicy:

@@ -58,7 +58,7 @@ class ObjectPolicy:
         """Forget the last episode; calls the object's own ``reset()`` if it takes no arguments."""
         self._state = None
         reset = getattr(self.thing, "reset", None)
-        if callable(reset) and not _required(reset):
+        if callable(reset) and _needs_nothing(reset):
             reset()
 
     def act(self, world: World, observation: Any) -> Action:
@@ -85,13 +85,12 @@ def _takes(function: Callable[..., Any], name: str) -> bool:
     return any(p.name == name or p.kind is inspect.Parameter.VAR_KEYWORD for p in parameters)
 
 
-def _required(function: Callable[..., Any]) -> int:
-    """How many arguments have no default."""
+def _needs_nothing(function: Callable[..., Any]) -> bool:
+    """Whether it may be called without arguments."""
     import inspect
 
     try:
-        parameters = inspect.signature(function).parameters.values()
+        inspect.signature(function).bind()
     except (TypeError, ValueError):
-        return 1
-    kinds = (inspect.Parameter.VAR_POSITIONAL, inspect.Parameter.VAR_KEYWORD)
-    return sum(p.default is inspect.Parameter.empty and p.kind not in kinds for p in parameters)
+        return False
+    return True

@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pushplan.world import InvalidInputError
-from pushplan.world.checks import choice, integer, known_keys, number
+from pushplan.world.checked_fields import CheckedFields, NonNegativeFloat, PositiveInt
+from pushplan.world.checks import choice, integer, known_keys
 
 MODES = {"turn_rate": 1, "velocity": 2, "wheels": 2, "heading": 1, "waypoint": 2}
 """Action modes of `pushplan.envs` and the number of elements of an action."""
@@ -28,7 +29,7 @@ class BadOutputError(InvalidInputError):
 
 
 @dataclass(frozen=True)
-class ActionSpec:
+class ActionSpec(CheckedFields):
     """What a network puts out, and what it means.
 
     Args:
@@ -46,23 +47,23 @@ class ActionSpec:
         step: with mode ``heading``, the task's ``heading_step`` [m]; else 0.
     """
 
+    field_prefix = "action."
+
     mode: str
     output: str
     shape: tuple[int, ...]
-    repeat: int = 1
-    window: float = 0.0
-    step: float = 0.0
+    repeat: PositiveInt = 1
+    window: NonNegativeFloat = 0.0
+    step: NonNegativeFloat = 0.0
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         choice("action mode", self.mode, tuple(MODES))
         choice("output", self.output, OUTPUTS)
         if isinstance(self.shape, str) or not hasattr(self.shape, "__iter__"):
             raise InvalidInputError(f"action.shape must be a list of numbers, got {self.shape!r}")
         shape = tuple(integer("action.shape", n, low=1, high=4096) for n in self.shape)
         object.__setattr__(self, "shape", shape)
-        object.__setattr__(self, "repeat", integer("action.repeat", self.repeat, low=1))
-        for name in ("window", "step"):
-            object.__setattr__(self, name, number(f"action.{name}", getattr(self, name), low=0.0))
         self._check_together()
 
     def _check_together(self) -> None:

@@ -41,11 +41,6 @@ class RobotSpec(CheckedFields):
     max_turn_rate: PositiveFloat
     radius: PositiveFloat
 
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        if not isinstance(self.drive, str):
-            raise InvalidInputError(f"robot.drive must be a text, got {self.drive!r}")
-
     @classmethod
     def of(cls, robot: RobotModel) -> RobotSpec:
         """Of a robot."""

@@ -1,10 +1,25 @@
-"""How far things moved. Lengths of paths, not displacements, from every recorded pose."""
+"""Plain facts of an episode; lengths are those of paths, not displacements, from every pose."""
 
 from __future__ import annotations
 
 from pushplan.world import Episode
 from pushplan.world.checks import FloatArray
 from pushplan.world.polyline import path_lengths
+
+
+def success(episode: Episode) -> float:
+    """1 if the task's goal was reached, else 0."""
+    return float(episode.success)
+
+
+def steps(episode: Episode) -> float:
+    """How many actions were sent to the environment."""
+    return float(len(episode.actions))
+
+
+def sim_time_s(episode: Episode) -> float:
+    """Simulated time from start to end [s]."""
+    return float(episode.times[-1] - episode.times[0])
 
 
 def path_length(poses: FloatArray) -> float:

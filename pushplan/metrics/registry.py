@@ -58,11 +58,10 @@ class Metric:
 
 _NAVIGATION = "pushplan.metrics.navigation"
 _MANIPULATION = "pushplan.metrics.manipulation"
-_LENGTHS = "pushplan.metrics.lengths"
-_COMMON = "pushplan.metrics.common"
+_FACTS = "pushplan.metrics.lengths"
 
 METRICS: dict[str, Metric] = {
-    "success": Metric(f"{_COMMON}:success", Role.ON_REQUEST),
+    "success": Metric(f"{_FACTS}:success", Role.ON_REQUEST),
     "E_nav": Metric(f"{_NAVIGATION}:e_nav", goal="robot", if_failed=0.0),
     "I_nav": Metric(f"{_NAVIGATION}:i_nav", goal="robot"),
     "S_manip": Metric(f"{_MANIPULATION}:s_manip", goal="objects", if_failed=0.0),
@@ -75,16 +74,16 @@ METRICS: dict[str, Metric] = {
         f"{_MANIPULATION}:e_manip_straight", Role.ON_REQUEST, goal="objects"
     ),
     "path_length_m": Metric(
-        f"{_LENGTHS}:robot_path_length", Role.DETAIL, "path [m]", higher_is_better=False
+        f"{_FACTS}:robot_path_length", Role.DETAIL, "path [m]", higher_is_better=False
     ),
     "interaction_work_kg_m": Metric(
-        f"{_LENGTHS}:interaction_work", Role.DETAIL, "work [kg m]", higher_is_better=False
+        f"{_FACTS}:interaction_work", Role.DETAIL, "work [kg m]", higher_is_better=False
     ),
     "steps": Metric(
-        f"{_COMMON}:steps", Role.FACT, higher_is_better=None, until_failure=True, whole=True
+        f"{_FACTS}:steps", Role.FACT, higher_is_better=None, until_failure=True, whole=True
     ),
     "sim_time_s": Metric(
-        f"{_COMMON}:sim_time_s", Role.FACT, "time [s]", higher_is_better=None, until_failure=True
+        f"{_FACTS}:sim_time_s", Role.FACT, "time [s]", higher_is_better=None, until_failure=True
     ),
 }
 """All metrics, in the order of the columns. A line here is all that a new one needs."""

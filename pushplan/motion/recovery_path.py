@@ -2,17 +2,105 @@
 
 from __future__ import annotations
 
+import math
+from typing import NamedTuple
+
 import numpy as np
 
-from pushplan.motion.collision import footprint, obstacles
-from pushplan.motion.recovery_kernels import (
-    STEP,
-    RecoveryProblem,
-    can_turn,
-    search_recovery,
-)
+from pushplan.compiled import copy_into, kernel
+from pushplan.geometry import core_distance
+from pushplan.geometry.transforms import arc_step
+from pushplan.motion.collision import ConvexObstacles, Footprint, footprint, obstacles, static_depth
 from pushplan.world import World
-from pushplan.world.checks import FloatArray
+from pushplan.world.checks import FloatArray, IntArray
+
+STEP = 0.08
+"""Length of a step [circumscribed radii], and turn of one on the spot [rad]."""
+_CELL = 0.6  # sides of the boxes of poses of which one is looked at each [steps]
+_REACH = 3.0  # how far away the place to turn may be [circumscribed radii]
+_MOST = 100_000  # poses that are looked at
+_CLEARANCE = 1.05  # clearance that the robot needs to turn about [circumscribed radii]
+_DEEPER = 1e-3  # by how much the robot may get deeper into what it touches [circumscribed radii]
+
+
+class RecoveryProblem(NamedTuple):
+    """Where the robot is, and what it must not touch."""
+
+    start: FloatArray  # (3,) pose of the robot
+    steps: FloatArray  # (A, 2) distance [m] and turn [rad] of each step that it may take
+    shape: Footprint
+    among: ConvexObstacles
+    size: float  # Circumscribed radius of the robot [m]
+
+
+@kernel
+def can_turn(pose: FloatArray, size: float, among: ConvexObstacles) -> bool:
+    """Whether the disc that the robot needs to turn about is within the bounds and free."""
+    x, y, bounds, radius = pose[0], pose[1], among.bounds, _CLEARANCE * size
+    if min(x - bounds[0], bounds[2] - x, y - bounds[1], bounds[3] - y) < radius:
+        return False
+    for s in range(among.boxes.shape[0]):
+        box = among.boxes[s]
+        if x + radius <= box[0] or x - radius >= box[2]:
+            continue
+        if y + radius <= box[1] or y - radius >= box[3]:
+            continue
+        first, end = among.offsets[s], among.offsets[s + 1]
+        if core_distance(x, y, among.vertices, first, end) < radius:
+            return False
+    return True
+
+
+@kernel(allocates=True)
+def _path_to(node: int, nodes: FloatArray, before: IntArray) -> FloatArray:
+    """(N, 3) the poses that have led to one."""
+    count, last = 1, node
+    while before[last] >= 0:
+        last = before[last]
+        count += 1
+    path = np.empty((count, 3))
+    for n in range(count - 1, -1, -1):
+        copy_into(path[n], nodes[node])
+        node = before[node]
+    return path
+
+
+@kernel(allocates=True)
+def search_recovery(problem: RecoveryProblem) -> FloatArray:
+    """The drive with the fewest steps, (N, 3), to where it can turn; (0, 3) if there is none."""
+    start, shape, among, size = problem.start, problem.shape, problem.among, problem.size
+    unit = _CELL * STEP
+    half, turns = int(_REACH / unit), math.ceil(2.0 * math.pi / unit)
+    seen = np.zeros((2 * half + 1, 2 * half + 1, turns), dtype=np.bool_)
+    nodes, before = np.empty((_MOST, 3)), np.empty(_MOST, dtype=np.int64)
+    scratch, pose, between = np.empty_like(shape.vertices), np.empty(3), np.empty(3)
+    limit = static_depth(start, shape, among, scratch) + _DEEPER * size
+    copy_into(nodes[0], start)
+    before[0], count = -1, 1
+    at = 0
+    while at < count:
+        for distance, turn in problem.steps:
+            arc_step(nodes[at], distance, turn, pose)
+            j = half + round((pose[0] - start[0]) / (unit * size))
+            i = half + round((pose[1] - start[1]) / (unit * size))
+            t = math.floor(pose[2] % (2.0 * math.pi) / unit)
+            if not (0 <= j <= 2 * half and 0 <= i <= 2 * half) or seen[i, j, t]:
+                continue
+            if static_depth(pose, shape, among, scratch) > limit:
+                continue
+            arc_step(nodes[at], 0.5 * distance, 0.5 * turn, between)
+            if static_depth(between, shape, among, scratch) > limit:
+                continue
+            seen[i, j, t] = True
+            copy_into(nodes[count], pose)
+            before[count] = at
+            count += 1
+            if count == _MOST:
+                return nodes[:0]
+            if can_turn(pose, size, among):
+                return _path_to(count - 1, nodes, before)
+        at += 1
+    return nodes[:0]
 
 
 def recovery_path(world: World, margin: float) -> FloatArray | None:

@@ -16,26 +16,21 @@ class ObservationBuilder(Protocol):
     @property
     def shape(self) -> tuple[int, ...]:
         """Shape of the array."""
-        ...
 
     @property
     def dtype(self) -> np.dtype[Any]:
         """Element type of the array."""
-        ...
 
     @property
     def low(self) -> float:
         """Least value of an element."""
-        ...
 
     @property
     def high(self) -> float:
         """Greatest value of an element."""
-        ...
 
     def observe(self, world: World) -> NDArray[Any]:
         """A new array for this snapshot."""
-        ...
 
 
 class LimitedVector:

@@ -1,4 +1,8 @@
-"""The window that an image observation looks through."""
+"""The window that an image observation looks through.
+
+To kernels a ``view`` is (7,): pose of the window, rows, columns, and the two steps, see
+`View.numbers`.
+"""
 
 from __future__ import annotations
 
@@ -7,11 +11,78 @@ from functools import cached_property
 
 import numpy as np
 
-from pushplan.observation import view_kernels
-from pushplan.observation.view_kernels import Image
+from pushplan.compiled import kernel
+from pushplan.geometry import fill_convex
+from pushplan.geometry.transforms import transform_points
 from pushplan.world import World
 from pushplan.world.checks import FloatArray, IntArray
 from pushplan.world.movables import Movables
+
+Image = np.ndarray[tuple[int, int], np.dtype[np.uint8]]
+
+
+@kernel(allocates=True)
+def to_pixels(view: FloatArray, points: FloatArray, out: FloatArray) -> None:
+    """World points (N, 2) [m] to column and row [px]."""
+    c, s = np.cos(view[2]), np.sin(view[2])
+    for i in range(points.shape[0]):
+        dx, dy = points[i, 0] - view[0], points[i, 1] - view[1]
+        out[i, 0] = 0.5 * view[4] - (c * dy - s * dx) / view[6]
+        out[i, 1] = 0.5 * view[3] - (c * dx + s * dy) / view[5]
+
+
+@kernel(allocates=True)
+def fill_parts(
+    image: Image, view: FloatArray, vertices: FloatArray, offsets: IntArray, value: int
+) -> None:
+    """Fill convex polygons (V, 2) of the world frame."""
+    spots = np.empty_like(vertices)
+    to_pixels(view, vertices, spots)
+    for k in range(offsets.shape[0] - 1):
+        fill_convex(image, spots[offsets[k] : offsets[k + 1]], value)
+
+
+@kernel(allocates=True)
+def fill_bodies(
+    image: Image,
+    view: FloatArray,
+    poses: FloatArray,
+    vertices: FloatArray,
+    offsets: IntArray,
+    radii: FloatArray,
+    value: int,
+) -> None:
+    """Fill the outlines of the bodies that the window may show."""
+    reach = 0.5 * np.hypot(view[3] * view[5], view[4] * view[6])
+    corners, spots = np.empty_like(vertices), np.empty_like(vertices)
+    for k in range(poses.shape[0]):
+        far = reach + radii[k]
+        if (poses[k, 0] - view[0]) ** 2 + (poses[k, 1] - view[1]) ** 2 > far * far:
+            continue
+        a, b = offsets[k], offsets[k + 1]
+        transform_points(poses[k], vertices[a:b], corners[a:b])
+        to_pixels(view, corners[a:b], spots[a:b])
+        fill_convex(image, spots[a:b], value)
+
+
+@kernel(allocates=True)
+def sample(
+    image: Image, view: FloatArray, values: Image, ox: float, oy: float, step: float
+) -> None:
+    """Read a raster with its first corner at ox, oy and cells of ``step`` [m] at every pixel."""
+    c, s = np.cos(view[2]), np.sin(view[2])
+    rows, cols = values.shape
+    up, across = view[5] / step, view[6] / step
+    # raster coordinates of the first pixel, and how they change along rows and columns
+    front, left = 0.5 * (view[3] - 1.0) * up, 0.5 * (view[4] - 1.0) * across
+    u0 = (view[0] - ox) / step + c * front - s * left
+    v0 = (view[1] - oy) / step + s * front + c * left
+    for r in range(image.shape[0]):
+        u, v = u0 - r * up * c, v0 - r * up * s
+        for q in range(image.shape[1]):
+            j = min(max(int(np.floor(u + q * across * s)), 0), cols - 1)
+            i = min(max(int(np.floor(v - q * across * c)), 0), rows - 1)
+            image[r, q] = values[i, j]
 
 
 @dataclass(frozen=True)
@@ -41,12 +112,12 @@ class View:
     def pixels(self, points: FloatArray) -> FloatArray:
         """World points (N, 2) [m] as column and row [px]."""
         spots = np.empty_like(points)
-        view_kernels.to_pixels(self.numbers, points, spots)
+        to_pixels(self.numbers, points, spots)
         return spots
 
     def fill_movables(self, image: Image, objects: Movables, value: int = 255) -> None:
         """Fill the outlines of objects."""
-        view_kernels.fill_bodies(
+        fill_bodies(
             image,
             self.numbers,
             objects.poses,
@@ -60,8 +131,8 @@ class View:
         self, image: Image, vertices: FloatArray, offsets: IntArray, value: int = 255
     ) -> None:
         """Fill convex polygons given in the world frame."""
-        view_kernels.fill_parts(image, self.numbers, vertices, offsets, value)
+        fill_parts(image, self.numbers, vertices, offsets, value)
 
     def sample(self, image: Image, values: Image, origin: FloatArray, step: float) -> None:
         """Read a raster in the world frame at every pixel; outside it its border counts."""
-        view_kernels.sample(image, self.numbers, values, origin[0], origin[1], step)
+        sample(image, self.numbers, values, origin[0], origin[1], step)

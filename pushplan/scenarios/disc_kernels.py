@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from pushplan.compiled import kernel
-from pushplan.scenarios.ice_water import IceWater, nearest_point
+from pushplan.scenarios.floe_kernels import IceWater, nearest_point
 from pushplan.world.checks import FloatArray, IntArray
 
 

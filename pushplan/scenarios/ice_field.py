@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from pushplan.world import InvalidInputError
-from pushplan.world.checks import ArrayRecord, FloatArray, array, frozen
+from pushplan.world.checks import ArrayRecord, FloatArray, checked_bounds, frozen
 from pushplan.world.outline import areas_and_centroids, convex_outlines, flatten
 
 
@@ -32,7 +32,7 @@ class IceField(ArrayRecord):
 
     def __post_init__(self) -> None:
         put = object.__setattr__
-        put(self, "bounds", checked_bounds(self.bounds))
+        put(self, "bounds", checked_bounds("ice bounds", self.bounds))
         if isinstance(self.polygons, str) or not isinstance(self.polygons, Sequence | np.ndarray):
             raise InvalidInputError(f"floes must be a list of outlines, got {self.polygons!r:.60}")
         put(self, "polygons", tuple(convex_outlines("floe", self.polygons)))
@@ -54,17 +54,3 @@ class IceField(ArrayRecord):
     def concentration(self) -> float:
         """Area of the floes over the area within the bounds."""
         return float(self.areas.sum() / np.prod(self.bounds[2:] - self.bounds[:2]))
-
-
-def checked_bounds(bounds: object) -> FloatArray:
-    """Check a rectangle (4,) x_min, y_min, x_max, y_max [m].
-
-    Raises:
-        InvalidInputError: if it has another shape or no area.
-    """
-    box: FloatArray = array("ice bounds", bounds, (4,))  # type: ignore[arg-type]
-    if (box[:2] >= box[2:]).any():
-        raise InvalidInputError(
-            f"ice bounds must be x_min, y_min, x_max, y_max with min < max, got {box.tolist()}"
-        )
-    return box

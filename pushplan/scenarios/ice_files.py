@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 import shapely
 
-from pushplan.scenarios.ice_field import IceField, checked_bounds
+from pushplan.scenarios.ice_field import IceField
 from pushplan.world import InvalidInputError, SchemaError
-from pushplan.world.checks import FloatArray, array, known_keys
+from pushplan.world.checks import FloatArray, array, checked_bounds, known_keys
 from pushplan.world.outline import flatten, signed_area, unflatten, well_formed
 
 SCHEMA = "pushplan-ice/1"
@@ -181,11 +181,11 @@ def _clean(polygons: Sequence[Any], hull: bool) -> tuple[FloatArray, ...]:
 
 def _bounds(floes: Sequence[FloatArray], bounds: object) -> FloatArray:
     if bounds is not None:
-        return checked_bounds(bounds)
+        return checked_bounds("ice bounds", bounds)
     if not floes:
         raise InvalidInputError("an ice field without floes must state its bounds")
     corners = np.concatenate(floes)
-    return checked_bounds([*corners.min(axis=0), *corners.max(axis=0)])
+    return checked_bounds("ice bounds", [*corners.min(axis=0), *corners.max(axis=0)])
 
 
 def _check_inside(field: IceField) -> None:

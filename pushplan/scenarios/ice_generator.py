@@ -10,12 +10,11 @@ from scipy.spatial import cKDTree
 
 from pushplan.geometry import polygon_area
 from pushplan.scenarios.disc_kernels import place_discs
-from pushplan.scenarios.floe_kernels import Discs, Outlines, cut_cells, fit_floes
+from pushplan.scenarios.floe_kernels import Discs, IceWater, Outlines, cut_cells, fit_floes
 from pushplan.scenarios.floe_sizes import MARGIN, FloeSizes
-from pushplan.scenarios.ice_field import IceField, checked_bounds
-from pushplan.scenarios.ice_water import IceWater
+from pushplan.scenarios.ice_field import IceField
 from pushplan.world import InvalidInputError, ScenarioError
-from pushplan.world.checks import FloatArray, IntArray, number
+from pushplan.world.checks import FloatArray, IntArray, checked_bounds, number
 from pushplan.world.outline import convex_outline, flatten, unflatten
 
 MOST_FLOES = 20_000
@@ -66,7 +65,7 @@ def generate_ice(
     sizes = FloeSizes() if sizes is None else sizes
     if not isinstance(sizes, FloeSizes):
         raise InvalidInputError(f"ice sizes must be a FloeSizes, got {type(sizes).__name__}")
-    box = checked_bounds(bounds)
+    box = checked_bounds("ice bounds", bounds)
     concentration = number("ice concentration", concentration, low=0.0, high=1.0)
     clumping = number("ice clumping", clumping, low=0.0, high=1.0)
     gap = 0.03 * sizes.mean_radius if gap is None else gap

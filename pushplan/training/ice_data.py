@@ -15,6 +15,7 @@ from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from itertools import starmap
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -52,6 +53,11 @@ def voyage_pairs(seed: int, split: str) -> IcePairs:
     )
 
 
+def _joined(pairs: Sequence[IcePairs]) -> dict[str, Any]:
+    names = ("patches", "after", "work")
+    return {name: np.concatenate([getattr(p, name) for p in pairs]) for name in names}
+
+
 def write_shard(folder: str | Path, split: str, index: int) -> Path:
     """Simulate the voyages of one shard and write it, unless it is there."""
     path = Path(folder) / f"{split}-{index:05d}.npz"
@@ -61,12 +67,7 @@ def write_shard(folder: str | Path, split: str, index: int) -> Path:
     pairs = [voyage_pairs(seed, split) for seed in seeds]
     partial = path.with_suffix(f".{os.getpid()}.partial")
     with partial.open("wb") as file:
-        np.savez_compressed(
-            file,
-            patches=np.concatenate([p.patches for p in pairs]),
-            after=np.concatenate([p.after for p in pairs]),
-            work=np.concatenate([p.work for p in pairs]),
-        )
+        np.savez_compressed(file, **_joined(pairs))
     partial.replace(path)
     return path
 
@@ -114,11 +115,7 @@ def read_shards(folder: str | Path, split: str, limit: int | None = None) -> Ice
             f"'python -m pushplan.training.ice_data --out {folder} --split {split}'"
         )
     pairs = [_read(path) for path in paths]
-    return IcePairs(
-        np.concatenate([p.patches for p in pairs]),
-        np.concatenate([p.after for p in pairs]),
-        np.concatenate([p.work for p in pairs]),
-    )
+    return IcePairs(**_joined(pairs))
 
 
 def _read(path: Path) -> IcePairs:

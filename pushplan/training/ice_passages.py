@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from typing import Annotated
 
 import numpy as np
 
@@ -18,30 +19,33 @@ from pushplan.interaction.occupancy import (
     patch_after,
 )
 from pushplan.world import World, stream
-from pushplan.world.checks import FloatArray, integer, number
+from pushplan.world.checked_fields import CheckedFields, Limits, PositiveInt
+from pushplan.world.checks import FloatArray, number
 
 SPLITS = ("train", "held-out")
 
 
 @dataclass(frozen=True)
-class PassageConfig:
+class PassageConfig(CheckedFields):
     """What passages are drawn. Lengths in hull lengths."""
 
-    greatest_concentration: float = 0.5  # of the ice, drawn from ``least_concentration`` to this
+    # of the ice, drawn from ``least_concentration`` to this
+    greatest_concentration: Annotated[float, Limits(0.0, 0.5)] = 0.5
     least_concentration: float = 0.01  # fraction of ice
-    passages: int = 48  # drawn from each voyage along the channel
+    passages: PositiveInt = 48  # drawn from each voyage along the channel
     shortest: float = 0.2  # least length of a passage
     longest: float = 1.2  # greatest length
     # least and greatest length of the arcs that a voyage is made of
     arcs: tuple[float, float] = (0.15, 1.0)
-    spacing: float = 0.05  # between the poses of a voyage
+    spacing: Annotated[float, Limits(0.0, 0.2, open_low=True)] = (
+        0.05  # between the poses of a voyage
+    )
     steepest: float = math.radians(75.0)  # greatest angle between the ship and the channel [rad]
 
     def __post_init__(self) -> None:
-        fraction = number("greatest_concentration", self.greatest_concentration, low=0.0, high=0.5)
-        number("least_concentration", self.least_concentration, low=0.0, high=fraction)
-        integer("passages", self.passages, low=1)
-        number("spacing", self.spacing, low=0.0, high=0.2, open_low=True)
+        super().__post_init__()
+        most = self.greatest_concentration
+        number("least_concentration", self.least_concentration, low=0.0, high=most)
         number("shortest", self.shortest, low=self.spacing)
         number("longest", self.longest, low=self.shortest, high=1.5)
         number("arcs", self.arcs[0], low=self.spacing, high=self.arcs[1])

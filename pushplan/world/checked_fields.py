@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, is_dataclass
 from functools import cache, partial
 from typing import Annotated, Any, ClassVar, get_args, get_origin, get_type_hints
 
-from pushplan.world.checks import boolean, choice, integer, number
+import numpy as np
+
+from pushplan.world.checks import array, boolean, choice, expect, integer, number, word
 
 
 @dataclass(frozen=True)
@@ -28,6 +30,17 @@ class OneOf:
     valid: tuple[str, ...]
 
 
+class Shape(tuple[int | str | None, ...]):
+    """Shape of an array, in ``Annotated[FloatArray, Shape("N", 3)]``.
+
+    A letter stands for any number, the same one in all fields of an instance; None for any.
+    """
+
+    def __new__(cls, *sides: int | str | None) -> Shape:
+        """Take the sides one by one."""
+        return super().__new__(cls, sides)
+
+
 PositiveFloat = Annotated[float, Limits(0.0, open_low=True)]
 NonNegativeFloat = Annotated[float, Limits(0.0)]
 Fraction = Annotated[float, Limits(0.0, 1.0)]
@@ -39,9 +52,11 @@ NonNegativeInt = Annotated[int, Limits(0)]
 class CheckedFields:
     """Base of dataclasses that check their fields when an instance is made.
 
-    A field of type float, int or bool takes a finite number, a whole number or a truth value and
-    keeps it as that type; `Limits` and `OneOf` in the annotation say which ones. None is left alone
-    where the annotation allows it, and so are fields of all other types.
+    A field of type float, int, bool or str takes a finite number, a whole number, a truth value or
+    a text and keeps it as that type; `Limits` and `OneOf` in the annotation say which ones. An
+    array becomes a read-only copy of the `Shape` in the annotation. A field whose type is a
+    dataclass takes an instance of it. None is left alone where the annotation allows it, and so are
+    fields of all other types.
 
     Raises:
         InvalidInputError: naming the first field with a wrong value, the value and the rule.
@@ -52,38 +67,55 @@ class CheckedFields:
 
     def __post_init__(self) -> None:
         kind: Any = type(self)
-        for name, check, optional in _checks(kind):
-            if (value := getattr(self, name)) is not None or not optional:
-                object.__setattr__(self, name, check(self.field_prefix + name, value))
+        values, sides = self.__dict__, dict[str | int | None, int]()
+        for name, called, check, optional, shape in _checks(kind):
+            value = values[name]
+            if optional and value is None:
+                continue
+            if shape is None:
+                values[name] = check(called, value)
+            else:
+                wanted = tuple(n if isinstance(n, int) else sides.get(n) for n in shape)
+                values[name] = found = check(called, value, wanted)
+                sides.update((n, k) for n, k in zip(shape, found.shape, strict=True) if n)
 
 
 @cache
-def _checks(kind: Any) -> tuple[tuple[str, Callable[[str, Any], Any], bool], ...]:
-    """Name of each checked field of a dataclass, its check, and whether it may be None."""
+def _checks(kind: Any) -> tuple[tuple[str, str, Callable[..., Any], bool, Shape | None], ...]:
+    """Each checked field: name, the same in errors, check, whether it may be None, lettered shape.
+
+    A check is a function of what errors call the value, the value, and a shape if it has letters.
+    """
     hints = get_type_hints(kind, include_extras=True)
     found = []
     for field in fields(kind):
         hint = hints[field.name]
         optional = type(None) in get_args(hint)
         kinds = [one for one in get_args(hint) if one is not type(None)] if optional else [hint]
-        check = _check(kinds[0]) if len(kinds) == 1 else None
+        check, shape = _check(kinds[0]) if len(kinds) == 1 else (None, None)
         if check is not None:
-            found.append((field.name, check, optional))
+            found.append((field.name, kind.field_prefix + field.name, check, optional, shape))
     return tuple(found)
 
 
-def _check(hint: Any) -> Callable[[str, Any], Any] | None:
-    """The check of one type: a function of what an error calls the value, and the value."""
+def _check(hint: Any) -> tuple[Callable[..., Any] | None, Shape | None]:
     base, *notes = get_args(hint) if get_origin(hint) is Annotated else (hint,)
     note = notes[0] if notes else Limits()
     if isinstance(note, OneOf):
-        return partial(choice, valid=note.valid)
-    if base is bool:
-        return boolean
+        return partial(choice, valid=note.valid), None
+    if isinstance(note, Shape):
+        dtype = np.dtype(get_args(get_args(base)[1])[0])
+        if any(isinstance(side, str) for side in note):
+            return partial(array, dtype=dtype), note
+        plain = tuple(side for side in note if not isinstance(side, str))
+        return partial(array, shape=plain, dtype=dtype), None
     if base is int:
-        return partial(integer, low=note.low, high=note.high)
-    if base is not float:
-        return None
-    low = -math.inf if note.low is None else note.low
-    high = math.inf if note.high is None else note.high
-    return partial(number, low=low, high=high, open_low=note.open_low, finite=note.finite)
+        return partial(integer, low=note.low, high=note.high), None
+    if base is float:
+        low = -math.inf if note.low is None else note.low
+        high = math.inf if note.high is None else note.high
+        own = partial(number, open_low=note.open_low, finite=note.finite)
+        return partial(own, low=low, high=high), None
+    if isinstance(base, type) and is_dataclass(base):
+        return partial(expect, kind=base), None
+    return {bool: boolean, str: word}.get(base), None

@@ -86,6 +86,17 @@ def boolean(name: str, value: object) -> bool:
     return bool(value)
 
 
+def word(name: str, value: object) -> str:
+    """Check that ``value`` is a text and return it.
+
+    Raises:
+        InvalidInputError: if it is not.
+    """
+    if not isinstance(value, str):
+        raise InvalidInputError(f"{name} must be a text, got {value!r:.60}")
+    return value
+
+
 def choice(kind: str, value: object, valid: Sequence[str]) -> str:
     """Check that ``value`` is one of the valid names and return it.
 
@@ -132,8 +143,9 @@ def array(
         ) from error
     if result.size == 0 and result.ndim != len(shape) and shape[0] is None:
         result = result.reshape((0, *(n or 0 for n in shape[1:])))
-    if result.ndim != len(shape) or any(
-        want is not None and have != want for have, want in zip(result.shape, shape, strict=True)
+    if result.shape != shape and (
+        result.ndim != len(shape)
+        or any(want not in (None, have) for have, want in zip(result.shape, shape, strict=True))
     ):
         raise InvalidInputError(f"{name} must have shape {_shape_text(shape)}, got {result.shape}")
     if wanted.kind == "f" and not np.isfinite(result).all():
@@ -143,6 +155,20 @@ def array(
         )
     result.flags.writeable = False
     return result
+
+
+def checked_bounds(name: str, value: Any) -> FloatArray:
+    """Check a rectangle (4,) x_min, y_min, x_max, y_max [m] and return it as `array` does.
+
+    Raises:
+        InvalidInputError: if it has another shape, is not finite or is empty.
+    """
+    sides: FloatArray = array(name, value, (4,))
+    if (sides[:2] >= sides[2:]).any():
+        raise InvalidInputError(
+            f"{name} must be x_min, y_min, x_max, y_max with min < max, got {sides.tolist()}"
+        )
+    return sides
 
 
 def frozen(values: NDArray[Any]) -> NDArray[Any]:

@@ -8,10 +8,11 @@ import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
+from pushplan.world.checked_fields import CheckedFields, Shape
 from pushplan.world.checks import ArrayRecord, BoolArray, FloatArray, array, known_keys
 from pushplan.world.errors import InvalidInputError, SchemaError
 from pushplan.world.files import world_from_dict, world_to_dict
@@ -41,8 +42,11 @@ _ARRAYS = (
 )
 
 
+Numbers = Annotated[FloatArray, Shape(None)]
+
+
 @dataclass(frozen=True, eq=False)
-class Episode(ArrayRecord):
+class Episode(ArrayRecord, CheckedFields):
     """What happened from one start to one end, whoever recorded it.
 
     Args:
@@ -64,39 +68,35 @@ class Episode(ArrayRecord):
         InvalidInputError: if shapes disagree or a value is not finite.
     """
 
+    field_prefix = "episode."
+
     world: World
-    times: FloatArray
-    robot_poses: FloatArray
+    times: Annotated[FloatArray, Shape("T")]
+    robot_poses: Annotated[FloatArray, Shape("T", 3)]
     object_poses: FloatArray
     success: bool
     reason: str
     completed: BoolArray | None = None
-    actions: FloatArray = field(default_factory=lambda: np.zeros((0, 0)))
-    rewards: FloatArray = field(default_factory=lambda: np.zeros(0))
-    act_times_s: FloatArray = field(default_factory=lambda: np.zeros(0), compare=False)
-    plan_times_s: FloatArray = field(default_factory=lambda: np.zeros(0), compare=False)
+    actions: Annotated[FloatArray, Shape(None, None)] = field(
+        default_factory=lambda: np.zeros((0, 0))
+    )
+    rewards: Numbers = field(default_factory=lambda: np.zeros(0))
+    act_times_s: Numbers = field(default_factory=lambda: np.zeros(0), compare=False)
+    plan_times_s: Numbers = field(default_factory=lambda: np.zeros(0), compare=False)
     about: Mapping[str, Any] = field(default_factory=dict, compare=False)
 
     def __post_init__(self) -> None:
-        if not isinstance(self.world, World):
-            raise InvalidInputError(f"episode.world must be a World, got {self.world!r:.60}")
-        count = len(self.world.movables)
+        super().__post_init__()
+        length, count = len(self.times), len(self.world.movables)
         put = object.__setattr__
-        put(self, "times", array("episode.times", self.times, (None,)))
-        length = len(self.times)
         if length == 0 or (np.diff(self.times) <= 0.0).any():
             raise InvalidInputError("episode.times must hold at least one instant and increase")
-        put(self, "robot_poses", array("episode.robot_poses", self.robot_poses, (length, 3)))
         poses = np.asarray(self.object_poses)
         if count == 0 and poses.size == 0:
             poses = np.zeros((length, 0, 3))
         put(self, "object_poses", array("episode.object_poses", poses, (length, count, 3)))
         done = np.zeros(count, dtype=bool) if self.completed is None else self.completed
         put(self, "completed", array("episode.completed", done, (count,), dtype=np.bool_))
-        put(self, "actions", array("episode.actions", self.actions, (None, None)))
-        for key in ("rewards", "act_times_s", "plan_times_s"):
-            put(self, key, array(f"episode.{key}", getattr(self, key), (None,)))
-        put(self, "success", bool(self.success))
 
     def world_at(self, index: int) -> World:
         """The scene at recorded instant ``index``."""

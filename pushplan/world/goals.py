@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
-from pushplan.world.checks import ArrayRecord, BoolArray, FloatArray, IntArray, array, number
+from pushplan.world.checked_fields import CheckedFields, PositiveFloat, Shape
+from pushplan.world.checks import ArrayRecord, BoolArray, FloatArray, IntArray, array
 from pushplan.world.errors import InvalidInputError
 from pushplan.world.outline import convex_outline, next_corner
 
+Point = Annotated[FloatArray, Shape(2)]
+
 
 @dataclass(frozen=True, eq=False)
-class GoalDisc(ArrayRecord):
+class GoalDisc(ArrayRecord, CheckedFields):
     """Reached when the robot's origin is within ``radius`` of ``center``.
 
     Args:
@@ -20,13 +24,10 @@ class GoalDisc(ArrayRecord):
         radius: [m], positive.
     """
 
-    center: FloatArray
-    radius: float
+    field_prefix = "goal."
 
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "center", array("goal.center", self.center, (2,)))
-        radius = number("goal.radius", self.radius, low=0.0, open_low=True)
-        object.__setattr__(self, "radius", radius)
+    center: Point
+    radius: PositiveFloat
 
     def distance(self, x: float, y: float) -> float:
         """Straight distance [m] from a point to the nearest point that counts, 0 inside."""
@@ -41,7 +42,7 @@ class GoalDisc(ArrayRecord):
 
 
 @dataclass(frozen=True, eq=False)
-class GoalLine(ArrayRecord):
+class GoalLine(ArrayRecord, CheckedFields):
     """Reached when the robot's origin is on or beyond a line.
 
     Args:
@@ -49,18 +50,19 @@ class GoalLine(ArrayRecord):
         normal: (2,) direction in which the line is crossed; stored with unit length.
     """
 
-    point: FloatArray
-    normal: FloatArray
+    field_prefix = "goal."
+
+    point: Point
+    normal: Point
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "point", array("goal.point", self.point, (2,)))
-        normal = array("goal.normal", self.normal, (2,))
-        length = float(np.hypot(normal[0], normal[1]))
+        super().__post_init__()
+        length = float(np.hypot(self.normal[0], self.normal[1]))
         if length == 0.0:
             raise InvalidInputError("goal.normal must not be zero")
         if abs(length - 1.0) > 1e-12:  # dividing a unit vector again could change its last digit
-            normal = array("goal.normal", normal / length, (2,))
-        object.__setattr__(self, "normal", normal)
+            unit = array("goal.normal", self.normal / length, (2,))
+            object.__setattr__(self, "normal", unit)
 
     def distance(self, x: float, y: float) -> float:
         """Straight distance [m] from a point to the line, 0 on it or beyond."""

@@ -5,10 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from pushplan.world.checked_fields import CheckedFields, Shape
 from pushplan.world.checks import (
     ArrayRecord,
     BoolArray,
@@ -31,7 +33,7 @@ from pushplan.world.outline import (
 
 
 @dataclass(frozen=True, eq=False)
-class Movables(ArrayRecord):
+class Movables(ArrayRecord, CheckedFields):
     """K convex objects that the robot may push.
 
     The origin of each body frame is the centroid of its outline, where the pressure on the
@@ -50,25 +52,20 @@ class Movables(ArrayRecord):
         InvalidInputError: if shapes disagree, an outline is not convex or off its centroid.
     """
 
-    ids: IntArray
-    poses: FloatArray
-    twists: FloatArray
-    masses: FloatArray
-    wheeled: BoolArray
-    vertices: FloatArray
-    offsets: IntArray
+    field_prefix = "movables."
+
+    ids: Annotated[IntArray, Shape("K")]
+    poses: Annotated[FloatArray, Shape("K", 3)]
+    twists: Annotated[FloatArray, Shape("K", 3)]
+    masses: Annotated[FloatArray, Shape("K")]
+    wheeled: Annotated[BoolArray, Shape("K")]
+    vertices: Annotated[FloatArray, Shape(None, 2)]
+    offsets: Annotated[IntArray, Shape(None)]
 
     def __post_init__(self) -> None:
-        put = object.__setattr__
-        put(self, "ids", array("movables.ids", self.ids, (None,), dtype=np.int64))
-        count = len(self.ids)
-        put(self, "poses", array("movables.poses", self.poses, (count, 3)))
-        put(self, "twists", array("movables.twists", self.twists, (count, 3)))
-        put(self, "masses", array("movables.masses", self.masses, (count,)))
-        put(self, "wheeled", array("movables.wheeled", self.wheeled, (count,), dtype=np.bool_))
-        put(self, "vertices", array("movables.vertices", self.vertices, (None, 2)))
-        put(self, "offsets", array("movables.offsets", self.offsets, (count + 1,), dtype=np.int64))
-        if len(np.unique(self.ids)) != count:
+        super().__post_init__()
+        array("movables.offsets", self.offsets, (len(self.ids) + 1,), dtype=np.int64)
+        if len(np.unique(self.ids)) != len(self.ids):
             raise InvalidInputError(f"movables.ids must be distinct, got {self.ids.tolist()}")
         if (self.masses <= 0.0).any():
             raise InvalidInputError(f"movables.masses must be positive, got {self.masses.min()}")

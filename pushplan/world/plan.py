@@ -5,11 +5,12 @@ from __future__ import annotations
 import enum
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 
-from pushplan.world.checks import ArrayRecord, FloatArray, array, frozen, number
+from pushplan.world.checked_fields import CheckedFields, NonNegativeFloat, Shape
+from pushplan.world.checks import ArrayRecord, FloatArray, frozen
 from pushplan.world.errors import InvalidInputError
 from pushplan.world.polyline import arc_lengths, path_length
 
@@ -74,7 +75,7 @@ class SubTask(ArrayRecord):
 
 
 @dataclass(frozen=True, eq=False)
-class Plan(ArrayRecord):
+class Plan(ArrayRecord, CheckedFields):
     """A time-stamped path of the robot with its expected price.
 
     Args:
@@ -89,35 +90,23 @@ class Plan(ArrayRecord):
         subtasks: the pushes in order, for manipulation.
     """
 
-    times: FloatArray
-    poses: FloatArray
-    speeds: FloatArray
-    turn_rates: FloatArray
-    travel_cost: float
-    interaction_cost: float = 0.0
-    object_poses: FloatArray | None = None
+    field_prefix = "plan."
+
+    times: Annotated[FloatArray, Shape("N")]
+    poses: Annotated[FloatArray, Shape("N", 3)]
+    speeds: Annotated[FloatArray, Shape("N")]
+    turn_rates: Annotated[FloatArray, Shape("N")]
+    travel_cost: NonNegativeFloat
+    interaction_cost: NonNegativeFloat = 0.0
+    object_poses: Annotated[FloatArray, Shape("N", None, 3)] | None = None
     subtasks: tuple[SubTask, ...] = ()
 
     def __post_init__(self) -> None:
-        put = object.__setattr__
-        put(self, "times", array("plan.times", self.times, (None,)))
-        count = len(self.times)
-        if count == 0:
+        super().__post_init__()
+        if len(self.times) == 0:
             raise InvalidInputError("a plan needs at least one pose")
         if self.times[0] < 0.0 or (np.diff(self.times) < 0.0).any():
             raise InvalidInputError("plan.times must start at 0 or later and not decrease")
-        put(self, "poses", array("plan.poses", self.poses, (count, 3)))
-        put(self, "speeds", array("plan.speeds", self.speeds, (count,)))
-        put(self, "turn_rates", array("plan.turn_rates", self.turn_rates, (count,)))
-        put(self, "travel_cost", number("plan.travel_cost", self.travel_cost, low=0.0))
-        cost = number("plan.interaction_cost", self.interaction_cost, low=0.0)
-        put(self, "interaction_cost", cost)
-        if self.object_poses is not None:
-            put(
-                self,
-                "object_poses",
-                array("plan.object_poses", self.object_poses, (count, None, 3)),
-            )
 
     @property
     def cost(self) -> float:

@@ -23,7 +23,6 @@ class ChoosesActions(Protocol):
     @property
     def actions(self) -> Sequence[str]:
         """Names of action modes, the preferred one first; the first that the task has is taken."""
-        ...
 
 
 @runtime_checkable
@@ -33,7 +32,6 @@ class ChoosesObservation(Protocol):
     @property
     def observation(self) -> Any:
         """Name of an observation of the task, or a `pushplan.observation.ObservationBuilder`."""
-        ...
 
 
 @runtime_checkable
@@ -50,7 +48,6 @@ class ChecksEnvironment(Protocol):
         Raises:
             InvalidInputError: naming what the policy needs and what the environment has.
         """
-        ...
 
 
 @runtime_checkable
@@ -59,7 +56,6 @@ class ChecksScenario(Protocol):
 
     def incompatibility(self, scenario: Any) -> str | None:
         """The reason why it cannot run a scenario; None if it may."""
-        ...
 
 
 @runtime_checkable
@@ -69,7 +65,6 @@ class HoldsDecisions(Protocol):
     @property
     def steps_per_decision(self) -> int:
         """Steps for which a decision stands, at least 1."""
-        ...
 
 
 @runtime_checkable
@@ -79,7 +74,6 @@ class PlansBesideDriving(Protocol):
     @property
     def background_s(self) -> float:
         """The part of the last call of ``act`` that went on beside driving [s]."""
-        ...
 
     def simulate_latency(self, factor: float, clock: Callable[[], float]) -> None:
         """Let a plan be there only after the time that it took, until the next ``reset``.
@@ -88,7 +82,6 @@ class PlansBesideDriving(Protocol):
             factor: seconds of the world's clock for one of ``clock``.
             clock: returns seconds.
         """
-        ...
 
 
 @runtime_checkable
@@ -98,7 +91,6 @@ class LogsPlans(Protocol):
     @property
     def plan_log(self) -> Sequence[PlanResult]:
         """Every planning call since the last ``reset``."""
-        ...
 
 
 @runtime_checkable
@@ -108,7 +100,6 @@ class ShowsPlan(Protocol):
     @property
     def current_plan(self) -> Plan | None:
         """The plan that is being driven; None while there is none."""
-        ...
 
 
 @runtime_checkable
@@ -117,4 +108,3 @@ class WarmsUp(Protocol):
 
     def warm_up(self) -> None:
         """Run, once a process, all that an episode may need."""
-        ...

@@ -33,7 +33,6 @@ class Planner(Protocol):
         Returns:
             A status, and a plan where there is one. Not finding a path is a status.
         """
-        ...
 
 
 @runtime_checkable
@@ -42,7 +41,6 @@ class Controller(Protocol):
 
     def reset(self, world: World) -> None:
         """Forget the last episode; ``world`` is the start of the next one."""
-        ...
 
     def command(self, world: World, plan: Plan) -> Twist:
         """The velocity to drive now, within the robot's limits.
@@ -55,7 +53,6 @@ class Controller(Protocol):
             InvalidInputError: if the time went back since the last call, or stands still although
                 things have moved.
         """
-        ...
 
 
 @runtime_checkable
@@ -69,7 +66,6 @@ class Policy(Protocol):
 
     def reset(self, world: World, rng: np.random.Generator) -> None:
         """Forget the last episode; ``world`` is the start of the next one."""
-        ...
 
     def act(self, world: World, observation: Any) -> Action:
         """The action for this step.
@@ -78,4 +74,3 @@ class Policy(Protocol):
             world: the exact snapshot.
             observation: what the environment observed, for policies that were trained on it.
         """
-        ...

@@ -7,10 +7,12 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from pushplan.world.checked_fields import CheckedFields, Limits, NonNegativeFloat, PositiveFloat
 from pushplan.world.checks import ArrayRecord, FloatArray, IntArray, choice, number
 from pushplan.world.errors import InvalidInputError
 from pushplan.world.outline import convex_outline, flatten
@@ -25,8 +27,11 @@ class Drive(enum.StrEnum):
     """Forward speed in [min_speed, max_speed] and turn rate are free; may turn on the spot."""
 
 
+Acceleration = Annotated[float, Limits(0.0, open_low=True, finite=False)]
+
+
 @dataclass(frozen=True, eq=False)
-class RobotModel(ArrayRecord):
+class RobotModel(ArrayRecord, CheckedFields):
     """Footprint, mass and motion limits of a robot. Body frame: x forward, y left.
 
     Args:
@@ -46,46 +51,31 @@ class RobotModel(ArrayRecord):
         InvalidInputError: if a part is not convex or a limit has no sense.
     """
 
+    field_prefix = "robot."
+
     parts: tuple[FloatArray, ...]
-    mass: float
+    mass: PositiveFloat
     drive: Drive
-    max_speed: float
-    max_turn_rate: float
+    max_speed: PositiveFloat
+    max_turn_rate: PositiveFloat
     min_speed: float = 0.0
-    max_acceleration: float = math.inf
-    max_turn_acceleration: float = math.inf
-    wheel_separation: float = 0.0
+    max_acceleration: Acceleration = math.inf
+    max_turn_acceleration: Acceleration = math.inf
+    wheel_separation: NonNegativeFloat = 0.0
     name: str = "robot"
 
     def __post_init__(self) -> None:
         if isinstance(self.parts, str) or not isinstance(self.parts, Sequence) or not self.parts:
             raise InvalidInputError("robot.parts must be a non-empty list of convex outlines")
+        super().__post_init__()
         put = object.__setattr__
-        put(
-            self,
-            "parts",
-            tuple(convex_outline(f"robot.parts[{i}]", p) for i, p in enumerate(self.parts)),
-        )
-        put(self, "mass", number("robot.mass", self.mass, low=0.0, open_low=True))
+        parts = [convex_outline(f"robot.parts[{i}]", p) for i, p in enumerate(self.parts)]
+        put(self, "parts", tuple(parts))
         put(self, "drive", Drive(choice("drive", self.drive, [d.value for d in Drive])))
-        speed = number("robot.max_speed", self.max_speed, low=0.0, open_low=True)
-        put(self, "max_speed", speed)
         if self.drive is Drive.CONSTANT_SPEED:
-            put(self, "min_speed", speed)
+            put(self, "min_speed", self.max_speed)
         else:  # it has to be able to stop
-            put(self, "min_speed", number("robot.min_speed", self.min_speed, high=0.0))
-        rate = number("robot.max_turn_rate", self.max_turn_rate, low=0.0, open_low=True)
-        put(self, "max_turn_rate", rate)
-        for key in ("max_acceleration", "max_turn_acceleration"):
-            value = number(f"robot.{key}", getattr(self, key), low=0.0, open_low=True, finite=False)
-            put(self, key, value)
-        put(
-            self,
-            "wheel_separation",
-            number("robot.wheel_separation", self.wheel_separation, low=0.0),
-        )
-        if not isinstance(self.name, str):
-            raise InvalidInputError(f"robot.name must be a text, got {self.name!r}")
+            number("robot.min_speed", self.min_speed, high=0.0)
 
     @classmethod
     def from_outline(cls, outline: ArrayLike, **limits: object) -> RobotModel:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pushplan.world.checks import ArrayRecord, BoolArray, FloatArray, array, number
+from pushplan.world.checked_fields import CheckedFields, Shape
+from pushplan.world.checks import ArrayRecord, BoolArray, FloatArray
 from pushplan.world.errors import InvalidInputError
 from pushplan.world.goals import (
     ClearanceArea,
@@ -24,9 +25,11 @@ from pushplan.world.outline import transform
 from pushplan.world.robot import RobotModel
 from pushplan.world.static_map import StaticMap
 
+Triple = Annotated[FloatArray, Shape(3)]
+
 
 @dataclass(frozen=True, eq=False)
-class World(ArrayRecord):
+class World(ArrayRecord, CheckedFields):
     """A scene at one instant, filled in by a simulator or by perception.
 
     SI units, radians, x forward and y left in body frames, one world frame for all poses.
@@ -44,31 +47,25 @@ class World(ArrayRecord):
         InvalidInputError: if a member has the wrong type or shape or is not finite.
     """
 
+    field_prefix = "world."
+
     robot: RobotModel
-    robot_pose: FloatArray
+    robot_pose: Triple
     static: StaticMap
     movables: Movables
     goal: Goal
-    robot_twist: FloatArray | None = None
+    robot_twist: Triple | None = None
     time: float = 0.0
 
     def __post_init__(self) -> None:
-        for key, kind in (("robot", RobotModel), ("static", StaticMap), ("movables", Movables)):
-            value = getattr(self, key)
-            if not isinstance(value, kind):
-                raise InvalidInputError(
-                    f"world.{key} must be a {kind.__name__}, got {type(value).__name__}"
-                )
+        if self.robot_twist is None:
+            object.__setattr__(self, "robot_twist", np.zeros(3))
+        super().__post_init__()
         if not isinstance(self.goal, GoalDisc | GoalLine | Receptacle | ClearanceArea):
             raise InvalidInputError(
                 "world.goal must be a GoalDisc, GoalLine, Receptacle or ClearanceArea, "
                 f"got {type(self.goal).__name__}"
             )
-        put = object.__setattr__
-        put(self, "robot_pose", array("world.robot_pose", self.robot_pose, (3,)))
-        twist = np.zeros(3) if self.robot_twist is None else self.robot_twist
-        put(self, "robot_twist", array("world.robot_twist", twist, (3,)))
-        put(self, "time", number("world.time", self.time))
 
     @property
     def navigation_goal(self) -> NavigationGoal:

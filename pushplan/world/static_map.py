@@ -5,11 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pushplan.world.checks import ArrayRecord, FloatArray, array, frozen
+from pushplan.world.checked_fields import CheckedFields, Shape
+from pushplan.world.checks import ArrayRecord, FloatArray, array, checked_bounds, frozen
 from pushplan.world.errors import InvalidInputError
 from pushplan.world.outline import convex_outline
 
@@ -18,7 +20,7 @@ CAP_CORNERS = 9
 
 
 @dataclass(frozen=True, eq=False)
-class StaticMap(ArrayRecord):
+class StaticMap(ArrayRecord, CheckedFields):
     """Walls and columns: convex polygons and thick segments, in the world frame.
 
     Args:
@@ -33,27 +35,23 @@ class StaticMap(ArrayRecord):
             empty.
     """
 
+    field_prefix = "static."
+
     polygons: tuple[FloatArray, ...]
-    segments: FloatArray
-    radii: FloatArray
+    segments: Annotated[FloatArray, Shape("S", 4)]
+    radii: Annotated[FloatArray, Shape("S")]
     bounds: FloatArray
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         if isinstance(self.polygons, str) or not isinstance(self.polygons, Sequence):
             raise InvalidInputError("static.polygons must be a list of convex outlines")
         put = object.__setattr__
         clean = [convex_outline(f"static.polygons[{i}]", p) for i, p in enumerate(self.polygons)]
         put(self, "polygons", tuple(clean))
-        put(self, "segments", array("static.segments", self.segments, (None, 4)))
-        put(self, "radii", array("static.radii", self.radii, (len(self.segments),)))
-        put(self, "bounds", array("static.bounds", self.bounds, (4,)))
+        put(self, "bounds", checked_bounds("static.bounds", self.bounds))
         if (self.radii < 0.0).any():
             raise InvalidInputError(f"static.radii must not be negative, got {self.radii.min()}")
-        if (self.bounds[:2] >= self.bounds[2:]).any():
-            raise InvalidInputError(
-                "static.bounds must be x_min, y_min, x_max, y_max with min < max, "
-                f"got {self.bounds.tolist()}"
-            )
 
     @classmethod
     def build(

@@ -15,7 +15,8 @@ from typing import Protocol
 
 import numpy as np
 
-from pushplan.world.checks import expect, integer, number
+from pushplan.world.checked_fields import CheckedFields, NonNegativeFloat, NonNegativeInt
+from pushplan.world.checks import expect
 from pushplan.world.errors import InvalidInputError
 
 
@@ -30,7 +31,6 @@ class StopCheck(Protocol):
             cost: what the planner minimises, for its best plan so far, such as travel plus weighted
                 interaction [kg m]; infinite while there is none.
         """
-        ...
 
 
 class Stop(ABC):
@@ -43,7 +43,7 @@ class Stop(ABC):
     def __or__(self, other: Stop) -> Stop:
         if not isinstance(other, Stop):
             return NotImplemented
-        return AnyOf((*_rules(self), *_rules(other)))
+        return AnyOf((*rules_of(self), *rules_of(other)))
 
     @property
     def seconds(self) -> float:
@@ -57,17 +57,16 @@ class Stop(ABC):
 
 
 @dataclass(frozen=True)
-class Deadline(Stop):
+class Deadline(Stop, CheckedFields):
     """Return after this much wall-clock time.
 
     Args:
         budget_s: seconds from the beginning of the call, not negative.
     """
 
-    budget_s: float
+    field_prefix = "Deadline "
 
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "budget_s", number("Deadline seconds", self.budget_s, low=0.0))
+    budget_s: NonNegativeFloat
 
     @property
     def seconds(self) -> float:
@@ -81,13 +80,12 @@ class Deadline(Stop):
 
 
 @dataclass(frozen=True)
-class MaxIterations(Stop):
+class MaxIterations(Stop, CheckedFields):
     """Return after this many main-loop iterations: the same result on every machine."""
 
-    limit: int
+    field_prefix = "MaxIterations "
 
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "limit", integer("MaxIterations limit", self.limit, low=0))
+    limit: NonNegativeInt
 
     def start(self) -> StopCheck:
         """Arm the rule for one call."""
@@ -166,7 +164,8 @@ class AnyOf(Stop):
         return lambda iterations, cost: any(check(iterations, cost) for check in checks)
 
 
-def _rules(stop: Stop) -> tuple[Stop, ...]:
+def rules_of(stop: Stop) -> tuple[Stop, ...]:
+    """The rules that one is made of."""
     return stop.rules if isinstance(stop, AnyOf) else (stop,)
 
 

@@ -63,6 +63,36 @@ def test_a_kernel_is_compiled_anew_when_one_that_it_calls_changes(
     assert len(list(cache.rglob("*.nbc"))) == 2  # those of the old code are gone
 
 
+_TUPLES = """
+import sys
+sys.path.insert(0, {folder!r})
+from {home} import Pair
+from pushplan.compiled import kernel, watching
+
+@kernel
+def total(pair):
+    return pair.a + pair.b
+
+ready = []
+with watching(lambda name, loaded: ready.append((name.rpartition(".")[2], loaded))):
+    assert total(Pair(1.0, 2.0)) == 3.0
+print(ready)
+"""
+
+
+def test_a_class_of_arguments_that_has_moved_is_no_error(tmp_path: Path) -> None:
+    module, cache = tmp_path / "totals.py", tmp_path / "cache"
+    for home, said in (("one", "False"), ("other", "False"), ("other", "True")):
+        for path in tmp_path.glob("*.py"):
+            path.unlink()
+        classes = (
+            "from typing import NamedTuple\nclass Pair(NamedTuple):\n    a: float\n    b: float\n"
+        )
+        (tmp_path / f"{home}.py").write_text(classes)
+        module.write_text(_TUPLES.format(folder=str(tmp_path), home=home))
+        assert _run(module, cache) == (f"[('total', {said})]", "")
+
+
 def test_damaged_files_are_one_warning_each_and_replaced(module: Path, tmp_path: Path) -> None:
     cache = tmp_path / "cache"
     _run(module, cache)

@@ -7,7 +7,7 @@ from manipulation_checks import check_reach, check_start, shapes
 
 from pushplan.envs import PushEnv
 from pushplan.envs.tasks.box_delivery import LAYOUTS, PRESETS, BoxDeliveryTask
-from pushplan.envs.tasks.box_kernels import sample_at
+from pushplan.envs.tasks.manipulation import sample_at
 from pushplan.world import (
     ScenarioError,
     UnknownNameError,

@@ -74,7 +74,9 @@ def test_time_goes_on(duration):
 
 @pytest.mark.parametrize("wrong", [{"water": 3}, {"solids": "x"}])
 def test_materials_are_checked(wrong):
-    with pytest.raises(InvalidInputError, match="or None, got"):
+    with pytest.raises(
+        InvalidInputError, match=r"materials\.(water must be a Water|solids must be a Solids), got"
+    ):
         Materials(**wrong)
 
 

@@ -27,9 +27,8 @@ from mujoco_scenes import (
 
 from pushplan.envs import PushEnv
 from pushplan.envs.registry import SIMULATORS
-from pushplan.envs.simulators.mujoco_kernels import drag_damping, planar_rows
+from pushplan.envs.simulators.mujoco_kernels import drag_damping, planar_rows, rest_cycles
 from pushplan.envs.simulators.mujoco_options import MujocoOptions
-from pushplan.envs.simulators.mujoco_rest import rest_cycles
 from pushplan.envs.simulators.mujoco_shapes import as_rectangle, prism_inertia
 from pushplan.envs.simulators.mujoco_simulator import MujocoSimulator
 from pushplan.world import (

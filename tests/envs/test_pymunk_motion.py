@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from pushplan.envs.simulators.base import Materials
-from pushplan.envs.simulators.momentum_kernels import slow_down
+from pushplan.envs.simulators.momentum import slow_down
 from pushplan.envs.simulators.pymunk_simulator import PymunkSimulator
 from pushplan.envs.simulators.water import Water
 from pushplan.world import (

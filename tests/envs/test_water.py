@@ -9,8 +9,7 @@ import pytest
 
 from pushplan.envs.simulators.base import Materials
 from pushplan.envs.simulators.pymunk_simulator import PymunkSimulator
-from pushplan.envs.simulators.water import Water, coasting
-from pushplan.envs.simulators.water_kernels import flow_shapes
+from pushplan.envs.simulators.water import Water, coasting, flow_shapes
 from pushplan.envs.tasks.ship_ice import ShipIceTask
 from pushplan.envs.tasks.ship_presets import FULL_SCALE
 from pushplan.world import Movables, Twist, World, stream

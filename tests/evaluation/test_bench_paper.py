@@ -17,8 +17,8 @@ from pushplan.evaluation.compatibility import incompatibility
 from pushplan.evaluation.paper_tables import training_cost
 from pushplan.evaluation.policies import PolicySpec
 from pushplan.evaluation.published import chosen_tables, published_tables
+from pushplan.learned.loading import weights_of
 from pushplan.learned.onnx_policy import read_specification
-from pushplan.learned.shipped import weights_of
 from pushplan.scenarios import suite, suite_names
 from pushplan.world import InvalidInputError, UnknownNameError
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pushplan.evaluation import ResultRow, Results, bench, compare
+from pushplan.evaluation import ResultRow, Results, bench
 from pushplan.evaluation.store import RunDirectory
 from pushplan.world import InvalidInputError
 
@@ -82,13 +82,13 @@ def test_a_failed_job_counts_against_its_policy(results: Results) -> None:
 
 
 def test_differences_are_taken_scenario_by_scenario(results: Results) -> None:
-    pair = next(p for p in compare(results) if p.setting == "maze-10" and p.metric == "E_nav")
+    pair = next(p for p in results.compare() if p.setting == "maze-10" and p.metric == "E_nav")
     assert (pair.first, pair.second) == ("plain", "better")
     # the spread between scenarios is far greater than the difference, and cancels
     assert pair.difference.mean == pytest.approx(0.1)
     assert pair.difference.high - pair.difference.low < 1e-9
     assert (pair.wins, pair.losses, pair.difference.count, pair.clear) == (19, 0, 19, True)
-    same = next(p for p in compare(results) if p.setting == "maze-10" and p.metric == "I_nav")
+    same = next(p for p in results.compare() if p.setting == "maze-10" and p.metric == "I_nav")
     assert (same.wins, same.losses, same.clear) == (0, 0, False)
 
 

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from pushplan.envs import PushEnv
 from pushplan.learned import FeatureObservation
-from pushplan.learned.ray_kernels import cast_rays, near_outlines
+from pushplan.learned.features import cast_rays, near_outlines
 from pushplan.world import InvalidInputError
 from pushplan.world.outline import flatten
 

@@ -21,9 +21,9 @@ from pushplan.evaluation import bench, parse_policy, run_episode
 from pushplan.evaluation.jobs import JobSettings
 from pushplan.evaluation.policies import policy_names
 from pushplan.learned import OnnxPolicy, learned_names, load_policy, onnx_session
+from pushplan.learned.loading import weights_of
 from pushplan.learned.onnx_policy import read_specification
 from pushplan.learned.outputs import ActionSpec, BadOutputError
-from pushplan.learned.shipped import weights_of
 from pushplan.scenarios import Scenario
 from pushplan.world import InvalidInputError, UnknownNameError
 

@@ -14,8 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from pushplan.scenarios import FloeSizes, generate_ice
-from pushplan.scenarios.floe_kernels import Discs, Outlines, cut_cells, fit_floes
-from pushplan.scenarios.ice_water import IceWater
+from pushplan.scenarios.floe_kernels import Discs, IceWater, Outlines, cut_cells, fit_floes
 from pushplan.world import InvalidInputError, ScenarioError, stream
 from pushplan.world.outline import convex_outline
 

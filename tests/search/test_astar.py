@@ -1,6 +1,7 @@
 """The A* kernel and the primitives."""
 
 import json
+from typing import NamedTuple
 
 import numpy as np
 import pytest
@@ -9,14 +10,15 @@ from hypothesis import strategies as st
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import dijkstra
 
+from pushplan.compiled import kernel
 from pushplan.motion.dubins import along_arc
 from pushplan.motion.state_lattice.generate import SHIPPED, main
-from pushplan.motion.state_lattice.heuristic import dubins_to_line
+from pushplan.motion.state_lattice.lattice_builder import dubins_to_line
 from pushplan.motion.state_lattice.primitive_set import PrimitiveConfig, PrimitiveSet
 from pushplan.motion.state_lattice.primitives import generate, primitives
-from pushplan.search.astar import EXHAUSTED, FOUND, PAUSED, AStar, offer, take
-from pushplan.search.graph_lattice import GraphLattice
+from pushplan.search.astar import EXHAUSTED, FOUND, PAUSED, AStar, offer, register, take
 from pushplan.world import InvalidInputError, SchemaError
+from pushplan.world.checks import BoolArray, FloatArray, IntArray
 
 
 def random_graph(seed: int, nodes: int = 120, edges: int = 500) -> tuple[csr_matrix, np.ndarray]:
@@ -25,6 +27,45 @@ def random_graph(seed: int, nodes: int = 120, edges: int = 500) -> tuple[csr_mat
     graph = csr_matrix((rng.random(edges) + 0.01, ends), shape=(nodes, nodes))
     graph.sum_duplicates()
     return graph, dijkstra(graph.T.tocsr(), indices=7)
+
+
+class GraphLattice(NamedTuple):
+    """A directed graph in compressed rows."""
+
+    first: IntArray  # (N + 1,) where the edges of each node start
+    targets: IntArray  # (E,) where each edge leads
+    costs: FloatArray  # (E,) its cost, not negative
+    bounds: FloatArray  # (N,) lower bounds of the cost from each node to a goal
+    goals: BoolArray  # (N,) which nodes are goals
+
+
+@kernel
+def _successors(
+    lattice: GraphLattice, node: int, nodes: IntArray, costs: FloatArray, edges: IntArray
+) -> int:
+    """List the targets of the edges of a node."""
+    count = 0
+    for e in range(lattice.first[node], lattice.first[node + 1]):
+        nodes[count], costs[count], edges[count] = lattice.targets[e], lattice.costs[e], e
+        count += 1
+    return count
+
+
+@kernel
+def _bound(lattice: GraphLattice, node: int) -> float:
+    """Lower bound of the cost to a goal."""
+    bound: float = lattice.bounds[node]
+    return bound
+
+
+@kernel
+def _reached(lattice: GraphLattice, node: int) -> bool:
+    """Whether a node is a goal."""
+    reached: bool = lattice.goals[node]
+    return reached
+
+
+register(GraphLattice, _successors, _bound, _reached)
 
 
 def lattice_of(graph: csr_matrix, bounds: np.ndarray) -> GraphLattice:

@@ -3,13 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Annotated
 
-from pushplan.world import InvalidInputError
-from pushplan.world.checks import integer, number
+from pushplan.world.checked_fields import (
+    CheckedFields,
+    Limits,
+    NonNegativeFloat,
+    PositiveFloat,
+    PositiveInt,
+)
 
 
 @dataclass(frozen=True)
-class MpcConfig:
+class MpcConfig(CheckedFields):
     """Parameters of `MpcTracker`. R is the robot's circumscribed radius, T = R / max_speed.
 
     The cost is the integral over time, in units of T, of offset² + ``heading_weight`` heading² +
@@ -36,31 +42,17 @@ class MpcConfig:
         solver_iterations: after which the solver gives up.
     """
 
-    horizon: int = 20
-    reach: float = 3.0
-    heading_weight: float = 0.5
-    turn_weight: float = 0.02
-    smoothness: float = 0.001
-    terminal: float = 4.0
+    horizon: Annotated[int, Limits(2, 100)] = 20
+    reach: PositiveFloat = 3.0
+    heading_weight: NonNegativeFloat = 0.5
+    turn_weight: NonNegativeFloat = 0.02
+    smoothness: PositiveFloat = 0.001
+    terminal: Annotated[float, Limits(1.0)] = 4.0
     optimise_speed: bool = False
-    speed_weight: float = 0.2
-    iterations: int = 1
-    first_iterations: int = 4
-    delay: float = 0.0
-    period: float = 0.1
-    tolerance: float = 1e-6
-    solver_iterations: int = 2000
-
-    def __post_init__(self) -> None:
-        integer("horizon", self.horizon, low=2, high=100)
-        for name in ("reach", "smoothness", "speed_weight", "period", "tolerance"):
-            number(name, getattr(self, name), low=0.0, open_low=True)
-        for name in ("heading_weight", "turn_weight", "delay"):
-            number(name, getattr(self, name), low=0.0)
-        number("terminal", self.terminal, low=1.0)
-        if not isinstance(self.optimise_speed, bool):
-            raise InvalidInputError(
-                f"optimise_speed must be True or False, got {self.optimise_speed!r}"
-            )
-        for name in ("iterations", "first_iterations", "solver_iterations"):
-            integer(name, getattr(self, name), low=1)
+    speed_weight: PositiveFloat = 0.2
+    iterations: PositiveInt = 1
+    first_iterations: PositiveInt = 4
+    delay: NonNegativeFloat = 0.0
+    period: PositiveFloat = 0.1
+    tolerance: PositiveFloat = 1e-6
+    solver_iterations: PositiveInt = 2000

@@ -14,8 +14,8 @@ from pushplan.envs.simulators.water import Water
 from pushplan.envs.trace import Trace
 from pushplan.interaction.model import Interaction
 from pushplan.world import InvalidInputError, Twist, World
-from pushplan.world.checked_fields import CheckedFields, PositiveFloat
-from pushplan.world.checks import ArrayRecord, FloatArray, IntArray, array, frozen, number
+from pushplan.world.checked_fields import CheckedFields, NonNegativeFloat, PositiveFloat
+from pushplan.world.checks import ArrayRecord, FloatArray, IntArray, array, frozen
 
 
 @dataclass(frozen=True)
@@ -30,7 +30,7 @@ class Solids(CheckedFields):
 
 
 @dataclass(frozen=True)
-class Materials:
+class Materials(CheckedFields):
     """How bodies grip, roll and float, in terms that every engine understands.
 
     Args:
@@ -46,26 +46,15 @@ class Materials:
             refuse it.
     """
 
-    robot_object: float = 0.0
-    object_object: float = 0.0
-    object_static: float = 0.0
-    rolling_time: float = 1.0
-    object_ground: float = 0.4
+    field_prefix = "materials."
+
+    robot_object: NonNegativeFloat = 0.0
+    object_object: NonNegativeFloat = 0.0
+    object_static: NonNegativeFloat = 0.0
+    rolling_time: PositiveFloat = 1.0
+    object_ground: NonNegativeFloat = 0.4
     water: Water | None = None
     solids: Solids | None = None
-
-    def __post_init__(self) -> None:
-        for key in ("robot_object", "object_object", "object_static", "object_ground"):
-            value = number(f"friction {key}", getattr(self, key), low=0.0)
-            object.__setattr__(self, key, value)
-        for key, kind in (("water", Water), ("solids", Solids)):
-            part = getattr(self, key)
-            if part is not None and not isinstance(part, kind):
-                raise InvalidInputError(
-                    f"{key} must be a {kind.__name__} or None, got {part!r:.60}"
-                )
-        rolling = number("rolling_time", self.rolling_time, low=0.0, open_low=True)
-        object.__setattr__(self, "rolling_time", rolling)
 
 
 @dataclass(frozen=True, eq=False)
@@ -206,3 +195,28 @@ def checked_path(path: ArrayLike) -> FloatArray:
     if len(poses) == 0:
         raise InvalidInputError("path must hold at least one pose")
     return poses
+
+
+def warm_up_simulator(simulator: Simulator, world: World, materials: Materials) -> None:
+    """Step where the robot is, with an object right before it, and with something static there.
+
+    Args:
+        simulator: holds another scene afterwards.
+        world: whose robot reaches nothing yet.
+        materials: as `Simulator.build` takes them.
+    """
+    robot = world.robot
+    radius, ahead = robot.circumscribed_radius, Twist(robot.max_speed, 0.0)
+    alone = replace(world, movables=world.movables.select(np.zeros(0, dtype=np.int64)))
+    worlds = [world, alone]
+    if len(world.movables):
+        x, y, _ = world.movables.poses[0]
+        gap = radius + float(world.movables.radii[0])
+        worlds.append(world.moved(robot_pose=np.array([x - gap, y, 0.0])))
+    for part in world.static.convex_parts[:1]:
+        (x, _), (_, y) = part.min(axis=0), part.mean(axis=0)
+        worlds.append(world.moved(robot_pose=np.array([x - radius, y, 0.0])))
+    for scene in worlds:
+        simulator.build(scene, materials)
+        for _ in range(5):
+            simulator.step(ahead, 0.2 * radius / robot.max_speed)

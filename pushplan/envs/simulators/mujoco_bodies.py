@@ -11,10 +11,16 @@ import numpy as np
 
 from pushplan.compiled import owned
 from pushplan.envs.simulators.base import Materials
-from pushplan.envs.simulators.mujoco_kernels import drag_damping, planar_rows, sleep_lists
+from pushplan.envs.simulators.mujoco_kernels import (
+    drag_damping,
+    planar_rows,
+    quiet_objects,
+    rest_cycles,
+    rest_gap,
+    sleep_lists,
+)
 from pushplan.envs.simulators.mujoco_model import SceneKey, scene_model
 from pushplan.envs.simulators.mujoco_options import MujocoOptions
-from pushplan.envs.simulators.mujoco_rest import quiet_objects, rest_cycles, rest_gap
 from pushplan.world import PushplanError, World
 from pushplan.world.checks import BoolArray, FloatArray, IntArray
 

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import math
-from typing import Protocol
 
 import numpy as np
 
-from pushplan.envs.trace import Trace
+from pushplan.envs.simulators.base import Simulator
 from pushplan.world import RobotModel, Twist
 from pushplan.world.checks import FloatArray
 
@@ -16,23 +15,8 @@ _PATIENCE = 1.0
 _LATE = 0.5
 
 
-class _Drivable(Protocol):
-    """What the tracking loop needs of a simulator."""
-
-    def step(self, command: Twist, duration: float) -> Trace: ...
-
-    @property
-    def robot_pose(self) -> FloatArray: ...
-
-    @property
-    def object_poses(self) -> FloatArray: ...
-
-    @property
-    def held(self) -> bool: ...
-
-
 def follow_path(
-    simulator: _Drivable, robot: RobotModel, poses: FloatArray
+    simulator: Simulator, robot: RobotModel, poses: FloatArray
 ) -> tuple[FloatArray, int]:
     """Sweep the robot through poses (N, 3); it stands at the first.
 
@@ -60,7 +44,7 @@ def follow_path(
 
 
 def _drive_leg(
-    simulator: _Drivable,
+    simulator: Simulator,
     robot: RobotModel,
     a: FloatArray,
     b: FloatArray,

@@ -23,6 +23,7 @@ from pushplan.envs.simulators.mujoco_shapes import (
     add_prism,
     color_of,
     prism_inertia,
+    set_mass,
     yaw_quaternion,
 )
 from pushplan.world import InvalidInputError, Movables, RobotModel, StaticMap, World
@@ -230,7 +231,7 @@ def _add_box(spec: Any, k: int, movables: Movables, materials: Materials, solids
     half = 0.5 * solids.object_height
     body = spec.worldbody.add_body(name=f"object {k}", pos=[0.0, 0.0, half])
     body.add_freejoint()
-    _set_mass(body, outline, solids.object_height, mass)
+    set_mass(body, outline, solids.object_height, mass, [0.0, 0.0, 0.0])
     surface = Surface(
         OBJECT_BIT,
         FLOOR_BIT | STATIC_BIT | OBJECT_BIT,
@@ -263,18 +264,11 @@ def _caster_corners(outline: FloatArray) -> FloatArray:
 def _add_floe(spec: Any, k: int, movables: Movables, materials: Materials, solids: Solids) -> None:
     half = 0.5 * solids.object_height
     body = add_floating(spec, f"object {k}")
-    _set_mass(body, movables.outline(k), solids.object_height, float(movables.masses[k]))
+    mass, height = float(movables.masses[k]), solids.object_height
+    set_mass(body, movables.outline(k), height, mass, [0.0, 0.0, 0.0])
     color = color_of(WATER_PALETTE.box[0])
     surface = Surface(OBJECT_BIT, STATIC_BIT | OBJECT_BIT, materials.object_object, 0, color)
     add_prism(spec, body, f"object {k}", movables.outline(k), -half, half, surface)
-
-
-def _set_mass(body: Any, outline: FloatArray, height: float, mass: float) -> None:
-    _, inertia = prism_inertia(outline, height, mass)
-    body.mass = mass
-    body.ipos = [0.0, 0.0, 0.0]
-    body.fullinertia = inertia
-    body.explicitinertial = True
 
 
 def _set_rolling(model: Any, movables: Movables, materials: Materials) -> None:

@@ -19,9 +19,10 @@ from pushplan.envs.simulators.mujoco_shapes import (
     Surface,
     add_prism,
     color_of,
-    prism_inertia,
+    set_mass,
 )
 from pushplan.world import RobotModel
+from pushplan.world.outline import centroid
 
 GRAVITY = 9.81
 _TYRE = (0.16, 0.16, 0.17)
@@ -56,11 +57,8 @@ def add_wheeled_robot(
     caster = caster_position(robot)
     height = solids.robot_height
     wheel_mass = _WHEEL_MASS * mass
-    body.mass = mass - 2.0 * wheel_mass
-    center, inertia = prism_inertia(robot.parts[0], height, body.mass)
-    body.ipos = [_BALANCE * caster, center[1], _MASS_HEIGHT * height - radius]
-    body.fullinertia = inertia
-    body.explicitinertial = True
+    middle = [_BALANCE * caster, centroid(robot.parts[0])[1], _MASS_HEIGHT * height - radius]
+    set_mass(body, robot.parts[0], height, mass - 2.0 * wheel_mass, middle)
     low = _CLEARANCE * radius
     add_hull(spec, body, robot, materials, solids, low=low, ground=radius)
     ball = _CASTER * radius
@@ -159,11 +157,8 @@ def add_ship(
 ) -> None:
     """A floating body with thrusters that hold its speed ahead, sideways and its turn rate."""
     body = add_floating(spec, "robot")
-    body.mass = robot.mass
-    center, inertia = prism_inertia(robot.parts[0], solids.robot_height, robot.mass)
-    body.ipos = [*center, 0.0]
-    body.fullinertia = inertia
-    body.explicitinertial = True
+    hull = robot.parts[0]
+    set_mass(body, hull, solids.robot_height, robot.mass, [*centroid(hull), 0.0])
     half = 0.5 * solids.object_height
     add_hull(spec, body, robot, materials, solids, low=-half, ground=0.0)
     body.add_site(name="thrusters")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -138,6 +139,15 @@ def prism_inertia(outline: FloatArray, height: float, mass: float) -> tuple[Floa
     xy = scale / 24.0 * float(cross @ mixed)
     tall = mass * height * height / 12.0
     return center, np.array([yy + tall, xx + tall, xx + yy, -xy, 0.0, 0.0])
+
+
+def set_mass(
+    body: Any, outline: FloatArray, height: float, mass: float, center: Sequence[float]
+) -> None:
+    """Give a body the mass and the inertia of a prism, about a centre of mass (3,) [m]."""
+    body.mass, body.ipos = mass, center
+    body.fullinertia = prism_inertia(outline, height, mass)[1]
+    body.explicitinertial = True
 
 
 def color_of(rgb: tuple[int, int, int]) -> Color:

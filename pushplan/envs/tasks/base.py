@@ -12,7 +12,7 @@ import numpy as np
 
 from pushplan.envs.simulators.base import Materials
 from pushplan.envs.tasks.variations import TaskVariations
-from pushplan.observation import ObservationBuilder
+from pushplan.observation import ObservationBuilder, StateObservation
 from pushplan.world import Drive, RobotModel, UnknownNameError, World
 from pushplan.world.checks import BoolArray, FloatArray, IntArray
 
@@ -72,6 +72,8 @@ class Task(ABC):
     """Time between two commands to the robot [s]."""
     materials: Materials
     robot: RobotModel
+    state_objects: int = 20
+    """Objects that the state observation has room for; the nearest where there are more."""
     reach: float
     """No coordinate and no distance that is observed exceeds this [m]."""
     slowness: float
@@ -153,13 +155,21 @@ class Task(ABC):
             touched_static: whether the robot touched something static.
         """
 
-    @abstractmethod
     def observation(self, name: str) -> ObservationBuilder:
         """The builder of an observation by name.
 
         Raises:
             UnknownNameError: if the task has no such observation.
         """
+        if name not in self.observations:
+            raise UnknownNameError(f"observation of task {self.name!r}", name, self.observations)
+        if name == "state":
+            return StateObservation(max_objects=self.state_objects)
+        return self._image(name)
+
+    def _image(self, name: str) -> ObservationBuilder:
+        """The builder of any other observation than ``"state"``."""
+        raise NotImplementedError(f"task {self.name!r} has neither observation nor _image")
 
 
 def drive_of(action: str) -> Drive:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from abc import abstractmethod
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
@@ -9,15 +10,16 @@ from typing import Annotated, Any, ClassVar
 
 import numpy as np
 
+from pushplan.compiled import kernel
 from pushplan.envs.simulators.base import Materials
 from pushplan.envs.tasks.base import Task, drive_of
-from pushplan.envs.tasks.box_kernels import sample_at
 from pushplan.envs.tasks.layout import FreeSpace, footprint_at, square_boxes
 from pushplan.envs.tasks.materials import SOLIDS
 from pushplan.envs.tasks.reach import Reach
 from pushplan.envs.tasks.variations import TaskVariations, Yaw
 from pushplan.geometry import GeodesicField, geodesic_field
-from pushplan.observation import ImageObservation, ObservationBuilder, StateObservation
+from pushplan.geometry.distance_field import sample_values
+from pushplan.observation import ImageObservation
 from pushplan.world import (
     BUMPERS,
     InvalidInputError,
@@ -25,7 +27,6 @@ from pushplan.world import (
     RobotModel,
     ScenarioError,
     StaticMap,
-    UnknownNameError,
     World,
 )
 from pushplan.world.checked_fields import (
@@ -37,12 +38,28 @@ from pushplan.world.checked_fields import (
 )
 from pushplan.world.checks import FloatArray, choice
 
+
+@kernel(allocates=True)
+def sample_at(
+    values: FloatArray,  # (rows, columns) distances [m], inf where no path leads to the goal
+    ox: float,  # least x and y of the grid [m]
+    oy: float,
+    step: float,  # side of a cell [m]
+    farthest: float,  # in place of inf [m]
+    poses: FloatArray,  # (K, 3)
+) -> FloatArray:
+    """(K,) goal distance of each object [m], from a grid."""
+    out = np.empty(poses.shape[0])
+    for k in range(poses.shape[0]):
+        found = sample_values(values, ox, oy, step, poses[k, 0], poses[k, 1])
+        out[k] = found if found < math.inf else farthest
+    return out
+
+
 LEAST_SIZE = 0.01
 """Least size of boxes, as a fraction of the preset's."""
 GAP = 0.01
 """Least distance between bodies at the start, as a fraction of the box size."""
-STATE_OBJECTS = 20
-"""Boxes that the state observation has room for; more if there are more."""
 _CHANNELS = ("occupancy", "footprint", "robot_distance", "goal_distance")
 _PIXELS = {"image": 224, "spatial": 96}
 _LAYOUT_TRIES = 8
@@ -124,6 +141,7 @@ class ManipulationTask(Task):
                 f"got {self.box_size:g}"
             )
         self.box_count = wanted.boxes or dimensions.boxes[wanted.layout]
+        self.state_objects = max(self.state_objects, self.box_count)
         self._field: GeodesicField | None = None
         self._idle_actions, self._idle_since = 0, 0.0
         self._furnish_room()
@@ -254,14 +272,7 @@ class ManipulationTask(Task):
             return self._idle_actions >= self.idle_limits[self.action]
         return world.time - self._idle_since >= self.idle_time * (1.0 - 1e-9)
 
-    def observation(self, name: str) -> ObservationBuilder:
-        """``"image"``, ``"spatial"`` (the same at fewer pixels) or ``"state"``."""
-        if name in _PIXELS:
-            window = self.preset.windows[self.variations.layout]
-            pixels = _PIXELS[name]
-            return ImageObservation(
-                channels=_CHANNELS, window=(window, window), pixels=(pixels, pixels)
-            )
-        if name == "state":
-            return StateObservation(max_objects=max(STATE_OBJECTS, self.box_count))
-        raise UnknownNameError(f"observation of task {self.name!r}", name, self.observations)
+    def _image(self, name: str) -> ImageObservation:
+        """``"image"``, or ``"spatial"``, the same at fewer pixels."""
+        window, pixels = self.waypoint_window, _PIXELS[name]
+        return ImageObservation(_CHANNELS, (window, window), (pixels, pixels))

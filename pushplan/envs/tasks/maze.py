@@ -14,14 +14,13 @@ from pushplan.envs.tasks.layout import FreeSpace, footprint_at, square_boxes
 from pushplan.envs.tasks.maze_presets import PRESETS, MazePreset
 from pushplan.envs.tasks.variations import TaskVariations, Yaw
 from pushplan.geometry.distance_field import GeodesicField, geodesic_field
-from pushplan.observation import ImageObservation, ObservationBuilder, StateObservation
+from pushplan.observation import ImageObservation
 from pushplan.world import (
     Drive,
     GoalDisc,
     InvalidInputError,
     Movables,
     ScenarioError,
-    UnknownNameError,
     World,
 )
 from pushplan.world.checked_fields import (
@@ -37,8 +36,6 @@ WALL_REWARD = -50.0
 SUCCESS_REWARD = 200.0
 GAP = 0.01
 """Least distance between bodies at the start, as a fraction of the box size."""
-STATE_OBJECTS = 20
-"""Boxes that the state observation has room for; more if there are more."""
 _IMAGE_CHANNELS = ("footprint", "movable", "static", "goal_distance")
 _START_TRIES = 2000
 
@@ -102,6 +99,7 @@ class MazeTask(Task):
         self._free_space = FreeSpace(self.static)
         room = self.static.bounds[2:] - self.static.bounds[:2]
         self.reach = 2.0 * float(np.hypot(*room))
+        self.state_objects = max(self.state_objects, self.variations.boxes)
         self._steps = 0
 
     @property
@@ -202,11 +200,6 @@ class MazeTask(Task):
         late = self._steps >= self._max_steps
         return StepOutcome(reward, False, "time_limit" if late else "", False, late)
 
-    def observation(self, name: str) -> ObservationBuilder:
-        """``"image"`` or ``"state"``."""
-        if name == "image":
-            window = self.preset.window
-            return ImageObservation(channels=_IMAGE_CHANNELS, window=(window, window))
-        if name == "state":
-            return StateObservation(max_objects=max(STATE_OBJECTS, self.variations.boxes))
-        raise UnknownNameError("observation of the maze", name, self.observations)
+    def _image(self, name: str) -> ImageObservation:
+        window = self.preset.window
+        return ImageObservation(channels=_IMAGE_CHANNELS, window=(window, window))

@@ -12,7 +12,7 @@ import shapely
 from pushplan.envs.tasks.base import StepOutcome, Task
 from pushplan.envs.tasks.ship_presets import PRESETS, ShipPreset
 from pushplan.envs.tasks.variations import TaskVariations
-from pushplan.observation import ImageObservation, ObservationBuilder, StateObservation
+from pushplan.observation import ImageObservation
 from pushplan.scenarios.ice import IceField, generate_ice, load_ice
 from pushplan.world import (
     GoalLine,
@@ -20,7 +20,6 @@ from pushplan.world import (
     Movables,
     ScenarioError,
     StaticMap,
-    UnknownNameError,
     World,
 )
 from pushplan.world.checked_fields import Fraction, Limits, PositiveFloat
@@ -31,8 +30,6 @@ OUTSIDE_REWARD = -50.0
 SUCCESS_REWARD = 200.0
 CONCENTRATION = 0.1
 """Where none is asked for, and there is no file."""
-STATE_OBJECTS = 20
-"""Floes that the state observation shows: the nearest."""
 _IMAGE_CHANNELS = ("footprint", "movable", "goal_distance", "heading_line")
 _PIXELS = 150
 _START_TRIES = 500
@@ -58,8 +55,6 @@ class ShipIceVariations(TaskVariations):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if self.ice_file is not None and not isinstance(self.ice_file, str):
-            raise InvalidInputError(f"ice_file must be a path as text, got {self.ice_file!r}")
         if self.concentration is not None and self.ice_file is not None:
             raise InvalidInputError("concentration and ice_file exclude each other")
 
@@ -201,17 +196,6 @@ class ShipIceTask(Task):
         late = self._steps >= self._max_steps
         return StepOutcome(reward, False, "time_limit" if late else "", False, late)
 
-    def observation(self, name: str) -> ObservationBuilder:
-        """``"image"`` or ``"state"``."""
-        if name == "image":
-            side = self.preset.window
-            return ImageObservation(
-                channels=_IMAGE_CHANNELS,
-                window=(side, side),
-                pixels=(_PIXELS, _PIXELS),
-                north_up=True,
-                shift=self.preset.shift,
-            )
-        if name == "state":
-            return StateObservation(max_objects=STATE_OBJECTS)
-        raise UnknownNameError("observation of ship_ice", name, self.observations)
+    def _image(self, name: str) -> ImageObservation:
+        side, pixels = self.preset.window, (_PIXELS, _PIXELS)
+        return ImageObservation(_IMAGE_CHANNELS, (side, side), pixels, True, self.preset.shift)

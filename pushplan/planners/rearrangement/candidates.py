@@ -6,6 +6,7 @@ import itertools
 import math
 from collections import Counter
 from collections.abc import Iterator, Sequence
+from functools import partial
 
 import numpy as np
 
@@ -149,19 +150,16 @@ def _path_pushes(
         if not scene.fits(start):
             continue
         for gain in row.gains:
-
-            def simulated(friction: float | None, gain: float = gain) -> list[Push]:
-                return simulator.simulate(
-                    start,
-                    k,
-                    path=path,
-                    shift=aside,
-                    limit=limit,
-                    gain=gain,
-                    friction=friction,
-                    wanted=wanted,
-                )
-
-            found = simulated(None)
-            if found and all(simulated(friction) for friction in row.frictions):
+            simulated = partial(
+                simulator.simulate,
+                start,
+                k,
+                path=path,
+                shift=aside,
+                limit=limit,
+                gain=gain,
+                wanted=wanted,
+            )
+            found = simulated()
+            if found and all(simulated(friction=friction) for friction in row.frictions):
                 yield from found

@@ -3,91 +3,58 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from pushplan.control import EpisodeClock, LegFollower, Legs, Recovery, StallChecker
-from pushplan.control.limits import arc_twist
+from pushplan.control import EpisodeClock, LegFollower, Recovery
 from pushplan.control.recovery import warm_up_recovery
-from pushplan.planners.arguments import check_pusher
-from pushplan.planners.rearrangement.line_up import (
-    LineUp,
-    bumper_half,
-    goal_heading,
-    is_done,
-    line_up,
-    unit,
-)
+from pushplan.planners.rearrangement.geometric_pusher import GeometricPusher
+from pushplan.planners.rearrangement.line_up import line_up
+from pushplan.planners.rearrangement.path_push import PathPush
+from pushplan.planners.rearrangement.push_scene import PushScene, check_world
+from pushplan.planners.rearrangement.rearrangement_config import RearrangementConfig
 from pushplan.world import Twist, World
-from pushplan.world.checks import FloatArray, expect, number
+from pushplan.world.checks import expect
 
-_OPTIONS = 8  # how many directions to push a box are tried before the first comes again
-_ASTRAY = 0.8  # difference between heading and push at which the robot lines up anew [rad]
-
-
-@dataclass(frozen=True)
-class GreedyConfig:
-    """Settings of `GreedyPusher`. Lengths are in units of the robot's circumscribed radius.
-
-    Args:
-        response: time in which an error of heading or place is driven off [s]; longer than the
-            robot's delay.
-        slack: clearance between bumper and box when the robot lines up.
-        retreat: how far it backs off after a push.
-        detour: how far it pushes in a direction other than that of the shortest path.
-        offset: distance from the line of push at which it lines up anew, as a fraction of half the
-            bumper's width.
-        patience: time without moving after which it gives up [s].
-    """
-
-    response: float = 0.2
-    slack: float = 0.08
-    retreat: float = 0.6
-    detour: float = 1.5
-    offset: float = 0.7
-    patience: float = 1.5
-
-    def __post_init__(self) -> None:
-        for item in fields(self):
-            number(f"greedy {item.name}", getattr(self, item.name), low=0.0, open_low=True)
+_OPTIONS = 8  # how many places to push a box from are tried before the first comes again
+_RETREAT = 0.6  # how far the robot backs off after a push [circumscribed radii]
+_WAIT = 1.5  # time after which it looks again where it can get at no box [s]
 
 
 @dataclass
 class _Attempt:
-    """One push: of which box, how, and where it began (None before that)."""
+    """One push: of which box, how the robot gets behind it, and whether it is there."""
 
     box: int
-    push: LineUp
     driver: LegFollower
-    heading: float
-    begun_at: FloatArray | None = None
+    push: PathPush
+    pushing: bool = False
 
 
 class GreedyPusher:
     """Takes the nearest box that is not done, drives behind it and pushes until it is done.
 
     Behind means opposite to the box's shortest path around static things to its goal; where the
-    robot does not fit there it stands aside or pushes at an angle, along a wall for instance.
+    robot does not fit there it stands aside or begins at an angle, beside a wall for instance.
     Other boxes are not looked at. A box that cannot be got at or got on with is put off until the
     others have had their turn. No chance is involved.
 
     Args:
-        config: settings.
+        config: settings; of these, ``slack`` and ``response`` count.
     """
 
     actions = ("velocity",)
 
-    def __init__(self, config: GreedyConfig | None = None) -> None:
-        self.config = expect("config", config or GreedyConfig(), GreedyConfig)
+    def __init__(self, config: RearrangementConfig | None = None) -> None:
+        self.config = expect("config", config or RearrangementConfig(), RearrangementConfig)
         self._forget()
 
     def _forget(self) -> None:
         self._attempt: _Attempt | None = None
         self._failures: dict[int, int] = {}
         self._away: Recovery | None = None
-        self._stall: StallChecker | None = None
         self._wait_until = -math.inf
         self._clock = EpisodeClock(self.config.response)
 
@@ -108,86 +75,56 @@ class GreedyPusher:
         Raises:
             InvalidInputError: if the goal is one for the robot, or the robot cannot stop.
         """
-        check_pusher(world, "the greedy pusher")
+        check_world(world)
         return self._clock.command_for(world, self._act)
 
     def _act(self, world: World) -> Twist:
-        if self._attempt is not None and self._is_over(world, self._attempt):
-            self._attempt = None
-            self._back_off(world)
-        command = self._retreat(world) or self._work(world)
+        command = self._retreat(world) or self._work(PushScene(world, self.config))
         return command or self._retreat(world) or Twist(0.0, 0.0)
 
-    def _work(self, world: World) -> Twist | None:
+    def _work(self, scene: PushScene) -> Twist | None:
         """The next command of the attempt in hand or of a new one; None where it has ended."""
-        if self._attempt is None and world.time >= self._wait_until:
-            self._attempt = self._choose(world)
-            self._wait_until = world.time + (self.config.patience if self._attempt is None else 0.0)
-        attempt = self._attempt
+        world, response = scene.world, self.config.response
+        self._attempt = attempt = self._attempt or self._choose(scene)
         if attempt is None:
             return None
-        if attempt.begun_at is None:
-            command = attempt.driver.command(world.robot_pose, world.time, self._clock.held)
-            if command is not None:
-                return command
-            if attempt.driver.arrived:
-                attempt.begun_at = world.robot_pose
-                self._stall = StallChecker(world.robot, self.config.patience)
-        sound = attempt.begun_at is not None and not self._is_stuck(world)
-        command = self._push(world, attempt) if sound else None
-        if command is not None and self._stall is not None:
-            self._stall.send(command)
+        done = attempt.box not in world.movables.ids[~scene.done]
+        command = None if done else self._drive(attempt, scene)
         if command is None:
-            if not sound:  # it is the box's fault, which comes last from now on
+            if not done:  # it is the box's fault, which comes last from now on
                 self._failures[attempt.box] = self._failures.get(attempt.box, 0) + 1
             self._attempt = None
-            self._back_off(world)
+            self._away = Recovery(world, _RETREAT * scene.size, response=response, looks=False)
         return command
 
-    def _is_over(self, world: World, attempt: _Attempt) -> bool:
-        k = np.flatnonzero(world.movables.ids == attempt.box)
-        return len(k) == 0 or is_done(world, int(k[0]))
+    def _drive(self, attempt: _Attempt, scene: PushScene) -> Twist | None:
+        """Get behind the box, and then push it; None where that fails."""
+        if not attempt.pushing:
+            pose, time = scene.world.robot_pose, scene.world.time
+            command = attempt.driver.command(pose, time, self._clock.held)
+            attempt.pushing = attempt.driver.arrived
+            if not attempt.pushing:
+                return command
+        return attempt.push.command(scene)
 
-    def _choose(self, world: World) -> _Attempt | None:
+    def _choose(self, scene: PushScene) -> _Attempt | None:
         """The nearest box that the robot can get behind, of those that failed least often."""
-        boxes = world.movables
-        left = [k for k in range(len(boxes)) if not is_done(world, k)]
-        away = np.hypot(*(boxes.poses[:, :2] - world.robot_pose[:2]).T)
-        ids = boxes.ids.tolist()
-        slack = self.config.slack * world.robot.circumscribed_radius
-        for k in sorted(left, key=lambda k: (self._failures.get(ids[k], 0), away[k], k)):
-            push = line_up(world, k, slack, skip=self._failures.get(ids[k], 0) % _OPTIONS)
-            if push is not None:
-                legs = Legs.ahead(push.points)
-                driver = LegFollower(world.robot, legs, response=self.config.response)
-                return _Attempt(ids[k], push, driver, push.heading)
-            self._failures[ids[k]] = self._failures.get(ids[k], 0) + 1
+        world, failures = scene.world, self._failures
+        if world.time < self._wait_until:
+            return None
+        left = np.flatnonzero(~scene.done).tolist()
+        away = np.hypot(*(scene.poses[:, :2] - world.robot_pose[:2]).T)
+        ids = world.movables.ids.tolist()
+        for k in sorted(left, key=lambda k: (failures.get(ids[k], 0), away[k], k)):
+            skip = failures.get(ids[k], 0) % _OPTIONS
+            place = line_up(scene, k, skip)
+            if place is not None:
+                driver = LegFollower(world.robot, place.legs, response=self.config.response)
+                pusher = GeometricPusher(scene.controller, place.shift)
+                return _Attempt(ids[k], driver, PathPush(scene, ids[k], place.path, pusher))
+            failures[ids[k]] = failures.get(ids[k], 0) + 1
+        self._wait_until = world.time + _WAIT
         return None
-
-    def _push(self, world: World, attempt: _Attempt) -> Twist | None:
-        """Follow the line through the box towards its goal; None where the box has been lost."""
-        k = int(np.flatnonzero(world.movables.ids == attempt.box)[0])
-        robot, size, shift = world.robot, world.robot.circumscribed_radius, attempt.push.shift
-        if attempt.push.turn == 0.0:
-            heading = goal_heading(world, k)
-            attempt.heading = attempt.heading if heading is None else heading
-        elif _distance(world.robot_pose, attempt.begun_at) > self.config.detour * size:
-            return None
-        u, half = unit(attempt.heading), bumper_half(robot)
-        gap = world.movables.poses[k, :2] - world.robot_pose[:2]
-        error = math.remainder(attempt.heading - float(world.robot_pose[2]), 2.0 * math.pi)
-        left = float(gap[0] * u[1] - gap[1] * u[0])  # robot left of the box [m]
-        reach = float(robot.vertices[:, 0].max()) + world.movables.radii[k] + 0.3 * size
-        lost = abs(left) > max(self.config.offset, abs(shift) + 0.25) * half
-        if lost or abs(error) > _ASTRAY or not 0.0 < float(gap @ u) < reach:
-            return None
-        wanted = error - math.atan((left - shift * half) / size)
-        return arc_twist(robot, size, 1.5 * wanted)
-
-    def _back_off(self, world: World) -> None:
-        far = self.config.retreat * world.robot.circumscribed_radius
-        response = self.config.response
-        self._away = Recovery(world, far, response=response, looks=False)
 
     def _retreat(self, world: World) -> Twist | None:
         """Get away from where the last attempt ended."""
@@ -195,13 +132,3 @@ class GreedyPusher:
         if command is None:
             self._away = None
         return command
-
-    def _is_stuck(self, world: World) -> bool:
-        """Whether something stops the robot."""
-        assert self._stall is not None
-        return self._stall.update(world.robot_pose, world.time)
-
-
-def _distance(a: FloatArray, b: FloatArray | None) -> float:
-    assert b is not None
-    return float(np.hypot(a[0] - b[0], a[1] - b[1]))

@@ -12,7 +12,6 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 
 from pushplan.motion.collision import footprint, obstacles
-from pushplan.planners.rearrangement.line_up import bumper_half
 from pushplan.planners.rearrangement.object_paths import done_places
 from pushplan.planners.rearrangement.pose_grid_kernels import LENGTHS, MOVES
 from pushplan.planners.rearrangement.primitives import SHIFTS
@@ -36,6 +35,7 @@ class PushCostToGo:
         static: walls and columns.
         goal: of the object.
         radius: of the object [m].
+        half_width: of the bumper [m].
         slack: clearance between bumper and object [m].
         margin: that the robot keeps from what is static [m].
         config: side of a cell, and the cost where the robot does not fit.
@@ -48,6 +48,7 @@ class PushCostToGo:
         goal: Goal,
         *,
         radius: float,
+        half_width: float,
         slack: float,
         margin: float,
         config: RelocationConfig,
@@ -66,11 +67,10 @@ class PushCostToGo:
         if not walls.is_empty:
             shapely.prepare(walls)
             open_cells = shapely.distance(walls, middles) > 0.5 * radius
-        half = bumper_half(robot)
         pushable = pushable_moves(
             np.stack(np.meshgrid(x, y), axis=2),
             open_cells,
-            np.array(SHIFTS) * half,
+            np.array(SHIFTS) * half_width,
             float(robot.vertices[:, 0].max()) + slack + 0.85 * radius,
             footprint(robot, margin),
             obstacles(static),

@@ -7,11 +7,11 @@ import math
 
 import numpy as np
 
-from pushplan.control import LegFollower, PoseFollower, ProgressChecker, StallChecker
+from pushplan.control import LegFollower, PoseFollower, StallChecker
 from pushplan.control.limits import arc_twist
 from pushplan.planners.pushing import PushingConfig, PushingMpc, PushParameters, PushPath
-from pushplan.planners.rearrangement.controller_kernels import is_on_bumper
 from pushplan.planners.rearrangement.geometric_pusher import GeometricPusher
+from pushplan.planners.rearrangement.path_push import PathPush
 from pushplan.planners.rearrangement.push import Push
 from pushplan.planners.rearrangement.push_poses import initial_heading
 from pushplan.planners.rearrangement.push_scene import PushScene
@@ -65,7 +65,7 @@ class PushExecution:
             aligned=_ALIGNED,
             response=response,
         )
-        self._pusher: GeometricPusher | PushingMpc | None = None
+        self._path_push: PathPush | None = None
         self._pose_follower: PoseFollower | None = None
         self._stall = StallChecker(world.robot)
         self._driven = 0.0
@@ -117,23 +117,20 @@ class PushExecution:
         if self.push.relocates:
             self._pose_follower = PoseFollower(world.robot, self.push.poses, scene.config.response)
         if self.push.controller == "path":
-            self._choose_pusher(scene, held)
+            self._path_push = self._choose_pusher(scene, held)
         return True
 
-    def _choose_pusher(self, scene: PushScene, held: float) -> None:
+    def _choose_pusher(self, scene: PushScene, held: float) -> PathPush:
         """Predictive control where that suits, else the controller of the prediction."""
         push, config = self.push, scene.config
-        size, robot = scene.size, scene.world.robot
-        predictive = self._predictive and suits_mpc(scene, push)
-        path = PushPath.through(push.object_path, radius=size if predictive else 0.0)
-        self._plan = path.plan(robot, push.target)
-        self._progress = ProgressChecker(config.progress * size, size / robot.max_speed)
-        if predictive:
+        if self._predictive and suits_mpc(scene, push):
+            path = PushPath.through(push.object_path, radius=scene.size)
             parameters = PushParameters(config.friction)
-            self._pusher = PushingMpc(PushingConfig(parameters=parameters, period=held))
-        else:
-            controller = scene.controller._replace(gain=push.gain)
-            self._pusher = GeometricPusher(controller, push.shift)
+            mpc = PushingMpc(PushingConfig(parameters=parameters, period=held))
+            return PathPush(scene, push.target, path, mpc)
+        controller = scene.controller._replace(gain=push.gain)
+        path = PushPath.through(push.object_path)
+        return PathPush(scene, push.target, path, GeometricPusher(controller, push.shift))
 
     def _push(self, scene: PushScene, held: float) -> Twist | ExecutionEnd:
         push, world, pose = self.push, scene.world, scene.world.robot_pose
@@ -147,17 +144,10 @@ class PushExecution:
         self._sent_at, self._speed = world.time, 0.0
         if self._driven > 1.1 * push.length + 0.4 * scene.size - 1e-6:
             return ExecutionEnd.FAILED
-        if self._pusher is None:
-            turn = _line_turn(push.start, pose, scene.size)
-            return arc_twist(world.robot, scene.controller.step, turn)
-        twist = self._pusher.command(world, self._plan)
-        target = np.flatnonzero((ids == push.target) & ~scene.done)
-        if len(target):
-            on_bumper = is_on_bumper(np.array(pose), scene.poses[target[0]], scene.controller)
-            rest = self._plan.length - self._pusher.along
-            if not (on_bumper and self._progress.update(rest, world.time)):
-                return ExecutionEnd.FAILED
-        return twist
+        if self._path_push is not None:
+            return self._path_push.command(scene) or ExecutionEnd.FAILED
+        turn = _line_turn(push.start, pose, scene.size)
+        return arc_twist(world.robot, scene.controller.step, turn)
 
 
 def suits_mpc(scene: PushScene, push: Push) -> bool:

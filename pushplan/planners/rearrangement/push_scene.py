@@ -23,7 +23,6 @@ from pushplan.motion.collision import (
 from pushplan.planners.arguments import check_pusher
 from pushplan.planners.rearrangement.controller_kernels import PushingController
 from pushplan.planners.rearrangement.goal_kernels import ObjectGoal, all_done
-from pushplan.planners.rearrangement.line_up import bumper_half
 from pushplan.planners.rearrangement.object_paths import ObjectPaths, object_paths
 from pushplan.planners.rearrangement.pose_grid import make_pose_grid
 from pushplan.planners.rearrangement.pose_grid_kernels import (
@@ -52,6 +51,7 @@ def check_world(world: World) -> None:
     check_pusher(world, "pushing objects")
 
 
+@functools.lru_cache(maxsize=8)
 def make_object_goal(goal: Goal, static: StaticMap, slack: float) -> ObjectGoal:
     """The goal for kernels. Sides of a receptacle that lie on the bounds do not count."""
     assert isinstance(goal, ClearanceArea | Receptacle)
@@ -138,8 +138,9 @@ class PushScene:
 
     @cached_property
     def half(self) -> float:
-        """Half the width of the bumper [m]."""
-        return bumper_half(self.world.robot)
+        """Half the width of the bumper, the robot's foremost edge [m]."""
+        vertices = self.world.robot.vertices
+        return float(np.abs(vertices[vertices[:, 0] > 0.9 * self.front, 1]).max())
 
     @cached_property
     def front(self) -> float:
@@ -279,6 +280,7 @@ class PushScene:
             world.static,
             world.goal,
             radius=round(radius, 6),
+            half_width=self.half,
             slack=config.slack * self.size,
             margin=0.3 * config.margin * self.size,
             config=config.relocation,

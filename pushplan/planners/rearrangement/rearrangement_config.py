@@ -58,7 +58,8 @@ class RearrangementConfig(CheckedFields):
         mpc_heading: a push that begins farther off the object's path is left to the latter
             [degrees].
         progress: by which an object has to get on in the time in which the robot could drive a
-            radius.
+            radius, or turn by the angle below.
+        turn_patience: that angle [rad].
         retreat: how far the robot backs off where it is stuck.
         failure_cost: what is added to the cost of a push for each time that it has failed.
         max_failures: after so many a push waits until something else has been done.
@@ -98,6 +99,7 @@ class RearrangementConfig(CheckedFields):
     mpc: bool = True
     mpc_heading: Annotated[float, Limits(0.0, 180.0)] = 20.0
     progress: PositiveFloat = 0.05
+    turn_patience: PositiveFloat = 0.15
     retreat: PositiveFloat = 0.3
     failure_cost: NonNegativeFloat = 3.0
     max_failures: PositiveInt = 3

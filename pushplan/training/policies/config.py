@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import json
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
@@ -117,17 +118,7 @@ class TrainingConfig(CheckedFields):
 
     def to_dict(self) -> dict[str, Any]:
         """JSON values."""
-        data = asdict(self)
-        data["scenarios"] = [dict(one) for one in self.scenarios]
-        data["observation"] = {
-            key: list(value) if isinstance(value, tuple) else value
-            for key, value in self.observation.items()
-        }
-        data["suites"] = list(self.suites)
-        data["options"] = {
-            key: list(value) if isinstance(value, tuple) else value
-            for key, value in data["options"].items()
-        }
+        data: dict[str, Any] = json.loads(json.dumps(asdict(self)))  # tuples as lists
         return data
 
     def changed(self, **changes: Any) -> TrainingConfig:

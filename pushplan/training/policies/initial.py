@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from pushplan.learned.loading import learned_file
+from pushplan.learned.loading import learned_file, learned_names, weights_of
 from pushplan.learned.onnx_guard import inspect
-from pushplan.learned.shipped import learned_names, weights_of
 from pushplan.training.libraries import need
 from pushplan.world import InvalidInputError
 

@@ -100,8 +100,6 @@ class SamOptions(AlgorithmOptions):
         super().__post_init__()
         if len(self.widths) != 2:
             raise InvalidInputError(f"widths of sam are two numbers, got {self.widths}")
-        if not isinstance(self.start, str):
-            raise InvalidInputError(f"start must be a policy's name or a file, got {self.start!r}")
 
 
 @dataclass(frozen=True)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import dataclasses
+import io
 import json
 import math
 import os
@@ -20,6 +21,7 @@ from pushplan.training.libraries import need
 from pushplan.training.policies.config import TrainingConfig, read_config
 from pushplan.training.policies.environment import TrainingEnv
 from pushplan.world import InvalidInputError
+from pushplan.world.files import write_atomic
 
 CONFIG, CURVE, PICTURE = "config.yaml", "curve.csv", "curve.png"
 CHECKPOINT, BEST, POLICY, RECORD = "checkpoint.pt", "best.pt", "policy.onnx", "training.json"
@@ -75,7 +77,7 @@ class TrainingRun:
                 )
             _same(read_config(there), config, self.folder)
         self.folder.mkdir(parents=True, exist_ok=True)
-        _replace(there, yaml.safe_dump(config.to_dict(), sort_keys=False).encode())
+        write_atomic(there, yaml.safe_dump(config.to_dict(), sort_keys=False).encode())
         if resume and self.path(CURVE).is_file():
             self.curve = _read_curve(self.path(CURVE))
 
@@ -149,17 +151,16 @@ class TrainingRun:
     def record(self, **facts: Any) -> None:
         """Write what a model card needs."""
         text = json.dumps({"config": self.config.to_dict(), **facts}, indent=2)
-        _replace(self.path(RECORD), text.encode())
+        write_atomic(self.path(RECORD), text.encode())
 
     def _write_curve(self) -> None:
         names = [entry.name for entry in dataclasses.fields(CurvePoint)]
-        partial = self.path(CURVE + ".part")
-        with partial.open("w", newline="", encoding="utf-8") as file:
-            writer = csv.writer(file)
-            writer.writerow(names)
-            for point in self.curve:
-                writer.writerow([f"{value:.6g}" for value in dataclasses.astuple(point)])
-        os.replace(partial, self.path(CURVE))
+        text = io.StringIO(newline="")
+        writer = csv.writer(text)
+        writer.writerow(names)
+        for point in self.curve:
+            writer.writerow([f"{value:.6g}" for value in dataclasses.astuple(point)])
+        write_atomic(self.path(CURVE), text.getvalue().encode())
 
 
 class Learned(NamedTuple):
@@ -264,9 +265,3 @@ def _read_curve(path: Path) -> list[CurvePoint]:
         ]
     except (TypeError, ValueError) as error:
         raise InvalidInputError(f"{path} is no learning curve: {error}") from error
-
-
-def _replace(path: Path, content: bytes) -> None:
-    partial = path.with_name(path.name + ".part")
-    partial.write_bytes(content)
-    os.replace(partial, path)

@@ -109,12 +109,34 @@ def specification_of(run: TrainingRun, **facts: Any) -> Any:
 
 
 def _draw(run: TrainingRun) -> None:
-    from pushplan.training.policies.curves import draw_curve
+    """Draw return and success over decisions, for training and validation."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
 
-    if run.curve:
-        title = f"{run.config.task}, {run.config.algorithm}"
-        pairs = run.config.algorithm == "bc"
-        draw_curve(run.curve, run.path(PICTURE), title, pairs=pairs)
+    points, algorithm = run.curve, run.config.algorithm
+    if not points:
+        return
+    figure: Any = Figure(figsize=(8.0, 3.2), layout="constrained")
+    FigureCanvasAgg(figure)
+    returns, fractions = figure.subplots(1, 2)
+    returns.set_ylabel("reward of an episode")
+    steps = [point.steps for point in points]
+    for axes, name, style, label in (
+        (returns, "train_return", ".-", "training"),
+        (returns, "valid_return", "o-", "validation"),
+        (fractions, "train_success", ".-", "success, training"),
+        (fractions, "valid_success", "o-", "success"),
+        (fractions, "valid_share", "--", "sub-tasks done"),
+    ):
+        axes.plot(steps, [getattr(p, name) for p in points], style, label=label, lw=1, ms=3)
+    fractions.set_ylim(-0.02, 1.02)
+    for axes in (returns, fractions):
+        axes.set_xlabel("pairs" if algorithm == "bc" else "decisions")
+        axes.locator_params(axis="x", nbins=6)
+        axes.grid(alpha=0.3)
+        axes.legend(fontsize=8)
+    figure.suptitle(f"{run.config.task}, {algorithm}", fontsize=10)
+    figure.savefig(str(run.path(PICTURE)), dpi=110)
 
 
 def _finish(
