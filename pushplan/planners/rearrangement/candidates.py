@@ -6,10 +6,11 @@ import itertools
 import math
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from functools import partial
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from pushplan.planners.rearrangement.goal_kernels import REMOVED
 from pushplan.planners.rearrangement.primitives import PushPrimitive
 from pushplan.planners.rearrangement.push import Push
 from pushplan.planners.rearrangement.push_poses import heading_axes, initial_heading, pose_behind
@@ -17,6 +18,9 @@ from pushplan.planners.rearrangement.push_simulator import PushSimulator
 from pushplan.world import ClearanceArea
 from pushplan.world.checks import FloatArray
 from pushplan.world.polyline import path_length
+
+_ADVANCE = 0.6
+"""By how much of the way that the robot drives an object has to get on, to be pushed at all."""
 
 
 def delivering_pushes(simulator: PushSimulator, objects: Sequence[int]) -> list[Push]:
@@ -41,27 +45,58 @@ def delivering_pushes(simulator: PushSimulator, objects: Sequence[int]) -> list[
     return found
 
 
-def can_deliver(simulator: PushSimulator, k: int) -> bool:
-    """Whether a push gets object ``k`` home."""
-    target = int(simulator.scene.world.movables.ids[k])
+def can_be_pushed(simulator: PushSimulator, k: int, horizon: float) -> bool:
+    """Whether some push gets object ``k`` on towards its goal.
+
+    Args:
+        simulator: for the scene.
+        k: index of the object.
+        horizon: how far the robot drives to see that [m].
+    """
+    scene = simulator.scene
+    costs = scene.push_cost_to_go(float(scene.world.movables.radii[k]))
+    enough = max(costs.at(scene.poses[k]) - _ADVANCE * horizon, 0.2 * scene.size)
+
+    def gets_on(attempt: _Attempt, friction: float | None) -> bool:
+        how = {**attempt.how, "limit": min(attempt.how["limit"], horizon)}
+        end = simulator.end_of(attempt.start, k, friction=friction, **how)
+        return bool(end[0] >= 0.5 * REMOVED or costs.at(end) <= enough)
+
     return any(
-        target in push.delivers
-        for row in simulator.scene.config.primitives
+        all(gets_on(attempt, friction) for friction in (None, *row.frictions))
+        for row in scene.config.primitives
         if row.controller != "arc" and not row.deep and not row.partners
-        for push in pushes_with(simulator, k, row)
+        for attempt in _attempts(simulator, k, row)
     )
 
 
 def pushes_with(simulator: PushSimulator, k: int, row: PushPrimitive) -> Iterator[Push]:
     """The pushes of one object by one row of the table that deliver something."""
+    for start, how in _attempts(simulator, k, row):
+        found = simulator.simulate(start, k, **how)
+        if found and all(
+            simulator.simulate(start, k, friction=friction, **how) for friction in row.frictions
+        ):
+            yield from found
+
+
+class _Attempt(NamedTuple):
+    """A push to simulate."""
+
+    start: FloatArray  # (3,)
+    how: dict[str, Any]  # Arguments of `PushSimulator.simulate`
+
+
+def _attempts(simulator: PushSimulator, k: int, row: PushPrimitive) -> Iterator[_Attempt]:
+    """The pushes of one object by one row of the table."""
     if row.controller == "line":
-        yield from _line_pushes(simulator, k, row)
+        yield from _line_attempts(simulator, k, row)
         return
     for path, shift, wanted in _paths(simulator, k, row):
-        yield from _path_pushes(simulator, k, row, path, shift, wanted)
+        yield from _path_attempts(simulator, k, row, path, shift, wanted)
 
 
-def _line_pushes(simulator: PushSimulator, k: int, row: PushPrimitive) -> Iterator[Push]:
+def _line_attempts(simulator: PushSimulator, k: int, row: PushPrimitive) -> Iterator[_Attempt]:
     """Straight pushes across the open edges of an area that are not much farther than others."""
     scene = simulator.scene
     goal, box, nearest = scene.world.goal, scene.poses[k, :2], scene.remaining_now[k]
@@ -88,8 +123,7 @@ def _line_pushes(simulator: PushSimulator, k: int, row: PushPrimitive) -> Iterat
                 wanted = [j for j in simulator.left.tolist() if j == k or swept[j]]
                 if tried.count(wanted) < 2 and scene.fits(start):
                     tried.append(wanted)
-                    limit = simulator.longest
-                    yield from simulator.simulate(start, k, wanted=wanted, limit=limit)
+                    yield _Attempt(start, {"wanted": wanted, "limit": simulator.longest})
 
 
 def _paths(
@@ -133,33 +167,22 @@ def _paths(
                 yield np.ascontiguousarray(points), side * 0.5 * width, (k, j)
 
 
-def _path_pushes(
+def _path_attempts(
     simulator: PushSimulator,
     k: int,
     row: PushPrimitive,
     path: FloatArray,
     shift: float | None,
     wanted: tuple[int, ...],
-) -> Iterator[Push]:
+) -> Iterator[_Attempt]:
+    """Pushes along a path, from each of the starts that the row allows."""
     scene = simulator.scene
     towards = initial_heading(path, 0.5 * scene.size)
     limit = 1.5 * path_length(path) + (6.0 if row.leans[0] else 4.0) * scene.size
     shifts = [fraction * scene.half for fraction in row.shifts] if shift is None else [shift]
     for lean, aside in itertools.product(row.leans, shifts):
         start = pose_behind(scene, k, towards + math.radians(lean), aside)
-        if not scene.fits(start):
-            continue
-        for gain in row.gains:
-            simulated = partial(
-                simulator.simulate,
-                start,
-                k,
-                path=path,
-                shift=aside,
-                limit=limit,
-                gain=gain,
-                wanted=wanted,
-            )
-            found = simulated()
-            if found and all(simulated(friction=friction) for friction in row.frictions):
-                yield from found
+        if scene.fits(start):
+            for gain in row.gains:
+                how = {"path": path, "shift": aside, "limit": limit, "gain": gain, "wanted": wanted}
+                yield _Attempt(start, how)

@@ -102,9 +102,13 @@ class PushCostToGo:
         out: FloatArray = dijkstra(graph, indices=seeds, min_only=True).reshape(rows, cols)
         return out
 
-    def at(self, points: FloatArray) -> FloatArray:
-        """(N,) cost from places (N, 2) of the object's middle [m]."""
-        cells = (points - self._low) / self._step
+    def at(self, pose: FloatArray) -> float:
+        """Cost from a pose (3,) of the object [m]."""
+        return float(self.along(pose[None])[0])
+
+    def along(self, poses: FloatArray) -> FloatArray:
+        """(N,) cost from poses (N, 3) of the object [m]."""
+        cells = (poses[:, :2] - self._low) / self._step
         out: FloatArray = map_coordinates(
             self._costs, cells[:, ::-1].T, order=1, mode="nearest", prefilter=False
         )

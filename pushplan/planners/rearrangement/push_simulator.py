@@ -73,13 +73,49 @@ class PushSimulator:
             poses: (K, 3) where the objects are when the push begins; where they are now by default.
             spent: (K,) path lengths that getting there has cost them [m].
         """
+        problem = self._problem(target, path, shift, limit, wanted, gain, friction)
+        rollout = self._roll_out(
+            start, target, problem, self.scene.poses if poses is None else poses
+        )
+        stages = range(len(rollout.steps))
+        found = (self._push_of(rollout, s, target, problem, spent) for s in stages)
+        return [push for push in found if push is not None]
+
+    def end_of(
+        self,
+        start: FloatArray,
+        target: int,
+        *,
+        path: FloatArray | None = None,
+        shift: float = 0.0,
+        limit: float | None = None,
+        wanted: Sequence[int] = (),
+        gain: float = 1.5,
+        friction: float | None = None,
+    ) -> FloatArray:
+        """(3,) where a push gets the target object to; the arguments are those of `simulate`."""
+        problem = self._problem(target, path, shift, limit, wanted, gain, friction)
+        end: FloatArray = self._roll_out(start, target, problem, self.scene.poses).poses[-1, target]
+        return end
+
+    def _problem(
+        self,
+        target: int,
+        path: FloatArray | None,
+        shift: float,
+        limit: float | None,
+        wanted: Sequence[int],
+        gain: float,
+        friction: float | None,
+    ) -> RolloutProblem:
+        """What `roll_out` takes; the arguments are those of `simulate`."""
         scene = self.scene
         flags = np.zeros(len(scene.poses), dtype=np.bool_)
         flags[list(wanted) or [target]] = True
         settings = scene.settings
         if friction is not None:
             settings = settings._replace(friction=friction)
-        problem = RolloutProblem(
+        return RolloutProblem(
             target=target if path is not None and len(path) else -1,
             path=_NO_PATH if path is None else path,
             shift=shift,
@@ -90,10 +126,6 @@ class PushSimulator:
             settings=settings,
             goal=scene.object_goal,
         )
-        rollout = self._roll_out(start, target, problem, scene.poses if poses is None else poses)
-        stages = range(len(rollout.steps))
-        found = (self._push_of(rollout, s, target, problem, spent) for s in stages)
-        return [push for push in found if push is not None]
 
     def _roll_out(
         self, start: FloatArray, target: int, problem: RolloutProblem, poses: FloatArray

@@ -20,7 +20,7 @@ import numpy as np
 
 from pushplan.planners.rearrangement.approach import ApproachTree, arrival_poses
 from pushplan.planners.rearrangement.arc_kernels import sweep_arcs
-from pushplan.planners.rearrangement.candidates import can_deliver
+from pushplan.planners.rearrangement.candidates import can_be_pushed
 from pushplan.planners.rearrangement.goal_kernels import REMOVED
 from pushplan.planners.rearrangement.push import Push
 from pushplan.planners.rearrangement.push_poses import (
@@ -229,7 +229,7 @@ class _RelocationSearch:
     def _rest(self, poses: FloatArray) -> FloatArray:
         """(N,) what is left to be done with the object at poses (N, 3) [m]."""
         gone = poses[:, 0] >= 0.5 * REMOVED
-        return np.where(gone, 0.0, self._cost_to_go.at(poses[:, :2]))
+        return np.where(gone, 0.0, self._cost_to_go.along(poses))
 
     def _has_moved(self, state: _State) -> bool:
         scene, k = self._scene, self._k
@@ -254,7 +254,7 @@ class _RelocationSearch:
         after = scene.with_objects_at(poses)
         if after.done[k]:
             return True
-        return can_deliver(PushSimulator(after), k)
+        return can_be_pushed(PushSimulator(after), k, self._config.horizon * scene.size)
 
     def _side(self, state: _State) -> _Cell:
         """The box of poses that a drive begins in."""

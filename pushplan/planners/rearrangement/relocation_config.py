@@ -35,6 +35,7 @@ class RelocationConfig(CheckedFields):
         errors: of the prediction, that a push home afterwards has to stand: along x and y
             [circumscribed radii], and in heading [rad].
         margins: factors on them; a drive costs a radius more for each that it does not stand.
+        horizon: how far a push goes by which it is seen that the object can be pushed home.
         least: by how much an object has to be moved for it to count.
         spacing: how far an object moves on until it is looked at anew.
         gain: by how much less has to be left to be done for a drive to help where no push home
@@ -60,6 +61,7 @@ class RelocationConfig(CheckedFields):
         (0.0, -0.1, 0.0),
     )
     margins: tuple[float, ...] = (1.0, 2.0, 3.0)
+    horizon: PositiveFloat = 3.0
     least: NonNegativeFloat = 0.15
     spacing: PositiveFloat = 0.05
     gain: NonNegativeFloat = 1.0
