@@ -6,6 +6,7 @@ import itertools
 import math
 from collections import Counter
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -78,6 +79,26 @@ def pushes_with(simulator: PushSimulator, k: int, row: PushPrimitive) -> Iterato
             simulator.simulate(start, k, friction=friction, **how) for friction in row.frictions
         ):
             yield from found
+
+
+def partial_pushes(simulator: PushSimulator, k: int) -> Iterator[Push]:
+    """Pushes of an object along its path that end before something goes wrong, and what is left.
+
+    Each costs what is left to be done, and a radius or two for another push.
+    """
+    scene = simulator.scene
+    costs = scene.push_cost_to_go(float(scene.world.movables.radii[k]))
+    now = costs.at(scene.poses[k])
+    for row in scene.config.primitives:
+        if row.controller != "path" or row.deep or row.partners:
+            continue
+        for start, how in _attempts(simulator, k, row):
+            for whole in simulator.simulate(start, k, relocates=True, **how):
+                how["limit"] = whole.length - scene.config.early * scene.size
+                for push in simulator.simulate(start, k, relocates=True, **how):
+                    left = costs.at(push.object_poses[k])
+                    if left < now - scene.config.relocation.gain * scene.size:
+                        yield replace(push, cost=push.cost + left + 2.0 * scene.size)
 
 
 class _Attempt(NamedTuple):

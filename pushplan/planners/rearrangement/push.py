@@ -28,6 +28,7 @@ class Push(ArrayRecord):
         object_path: (M, 2) of the target object [m].
         shift: how far the robot's middle is to the left of the target object [m].
         gain: of the pushing controller, see `PushingController`.
+        relocates: whether it only brings its target to where it can be pushed from, or nearer home.
     """
 
     delivers: tuple[int, ...]
@@ -41,11 +42,7 @@ class Push(ArrayRecord):
     object_path: FloatArray = field(default_factory=lambda: np.zeros((0, 2)))
     shift: float = 0.0
     gain: float = 1.5
-
-    @property
-    def relocates(self) -> bool:
-        """Whether it only brings its target to where it can be pushed home from."""
-        return self.controller == "arc"
+    relocates: bool = False
 
     @property
     def serves(self) -> tuple[int, ...]:
@@ -68,6 +65,6 @@ class Push(ArrayRecord):
 def signature(push: Push) -> tuple[object, ...]:
     """What a push is known by when it has failed."""
     heading = math.remainder(float(push.start[2]), 2.0 * math.pi)
-    if push.relocates:
+    if push.controller == "arc":
         return push.target, push.controller, round(heading / 0.6)
     return push.target, push.controller, round(heading / 0.3), round(push.shift, 2), push.gain

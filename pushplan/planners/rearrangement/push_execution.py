@@ -114,7 +114,7 @@ class PushExecution:
             good, key=lambda end: (len(set(end.delivers) & set(push.delivers)), -end.length)
         )
         self.pushing = True
-        if self.push.relocates:
+        if self.push.controller == "arc":
             self._pose_follower = PoseFollower(world.robot, self.push.poses, scene.config.response)
         if self.push.controller == "path":
             self._path_push = self._choose_pusher(scene, held)
@@ -142,8 +142,9 @@ class PushExecution:
             return self._pose_follower.command(pose, world.time, held) or ExecutionEnd.DONE
         self._driven += (world.time - self._sent_at) * self._speed
         self._sent_at, self._speed = world.time, 0.0
-        if self._driven > 1.1 * push.length + 0.4 * scene.size - 1e-6:
-            return ExecutionEnd.FAILED
+        longest = push.length if push.relocates else 1.1 * push.length + 0.4 * scene.size
+        if self._driven > longest - 1e-6:
+            return ExecutionEnd.DONE if push.relocates else ExecutionEnd.FAILED
         if self._path_push is not None:
             return self._path_push.command(scene) or ExecutionEnd.FAILED
         turn = _line_turn(push.start, pose, scene.size)
@@ -152,7 +153,7 @@ class PushExecution:
 
 def suits_mpc(scene: PushScene, push: Push) -> bool:
     """Whether the contact model of `PushingMpc` describes a push: of one object, along its path."""
-    if push.delivers != (push.target,):
+    if push.relocates or push.delivers != (push.target,):
         return False
     away = initial_heading(push.object_path, 0.5 * scene.size) - float(scene.world.robot_pose[2])
     return abs(math.remainder(away, math.tau)) < math.radians(scene.config.mpc_heading)

@@ -56,6 +56,7 @@ class PushSimulator:
         wanted: Sequence[int] = (),
         gain: float = 1.5,
         friction: float | None = None,
+        relocates: bool = False,
         poses: FloatArray | None = None,
         spent: FloatArray | None = None,
     ) -> list[Push]:
@@ -70,6 +71,7 @@ class PushSimulator:
             wanted: indices of the objects after which to stop; ``target`` alone by default.
             gain: of the pushing controller.
             friction: coefficient between robot and objects; that of the config by default.
+            relocates: whether to keep only the end, whatever is done then.
             poses: (K, 3) where the objects are when the push begins; where they are now by default.
             spent: (K,) path lengths that getting there has cost them [m].
         """
@@ -78,7 +80,10 @@ class PushSimulator:
             start, target, problem, self.scene.poses if poses is None else poses
         )
         stages = range(len(rollout.steps))
-        found = (self._push_of(rollout, s, target, problem, spent) for s in stages)
+        found = (
+            self._push_of(rollout, s, target, problem, spent, relocates)
+            for s in (stages[-1:] if relocates else stages)
+        )
         return [push for push in found if push is not None]
 
     def end_of(
@@ -167,6 +172,7 @@ class PushSimulator:
         target: int,
         problem: RolloutProblem,
         spent: FloatArray | None,
+        relocates: bool,
     ) -> Push | None:
         """The push up to stage ``s`` of a rollout; None where nothing is won by it."""
         scene, movables = self.scene, self.scene.world.movables
@@ -176,7 +182,8 @@ class PushSimulator:
         follows_path = len(problem.path) > 0
         if (scene.done & ~done).any():
             return None  # something came back
-        if not len(delivers) or (follows_path and target not in delivers):
+        homeward = target in delivers if follows_path else len(delivers) > 0
+        if not (relocates or homeward):
             return None
         track = rollout.track[: int(rollout.steps[s])]
         length = (len(track) - 1) * scene.controller.step
@@ -193,6 +200,7 @@ class PushSimulator:
             object_path=problem.path,
             shift=problem.shift,
             gain=problem.controller.gain,
+            relocates=relocates,
         )
 
     def simulate_primitive(
@@ -227,6 +235,7 @@ class PushSimulator:
                 delivers=tuple(ids[np.flatnonzero(done & ~scene.done)].tolist()),
                 target=int(ids[target]),
                 controller="arc",
+                relocates=True,
                 poses=path,
                 length=length,
                 work=float(masses @ lengths),
@@ -254,7 +263,7 @@ class PushSimulator:
         scene = self.scene
         ids = scene.world.movables.ids
         target = int(np.flatnonzero(ids == push.target)[0])
-        if push.relocates:
+        if push.controller == "arc":
             path = np.vstack([start, push.poses[1:]])
             path[:, 2] = np.unwrap(path[:, 2])
             ends = self.simulate_primitive(path, target, poses, spent)
@@ -267,8 +276,10 @@ class PushSimulator:
             target,
             path=push.object_path if push.controller == "path" else None,
             shift=push.shift,
+            limit=push.length if push.relocates else None,
             wanted=np.flatnonzero(np.isin(ids, push.delivers) & ~scene.done).tolist(),
             gain=push.gain,
+            relocates=push.relocates,
             poses=poses,
             spent=spent,
         )

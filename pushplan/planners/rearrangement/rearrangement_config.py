@@ -43,6 +43,7 @@ class RearrangementConfig(CheckedFields):
         slack: clearance between the bumper and the object where a push begins.
         margin: distance that approaches keep from what is static.
         turn_cost: cost of a turn by one radian on the spot, so that needless ones are left out.
+        early: how far before something goes wrong a push ends that does not get home.
         detour: how much farther than the nearest edge of an area one may be that an object is
             pushed across [times the distance].
         hard_objects: so many objects that no simple push gets home, the nearest ones, are looked at
@@ -89,6 +90,7 @@ class RearrangementConfig(CheckedFields):
     slack: Fraction = 0.05
     margin: Fraction = 0.03
     turn_cost: Annotated[float, Limits(0.0, 1e6)] = 0.03
+    early: NonNegativeFloat = 0.6
     detour: Annotated[float, Limits(1.0)] = 1.3
     hard_objects: PositiveInt = 3
     per_object: Annotated[int, Limits(1, 1000)] = 16

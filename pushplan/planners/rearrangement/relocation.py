@@ -20,7 +20,7 @@ import numpy as np
 
 from pushplan.planners.rearrangement.approach import ApproachTree, arrival_poses
 from pushplan.planners.rearrangement.arc_kernels import sweep_arcs
-from pushplan.planners.rearrangement.candidates import can_be_pushed
+from pushplan.planners.rearrangement.candidates import can_be_pushed, partial_pushes
 from pushplan.planners.rearrangement.goal_kernels import REMOVED
 from pushplan.planners.rearrangement.push import Push
 from pushplan.planners.rearrangement.push_poses import (
@@ -43,6 +43,9 @@ _SPREAD = np.array([0.8191725134, 0.6710436067, 0.5497004779])
 def relocating_pushes(simulator: PushSimulator, k: int, approach: ApproachTree) -> list[Push]:
     """Drives after which object ``k`` can be pushed home, or else lies better than now."""
     scene, found = simulator.scene, None
+    onward = list(partial_pushes(simulator, k))
+    if onward:
+        return onward
     movables, cache = scene.world.movables, scene.cache
     away = np.hypot(*(scene.poses[:, :2] - scene.poses[k, :2]).T)
     near = away < scene.config.relocation.near * scene.size
@@ -108,6 +111,7 @@ class _RelocationSearch:
     def __init__(self, scene: PushScene, k: int, approach: ApproachTree) -> None:
         self._scene, self._k, self._approach = scene, k, approach
         self._config = scene.config.relocation
+        self._horizon = self._config.horizon * scene.size
         self._cost_to_go = scene.push_cost_to_go(float(scene.world.movables.radii[k]))
         self._arcs = _arcs(scene)
         self._steps = max(
@@ -121,6 +125,9 @@ class _RelocationSearch:
 
     def run(self) -> list[Primitive]:
         """Drives, each with the cost of what it leaves to be done [m]."""
+        simulator = PushSimulator(self._scene)
+        if can_be_pushed(simulator, self._k, self._horizon):  # but not all the way
+            self._horizon = simulator.longest
         scene, k, config = self._scene, self._k, self._config
         now = float(self._rest(scene.poses[[k]])[0])
         for start in itertools.chain(self._behind(), self._around()):
@@ -254,7 +261,7 @@ class _RelocationSearch:
         after = scene.with_objects_at(poses)
         if after.done[k]:
             return True
-        return can_be_pushed(PushSimulator(after), k, self._config.horizon * scene.size)
+        return can_be_pushed(PushSimulator(after), k, self._horizon)
 
     def _side(self, state: _State) -> _Cell:
         """The box of poses that a drive begins in."""
