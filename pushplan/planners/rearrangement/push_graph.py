@@ -13,7 +13,7 @@ from pushplan.planners.rearrangement.approach import (
     arrivals_at,
     search_approaches,
 )
-from pushplan.planners.rearrangement.candidates import delivering_pushes
+from pushplan.planners.rearrangement.candidates import delivering_pushes, partial_pushes
 from pushplan.planners.rearrangement.pose_search_kernels import least_costs
 from pushplan.planners.rearrangement.push import Push
 from pushplan.planners.rearrangement.push_scene import PushScene
@@ -49,6 +49,7 @@ def build_push_graph(
     scene: PushScene,
     penalty: Callable[[Push], float] = no_penalty,
     *,
+    onward: bool = False,
     relocations: int = 0,
 ) -> PushGraph:
     """Make the candidate pushes of a scene and their costs.
@@ -56,12 +57,13 @@ def build_push_graph(
     Args:
         scene: the scene.
         penalty: what to add to the cost of a push [m].
+        onward: whether pushes are wanted too that only bring an object nearer to its goal.
         relocations: for how many objects, the nearest ones first, drives that only bring them to
             where they can be pushed home from are wanted too.
     """
     approach = approach_tree(scene)
     simulator = PushSimulator(scene)
-    pushes = candidate_pushes(scene, simulator, approach, relocations)
+    pushes = candidate_pushes(scene, simulator, approach, onward, relocations)
     row = least_costs(approach.costs, arrivals_at(scene.fine, pushes))
     extra = np.array([penalty(push) for push in pushes])
     pushes, keep = _best(scene, pushes, row + extra)
@@ -79,12 +81,18 @@ def build_push_graph(
 
 
 def candidate_pushes(
-    scene: PushScene, simulator: PushSimulator, approach: ApproachTree, relocations: int = 0
+    scene: PushScene,
+    simulator: PushSimulator,
+    approach: ApproachTree,
+    onward: bool = False,
+    relocations: int = 0,
 ) -> list[Push]:
-    """All candidates of a scene; ``relocations`` see `build_push_graph`."""
+    """All candidates of a scene; the arguments are those of `build_push_graph`."""
     away = np.hypot(*(scene.poses[:, :2] - scene.world.robot_pose[:2]).T)
     objects = sorted(simulator.left.tolist(), key=lambda k: (float(away[k]), k))
     pushes = delivering_pushes(simulator, objects)
+    if onward:
+        pushes += [push for k in objects for push in partial_pushes(simulator, k)]
     for k in objects:
         if not relocations:
             break

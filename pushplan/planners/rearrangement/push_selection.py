@@ -41,8 +41,8 @@ class Selection:
 def select_push(scene: PushScene, penalty: Callable[[Push], float]) -> Selection:
     """Sequence anew: the pushes to make, and the first of them with the route to it.
 
-    Where no push can be carried out, those that only free an object are looked at too: first those
-    for the nearest objects, then for all.
+    Where no push home can be carried out, those that end on the way count as well, and where none
+    of these can, drives that free an object: first for the nearest objects, then for all.
 
     Args:
         scene: the scene.
@@ -50,9 +50,9 @@ def select_push(scene: PushScene, penalty: Callable[[Push], float]) -> Selection
     """
     selection = _select(scene, build_push_graph(scene, penalty), penalty)
     left = int((~scene.done).sum())
-    for relocations in sorted({min(scene.config.relocation.objects, left), left}):
+    for relocations in sorted({0, min(scene.config.relocation.objects, left), left}):
         if selection.first is None:
-            graph = build_push_graph(scene, penalty, relocations=relocations)
+            graph = build_push_graph(scene, penalty, onward=True, relocations=relocations)
             selection = _select(scene, graph, penalty)
     return selection
 

@@ -20,7 +20,7 @@ import numpy as np
 
 from pushplan.planners.rearrangement.approach import ApproachTree, arrival_poses
 from pushplan.planners.rearrangement.arc_kernels import sweep_arcs
-from pushplan.planners.rearrangement.candidates import can_be_pushed, partial_pushes
+from pushplan.planners.rearrangement.candidates import can_be_pushed
 from pushplan.planners.rearrangement.goal_kernels import REMOVED
 from pushplan.planners.rearrangement.push import Push
 from pushplan.planners.rearrangement.push_poses import (
@@ -43,9 +43,6 @@ _SPREAD = np.array([0.8191725134, 0.6710436067, 0.5497004779])
 def relocating_pushes(simulator: PushSimulator, k: int, approach: ApproachTree) -> list[Push]:
     """Drives after which object ``k`` can be pushed home, or else lies better than now."""
     scene, found = simulator.scene, None
-    onward = list(partial_pushes(simulator, k))
-    if onward:
-        return onward
     movables, cache = scene.world.movables, scene.cache
     away = np.hypot(*(scene.poses[:, :2] - scene.poses[k, :2]).T)
     near = away < scene.config.relocation.near * scene.size
