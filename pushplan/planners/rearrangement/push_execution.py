@@ -28,7 +28,7 @@ class ExecutionEnd(enum.Enum):
     """How an execution ended."""
 
     DONE = "done"
-    """What it was for is where it belongs, or has been pre-relocated."""
+    """What it was for is where it belongs, or has been relocated."""
     FAILED = "failed"
     """The push did not do what it was for."""
     STUCK = "stuck"

@@ -22,7 +22,7 @@ from pushplan.world.checks import BoolArray, FloatArray
 from pushplan.world.polyline import path_length, path_lengths
 
 _ALIKE = 0.2
-"""By how much places of an object may differ that an extraction primitive gets it to
+"""By how much places of an object may differ that a relocation gets it to
 [circumscribed radii]."""
 _NO_PATH = np.zeros((0, 2))
 
@@ -34,8 +34,9 @@ class PushSimulator:
         self.scene = scene
         count = len(scene.poses)
         sides = scene.world.static.bounds[2:] - scene.world.static.bounds[:2]
-        self.longest = 2.0 * float(sides.sum())
-        steps = int(self.longest / scene.controller.step) + 2
+        step = scene.controller.step
+        self.longest = min(2.0 * float(sides.sum()), scene.config.max_steps * step)
+        steps = int(self.longest / step) + 2
         self._log = RolloutLog(
             np.empty((steps, 3)),
             np.zeros(STAGES),

@@ -50,6 +50,7 @@ class RearrangementConfig(CheckedFields):
             closely.
         per_object: how many pushes are kept for each object.
         max_pushes: how many are kept for all together, by which the time of a plan is bounded.
+        max_steps: how many steps a predicted push has at most.
         max_simulations: how many pushes are simulated before one is chosen.
         max_searches: how many objects relocations are searched for before one is chosen.
         response: time in which an error of heading or place is driven off [s]; longer than the
@@ -95,6 +96,7 @@ class RearrangementConfig(CheckedFields):
     hard_objects: PositiveInt = 3
     per_object: Annotated[int, Limits(1, 1000)] = 16
     max_pushes: Annotated[int, Limits(1, 10_000)] = 80
+    max_steps: Annotated[int, Limits(1, 100_000)] = 5000
     max_simulations: Annotated[int, Limits(1, 1000)] = 30
     max_searches: PositiveInt = 6
     response: Annotated[float, Limits(0.0, 1e3, open_low=True)] = 0.2

@@ -34,7 +34,7 @@ class DeliverySets:
 
 
 def delivery_sets(graph: PushGraph) -> DeliverySets:
-    """The sets of a graph; an object that can only be pre-relocated counts as delivered by that."""
+    """The sets of a graph; an object that can only be relocated counts as delivered by that."""
     reachable = [n for n in range(len(graph.pushes)) if np.isfinite(graph.costs[-1, n])]
     objects = tuple(sorted({i for n in reachable for i in graph.pushes[n].serves})[:MAX_OBJECTS])
     sets = DeliverySets(objects, np.zeros(0, dtype=np.int64))

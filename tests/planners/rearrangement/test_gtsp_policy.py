@@ -3,6 +3,7 @@
 import hashlib
 import subprocess
 import sys
+import time
 from dataclasses import replace
 
 import numpy as np
@@ -121,6 +122,16 @@ def test_a_box_that_nobody_can_reach_is_given_up_with_a_reason():
     assert command == Twist(0.0, 0.0)
     assert list(policy.given_up) == [0] and "push" in policy.given_up[0]
     assert policy.plan == ()
+
+
+@pytest.mark.parametrize("apart", [1e3, 1e6])
+def test_a_decision_is_bounded_however_far_the_boxes_are(apart):
+    here = room([(0.5, 0.1, 0.0), (apart, apart, 0.3)])
+    here = replace(here, static=StaticMap.build(bounds=(-5, -5, apart + 5, apart + 5)))
+    GtspMpc().act(room([(0.5, 0.1, 0.0)]))
+    before = time.process_time()
+    assert GtspMpc().act(here) != Twist(0.0, 0.0)
+    assert time.process_time() - before < 10.0
 
 
 def test_a_box_delivered_by_accident_is_dropped():
