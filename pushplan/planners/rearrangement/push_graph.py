@@ -51,6 +51,7 @@ def build_push_graph(
     *,
     onward: bool = False,
     relocations: int = 0,
+    thorough: bool = False,
 ) -> PushGraph:
     """Make the candidate pushes of a scene and their costs.
 
@@ -60,10 +61,11 @@ def build_push_graph(
         onward: whether pushes are wanted too that only bring an object nearer to its goal.
         relocations: for how many objects, the nearest ones first, drives that only bring them to
             where they can be pushed home from are wanted too.
+        thorough: whether to look for ones that cost much more than the best one.
     """
     approach = approach_tree(scene)
     simulator = PushSimulator(scene)
-    pushes = candidate_pushes(scene, simulator, approach, onward, relocations)
+    pushes = candidate_pushes(scene, simulator, approach, onward, relocations, thorough)
     row = least_costs(approach.costs, arrivals_at(scene.fine, pushes))
     extra = np.array([penalty(push) for push in pushes])
     pushes, keep = _best(scene, pushes, row + extra)
@@ -86,6 +88,7 @@ def candidate_pushes(
     approach: ApproachTree,
     onward: bool = False,
     relocations: int = 0,
+    thorough: bool = False,
 ) -> list[Push]:
     """All candidates of a scene; the arguments are those of `build_push_graph`."""
     away = np.hypot(*(scene.poses[:, :2] - scene.world.robot_pose[:2]).T)
@@ -96,7 +99,7 @@ def candidate_pushes(
     for k in objects:
         if not relocations:
             break
-        found = relocating_pushes(simulator, k, approach)
+        found = relocating_pushes(simulator, k, approach, thorough)
         pushes += found
         relocations -= bool(found)
     return pushes

@@ -50,9 +50,12 @@ def select_push(scene: PushScene, penalty: Callable[[Push], float]) -> Selection
     """
     selection = _select(scene, build_push_graph(scene, penalty), penalty)
     left = int((~scene.done).sum())
-    for relocations in sorted({0, min(scene.config.relocation.objects, left), left}):
+    few = min(scene.config.relocation.objects, left)
+    for relocations, thorough in ((0, False), (few, False), (left, True)):
         if selection.first is None:
-            graph = build_push_graph(scene, penalty, onward=True, relocations=relocations)
+            graph = build_push_graph(
+                scene, penalty, onward=True, relocations=relocations, thorough=thorough
+            )
             selection = _select(scene, graph, penalty)
     return selection
 

@@ -40,20 +40,29 @@ _SPREAD = np.array([0.8191725134, 0.6710436067, 0.5497004779])
 """Steps of an additive recurrence that fills a cube evenly (Roberts 2018)."""
 
 
-def relocating_pushes(simulator: PushSimulator, k: int, approach: ApproachTree) -> list[Push]:
-    """Drives after which object ``k`` can be pushed home, or else lies better than now."""
+def relocating_pushes(
+    simulator: PushSimulator, k: int, approach: ApproachTree, thorough: bool = False
+) -> list[Push]:
+    """Drives after which object ``k`` can be pushed home, or else lies better than now.
+
+    Args:
+        simulator: for the scene.
+        k: index of the object.
+        approach: from where the robot is.
+        thorough: whether to look for drives that cost much more than the best one too.
+    """
     scene, found = simulator.scene, None
     movables, cache = scene.world.movables, scene.cache
     away = np.hypot(*(scene.poses[:, :2] - scene.poses[k, :2]).T)
     near = away < scene.config.relocation.near * scene.size
     robot = np.round(scene.world.robot_pose[:2] / (2.0 * scene.size))
-    around = movables.ids[near].tobytes() + scene.poses[near].tobytes()
+    around = bytes([thorough]) + movables.ids[near].tobytes() + scene.poses[near].tobytes()
     if cache is not None:
         found = cache.primitives(int(movables.ids[k]), around, robot.tobytes())
         if found is None and cache.searches >= scene.config.max_searches:
             return []
     if found is None:
-        found = _RelocationSearch(scene, k, approach).run()
+        found = _RelocationSearch(scene, k, approach, thorough).run()
         if cache is not None:
             cache.keep_primitives(int(movables.ids[k]), around, robot.tobytes(), found)
     return [
@@ -105,8 +114,11 @@ class _State:
 class _RelocationSearch:
     """The search for one object of a scene."""
 
-    def __init__(self, scene: PushScene, k: int, approach: ApproachTree) -> None:
+    def __init__(
+        self, scene: PushScene, k: int, approach: ApproachTree, thorough: bool = False
+    ) -> None:
         self._scene, self._k, self._approach = scene, k, approach
+        self._slack = math.inf if thorough else scene.config.relocation.slack * scene.size
         self._config = scene.config.relocation
         self._horizon = self._config.horizon * scene.size
         self._cost_to_go = scene.push_cost_to_go(float(scene.world.movables.radii[k]))
@@ -135,7 +147,7 @@ class _RelocationSearch:
         expansions, sides, alike = Counter[bool](), Counter[_Cell](), Counter[_Cell]()
         while self._open and expansions[True] < config.expansions and sides.total() < config.enough:
             state = heapq.heappop(self._open)[2]
-            if state.cost > best + config.slack * scene.size:
+            if state.cost > best + self._slack:
                 break
             if state.depth and not self._has_moved(state):
                 continue

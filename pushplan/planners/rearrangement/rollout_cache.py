@@ -13,7 +13,7 @@ from pushplan.world.checks import BoolArray, FloatArray, IntArray
 _OLD = 8  # for how many plans what is not asked for is kept
 
 Primitive = tuple[FloatArray, float]
-"""Poses (N, 3) of the robot in a drive that relocates an object, and the cost of what it leaves [m]."""
+"""Poses (N, 3) of the robot in a relocation, and the cost of what it leaves to be done [m]."""
 
 
 @dataclass(frozen=True, eq=False)
