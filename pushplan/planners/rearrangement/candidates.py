@@ -47,21 +47,25 @@ def delivering_pushes(simulator: PushSimulator, objects: Sequence[int]) -> list[
 
 
 def can_be_pushed(simulator: PushSimulator, k: int, horizon: float) -> bool:
-    """Whether some push gets object ``k`` on towards its goal.
+    """Whether some push gets object ``k`` home, or on towards its goal where that is far away.
 
     Args:
         simulator: for the scene.
         k: index of the object.
-        horizon: how far the robot drives to see that [m].
+        horizon: how far the robot drives at most to see that [m].
     """
-    scene = simulator.scene
+    scene, target = simulator.scene, int(simulator.scene.world.movables.ids[k])
     costs = scene.push_cost_to_go(float(scene.world.movables.radii[k]))
-    enough = max(costs.at(scene.poses[k]) - _ADVANCE * horizon, 0.2 * scene.size)
+    now = costs.at(scene.poses[k])
 
     def gets_on(attempt: _Attempt, friction: float | None) -> bool:
-        how = {**attempt.how, "limit": min(attempt.how["limit"], horizon)}
-        end = simulator.end_of(attempt.start, k, friction=friction, **how)
-        return bool(end[0] >= 0.5 * REMOVED or costs.at(end) <= enough)
+        start, how = attempt
+        if now <= horizon:
+            pushes = simulator.simulate(start, k, friction=friction, **how)
+            return any(target in push.delivers for push in pushes)
+        how = {**how, "limit": min(how["limit"], horizon)}
+        end = simulator.end_of(start, k, friction=friction, **how)
+        return bool(end[0] >= 0.5 * REMOVED or costs.at(end) <= now - _ADVANCE * horizon)
 
     return any(
         all(gets_on(attempt, friction) for friction in (None, *row.frictions))
