@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-import functools
 import math
 
 import numpy as np
-import shapely
 
 from pushplan.planners.rearrangement.controller_kernels import along_path
 from pushplan.planners.rearrangement.push_pose_kernels import pose_behind_outline
 from pushplan.planners.rearrangement.push_scene import PushScene
-from pushplan.world import StaticMap
 from pushplan.world.checks import FloatArray
 
 
@@ -49,25 +46,3 @@ def pose_distance(pose: FloatArray, other: FloatArray, size: float) -> float:
     """How far two poses (3,) of an object are apart, turns included, in units of ``size``."""
     turn = math.remainder(float(pose[2] - other[2]), 2.0 * math.pi)
     return math.dist(pose[:2], other[:2]) / size + 0.2 * abs(turn)
-
-
-def distance_to_bounds(static: StaticMap, points: FloatArray) -> FloatArray:
-    """Distance of points (N, 2) from the bounds, negative beyond them [m]."""
-    out: FloatArray = np.minimum(points - static.bounds[:2], static.bounds[2:] - points).min(axis=1)
-    return out
-
-
-def distance_to_obstacles(static: StaticMap, points: FloatArray) -> FloatArray:
-    """Distance of points (..., 2) from what stands within the bounds [m]; inf if nothing does."""
-    if not len(static.convex_parts):
-        return np.full(points.shape[:-1], np.inf)
-    out: FloatArray = shapely.distance(_columns(static), shapely.points(points))
-    return out
-
-
-@functools.lru_cache(maxsize=8)
-def _columns(static: StaticMap) -> shapely.Geometry:
-    """All that is static within the bounds."""
-    columns = shapely.union_all([shapely.Polygon(part) for part in static.convex_parts])
-    shapely.prepare(columns)
-    return columns

@@ -120,7 +120,7 @@ class PushSimulator:
         flags[list(wanted) or [target]] = True
         settings = scene.settings
         if friction is not None:
-            settings = settings._replace(friction=friction)
+            settings = settings._replace(friction=float(friction))
         return RolloutProblem(
             target=target if path is not None and len(path) else -1,
             path=_NO_PATH if path is None else path,
