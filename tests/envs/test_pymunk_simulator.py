@@ -260,5 +260,5 @@ def test_overlaps_in_a_perceived_scene_do_not_hold_the_robot():
 def test_bad_options_are_refused(bad):
     with pytest.raises(InvalidInputError, match=next(iter(bad))):
         PymunkOptions(**bad)
-    with pytest.raises(InvalidInputError, match="materials.robot_object"):
+    with pytest.raises(InvalidInputError, match="robot_object"):
         Materials(robot_object=-1.0)
