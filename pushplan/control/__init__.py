@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from pushplan.control.episode_clock import EpisodeClock
+from pushplan.control.executors import ImmediateExecutor, SimulatedExecutor
 from pushplan.control.leg_follower import LegFollower, Legs
 from pushplan.control.limits import TwistLimiter, clamp_twist
 from pushplan.control.path_follower import PathFollower
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "EpisodeClock",
+    "ImmediateExecutor",
     "LegFollower",
     "Legs",
     "MpcConfig",
@@ -33,6 +35,7 @@ __all__ = [
     "PurePursuit",
     "Recovery",
     "Retreat",
+    "SimulatedExecutor",
     "StallChecker",
     "TwistLimiter",
     "clamp_twist",

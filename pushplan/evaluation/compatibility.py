@@ -6,7 +6,8 @@ import contextlib
 from collections.abc import Sequence
 from typing import Any
 
-from pushplan.evaluation.episode import PolicyError, Recording, describe
+from pushplan.evaluation.episode import PolicyError, Recording
+from pushplan.world.errors import describe
 from pushplan.evaluation.jobs import Job, JobSettings
 from pushplan.evaluation.limits import EpisodeTimeout, soft_limit
 from pushplan.evaluation.policies import PolicySpec, parse_policies

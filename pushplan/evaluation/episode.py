@@ -9,6 +9,7 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 
 import pushplan
+from pushplan.control.executors import SimulatedExecutor
 from pushplan.world import (
     ChoosesActions,
     ChoosesObservation,
@@ -25,6 +26,7 @@ from pushplan.world import (
     stream,
 )
 from pushplan.world.checks import FloatArray, number
+from pushplan.world.errors import describe
 
 Clock = Callable[[], float]
 """Returns seconds, like `time.perf_counter`."""
@@ -101,6 +103,7 @@ class Recording:
             None if latency_factor is None else number("latency_factor", latency_factor, low=0.0)
         )
         self._clock = clock
+        self._executor = SimulatedExecutor(self.latency_factor or 0.0, clock)
         self.scenario = scenario
         self.label = label or type(policy).__name__
         self.started = False
@@ -131,6 +134,7 @@ class Recording:
         ended = False
         while not ended:
             seeing = observation_time(env, self.policy, len(self._actions))
+            beside = self._executor.spent
             begin = self._clock()
             action = self._ask(self.policy.act, world, observation)
             elapsed = self._clock() - begin
@@ -141,7 +145,8 @@ class Recording:
             if self.latency_factor is None:
                 observation, reward, terminated, truncated, info = env.step(command)
             else:
-                lag = self.latency_factor * (seeing + blocking_time(self.policy, elapsed))
+                waited = max(elapsed - (self._executor.spent - beside), 0.0)
+                lag = self.latency_factor * (seeing + waited)
                 observation, reward, terminated, truncated, info = env.step_late(command, lag)
             elapsed += seeing
             world = env.world
@@ -203,7 +208,7 @@ class Recording:
                 f"{type(env).__name__} has none"
             )
         if isinstance(self.policy, PlansBesideDriving):
-            self._ask(self.policy.simulate_latency, self.latency_factor, self._clock)
+            self._ask(self.policy.plan_with, self._executor)
 
     def _begin(self, world: World) -> None:
         self.started = True
@@ -227,17 +232,6 @@ class Recording:
             raise
         except (Exception, SystemExit) as error:
             raise PolicyError(describe(error)) from error
-
-
-def blocking_time(policy: Policy, elapsed_s: float) -> float:
-    """How long the robot waited for an action [s].
-
-    Args:
-        policy: one that `PlansBesideDriving` does part of the call while the robot drives.
-        elapsed_s: wall-clock time of the call [s].
-    """
-    beside = policy.background_s if isinstance(policy, PlansBesideDriving) else 0.0
-    return max(elapsed_s - max(beside, 0.0), 0.0)
 
 
 def held_for(policy: Policy) -> int:
@@ -295,13 +289,6 @@ def plan_times(policy: Policy) -> list[float] | None:
     if not isinstance(policy, LogsPlans):
         return None
     return [float(result.stats.wall_time_s) for result in policy.plan_log]
-
-
-def describe(error: BaseException) -> str:
-    """One line for an exception: its type and its message."""
-    text = " ".join(str(error).split())
-    name = type(error).__name__
-    return f"{name}: {text}" if text else name
 
 
 def describe_value(value: object) -> str:

@@ -19,12 +19,12 @@ from pushplan.evaluation.episode import (
     InvalidActionError,
     PolicyError,
     Recording,
-    describe,
     plan_times,
 )
 from pushplan.evaluation.jobs import Job, JobResult, JobSettings, failed_result, timeout_reason
 from pushplan.evaluation.limits import EpisodeTimeout, hard_limit, soft_limit
 from pushplan.evaluation.rows import Status, blank_row, scored_row
+from pushplan.world.errors import describe
 from pushplan.world.policy_abilities import WarmsUp
 
 DRY_RUN_STEPS = 2

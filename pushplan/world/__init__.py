@@ -22,6 +22,7 @@ from pushplan.world.goals import (
 )
 from pushplan.world.movables import Movables
 from pushplan.world.plan import Plan, PlanResult, PlanStats, PlanStatus, SubTask
+from pushplan.world.planning_executor import PendingResult, PlanningExecutor
 from pushplan.world.policy_abilities import (
     ChecksEnvironment,
     ChecksScenario,
@@ -52,6 +53,7 @@ from pushplan.world.stop import (
     Deadline,
     FirstSolution,
     MaxIterations,
+    OwnBudget,
     Stop,
     StopCheck,
 )
@@ -82,10 +84,13 @@ __all__ = [
     "MissingDependencyError",
     "Movables",
     "NavigationGoal",
+    "OwnBudget",
+    "PendingResult",
     "Plan",
     "PlanResult",
     "PlanStats",
     "PlanStatus",
+    "PlanningExecutor",
     "Planner",
     "PlansBesideDriving",
     "Policy",

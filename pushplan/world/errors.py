@@ -48,3 +48,10 @@ def unknown_name_message(kind: str, name: object, choices: Iterable[str]) -> str
     near = difflib.get_close_matches(str(name), valid, n=1, cutoff=0.5)
     hint = f"; did you mean {near[0]!r}?" if near else ""
     return f"unknown {kind} {name!r}{hint} (valid: {', '.join(valid) or 'none'})"
+
+
+def describe(error: BaseException) -> str:
+    """One line for an exception: its type and its message."""
+    text = " ".join(str(error).split())
+    name = type(error).__name__
+    return f"{name}: {text}" if text else name

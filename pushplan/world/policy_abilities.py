@@ -6,10 +6,11 @@ attributes, without inheriting anything. ``docs/extending.md`` shows each.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any, Protocol, runtime_checkable
 
 from pushplan.world.plan import Plan, PlanResult
+from pushplan.world.planning_executor import PlanningExecutor
 
 
 @runtime_checkable
@@ -69,18 +70,14 @@ class HoldsDecisions(Protocol):
 
 @runtime_checkable
 class PlansBesideDriving(Protocol):
-    """Plans while the robot drives on, in latency-aware simulation."""
+    """Can plan while the robot drives on: on a robot, and in latency-aware simulation."""
 
-    @property
-    def background_s(self) -> float:
-        """The part of the last call of ``act`` that went on beside driving [s]."""
-
-    def simulate_latency(self, factor: float, clock: Callable[[], float]) -> None:
-        """Let a plan be there only after the time that it took, until the next ``reset``.
+    def plan_with(self, executor: PlanningExecutor) -> None:
+        """Run planning calls by an executor until the next ``reset``.
 
         Args:
-            factor: seconds of the world's clock for one of ``clock``.
-            clock: returns seconds.
+            executor: ``act`` gives it every call that may take long, and returns without waiting
+                for the result.
         """
 
 

@@ -104,6 +104,18 @@ class DefaultBudget(Stop):
 
 
 @dataclass(frozen=True)
+class OwnBudget(Stop):
+    """Return when the planner would without a rule; for `OwnBudget() | Deadline(1.0)`.
+
+    A planner that ends by itself has no such budget: the other rules alone end it.
+    """
+
+    def start(self) -> StopCheck:
+        """Arm the rule for one call; `PlanningCall` has put the budget beside it."""
+        return lambda iterations, cost: False
+
+
+@dataclass(frozen=True)
 class FirstSolution(Stop):
     """Return as soon as there is a plan."""
 

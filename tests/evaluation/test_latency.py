@@ -50,16 +50,14 @@ class Turns:
         return Twist(0.15, 0.05 if len(self.times) % 2 else -0.05)
 
 
-class Stops(Turns):
-    """A policy with its own idea of how it keeps time."""
+class Thinks(Turns):
+    """A policy of whose time one tick goes on beside driving."""
 
-    background_s = 0.0
-
-    def simulate_latency(self, factor, clock) -> None:
-        self.kept = (factor, clock)
+    def plan_with(self, executor) -> None:
+        self.executor = executor
 
     def act(self, world, observation):
-        self.background_s = 0.75
+        self.executor.submit(lambda stop: None, world.time)
         return super().act(world, observation)
 
 
@@ -199,10 +197,10 @@ class TestRunEpisode:
         assert "latency_factor" not in frozen.about
 
     def test_what_goes_on_beside_driving_does_not_hold_the_robot(self):
-        policy, clock = Stops(), Ticks(1.0)
-        run_episode(maze(), policy, MAZE, latency_factor=2.0, clock=clock)
-        assert policy.kept == (2.0, clock)
-        assert np.diff(policy.times) == pytest.approx(0.8 + 2.0 * 0.25)
+        policy = Thinks()
+        run_episode(maze(), policy, MAZE, latency_factor=2.0, clock=Ticks(1.0))
+        # of the three ticks of a call one is the planning's own
+        assert np.diff(policy.times) == pytest.approx(0.8 + 2.0 * 2.0)
 
     def test_slow_planning_costs_a_plan_follower_little(self):
         """It drives the old plan until the new one is there; one that waits for it does not."""

@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from pushplan.control import EpisodeClock, PathFollower, clamp_twist
+from pushplan.control import EpisodeClock, ImmediateExecutor, PathFollower, clamp_twist
 from pushplan.control.limits import driven_twist, ramp_twist
 from pushplan.control.tracking import Progress
 from pushplan.interaction import InteractionModel, QuasiStatic
-from pushplan.planners.following.planning_time import PlanningTime
 from pushplan.planners.following.recovery import RecoveryRule
 from pushplan.planners.following.replanning import (
     Reason,
@@ -28,13 +25,16 @@ from pushplan.world import (
     GoalDisc,
     GoalLine,
     InvalidInputError,
+    PendingResult,
     Plan,
     Planner,
+    PlanningExecutor,
     PlanResult,
     Stop,
     Twist,
     World,
 )
+from pushplan.world.checks import expect
 from pushplan.world.polyline import path_lengths
 
 _PERIOD = 0.1  # for which the first command is taken to be held [s]
@@ -45,13 +45,11 @@ _PAUSE = 0.1  # between two plans, of the time for which the robot has not got o
 class _PendingPlan:
     """A planning call whose plan may not be there yet."""
 
-    result: PlanResult
+    call: PendingResult[PlanResult]
     stretch: Plan | None
     reason: Reason
     made: float
     """When it was asked for, by the clock of the world [s]."""
-    ready: float
-    """When its plan is there [s]."""
 
 
 class PlanFollower:
@@ -62,8 +60,8 @@ class PlanFollower:
     up, a new plan is made. If none is found the old one is kept. A differential drive that does
     not get on, with a plan or without, recovers (`pushplan.control.Recovery`) and plans anew.
 
-    In latency-aware simulation (`simulate_latency`) planning goes on beside driving: a plan is
-    there only after the time that it took, and the old one is driven until then.
+    With an executor that takes time (`plan_with`) planning goes on beside driving: a call plans
+    from where the robot will be when it is done, and the old plan is driven until then.
 
     Args:
         planner: makes the plans.
@@ -94,31 +92,22 @@ class PlanFollower:
         self._forget(np.random.default_rng(0))
 
     def reset(self, world: World, rng: np.random.Generator) -> None:
-        """Forget the last episode; planning takes no time until `simulate_latency` is called."""
+        """Forget the last episode; calls run at once until `plan_with` says otherwise."""
         self._forget(rng)
         self.controller.reset(world)
         self._clock.command = driven_twist(world)
         self._progress = Progress(window=2.0 * world.robot.circumscribed_radius)
         self._recovery = RecoveryRule(world)
 
-    def simulate_latency(
-        self, factor: float, clock: Callable[[], float] = time.perf_counter
-    ) -> None:
-        """From now to the next reset a plan is there only after the time that it took.
-
-        Args:
-            factor: seconds of the world's clock for one of ``clock``.
-            clock: returns seconds.
-        """
-        self._planning_time.simulate(factor, clock)
+    def plan_with(self, executor: PlanningExecutor) -> None:
+        """See `pushplan.world.PlansBesideDriving`."""
+        self._executor: PlanningExecutor = executor
 
     def _forget(self, rng: np.random.Generator) -> None:
         self.plan_log: list[PlanResult] = []
         """Every planning call since the last reset."""
         self.current_plan: Plan | None = None
-        self.background_s = 0.0
-        """How much of the last call of `act` a robot would do beside driving [s]."""
-        self._planning_time = PlanningTime()
+        self.plan_with(ImmediateExecutor())
         self._clock = EpisodeClock(_PERIOD)
         self._pending: _PendingPlan | None = None
         self._rng = rng
@@ -136,7 +125,6 @@ class PlanFollower:
         """The twist for this step; plans first where that is necessary."""
         if self._progress is None:
             self.reset(world, self._rng)
-        self.background_s = 0.0
         return self._clock.command_for(world, self._act)
 
     def _act(self, world: World) -> Twist:
@@ -178,6 +166,8 @@ class PlanFollower:
         """The next velocity of a recovery, after which nothing is left of the old plan."""
         away = self._recovery.command(world, self._clock.held)
         if away is not None:
+            if self._pending is not None:
+                self._pending.call.abandon()
             self.current_plan = self._pending = None
             self.controller.reset(world)
         return away
@@ -187,34 +177,35 @@ class PlanFollower:
         assert self._progress is not None
         latency = self.replanning.latency
         if latency is None:
-            latency = self._planning_time.expected(self.stop)
+            latency = self._executor.expected(self.stop)
         start, stretch = world_ahead(
             world, self.current_plan, self._progress.along, latency, self.interaction
         )
-        result, took = self._planning_time.measure(
-            lambda: self.planner.plan(start, stop=self.stop, rng=self._rng)
-        )
-        self.background_s = self._planning_time.own
-        self.plan_log.append(result)
+        planner, rng = self.planner, self._rng
         self._planned_at, self._planned_from = world.time, world.robot_pose[:2]
         self._planned_ids = world.movables.ids
-        self._pending = _PendingPlan(result, stretch, reason, world.time, world.time + took)
+        call = self._executor.submit(
+            lambda stop: planner.plan(start, stop=stop, rng=rng), world.time, self.stop
+        )
+        self._pending = _PendingPlan(call, stretch, reason, world.time)
 
     def _receive(self, world: World) -> None:
-        """Take up a plan that has been waited for long enough."""
+        """Take up a plan that is there."""
         pending = self._pending
-        if pending is None or world.time < pending.ready - 1e-9:
+        if pending is None or not pending.call.ready(world.time):
             return
         self._pending = None
-        if pending.result.plan is None:
+        result = expect("what the planner returns", pending.call.result(), PlanResult)
+        self.plan_log.append(result)
+        if result.plan is None:
             return
-        new = joined(pending.stretch, pending.result.plan)
+        new = joined(pending.stretch, result.plan)
         if world.time > pending.made:
             new = rest_of(new, passed(world, new, world.time - pending.made), None)
         if self._keeps_old(world, new, pending.reason):
             return
         self.current_plan = new
-        self._tight = pending.result.stats.detail.get("tight", 0.0) > 0.0
+        self._tight = result.stats.detail.get("tight", 0.0) > 0.0
 
     def _keeps_old(self, world: World, new: Plan, reason: Reason) -> bool:
         """Whether the new plan is not enough better than what is left of the old one."""

@@ -68,7 +68,8 @@ def can_be_pushed(simulator: PushSimulator, k: int, horizon: float) -> bool:
         return bool(end[0] >= 0.5 * REMOVED or costs.at(end) <= now - _ADVANCE * horizon)
 
     return any(
-        all(gets_on(attempt, friction) for friction in (None, *row.frictions))
+        not scene.budget.is_over
+        and all(gets_on(attempt, friction) for friction in (None, *row.frictions))
         for row in scene.config.primitives
         if row.controller != "arc" and not row.deep and not row.partners
         for attempt in _attempts(simulator, k, row)
@@ -78,6 +79,8 @@ def can_be_pushed(simulator: PushSimulator, k: int, horizon: float) -> bool:
 def pushes_with(simulator: PushSimulator, k: int, row: PushPrimitive) -> Iterator[Push]:
     """The pushes of one object by one row of the table that deliver something."""
     for start, how in _attempts(simulator, k, row):
+        if simulator.scene.budget.is_over:
+            return
         found = simulator.simulate(start, k, **how)
         if found and all(
             simulator.simulate(start, k, friction=friction, **how) for friction in row.frictions
@@ -97,6 +100,8 @@ def partial_pushes(simulator: PushSimulator, k: int) -> Iterator[Push]:
         if row.controller != "path" or row.deep or row.partners:
             continue
         for start, how in _attempts(simulator, k, row):
+            if scene.budget.is_over:
+                return
             for whole in simulator.simulate(start, k, relocates=True, **how):
                 how["limit"] = whole.length - scene.config.early * scene.size
                 for push in simulator.simulate(start, k, relocates=True, **how):

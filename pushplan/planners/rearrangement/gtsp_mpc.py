@@ -2,23 +2,25 @@
 
 from __future__ import annotations
 
-import math
-from collections import Counter
-from functools import partial
 from typing import Any
 
 import numpy as np
 
-from pushplan.control import EpisodeClock, PoseFollower, Retreat
-from pushplan.motion.recovery_path import recovery_path
-from pushplan.planners.rearrangement.push import Push, signature
+from pushplan.control import EpisodeClock, ImmediateExecutor, PoseFollower, Retreat
+from pushplan.planners.rearrangement.push import Push
+from pushplan.planners.rearrangement.push_choice import (
+    PendingChoice,
+    PushChoice,
+    choose_push,
+    scene_after,
+)
 from pushplan.planners.rearrangement.push_execution import ExecutionEnd, PushExecution
 from pushplan.planners.rearrangement.push_graph import PushGraph
+from pushplan.planners.rearrangement.push_history import PushHistory
 from pushplan.planners.rearrangement.push_scene import PushScene, check_world
-from pushplan.planners.rearrangement.push_selection import select_push
 from pushplan.planners.rearrangement.rearrangement_config import RearrangementConfig
 from pushplan.planners.rearrangement.rollout_cache import RolloutCache
-from pushplan.world import InvalidInputError, Twist, World
+from pushplan.world import InvalidInputError, PlanningExecutor, Stop, Twist, World
 from pushplan.world.checks import FloatArray, expect
 
 
@@ -26,10 +28,14 @@ class GtspMpc:
     """Clears or delivers objects: which next, from which side, together with which others.
 
     After every push the push graph is built anew from what is seen, and the order of pushes
-    solved anew; the first of them is carried out. No chance is involved.
+    solved anew; the first of them is carried out. No chance is involved. With an executor that
+    takes time (`plan_with`) the next push is chosen while the present one is driven, for the scene
+    that is expected after it.
 
     Args:
         config: settings.
+        stop: stop rule of each choice, counted in simulated pushes; what was found until then is
+            driven. None for no end but those of the config.
         overrides: fields of the default config to change, in place of ``config``.
 
     Attributes:
@@ -40,20 +46,28 @@ class GtspMpc:
 
     actions = ("velocity",)
 
-    def __init__(self, config: RearrangementConfig | None = None, **overrides: Any) -> None:
+    def __init__(
+        self,
+        config: RearrangementConfig | None = None,
+        *,
+        stop: Stop | None = None,
+        **overrides: Any,
+    ) -> None:
         if config is not None and overrides:
             raise InvalidInputError("give either a config or fields of one, not both")
         if config is None:
             config = RearrangementConfig.of(**overrides)
         self.config = expect("config", config, RearrangementConfig)
+        self.stop = None if stop is None else expect("stop", stop, Stop)  # type: ignore[type-abstract]
         self._forget()
 
     def _forget(self) -> None:
+        self._executor: PlanningExecutor = ImmediateExecutor()
+        self._choosing: PendingChoice | None = None
         self._execution: PushExecution | None = None
         self._away: Retreat | PoseFollower | None = None
         self._cache = RolloutCache()
-        self._failures: Counter[tuple[object, ...]] = Counter()
-        self._relocations: Counter[int] = Counter()
+        self._history = PushHistory(self.config)
         self._left, self._rounds, self._stuck = -1, 0, 0
         self._recovered_from: FloatArray | None = None
         self._stopped_at: PushScene | None = None
@@ -63,8 +77,12 @@ class GtspMpc:
         self.graph: PushGraph | None = None
 
     def reset(self, world: World, rng: np.random.Generator) -> None:
-        """Forget the last episode."""
+        """Forget the last episode; choices are made at once until `plan_with` says otherwise."""
         self._forget()
+
+    def plan_with(self, executor: PlanningExecutor) -> None:
+        """See `pushplan.world.PlansBesideDriving`."""
+        self._executor = executor
 
     def warm_up(self) -> None:
         """Load the kernels that an episode may need."""
@@ -87,12 +105,10 @@ class GtspMpc:
         left = int((~scene.done).sum())
         if left != self._left:  # something was done, or has come back
             self._left, self._rounds, self._stopped_at = left, 0, None
-            self._relocations.clear()
-            self._failures = Counter(
-                {key: min(n, self.config.max_failures - 1) for key, n in self._failures.items()}
-            )
+            self._history.count_progress()
         if not left:
             self._execution, self.given_up, self.plan = None, {}, ()
+            self._forget_choice()
             return Twist(0.0, 0.0)
         if self._stopped_at is not None and _alike(scene, self._stopped_at):
             return Twist(0.0, 0.0)
@@ -104,52 +120,79 @@ class GtspMpc:
                     return away
                 self._away = None
             if self._execution is None:
-                if searched or not self._choose(scene):  # one search a step is enough
+                if self._choosing is None:
+                    if searched:  # one search a step is enough
+                        break
+                    self._choosing = choose_push(scene, self._history, self._executor, self.stop)
+                    searched = True
+                if not self._take_up_choice(scene):
                     break
-                searched = True
             if self._execution is not None:
                 command = self._execution.command(scene, held)
                 if isinstance(command, Twist):
+                    self._choose_ahead(scene, self._execution)
                     return command
                 self._close(scene, self._execution, command)
         return Twist(0.0, 0.0)
 
-    def _choose(self, scene: PushScene) -> bool:
+    def _choose_ahead(self, scene: PushScene, execution: PushExecution) -> None:
+        """Ask for the next push while one is driven, where that takes time."""
+        if self._executor.takes_time and execution.pushing and not execution.asked_for_next:
+            execution.asked_for_next = True
+            expected = scene_after(scene, execution.push)
+            if not expected.done.all():
+                self._choosing = choose_push(
+                    expected, self._history, self._executor, self.stop, ahead=True
+                )
+
+    def _take_up_choice(self, scene: PushScene) -> bool:
+        """Begin with what was chosen, if it is there; whether there may be anything to do."""
+        choosing = self._choosing
+        assert choosing is not None
+        if not choosing.fits(scene):
+            self._forget_choice()
+            return True
+        if not choosing.call.ready(scene.world.time):
+            return False
+        self._choosing = None
+        return self._begin(scene, choosing.call.result())
+
+    def _forget_choice(self) -> None:
+        if self._choosing is not None:
+            self._choosing.call.abandon()
+        self._choosing = None
+
+    def _begin(self, scene: PushScene, choice: PushChoice) -> bool:
         """Take up the best push, or else leave a tight place; whether there is anything to do."""
-        self._cache.age()
-        chosen = select_push(scene, partial(self._penalty, scene.size))
+        chosen = choice.selection
         self.graph, self.plan = chosen.graph, chosen.plan
         self.given_up = dict(chosen.graph.infeasible)
         if chosen.first is not None:
-            push, route = chosen.first.push, chosen.first.route
-            predictive = self.config.mpc and signature(push) not in self._failures
+            push = chosen.first.push
             self._execution = PushExecution(
-                scene.world, push, route, self.config.response, predictive=predictive
+                scene.world,
+                push,
+                chosen.first.route,
+                self.config.response,
+                self._executor,
+                predictive=self.config.mpc and not self._history.failed_before(push),
             )
             return True
-        path = recovery_path(scene.world, 0.5 * self.config.margin * scene.size)
         here, before = scene.world.robot_pose, self._recovered_from
         moved = before is None or bool(np.abs(before - here).max() > 0.02 * scene.size)
-        if path is not None and moved:
+        if choice.way_out is not None and moved:
             self._recovered_from = here
-            self._away = PoseFollower(scene.world.robot, path, self.config.response)
+            self._away = PoseFollower(scene.world.robot, choice.way_out, self.config.response)
             return True
-        if self._failures and self._rounds < self.config.max_rounds:
-            self._failures.clear()
+        if choice.interrupted:  # the next search begins with what is known by now
+            return False
+        if self._history.has_failures and self._rounds < self.config.max_rounds:
+            self._history.forget_failures()
             self._rounds += 1
             return True
-        if self._cache.searches < self.config.max_searches:  # else the search goes on
+        if choice.searches < self.config.max_searches:  # else the search goes on
             self._stopped_at = scene
         return False
-
-    def _penalty(self, size: float, push: Push) -> float:
-        """What is added to the cost of a push for what has failed [m]."""
-        failures, config = self._failures[signature(push)], self.config
-        relocations = self._relocations[push.target] if push.relocates else 0
-        if failures >= config.max_failures or relocations >= config.max_relocations:
-            return math.inf
-        cost = failures * config.failure_cost + relocations * config.relocation_cost
-        return cost * size
 
     def _close(self, scene: PushScene, execution: PushExecution, end: ExecutionEnd) -> None:
         """Draw the conclusions from how an execution ended."""
@@ -158,16 +201,9 @@ class GtspMpc:
             self._stuck = 0
             return
         if end is not ExecutionEnd.OBSOLETE:  # also a relocation, so that another comes next
-            self._failures[signature(push)] += 1
-        if end is ExecutionEnd.DONE:  # what has failed before may succeed from here
-            self._relocations[push.target] += 1
-            self._failures = Counter(
-                {
-                    key: count
-                    for key, count in self._failures.items()
-                    if key[0] != push.target or key[1] == push.controller
-                }
-            )
+            self._history.count_failure(push)
+        if end is ExecutionEnd.DONE:
+            self._history.count_relocation(push)
         if end is ExecutionEnd.STUCK:
             robot, pose = scene.world.robot, scene.world.robot_pose
             self._away = Retreat(robot, pose, self.config.retreat * scene.size, self._stuck)

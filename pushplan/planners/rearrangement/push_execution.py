@@ -17,7 +17,7 @@ from pushplan.planners.rearrangement.push_poses import initial_heading
 from pushplan.planners.rearrangement.push_scene import PushScene
 from pushplan.planners.rearrangement.push_simulator import PushSimulator
 from pushplan.planners.rearrangement.route import Route
-from pushplan.world import Twist, World
+from pushplan.world import PendingResult, PlanningExecutor, Twist, World
 from pushplan.world.checks import FloatArray
 
 _ALIGNED = math.radians(0.4)  # error of a heading that is left where a push begins
@@ -45,19 +45,30 @@ class PushExecution:
         push: the push.
         route: to its start.
         response: time in which an error is driven off [s].
+        executor: runs the prediction of the push from where the route has led to.
         predictive: whether to push by predictive control where that suits.
 
     Attributes:
         push: the push, as predicted last.
         route: to its start.
         pushing: whether the push itself has begun.
+        asked_for_next: whether what comes after it has been asked for.
     """
 
     def __init__(
-        self, world: World, push: Push, route: Route, response: float, *, predictive: bool = True
+        self,
+        world: World,
+        push: Push,
+        route: Route,
+        response: float,
+        executor: PlanningExecutor,
+        *,
+        predictive: bool = True,
     ) -> None:
         self.push, self.route, self.pushing = push, route, False
-        self._predictive = predictive
+        self.asked_for_next = False
+        self._executor, self._predictive = executor, predictive
+        self._prediction: PendingResult[list[Push]] | None = None
         self._route_follower = LegFollower(
             world.robot,
             route,
@@ -88,7 +99,14 @@ class PushExecution:
                 return twist
             if not approach.arrived:
                 return ExecutionEnd.STUCK
-            if not self._begin(scene, held):
+            if self._prediction is None:
+                self._prediction = self._executor.submit(
+                    lambda stop: PushSimulator(scene).resimulate(self.push, world.robot_pose),
+                    world.time,
+                )
+            if not self._prediction.ready(world.time):
+                return Twist(0.0, 0.0)
+            if not self._begin(scene, self._prediction.result(), held):
                 return ExecutionEnd.FAILED
         if self._stall.update(world.robot_pose, world.time):
             return ExecutionEnd.STUCK
@@ -103,10 +121,9 @@ class PushExecution:
         target = np.flatnonzero(scene.world.movables.ids == self.push.target)
         return not len(target) or bool(scene.done[target[0]])
 
-    def _begin(self, scene: PushScene, held: float) -> bool:
-        """Look again at what the push would do from here; whether it is good for anything."""
+    def _begin(self, scene: PushScene, ends: list[Push], held: float) -> bool:
+        """Take the push as it is predicted from here; whether it is good for anything."""
         push, world = self.push, scene.world
-        ends = PushSimulator(scene).resimulate(push, world.robot_pose)
         good = [end for end in ends if push.relocates or set(push.delivers) & set(end.delivers)]
         if not good:
             return False

@@ -144,6 +144,9 @@ def _between(scene: PushScene, pushes: Sequence[Push]) -> FloatArray:
             *np.round(push.end[:2] / step).tolist(),
             round(float(push.end[2]) / 0.8),
         )
+        if key not in known and scene.budget.is_over:
+            out[n] = far
+            continue
         if key not in known:
             gone = np.flatnonzero(np.isin(ids, push.delivers))
             found = search_approaches(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import copy
 import functools
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -34,6 +34,7 @@ from pushplan.planners.rearrangement.pose_grid_kernels import (
 from pushplan.planners.rearrangement.push_cost_to_go import PushCostToGo, push_cost_to_go
 from pushplan.planners.rearrangement.rearrangement_config import RearrangementConfig
 from pushplan.planners.rearrangement.rollout_cache import RolloutCache
+from pushplan.planners.rearrangement.search_budget import SearchBudget
 from pushplan.world import ClearanceArea, Goal, Receptacle, RobotModel, StaticMap, World
 from pushplan.world.checks import BoolArray, FloatArray, IntArray, frozen
 
@@ -41,9 +42,8 @@ from pushplan.world.checks import BoolArray, FloatArray, IntArray, frozen
 @functools.lru_cache(maxsize=8)
 def _fit_of(
     robot: RobotModel, static: StaticMap, margin: float
-) -> tuple[Footprint, ConvexObstacles, FloatArray]:
-    shape = footprint(robot, margin)
-    return shape, obstacles(static), np.empty_like(shape.vertices)
+) -> tuple[Footprint, ConvexObstacles]:
+    return footprint(robot, margin), obstacles(static)
 
 
 def check_world(world: World) -> None:
@@ -111,14 +111,22 @@ class PushScene:
         world: the snapshot; its goal is one for the objects.
         config: settings.
         cache: what is known from the last scene.
+        budget: of the decision that is made for it; endless by default.
     """
 
     world: World
     config: RearrangementConfig
     cache: RolloutCache | None = None
+    budget: SearchBudget = field(default_factory=SearchBudget)
 
     def __post_init__(self) -> None:
         check_world(self.world)
+
+    def with_budget(self, budget: SearchBudget) -> PushScene:
+        """The same for a decision with a stop rule."""
+        other = copy.copy(self)
+        other.__dict__["budget"] = budget
+        return other
 
     def with_objects_at(self, poses: FloatArray) -> PushScene:
         """The same with the objects at poses (K, 3), as far as rolling out pushes goes.
@@ -290,7 +298,8 @@ class PushScene:
     def fit(self) -> tuple[Footprint, ConvexObstacles, FloatArray]:
         """Footprint, obstacles and memory for `is_free`."""
         margin = 0.3 * self.config.margin * self.size
-        return _fit_of(self.world.robot, self.world.static, margin)
+        shape, among = _fit_of(self.world.robot, self.world.static, margin)
+        return shape, among, np.empty_like(shape.vertices)
 
     def fits(self, pose: FloatArray) -> bool:
         """Whether the robot fits at a pose (3,) among what is static."""

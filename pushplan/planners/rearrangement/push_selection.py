@@ -52,7 +52,7 @@ def select_push(scene: PushScene, penalty: Callable[[Push], float]) -> Selection
     left = int((~scene.done).sum())
     few = min(scene.config.relocation.objects, left)
     for relocations, thorough in ((0, False), (few, False), (left, True)):
-        if selection.first is None:
+        if selection.first is None and not scene.budget.is_over:
             graph = build_push_graph(
                 scene, penalty, onward=True, relocations=relocations, thorough=thorough
             )
@@ -65,11 +65,14 @@ def _select(scene: PushScene, graph: PushGraph, penalty: Callable[[Push], float]
     forward = _ForwardSimulator(scene, graph.approach)
 
     def simulated_cost(n: int) -> tuple[float, tuple[int, ...]]:
+        if scene.budget.is_over and any(math.isfinite(one.cost) for one in known.values()):
+            return math.inf, ()
         push = graph.pushes[n]
         found = forward.of(push)
         if found is None:
             return math.inf, ()
         known[n] = found
+        scene.budget.cost = min(scene.budget.cost, found.cost)
         return found.cost + penalty(push), found.push.delivers
 
     order = sequence_pushes(graph, simulated_cost, scene.config.max_simulations)

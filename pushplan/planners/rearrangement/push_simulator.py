@@ -154,6 +154,7 @@ class PushSimulator:
         known = None if cache is None else cache.find(key, movables, poses)
         if known is not None:
             return known
+        scene.budget.used += 1
         # copies may be written to: one kernel for all
         stages, used = roll_out(np.array(start), np.array(poses), problem, log)
         rollout = Rollout(

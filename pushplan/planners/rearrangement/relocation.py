@@ -63,7 +63,7 @@ def relocating_pushes(
             return []
     if found is None:
         found = _RelocationSearch(scene, k, approach, thorough).run()
-        if cache is not None:
+        if cache is not None and not scene.budget.interrupted:
             cache.keep_primitives(int(movables.ids[k]), around, robot.tobytes(), found)
     return [
         replace(push, cost=push.cost + extra)
@@ -146,6 +146,8 @@ class _RelocationSearch:
         most, best = len(config.margins), math.inf
         expansions, sides, alike = Counter[bool](), Counter[_Cell](), Counter[_Cell]()
         while self._open and expansions[True] < config.expansions and sides.total() < config.enough:
+            if scene.budget.is_over:
+                break
             state = heapq.heappop(self._open)[2]
             if state.cost > best + self._slack:
                 break

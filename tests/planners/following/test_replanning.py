@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from conftest import make_boxes, make_robot, make_u_maze
 
-from pushplan.control import Progress
+from pushplan.control import Progress, SimulatedExecutor
 from pushplan.interaction import QuasiStatic
 from pushplan.planners.following.plan_follower import PlanFollower
 from pushplan.planners.following.replanning import (
@@ -285,30 +285,29 @@ class TestHonestTime:
         found = []
         for step in range(steps):
             twist = policy.act(world)
-            found.append((world.robot_pose[0], twist, policy.background_s))
+            found.append((world.robot_pose[0], twist))
             x = world.robot_pose[0] + twist.linear * period
             world = floor(robot_pose=[x, 0, 0], time=(step + 1) * period, **changes)
         return found
 
     def test_a_plan_is_there_only_after_the_time_it_took(self):
         policy = follower(Scripted(line_plan), surprise=math.inf)
-        policy.simulate_latency(10.0, Ticks(0.25))
+        policy.plan_with(SimulatedExecutor(10.0, Ticks(0.25)))
         robot = make_robot(drive="differential")
         found = self.drive(policy, 5, robot=robot)
         # 2.5 s: it stands at 0, 1 and 2 s, and drives at 3 s
-        assert [twist.linear for _, twist, _ in found] == [0.0, 0.0, 0.0, 0.15, 0.15]
-        assert [beside for *_, beside in found] == [0.25, 0.0, 0.0, 0.0, 0.0]
+        assert [twist.linear for _, twist in found] == [0.0, 0.0, 0.0, 0.15, 0.15]
 
     def test_a_constant_speed_robot_goes_straight_on_and_finds_itself_on_the_plan(self):
         policy = follower(Scripted(line_plan))
-        policy.simulate_latency(10.0, Ticks(0.25))
+        policy.plan_with(SimulatedExecutor(10.0, Ticks(0.25)))
         self.drive(policy, 4)
         assert policy.current_plan.poses[0, 0] == pytest.approx(0.4)  # it was at 0.45
 
     def test_the_next_plan_starts_where_the_robot_will_be(self):
         planner = Scripted(line_plan)
         policy = follower(planner, every_seconds=5.0)
-        policy.simulate_latency(10.0, Ticks(0.2))
+        policy.plan_with(SimulatedExecutor(10.0, Ticks(0.2)))
         self.drive(policy, 12)
         # asked for at 0, 5, 10 s; 2 s ahead once it is known that it takes 2 s
         asked = [float(world.robot_pose[0]) for world in planner.asked]
@@ -321,21 +320,21 @@ class TestHonestTime:
         planner = Scripted(line_plan)
         policy = PlanFollower(planner, stop=Deadline(0.1))
         policy.reset(floor(), np.random.default_rng(0))
-        policy.simulate_latency(20.0, Ticks(0.1))
+        policy.plan_with(SimulatedExecutor(20.0, Ticks(0.1)))
         policy.act(floor())
         assert planner.asked[0].robot_pose == pytest.approx([0.3, 0, 0])
 
     def test_a_failed_call_keeps_the_old_plan(self):
         planner = Scripted(line_plan, None)
         policy = follower(planner, every_seconds=3.0)
-        policy.simulate_latency(1.0, Ticks(0.5))
+        policy.plan_with(SimulatedExecutor(1.0, Ticks(0.5)))
         self.drive(policy, 8)
         assert len(planner.asked) > 1
         assert policy.current_plan.poses[-1, 0] == pytest.approx(8.0, abs=0.2)
 
     def test_it_ends_with_the_episode(self):
         policy = follower(Scripted(line_plan))
-        policy.simulate_latency(10.0, Ticks(0.25))
+        policy.plan_with(SimulatedExecutor(10.0, Ticks(0.25)))
         policy.act(floor())
         policy.reset(floor(), np.random.default_rng(0))
         policy.act(floor())

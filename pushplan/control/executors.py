@@ -1,0 +1,99 @@
+"""Executors of planning calls that need no thread: the world waits, or time is simulated."""
+
+from __future__ import annotations
+
+import math
+import time as wall
+from collections import deque
+from collections.abc import Callable
+from typing import Generic, TypeVar
+
+from pushplan.world import Stop
+from pushplan.world.checks import number
+
+T = TypeVar("T")
+_REMEMBERED = 5  # calls whose times say how long the next one will take
+
+
+class _Done(Generic[T]):
+    """A result that is there from a time on."""
+
+    def __init__(self, result: T, ready_at: float) -> None:
+        self._result, self._ready_at = result, ready_at
+
+    def ready(self, time: float) -> bool:
+        return time >= self._ready_at - 1e-9
+
+    def result(self) -> T:
+        return self._result
+
+    def abandon(self) -> None:
+        pass
+
+
+class ExpectedTime:
+    """How long the next planning call will take, by the last ones."""
+
+    def __init__(self) -> None:
+        self._took: deque[float] = deque(maxlen=_REMEMBERED)
+
+    def add(self, seconds: float) -> None:
+        """A call has taken so long [s]."""
+        self._took.append(seconds)
+
+    def of(self, stop: Stop | None) -> float:
+        """What the slowest of the last calls took [s], or else the budget; 0 without either."""
+        budget = math.inf if stop is None else stop.seconds
+        if self._took:
+            return min(budget, max(self._took))
+        return budget if math.isfinite(budget) else 0.0
+
+
+class ImmediateExecutor:
+    """Runs calls at once, and takes it that they take no time: the world stands still meanwhile."""
+
+    takes_time = False
+
+    def expected(self, stop: Stop | None) -> float:
+        """Nothing."""
+        return 0.0
+
+    def submit(
+        self, call: Callable[[Stop | None], T], time: float, stop: Stop | None = None
+    ) -> _Done[T]:
+        """See `pushplan.world.PlanningExecutor`."""
+        return _Done(call(stop), -math.inf)
+
+
+class SimulatedExecutor:
+    """Runs calls at once; their results are there after the time that they would have taken.
+
+    Args:
+        factor: seconds of the world's clock for one of ``clock``.
+        clock: returns seconds; what a call takes is measured by it.
+
+    Attributes:
+        spent: what all calls together have taken by ``clock`` [s].
+    """
+
+    takes_time = True
+
+    def __init__(self, factor: float, clock: Callable[[], float] = wall.perf_counter) -> None:
+        self._factor, self._clock = number("factor", factor, low=0.0), clock
+        self._took = ExpectedTime()
+        self.spent = 0.0
+
+    def expected(self, stop: Stop | None) -> float:
+        """What the last calls took, or else the budget of the rule [s]."""
+        return self._factor * self._took.of(stop) if self._factor else 0.0
+
+    def submit(
+        self, call: Callable[[Stop | None], T], time: float, stop: Stop | None = None
+    ) -> _Done[T]:
+        """See `pushplan.world.PlanningExecutor`."""
+        began = self._clock()
+        result = call(stop)
+        took = self._clock() - began
+        self._took.add(took)
+        self.spent += took
+        return _Done(result, time + self._factor * took)
