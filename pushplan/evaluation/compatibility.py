@@ -7,11 +7,11 @@ from collections.abc import Sequence
 from typing import Any
 
 from pushplan.evaluation.episode import PolicyError, Recording
-from pushplan.world.errors import describe
 from pushplan.evaluation.jobs import Job, JobSettings
 from pushplan.evaluation.limits import EpisodeTimeout, soft_limit
 from pushplan.evaluation.policies import PolicySpec, parse_policies
 from pushplan.world import ChecksScenario, InvalidInputError, Policy, PushplanError
+from pushplan.world.errors import describe
 
 
 class UnusablePolicyError(InvalidInputError):

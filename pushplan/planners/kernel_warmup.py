@@ -20,6 +20,7 @@ from pushplan.world import (
     InvalidInputError,
     MaxIterations,
     Movables,
+    Policy,
     RobotModel,
     StaticMap,
     World,
@@ -59,14 +60,20 @@ def warm_up(*names: str) -> None:
 
 @functools.cache
 def _warm_up(name: str) -> None:
-    policy = make_policy(name)
+    warm_up_policy(make_policy(name))
+
+
+def warm_up_policy(policy: Policy) -> None:
+    """Do as `warm_up` for a policy that was made already; it has to be reset afterwards."""
     if isinstance(policy, WarmsUp):
         policy.warm_up()
     elif isinstance(policy, PlanFollower):
         warm_up_recovery()
+        stop = policy.stop
         for world in (_room(), _water()):
             with contextlib.suppress(InvalidInputError):  # another planner's world
                 _plan_and_follow(policy, world)
+        policy.stop = stop
 
 
 def _plan_and_follow(policy: PlanFollower, world: World) -> None:

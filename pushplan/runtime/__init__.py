@@ -1,0 +1,17 @@
+"""From worlds to motor commands, in a robot's own loop."""
+
+from pushplan.runtime.command import Command, CommandStatus
+from pushplan.runtime.runner import PLAN_STOP, RunLog, Runner
+from pushplan.runtime.state_estimator import StateEstimator
+from pushplan.runtime.thread_executor import PlanningError, ThreadExecutor
+
+__all__ = [
+    "PLAN_STOP",
+    "Command",
+    "CommandStatus",
+    "PlanningError",
+    "RunLog",
+    "Runner",
+    "StateEstimator",
+    "ThreadExecutor",
+]

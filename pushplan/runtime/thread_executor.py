@@ -59,6 +59,12 @@ class ThreadExecutor:
         self.latest = pending = ThreadCall(run, rule, self._clock())
         return pending
 
+    @property
+    def running_s(self) -> float:
+        """For how long the call that was submitted last has been running [s]; 0 if none is."""
+        call = self.latest
+        return self._clock() - call.began if call is not None and call.thread.is_alive() else 0.0
+
     def close(self, timeout: float) -> bool:
         """End the call that runs.
 
@@ -104,7 +110,7 @@ class ThreadCall(Generic[T]):
 
     def ready(self, time: float) -> bool:
         """Whether the call has ended, in whatever way."""
-        return not self.thread.is_alive()
+        return self._done or not self.thread.is_alive()
 
     def result(self) -> T:
         """What it returned.

@@ -1,0 +1,50 @@
+"""`Command`: what a robot drives now, and why."""
+
+from __future__ import annotations
+
+import enum
+from dataclasses import dataclass
+
+from pushplan.world import Plan, Twist
+
+
+class CommandStatus(enum.StrEnum):
+    """What a command is for."""
+
+    DRIVING = "driving"
+    """What the policy wants, within the robot's limits."""
+    WAITING = "waiting"
+    """The robot stands until a plan is there."""
+    DONE = "done"
+    """The robot, or every object, is where the goal wants it."""
+    STALE = "stale"
+    """A controlled stop, because the newest world is too old."""
+    FAILED = "failed"
+    """A controlled stop, because planning or the policy failed."""
+    CANCELLED = "cancelled"
+    """A controlled stop that was asked for."""
+
+
+@dataclass(frozen=True)
+class Command:
+    """What to send to the motors.
+
+    Args:
+        time: for which it was asked, by the clock of the worlds [s].
+        twist: the velocity to drive; within speeds, turn rate and accelerations of the robot.
+        status: what it is for.
+        reason: why the robot is being stopped, or waits; empty where it is driven.
+        plan: what is followed; None for policies without one.
+        plan_age: time since that plan was taken up [s].
+        world_age: time since the newest world was seen [s].
+        late: whether the call came more than half a period after it was due.
+    """
+
+    time: float
+    twist: Twist
+    status: CommandStatus
+    reason: str = ""
+    plan: Plan | None = None
+    plan_age: float = 0.0
+    world_age: float = 0.0
+    late: bool = False

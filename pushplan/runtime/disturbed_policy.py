@@ -1,0 +1,143 @@
+"""`DisturbedPolicy`: a policy in a `Runner`, behind simulated perception and actuators."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections import deque
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from pushplan.control import SimulatedExecutor, clamp_twist
+from pushplan.control.limits import driven_twist
+from pushplan.runtime.disturbances import Disturbances
+from pushplan.runtime.runner import Runner
+from pushplan.world import ChoosesActions, Planner, Policy, Twist, World
+from pushplan.world.checks import BoolArray, FloatArray, number
+
+
+class DisturbedPolicy:
+    """What a robot does that runs a policy by `Runner`, for the same loop as every policy.
+
+    Each call of ``act`` is one period of the robot's loop. All chance comes from the generator of
+    the episode, and planning takes a fixed time, so that episodes repeat exactly.
+
+    Args:
+        policy: a policy, a planner, or a name, as for `Runner`.
+        disturbances: what perception and actuators do.
+        period: of the robot's loop, which is that of the environment [s].
+        planning_time: what every planning call takes [s].
+        told: whether the runner knows the noise and the delays of the actuators, as on a robot
+            that has been measured.
+        runner: further arguments of `Runner`.
+    """
+
+    def __init__(
+        self,
+        policy: Policy | Planner | str,
+        disturbances: Disturbances | None = None,
+        *,
+        period: float,
+        planning_time: float = 0.05,
+        told: bool = True,
+        **runner: Any,
+    ) -> None:
+        self.disturbances = disturbances or Disturbances()
+        number("planning_time", planning_time, low=0.0)
+        self._options = {"max_age": 1.0, **runner}
+        if told:
+            self._options.setdefault("delay", 0.7 * self.disturbances.lag)
+            noisy = max(self.disturbances.position_noise, self.disturbances.heading_noise) > 0.0
+            self._options.setdefault("observer_gain", 0.3 if noisy else 1.0)
+        self._make = lambda: Runner(
+            policy,
+            period=period,
+            executor=SimulatedExecutor(1.0, itertools.count(0.0, planning_time).__next__),
+            **self._options,
+        )
+        probe = self._make().policy
+        self.actions = probe.actions if isinstance(probe, ChoosesActions) else ("velocity",)
+        self.runner: Runner | None = None
+
+    def reset(self, world: World, rng: np.random.Generator) -> None:
+        """Begin an episode; the robot is seen as it is in the first snapshot."""
+        self._rng = rng
+        self._inbox: deque[tuple[float, World]] = deque()
+        self._applied = driven_twist(world)
+        self._hidden = np.zeros(len(world.movables), dtype=np.bool_)
+        self._seen_at, self._acted_at, self._lost = world.time, world.time, False
+        self._start: World | None = world
+        self.runner = None
+
+    def act(self, world: World, observation: Any = None) -> Twist:
+        """What the actuators do in this period."""
+        if self.runner is None:
+            assert self._start is not None
+            self.runner = self._make()
+            command = self.runner.start(world)
+        else:
+            self._see(world)
+            while self._inbox and self._inbox[0][0] <= world.time + 1e-9:
+                self.runner.update(self._inbox.popleft()[1])
+            command = self.runner.command(world.time)
+        return self._actuate(world, command.twist)
+
+    def _actuate(self, world: World, twist: Twist) -> Twist:
+        held, self._acted_at = world.time - self._acted_at, world.time
+        lag = self.disturbances.lag
+        if lag <= 0.0:
+            return twist
+        part = -math.expm1(-held / lag)
+        last = self._applied
+        self._applied = clamp_twist(
+            world.robot,
+            last.linear + part * (twist.linear - last.linear),
+            last.angular + part * (twist.angular - last.angular),
+        )
+        return self._applied
+
+    def _see(self, world: World) -> None:
+        """Put what perception makes of the world into the inbox, unless it is lost."""
+        d, rng = self.disturbances, self._rng
+        if world.time < self._seen_at + 1.0 / d.rate - 1e-9:
+            return
+        passed, self._seen_at = world.time - self._seen_at, world.time
+        if d.loss > 0.0:  # a chain with two states: mean length of a burst, and fraction lost
+            again = 1.0 - 1.0 / d.burst if self._lost else d.loss / (d.burst * (1.0 - d.loss))
+            self._lost = bool(rng.random() < again)
+        seen = self._noisy(world, self._visible(world, passed))
+        if not self._lost:
+            self._inbox.append((world.time + d.delay, seen))
+
+    def _visible(self, world: World, passed: float) -> BoolArray:
+        """(K,) which objects are seen."""
+        d, movables = self.disturbances, world.movables
+        if d.vanish <= 0.0:
+            return np.ones(len(movables), dtype=np.bool_)
+        most = max(int(movables.ids.max(initial=-1)) + 1, len(self._hidden))
+        self._hidden = np.pad(self._hidden, (0, most - len(self._hidden)))
+        draw = self._rng.random(most)
+        stays = math.exp(-passed / d.vanish_time)
+        begins = (1.0 - stays) * d.vanish / (1.0 - d.vanish)
+        self._hidden = np.where(self._hidden, draw < stays, draw < begins)
+        return ~self._hidden[movables.ids]
+
+    def _noisy(self, world: World, visible: BoolArray) -> World:
+        d, rng, movables = self.disturbances, self._rng, world.movables
+        scale = np.array([d.position_noise, d.position_noise, d.heading_noise])
+        noise = scale * rng.normal(size=(1 + len(movables), 3))
+        poses: FloatArray = movables.poses + noise[1:]
+        if d.jump > 0.0 and len(movables) and rng.random() < d.jump:
+            angle, far = rng.uniform(-math.pi, math.pi), d.jump_distance
+            far *= world.robot.circumscribed_radius
+            poses[rng.integers(len(movables)), :2] += far * np.array(
+                [math.cos(angle), math.sin(angle)]
+            )
+        seen = movables.moved_to(poses)
+        return replace(
+            world,
+            robot_pose=world.robot_pose + noise[0],
+            movables=seen if visible.all() else seen.select(visible),
+        )

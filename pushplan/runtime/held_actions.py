@@ -1,0 +1,94 @@
+"""`HeldActions`: a policy that decides in one go, asked beside driving."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from pushplan.control import ImmediateExecutor
+from pushplan.planners.kernel_warmup import warm_up_policy
+from pushplan.world import (
+    ChoosesActions,
+    ChoosesObservation,
+    InvalidInputError,
+    PendingResult,
+    PlanningExecutor,
+    Policy,
+    Twist,
+    WheelSpeeds,
+    World,
+)
+
+_MODES = ("velocity", "turn_rate", "wheels")
+
+
+class HeldActions:
+    """Asks a policy again as soon as it has answered, and drives its last answer until then.
+
+    Args:
+        policy: gives velocities, from the world alone.
+        hold: for how long an answer is driven at most [s]; after it the robot stands.
+
+    Raises:
+        InvalidInputError: if the policy gives other actions, or needs an observation.
+    """
+
+    def __init__(self, policy: Policy, hold: float) -> None:
+        name = type(policy).__name__
+        if isinstance(policy, ChoosesActions) and not set(policy.actions) & set(_MODES):
+            raise InvalidInputError(
+                f"a Runner drives policies with one of the actions {', '.join(_MODES)}; "
+                f"{name} gives {', '.join(policy.actions)}"
+            )
+        if isinstance(policy, ChoosesObservation) and policy.observation is not None:
+            raise InvalidInputError(
+                f"a Runner drives policies that look at the World alone; {name} needs the "
+                f"observation {policy.observation!r}"
+            )
+        self._policy, self._hold = policy, hold
+        self.plan_with(ImmediateExecutor())
+
+    def plan_with(self, executor: PlanningExecutor) -> None:
+        """See `pushplan.world.PlansBesideDriving`."""
+        self._executor = executor
+        self._pending: PendingResult[Any] | None = None
+        self._twist, self._since = Twist(0.0, 0.0), -np.inf
+
+    def warm_up(self) -> None:
+        """See `pushplan.world.WarmsUp`."""
+        warm_up_policy(self._policy)
+
+    def reset(self, world: World, rng: np.random.Generator) -> None:
+        """Forget the last episode."""
+        self._policy.reset(world, rng)
+        self.plan_with(ImmediateExecutor())
+
+    def act(self, world: World, observation: Any = None) -> Twist:
+        """The last answer, if it is not too old."""
+        self._receive(world)
+        if self._pending is None:
+            self._pending = self._executor.submit(
+                lambda stop: self._policy.act(world, None), world.time
+            )
+            self._receive(world)
+        old = world.time - self._since > self._hold
+        return Twist(0.0, 0.0) if old else self._twist
+
+    def _receive(self, world: World) -> None:
+        if self._pending is not None and self._pending.ready(world.time):
+            pending, self._pending = self._pending, None
+            self._twist, self._since = _twist(world, pending.result()), world.time
+
+
+def _twist(world: World, action: object) -> Twist:
+    """An action as a velocity."""
+    if isinstance(action, Twist):
+        return action
+    if isinstance(action, WheelSpeeds) and world.robot.wheel_separation > 0.0:
+        turn = (action.right - action.left) / world.robot.wheel_separation
+        return Twist(0.5 * (action.left + action.right), turn)
+    raise InvalidInputError(
+        f"a Runner needs a Twist, or WheelSpeeds of a robot with a wheel_separation, "
+        f"got {type(action).__name__}"
+    )

@@ -1,0 +1,129 @@
+"""`StateEstimator`: the newest world, brought forward to now along what was commanded."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections import deque
+from dataclasses import replace
+
+import numpy as np
+
+from pushplan.geometry.transforms import arc_step
+from pushplan.interaction.path_sweepers import default_interaction
+from pushplan.world import Twist, World
+from pushplan.world.checks import FloatArray
+
+_STEP = 0.15  # greatest length of a predicted step [circumscribed radii], and turn [rad]
+_REACH = 1.1  # what is farther from the robot's path than this many radii is not moved
+
+
+class StateEstimator:
+    """Predicts where robot and objects are, and corrects that by what is seen.
+
+    The robot drives what it was commanded, after the delay; objects in its way move as the
+    interaction model predicts. Of the difference between prediction and observation the part
+    ``gain`` is taken over (a filter of fixed gain, which smooths noise and lags behind nothing
+    that was commanded).
+
+    Args:
+        delay: time between a command and its effect [s].
+        gain: 1 trusts each observation as it is.
+    """
+
+    def __init__(self, delay: float, gain: float) -> None:
+        self._delay, self._gain = delay, gain
+        self._sent: deque[tuple[float, Twist]] = deque()
+        self._world: World | None = None
+
+    def reset(self) -> None:
+        """Forget everything."""
+        self._sent.clear()
+        self._world = None
+
+    def sent(self, time: float, twist: Twist) -> None:
+        """A command was sent at a time [s]."""
+        self._sent.append((time + self._delay, twist))
+
+    def observe(self, world: World) -> None:
+        """Take a snapshot, later than the one before."""
+        if self._gain < 1.0 and self._world is not None:
+            world = self._blend(self._advanced(self._world, world.time), world)
+        self._world = world
+        while len(self._sent) > 1 and self._sent[1][0] <= world.time:
+            self._sent.popleft()
+
+    def at(self, time: float) -> World:
+        """The world at a time [s]; the newest snapshot with that time where it is not earlier."""
+        assert self._world is not None
+        return self._advanced(self._world, time)
+
+    def _advanced(self, world: World, time: float) -> World:
+        if time <= world.time:
+            return world if time == world.time else world.moved(time=time)
+        path = self._path(world, time)
+        if len(path) == 1:
+            return world.moved(time=time)
+        twist, heading = self._driven(time), float(path[-1, 2])
+        vx, vy = twist.linear * math.cos(heading), twist.linear * math.sin(heading)
+        return world.moved(
+            robot_pose=path[-1],
+            robot_twist=[vx, vy, twist.angular],
+            movable_poses=_pushed(world, path),
+            time=time,
+        )
+
+    def _path(self, world: World, time: float) -> FloatArray:
+        """(N, 3) poses of the robot from a world to a time, by what was commanded."""
+        size = world.robot.circumscribed_radius
+        times = [at for at, _ in self._sent if world.time < at < time]
+        edges = [world.time, *times, time]
+        poses = [np.array(world.robot_pose)]
+        for begin, end in itertools.pairwise(edges):
+            twist = self._driven(0.5 * (begin + end))
+            length, turn = twist.linear * (end - begin), twist.angular * (end - begin)
+            steps = math.ceil(max(abs(length) / (_STEP * size), abs(turn) / _STEP))
+            for _ in range(steps):
+                there = np.empty(3)
+                arc_step(poses[-1], length / steps, turn / steps, there)
+                poses.append(there)
+        return np.array(poses)
+
+    def _driven(self, time: float) -> Twist:
+        """What takes effect at a time [s]; nothing before the first command."""
+        driven = Twist(0.0, 0.0)
+        for at, twist in self._sent:
+            if at > time:
+                break
+            driven = twist
+        return driven
+
+    def _blend(self, predicted: World, seen: World) -> World:
+        """Between what was predicted and what is seen."""
+        old, new = predicted.movables, seen.movables
+        poses = np.array(new.poses)
+        _, here, there = np.intersect1d(new.ids, old.ids, return_indices=True)
+        poses[here] = self._between(old.poses[there], new.poses[here])
+        pose = self._between(predicted.robot_pose, seen.robot_pose)
+        return replace(seen, robot_pose=pose, movables=new.moved_to(poses, new.twists))
+
+    def _between(self, predicted: FloatArray, seen: FloatArray) -> FloatArray:
+        away = seen - predicted
+        away[..., 2] = np.remainder(away[..., 2] + math.pi, 2.0 * math.pi) - math.pi
+        return predicted + self._gain * away
+
+
+def _pushed(world: World, path: FloatArray) -> FloatArray | None:
+    """(K, 3) where the objects are after the robot has driven a path; None if none was near it."""
+    movables = world.movables
+    if not len(movables):
+        return None
+    low, high = path[:, :2].min(axis=0), path[:, :2].max(axis=0)
+    reach = _REACH * world.robot.circumscribed_radius + movables.radii[:, None]
+    places = movables.poses[:, :2]
+    near = ((places > low - reach) & (places < high + reach)).all(axis=1)
+    if not near.any():
+        return None
+    swept = default_interaction(world).sweep(world, path)
+    poses: FloatArray = swept.object_poses[-1]
+    return poses
