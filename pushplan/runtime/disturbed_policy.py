@@ -49,8 +49,8 @@ class DisturbedPolicy:
         self._options = {"max_age": 1.0, **runner}
         if told:
             self._options.setdefault("delay", 0.7 * self.disturbances.lag)
-            noisy = max(self.disturbances.position_noise, self.disturbances.heading_noise) > 0.0
-            self._options.setdefault("observer_gain", 0.3 if noisy else 1.0)
+            self._options.setdefault("position_noise", self.disturbances.position_noise)
+            self._options.setdefault("heading_noise", self.disturbances.heading_noise)
         self._make = lambda: Runner(
             policy,
             period=period,

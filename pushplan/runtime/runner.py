@@ -22,6 +22,7 @@ from pushplan.runtime.state_estimator import StateEstimator
 from pushplan.runtime.thread_executor import ThreadExecutor
 from pushplan.world import (
     Deadline,
+    ExpectsNoise,
     GoalDisc,
     GoalLine,
     InvalidInputError,
@@ -41,6 +42,7 @@ from pushplan.world.errors import describe
 
 PLAN_STOP = OwnBudget() | Deadline(1.0)
 """Stop rule of planning calls: the planner's own budget, and never more than a second."""
+_SMOOTHING = 0.3  # gain of the filter of noisy poses
 _RETRY = 0.25  # time after a failure in which the policy is not asked [s]
 _SWITCH = 5e-4  # how long the planning thread may keep the interpreter to itself [s]
 
@@ -76,8 +78,11 @@ class Runner:
             go [s].
         on_stale: ``"stop"``, or ``"continue"`` along what is predicted.
         delay: time between a command and its effect [s].
+        position_noise: standard deviation of the places in the worlds, of robot and objects [m].
+        heading_noise: the same of the headings [rad].
         observer_gain: how much of the difference between what is predicted and what is seen is
-            believed; less than 1 smooths noisy poses.
+            believed; less than 1 smooths noisy poses. By default 1, and 0.3 where there is noise.
+            A policy that `ExpectsNoise` is told what is left.
         margin: distance that plans keep from what is static [m]; that of the worlds if None.
         log: keeps worlds, plans and commands.
         executor: runs planning calls; a thread by default, another one for simulation.
@@ -111,7 +116,9 @@ class Runner:
         max_age: float = 0.5,
         on_stale: str = "stop",
         delay: float = 0.0,
-        observer_gain: float = 1.0,
+        position_noise: float = 0.0,
+        heading_noise: float = 0.0,
+        observer_gain: float | None = None,
         margin: float | None = None,
         log: RunLog | None = None,
         executor: PlanningExecutor | None = None,
@@ -123,8 +130,17 @@ class Runner:
         self.on_stale = choice("on_stale", on_stale, ("stop", "continue"))
         self.margin = None if margin is None else number("margin", margin, low=0.0)
         delay = number("delay", delay, low=0.0)
+        noise = [
+            number("position_noise", position_noise, low=0.0),
+            number("heading_noise", heading_noise, low=0.0),
+        ]
+        if observer_gain is None:
+            observer_gain = _SMOOTHING if any(noise) else 1.0
         gain = number("observer_gain", observer_gain, low=0.0, high=1.0, open_low=True)
         self.policy = _policy_of(policy, self.max_age)
+        if any(noise) and isinstance(self.policy, ExpectsNoise):
+            left = math.sqrt(gain / (2.0 - gain))  # of white noise, after a filter of that gain
+            self.policy.expect_noise(left * noise[0], left * noise[1])
         self._estimator = StateEstimator(delay, gain)
         self._delay, self._clock, self._log = delay, clock, log
         self._executor = executor or ThreadExecutor(self.plan_stop, clock)

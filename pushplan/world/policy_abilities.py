@@ -82,6 +82,19 @@ class PlansBesideDriving(Protocol):
 
 
 @runtime_checkable
+class ExpectsNoise(Protocol):
+    """Can be told how noisy the poses are that it gets, and asks for no more precision then."""
+
+    def expect_noise(self, position: float, heading: float) -> None:
+        """Take it into account from the next ``reset`` on.
+
+        Args:
+            position: standard deviation of every x and y [m].
+            heading: the same of every heading [rad].
+        """
+
+
+@runtime_checkable
 class LogsPlans(Protocol):
     """Keeps what its planner returned."""
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -84,6 +85,10 @@ class GtspMpc:
         """See `pushplan.world.PlansBesideDriving`."""
         self._executor = executor
 
+    def expect_noise(self, position: float, heading: float) -> None:
+        """See `pushplan.world.ExpectsNoise`."""
+        self.config = replace(self.config, position_noise=position, heading_noise=heading)
+
     def warm_up(self) -> None:
         """Load the kernels that an episode may need."""
         from pushplan.planners.rearrangement import kernel_warmup
@@ -137,8 +142,11 @@ class GtspMpc:
 
     def _choose_ahead(self, scene: PushScene, execution: PushExecution) -> None:
         """Ask for the next push while one is driven, where that takes time."""
-        if self._executor.takes_time and execution.pushing and not execution.asked_for_next:
-            execution.asked_for_next = True
+        ids = scene.world.movables.ids
+        if not (self._executor.takes_time and execution.pushing) or execution.asked_for_next:
+            return
+        execution.asked_for_next = True
+        if np.array_equal(ids, execution.ids):
             expected = scene_after(scene, execution.push)
             if not expected.done.all():
                 self._choosing = choose_push(
@@ -173,7 +181,7 @@ class GtspMpc:
                 scene.world,
                 push,
                 chosen.first.route,
-                self.config.response,
+                self.config,
                 self._executor,
                 predictive=self.config.mpc and not self._history.failed_before(push),
             )

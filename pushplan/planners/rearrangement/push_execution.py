@@ -16,6 +16,7 @@ from pushplan.planners.rearrangement.push import Push
 from pushplan.planners.rearrangement.push_poses import initial_heading
 from pushplan.planners.rearrangement.push_scene import PushScene
 from pushplan.planners.rearrangement.push_simulator import PushSimulator
+from pushplan.planners.rearrangement.rearrangement_config import RearrangementConfig
 from pushplan.planners.rearrangement.route import Route
 from pushplan.world import PendingResult, PlanningExecutor, Twist, World
 from pushplan.world.checks import FloatArray
@@ -44,7 +45,7 @@ class PushExecution:
         world: the snapshot in which it begins.
         push: the push.
         route: to its start.
-        response: time in which an error is driven off [s].
+        config: settings.
         executor: runs the prediction of the push from where the route has led to.
         predictive: whether to push by predictive control where that suits.
 
@@ -52,6 +53,7 @@ class PushExecution:
         push: the push, as predicted last.
         route: to its start.
         pushing: whether the push itself has begun.
+        ids: (K,) of the objects that the prediction of the push is about.
         asked_for_next: whether what comes after it has been asked for.
     """
 
@@ -60,21 +62,21 @@ class PushExecution:
         world: World,
         push: Push,
         route: Route,
-        response: float,
+        config: RearrangementConfig,
         executor: PlanningExecutor,
         *,
         predictive: bool = True,
     ) -> None:
         self.push, self.route, self.pushing = push, route, False
-        self.asked_for_next = False
+        self.ids, self.asked_for_next = world.movables.ids, False
         self._executor, self._predictive = executor, predictive
         self._prediction: PendingResult[list[Push]] | None = None
         self._route_follower = LegFollower(
             world.robot,
             route,
-            near=_NEAR * world.robot.circumscribed_radius,
-            aligned=_ALIGNED,
-            response=response,
+            near=_NEAR * world.robot.circumscribed_radius + config.position_noise,
+            aligned=_ALIGNED + config.heading_noise,
+            response=config.response,
         )
         self._path_push: PathPush | None = None
         self._pose_follower: PoseFollower | None = None
@@ -100,6 +102,7 @@ class PushExecution:
             if not approach.arrived:
                 return ExecutionEnd.STUCK
             if self._prediction is None:
+                self.ids = world.movables.ids
                 self._prediction = self._executor.submit(
                     lambda stop: PushSimulator(scene).resimulate(self.push, world.robot_pose),
                     world.time,

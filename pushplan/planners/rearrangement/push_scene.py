@@ -184,9 +184,8 @@ class PushScene:
     @cached_property
     def object_goal(self) -> ObjectGoal:
         """When objects are done."""
-        return make_object_goal(
-            self.world.goal, self.world.static, self.config.goal_slack * self.size
-        )
+        slack = self.config.goal_slack * self.size + 2.0 * self.config.position_noise
+        return make_object_goal(self.world.goal, self.world.static, slack)
 
     @cached_property
     def controller(self) -> PushingController:

@@ -68,6 +68,10 @@ class RearrangementConfig(CheckedFields):
         relocation_cost: what is added to that of a relocation for each one that its object has had
             since something was done.
         max_relocations: after so many an object waits until something else has been done.
+        position_noise: standard deviation of the places that are seen, after filtering [m]; the
+            robot is not placed more precisely, and objects have to be clear of the goal's edge by
+            twice as much.
+        heading_noise: the same of the headings [rad].
         max_rounds: how often pushes that have failed are tried anew before what is left is given
             up.
         primitives: the table of pushes that are tried.
@@ -109,6 +113,8 @@ class RearrangementConfig(CheckedFields):
     max_failures: PositiveInt = 3
     relocation_cost: NonNegativeFloat = 1.0
     max_relocations: PositiveInt = 12
+    position_noise: NonNegativeFloat = 0.0
+    heading_noise: NonNegativeFloat = 0.0
     max_rounds: NonNegativeInt = 6
     primitives: tuple[PushPrimitive, ...] = PRIMITIVES
     relocation: RelocationConfig = RELOCATION
