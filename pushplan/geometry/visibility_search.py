@@ -49,11 +49,11 @@ class Frontier(NamedTuple):
 
     keys: FloatArray  # (M,) in heap order, length plus bound [m]
     lengths: FloatArray  # (M,) length of the path to the node [m]
+    limits: FloatArray  # (M,) of the rest of an expansion: the least that is left to offer [m]
     heap: IntArray  # (M,)
     places: IntArray  # (M,)
     nodes: IntArray  # (M,)
     before: IntArray  # (M,) the node before, `START` for none
-    limits: FloatArray  # (M,) of the rest of an expansion: the least that is left to offer [m]
 
     def larger(self) -> Frontier:
         """Twice the memory, with the same entries."""
@@ -245,8 +245,9 @@ def search_on(search: VisibilitySearch, frontier: Frontier, budget: int) -> int:
 
 def new_frontier(capacity: int) -> Frontier:
     """Memory for entries."""
+    lengths = [np.empty(capacity) for _ in range(3)]
     numbers = [np.empty(capacity, dtype=np.int64) for _ in range(4)]
-    return Frontier(np.empty(capacity), np.empty(capacity), *numbers, np.empty(capacity))
+    return Frontier(*lengths, *numbers)
 
 
 def path_found(search: VisibilitySearch) -> tuple[float, list[FloatArray]]:
