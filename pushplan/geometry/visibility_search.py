@@ -245,9 +245,9 @@ def search_on(search: VisibilitySearch, frontier: Frontier, budget: int) -> int:
 
 def new_frontier(capacity: int) -> Frontier:
     """Memory for entries."""
-    lengths = [np.empty(capacity) for _ in range(3)]
+    keys, lengths, limits = (np.empty(capacity) for _ in range(3))
     numbers = [np.empty(capacity, dtype=np.int64) for _ in range(4)]
-    return Frontier(*lengths, *numbers)
+    return Frontier(keys, lengths, limits, *numbers)
 
 
 def path_found(search: VisibilitySearch) -> tuple[float, list[FloatArray]]:
