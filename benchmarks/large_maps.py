@@ -1,6 +1,7 @@
 """Time to a first plan on large maps and among many objects.
 
-    python benchmarks/large_maps.py [CALLS] [--figure docs/images/large-maps.png]
+    python benchmarks/large_maps.py [CALLS] [--planner NAME] [--case NAME]
+    python benchmarks/large_maps.py [CALLS] --figure docs/images/large-maps.png
 
 CPU time of a call that ends with its first plan, kernels loaded. "new map" is the first call on a
 map that no planner has seen; "same map" are later calls from and to other places.
@@ -10,7 +11,7 @@ from __future__ import annotations
 
 import argparse
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 import shapely
@@ -28,7 +29,7 @@ from pushplan.world import (
 from pushplan.world.checks import BoolArray, FloatArray
 
 PLANNERS = ("straight", "kinodynamic-rrt", "push-aware", "skeleton", "geometric-rrt")
-PATIENCE = 3.0  # [s]
+PATIENCE = 1.0  # [s]
 ROBOT = jackal(drive="differential")
 MakeMap = Callable[[np.random.Generator], StaticMap]
 
@@ -162,6 +163,33 @@ CASES: dict[str, tuple[MakeMap, int]] = {
 }
 
 
+def draw_growth(path: str, planners: Sequence[str], calls: int) -> None:
+    """Write a figure of median times on new maps, against polygons and against objects."""
+    import matplotlib.pyplot as plt
+
+    counts = {"polygons": (125, 250, 500, 1000, 2000, 4000), "objects": (0, 125, 250, 500, 1000)}
+    makers: dict[str, Callable[[int], tuple[MakeMap, int]]] = {
+        "polygons": lambda count: (lambda rng: posts(count, rng), 0),
+        "objects": lambda count: (hall, count),
+    }
+    figure, axes = plt.subplots(1, 2, figsize=(8.0, 3.0), layout="constrained", sharey=True)
+    for axis, (kind, numbers) in zip(axes, counts.items(), strict=True):
+        for name in planners:
+            times = [measure(name, *makers[kind](count), calls)[0] for count in numbers]
+            middle = [1e3 * np.percentile(values, 50, method="higher") for values in times]
+            axis.plot(numbers, middle, "o-", label=name)
+            print(
+                kind,
+                name,
+                [f"{count}: {value:.0f} ms" for count, value in zip(numbers, middle, strict=True)],
+            )
+        axis.axhline(50.0 if kind == "polygons" else 100.0, color="0.6", linestyle=":")
+        axis.set(xlabel=kind, yscale="log")
+    axes[0].set_ylabel("first plan, new map [ms]")
+    axes[0].legend(fontsize=8)
+    figure.savefig(path, dpi=90)
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("calls", nargs="?", type=int, default=10)
@@ -172,6 +200,8 @@ def main() -> None:
     planners = options.planner or PLANNERS
     for name in planners:
         warm_up(name)
+    if options.figure:
+        return draw_growth(options.figure, planners, options.calls)
     print("| map | planner | new map: median / p95 / worst [ms] | same map |\n|---|---|---|---|")
     for case in options.case or CASES:
         make_map, objects = CASES[case]
