@@ -37,6 +37,8 @@ def warm_start(improver: PathImprover) -> None:
         depth = improver.goal.radius - 0.99 * float(problem.goal[3])
     radius = problem.turning_radius
     for clearance in (max(1.25 * size, 1.02 * radius), 1.1 * size):
+        if improver.stopped():
+            return  # the contours alone take their time on a large map
         arcs = warm_start_arcs(
             improver.world, improver.goal, clearance, radius, depth, improver.stopped
         )
