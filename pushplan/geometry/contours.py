@@ -141,6 +141,14 @@ def box_edges(box: FloatArray) -> FloatArray:
     return np.array([[x0, y0, x1, y0], [x1, y0, x1, y1], [x1, y1, x0, y1], [x0, y1, x0, y0]])
 
 
-def contour_edges(contours: Contours) -> FloatArray:
-    """All sides (V, 4) of the contours as segments [m], in the order of their first corner."""
-    return np.ascontiguousarray(np.hstack([contours.corners, contours.corners[contours.following]]))
+def contour_edges(contours: Contours, which: BoolArray | None = None) -> FloatArray:
+    """Sides (N, 4) of the contours as segments [m] in the order of their first corner.
+
+    Args:
+        contours: the contours.
+        which: (V,) flags of the first corners; all of them if None.
+    """
+    first, after = contours.corners, contours.following
+    if which is not None:
+        first, after = first[which], after[which]
+    return np.ascontiguousarray(np.hstack([first, contours.corners[after]]))

@@ -226,14 +226,15 @@ def _distances(
 def ends_on_rims(static: StaticMap, clearance: float, regions: Regions) -> FloatArray:
     """Where a path may end at the rim (N, 2) [m] of what covers a part of the goal."""
     shapes, contours = obstacles_of(static, clearance), contours_of(static, clearance)
-    rims = [contour_edges(contours), box_edges(static.bounds)]
+    which = None
     if not len(regions.lines):  # only obstacles near it can cover a part of it
         around = np.concatenate([regions.discs[:, :2], regions.corners])
         reach = regions.discs[:, 2].max(initial=0.0) + standoff_of(static, clearance)
         low = around.min(axis=0, initial=np.inf) - reach
         high = around.max(axis=0, initial=-np.inf) + reach
         near = ((shapes.boxes[:, :2] <= high) & (shapes.boxes[:, 2:] >= low)).all(axis=1)
-        rims[0] = rims[0][near[contours.owner]]
+        which = near[contours.owner]
+    rims = [contour_edges(contours, which), box_edges(static.bounds)]
     ends = region_crossings(regions, np.concatenate(rims))
     return ends[free_points(ends, shapes, static.bounds, gap_of(static))]
 
@@ -309,8 +310,8 @@ def leave_inflation(static: StaticMap, clearance: float, point: FloatArray) -> F
 def _ways_out(static: StaticMap, clearance: float, near: IntArray) -> FloatArray:
     """Where outlines of the obstacles ``near`` cross each other or the bounds, (N, 2) [m]."""
     contours = contours_of(static, clearance)
-    edges = contour_edges(contours)[np.isin(contours.owner, near)]
-    owner = contours.owner[np.isin(contours.owner, near)]
+    which = np.isin(contours.owner, near)
+    edges, owner = contour_edges(contours, which), contours.owner[which]
     found = [segment_crossings(box_edges(static.bounds), edges)]
     found += [segment_crossings(edges[owner == k], edges[owner > k]) for k in near.tolist()]
     return np.ascontiguousarray(np.concatenate(found))

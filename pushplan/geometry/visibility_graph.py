@@ -23,6 +23,7 @@ from pushplan.geometry.visibility_search import (
     START,
     Corners,
     VisibilitySearch,
+    bounds_by_obstacle,
     expand,
     new_frontier,
     path_found,
@@ -87,7 +88,7 @@ class VisibilityGraph:
     ) -> Path:
         search = _visibility_search(self.static, self.clearance, target, free)
         frontier = new_frontier(8 * len(search.done) + 64)
-        expand(search, frontier, START, 0.0)
+        expand(search, frontier, START, 0.0, -math.inf)
         outcome = PAUSED
         while outcome in (PAUSED, FULL):
             if stopped():
@@ -123,14 +124,16 @@ def _visibility_search(
     shapes, corners = obstacles_of(static, clearance), _corners_of(static, clearance)
     ends = ends_on_rims(static, clearance, regions)
     points = np.concatenate([corners.points, ends])
+    scene = GoalScene(regions, shapes, static.bounds, gap)
     return VisibilitySearch(
         start=owned(start),
         corners=corners._replace(points=points),
-        scene=GoalScene(regions, shapes, static.bounds, gap),
+        scene=scene,
         grid=obstacle_grid(static, clearance, gap),
         sliver=standoff_of(static, clearance),
         done=np.zeros(len(points), dtype=np.bool_),
         parents=np.full(len(points), START, dtype=np.int64),
         counters=np.array([0, 0, 0, START]),
         seen=np.zeros(len(shapes.radii) + 1, dtype=np.int64),
+        left=bounds_by_obstacle(corners, scene),
     )

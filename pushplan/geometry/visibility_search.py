@@ -3,7 +3,10 @@
 A node is a corner of a contour. When one is reached, its successors are the corners that a common
 tangent leads to; they are put into the heap untested, and whether nothing lies between is found
 out for the cheapest entry only (Dellin and Srinivasa, "A unifying formalism for shortest path
-problems with expensive edge evaluations", 2016). Most of the graph is never made.
+problems with expensive edge evaluations", 2016). Nor are all successors put there at once: those
+through which the way to the goal would be much longer wait until it is their turn (Yoshizumi, Miura
+and Ishida, "A* with partial expansion for large branching factor problems", 2000). Most of the
+graph is never made.
 """
 
 from __future__ import annotations
@@ -46,6 +49,7 @@ class Frontier(NamedTuple):
 
     keys: FloatArray  # (M,) in heap order, length plus bound [m]
     lengths: FloatArray  # (M,) length of the path to the node [m]
+    limits: FloatArray  # (M,) of the rest of an expansion: the least that is left to offer [m]
     heap: IntArray  # (M,)
     places: IntArray  # (M,)
     nodes: IntArray  # (M,)
@@ -68,6 +72,7 @@ class VisibilitySearch(NamedTuple):
     parents: IntArray  # (V + E,)
     counters: IntArray  # (4,) size of the heap, entries used, lines tested, last node or `START`
     seen: IntArray  # (C + 1,) memory of `sees`
+    left: FloatArray  # (C,) from any corner of an obstacle at least as far to the goal [m]
 
 
 @kernel
@@ -79,6 +84,16 @@ def _bound(x: float, y: float, scene: GoalScene) -> float:
         qx, qy = nearest_in_region(k, x, y, regions)
         best = min(best, math.hypot(qx - x, qy - y))
     return best
+
+
+@kernel(allocates=True)
+def bounds_by_obstacle(corners: Corners, scene: GoalScene) -> FloatArray:
+    """(C,) straight distance [m] to the goal, at least, from every corner of each obstacle."""
+    left = np.empty(corners.middles.shape[0])
+    for k in range(left.shape[0]):
+        half = math.hypot(corners.halves[k, 0], corners.halves[k, 1])
+        left[k] = _bound(corners.middles[k, 0], corners.middles[k, 1], scene) - half
+    return left
 
 
 @kernel
@@ -120,8 +135,14 @@ def _offer(
 
 
 @kernel
-def expand(search: VisibilitySearch, frontier: Frontier, at: int, length: float) -> None:
-    """Offer the goal and all corners that a common tangent leads to from node ``at``."""
+def expand(
+    search: VisibilitySearch, frontier: Frontier, at: int, length: float, low: float
+) -> None:
+    """Offer the goal and corners that a common tangent leads to from node ``at``.
+
+    Only corners through which the goal is farther than ``low`` [m], -inf at first, and not much
+    farther; an entry stands for the rest.
+    """
     corners, scene, gap = search.corners, search.scene, search.scene.gap
     count, box, point = corners.owner.shape[0], scene.box, corners.points
     x, y, own = search.start[0], search.start[1], -1
@@ -130,15 +151,26 @@ def expand(search: VisibilitySearch, frontier: Frontier, at: int, length: float)
         x, y, own = point[at, 0], point[at, 1], corners.owner[at]
         ix, iy = corners.incoming[at, 0], corners.incoming[at, 1]
         ox, oy = corners.outgoing[at, 0], corners.outgoing[at, 1]
-    leg, _, _ = exit_leg(x, y, search)
-    if leg < math.inf:
-        _offer(search, frontier, point.shape[0], length + leg, 0.0, at)
-    for j in range(count, point.shape[0]):
-        dx, dy = point[j, 0] - x, point[j, 1] - y
-        if at < 0 or is_tangent(dx, dy, corners.incoming, corners.outgoing, at, gap):
-            _offer(search, frontier, j, length + math.hypot(dx, dy), 0.0, at)
+    straight = _bound(x, y, scene)
+    high, rest = straight + 2.0 * (low - straight), False
+    if low == -math.inf:
+        high = straight + search.grid.cell
+        leg, _, _ = exit_leg(x, y, search)
+        if leg < math.inf:
+            _offer(search, frontier, point.shape[0], length + leg, 0.0, at)
+        for j in range(count, point.shape[0]):
+            dx, dy = point[j, 0] - x, point[j, 1] - y
+            if at < 0 or is_tangent(dx, dy, corners.incoming, corners.outgoing, at, gap):
+                _offer(search, frontier, j, length + math.hypot(dx, dy), 0.0, at)
     obstacles = scene.obstacles
     for k in range(corners.middles.shape[0]):
+        mx, my = corners.middles[k, 0] - x, corners.middles[k, 1] - y
+        hx, hy = corners.halves[k, 0], corners.halves[k, 1]
+        ax, ay = max(abs(mx) - hx, 0.0), max(abs(my) - hy, 0.0)
+        away = high - search.left[k]  # farther than that the goal is too far from its corners
+        if away < 0.0 or ax * ax + ay * ay > away * away:
+            rest = True
+            continue
         first, last = corners.first[k], corners.first[k + 1]
         every = k == own
         if at < 0:
@@ -147,8 +179,6 @@ def expand(search: VisibilitySearch, frontier: Frontier, at: int, length: float)
             )
             every = away - obstacles.radii[k] <= search.sliver
         elif not every:  # the box around it must reach into where tangents at this corner lead
-            mx, my = corners.middles[k, 0] - x, corners.middles[k, 1] - y
-            hx, hy = corners.halves[k, 0], corners.halves[k, 1]
             before, after = ix * my - iy * mx, ox * my - oy * mx
             b, a = abs(ix) * hy + abs(iy) * hx + gap, abs(ox) * hy + abs(oy) * hx + gap
             if not ((before >= -b and after <= a) or (before <= b and after >= -a)):
@@ -164,14 +194,21 @@ def expand(search: VisibilitySearch, frontier: Frontier, at: int, length: float)
                 continue
             if at >= 0 and not is_tangent(dx, dy, corners.incoming, corners.outgoing, at, gap):
                 continue
-            _offer(search, frontier, j, length + math.hypot(dx, dy), _bound(px, py, scene), at)
+            step, bound = math.hypot(dx, dy), _bound(px, py, scene)
+            if step + bound > high:
+                rest = True
+            elif step + bound > low:
+                _offer(search, frontier, j, length + step, bound, at)
+    if rest:
+        frontier.limits[search.counters[_USED]] = high
+        _offer(search, frontier, point.shape[0] + 1, length, high, at)
 
 
 @kernel
 def search_on(search: VisibilitySearch, frontier: Frontier, budget: int) -> int:
     """Take up the search for about ``budget`` corners looked at, or lines tested."""
     corners, scene, counters = search.corners, search.scene, search.counters
-    most, count = corners.points.shape[0] + 1, corners.owner.shape[0]
+    most, count = corners.points.shape[0] + 2, corners.owner.shape[0]
     while budget > 0:
         if counters[0] == 0:
             return EXHAUSTED
@@ -183,6 +220,10 @@ def search_on(search: VisibilitySearch, frontier: Frontier, budget: int) -> int:
         if node == corners.points.shape[0]:  # its line has been tested
             counters[_END] = before
             return FOUND
+        if node > corners.points.shape[0]:
+            expand(search, frontier, before, frontier.lengths[entry], frontier.limits[entry])
+            budget -= corners.middles.shape[0] + 8
+            continue
         if search.done[node]:
             continue
         x, y = search.start[0], search.start[1]
@@ -197,15 +238,16 @@ def search_on(search: VisibilitySearch, frontier: Frontier, budget: int) -> int:
         if node >= count:
             counters[_END] = node
             return FOUND
-        expand(search, frontier, node, frontier.lengths[entry])
+        expand(search, frontier, node, frontier.lengths[entry], -math.inf)
         budget -= corners.middles.shape[0] + 8
     return PAUSED
 
 
 def new_frontier(capacity: int) -> Frontier:
     """Memory for entries."""
+    keys, lengths, limits = (np.empty(capacity) for _ in range(3))
     numbers = [np.empty(capacity, dtype=np.int64) for _ in range(4)]
-    return Frontier(np.empty(capacity), np.empty(capacity), *numbers)
+    return Frontier(keys, lengths, limits, *numbers)
 
 
 def path_found(search: VisibilitySearch) -> tuple[float, list[FloatArray]]:

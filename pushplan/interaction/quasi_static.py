@@ -31,7 +31,7 @@ from pushplan.world.checked_fields import (
     PositiveInt,
 )
 from pushplan.world.checks import FloatArray, IntArray
-from pushplan.world.outline import flatten
+from pushplan.world.outline import flatten, unflatten
 
 
 class QuasiStaticContacts(NamedTuple):
@@ -152,17 +152,20 @@ class _Shapes:
 def _thinnest(robot: RobotModel, shapes: _Shapes) -> float:
     """Half diagonal of the square that is as wide as the thinnest body [m]."""
     movables = shapes.movables
-    outlines = [*robot.parts, *(movables.outline(k) for k in range(len(movables)))]
+    outlines = [*robot.parts, *unflatten(movables.vertices, movables.offsets)]
     floor = robot.circumscribed_radius / 30.0
-    return max(min(_width(outline) for outline in outlines) / math.sqrt(2.0), floor)
+    sizes = {len(outline) for outline in outlines}  # those with as many corners at once
+    widths = [_width(np.stack([o for o in outlines if len(o) == size])) for size in sizes]
+    return max(min(widths) / math.sqrt(2.0), floor)
 
 
-def _width(outline: FloatArray) -> float:
-    """Least distance between two parallel lines that hold a convex outline (N, 2) [m]."""
-    edges = np.roll(outline, -1, axis=0) - outline
-    normals = np.column_stack([-edges[:, 1], edges[:, 0]]) / np.hypot(*edges.T)[:, None]
-    depths = (outline[None] - outline[:, None]) @ normals[:, :, None]
-    return float(depths[..., 0].max(axis=1).min())
+def _width(outlines: FloatArray) -> float:
+    """Least distance between two parallel lines that hold one of the outlines (K, N, 2) [m]."""
+    edges = np.roll(outlines, -1, axis=1) - outlines
+    normals = np.stack([-edges[..., 1], edges[..., 0]], axis=-1)
+    normals /= np.hypot(edges[..., 0], edges[..., 1])[..., None]
+    depths = (outlines[:, None] - outlines[:, :, None]) @ normals[..., None]  # (K, N, N, 1)
+    return float(depths[..., 0].max(axis=2).min())
 
 
 @functools.lru_cache(maxsize=32)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -11,7 +12,7 @@ from pushplan.geometry import core_distance
 from pushplan.search.grid_dijkstra import grid_dijkstra
 from pushplan.world import GoalDisc, StaticMap, World
 from pushplan.world.checks import FloatArray, IntArray, frozen
-from pushplan.world.outline import flatten
+from pushplan.world.outline import flatten, unflatten
 
 _SIDE = 96  # cells along the longer side of the workspace, if that resolves the robot's own width
 _MOST = 400  # cells along the longer side at most
@@ -73,7 +74,7 @@ def coarse_path(world: World, push_weight: float) -> FloatArray:
     walls = _wall_weights(world.static, cell, ((inner, np.inf), (1.3 * outer, 2.0)))
     # passing through the middle of a box pushes it for about a robot's width
     per_metre = push_weight * objects.masses / robot.mass
-    boxes = [objects.outline_world(k) for k in range(len(objects))]
+    boxes = unflatten(objects.vertices_world, objects.offsets)
     reach = np.full(len(boxes), outer)
     extra = walls + _grid_weights(world.static.bounds, cell, boxes, reach, per_metre)
     return _cheapest(world, extra, cell)
@@ -108,7 +109,11 @@ def _wall_weights(
 
 
 def _grid_weights(
-    bounds: FloatArray, cell: float, shapes: list[FloatArray], reach: FloatArray, weight: FloatArray
+    bounds: FloatArray,
+    cell: float,
+    shapes: Sequence[FloatArray],
+    reach: FloatArray,
+    weight: FloatArray,
 ) -> FloatArray:
     cols, rows = (int(np.ceil(side / cell)) for side in bounds[2:] - bounds[:2])
     return _cell_weights(bounds[:2], cell, rows, cols, *flatten(shapes), reach, weight)

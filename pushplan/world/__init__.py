@@ -21,6 +21,7 @@ from pushplan.world.goals import (
     Receptacle,
 )
 from pushplan.world.movables import Movables
+from pushplan.world.nav2_map import load_nav2_map
 from pushplan.world.plan import Plan, PlanResult, PlanStats, PlanStatus, SubTask
 from pushplan.world.planning_executor import PendingResult, PlanningExecutor
 from pushplan.world.policy_abilities import (
@@ -114,6 +115,7 @@ __all__ = [
     "area_clearing_robot",
     "box_delivery_robot",
     "jackal",
+    "load_nav2_map",
     "load_world",
     "maze_robot",
     "save_world",

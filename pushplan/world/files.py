@@ -12,10 +12,11 @@ from typing import Any
 import numpy as np
 import yaml
 
-from pushplan.world.checks import array, integer, known_keys, number
+from pushplan.world.checks import array, integer, known_keys, number, word
 from pushplan.world.errors import InvalidInputError, SchemaError, unknown_name_message
 from pushplan.world.goals import ClearanceArea, Goal, GoalDisc, GoalLine, Receptacle
 from pushplan.world.movables import Movables
+from pushplan.world.nav2_map import load_nav2_map
 from pushplan.world.outline import convex_outline, signed_area
 from pushplan.world.robot import Drive, RobotModel
 from pushplan.world.scene import World
@@ -87,8 +88,12 @@ def world_to_dict(world: World) -> dict[str, Any]:
     }
 
 
-def world_from_dict(data: object) -> World:
+def world_from_dict(data: object, folder: str | Path = ".") -> World:
     """Read what `world_to_dict` wrote, or what a person wrote by the same schema.
+
+    Args:
+        data: the mapping.
+        folder: where the file of a map is looked for, if ``data`` name one.
 
     Raises:
         SchemaError: an unknown or missing key, or another schema version.
@@ -108,7 +113,7 @@ def world_from_dict(data: object) -> World:
         robot=robot,
         robot_pose=pose,
         robot_twist=twist,
-        static=_static(data.get("static", {})),
+        static=_static(data.get("static", {}), Path(folder)),
         movables=_movables(data.get("movables", [])),
         goal=_goal(data["goal"]),
         time=number("time", data.get("time", 0.0)),
@@ -132,7 +137,7 @@ def load_world(path: str | Path) -> World:
         problem = " ".join(str(error).split())
         raise SchemaError(f"{path} is not valid {path.suffix[1:] or 'YAML'}: {problem}") from error
     try:
-        return world_from_dict(data)
+        return world_from_dict(data, path.parent)
     except SchemaError as error:
         raise SchemaError(f"{path}: {error}") from error
     except InvalidInputError as error:
@@ -176,9 +181,18 @@ def _robot(data: object) -> tuple[RobotModel, Any, Any]:
     return RobotModel(**fields), data["pose"], data.get("twist")
 
 
-def _static(data: object) -> StaticMap:
-    known_keys("static", data, ("bounds", "polygons", "segments"), ())
+def _static(data: object, folder: Path) -> StaticMap:
+    known_keys("static", data, ("bounds", "polygons", "segments", "map", "unknown"), ())
     assert isinstance(data, Mapping)
+    polygons = _list("static.polygons", data.get("polygons", []))
+    bounds = data.get("bounds")
+    if "map" in data:
+        file = folder / word("static.map", data["map"])
+        grid = load_nav2_map(file, unknown=data.get("unknown", "obstacle"))
+        polygons = [*grid.polygons, *polygons]
+        bounds = grid.bounds if bounds is None else bounds
+    elif "unknown" in data:
+        raise SchemaError("static.unknown says how to read a map: it needs static.map")
     lines, radii = [], []
     for i, segment in enumerate(_list("static.segments", data.get("segments", []))):
         known_keys(f"static.segments[{i}]", segment, ("from", "to", "radius"), ("from", "to"))
@@ -186,10 +200,10 @@ def _static(data: object) -> StaticMap:
         lines.append(array(f"static.segments[{i}]", [*ends[0], *ends[1]], (4,)))
         radii.append(number(f"static.segments[{i}].radius", segment.get("radius", 0.0), low=0.0))
     return StaticMap.build(
-        polygons=_list("static.polygons", data.get("polygons", [])),
+        polygons=polygons,
         segments=lines,
         radii=radii,
-        bounds=data.get("bounds"),
+        bounds=bounds,
     )
 
 

@@ -13,7 +13,8 @@ from numpy.typing import ArrayLike
 from pushplan.world.checked_fields import CheckedFields, Shape
 from pushplan.world.checks import ArrayRecord, FloatArray, array, checked_bounds, frozen
 from pushplan.world.errors import InvalidInputError
-from pushplan.world.outline import convex_outline
+from pushplan.world.occupancy import occupancy_polygons, occupied_cells
+from pushplan.world.outline import convex_outlines
 
 CAP_CORNERS = 9
 """Corners of each half circle where a thick segment is turned into a polygon."""
@@ -47,8 +48,7 @@ class StaticMap(ArrayRecord, CheckedFields):
         if isinstance(self.polygons, str) or not isinstance(self.polygons, Sequence):
             raise InvalidInputError("static.polygons must be a list of convex outlines")
         put = object.__setattr__
-        clean = [convex_outline(f"static.polygons[{i}]", p) for i, p in enumerate(self.polygons)]
-        put(self, "polygons", tuple(clean))
+        put(self, "polygons", tuple(convex_outlines("static.polygons", self.polygons)))
         put(self, "bounds", checked_bounds("static.bounds", self.bounds))
         if (self.radii < 0.0).any():
             raise InvalidInputError(f"static.radii must not be negative, got {self.radii.min()}")
@@ -73,7 +73,7 @@ class StaticMap(ArrayRecord, CheckedFields):
             raise InvalidInputError(
                 f"static.radii must be one number or {len(lines)} of them, got {radii!r}"
             ) from error
-        shapes = tuple(convex_outline(f"static.polygons[{i}]", p) for i, p in enumerate(polygons))
+        shapes = tuple(convex_outlines("static.polygons", polygons))
         if bounds is None:
             corners = [
                 *shapes,
@@ -87,6 +87,40 @@ class StaticMap(ArrayRecord, CheckedFields):
                 raise InvalidInputError("a static map without obstacles needs bounds")
             bounds = np.concatenate([every.min(axis=0), every.max(axis=0)])
         return cls(shapes, lines, thick, array("static.bounds", bounds, (4,)))
+
+    @classmethod
+    def from_occupancy(
+        cls,
+        grid: ArrayLike,
+        resolution: float,
+        origin: ArrayLike = (0.0, 0.0),
+        *,
+        occupied: int = 65,
+        unknown: str = "obstacle",
+    ) -> StaticMap:
+        """A map from an occupancy grid; occupied cells become few rectangles, exactly.
+
+        The union of the polygons is the union of the occupied cells, and the bounds are the box
+        around the grid. Values are those of ROS's ``nav_msgs/OccupancyGrid``, whose data belong
+        here as ``np.reshape(data, (height, width))``.
+
+        Args:
+            grid: (rows, columns) row 0 at the least y: whole numbers, -1 for unknown and else 0 to
+                100, the probability in percent that a cell is occupied; or truth values, true for
+                an obstacle.
+            resolution: side of a cell [m].
+            origin: (2,) or (3,) x, y [m] and theta [rad] of the outer corner of cell (0, 0).
+            occupied: cells from this value on are obstacles [%].
+            unknown: "obstacle" or "free", what unknown cells count as. With obstacles, that is also
+                what the bounds hold beyond a grid that is rotated.
+
+        Raises:
+            InvalidInputError: if the grid, one of its values or another argument is none of these.
+        """
+        full = occupied_cells(grid, occupied, unknown)
+        beyond = unknown == "obstacle"
+        polygons, bounds = occupancy_polygons(full, resolution, origin, beyond)
+        return cls.build(polygons, bounds=bounds)
 
     @cached_property
     def convex_parts(self) -> tuple[FloatArray, ...]:

@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from pushplan.compiled import kernel
 from pushplan.control.mpc.kernels import Track
 from pushplan.control.mpc.solver import QuadraticProgram
 from pushplan.world import Plan, RobotModel
@@ -31,14 +32,9 @@ def time_grid(count: int, span: float, held: float) -> FloatArray:
     return steps
 
 
+@kernel(allocates=True)
 def shifted_index(old: FloatArray, new: FloatArray, held: float) -> IntArray:
-    """(N,) the old step that each new one lies in, ``held`` [s] later; their number past the end.
-
-    Args:
-        old: (N,) steps of the last solution [s].
-        new: (N,) steps now [s].
-        held: time since then [s].
-    """
+    """(N,) the old step that each new one lies in, ``held`` [s] later, N past the end."""
     ends, middles = np.cumsum(old) - held, np.cumsum(new) - 0.5 * new
     return np.searchsorted(ends, middles)
 

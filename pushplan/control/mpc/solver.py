@@ -58,7 +58,7 @@ class QuadraticProgram:
         """Number of constraints: the inputs, then the changes of the limited ones."""
         self.count = count
         """Number of variables."""
-        self._solved = osqp.SolverStatus.OSQP_SOLVED
+        self._solved = int(osqp.SolverStatus.OSQP_SOLVED)
         self._solver: Any = osqp.OSQP()
         pattern.data[:] = self._packed(np.eye(count))
         self._solver.setup(
@@ -101,12 +101,15 @@ class QuadraticProgram:
             high: (rows,) upper bounds.
             start: (n,) what to start from.
         """
-        solver = self._solver
+        # the binding itself: its wrapper in Python takes three times as long as the solver
+        solver = self._solver._solver
         scale = self.count / np.trace(hessian)  # so that the step size suits any horizon
-        solver.update(Px=scale * self._packed(hessian), q=scale * gradient, l=low, u=high)
-        solver.warm_start(x=start)
-        result = solver.solve(raise_error=False)
-        if result.info.status_val != self._solved or not np.isfinite(result.x).all():
+        solver.update_data_vec(q=scale * gradient, l=low, u=high)
+        packed = scale * self._packed(hessian)
+        solver.update_data_mat(P_x=packed, P_i=None, A_x=None, A_i=None)
+        solver.warm_start(start, None)
+        solver.solve()
+        found: FloatArray = np.array(solver.solution.x)
+        if solver.info.status_val != self._solved or not np.isfinite(found).all():
             return None
-        found: FloatArray = np.array(result.x)
         return found

@@ -15,6 +15,7 @@ from pushplan.motion.polyline import polyline_plan
 from pushplan.motion.random_tree.kinodynamic_tree import TreeGrowth, TreeLimits
 from pushplan.motion.random_tree.targets import Targets
 from pushplan.world.checks import FloatArray
+from pushplan.world.outline import unflatten
 from pushplan.world.polyline import path_length
 
 _EDGES = 30
@@ -64,7 +65,7 @@ class TreePaths:
         improver.iterations += 1
         among, shape = problem.walls, problem.footprint
         if np.isinf(push_weight):
-            boxes = [world.movables.outline_world(k) for k in range(len(world.movables))]
+            boxes = unflatten(world.movables.vertices_world, world.movables.offsets)
             among = obstacles(world.static, boxes)
             if not is_free(owned(world.robot_pose), shape, among, np.empty_like(shape.vertices)):
                 return None  # the robot touches an object already: only pushing helps

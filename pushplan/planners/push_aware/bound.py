@@ -30,7 +30,7 @@ def lower_bound(world: World, stopped: Callable[[], bool] = lambda: False) -> fl
     around = 0.0
     clearance = (1.0 - _SLIM) * world.robot.inscribed_radius
     start = world.robot_pose[:2]
-    if _is_clear(world.static, start, clearance):
+    if not stopped() and _is_clear(world.static, start, clearance):
         path = VisibilityGraph(world.static, clearance).to_goal(start, goal, stopped)
         length = float(path.length)
         around = length / (1.0 + _TOO_LONG) if np.isfinite(length) else 0.0

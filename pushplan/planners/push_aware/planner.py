@@ -10,7 +10,6 @@ import numpy as np
 from pushplan.interaction import InteractionModel, QuasiStatic
 from pushplan.motion.path_improver import PathImprover
 from pushplan.motion.speed_profile import turning_radius
-from pushplan.planners.push_aware.bound import lower_bound
 from pushplan.planners.push_aware.push_aware_config import PushAwareConfig
 from pushplan.planners.push_aware.search import PushAwareSearch
 from pushplan.world import Drive, PlanResult, RobotModel, Stop, World
@@ -78,9 +77,6 @@ class PushAware:
         radius = _least_radius(world.robot, self.config)
         improver = PathImprover(call, self.config, self.interaction, radius)
         search = PushAwareSearch(improver, self.config)
-        bound = lower_bound(
-            world, improver.stopped
-        )  # before the search, so that it is within the time given
         status = search.run() or call.stopped_status
         detail = {
             "trees": float(search.trees.trees),
@@ -89,8 +85,8 @@ class PushAware:
             "random_arcs": float(search.random_arcs),
         }
         if status.has_plan:
-            detail["cost"], detail["bound"] = float(improver.best_cost), bound
-            detail["gap"] = _gap(float(improver.best_cost), bound)
+            detail["cost"], detail["bound"] = float(improver.best_cost), search.bound
+            detail["gap"] = _gap(float(improver.best_cost), search.bound)
         return improver.result(status, **detail)
 
 

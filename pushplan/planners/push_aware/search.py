@@ -7,17 +7,18 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pushplan.compiled import owned
+from pushplan.motion.dubins_warm_start import warm_start
 from pushplan.motion.path_improver import Candidate, PathImprover
 from pushplan.motion.random_tree.tree_paths import TreePaths
 from pushplan.planners.push_aware.best_first import Branching, make_search
+from pushplan.planners.push_aware.bound import lower_bound
 from pushplan.planners.push_aware.cost_to_go import CostToGo, length_to_go
 from pushplan.planners.push_aware.cost_to_go_maker import cost_to_go_maker
-from pushplan.planners.push_aware.dubins_warm_start import warm_start_arcs
 from pushplan.planners.push_aware.push_aware_config import PushAwareConfig
 from pushplan.planners.push_aware.push_tree import PushTree, make_push_tree, plant, trace
 from pushplan.planners.push_aware.random_tree import DRAWS, grow
 from pushplan.search.astar import EXHAUSTED, FOUND
-from pushplan.world import GoalDisc, PlanStatus
+from pushplan.world import PlanStatus
 from pushplan.world.checks import FloatArray
 
 _RANDOM_NODES = 20_000  # nodes of a random tree at most; then another is begun
@@ -47,6 +48,8 @@ class PushAwareSearch:
         self.improver, self.config, self.trees = improver, config, TreePaths(improver)
         self.world, self.rng, self.size = improver.world, improver.rng, improver.size
         self.expansions = self.searches = self.random_arcs = 0
+        self.bound = 0.0
+        """What no plan can cost less than [kg m]."""
         self._radius = improver.problem.turning_radius
         self._patience = float(config.first_search)
         self._nodes: PushTree | None = None
@@ -56,6 +59,7 @@ class PushAwareSearch:
         """Search until the stop rule fires; None where there is no plan by then."""
         improver = self.improver
         status = self._first_plan()
+        self.bound = lower_bound(self.world, improver.stopped)
         if status is not None:
             return status
         table = self._table()
@@ -81,7 +85,7 @@ class PushAwareSearch:
         status = improver.begin()
         if status is not None:
             return status
-        self._warm_start()
+        warm_start(improver)
         while not improver.stopped():
             self._one_round()
             if improver.solved:
@@ -90,27 +94,11 @@ class PushAwareSearch:
                 return PlanStatus.GOAL_UNREACHABLE
             trees.relax()
             trees.relax()  # where a first tree fails, the start is most often a tight one
-            self._warm_start()
+            warm_start(improver)
             table = self._table()
             if table is not None:
                 self._search(table, replace(self._first_variant(table), inflation=1.3))
         return None
-
-    def _warm_start(self) -> None:
-        """Try to drive along the shortest homotopic path, objects or not."""
-        improver, problem = self.improver, self.improver.problem
-        depth = 1.01 * self.config.inset * self.size
-        if isinstance(improver.goal, GoalDisc):
-            depth = improver.goal.radius - 0.99 * float(problem.goal[3])
-        radius = problem.turning_radius
-        for clearance in (max(1.25 * self.size, 1.02 * radius), 1.1 * self.size):
-            arcs = warm_start_arcs(
-                self.world, improver.goal, clearance, radius, depth, improver.stopped
-            )
-            if arcs is None:
-                continue
-            if improver.candidate(arcs, improver.jam_cost, free=False) is not None:
-                return
 
     def _table(self) -> CostToGo | None:
         """Lengths to the goal without objects; the same for every call on this map."""

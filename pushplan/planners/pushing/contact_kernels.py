@@ -174,19 +174,17 @@ def _drive(state: FloatArray, v: float, w: float, dt: float) -> None:
 
 
 @kernel
-def _leave(contact: Contact, state: FloatArray, v: float, w: float, dt: float) -> float:
-    """Move the robot for ``dt`` while the box stands; the gap after it [m]."""
+def _leave(
+    contact: Contact, state: FloatArray, ahead: float, v: float, w: float, dt: float
+) -> tuple[float, float, float]:
+    """Offset, angle and gap when the robot has moved for ``dt`` and the box, at x ahead, stood."""
     turn = w * dt
     half = 0.5 * turn
     chord = v * dt * (np.sin(half) / half if abs(half) > 1e-9 else 1.0)
-    x = standoff(contact, state[3], state[4])[0] + state[5]
-    dx, dy = x - chord * np.cos(half), state[3] - chord * np.sin(half)
+    dx, dy = ahead - chord * np.cos(half), state[3] - chord * np.sin(half)
     c, s = np.cos(turn), np.sin(turn)
-    _drive(state, v, w, dt)
-    state[3], state[4] = c * dy - s * dx, state[4] - turn
-    state[5] = c * dx + s * dy - standoff(contact, state[3], state[4])[0]
-    gap: float = state[5]
-    return gap
+    offset, angle = c * dy - s * dx, state[4] - turn
+    return offset, angle, c * dx + s * dy - standoff(contact, offset, angle)[0]
 
 
 @kernel
@@ -224,19 +222,18 @@ def advance(
     step = dt / count
     out[:] = 0.0
     for _ in range(count):
-        x, y, theta = state[0], state[1], state[2]
-        offset, angle, before = state[3], state[4], state[5]
-        gap = max(before, 0.0)
-        state[5] = gap
-        after = _leave(contact, state, v, w, step)
-        if after >= 1e-9:
+        gap = max(state[5], 0.0)
+        ahead = standoff(contact, state[3], state[4])[0] + gap
+        left = _leave(contact, state, ahead, v, w, step)
+        if left[2] >= 1e-9:
+            state[3], state[4], state[5] = left
+            _drive(state, v, w, step)
             out[:] = 0.0
             continue
-        state[0], state[1], state[2] = x, y, theta
-        state[3], state[4], state[5] = offset, angle, before
-        fraction = gap / (gap - after) if gap > 1e-9 and gap > after else 0.0
+        fraction = gap / (gap - left[2]) if gap > 1e-9 and gap > left[2] else 0.0
         if fraction > 0.0:
-            _leave(contact, state, v, w, fraction * step)
+            state[3], state[4], _ = _leave(contact, state, ahead, v, w, fraction * step)
+            _drive(state, v, w, fraction * step)
         state[5] = 0.0
         if fraction < 1.0:
             push_step(contact, state, v, w, (1.0 - fraction) * step, out)

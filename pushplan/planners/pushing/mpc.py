@@ -134,7 +134,7 @@ class PushingMpc:
             raise InvalidInputError(
                 "the plan must name the box in its first sub-task, as PushPath.plan does"
             )
-        if self._robot != robot:
+        if self._robot is not robot and self._robot != robot:
             self._observer = PushObserver(config.observer_gain, config.delay)
             self._robot, self._plan = robot, None
             self.fallbacks = 0

@@ -35,7 +35,9 @@ class PushObserver:
     def send(self, time: float, twist: Twist) -> None:
         """Remember what was sent at a time [s]."""
         self._sent.append((time, twist.linear, twist.angular))
-        while len(self._sent) > 1 and self._sent[1][0] < time - 2.0 * self._delay - 1.0:
+        # what another command had followed in effect when the state was observed moves it no more
+        over = max(self._time - self._delay, time - 2.0 * self._delay - 1.0)
+        while len(self._sent) > 1 and self._sent[1][0] < over:
             self._sent.popleft()
 
     def forget(self) -> None:

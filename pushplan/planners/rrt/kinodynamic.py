@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from pushplan.interaction import InteractionModel, QuasiStatic
+from pushplan.motion.dubins_warm_start import is_far, warm_start
 from pushplan.motion.path_improver import Candidate, PathImprover
 from pushplan.motion.path_search_config import PathSearchConfig
 from pushplan.motion.random_tree.tree_paths import TreePaths
@@ -63,7 +64,11 @@ class KinodynamicRRT:
         radius = turning_radius(world.robot, self.config.turn_fraction)
         improver = PathImprover(call, self.config, self.interaction, radius)
         trees = TreePaths(improver)
-        status = improver.begin() or _search(improver, trees) or call.stopped_status
+        status = improver.begin()
+        if status is None:
+            if is_far(improver):
+                warm_start(improver)
+            status = _search(improver, trees) or call.stopped_status
         return improver.result(status, trees=float(trees.trees))
 
 

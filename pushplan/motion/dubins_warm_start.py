@@ -13,11 +13,39 @@ import numpy as np
 from pushplan.compiled import owned
 from pushplan.geometry import VisibilityGraph
 from pushplan.motion.dubins import dubins
-from pushplan.world import NavigationGoal, World
+from pushplan.motion.path_improver import PathImprover
+from pushplan.world import GoalDisc, NavigationGoal, World
 from pushplan.world.checks import FloatArray
 
+_FAR = 30.0
+"""Edges of a tree in a straight line to the goal beyond which it is far."""
 _SHARP = 0.8
 """Turn beyond which a bend is driven through its ends, not only through its middle [rad]."""
+
+
+def is_far(improver: PathImprover) -> bool:
+    """Whether the goal is more edges of a tree away than one grows in some milliseconds."""
+    away = improver.goal.distance(*improver.world.robot_pose[:2])
+    return bool(away > _FAR * improver.config.edge * improver.size)
+
+
+def warm_start(improver: PathImprover) -> None:
+    """Try to drive along the shortest homotopic path, objects or not; the improver keeps it."""
+    problem, size = improver.problem, improver.size
+    depth = 1.01 * improver.config.inset * size
+    if isinstance(improver.goal, GoalDisc):
+        depth = improver.goal.radius - 0.99 * float(problem.goal[3])
+    radius = problem.turning_radius
+    for clearance in (max(1.25 * size, 1.02 * radius), 1.1 * size):
+        if improver.stopped():
+            return  # the contours alone take their time on a large map
+        arcs = warm_start_arcs(
+            improver.world, improver.goal, clearance, radius, depth, improver.stopped
+        )
+        if arcs is None:
+            continue
+        if improver.candidate(arcs, improver.jam_cost, free=False) is not None:
+            return
 
 
 def warm_start_arcs(

@@ -1,0 +1,91 @@
+"""Occupancy grids, as robots map with them, to convex polygons."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from pushplan.world.checks import BoolArray, FloatArray, array, choice, integer, number
+from pushplan.world.errors import InvalidInputError
+from pushplan.world.outline import transform
+from pushplan.world.rectangles import rectangle_cover
+
+UNKNOWN = ("obstacle", "free")
+"""What unknown cells may count as."""
+
+
+def occupied_cells(grid: ArrayLike, occupied: int, unknown: str) -> BoolArray:
+    """Which cells of an occupancy grid are obstacles, (rows, columns).
+
+    Arguments as in `StaticMap.from_occupancy`.
+
+    Raises:
+        InvalidInputError: if the grid has another shape, or a value other than -1 to 100.
+    """
+    choice("treatment of unknown cells", unknown, UNKNOWN)
+    least = integer("occupied", occupied, low=1, high=100)
+    values: Any = np.asarray(grid)
+    if values.dtype.kind not in "biu" or values.ndim != 2 or 0 in values.shape:
+        raise InvalidInputError(
+            "grid must be an array (rows, columns) of whole numbers or of truth values, "
+            f"got {values.dtype} of shape {values.shape}"
+        )
+    if values.dtype.kind == "b":
+        return np.asarray(values, dtype=np.bool_)
+    if values.min() < -1 or values.max() > 100:
+        wrong = values.min() if values.min() < -1 else values.max()
+        raise InvalidInputError(f"grid holds -1 (unknown) and 0 to 100 [%], got {wrong}")
+    full: BoolArray = values >= least
+    return full | (values < 0) if unknown == "obstacle" else full
+
+
+def occupancy_polygons(
+    full: BoolArray, resolution: float, origin: ArrayLike, beyond: bool
+) -> tuple[list[FloatArray], FloatArray]:
+    """Obstacles of a grid, and the box around it.
+
+    Args:
+        full: (rows, columns) cells that are obstacles.
+        resolution: side of a cell [m].
+        origin: (2,) or (3,) x, y [m] and theta [rad] of the corner of cell (0, 0).
+        beyond: whether what the box holds beyond a rotated grid is an obstacle too.
+
+    Returns:
+        Polygons, each (N, 2) [m], and x_min, y_min, x_max, y_max [m].
+    """
+    side = number("resolution", resolution, low=0.0, open_low=True)
+    place = np.zeros(3)
+    given: FloatArray = array("origin", origin, (None,))
+    if len(given) not in (2, 3):
+        raise InvalidInputError(f"origin must be x, y or x, y, theta, got {given.tolist()}")
+    place[: len(given)] = given
+    r0, c0, r1, c1 = rectangle_cover(full).T
+    corners = np.stack([c0, r0, c1, r0, c1, r1, c0, r1], axis=1).reshape(-1, 2)
+    points = _placed(place, side * corners)
+    rows, columns = full.shape
+    rim = _placed(place, side * np.array([[0, 0], [columns, 0], [columns, rows], [0, rows]]))
+    low, high = rim.min(axis=0), rim.max(axis=0)
+    polygons = list(points.reshape(-1, 4, 2))
+    if beyond:
+        box = np.array([[low[0], low[1]], [high[0], low[1]], [high[0], high[1]], [low[0], high[1]]])
+        polygons += _triangles(rim, box)
+    return polygons, np.concatenate([low, high])
+
+
+def _placed(origin: FloatArray, points: FloatArray) -> FloatArray:
+    """Points of the grid (N, 2) [m] in the world frame, exact where it is not rotated."""
+    return points + origin[:2] if origin[2] == 0.0 else transform(origin, points)
+
+
+def _triangles(rim: FloatArray, box: FloatArray) -> list[FloatArray]:
+    """What a box (4, 2) holds beyond a rotated rectangle (4, 2) whose corners lie on its sides."""
+    found = []
+    for a, b in zip(rim, np.roll(rim, -1, axis=0), strict=True):
+        outward = np.array([b[1] - a[1], a[0] - b[0]])
+        beyond = (box - a) @ outward
+        corner = box[int(beyond.argmax())]
+        if beyond.max() > 1e-9 * float(outward @ outward):
+            found.append(np.array([a, corner, b]))
+    return found
