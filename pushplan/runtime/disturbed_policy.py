@@ -51,15 +51,15 @@ class DisturbedPolicy:
             self._options.setdefault("delay", 0.7 * self.disturbances.lag)
             self._options.setdefault("position_noise", self.disturbances.position_noise)
             self._options.setdefault("heading_noise", self.disturbances.heading_noise)
-        self._make = lambda: Runner(
-            policy,
-            period=period,
-            executor=SimulatedExecutor(1.0, itertools.count(0.0, planning_time).__next__),
-            **self._options,
-        )
+        self._policy, self._period, self._planning_time = policy, period, planning_time
         probe = self._make().policy
         self.actions = probe.actions if isinstance(probe, ChoosesActions) else ("velocity",)
         self.runner: Runner | None = None
+
+    def _make(self) -> Runner:
+        ticks = itertools.count(0.0, self._planning_time)
+        executor = SimulatedExecutor(1.0, ticks.__next__)
+        return Runner(self._policy, period=self._period, executor=executor, **self._options)
 
     def reset(self, world: World, rng: np.random.Generator) -> None:
         """Begin an episode; the robot is seen as it is in the first snapshot."""
