@@ -62,7 +62,7 @@ class DisturbedPolicy:
         return Runner(self._policy, period=self._period, executor=executor, **self._options)
 
     def reset(self, world: World, rng: np.random.Generator) -> None:
-        """Begin an episode; the robot is seen as it is in the first snapshot."""
+        """Begin an episode; nothing is hidden in the first snapshot."""
         self._rng = rng
         self._inbox: deque[tuple[float, World]] = deque()
         self._applied = driven_twist(world)
@@ -76,7 +76,8 @@ class DisturbedPolicy:
         if self.runner is None:
             assert self._start is not None
             self.runner = self._make()
-            command = self.runner.start(world)
+            every = np.ones(len(world.movables), dtype=np.bool_)
+            command = self.runner.start(self._noisy(world, every))
         else:
             self._see(world)
             while self._inbox and self._inbox[0][0] <= world.time + 1e-9:
@@ -136,6 +137,8 @@ class DisturbedPolicy:
                 [math.cos(angle), math.sin(angle)]
             )
         seen = movables.moved_to(poses)
+        if d.mass_factor != 1.0:
+            seen = replace(seen, masses=d.mass_factor * seen.masses)
         return replace(
             world,
             robot_pose=world.robot_pose + noise[0],
