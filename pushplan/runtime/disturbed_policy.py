@@ -52,8 +52,9 @@ class DisturbedPolicy:
             self._options.setdefault("position_noise", self.disturbances.position_noise)
             self._options.setdefault("heading_noise", self.disturbances.heading_noise)
         self._policy, self._period, self._planning_time = policy, period, planning_time
-        probe = self._make().policy
-        self.actions = probe.actions if isinstance(probe, ChoosesActions) else ("velocity",)
+        driven = self._make().policy
+        given = driven.actions if isinstance(driven, ChoosesActions) else ()
+        self.actions = tuple(given) or ("velocity", "turn_rate")
         self.runner: Runner | None = None
 
     def _make(self) -> Runner:
