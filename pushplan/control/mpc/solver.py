@@ -1,26 +1,19 @@
-"""OSQP for a small dense quadratic program whose constraints keep their structure."""
+"""A small dense quadratic program whose constraints keep their structure."""
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
+from pushplan.control.mpc.qp_kernels import qp_memory, solve_program
 from pushplan.world.checks import FloatArray
-
-RHO = 0.1
-"""First step size of the operator splitting; adapted after a fixed number of iterations."""
-RHO_INTERVAL = 20
-CHECK_INTERVAL = 5
-_BY_ITERATIONS = 1  # OSQP_ADAPTIVE_RHO_UPDATE_ITERATIONS; 2 would be by the clock
 
 
 class QuadraticProgram:
-    """min 1/2 zᵀPz + qᵀz with low <= (z, changes of z) <= high, solved again and again by OSQP.
+    """min 1/2 zᵀPz + qᵀz with low <= (z, changes of z) <= high, solved again and again.
 
-    Set up once; `solve` changes values only and starts from the last solution. The step size is
-    adapted after fixed numbers of iterations and never by the clock, so that runs repeat.
-    Stellato et al., "OSQP: an operator splitting solver for quadratic programs", 2020.
+    The operator splitting of OSQP (Stellato et al., Math. Program. Comput. 12(4), 2020); each
+    call starts from the multipliers and the step size of the last one. The step size is adapted
+    after fixed numbers of iterations and never by the clock, so that runs repeat.
 
     Args:
         blocks: how many inputs there are; each has N values.
@@ -39,50 +32,12 @@ class QuadraticProgram:
         tolerance: float = 1e-6,
         iterations: int = 2000,
     ) -> None:
-        import osqp  # not loaded by those who do not need it
-        from scipy import sparse
-
-        count = blocks * horizon
-        change = sparse.eye_array(horizon) - sparse.eye_array(horizon, k=-1)
-        rows: list[Any] = [sparse.eye_array(count)]
-        for block in range(blocks):
-            if limited[block]:
-                pick = sparse.csr_array(np.eye(blocks)[block][None])
-                rows.append(sparse.kron(pick, change))
-        self._upper = np.triu_indices(count)
-        order = np.lexsort(self._upper)  # column by column
-        self._upper = (self._upper[0][order], self._upper[1][order])
-        pattern = sparse.csc_matrix(np.triu(np.ones((count, count))))
-        constraints = sparse.csc_matrix(sparse.vstack(rows))
-        self.rows = constraints.shape[0]
-        """Number of constraints: the inputs, then the changes of the limited ones."""
-        self.count = count
+        firsts = np.flatnonzero(limited).astype(np.int64) * horizon
+        self.count = blocks * horizon
         """Number of variables."""
-        self._solved = int(osqp.SolverStatus.OSQP_SOLVED)
-        self._solver: Any = osqp.OSQP()
-        pattern.data[:] = self._packed(np.eye(count))
-        self._solver.setup(
-            pattern,
-            np.zeros(count),
-            constraints,
-            -np.ones(self.rows),
-            np.ones(self.rows),
-            verbose=False,
-            eps_abs=tolerance,
-            eps_rel=tolerance,
-            max_iter=iterations,
-            rho=RHO,
-            adaptive_rho=_BY_ITERATIONS,
-            adaptive_rho_interval=RHO_INTERVAL,
-            check_termination=CHECK_INTERVAL,
-            scaling=0,
-            polishing=False,
-            warm_starting=True,
-        )
-
-    def _packed(self, hessian: FloatArray) -> FloatArray:
-        packed: FloatArray = hessian[self._upper]
-        return packed
+        self.memory = qp_memory(self.count, horizon, firsts, tolerance, iterations)
+        self.rows = len(self.memory.y)
+        """Number of constraints: the inputs, then the changes of the limited ones."""
 
     def solve(
         self,
@@ -92,7 +47,7 @@ class QuadraticProgram:
         high: FloatArray,
         start: FloatArray,
     ) -> FloatArray | None:
-        """The minimiser, or None where OSQP does not say that it has solved the problem.
+        """The minimiser, or None where it is not found.
 
         Args:
             hessian: (n, n) P.
@@ -101,15 +56,7 @@ class QuadraticProgram:
             high: (rows,) upper bounds.
             start: (n,) what to start from.
         """
-        # the binding itself: its wrapper in Python takes three times as long as the solver
-        solver = self._solver._solver
-        scale = self.count / np.trace(hessian)  # so that the step size suits any horizon
-        solver.update_data_vec(q=scale * gradient, l=low, u=high)
-        packed = scale * self._packed(hessian)
-        solver.update_data_mat(P_x=packed, P_i=None, A_x=None, A_i=None)
-        solver.warm_start(start, None)
-        solver.solve()
-        found: FloatArray = np.array(solver.solution.x)
-        if solver.info.status_val != self._solved or not np.isfinite(found).all():
-            return None
-        return found
+        memory = self.memory
+        memory.hessian[:], memory.gradient[:] = hessian, gradient
+        memory.low[:], memory.high[:], memory.x[:] = low, high, start
+        return memory.x.copy() if solve_program(memory) else None
