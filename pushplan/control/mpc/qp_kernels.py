@@ -69,7 +69,7 @@ def qp_memory(
 
 @kernel
 def solve_program(memory: QpMemory) -> bool:
-    """Minimise 1/2 xᵀPx + qᵀx within the bounds, from ``x``, which is changed; False if unsolved."""
+    """Minimise 1/2 xᵀPx + qᵀx within the bounds from ``x``, in place; False if it is not solved."""
     n, rows = memory.x.shape[0], memory.y.shape[0]
     x, y, low, high = memory.x, memory.y, memory.low, memory.high
     z, weights, before, ahead = memory.wide[0], memory.wide[1], memory.wide[2], memory.wide[3]
