@@ -18,11 +18,12 @@ from pushplan.cli import (
     report,
     run,
     score,
+    stress,
     teleop,
     train,
 )
 
-COMMANDS = (run, teleop, plan, bench, listing, score, report, ice, gtsp, train, compiling)
+COMMANDS = (run, teleop, plan, bench, stress, listing, score, report, ice, gtsp, train, compiling)
 
 _DESCRIPTION = "Plan, push, score and compare: baselines for robots that push things."
 _EXAMPLES = """\

@@ -100,7 +100,7 @@ def run(options: argparse.Namespace) -> int:
         return _refuse(wrong)
     out = options.out or os.path.join("runs", options.suite)
     comparison = None
-    with _progress(options.policies or "") as progress:
+    with progress_of(options.policies or "") as progress:
         try:
             if options.suite == paper.SUITE:
                 comparison = paper.compare(options, out, progress)
@@ -144,7 +144,7 @@ def _refuse(message: str) -> int:
 
 
 @contextmanager
-def _progress(policies: str) -> Iterator[_Progress]:
+def progress_of(policies: str) -> Iterator[_Progress]:
     """Kernels while they are compiled; then a bar where there is a terminal, else lines."""
     with ExitStack() as running, ExitStack() as compiling:
         compiling.enter_context(kernel_progress(*policies.split(",")))

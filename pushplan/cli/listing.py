@@ -34,6 +34,7 @@ _KINDS: dict[str, str] = {
     "policies": "pushplan.evaluation.policies:policy_names",
     "tasks": "pushplan.envs.registry:TASKS",
     "suites": "pushplan.scenarios:suite_names",
+    "conditions": "pushplan.evaluation.stress_testing:CONDITIONS",
     "metrics": "pushplan.metrics:metric_names",
     "simulators": "pushplan.envs.registry:SIMULATORS",
 }

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import fields
 
 from pushplan.world.lazy_names import look_up
 
@@ -33,6 +34,16 @@ def goal_kind(task: str) -> str | None:
     """Who has the goal in a task, ``"robot"`` or ``"objects"``; None for an unknown task."""
     kind: str | None = look_up("task", TASKS, task).goal_kind if task in TASKS else None
     return kind
+
+
+def variation_names(task: str) -> set[str]:
+    """What may depart from the presets of a task.
+
+    Raises:
+        UnknownNameError: if there is no such task.
+    """
+    kind = look_up("task", TASKS, task).variation_class
+    return {field.name for field in fields(kind)}
 
 
 def default_preset(task: str, simulator: str) -> str:

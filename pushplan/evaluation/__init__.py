@@ -21,11 +21,14 @@ if TYPE_CHECKING:
     from pushplan.evaluation.results import Results
     from pushplan.evaluation.rows import TIMING_COLUMNS, ResultRow, Status, columns
     from pushplan.evaluation.statistics import Estimate, Proportion, bootstrap_interval, wilson
+    from pushplan.evaluation.stress_testing import CONDITIONS, Condition, ScoreSheet, stress
     from pushplan.evaluation.summary import PairedDifference, PolicySummary
 
 __all__ = [
+    "CONDITIONS",
     "TIMING_COLUMNS",
     "Comparison",
+    "Condition",
     "Estimate",
     "InvalidActionError",
     "Job",
@@ -38,6 +41,7 @@ __all__ = [
     "Proportion",
     "ResultRow",
     "Results",
+    "ScoreSheet",
     "Status",
     "UnusablePolicyError",
     "WorkerPool",
@@ -49,6 +53,7 @@ __all__ = [
     "parse_policy",
     "run_batch",
     "run_episode",
+    "stress",
     "wilson",
 ]
 
@@ -66,6 +71,7 @@ __getattr__, __dir__ = lazy_names(
         "results": "Results",
         "rows": "TIMING_COLUMNS ResultRow Status columns",
         "statistics": "Estimate Proportion bootstrap_interval wilson",
+        "stress_testing": "CONDITIONS Condition ScoreSheet stress",
         "summary": "PairedDifference PolicySummary",
     },
 )

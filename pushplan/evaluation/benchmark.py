@@ -64,7 +64,7 @@ def bench(
     settings = JobSettings(
         observation=observation, timeout_s=timeout_s, latency_factor=latency_factor
     )
-    name, version, scenarios = _scenarios(suite, episodes, seed)
+    name, version, scenarios = scenarios_of(suite, episodes, seed)
     specs = usable_policies(policies, scenarios, settings)
     # all policies of a scenario close together: a run that is cut short still compares them
     jobs = [Job(spec, scenario) for scenario in scenarios for spec in specs]
@@ -85,7 +85,8 @@ def bench(
     return Results(loaded.rows, loaded.about, None)
 
 
-def _scenarios(given: Any, episodes: int | None, seed: int) -> tuple[str, int, Sequence[Any]]:
+def scenarios_of(given: Any, episodes: int | None, seed: int) -> tuple[str, int, Sequence[Any]]:
+    """Name, version and scenarios of a suite by name, a suite, or a list of scenarios."""
     from pushplan.scenarios import Suite, suite
 
     if isinstance(given, str):

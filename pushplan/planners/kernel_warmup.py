@@ -17,7 +17,6 @@ from pushplan.world import (
     Drive,
     GoalDisc,
     GoalLine,
-    InvalidInputError,
     MaxIterations,
     Movables,
     Policy,
@@ -71,9 +70,11 @@ def warm_up_policy(policy: Policy) -> None:
         warm_up_recovery()
         stop = policy.stop
         for world in (_room(), _water()):
-            with contextlib.suppress(InvalidInputError):  # another planner's world
+            with contextlib.suppress(Exception):  # it may be made for other worlds than these
                 _plan_and_follow(policy, world)
         policy.stop = stop
+        with contextlib.suppress(Exception):
+            policy.planner.plan(_doorway(), stop=MaxIterations(_ITERATIONS))
 
 
 def _plan_and_follow(policy: PlanFollower, world: World) -> None:
@@ -103,6 +104,15 @@ def _room() -> World:
         movables=Movables.from_outlines([square, square], [[4.0, 5.0, 0.0], [5.2, 5.0, 0.0]]),
         goal=GoalDisc(np.array([8.0, 5.0]), 0.5),
     )
+
+
+def _doorway() -> World:
+    """A doorway that a coarse grid misses."""
+    wall = np.array([[5.9, 5.52], [6.1, 5.52], [6.1, 10.0], [5.9, 10.0]])
+    static = StaticMap.build(
+        polygons=[wall, wall * [1.0, -1.0] + [0.0, 10.0]], bounds=[0.0, 0.0, 10.0, 10.0]
+    )
+    return replace(_room(), static=static, movables=Movables.empty())
 
 
 def _water() -> World:

@@ -25,6 +25,7 @@ class Disturbances(CheckedFields):
         loss: fraction of the worlds that never come in.
         burst: mean number of worlds lost one after another.
         rate: worlds seen in a second at most [Hz]; all by default.
+        mass_factor: masses that are told over those that objects have.
         lag: time constant of the actuators [s].
         vanish: for what fraction of the time each object is not seen.
         vanish_time: for how long at a time, on average [s].
@@ -38,6 +39,7 @@ class Disturbances(CheckedFields):
     loss: Annotated[float, Limits(0.0, 0.95)] = 0.0
     burst: Annotated[float, Limits(1.0)] = 4.0
     rate: Annotated[float, Limits(0.0, open_low=True, finite=False)] = math.inf
+    mass_factor: PositiveFloat = 1.0
     lag: NonNegativeFloat = 0.0
     vanish: Annotated[float, Limits(0.0, 0.95)] = 0.0
     vanish_time: PositiveFloat = 2.0

@@ -52,8 +52,9 @@ class DisturbedPolicy:
             self._options.setdefault("position_noise", self.disturbances.position_noise)
             self._options.setdefault("heading_noise", self.disturbances.heading_noise)
         self._policy, self._period, self._planning_time = policy, period, planning_time
-        probe = self._make().policy
-        self.actions = probe.actions if isinstance(probe, ChoosesActions) else ("velocity",)
+        driven = self._make().policy
+        given = driven.actions if isinstance(driven, ChoosesActions) else ()
+        self.actions = tuple(given) or ("velocity", "turn_rate")
         self.runner: Runner | None = None
 
     def _make(self) -> Runner:
@@ -62,7 +63,7 @@ class DisturbedPolicy:
         return Runner(self._policy, period=self._period, executor=executor, **self._options)
 
     def reset(self, world: World, rng: np.random.Generator) -> None:
-        """Begin an episode; the robot is seen as it is in the first snapshot."""
+        """Begin an episode; nothing is hidden in the first snapshot."""
         self._rng = rng
         self._inbox: deque[tuple[float, World]] = deque()
         self._applied = driven_twist(world)
@@ -76,7 +77,8 @@ class DisturbedPolicy:
         if self.runner is None:
             assert self._start is not None
             self.runner = self._make()
-            command = self.runner.start(world)
+            every = np.ones(len(world.movables), dtype=np.bool_)
+            command = self.runner.start(self._noisy(world, every))
         else:
             self._see(world)
             while self._inbox and self._inbox[0][0] <= world.time + 1e-9:
@@ -136,6 +138,8 @@ class DisturbedPolicy:
                 [math.cos(angle), math.sin(angle)]
             )
         seen = movables.moved_to(poses)
+        if d.mass_factor != 1.0:
+            seen = replace(seen, masses=d.mass_factor * seen.masses)
         return replace(
             world,
             robot_pose=world.robot_pose + noise[0],

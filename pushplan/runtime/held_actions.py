@@ -20,7 +20,8 @@ from pushplan.world import (
     World,
 )
 
-_MODES = ("velocity", "turn_rate", "wheels")
+_TWISTS = ("velocity", "turn_rate")
+_MODES = (*_TWISTS, "wheels")
 
 
 class HeldActions:
@@ -47,6 +48,8 @@ class HeldActions:
                 f"observation {policy.observation!r}"
             )
         self._policy, self._hold = policy, hold
+        given = policy.actions if isinstance(policy, ChoosesActions) else ()
+        self.actions = tuple(mode for mode in given if mode in _TWISTS) or _TWISTS
         self.plan_with(ImmediateExecutor())
 
     def plan_with(self, executor: PlanningExecutor) -> None:

@@ -44,6 +44,7 @@ PLAN_STOP = OwnBudget() | Deadline(1.0)
 """Stop rule of planning calls: the planner's own budget, and never more than a second."""
 _SMOOTHING = 0.3  # gain of the filter of noisy poses
 _RETRY = 0.25  # time after a failure in which the policy is not asked [s]
+_BLIND = 60.0  # for how long a robot that is to continue does so without a world [s]
 _SWITCH = 5e-4  # how long the planning thread may keep the interpreter to itself [s]
 
 
@@ -76,7 +77,7 @@ class Runner:
             as long, and half a second more, stops the robot until it has returned.
         max_age: a world that is older stops the robot, or an answer of a policy that plans in one
             go [s].
-        on_stale: ``"stop"``, or ``"continue"`` along what is predicted.
+        on_stale: ``"stop"``, or ``"continue"`` along what is predicted, for a minute at most.
         delay: time between a command and its effect [s].
         position_noise: standard deviation of the places in the worlds, of robot and objects [m].
         heading_noise: the same of the headings [rad].
@@ -141,7 +142,8 @@ class Runner:
         if any(noise) and isinstance(self.policy, ExpectsNoise):
             left = math.sqrt(gain / (2.0 - gain))  # of white noise, after a filter of that gain
             self.policy.expect_noise(left * noise[0], left * noise[1])
-        self._estimator = StateEstimator(delay, gain)
+        self._believed = max(self.max_age, _BLIND if self.on_stale == "continue" else 0.0)
+        self._estimator = StateEstimator(delay, gain, self._believed)
         self._delay, self._clock, self._log = delay, clock, log
         self._executor = executor or ThreadExecutor(self.plan_stop, clock)
         self._lock = threading.Lock()
@@ -292,7 +294,7 @@ class Runner:
         halt = clamp_twist(world.robot, 0.0, 0.0)
         if self._cancelled:
             return halt, CommandStatus.CANCELLED, self._cancelled
-        if self.on_stale == "stop" and abs(age) > self.max_age:
+        if abs(age) > self._believed:
             why = "old" if age > 0.0 else "ahead of the clock of the commands"
             return halt, CommandStatus.STALE, f"the newest world is {abs(age):.3g} s {why}"
         running, budget = self._running_s, self.plan_stop.seconds

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from bisect import bisect_right
 from collections import deque
 from dataclasses import replace
 
@@ -29,38 +30,53 @@ class StateEstimator:
     Args:
         delay: time between a command and its effect [s].
         gain: 1 trusts each observation as it is.
+        horizon: for how long a snapshot is brought forward at most [s]; later the robot and the
+            objects are where they were expected then.
     """
 
-    def __init__(self, delay: float, gain: float) -> None:
-        self._delay, self._gain = delay, gain
+    def __init__(self, delay: float, gain: float, horizon: float) -> None:
+        self._delay, self._gain, self._horizon = delay, gain, delay + horizon
         self._sent: deque[tuple[float, Twist]] = deque()
         self._world: World | None = None
+        self._ahead: World | None = None
+        """The newest snapshot, as far as it has been brought forward."""
 
     def reset(self) -> None:
         """Forget everything."""
         self._sent.clear()
-        self._world = None
+        self._world = self._ahead = None
 
     def sent(self, time: float, twist: Twist) -> None:
         """A command was sent at a time [s]."""
         self._sent.append((time + self._delay, twist))
+        self._drop_before(time - self._horizon)
 
     def observe(self, world: World) -> None:
         """Take a snapshot, later than the one before."""
         if self._gain < 1.0 and self._world is not None:
             world = self._blend(self._advanced(self._world, world.time), world)
-        self._world = world
-        while len(self._sent) > 1 and self._sent[1][0] <= world.time:
+        self._world = self._ahead = world
+        self._drop_before(world.time)
+
+    def _drop_before(self, time: float) -> None:
+        """Forget the commands that were over by then [s]."""
+        while len(self._sent) > 1 and self._sent[1][0] <= time:
             self._sent.popleft()
 
     def at(self, time: float) -> World:
-        """The world at a time [s]; the newest snapshot with that time where it is not earlier."""
-        assert self._world is not None
-        return self._advanced(self._world, time)
+        """The world at a time [s]; the newest snapshot with that time where it is not earlier.
+
+        Costs what has passed since the last call or snapshot; times must not go back in between.
+        """
+        assert self._world is not None and self._ahead is not None
+        end = min(time, self._world.time + self._horizon)
+        if end > self._ahead.time:
+            self._ahead = self._advanced(self._ahead, end)
+        return self._ahead if self._ahead.time == time else self._ahead.moved(time=time)
 
     def _advanced(self, world: World, time: float) -> World:
         if time <= world.time:
-            return world if time == world.time else world.moved(time=time)
+            return world
         path = self._path(world, time)
         if len(path) == 1:
             return world.moved(time=time)
@@ -91,12 +107,8 @@ class StateEstimator:
 
     def _driven(self, time: float) -> Twist:
         """What takes effect at a time [s]; nothing before the first command."""
-        driven = Twist(0.0, 0.0)
-        for at, twist in self._sent:
-            if at > time:
-                break
-            driven = twist
-        return driven
+        before = bisect_right(self._sent, time, key=lambda sent: sent[0])
+        return self._sent[before - 1][1] if before else Twist(0.0, 0.0)
 
     def _blend(self, predicted: World, seen: World) -> World:
         """Between what was predicted and what is seen."""

@@ -56,15 +56,18 @@ def relocating_pushes(
     away = np.hypot(*(scene.poses[:, :2] - scene.poses[k, :2]).T)
     near = away < scene.config.relocation.near * scene.size
     robot = np.round(scene.world.robot_pose[:2] / (2.0 * scene.size))
-    around = bytes([thorough]) + movables.ids[near].tobytes() + scene.poses[near].tobytes()
+    around = movables.ids[near].tobytes() + scene.poses[near].tobytes()
     if cache is not None:
-        found = cache.primitives(int(movables.ids[k]), around, robot.tobytes())
+        found = cache.primitives(int(movables.ids[k]), around, robot.tobytes(), thorough)
         if found is None and cache.searches >= scene.config.max_searches:
             return []
     if found is None:
-        found = _RelocationSearch(scene, k, approach, thorough).run()
+        search = _RelocationSearch(scene, k, approach, thorough)
+        found = search.run()
         if cache is not None and not scene.budget.interrupted:
-            cache.keep_primitives(int(movables.ids[k]), around, robot.tobytes(), found)
+            cache.keep_primitives(
+                int(movables.ids[k]), around, robot.tobytes(), search.exhaustive, found
+            )
     return [
         replace(push, cost=push.cost + extra)
         for path, extra in found
@@ -112,12 +115,17 @@ class _State:
 
 
 class _RelocationSearch:
-    """The search for one object of a scene."""
+    """The search for one object of a scene.
+
+    Attributes:
+        exhaustive: whether a thorough search would have looked at nothing more.
+    """
 
     def __init__(
         self, scene: PushScene, k: int, approach: ApproachTree, thorough: bool = False
     ) -> None:
         self._scene, self._k, self._approach = scene, k, approach
+        self.exhaustive = True
         self._slack = math.inf if thorough else scene.config.relocation.slack * scene.size
         self._config = scene.config.relocation
         self._horizon = self._config.horizon * scene.size
@@ -150,6 +158,7 @@ class _RelocationSearch:
                 break
             state = heapq.heappop(self._open)[2]
             if state.cost > best + self._slack:
+                self.exhaustive = False
                 break
             if state.depth and not self._has_moved(state):
                 continue

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -46,6 +47,15 @@ class _Entry:
     age: int = 0
 
 
+class _Relocations(NamedTuple):
+    """What a search for relocations of an object has found."""
+
+    around: bytes
+    robot: bytes
+    exhaustive: bool
+    found: list[Primitive]
+
+
 class RolloutCache:
     """Rollouts of the plans before, by what was rolled out.
 
@@ -57,22 +67,27 @@ class RolloutCache:
 
     def __init__(self) -> None:
         self._entries: dict[object, _Entry] = {}
-        self._primitives: dict[int, tuple[bytes, bytes, list[Primitive] | None]] = {}
+        self._primitives: dict[int, _Relocations] = {}
         self.searches = 0
 
-    def primitives(self, target: int, around: bytes, robot: bytes) -> list[Primitive] | None:
+    def primitives(
+        self, target: int, around: bytes, robot: bytes, thorough: bool
+    ) -> list[Primitive] | None:
         """Drives found for an object, if that was with the same around it.
 
-        That there are none counts only for the robot in the same place: it may get to others.
+        That there are none counts only for the robot in the same place: it may get to others. A
+        thorough search asks for what an exhaustive one has found.
         """
-        then, where, found = self._primitives.get(target, (b"", b"", None))
-        return found if then == around and (found or where == robot) else None
+        known = self._primitives.get(target)
+        if known is None or known.around != around or (thorough and not known.exhaustive):
+            return None
+        return known.found if known.found or known.robot == robot else None
 
     def keep_primitives(
-        self, target: int, around: bytes, robot: bytes, found: list[Primitive]
+        self, target: int, around: bytes, robot: bytes, exhaustive: bool, found: list[Primitive]
     ) -> None:
         """Keep the drives found for an object."""
-        self._primitives[target] = around, robot, found
+        self._primitives[target] = _Relocations(around, robot, exhaustive, found)
         self.searches += 1
 
     def __len__(self) -> int:

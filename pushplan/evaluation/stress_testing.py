@@ -1,0 +1,262 @@
+"""Stress test: a policy in a robot's loop, under one disturbance after another."""
+
+from __future__ import annotations
+
+import math
+import tempfile
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from pushplan.envs.registry import variation_names
+from pushplan.evaluation.batch import Progress, run_batch
+from pushplan.evaluation.benchmark import scenarios_of
+from pushplan.evaluation.compatibility import usable_policies
+from pushplan.evaluation.jobs import Job, JobSettings
+from pushplan.evaluation.policies import PolicySpec, parse_policy
+from pushplan.evaluation.rows import ResultRow
+from pushplan.evaluation.statistics import wilson
+from pushplan.evaluation.tables import Table, heading
+from pushplan.metrics import Role, metric_names
+from pushplan.runtime.disturbances import Disturbances
+from pushplan.runtime.disturbed_policy import DisturbedPolicy
+from pushplan.scenarios.scenario import Variations
+from pushplan.world import InvalidInputError, UnknownNameError
+from pushplan.world.checks import number
+
+_DEG = math.pi / 180.0
+UNDISTURBED = "undisturbed"
+
+
+@dataclass(frozen=True)
+class Condition:
+    """What a policy has to stand.
+
+    Args:
+        disturbances: of perception, prediction and actuators.
+        rate: of the robot's loop [Hz]; that of the stress test if None.
+        variations: of the scenario.
+        success: fraction of episodes that has to succeed; None where nothing is asked for.
+        kept: least part of the undisturbed efficiency and effort scores; 0 where nothing is asked.
+    """
+
+    disturbances: Disturbances = field(default_factory=Disturbances)
+    rate: float | None = None
+    variations: Mapping[str, Any] = field(default_factory=dict)
+    success: float | None = 0.95
+    kept: float = 0.0
+
+
+def _noise(position: float, heading: float, **more: float) -> Disturbances:
+    return Disturbances(position_noise=position, heading_noise=heading * _DEG, **more)
+
+
+CONDITIONS: Mapping[str, Condition] = {
+    UNDISTURBED: Condition(),
+    "noise-1cm-2deg": Condition(_noise(0.01, 2.0), kept=0.85),
+    "noise-2cm-3deg": Condition(_noise(0.02, 3.0)),
+    "noise-3cm-5deg": Condition(_noise(0.03, 5.0), success=0.8),
+    "delay-100ms": Condition(Disturbances(delay=0.1)),
+    "delay-200ms": Condition(Disturbances(delay=0.2)),
+    "loss-20": Condition(Disturbances(loss=0.2)),
+    "loss-50": Condition(Disturbances(loss=0.5), success=None),
+    "rate-10hz": Condition(rate=10.0),
+    "rate-100hz": Condition(rate=100.0),
+    "mass-half": Condition(Disturbances(mass_factor=0.5)),
+    "mass-double": Condition(Disturbances(mass_factor=2.0)),
+    "friction-0": Condition(variations={"bumper_friction": 0.0}),
+    "friction-0.8": Condition(variations={"bumper_friction": 0.8}),
+    "lag-100ms": Condition(Disturbances(lag=0.1)),
+    "lag-300ms": Condition(Disturbances(lag=0.3), success=None),
+    "vanish-20": Condition(Disturbances(vanish=0.2), success=None),
+    "jump-5": Condition(Disturbances(jump=0.05), success=None),
+    "together": Condition(_noise(0.02, 3.0, delay=0.2, loss=0.2), success=None),
+}
+"""The standard conditions by name. Noise is that of every pose seen; what is lost comes in bursts
+of four on average; "mass" is what the policy is told over what is true."""
+
+
+@dataclass(frozen=True)
+class StressRow:
+    """What became of one condition.
+
+    Attributes:
+        condition: its name.
+        episodes: how many there were.
+        successes: how many reached the task's goal.
+        walls: how many ended at a wall.
+        failed: how many did not end by the rules of the task.
+        scores: mean of each score that there is.
+        kept: each score over that of the undisturbed episodes with the same seeds.
+        missed: what was asked for and not reached, in words.
+    """
+
+    condition: str
+    episodes: int
+    successes: int
+    walls: int
+    failed: int
+    scores: Mapping[str, float]
+    kept: Mapping[str, float]
+    missed: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class ScoreSheet:
+    """A stress test: one row a condition."""
+
+    policy: str
+    suite: str
+    rows: tuple[StressRow, ...]
+
+    @property
+    def missed(self) -> tuple[str, ...]:
+        """Conditions in which something that was asked for was not reached."""
+        return tuple(row.condition for row in self.rows if row.missed)
+
+    def table(self) -> Table:
+        """The sheet as a table."""
+        names = list(dict.fromkeys(name for row in self.rows for name in row.scores))
+        headings = ["condition", "success"]
+        for name in names:
+            headings += [heading(name), "kept"]
+        cells = []
+        for row in self.rows:
+            rate = wilson(row.successes, row.episodes)
+            line = [row.condition, f"{rate.fraction:.2f} [{rate.low:.2f}, {rate.high:.2f}]"]
+            for name in names:
+                line.append(f"{row.scores[name]:.3f}" if name in row.scores else "")
+                line.append(f"{row.kept[name]:.2f}" if name in row.kept else "")
+            cells.append((*line, str(row.walls), str(row.failed), "; ".join(row.missed)))
+        return Table(
+            f"{self.policy} on {self.suite}, {self.rows[0].episodes} episodes a condition",
+            (*headings, "at a wall", "failed", "missed"),
+            tuple(cells),
+            "success with its Wilson 95 % interval; kept is the mean over that of the undisturbed "
+            "episodes with the same seeds",
+        )
+
+
+def stress(
+    policy: str | Callable[..., Any] | PolicySpec,
+    suite: Any,
+    *,
+    conditions: Sequence[str] | Mapping[str, Condition] | None = None,
+    episodes: int = 20,
+    seed: int = 0,
+    rate: float = 20.0,
+    planning_time: float = 0.05,
+    workers: int | None = None,
+    out: str | Path | None = None,
+    timeout_s: float | None = 900.0,
+    progress: Progress | None = None,
+) -> ScoreSheet:
+    """Drive a policy by `pushplan.runtime.Runner` under one disturbance after another.
+
+    What is known of a robot that has been measured, its noise and the lag of its actuators, is
+    told to the runner. A planning call takes the same simulated time each, so the sheet repeats.
+
+    Args:
+        policy: a name, ``"module:Class"``, ``"file.py:Class"``, or a callable that makes one.
+        suite: name of a suite, a `pushplan.scenarios.Suite`, or a list of scenarios.
+        conditions: names of `CONDITIONS`, or conditions of your own by name; all that the task
+            has the variations for by default. `UNDISTURBED` is always run too.
+        episodes: scenarios of a suite by name.
+        seed: of the first scenario of a suite by name.
+        rate: of the robot's loop where a condition does not say [Hz].
+        planning_time: what a planning call takes [s].
+        workers: processes, all cores by default; 0 runs in this process.
+        out: run directory, continued if it holds this test already.
+        timeout_s: wall-clock limit of an episode [s].
+        progress: told of every row.
+
+    Raises:
+        UnknownNameError: if there is no such policy, suite or condition.
+        UnusablePolicyError: if the policy cannot run in any of the scenarios.
+    """
+    rate = number("rate", rate, low=0.0, open_low=True)
+    name, _, scenarios = scenarios_of(suite, episodes, seed)
+    if not scenarios:
+        raise InvalidInputError("a stress test needs at least one scenario")
+    wanted = _conditions(conditions, scenarios)
+    spec = parse_policy(policy)
+    usable_policies([spec], scenarios, JobSettings())
+    jobs = []
+    for label, condition in wanted.items():
+        period = 1.0 / (condition.rate or rate)
+        make = partial(_disturbed, spec, condition.disturbances, period, planning_time)
+        changes = {**condition.variations, "control_step": period}
+        for scenario in scenarios:
+            varied = replace(scenario, variations=Variations({**scenario.variations, **changes}))
+            jobs.append(Job(PolicySpec(label, make), varied))
+    jobs.sort(key=lambda job: job.id[2])  # a test that is cut short still compares conditions
+    options: dict[str, Any] = {"settings": JobSettings(timeout_s=timeout_s), "progress": progress}
+    if out is not None:
+        rows = run_batch(jobs, out=out, workers=workers, **options)
+    else:
+        with tempfile.TemporaryDirectory(prefix="pushplan-") as folder:
+            rows = run_batch(jobs, out=folder, workers=workers, **options)
+    return ScoreSheet(spec.label, name, tuple(_rows(wanted, rows)))
+
+
+def _disturbed(
+    spec: PolicySpec, disturbances: Disturbances, period: float, planning_time: float
+) -> DisturbedPolicy:
+    return DisturbedPolicy(spec.make(), disturbances, period=period, planning_time=planning_time)
+
+
+def _conditions(
+    given: Sequence[str] | Mapping[str, Condition] | None, scenarios: Sequence[Any]
+) -> dict[str, Condition]:
+    if isinstance(given, Mapping):
+        return {UNDISTURBED: CONDITIONS[UNDISTURBED], **given}
+    if given is not None:
+        for name in given:
+            if name not in CONDITIONS:
+                raise UnknownNameError("condition", name, CONDITIONS)
+        return {name: CONDITIONS[name] for name in dict.fromkeys((UNDISTURBED, *given))}
+    tasks = {scenario.task for scenario in scenarios}
+    known = set.intersection(*(variation_names(task) for task in tasks))
+    return {name: one for name, one in CONDITIONS.items() if known.issuperset(one.variations)}
+
+
+def _rows(conditions: Mapping[str, Condition], rows: Sequence[ResultRow]) -> Iterable[StressRow]:
+    found = {name: [row for row in rows if row.policy == name] for name in conditions}
+    scores = metric_names(Role.SCORE)
+    base = {row.seed: row for row in found[UNDISTURBED]}
+    for name, condition in conditions.items():
+        mine = found[name]
+        means, kept = {}, {}
+        for score in scores:
+            pairs = [(getattr(row, score), getattr(base[row.seed], score)) for row in mine]
+            pairs = [pair for pair in pairs if None not in pair]
+            if pairs:
+                value, before = np.mean(pairs, axis=0).tolist()
+                means[score] = value
+                if before > 0.0:
+                    kept[score] = value / before
+        yield _judged(name, condition, mine, means, kept)
+
+
+def _judged(
+    name: str,
+    condition: Condition,
+    rows: Sequence[ResultRow],
+    scores: Mapping[str, float],
+    kept: Mapping[str, float],
+) -> StressRow:
+    successes, walls = sum(row.success for row in rows), sum(row.reason == "wall" for row in rows)
+    missed = []
+    if condition.success is not None and successes < condition.success * len(rows):
+        missed.append(f"success ≥ {condition.success:g}")
+    if walls and condition.success is not None:
+        missed.append("no wall")
+    for score, part in kept.items():
+        if part < condition.kept:
+            missed.append(f"{score} kept ≥ {condition.kept:g}")
+    failed = sum(row.failed for row in rows)
+    return StressRow(name, len(rows), successes, walls, failed, scores, kept, tuple(missed))
