@@ -118,7 +118,7 @@ def simulate(pipe: Connection, policy: str, scenarios: Sequence[Scenario], perio
         while not over:
             *_, terminated, truncated, info = env.step(env.encode(twist))
             over = terminated or truncated
-            due += period
+            due = max(due + period, time.perf_counter())
             time.sleep(max(0.0, due - time.perf_counter()))
             receiver.sendto(message(number, env.world), there)
             twist = newest(receiver, number, twist)
@@ -172,7 +172,7 @@ class _Loop:
         self.late = self.killed = self.failures = 0
         self.growth_mb = 0.0
         self._number = -1
-        self._offset = 0.0
+        self._offset = self._now = 0.0
         self._start: World | None = None
 
     def run(self, seconds: float) -> None:
@@ -194,7 +194,7 @@ class _Loop:
         self.failures += self.runner.failures
         self.runner.start(world)
         self._start, self._number = world, number
-        self._offset = time.perf_counter() - world.time
+        self._offset, self._now = time.perf_counter() - world.time, world.time
         self._pipe.send(None)
 
     def _receive(self) -> None:
@@ -216,7 +216,9 @@ class _Loop:
                 self._begin()
                 due = time.perf_counter()
             before, own = time.perf_counter(), time.thread_time()
-            command = self.runner.command(before - self._offset)
+            # the simulation may fall behind the wall clock, but its clock never goes back
+            self._now = max(self._now, before - self._offset)
+            command = self.runner.command(self._now)
             self.own.append(time.thread_time() - own)
             self.took.append(time.perf_counter() - before)
             self.late += command.late

@@ -69,7 +69,7 @@ class MpcTracker:
     def command(self, world: World, plan: Plan) -> Twist:
         """See `pushplan.world.Controller`.
 
-        Past the end of the plan a differential drive stops; a constant-speed robot drives on
+        Past the end of the plan the robot stops; a constant-speed robot drives on
         along the last heading.
         """
         return self._clock.command_for(world, lambda _: self._follow(world, plan))
@@ -84,13 +84,16 @@ class MpcTracker:
         along, index, fraction = locate(track, x, y, low, self._along + _WINDOW * size)
         self._along = min(along, float(track.lengths[-1]))
         error = errors(track, x, y, theta, index, fraction)[1]
-        stops = robot.drive is Drive.DIFFERENTIAL
-        if stops and along >= track.lengths[-1] - 1e-9:
+        on_the_spot = robot.drive is Drive.DIFFERENTIAL
+        if robot.can_stop and along >= track.lengths[-1] - 1e-9:
             return self._send(world, self._ramped(world, 0.0, 0.0), None)
-        if abs(error) > (math.pi / 4 if stops else math.pi / 2):
+        if abs(error) > (math.pi / 4 if on_the_spot else math.pi / 2):
             # too far from the path's heading for a linear model: turn towards it first
             turn = math.copysign(robot.max_turn_rate, -error)
-            return self._send(world, self._ramped(world, 0.0, turn), None)
+            speed = 0.0
+            if robot.drive is Drive.CAR:
+                speed = min(robot.max_speed, robot.max_turn_rate * robot.min_turning_radius)
+            return self._send(world, self._ramped(world, speed, turn), None)
         solution = self._solve(pose)
         if solution is None:
             self.fallbacks += 1
@@ -208,7 +211,7 @@ def _tuning(robot: RobotModel, config: MpcConfig) -> Tuning:
         max_speed=robot.max_speed,
         max_turn_rate=robot.max_turn_rate,
         max_acceleration=robot.max_acceleration,
-        stops=robot.drive is Drive.DIFFERENTIAL,
+        stops=robot.can_stop,
         optimise_speed=_optimises_speed(robot, config),
         heading_weight=config.heading_weight,
         turn_weight=config.turn_weight,
