@@ -87,6 +87,7 @@ def world_to_dict(world: World) -> dict[str, Any]:
     return {
         "schema": SCHEMA,
         "time": world.time,
+        **({"margin": world.margin} if world.margin else {}),
         "robot": robot,
         "static": static,
         "movables": movables,
@@ -108,7 +109,7 @@ def world_from_dict(data: object, folder: str | Path = ".") -> World:
     known_keys(
         "world file",
         data,
-        ("schema", "time", "robot", "static", "movables", "goal"),
+        ("schema", "time", "margin", "robot", "static", "movables", "goal"),
         ("schema", "robot", "goal"),
     )
     assert isinstance(data, Mapping)
@@ -123,6 +124,7 @@ def world_from_dict(data: object, folder: str | Path = ".") -> World:
         movables=_movables(data.get("movables", [])),
         goal=_goal(data["goal"]),
         time=number("time", data.get("time", 0.0)),
+        margin=data.get("margin", 0.0),
     )
 
 

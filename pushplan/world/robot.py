@@ -5,7 +5,7 @@ from __future__ import annotations
 import enum
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Annotated
 
@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 from pushplan.world.checked_fields import CheckedFields, Limits, NonNegativeFloat, PositiveFloat
 from pushplan.world.checks import ArrayRecord, FloatArray, IntArray, choice, number
 from pushplan.world.errors import InvalidInputError
-from pushplan.world.outline import convex_outline, flatten
+from pushplan.world.outline import convex_outline, flatten, grown_outline
 
 
 class Drive(enum.StrEnum):
@@ -90,6 +90,20 @@ class RobotModel(ArrayRecord, CheckedFields):
     def from_outline(cls, outline: ArrayLike, **limits: object) -> RobotModel:
         """A robot whose footprint is one convex outline (N, 2) [m]; the rest as in the class."""
         return cls(parts=(np.asarray(outline),), **limits)  # type: ignore[arg-type]
+
+    def inflated(self, margin: float) -> RobotModel:
+        """The same robot with every part grown by ``margin`` [m], with sharp corners.
+
+        Whoever plans with it also predicts that it pushes with this footprint; `World.margin`
+        keeps away from what is static alone.
+
+        Raises:
+            InvalidInputError: if the margin is negative or not finite.
+        """
+        margin = number("margin", margin, low=0.0)
+        if margin == 0.0:
+            return self
+        return replace(self, parts=tuple(grown_outline(part, margin) for part in self.parts))
 
     @cached_property
     def _flat(self) -> tuple[FloatArray, IntArray]:

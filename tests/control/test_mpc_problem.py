@@ -12,8 +12,15 @@ from scipy.optimize import minimize
 from test_tracking_controllers import FLOOR, arc_plan
 
 from pushplan.control import MpcConfig, MpcTracker
-from pushplan.control.mpc.kernels import Track, Tuning, assemble, errors, locate
-from pushplan.control.mpc.solver import QuadraticProgram
+from pushplan.control.mpc.kernels import (
+    Track,
+    Tuning,
+    assemble,
+    assembly_memory,
+    errors,
+    locate,
+)
+from pushplan.control.mpc.qp_kernels import qp_memory, solve_program
 
 CURVATURE = 0.4
 CENTRE = np.array([0.0, 1.0 / CURVATURE])
@@ -95,7 +102,8 @@ def test_the_assembled_problem_is_the_linearised_one(seed, optimise):
     hessian, gradient = np.empty((n, n)), np.empty(n)
     last = rng.uniform(-0.2, 0.2)
     twist = np.array([SPEED, last])
-    assemble(circle_track(), tune, pose, 0.3, twist, steps, nominal.copy(), hessian, gradient)
+    place = (pose, 0.3, twist, steps, nominal.copy())
+    assemble(circle_track(), tune, *place, hessian, gradient, assembly_memory(n))
     small = 1e-6
     columns = [
         (
@@ -155,12 +163,26 @@ def random_problem(rng, blocks: int, horizon: int):
     return hessian, gradient, low, high
 
 
+class QuadraticProgram:
+    """`solve_program` with arrays in and out."""
+
+    def __init__(self, blocks, horizon, tolerance=1e-6):
+        firsts = np.arange(blocks) * horizon
+        self.memory = qp_memory(blocks * horizon, horizon, firsts, tolerance, 2000)
+
+    def solve(self, hessian, gradient, low, high, start):
+        memory = self.memory
+        memory.hessian[:], memory.gradient[:] = hessian, gradient
+        memory.low[:], memory.high[:], memory.x[:] = low, high, start
+        return memory.x.copy() if solve_program(memory) else None
+
+
 @pytest.mark.parametrize("blocks", [1, 2])
 def test_the_solver_agrees_with_an_active_set_method(blocks):
     rng = np.random.default_rng(blocks)
     horizon = 12
     n = blocks * horizon
-    program = QuadraticProgram(blocks, horizon, (True,) * blocks, tolerance=1e-7)
+    program = QuadraticProgram(blocks, horizon, tolerance=1e-7)
     change = np.kron(np.eye(blocks), np.eye(horizon) - np.eye(horizon, k=-1))
     reference = casadi.conic(
         "reference",
@@ -181,7 +203,7 @@ def test_the_solver_agrees_with_an_active_set_method(blocks):
 
 
 def test_what_cannot_be_met_has_no_solution():
-    program = QuadraticProgram(1, 4, (True,))
+    program = QuadraticProgram(1, 4)
     low, high = -np.ones(8), np.ones(8)
     free = program.solve(np.eye(4), np.ones(4), low, high, np.zeros(4))
     assert free == pytest.approx(-np.ones(4), abs=1e-5)

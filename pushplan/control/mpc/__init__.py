@@ -1,4 +1,4 @@
-"""Model-predictive tracking of a path. OSQP is loaded when the first command is computed."""
+"""Model-predictive tracking of a path."""
 
 from pushplan.control.mpc.mpc_config import MpcConfig
 from pushplan.control.mpc.tracker import MpcTracker

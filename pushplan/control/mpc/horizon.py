@@ -3,116 +3,215 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
-from pushplan.compiled import kernel
+from pushplan.compiled import copy_into, kernel, owned
 from pushplan.control.mpc.kernels import Track
-from pushplan.control.mpc.solver import QuadraticProgram
-from pushplan.world import Plan, RobotModel
+from pushplan.control.mpc.qp_kernels import QpMemory, qp_memory, solve_program
+from pushplan.world import Drive, Plan, RobotModel
 from pushplan.world.checks import FloatArray, IntArray
+
+SENT = 256
+"""Commands under way that are remembered; of more than these the oldest count no more."""
+
+
+class Limits(NamedTuple):
+    """What a robot can do."""
+
+    constant: bool  # Whether it always drives at max_speed
+    min_speed: float
+    max_speed: float
+    max_turn_rate: float
+    max_acceleration: float
+    max_turn_acceleration: float
+    turning_radius: float  # That a car has at any speed [m]; 0 for other drives
+
+
+class Horizon(NamedTuple):
+    """Commands for the next steps, from quadratic programs about the last solution."""
+
+    limits: Limits
+    units: FloatArray  # (2,) of speed [m/s] and turn rate [rad/s] in the program
+    columns: IntArray  # (C,) what each block of variables is: 0 speed, 1 turn rate
+    program: QpMemory  # Over M commands of each, in units
+    steps: FloatArray  # (N,) how long each step is [s]
+    solved: FloatArray  # (N,) the same when the last solution was found
+    shifted: IntArray  # (N,) the step of then that each one lies in; N past the end
+    solution: FloatArray  # (M, 2) speeds [m/s] and turn rates [rad/s]
+    nominal: FloatArray  # (M, 2) what the next program is about
+    last: FloatArray  # (2,) the command before the first
+    sent: FloatArray  # (SENT, 3) time [s], speed and turn rate of commands under way
+    counts: IntArray  # (4,) commands under way, 1 if there is a solution, failures since, and ever
+
+
+UNDER_WAY, KNOWN, MISSED, FAILED = range(4)
+"""Places in `Horizon.counts`."""
 
 
 def track_of(plan: Plan) -> Track:
     """The path of a plan as the kernels read it."""
-    return Track(plan.poses, plan.arc_lengths, plan.speeds)
+    return Track(owned(plan.poses), owned(plan.arc_lengths), owned(plan.speeds))
 
 
-def time_grid(count: int, span: float, held: float) -> FloatArray:
-    """(N,) how long each step is [s]: the first until the next call, the others a part of a span.
-
-    Args:
-        count: N.
-        span: of all steps [s].
-        held: time between two calls [s]; no step is shorter.
-    """
-    steps = np.full(count, max(held, span / count))
-    steps[0] = held
-    return steps
-
-
-@kernel(allocates=True)
-def shifted_index(old: FloatArray, new: FloatArray, held: float) -> IntArray:
-    """(N,) the old step that each new one lies in, ``held`` [s] later, N past the end."""
-    ends, middles = np.cumsum(old) - held, np.cumsum(new) - 0.5 * new
-    return np.searchsorted(ends, middles)
+def limits_of(robot: RobotModel) -> Limits:
+    """The limits of a robot as the kernels read them."""
+    return Limits(
+        robot.drive is Drive.CONSTANT_SPEED,
+        robot.min_speed,
+        robot.max_speed,
+        robot.max_turn_rate,
+        robot.max_acceleration,
+        robot.max_turn_acceleration,
+        robot.min_turning_radius,
+    )
 
 
-class RecedingHorizon:
-    """Commands for the next steps from quadratic programs about the last solution.
+def make_horizon(
+    robot: RobotModel,
+    columns: Sequence[int],
+    count: int,
+    moves: int,
+    *,
+    tolerance: float,
+    iterations: int,
+) -> Horizon:
+    """Memory for commands to a robot.
 
     Args:
         robot: its limits.
         columns: the variables in their order: 0 speed, 1 turn rate.
-        moves: M, commands of each.
+        count: N, steps.
+        moves: M, commands of each variable.
         tolerance: of the solver, absolute and relative.
         iterations: after which the solver gives up.
     """
+    rates = (robot.max_acceleration, robot.max_turn_acceleration)
+    limited = [math.isfinite(rates[column]) for column in columns]
+    blocks = np.flatnonzero(limited).astype(np.int64) * moves
+    return Horizon(
+        limits_of(robot),
+        np.array([robot.max_speed, robot.max_turn_rate]),
+        np.array(columns, dtype=np.int64),
+        qp_memory(len(columns) * moves, moves, blocks, tolerance, iterations),
+        np.zeros(count),
+        np.zeros(count),
+        np.zeros(count, dtype=np.int64),
+        np.zeros((moves, 2)),
+        np.zeros((moves, 2)),
+        np.zeros(2),
+        np.zeros((SENT, 3)),
+        np.zeros(4, dtype=np.int64),
+    )
 
-    def __init__(
-        self,
-        robot: RobotModel,
-        columns: Sequence[int],
-        moves: int,
-        *,
-        tolerance: float,
-        iterations: int,
-    ) -> None:
-        self.units = np.array([robot.max_speed, robot.max_turn_rate])
-        """Of speed [m/s] and turn rate [rad/s] in the program."""
-        self._limits = np.array([robot.max_acceleration, robot.max_turn_acceleration]) / self.units
-        self._columns = list(columns)
-        limited = tuple(math.isfinite(self._limits[column]) for column in columns)
-        self._program = QuadraticProgram(
-            len(columns), moves, limited, tolerance=tolerance, iterations=iterations
-        )
-        self.count = self._program.count
-        """Number of variables."""
-        self.changes = self._program.rows - self.count
-        """Number of constraints on changes of commands."""
 
-    def bounds(self, spans: FloatArray, last: Sequence[float]) -> tuple[FloatArray, FloatArray]:
-        """Bounds of the commands, ±1, and of their changes, in the units of the program.
+@kernel
+def lay_steps(horizon: Horizon, span: float, held: float) -> None:
+    """Set the steps: the first until the next call, ``held``, the others a part of ``span`` [s]."""
+    count = horizon.steps.shape[0]
+    for k in range(count):
+        horizon.steps[k] = held if k == 0 else max(held, span / count)
 
-        Args:
-            spans: (M,) time in which each command may change [s].
-            last: speed [m/s] and turn rate [rad/s] before the first.
-        """
-        low, high = -np.ones(self._program.rows), np.ones(self._program.rows)
-        row, count = self.count, len(spans)
-        for column in self._columns:
-            if math.isfinite(self._limits[column]):
-                reach = self._limits[column] * spans
-                low[row : row + count], high[row : row + count] = -reach, reach
-                low[row] += last[column] / self.units[column]
-                high[row] += last[column] / self.units[column]
-                row += count
-        return low, high
 
-    def solve(
-        self,
-        nominal: FloatArray,
-        low: FloatArray,
-        high: FloatArray,
-        rounds: int,
-        assemble: Callable[[FloatArray], tuple[FloatArray, FloatArray]],
-    ) -> FloatArray | None:
-        """(M, 2) speeds [m/s] and turn rates [rad/s]; None where the solver has no solution.
+@kernel
+def shift_steps(horizon: Horizon, held: float) -> None:
+    """Set which step of the last solution each one lies in, ``held`` [s] later."""
+    old, new, count = horizon.solved, horizon.steps, horizon.steps.shape[0]
+    index, end, begin = 0, old[0], 0.0
+    for k in range(count):
+        middle = begin + new[k] - 0.5 * new[k]
+        while index < count and end - held < middle:
+            index += 1
+            if index < count:
+                end += old[index]
+        horizon.shifted[k] = index
+        begin += new[k]
 
-        Args:
-            nominal: (M, 2) to begin with; changed in place.
-            low: lower bounds, see `bounds`.
-            high: upper bounds.
-            rounds: programs that are solved, each about the solution of the one before.
-            assemble: from nominal commands to P and q of the program.
-        """
-        columns = self._columns
-        for _ in range(rounds):
-            hessian, gradient = assemble(nominal)
-            start = np.ascontiguousarray((nominal / self.units)[:, columns].T.ravel())
-            found = self._program.solve(hessian, gradient, low, high, start)
-            if found is None:
-                return None
-            nominal[:, columns] = found.reshape(len(columns), -1).T * self.units[columns]
-        return nominal
+
+@kernel
+def set_bounds(horizon: Horizon, first: float, later: float) -> None:
+    """Bound the commands, ±1, and by what they change in times [s], in the program's units."""
+    program, limits, units = horizon.program, horizon.limits, horizon.units
+    n, moves = program.x.shape[0], program.moves
+    for i in range(n):
+        program.low[i], program.high[i] = -1.0, 1.0
+    for b in range(program.blocks.shape[0]):
+        kind, row = horizon.columns[program.blocks[b] // moves], n + b * moves
+        rate = limits.max_acceleration if kind == 0 else limits.max_turn_acceleration
+        for i in range(moves):
+            reach = rate / units[kind] * (first if i == 0 else later)
+            before = horizon.last[kind] / units[kind] if i == 0 else 0.0
+            program.low[row + i], program.high[row + i] = before - reach, before + reach
+
+
+@kernel
+def solve_about(horizon: Horizon) -> bool:
+    """Solve the program from the nominal commands, and replace them; False if it is not solved."""
+    program, units = horizon.program, horizon.units
+    moves = program.moves
+    for i in range(program.x.shape[0]):
+        kind = horizon.columns[i // moves]
+        program.x[i] = horizon.nominal[i % moves, kind] / units[kind]
+    if not solve_program(program):
+        return False
+    for i in range(program.x.shape[0]):
+        kind = horizon.columns[i // moves]
+        horizon.nominal[i % moves, kind] = program.x[i] * units[kind]
+    return True
+
+
+@kernel
+def keep_solution(horizon: Horizon) -> None:
+    """Keep the nominal commands as the solution for the present steps."""
+    horizon.counts[KNOWN] = 1
+    copy_into(horizon.solution, horizon.nominal)
+    copy_into(horizon.solved, horizon.steps)
+
+
+@kernel
+def send(horizon: Horizon, v: float, w: float, held: float, ramps: bool, out: FloatArray) -> None:
+    """Fill the nearest command within the limits, and remember it as the last.
+
+    Args:
+        horizon: its memory.
+        v: wanted speed [m/s].
+        w: wanted turn rate [rad/s].
+        held: time for which it is held [s].
+        ramps: whether the accelerations limit it too.
+        out: (2,) speed and turn rate.
+    """
+    limits, last = horizon.limits, horizon.last
+    if ramps:
+        dv, dw = limits.max_acceleration * held, limits.max_turn_acceleration * held
+        v = min(max(v, last[0] - dv), last[0] + dv)
+        w = min(max(w, last[1] - dw), last[1] + dw)
+    if limits.constant:
+        v = limits.max_speed
+    out[0] = min(max(v, limits.min_speed), limits.max_speed)
+    most = limits.max_turn_rate
+    if limits.turning_radius > 0.0:
+        most = min(most, abs(out[0]) / limits.turning_radius)
+    out[1] = min(max(w, -most), most)
+    last[0], last[1] = out[0], out[1]
+
+
+@kernel
+def remember(horizon: Horizon, time: float, over: float) -> None:
+    """Add the last command, sent at ``time``, and drop those that another followed by ``over``."""
+    sent, count, drop = horizon.sent, horizon.counts[UNDER_WAY], 0
+    while drop < count and (count - drop >= sent.shape[0] or _followed(sent, count, drop, over)):
+        drop += 1
+    for i in range(drop, count):
+        for j in range(3):
+            sent[i - drop, j] = sent[i, j]
+    count -= drop
+    sent[count, 0], sent[count, 1], sent[count, 2] = time, horizon.last[0], horizon.last[1]
+    horizon.counts[UNDER_WAY] = count + 1
+
+
+@kernel
+def _followed(sent: FloatArray, count: int, i: int, over: float) -> bool:
+    """Whether the command after one was sent by ``over`` [s]; never so for the last."""
+    return i + 1 < count and sent[i + 1, 0] < over

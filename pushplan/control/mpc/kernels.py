@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pushplan.compiled import kernel
+from pushplan.compiled import copy_into, kernel
 from pushplan.geometry.angles import wrap_angle
 from pushplan.world.checks import FloatArray
 
@@ -40,6 +40,20 @@ class Tuning(NamedTuple):
     smoothness: float
     terminal: float
     speed_weight: float
+
+
+class AssemblyMemory(NamedTuple):
+    """Memory for an assembly over n variables."""
+
+    jacobian: FloatArray  # (3, n) d(x, y, theta)/dz
+    rows: FloatArray  # (2, n) d(offset, heading error)/dz
+    motion: FloatArray  # (9,) as `arc` fills it
+    here: FloatArray  # (3,)
+
+
+def assembly_memory(count: int) -> AssemblyMemory:
+    """Memory for ``count`` variables."""
+    return AssemblyMemory(np.zeros((3, count)), np.zeros((2, count)), np.zeros(9), np.zeros(3))
 
 
 @kernel
@@ -137,7 +151,7 @@ def arc(
     out[7], out[8] = dt * sinc * c, dt * sinc * s
 
 
-@kernel(allocates=True)
+@kernel
 def assemble(
     track: Track,
     tuning: Tuning,
@@ -148,15 +162,16 @@ def assemble(
     nominal: FloatArray,  # (N, 2) to linearise about; NaN is filled with what the path asks for
     hessian: FloatArray,  # (n, n) P; n = N, or 2 N where the speed is optimised
     gradient: FloatArray,  # (n,) q
+    memory: AssemblyMemory,
 ) -> None:
     """Fill P and q of min 1/2 zᵀPz + qᵀz over z = (w_0 .. w_N-1 [, v_0 .. v_N-1]), as fractions."""
     count, n = steps.shape[0], gradient.shape[0]
     hessian[:] = 0.0
     gradient[:] = 0.0
-    jacobian = np.zeros((3, n))
-    rows = np.zeros((2, n))
-    out = np.empty(9)
-    here, place, speed = pose.copy(), along, twist[0]
+    jacobian, rows, out, here = memory
+    jacobian[:] = 0.0
+    copy_into(here, pose)
+    place, speed = along, twist[0]
     unit = tuning.size / tuning.max_speed  # T [s]
     _, index, fraction = locate(track, here[0], here[1], place, place)
     curvature = errors(track, here[0], here[1], here[2], index, fraction)[3]

@@ -69,6 +69,29 @@ class Face:
         number("face high", self.high, low=self.low, open_low=True)
 
 
+def faces_of(outline: FloatArray) -> tuple[list[Face], FloatArray]:
+    """The sides of a convex box, and what says which of them a push meets.
+
+    Args:
+        outline: (N, 2) convex, counter-clockwise corners, origin at the centroid [m].
+
+    Returns:
+        Faces, and (N, 3): the inward normal and an advantage for length. A push along a unit
+        vector meets the face of the greatest product of normal and vector, plus advantage.
+    """
+    edges = np.roll(outline, -1, axis=0) - outline
+    lengths = np.hypot(edges[:, 0], edges[:, 1])
+    inward = np.stack([-edges[:, 1], edges[:, 0]], axis=1) / lengths[:, None]
+    faces = []
+    for normal, corner, edge in zip(inward, outline, edges, strict=True):
+        along = np.array([-normal[1], normal[0]])
+        ends = sorted((float(corner @ along), float((corner + edge) @ along)))
+        depth = -float(corner @ normal)
+        faces.append(Face(math.atan2(normal[1], normal[0]), depth, ends[0], ends[1]))
+    # of sides that face it nearly alike the longer one
+    return faces, np.column_stack([inward, 0.05 * lengths / lengths.max()])
+
+
 def face_towards(outline: FloatArray, direction: float) -> Face:
     """The face of a box that a push along ``direction`` [rad, box frame] meets most squarely.
 
@@ -77,17 +100,9 @@ def face_towards(outline: FloatArray, direction: float) -> Face:
         direction: [rad].
     """
     outline, direction = convex_outline("outline", outline), number("direction", direction)
-    edges = np.roll(outline, -1, axis=0) - outline
-    lengths = np.hypot(edges[:, 0], edges[:, 1])
-    inward = np.stack([-edges[:, 1], edges[:, 0]], axis=1) / lengths[:, None]
-    facing = inward @ np.array([math.cos(direction), math.sin(direction)])
-    # of sides that face it nearly alike the longer one
-    k = int(np.argmax(facing + 0.05 * lengths / lengths.max()))
-    normal = inward[k]
-    along = np.array([-normal[1], normal[0]])
-    ends = sorted((float(outline[k] @ along), float((outline[k] + edges[k]) @ along)))
-    depth = -float(outline[k] @ normal)
-    return Face(math.atan2(normal[1], normal[0]), depth, ends[0], ends[1])
+    faces, scores = faces_of(outline)
+    facing = scores @ np.array([math.cos(direction), math.sin(direction), 1.0])
+    return faces[int(np.argmax(facing))]
 
 
 def contact_of(

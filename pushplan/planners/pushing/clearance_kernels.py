@@ -6,11 +6,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pushplan.compiled import copy_into, kernel
+from pushplan.compiled import copy_into, kernel, owned
 from pushplan.geometry.convex import convex_distance, convex_penetration
 from pushplan.geometry.obstacles import Obstacles
 from pushplan.planners.pushing.contact_kernels import Contact, advance, box_pose
+from pushplan.world import RobotModel
 from pushplan.world.checks import FloatArray, IntArray
+from pushplan.world.outline import flatten
 
 SAMPLES = 4
 """Poses checked along one command."""
@@ -22,30 +24,63 @@ pushed along a wall, and lies against it in the end."""
 
 
 class ClearanceProblem(NamedTuple):
-    """Footprint, box and obstacles, as the kernels read them."""
+    """Footprint and box, as the kernels read them, and memory."""
 
     vertices: FloatArray
     """(V, 2) corners of the robot's parts, then of the box, in their frames [m]."""
-    offsets: IntArray
-    own: int  # How many of the parts are the robot's
+    offsets: IntArray  # (P + 1,) where each part starts; the last is the box
     radii: FloatArray  # (P,) of the disc about the origin that holds each part [m]
-    least: float
-    slack: float
-    obstacles: Obstacles
+    least: float  # Distance to keep [m]
+    slack: float  # What is nearer than that already may come this much nearer [m]
+    placed: FloatArray  # (V, 2)
+    box: FloatArray  # (3,)
+    states: FloatArray  # (2, 6)
+    detail: FloatArray  # (6,)
 
 
-@kernel(allocates=True)
-def gaps(contact: Contact, state: FloatArray, problem: ClearanceProblem) -> tuple[float, float]:
+def clearance_problem(
+    robot: RobotModel, outline: FloatArray, least: float, slack: float
+) -> ClearanceProblem:
+    """Footprint and box.
+
+    Args:
+        robot: its parts.
+        outline: (N, 2) corners of the box [m].
+        least: see `ClearanceProblem`.
+        slack: the same.
+    """
+    vertices, offsets = flatten([*robot.parts, outline])
+    reach = np.hypot(vertices[:, 0], vertices[:, 1])
+    return ClearanceProblem(
+        owned(vertices),
+        owned(offsets),
+        np.maximum.reduceat(reach, offsets[:-1]),
+        least,
+        slack,
+        np.zeros(vertices.shape),
+        np.zeros(3),
+        np.zeros((2, 6)),
+        np.zeros(6),
+    )
+
+
+@kernel
+def gaps(
+    contact: Contact,
+    normal: float,
+    state: FloatArray,
+    problem: ClearanceProblem,
+    obstacles: Obstacles,
+) -> tuple[float, float]:
     """Least distance of the robot and of the box from static things [m], negative inside one."""
-    found, box, placed = np.empty(2), np.empty(3), np.empty_like(problem.vertices)
-    found[:] = np.inf
+    box, placed = problem.box, problem.placed
+    robot_gap, box_gap = np.inf, np.inf
     box_pose(contact, state, box)
-    obstacles = problem.obstacles
-    for p in range(problem.offsets.shape[0] - 1):
-        kind = 1 if p >= problem.own else 0
-        x, y, theta = state[0], state[1], state[2]
-        if kind == 1:
-            x, y, theta = box[0], box[1], box[2]
+    parts = problem.offsets.shape[0] - 1
+    for p in range(parts):
+        x, y, theta, least = state[0], state[1], state[2], robot_gap
+        if p == parts - 1:
+            x, y, theta, least = box[0], box[1], box[2] - normal, box_gap
         first, last = problem.offsets[p], problem.offsets[p + 1]
         c, s = np.cos(theta), np.sin(theta)
         for i in range(first, last):
@@ -55,57 +90,69 @@ def gaps(contact: Contact, state: FloatArray, problem: ClearanceProblem) -> tupl
             b = obstacles.boxes[k]
             dx = max(b[0] - x, x - b[2], 0.0)
             dy = max(b[1] - y, y - b[3], 0.0)
-            if np.sqrt(dx * dx + dy * dy) - problem.radii[p] >= found[kind]:
+            if np.sqrt(dx * dx + dy * dy) - problem.radii[p] >= least:
                 continue
             core = obstacles.vertices[obstacles.offsets[k] : obstacles.offsets[k + 1]]
             gap = convex_distance(placed[first:last], core)
             if gap <= 0.0:
                 gap = -max(convex_penetration(placed[first:last], core)[0], 0.0)
-            found[kind] = min(found[kind], gap - obstacles.radii[k])
-    return found[0], found[1]
+            least = min(least, gap - obstacles.radii[k])
+        if p == parts - 1:
+            box_gap = least
+        else:
+            robot_gap = least
+    return robot_gap, box_gap
 
 
-@kernel(allocates=True)
+@kernel
 def _clear(
     contact: Contact,
+    normal: float,
     state: FloatArray,
     problem: ClearanceProblem,
+    obstacles: Obstacles,
     robot: float,
     box: float,
     travel: float,
 ) -> bool:
     """Whether robot and box keep their distances; a box near a wall may graze along it."""
-    here = gaps(contact, state, problem)
+    here = gaps(contact, normal, state, problem, obstacles)
     graze = GRAZE * travel if box < problem.least else 0.0
     return here[0] >= robot and here[1] >= box - graze
 
 
-@kernel(allocates=True)
+@kernel
 def free_fraction(
     contact: Contact,
+    normal: float,  # of the pushed face in the box's frame [rad]
     start: FloatArray,
     v: float,
     w: float,
     duration: float,
     problem: ClearanceProblem,
+    obstacles: Obstacles,
 ) -> float:
     """Fraction of a command that keeps robot and box clear of static things."""
-    here, before, detail = np.empty(6), np.empty(6), np.empty(6)
+    here, before, detail = problem.states[0], problem.states[1], problem.detail
     copy_into(here, start)
-    now = gaps(contact, here, problem)
+    now = gaps(contact, normal, here, problem, obstacles)
     robot = min(problem.least, now[0] - problem.slack)
     box = min(problem.least, now[1] - problem.slack)
     travel_ahead = (abs(v) + abs(w) * (contact.front + contact.depth)) * duration
     for i in range(SAMPLES):
         copy_into(before, here)
         advance(contact, here, v, w, duration / SAMPLES, detail)
-        if _clear(contact, here, problem, robot, box, travel_ahead * (i + 1) / SAMPLES):
+        if _clear(
+            contact, normal, here, problem, obstacles, robot, box, travel_ahead * (i + 1) / SAMPLES
+        ):
             continue
         free, step = i / SAMPLES, 0.5 / SAMPLES
         for _ in range(HALVINGS):
             copy_into(here, before)
             advance(contact, here, v, w, step * duration, detail)
-            if _clear(contact, here, problem, robot, box, travel_ahead * (free + step)):
+            if _clear(
+                contact, normal, here, problem, obstacles, robot, box, travel_ahead * (free + step)
+            ):
                 copy_into(before, here)
                 free += step
             step *= 0.5

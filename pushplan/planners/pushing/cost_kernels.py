@@ -52,13 +52,37 @@ class PushingProblem(NamedTuple):
 
 
 class Memory(NamedTuple):
-    """What an assembly fills."""
+    """What an assembly fills, and its memory; n = 2 M."""
 
-    jacobian: FloatArray  # (6 N, 2 M)
+    jacobian: FloatArray  # (6 N, n)
     residual: FloatArray  # (6 N,)
-    hessian: FloatArray  # (2 M, 2 M) P
-    gradient: FloatArray  # (2 M,) q
+    hessian: FloatArray  # (n, n) P
+    gradient: FloatArray  # (n,) q
     states: FloatArray  # (N + 1, 6) the nominal motion
+    rows: FloatArray  # (5, n) d(x, y, theta, offset, angle)/dz
+    motion: FloatArray  # (9,)
+    detail: FloatArray  # (6,)
+    slopes: FloatArray  # (2, 4)
+    scales: FloatArray  # (4,)
+    work: FloatArray  # (12,)
+    product: FloatArray  # (n, n)
+    pull: FloatArray  # (n,)
+    z: FloatArray  # (n,)
+    row: FloatArray  # (n,)
+
+
+def assembly_memory(count: int, hessian: FloatArray, gradient: FloatArray) -> Memory:
+    """Memory for N steps that fills P (n, n) and q (n,)."""
+    n = len(gradient)
+    shapes = [(5, n), (9,), (6,), (2, 4), (4,), (12,), (n, n), (n,), (n,), (n,)]
+    return Memory(
+        np.zeros((ROWS * count, n)),
+        np.zeros(ROWS * count),
+        hessian,
+        gradient,
+        np.zeros((count + 1, 6)),
+        *(np.zeros(shape) for shape in shapes),
+    )
 
 
 @kernel

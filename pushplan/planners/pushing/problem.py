@@ -2,13 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
-from pushplan.planners.pushing.cost_kernels import Weights
+from pushplan.control.mpc.horizon import Horizon, make_horizon
+from pushplan.planners.pushing.bumper import faces_of
+from pushplan.planners.pushing.clearance_kernels import clearance_problem
+from pushplan.planners.pushing.cost_kernels import Weights, assembly_memory
 from pushplan.planners.pushing.model import PushModel
+from pushplan.planners.pushing.push_kernels import Faces, PushingMemory
 from pushplan.planners.pushing.pushing_config import PushingConfig
 from pushplan.world import RobotModel
-from pushplan.world.checks import IntArray
+from pushplan.world.checks import FloatArray, IntArray
+from pushplan.world.outline import convex_outline
+
+_NEARER = 1e-6  # what is nearer than the clearance already may come this much nearer [R]
 
 
 def groups_of(horizon: int, moves: int) -> IntArray:
@@ -19,15 +28,13 @@ def groups_of(horizon: int, moves: int) -> IntArray:
     return np.searchsorted(ends, np.arange(horizon), side="right").astype(np.int64)
 
 
-def weights_of(config: PushingConfig, model: PushModel, robot: RobotModel) -> Weights:
-    """Costs and scales for one robot and box."""
-    stable = model.stable_curvature()
-    limit = config.margin * stable if stable * model.reach > 0.02 else -1.0
+def weights_of(config: PushingConfig, robot: RobotModel, half: float) -> Weights:
+    """Costs for one robot, whose bumper has half a width [m]; length and curvature are missing."""
     return Weights(
-        length=model.reach,
+        length=0.0,
         max_speed=robot.max_speed,
-        half=model.bumper.half,
-        curvature=limit,
+        half=half,
+        curvature=-1.0,
         heading=config.heading,
         offset=config.offset,
         rim=config.rim,
@@ -39,3 +46,60 @@ def weights_of(config: PushingConfig, model: PushModel, robot: RobotModel) -> We
         smoothness=config.smoothness,
         terminal=config.terminal,
     )
+
+
+def face_tables(models: Sequence[PushModel], scores: FloatArray, margin: float) -> Faces:
+    """The sides of a box as the kernels read them, from a model for each."""
+    stable = [(model.stable_curvature(), model.reach) for model in models]
+    return Faces(
+        scores,
+        np.array([model.contact for model in models]),
+        np.array([model.face.normal for model in models]),
+        np.array([margin * limit if limit * reach > 0.02 else -1.0 for limit, reach in stable]),
+    )
+
+
+def pushing_horizon(robot: RobotModel, config: PushingConfig) -> Horizon:
+    """Memory for commands, which outlasts a path."""
+    return make_horizon(
+        robot,
+        (0, 1),
+        config.horizon,
+        config.moves,
+        tolerance=config.tolerance,
+        iterations=config.solver_iterations,
+    )
+
+
+def pushing_memory(
+    robot: RobotModel, outline: FloatArray, config: PushingConfig, horizon: Horizon
+) -> tuple[PushingMemory, list[PushModel]]:
+    """Parameters and memory of `push_step`, and the contact model of each face.
+
+    Args:
+        robot: that pushes.
+        outline: (N, 2) convex, counter-clockwise corners of the box, origin at the centroid [m].
+        config: parameters.
+        horizon: of `pushing_horizon`.
+    """
+    outline = convex_outline("outline", outline)
+    faces, scores = faces_of(outline)
+    models = [PushModel(robot, outline, config.parameters, face) for face in faces]
+    size = robot.circumscribed_radius
+    memory = PushingMemory(
+        horizon,
+        weights_of(config, robot, models[0].bumper.half),
+        face_tables(models, scores, config.margin),
+        assembly_memory(config.horizon, horizon.program.hessian, horizon.program.gradient),
+        clearance_problem(robot, outline, config.clearance * size, _NEARER * size),
+        groups_of(config.horizon, config.moves),
+        config.reach,
+        config.delay,
+        config.observer_gain,
+        config.iterations,
+        config.first_iterations,
+        np.zeros(1, dtype=np.int64),
+        np.array([0.0, 0.0, 1.0, 0.0, 0.0, 0.0]),
+        *(np.zeros(count) for count in (6, 6, 6, 6, 3, 6)),
+    )
+    return memory, models

@@ -108,21 +108,26 @@ def _propagate(
     rows[4, moves + g] += slopes[1, 3] * units[1]
 
 
-@kernel(allocates=True)
+@kernel
 def assemble(problem: PushingProblem, nominal: FloatArray, memory: Memory) -> float:
     """Fill P and q over z = (v_0 .. v_M-1, w_0 .. w_M-1) in ``units``; returns the nominal cost."""
     contact, track, weights, start, along, _, units, steps, groups = problem
-    jacobian, residual, hessian, gradient, states = memory
+    jacobian, residual, hessian, gradient, states = (
+        memory.jacobian,
+        memory.residual,
+        memory.hessian,
+        memory.gradient,
+        memory.states,
+    )
+    rows, motion, detail = memory.rows, memory.motion, memory.detail
+    slopes, scales, work = memory.slopes, memory.scales, memory.work
     count, moves = steps.shape[0], nominal.shape[0]
-    n = 2 * moves
     jacobian[:] = 0.0
     hessian[:] = 0.0
     gradient[:] = 0.0
-    rows = np.zeros((5, n))  # d(x, y, theta, offset, angle)/dz
-    motion, detail, slopes, work = np.empty(9), np.empty(6), np.empty((2, 4)), np.empty(12)
-    scales = np.array(
-        [0.01 * weights.half, 0.02, 0.05 * units[0], 0.02 * units[0] / weights.length]
-    )
+    rows[:] = 0.0
+    scales[0], scales[1] = 0.01 * weights.half, 0.02
+    scales[2], scales[3] = 0.05 * units[0], 0.02 * units[0] / weights.length
     here = states[0]
     copy_into(here, start)
     here[0] += start[5] * np.cos(start[2])  # as if the gap had closed already
@@ -166,20 +171,23 @@ def assemble(problem: PushingProblem, nominal: FloatArray, memory: Memory) -> fl
             jacobian[ROWS * k + 5, g] = sign * slope * units[0]
         step = Step(k, g, tau, wanted, asked_turn)
         value += add_command_costs(problem, step, nominal, memory)
-    value += 0.5 * float(residual @ residual)
+    for r in range(residual.shape[0]):
+        value += 0.5 * residual[r] * residual[r]
     _square(problem, nominal, memory)
     return value
 
 
-@kernel(allocates=True)
+@kernel
 def _square(problem: PushingProblem, nominal: FloatArray, memory: Memory) -> None:
     """Add JᵀJ to P and Jᵀ(r - J z) to q by loops over what is not zero."""
     # a threaded matrix product waits longer than it computes
-    jacobian, residual, hessian, gradient, _ = memory
+    jacobian, residual = memory.jacobian, memory.residual
+    hessian, gradient = memory.hessian, memory.gradient
+    product, pull, z, row = memory.product, memory.pull, memory.z, memory.row
     units, groups = problem.units, problem.groups
     moves, n = nominal.shape[0], gradient.shape[0]
-    product = np.zeros((n, n))  # in the order v_0, w_0, v_1, ..: no command after its step
-    pull, z, row = np.zeros(n), np.empty(n), np.empty(n)
+    product[:] = 0.0  # in the order v_0, w_0, v_1, ..: no command after its step
+    pull[:] = 0.0
     for i in range(n):
         z[i] = nominal[i // 2, i % 2] / units[i % 2]
     for r in range(residual.shape[0]):

@@ -11,11 +11,20 @@ import casadi
 import numpy as np
 
 from pushplan.control.mpc.kernels import errors, locate
+from pushplan.geometry.obstacles import obstacles_of
 from pushplan.planners.pushing.contact_kernels import FLUSH, Contact, box_pose
-from pushplan.planners.pushing.cost_kernels import SPEED_SMOOTHNESS, Weights
+from pushplan.planners.pushing.cost_kernels import SPEED_SMOOTHNESS, PushingProblem, Weights
 from pushplan.planners.pushing.mpc import PushingMpc
 from pushplan.planners.pushing.problem_kernels import assemble
-from pushplan.world import RobotModel
+from pushplan.planners.pushing.push_kernels import (
+    VALUE,
+    drive_push,
+    observe_push,
+    problem_now,
+    send_push,
+    solve_push,
+)
+from pushplan.world import RobotModel, World
 from pushplan.world.checks import FloatArray, IntArray
 
 _SUBSTEPS = 2
@@ -43,33 +52,34 @@ class NonlinearPushingMpc(PushingMpc):
     gain: tuple[float, float] = (0.0, 0.0)
     """Cost of the quadratic program's commands and of those found at the last call."""
 
-    def _solve(self, robot: RobotModel, start: FloatArray) -> FloatArray | None:
-        quick = super()._solve(robot, start)
-        if quick is None:
-            quick = np.tile([robot.max_speed, 0.0], (self.config.moves, 1))
-        steps = self._steps(robot)
-        best = self._refined(robot, start, steps, quick)
-        self.value = self.gain[1]
-        self._solution_steps = steps
-        return best
+    def _step(self, world: World, pose: FloatArray, box: FloatArray) -> None:
+        memory, held, out = self._memory, self._clock.held, self._out
+        observe_push(memory, self._track, pose, box, world.time)
+        if self.along >= self._track.lengths[-1] - 1e-9:
+            send_push(memory, 0.0, 0.0, world.time, held, out)
+            return
+        if not solve_push(memory, self._track, held):
+            memory.horizon.nominal[:] = [world.robot.max_speed, 0.0]
+        memory.horizon.nominal[:] = self._refined(world.robot, memory.horizon.nominal.copy())
+        memory.told[VALUE] = self.gain[1]
+        drive_push(memory, obstacles_of(world.static), True, world.time, held, out)
 
-    def _refined(
-        self, robot: RobotModel, start: FloatArray, steps: FloatArray, commands: FloatArray
-    ) -> FloatArray:
+    def _refined(self, robot: RobotModel, commands: FloatArray) -> FloatArray:
         """The best of commands (M, 2) and of what IPOPT makes of them."""
-        config, nominal = self.config, commands
-        problem = self._problem(start, steps)
-        value = float(assemble(problem, nominal, self._memory))
+        config, nominal, memory = self.config, commands, self._memory.assembly
+        problem = problem_now(self._memory, self._track, self._clock.held)
+        value = float(assemble(problem, nominal, memory))
         self.gain = (value, value)
-        units, last = self._program.units, np.array([self._last.linear, self._last.angular])
-        low, high = self._bounds(robot, steps)
-        solver, changes = self._nonlinear(robot)
+        horizon, steps = self._memory.horizon, problem.steps
+        units, last = horizon.units, horizon.last
+        low, high = horizon.program.low, horizon.program.high
+        solver, changes = self._nonlinear(problem, robot)
         n, count = 2 * config.moves, 5 * config.horizon
         best = nominal
         for _ in range(_ROUNDS):
-            assemble(problem, nominal, self._memory)
-            places = self._places(robot, steps, nominal)
-            states = self._memory.states
+            assemble(problem, nominal, memory)
+            places = self._places(problem, robot, nominal)
+            states = memory.states
             found = solver(
                 x0=np.concatenate([(nominal / units).T.ravel(), states[1:, :5].ravel()]),
                 p=np.concatenate([states[0, :5], steps, last / units, places.ravel()]),
@@ -83,28 +93,33 @@ class NonlinearPushingMpc(PushingMpc):
                 break
             z = np.clip(z, low[:n], high[:n])
             nominal = np.ascontiguousarray(z.reshape(2, -1).T * units)
-            cost = float(assemble(problem, nominal, self._memory))
+            cost = float(assemble(problem, nominal, memory))
             if cost < self.gain[1]:
                 best, self.gain = nominal, (value, cost)
         return best
 
-    def _nonlinear(self, robot: RobotModel) -> tuple[Any, int]:
+    def _nonlinear(self, problem: PushingProblem, robot: RobotModel) -> tuple[Any, int]:
         """The solver, and its number of constraints on changes of commands."""
-        assert self.model is not None
-        key = (self.model.contact, self._weights, robot, self.config)
+        key = (problem.contact, problem.weights, robot, self.config)
         if self._solver_of is None or self._solver_of[0] != key:
             made = nonlinear_problem(
-                self.model.contact, self._weights, robot, self._groups, self.config.moves
+                problem.contact, problem.weights, robot, problem.groups, self.config.moves
             )
-            self._solver_of = (key, made, self._program.changes)
+            changes = len(self._memory.horizon.program.low) - 2 * self.config.moves
+            self._solver_of = (key, made, changes)
         return self._solver_of[1], self._solver_of[2]
 
-    def _places(self, robot: RobotModel, steps: FloatArray, nominal: FloatArray) -> FloatArray:
+    def _places(
+        self, problem: PushingProblem, robot: RobotModel, nominal: FloatArray
+    ) -> FloatArray:
         """(N, 6) of each step: path x, y, heading, curvature; wanted speed and turn rate."""
-        assert self.model is not None
-        track, weights, states = self._track, self._weights, self._memory.states
-        rows, place = [], self.along
-        contact = self.model.contact
+        contact, track, weights, steps = (
+            problem.contact,
+            problem.track,
+            problem.weights,
+            problem.steps,
+        )
+        states, rows, place = self._memory.assembly.states, [], self.along
         at = _box_of(contact, states[0])
         _, index, fraction = locate(track, at[0], at[1], place, place)
         curvature = errors(track, at[0], at[1], states[0, 2], index, fraction)[3]
@@ -112,7 +127,7 @@ class NonlinearPushingMpc(PushingMpc):
             wanted = min(float(track.speeds[index]), weights.max_speed)
             wanted = min(wanted, max(float(track.lengths[-1]) - place, 0.0) / dt)
             turn = min(max(wanted * curvature, -robot.max_turn_rate), robot.max_turn_rate)
-            v = float(nominal[self._groups[k], 0])
+            v = float(nominal[problem.groups[k], 0])
             at = _box_of(contact, states[k + 1])
             theta = states[k + 1, 2] + states[k + 1, 4]
             place, index, fraction = locate(track, at[0], at[1], place, place + 2.0 * v * dt + 1e-9)

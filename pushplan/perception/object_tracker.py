@@ -1,0 +1,323 @@
+"""`ObjectTracker`: outlines seen one after another become objects that last."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+import shapely
+from numpy.typing import ArrayLike
+
+from pushplan.perception.assignment import assign
+from pushplan.perception.contour_alignment import Contour
+from pushplan.perception.track import Track
+from pushplan.world import InvalidInputError, Movables
+from pushplan.world.checks import FloatArray, array, boolean, frozen, integer, number
+from pushplan.world.outline import areas_and_centroids, flatten, signed_area
+
+_FLAT = 1e-6  # least area of an outline [squared sides of the box around it]
+_SAME_SIZE = 0.2  # relative difference of sizes up to which a jump may be of the same object
+
+
+class Sighting(NamedTuple):
+    """An outline in one snapshot: contour (N,), centre x + iy [m] and area [m²] of its hull."""
+
+    contour: Contour
+    centre: complex
+    area: float
+    label: int | None
+
+
+class Candidate(NamedTuple):
+    """A sighting that belongs to no track yet, since when [s], and how often it was seen."""
+
+    sighting: Sighting
+    since: float
+    times: int
+
+
+class ObjectTracker:
+    """Gives objects an identity, a shape, a heading and a velocity from outlines with noise.
+
+    Outlines may have noise at every corner, be slightly concave, run either way round and start
+    at any corner. A sighting within the gate of an expected place is that object (assignment of
+    least cost); its shape is the mean of its sightings, and its pose the least-squares fit of
+    that shape, filtered by how far the fit is off. A heading goes on from the one before, so that
+    a square that turns by 90 degrees in a second has turned, and starts at 0.
+
+    An object that is not seen stays where it comes to rest, for ``keep`` seconds. One that is seen
+    outside every gate has jumped, or is new, once it was seen there ``confirm`` times one after
+    another; until then the sighting is doubted. In the first snapshot all is believed.
+
+    Args:
+        gate: greatest distance from the expected place to a sighting [radii of the object],
+            besides three standard deviations of that place.
+        keep: how long an object is kept that is not seen [s].
+        confirm: how many sightings it takes to believe a jump or a new object.
+        acceleration: standard deviation of accelerations of objects [m/s²]; less smooths more.
+        turn_acceleration: the same of turning [rad/s²].
+        density: of objects, for their masses [kg/m²].
+        wheeled: whether they stand on casters.
+
+    Attributes:
+        ignored: how many snapshots were not later than the one before.
+        flat: how many outlines had no area.
+
+    Raises:
+        InvalidInputError: if an argument is out of range.
+
+    Example:
+        >>> tracker = ObjectTracker()
+        >>> seen = [[(0, 0), (0.1, 0.001), (0.1, 0.1), (0, 0.1)]]
+        >>> tracker.update(seen, 0.0).ids.tolist()
+        [0]
+    """
+
+    def __init__(
+        self,
+        *,
+        gate: float = 1.0,
+        keep: float = 5.0,
+        confirm: int = 2,
+        acceleration: float = 0.5,
+        turn_acceleration: float = 3.0,
+        density: float = 1.0,
+        wheeled: bool = False,
+    ) -> None:
+        self.gate = number("gate", gate, low=0.0, open_low=True)
+        self.keep = number("keep", keep, low=0.0, finite=False)
+        self.confirm = integer("confirm", confirm, low=1)
+        self._accelerations = (
+            number("acceleration", acceleration, low=0.0, open_low=True),
+            number("turn_acceleration", turn_acceleration, low=0.0, open_low=True),
+        )
+        self._density = number("density", density, low=0.0, open_low=True)
+        self._wheeled = boolean("wheeled", wheeled)
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget everything; the next snapshot begins anew, at any time."""
+        self.ignored = self.flat = 0
+        self._time: float | None = None
+        self._tracks: list[Track] = []
+        self._candidates: list[Candidate] = []
+        self._next = 0
+        self._movables = Movables.empty()
+        self._shown: list[tuple[int, int, int]] = []
+        self._middles: Contour = np.zeros(0, dtype=np.complex128)
+
+    @property
+    def time(self) -> float | None:
+        """Of the newest snapshot [s]; None before the first."""
+        return self._time
+
+    @property
+    def movables(self) -> Movables:
+        """What the last `update` returned."""
+        return self._movables
+
+    @property
+    def unseen_s(self) -> FloatArray:
+        """(K,) for how long each object has not been seen [s]."""
+        return frozen(np.array([track.time - track.seen_at for track in self._tracks], dtype=float))
+
+    def update(
+        self, polygons: Sequence[ArrayLike], stamp: float, ids: ArrayLike | None = None
+    ) -> Movables:
+        """Take a snapshot.
+
+        Args:
+            polygons: outlines of all that is seen, each (N, 2) corners in order [m], world frame.
+                One without area counts as not seen.
+            stamp: when it was seen [s]. A snapshot that is not later than the newest changes
+                nothing.
+            ids: (M,) distinct labels where perception knows them; by default the tracker gives
+                its own. All snapshots of an episode have labels, or none has.
+
+        Returns:
+            All objects that are believed to be there now, seen or not, the oldest first. An
+            outline has its centroid as origin.
+
+        Raises:
+            InvalidInputError: naming the value that is no number, not finite, of a wrong shape or
+                given twice. The tracker is then as before.
+        """
+        stamp = number("stamp", stamp)
+        if isinstance(polygons, str) or not isinstance(polygons, Sequence | np.ndarray):
+            raise InvalidInputError(f"polygons must be a list of outlines, got {polygons!r:.60}")
+        labels = None if ids is None else array("ids", ids, (len(polygons),), dtype=np.int64)
+        if labels is not None and len(np.unique(labels)) != len(labels):
+            raise InvalidInputError(f"ids must be distinct, got {labels.tolist()}")
+        points = [array(f"polygons[{i}]", p, (None, 2)) for i, p in enumerate(polygons)]
+        if self._time is not None and stamp <= self._time:
+            self.ignored += 1
+            return self._movables
+        sightings = self._sightings(points, labels)
+        first, self._time = self._time is None, stamp
+        for track in self._tracks:
+            track.predict(stamp)
+        rest = self._match(sightings)
+        if first:
+            for sighting in rest:
+                self._add(sighting)
+        else:
+            self._doubt(rest)
+        self._tracks = [one for one in self._tracks if stamp - one.seen_at <= self.keep]
+        self._movables = self._collected()
+        return self._movables
+
+    def _sightings(self, points: Sequence[FloatArray], labels: FloatArray | None) -> list[Sighting]:
+        solid = [i for i, corners in enumerate(points) if _has_area(corners)]
+        self.flat += len(points) - len(solid)
+        hulls = [_hull(points[i]) for i in solid]
+        areas, centres = areas_and_centroids(*flatten(hulls))
+        return [
+            Sighting(
+                _contour(points[i]), complex(*centre), area, None if labels is None else labels[i]
+            )
+            for i, centre, area in zip(solid, centres.tolist(), areas.tolist(), strict=True)
+        ]
+
+    def _match(self, sightings: list[Sighting]) -> list[Sighting]:
+        """Give the sightings within the gates to their tracks; return the others."""
+        if not sightings or not self._tracks:
+            return sightings
+        tracks = self._tracks
+        gates = np.array([self.gate * one.radius + 3.0 * one.deviation for one in tracks])
+        if sightings[0].label is None:
+            pairs = list(
+                assign(
+                    _plane([one.centre for one in tracks]),
+                    np.sqrt([one.area for one in tracks]),
+                    gates,
+                    _plane([one.centre for one in sightings]),
+                    np.sqrt([one.area for one in sightings]),
+                )
+            )
+        else:
+            known = [one.label for one in tracks]
+            labels = [int(one.label) for one in sightings if one.label is not None]
+            _, *pairs = np.intersect1d(np.array(known), np.array(labels), return_indices=True)
+        taken = set()
+        for k, i in zip(pairs[0].tolist(), pairs[1].tolist(), strict=True):
+            if abs(tracks[k].centre - sightings[i].centre) <= gates[k]:
+                tracks[k].see(sightings[i].contour)
+                taken.add(i)
+        return [one for i, one in enumerate(sightings) if i not in taken]
+
+    def _doubt(self, sightings: list[Sighting]) -> None:
+        """Believe what was seen often enough at a place, and remember the others."""
+        assert self._time is not None
+        before, self._candidates = self._candidates, []
+        for sighting in sightings:
+            lost = self._lost(sighting)
+            if sighting.label is not None and lost is None:
+                self._add(sighting)
+                continue
+            reach = self.gate * float(np.abs(sighting.contour - sighting.centre).max())
+            near = [one for one in before if _is_same(one.sighting, sighting, reach)]
+            old = min(
+                near, key=lambda one: abs(one.sighting.centre - sighting.centre), default=None
+            )
+            if old is not None:
+                before.remove(old)
+            found = Candidate(
+                sighting,
+                self._time if old is None else old.since,
+                1 if old is None else old.times + 1,
+            )
+            if found.times < self.confirm:
+                self._candidates.append(found)
+                continue
+            if lost is not None and (sighting.label is not None or lost.seen_at <= found.since):
+                lost.jump(sighting.contour, sighting.centre)
+            else:
+                self._add(sighting)
+
+    def _lost(self, sighting: Sighting) -> Track | None:
+        """The object that is not seen where it was and may be this sighting: the nearest."""
+        if sighting.label is not None:
+            return next((one for one in self._tracks if one.label == sighting.label), None)
+        lost = [
+            one
+            for one in self._tracks
+            if one.seen_at < one.time
+            and abs(0.5 * math.log(one.area / sighting.area)) <= _SAME_SIZE
+        ]
+        return min(lost, key=lambda one: abs(one.centre - sighting.centre), default=None)
+
+    def _add(self, sighting: Sighting) -> None:
+        assert self._time is not None
+        label = self._next if sighting.label is None else int(sighting.label)
+        self._next = max(self._next, label) + 1
+        contour, centre, area, _ = sighting
+        self._tracks.append(Track(label, contour, centre, area, self._time, self._accelerations))
+
+    def _collected(self) -> Movables:
+        """The tracks as `Movables`; outlines are made anew when a mean has become better."""
+        tracks = self._tracks
+        shown = [(one.label, len(one.shape), one.sightings.bit_length()) for one in tracks]
+        if shown != self._shown:
+            hulls = [_hull(np.column_stack([one.shape.real, one.shape.imag])) for one in tracks]
+            areas, centres = areas_and_centroids(*flatten(hulls))
+            self._middles = centres[:, 0] + 1j * centres[:, 1]
+            for one, area in zip(tracks, areas.tolist(), strict=True):
+                one.area = area
+        poses, twists = self._states()
+        if shown == self._shown:
+            return self._movables.moved_to(poses, twists)
+        self._shown = shown
+        return Movables.from_outlines(
+            [hull - centre for hull, centre in zip(hulls, centres, strict=True)],
+            poses,
+            twists=twists,
+            density=self._density,
+            wheeled=np.full(len(tracks), self._wheeled),
+            ids=np.array([one.label for one in tracks], dtype=np.int64),
+        )
+
+    def _states(self) -> tuple[FloatArray, FloatArray]:
+        """(K, 3) poses and twists of the centroids."""
+        tracks = self._tracks
+        headings = np.array([one.heading for one in tracks], dtype=float)
+        rates = np.array([one.turn_rate for one in tracks], dtype=float)
+        arms = self._middles * np.exp(1j * headings)
+        places = np.array([one.centre for one in tracks], dtype=complex) + arms
+        speeds = np.array([one.velocity for one in tracks], dtype=complex) + 1j * rates * arms
+        return (
+            np.column_stack([places.real, places.imag, headings]),
+            np.column_stack([speeds.real, speeds.imag, rates]),
+        )
+
+
+def _is_same(one: Sighting, other: Sighting, reach: float) -> bool:
+    return one.label == other.label and abs(one.centre - other.centre) <= reach
+
+
+def _plane(points: Sequence[complex]) -> FloatArray:
+    values = np.array(points)
+    return np.column_stack([values.real, values.imag])
+
+
+def _has_area(corners: FloatArray) -> bool:
+    if len(corners) < 3:
+        return False
+    hull = shapely.MultiPoint(corners).convex_hull
+    return bool(hull.area > _FLAT * float(np.ptp(corners, axis=0).max()) ** 2)
+
+
+def _hull(corners: FloatArray) -> FloatArray:
+    """(H, 2) corners of the convex hull, counter-clockwise."""
+    ring = shapely.MultiPoint(corners).convex_hull.exterior.coords[:-1]
+    hull = np.array(ring)
+    return hull if signed_area(hull) > 0.0 else np.ascontiguousarray(hull[::-1])
+
+
+def _contour(corners: FloatArray) -> Contour:
+    """Corners as a contour, counter-clockwise, without the first one repeated at the end."""
+    if (corners[0] == corners[-1]).all():
+        corners = corners[:-1]
+    points = corners[:, 0] + 1j * corners[:, 1]
+    return points if signed_area(corners) > 0.0 else points[::-1]

@@ -1,0 +1,145 @@
+"""`Track`: one object over time."""
+
+from __future__ import annotations
+
+import cmath
+import math
+
+import numpy as np
+
+from pushplan.perception.contour_alignment import Contour, align
+
+_MOST_SIGHTINGS = 100  # over so many a shape is averaged
+_LEAST_NOISE = 1e-4  # standard deviation of a corner [radii]
+_FIRST_NOISE = 0.03  # the same before a second sighting [radii]
+_SPREAD = 0.15  # of a heading, besides what the filter says [rad]
+_COASTING = 0.3  # time constant with which an unseen object comes to rest [s]
+
+
+class Axis:
+    """Kalman filter of a quantity and its rate, driven by white accelerations.
+
+    Args:
+        acceleration: standard deviation of the acceleration [units/s²].
+        variance: of the first observation.
+    """
+
+    def __init__(self, acceleration: float, variance: float) -> None:
+        self.acceleration = acceleration
+        self.restart(variance)
+
+    def restart(self, variance: float) -> None:
+        """Know a place and that the object rests, or nearly."""
+        self.variance, self.shared, self.of_rate = variance, 0.0, 0.0
+
+    def predict(self, step: float) -> None:
+        """Pass some time [s]."""
+        q = self.acceleration**2
+        self.variance += step * (2.0 * self.shared + step * (self.of_rate + q * step * step / 4.0))
+        self.shared += step * (self.of_rate + q * step * step / 2.0)
+        self.of_rate += q * step * step
+
+    def correct(self, variance: float) -> tuple[float, float]:
+        """Gains for the quantity and for its rate [1/s], given the variance of an observation."""
+        total = self.variance + variance
+        gain, rate_gain = self.variance / total, self.shared / total
+        self.of_rate -= rate_gain * self.shared
+        self.shared -= gain * self.shared
+        self.variance -= gain * self.variance
+        return gain, rate_gain
+
+
+class Track:
+    """Shape, pose and velocity of an object that is seen again and again.
+
+    Args:
+        label: of the object.
+        seen: (N,) its first contour, world frame.
+        centre: of its hull, x + iy [m].
+        area: of its hull [m²].
+        time: [s].
+        accelerations: standard deviations [m/s²] and [rad/s²].
+    """
+
+    def __init__(
+        self,
+        label: int,
+        seen: Contour,
+        centre: complex,
+        area: float,
+        time: float,
+        accelerations: tuple[float, float],
+    ) -> None:
+        self.label, self.area = label, area
+        self.centre, self.heading = centre, 0.0
+        self.velocity, self.turn_rate = 0j, 0.0
+        self.shape = seen - centre
+        self.radius = float(np.abs(self.shape).max())
+        self.variance = (_FIRST_NOISE * self.radius) ** 2
+        self.sightings, self.votes = 1, 1
+        self.seen_at = self.time = time
+        self.place = Axis(accelerations[0], self.variance / len(seen))
+        self.direction = Axis(accelerations[1], self.variance / self._moment)
+
+    @property
+    def _moment(self) -> float:
+        away = self.shape - self.shape.mean()
+        return float(np.vdot(away, away).real)
+
+    @property
+    def deviation(self) -> float:
+        """Standard deviation of the place [m]."""
+        return math.sqrt(self.place.variance)
+
+    def predict(self, time: float) -> None:
+        """Move on as before; an object that was not seen lately comes to rest."""
+        step = time - self.time
+        stays = math.exp(-step / _COASTING) if self.time > self.seen_at else 1.0
+        self.velocity *= stays
+        self.turn_rate *= stays
+        self.centre += step * self.velocity
+        self.heading += step * self.turn_rate
+        self.place.predict(step)
+        self.direction.predict(step)
+        self.time = time
+
+    def see(self, seen: Contour) -> None:
+        """Take in a contour (M,) of this object, seen now."""
+        spread = math.sqrt(_SPREAD**2 + self.direction.variance)
+        found = align(self.shape, seen, self.heading, self.variance, spread)
+        self._average(seen, found.centre, self.heading + found.turn, found.corners)
+        self.sightings += 1
+        if found.corners is not None:
+            least = (_LEAST_NOISE * self.radius) ** 2
+            part = 1.0 / min(self.sightings - 1, 20)
+            self.variance += part * (max(found.variance, least) - self.variance)
+        noise = max(self.variance, found.variance)
+        gain, rate_gain = self.place.correct(noise / min(found.points, len(seen)))
+        away = found.centre - self.centre
+        self.centre += gain * away
+        self.velocity += rate_gain * away
+        gain, rate_gain = self.direction.correct(noise / self._moment)
+        self.heading += gain * found.turn
+        self.turn_rate += rate_gain * found.turn
+        self.seen_at = self.time
+
+    def jump(self, seen: Contour, centre: complex) -> None:
+        """Take in a contour (M,) of this object, seen far from where it was expected."""
+        self.velocity, self.turn_rate, self.centre = 0j, 0.0, centre
+        self.place.restart(self.radius**2)
+        self.direction.restart(math.pi**2)
+        self.see(seen)
+
+    def _average(
+        self, seen: Contour, centre: complex, heading: float, corners: Contour | None
+    ) -> None:
+        """Bring the shape nearer to what is seen; the number of corners is a majority vote."""
+        into_body = cmath.exp(-1j * heading)
+        if corners is not None:
+            self.votes = min(self.votes + 1, _MOST_SIGHTINGS)
+            part = 1.0 / min(self.sightings + 1, _MOST_SIGHTINGS)
+            self.shape = self.shape + part * ((corners - centre) * into_body - self.shape)
+            return
+        self.votes -= 1
+        if self.votes < 0:
+            self.shape, self.votes, self.sightings = (seen - centre) * into_body, 1, 0
