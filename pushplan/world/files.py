@@ -25,7 +25,13 @@ from pushplan.world.static_map import StaticMap
 SCHEMA = "pushplan-world/1"
 """Name and version of the file format; files of another version are refused."""
 
-_ROBOT_LIMITS = ("min_speed", "max_acceleration", "max_turn_acceleration", "wheel_separation")
+_ROBOT_LIMITS = (
+    "min_speed",
+    "max_acceleration",
+    "max_turn_acceleration",
+    "min_turning_radius",
+    "wheel_separation",
+)
 _GOALS: dict[str, tuple[type[Any], tuple[str, ...]]] = {
     "disc": (GoalDisc, ("center", "radius")),
     "line": (GoalLine, ("point", "normal")),
