@@ -230,7 +230,7 @@ class ObjectTracker:
                 near, key=lambda one: abs(one.sighting.centre - sighting.centre), default=None
             )
             if old is not None:
-                before.remove(old)
+                before = [one for one in before if one is not old]
             found = Candidate(
                 sighting,
                 self._time if old is None else old.since,

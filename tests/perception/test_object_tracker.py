@@ -127,6 +127,15 @@ def test_a_single_sighting_elsewhere_is_doubted_and_a_second_one_is_believed() -
     assert tracker.update([far, at], 0.6).ids.tolist() == [0, 1]  # both are there: a new one
 
 
+def test_several_objects_may_appear_at_once() -> None:
+    tracker = ObjectTracker()
+    places = [transform((0.3 * k, 0.0, 0.0), BOX) for k in range(4)]
+    tracker.update(places[:1], 0.0)
+    assert len(tracker.update(places, 0.1)) == 1
+    found = tracker.update(places[::-1], 0.2)
+    assert sorted(found.poses[:, 0].tolist()) == pytest.approx([0.0, 0.3, 0.6, 0.9])
+
+
 def test_labels_of_perception_are_kept() -> None:
     tracker = ObjectTracker()
     at, far = transform((0.0, 0.0, 0.0), BOX), transform((1.0, 0.0, 0.0), BOX)
