@@ -49,7 +49,7 @@ def relocating_pushes(
         simulator: for the scene.
         k: index of the object.
         approach: from where the robot is.
-        thorough: whether to look farther, and for drives that cost much more than the best one too.
+        thorough: whether to look for drives that cost much more than the best one too.
     """
     scene, found = simulator.scene, None
     movables, cache = scene.world.movables, scene.cache
@@ -119,7 +119,7 @@ class _RelocationSearch:
     ) -> None:
         self._scene, self._k, self._approach = scene, k, approach
         self._slack = math.inf if thorough else scene.config.relocation.slack * scene.size
-        self._config = scene.config.relocation.farther if thorough else scene.config.relocation
+        self._config = scene.config.relocation
         self._horizon = self._config.horizon * scene.size
         self._cost_to_go = scene.push_cost_to_go(float(scene.world.movables.radii[k]))
         self._arcs = _arcs(scene)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import ClassVar
 
 from pushplan.world.checked_fields import (
@@ -41,7 +41,6 @@ class RelocationConfig(CheckedFields):
         gain: by how much less has to be left to be done for a drive to help where no push home
             follows it.
         near: what is farther from the object does not count for the search.
-        thorough: factor on ``depth``, ``expansions`` and ``alike`` where nothing else was found.
     """
 
     objects: PositiveInt = 2
@@ -67,16 +66,8 @@ class RelocationConfig(CheckedFields):
     spacing: PositiveFloat = 0.05
     gain: NonNegativeFloat = 1.0
     near: PositiveFloat = 8.0
-    thorough: PositiveInt = 2
 
     field_prefix: ClassVar[str] = "relocation "
-
-    @property
-    def farther(self) -> RelocationConfig:
-        """The settings of a thorough search."""
-        n = self.thorough
-        depth, expansions, alike = n * self.depth, n * self.expansions, n * self.alike
-        return replace(self, depth=depth, expansions=expansions, alike=alike, thorough=1)
 
 
 RELOCATION = RelocationConfig()
