@@ -10,7 +10,7 @@ from scipy.spatial import cKDTree
 
 from pushplan.world.checks import FloatArray, IntArray
 
-_SIZE_SPREAD = 0.2  # relative difference of two sizes that counts as much as the whole gate
+_SIZE_SPREAD = 0.2  # standard deviation of the relative difference of two sizes
 
 
 def assign(
@@ -20,7 +20,7 @@ def assign(
     seen_places: FloatArray,
     seen_sizes: FloatArray,
 ) -> tuple[IntArray, IntArray]:
-    """Pair tracks with sightings: as many as the gates allow, at the least sum of costs.
+    """Pair tracks with sightings: as many as the gates allow, most likely.
 
     Args:
         places: (K, 2) where the objects are expected [m].
@@ -40,7 +40,9 @@ def assign(
     ks, js = ks[~alone], js[~alone]
     away = np.hypot(*(places[ks] - seen_places[js]).T)
     ratio = np.log(seen_sizes[js] / sizes[ks]) / _SIZE_SPREAD
-    costs = (away / gates[ks]) ** 2 + np.minimum(ratio**2, 1.0)
+    # of a normal distribution with a third of the gate: a wide gate must not win by its width
+    unlikely = 4.5 * (away / gates[ks]) ** 2 + 2.0 * np.log(gates[ks] / gates.min())
+    costs = unlikely + np.minimum(0.5 * ratio**2, 2.0)
     # tracks and sightings that no chain of pairs within gates connects do not compete
     count = len(places) + len(seen_places)
     edges = csr_array((np.ones(len(ks)), (ks, len(places) + js)), shape=(count, count))
@@ -49,10 +51,11 @@ def assign(
         mine = labels[ks] == group
         tracks, k = np.unique(ks[mine], return_inverse=True)
         seen, j = np.unique(js[mine], return_inverse=True)
-        table = np.full((len(tracks), len(seen)), 3.0 * (1 + min(len(tracks), len(seen))))
+        top = costs[mine].max()
+        table = np.full((len(tracks), len(seen)), (top + 1.0) * (1 + min(len(tracks), len(seen))))
         table[k, j] = costs[mine]  # the others are dearer than all open pairs together
         chosen = linear_sum_assignment(table)
-        kept = table[chosen] <= 2.0  # an open pair costs no more
+        kept = table[chosen] <= top
         first = np.append(first, tracks[chosen[0][kept]])
         second = np.append(second, seen[chosen[1][kept]])
     return first, second

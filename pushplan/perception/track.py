@@ -40,6 +40,11 @@ class Axis:
         self.shared += step * (self.of_rate + q * step * step / 2.0)
         self.of_rate += q * step * step
 
+    def slow(self, stays: float) -> None:
+        """Come nearer to rest: only a part of the rate stays."""
+        self.shared *= stays
+        self.of_rate *= stays * stays
+
     def correct(self, variance: float) -> tuple[float, float]:
         """Gains for the quantity and for its rate [1/s], given the variance of an observation."""
         total = self.variance + variance
@@ -95,9 +100,12 @@ class Track:
     def predict(self, time: float) -> None:
         """Move on as before; an object that was not seen lately comes to rest."""
         step = time - self.time
-        stays = math.exp(-step / _COASTING) if self.time > self.seen_at else 1.0
-        self.velocity *= stays
-        self.turn_rate *= stays
+        if self.time > self.seen_at:
+            stays = math.exp(-step / _COASTING)
+            self.velocity *= stays
+            self.turn_rate *= stays
+            self.place.slow(stays)
+            self.direction.slow(stays)
         self.centre += step * self.velocity
         self.heading += step * self.turn_rate
         self.place.predict(step)

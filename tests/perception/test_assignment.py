@@ -18,7 +18,7 @@ def test_as_many_pairs_at_the_same_cost_as_one_assignment_of_all(
     first, second = assign(places, sizes, np.full(count, gate), seen_places, seen_sizes)
     away = np.linalg.norm(places[:, None] - seen_places, axis=2)
     ratio = np.log(seen_sizes / sizes[:, None]) / 0.2
-    cost = np.where(away <= gate, (away / gate) ** 2 + np.minimum(ratio**2, 1.0), 1e3)
+    cost = np.where(away <= gate, 4.5 * (away / gate) ** 2 + np.minimum(0.5 * ratio**2, 2.0), 1e3)
     rows, columns = linear_sum_assignment(cost)
     open_ = cost[rows, columns] < 1e3
     assert len(set(first.tolist())) == len(first) == open_.sum()
