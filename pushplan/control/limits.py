@@ -14,14 +14,18 @@ def clamp_twist(robot: RobotModel, linear: float, angular: float) -> Twist:
     """The nearest twist that the robot's speed and turn limits allow.
 
     Args:
-        robot: gives the limits; a constant-speed robot always drives at ``max_speed``.
+        robot: gives the limits; a constant-speed robot always drives at ``max_speed``, and a car
+            turns as its speed allows.
         linear: wanted forward speed [m/s].
         angular: wanted turn rate [rad/s].
     """
     if robot.drive is Drive.CONSTANT_SPEED:
         linear = robot.max_speed
     linear = min(max(linear, robot.min_speed), robot.max_speed)
-    angular = min(max(angular, -robot.max_turn_rate), robot.max_turn_rate)
+    most = robot.max_turn_rate
+    if robot.drive is Drive.CAR:
+        most = min(most, abs(linear) / robot.min_turning_radius)
+    angular = min(max(angular, -most), most)
     return Twist(linear, angular)
 
 
@@ -47,6 +51,8 @@ def ramp_twist(
     robot: RobotModel, last: Twist, linear: float, angular: float, period: float
 ) -> Twist:
     """The nearest twist that speeds and accelerations allow after the last one.
+
+    The turn rate of a car falls with its speed, however fast that is.
 
     Args:
         robot: gives the limits.

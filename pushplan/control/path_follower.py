@@ -44,8 +44,8 @@ class PathFollower:
     def command(self, world: World, plan: Plan) -> Twist:
         """See `pushplan.world.Controller`.
 
-        Past the end of the plan a differential drive stops; a constant-speed robot drives on
-        along the last heading.
+        Past the end of the plan the robot stops; a constant-speed robot drives on along the last
+        heading.
         """
         return self._clock.command_for(world, lambda _: self._follow(world, plan))
 
@@ -59,7 +59,7 @@ class PathFollower:
         index = progress.index(along)
         speed = float(plan.speeds[index])
         over = along >= progress.total - 1e-9
-        if over and robot.drive is Drive.DIFFERENTIAL:
+        if over and robot.can_stop:
             return self._limit(Twist(0.0, 0.0))
         ahead = progress.index(min(along + 0.5 * self._clock.held * speed, progress.total))
         curvature = 0.0 if over else float(plan.turn_rates[ahead]) / max(plan.speeds[ahead], 1e-9)
@@ -76,6 +76,10 @@ class PathFollower:
             if abs(error) > math.pi / 4:
                 turn = math.copysign(robot.max_turn_rate, -error)
                 return self._limit(clamp_twist(robot, 0.0, turn))
+        elif robot.drive is Drive.CAR:
+            sharpest = 1.0 / robot.min_turning_radius
+            wanted = max(min(wanted, sharpest), -sharpest)
+        if robot.can_stop:
             speed = min(speed, robot.max_turn_rate / max(abs(wanted), 1e-9))
         turn = max(min(speed * wanted, robot.max_turn_rate), -robot.max_turn_rate)
         return self._limit(Twist(speed, turn))

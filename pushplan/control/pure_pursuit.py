@@ -38,8 +38,8 @@ class PurePursuit:
     def command(self, world: World, plan: Plan) -> Twist:
         """See `pushplan.world.Controller`.
 
-        Past the end of the plan a differential drive stops; a constant-speed robot drives on
-        along the last heading.
+        Past the end of the plan the robot stops; a constant-speed robot drives on along the last
+        heading.
         """
         return self._clock.command_for(world, lambda _: self._follow(world, plan))
 
@@ -49,7 +49,7 @@ class PurePursuit:
         progress = self._progress = self._progress or Progress(window=2.0 * reach)
         x, y, theta = (float(value) for value in world.robot_pose)
         along = progress.update(plan, x, y)
-        if robot.drive is Drive.DIFFERENTIAL and along >= progress.total - 1e-9:
+        if robot.can_stop and along >= progress.total - 1e-9:
             return clamp_twist(robot, 0.0, 0.0)
         aim = progress.pose(min(along + reach, progress.total))
         dx, dy = float(aim[0]) - x, float(aim[1]) - y
@@ -62,7 +62,10 @@ class PurePursuit:
         if robot.drive is Drive.DIFFERENTIAL and abs(bearing) > math.pi / 4:
             return clamp_twist(robot, 0.0, math.copysign(robot.max_turn_rate, bearing))
         curvature = 2.0 * math.sin(bearing) / max(math.hypot(dx, dy), 1e-9)
-        if robot.drive is Drive.DIFFERENTIAL and abs(curvature) * speed > robot.max_turn_rate:
+        if robot.drive is Drive.CAR:
+            sharpest = 1.0 / robot.min_turning_radius
+            curvature = max(min(curvature, sharpest), -sharpest)
+        if robot.can_stop and abs(curvature) * speed > robot.max_turn_rate:
             speed = robot.max_turn_rate / abs(curvature)
         if abs(bearing) > math.pi / 2:  # the point is behind: turn as fast as possible
             return clamp_twist(robot, speed, math.copysign(robot.max_turn_rate, bearing))

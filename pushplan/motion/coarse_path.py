@@ -9,6 +9,7 @@ import numpy as np
 
 from pushplan.compiled import kernel
 from pushplan.geometry import core_distance
+from pushplan.motion.keep_out import keep_out
 from pushplan.search.grid_dijkstra import grid_dijkstra
 from pushplan.world import GoalDisc, StaticMap, World
 from pushplan.world.checks import FloatArray, IntArray, frozen
@@ -71,7 +72,7 @@ def coarse_path(world: World, push_weight: float) -> FloatArray:
     inner, outer = robot.inscribed_radius, robot.circumscribed_radius
     cell = _cell(world)
     # walls hold the inscribed disc for certain; the rest of the footprint is a matter of heading
-    walls = _wall_weights(world.static, cell, ((inner, np.inf), (1.3 * outer, 2.0)))
+    walls = _wall_weights(keep_out(world), cell, ((inner, np.inf), (1.3 * outer, 2.0)))
     # passing through the middle of a box pushes it for about a robot's width
     per_metre = push_weight * objects.masses / robot.mass
     boxes = unflatten(objects.vertices_world, objects.offsets)
@@ -90,7 +91,7 @@ def reachable(world: World) -> bool:
     if cell > inner:
         return True  # too coarse to tell
     # a cell less than the disc: a narrow gap is left for the search to find out about
-    extra = _wall_weights(world.static, cell, ((inner - cell, np.inf),))
+    extra = _wall_weights(keep_out(world), cell, ((inner - cell, np.inf),))
     return len(_cheapest(world, extra, cell)) > 0
 
 

@@ -13,6 +13,7 @@ import numpy as np
 from pushplan.compiled import owned
 from pushplan.geometry import VisibilityGraph
 from pushplan.motion.dubins import dubins
+from pushplan.motion.keep_out import keep_out
 from pushplan.motion.path_improver import PathImprover
 from pushplan.world import GoalDisc, NavigationGoal, World
 from pushplan.world.checks import FloatArray
@@ -62,7 +63,7 @@ def warm_start_arcs(
         (E, 2) length [m] and curvature [1/m] of each arc, or None if there is no way.
     """
     start = world.robot_pose[:2]
-    corners = VisibilityGraph(world.static, clearance).to_goal(start, goal, stopped).points
+    corners = VisibilityGraph(keep_out(world), clearance).to_goal(start, goal, stopped).points
     if len(corners) < 2:
         return None
     vias = _vias(corners, radius, depth)

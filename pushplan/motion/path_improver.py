@@ -14,6 +14,7 @@ from pushplan.motion.arc_rollout import lay_out, sweep_cost
 from pushplan.motion.collision import first_blocked, footprint, obstacles
 from pushplan.motion.dubins import step_along
 from pushplan.motion.goal_region import goal_numbers
+from pushplan.motion.keep_out import keep_out
 from pushplan.motion.path_problem import PathProblem, SweptPath, make_swept_path
 from pushplan.motion.path_search_config import PathSearchConfig
 from pushplan.motion.shortcutting import shortcut
@@ -69,7 +70,7 @@ class PathImprover:
             displacement=1.5 * self.size,
             goal=goal_numbers(self.goal, config.inset * self.size),
             footprint=footprint(world.robot),
-            walls=obstacles(world.static),
+            walls=obstacles(keep_out(world)),
             contacts=compile_interaction(interaction, world),
         )
         # crowded worlds are slow to sweep: look at the stop rule more often

@@ -55,11 +55,13 @@ def polyline_status(world: World, plan: Plan) -> PlanStatus:
     robot, poses = world.robot, plan.poses
     moves, off = np.diff(poses, axis=0), poses[0] - world.robot_pose
     fast = np.abs(wrap_angle(moves[:, 2])) > robot.max_turn_rate * np.diff(plan.times) + 1e-9
+    lengths = np.hypot(moves[:, 0], moves[:, 1])
+    fast |= np.abs(wrap_angle(moves[:, 2])) * robot.min_turning_radius > lengths + 1e-9
     near = 1e-9 * robot.circumscribed_radius
     if np.abs(off[:2]).max() > near or abs(wrap_angle(off[2])) > 1e-9 or fast.any():
         return PlanStatus.PATH_ONLY
     step = _FINE * robot.circumscribed_radius
-    counts = np.maximum(np.ceil(np.hypot(moves[:, 0], moves[:, 1]) / step), 1.0).astype(np.int64)
+    counts = np.maximum(np.ceil(lengths / step), 1.0).astype(np.int64)
     first = np.repeat(np.arange(len(moves)), counts)
     fraction = (np.arange(len(first)) - np.repeat(np.cumsum(counts) - counts, counts)) / counts[
         first

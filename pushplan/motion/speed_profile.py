@@ -6,6 +6,7 @@ import numpy as np
 
 from pushplan.compiled import owned
 from pushplan.motion.collision import footprint, is_free, obstacles
+from pushplan.motion.keep_out import keep_out
 from pushplan.motion.path_problem import SweptPath
 from pushplan.world import Drive, InvalidInputError, Plan, RobotModel, World
 
@@ -47,7 +48,7 @@ def start_margin(world: World, margin: float) -> float | None:
 
     A robot that starts nearer to a wall than ``margin`` keeps what it has.
     """
-    walls = obstacles(world.static)
+    walls = obstacles(keep_out(world))
     for fraction in (1.0, 0.5, 0.25, 0.1, 0.0):
         shape = footprint(world.robot, fraction * margin)
         if is_free(owned(world.robot_pose), shape, walls, np.empty_like(shape.vertices)):

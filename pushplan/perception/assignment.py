@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 from scipy.optimize import linear_sum_assignment
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
 
 from pushplan.world.checks import FloatArray, IntArray
 
@@ -29,20 +32,27 @@ def assign(
     Returns:
         (P,) indices of tracks and (P,) of sightings.
     """
-    away = np.linalg.norm(places[:, None] - seen_places[None], axis=2)  # (K, M)
-    open_ = away <= gates[:, None]
-    rows, columns = open_.sum(axis=1), open_.sum(axis=0)
-    alone = open_ & (rows[:, None] == 1) & (columns == 1)
-    first, second = np.nonzero(alone)
-    hard = np.flatnonzero((rows > 0) & ~alone.any(axis=1))
-    if len(hard):
-        other = np.flatnonzero((columns > 0) & ~alone.any(axis=0))
-        pairs = np.ix_(hard, other)
-        ratio = np.log(seen_sizes[other] / sizes[hard, None]) / _SIZE_SPREAD
-        cost = (away[pairs] / gates[hard, None]) ** 2 + np.minimum(ratio**2, 1.0)
-        closed = 3.0 * (1 + min(cost.shape))  # dearer than all open pairs together
-        chosen = linear_sum_assignment(np.where(open_[pairs], cost, closed))
-        kept = open_[pairs][chosen]
-        first = np.append(first, hard[chosen[0][kept]])
-        second = np.append(second, other[chosen[1][kept]])
+    near = cKDTree(seen_places).query_ball_point(places, gates)
+    ks = np.repeat(np.arange(len(places)), [len(some) for some in near])
+    js = np.concatenate([np.array(some, dtype=np.int64) for some in near])
+    alone = (np.bincount(ks, minlength=len(places))[ks] == 1) & (np.bincount(js)[js] == 1)
+    first, second = ks[alone], js[alone]
+    ks, js = ks[~alone], js[~alone]
+    away = np.hypot(*(places[ks] - seen_places[js]).T)
+    ratio = np.log(seen_sizes[js] / sizes[ks]) / _SIZE_SPREAD
+    costs = (away / gates[ks]) ** 2 + np.minimum(ratio**2, 1.0)
+    # tracks and sightings that no chain of pairs within gates connects do not compete
+    count = len(places) + len(seen_places)
+    edges = csr_array((np.ones(len(ks)), (ks, len(places) + js)), shape=(count, count))
+    _, labels = connected_components(edges, directed=False)
+    for group in np.unique(labels[ks]).tolist():
+        mine = labels[ks] == group
+        tracks, k = np.unique(ks[mine], return_inverse=True)
+        seen, j = np.unique(js[mine], return_inverse=True)
+        table = np.full((len(tracks), len(seen)), 3.0 * (1 + min(len(tracks), len(seen))))
+        table[k, j] = costs[mine]  # the others are dearer than all open pairs together
+        chosen = linear_sum_assignment(table)
+        kept = table[chosen] <= 2.0  # an open pair costs no more
+        first = np.append(first, tracks[chosen[0][kept]])
+        second = np.append(second, seen[chosen[1][kept]])
     return first, second

@@ -9,6 +9,7 @@ import numpy as np
 
 from pushplan.control import PurePursuit
 from pushplan.geometry import VisibilityGraph
+from pushplan.motion.keep_out import keep_out
 from pushplan.motion.polyline import polyline_plan, polyline_status
 from pushplan.motion.speed_profile import start_margin
 from pushplan.planners.following.plan_follower import PlanFollower
@@ -52,7 +53,7 @@ class ShortestPath:
             return late
 
         for clearance in (robot.circumscribed_radius, robot.inscribed_radius):
-            path = VisibilityGraph(world.static, clearance).to_goal(start, goal, stopped)
+            path = VisibilityGraph(keep_out(world), clearance).to_goal(start, goal, stopped)
             if late:
                 return call.result(call.stopped_status, iterations=looks)
             if np.isfinite(path.length):

@@ -13,6 +13,7 @@ from scipy.spatial import Delaunay, QhullError, cKDTree
 
 from pushplan.control import PurePursuit
 from pushplan.geometry import VisibilityGraph
+from pushplan.motion.keep_out import keep_out
 from pushplan.motion.polyline import polyline_plan, polyline_status
 from pushplan.motion.speed_profile import start_margin
 from pushplan.planners.following.plan_follower import PlanFollower
@@ -100,7 +101,7 @@ class Skeleton:
             late = check(1, math.inf)
             return late
 
-        graph = VisibilityGraph(world.static, world.robot.inscribed_radius)
+        graph = VisibilityGraph(keep_out(world), world.robot.inscribed_radius)
         direct = graph.to_goal(start, goal, stopped)
         if not np.isfinite(direct.length):
             return PlanStatus.TIMED_OUT if late else PlanStatus.GOAL_UNREACHABLE, None
@@ -197,7 +198,7 @@ class Skeleton:
 
 def _walls(world: World) -> shapely.Geometry | None:
     """Where the robot's inscribed disc touches something static; None in open water."""
-    parts = [shapely.Polygon(part) for part in world.static.convex_parts]
+    parts = [shapely.Polygon(part) for part in keep_out(world).convex_parts]
     if not parts:
         return None
     walls = shapely.buffer(shapely.union_all(parts), (1.0 - 1e-6) * world.robot.inscribed_radius)
@@ -238,7 +239,7 @@ def _circumcentres(triangles: FloatArray) -> FloatArray:
 
 def _outlines(world: World) -> tuple[FloatArray, IntArray]:
     """(V, 2) corners of all objects, then of all obstacles [m], and how many each has."""
-    floes, parts = world.movables, world.static.convex_parts
+    floes, parts = world.movables, keep_out(world).convex_parts
     sizes = np.array([len(part) for part in parts], dtype=np.int64)
     counts = np.concatenate([np.diff(floes.offsets), sizes])
     return np.concatenate([floes.vertices_world, *parts]), counts

@@ -8,6 +8,7 @@ import threading
 import time
 import warnings
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any, Protocol
 
 import numpy as np
@@ -197,7 +198,8 @@ class Runner:
         self.policy.plan_with(self._executor)
 
     def _with_margin(self, world: World) -> World:
-        return expect("world", world, World)
+        world = expect("world", world, World)
+        return world if self.margin is None else replace(world, margin=self.margin)
 
     def update(self, world: World) -> bool:
         """Take a snapshot, from any thread.

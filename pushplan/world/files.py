@@ -25,7 +25,13 @@ from pushplan.world.static_map import StaticMap
 SCHEMA = "pushplan-world/1"
 """Name and version of the file format; files of another version are refused."""
 
-_ROBOT_LIMITS = ("min_speed", "max_acceleration", "max_turn_acceleration", "wheel_separation")
+_ROBOT_LIMITS = (
+    "min_speed",
+    "max_acceleration",
+    "max_turn_acceleration",
+    "min_turning_radius",
+    "wheel_separation",
+)
 _GOALS: dict[str, tuple[type[Any], tuple[str, ...]]] = {
     "disc": (GoalDisc, ("center", "radius")),
     "line": (GoalLine, ("point", "normal")),
@@ -81,6 +87,7 @@ def world_to_dict(world: World) -> dict[str, Any]:
     return {
         "schema": SCHEMA,
         "time": world.time,
+        **({"margin": world.margin} if world.margin else {}),
         "robot": robot,
         "static": static,
         "movables": movables,
@@ -102,7 +109,7 @@ def world_from_dict(data: object, folder: str | Path = ".") -> World:
     known_keys(
         "world file",
         data,
-        ("schema", "time", "robot", "static", "movables", "goal"),
+        ("schema", "time", "margin", "robot", "static", "movables", "goal"),
         ("schema", "robot", "goal"),
     )
     assert isinstance(data, Mapping)
@@ -117,6 +124,7 @@ def world_from_dict(data: object, folder: str | Path = ".") -> World:
         movables=_movables(data.get("movables", [])),
         goal=_goal(data["goal"]),
         time=number("time", data.get("time", 0.0)),
+        margin=data.get("margin", 0.0),
     )
 
 

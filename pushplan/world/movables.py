@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from functools import cached_property
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -17,6 +17,7 @@ from pushplan.world.checks import (
     FloatArray,
     IntArray,
     array,
+    expect,
     frozen,
     number,
 )
@@ -30,6 +31,8 @@ from pushplan.world.outline import (
     transform_outlines,
     well_formed,
 )
+
+_ONE_EACH = ("poses", "twists", "masses", "wheeled")
 
 
 @dataclass(frozen=True, eq=False)
@@ -176,10 +179,7 @@ class Movables(ArrayRecord, CheckedFields):
         """
         count = len(self)
         still = frozen(np.zeros((count, 3)))
-        clone = object.__new__(Movables)
-        clone.__dict__.update(
-            {key: value for key, value in self.__dict__.items() if key != "_hash"}
-        )
+        clone = self._unchecked(self.__dict__)
         clone.__dict__["poses"] = array("poses", poses, (count, 3))
         clone.__dict__["twists"] = still if twists is None else array("twists", twists, (count, 3))
         return clone
@@ -187,16 +187,85 @@ class Movables(ArrayRecord, CheckedFields):
     def select(self, keep: ArrayLike) -> Movables:
         """The objects whose index or flag is in ``keep``."""
         index = np.arange(len(self))[np.asarray(keep)]
-        vertices, offsets = flatten([self.outline(int(k)) for k in index])
-        return replace(
-            self,
-            ids=self.ids[index],
-            poses=self.poses[index],
-            twists=self.twists[index],
-            masses=self.masses[index],
-            wheeled=self.wheeled[index],
-            vertices=vertices,
-            offsets=offsets,
+        if len(np.unique(index)) != len(index):
+            raise InvalidInputError(f"keep must name an object once, got {index.tolist()}")
+        return self._gathered(index)
+
+    def updated(self, changes: Movables, removed: ArrayLike = ()) -> Movables:
+        """These objects with some of them changed, added or removed, at the cost of a copy.
+
+        Outlines are not checked again. Where all changed objects keep their outlines, the arrays
+        of the outlines stay the same ones.
+
+        Args:
+            changes: objects by their ``ids``: those that are known here take the place of the old
+                ones, all others are added at the end.
+            removed: (R,) ids of objects that are gone.
+
+        Raises:
+            InvalidInputError: if an id in ``removed`` is unknown, or in ``changes`` too.
+        """
+        expect("changes", changes, Movables)
+        gone = self._index_of(array("removed", removed, (None,), dtype=np.int64))
+        if (gone < 0).any() or np.isin(changes.ids, self.ids[gone]).any():
+            raise InvalidInputError(
+                "removed must name objects that are there and not among the changes, got "
+                f"{np.asarray(removed).tolist()}"
+            )
+        at = self._index_of(changes.ids)
+        known = np.flatnonzero(at >= 0)
+        if len(gone) == 0 and len(known) == len(at) and self._has_outlines_of(changes, at):
+            clone = self._unchecked(self.__dict__)
+            for name in _ONE_EACH:
+                values = getattr(self, name).copy()
+                values[at] = getattr(changes, name)
+                clone.__dict__[name] = frozen(values)
+            return clone
+        values = {
+            name: np.concatenate([getattr(self, name), getattr(changes, name)])
+            for name in (*_ONE_EACH, "ids", "vertices")
+        }
+        values["offsets"] = np.concatenate(
+            [self.offsets, self.offsets[-1] + changes.offsets[1:]], dtype=np.int64
+        )
+        index = np.arange(len(self))
+        index[at[known]] = len(self) + known
+        kept = np.ones(len(self), dtype=np.bool_)
+        kept[gone] = False
+        new = len(self) + np.flatnonzero(at < 0)
+        return self._unchecked(values)._gathered(np.concatenate([index[kept], new]))
+
+    @staticmethod
+    def _unchecked(values: Mapping[str, Any]) -> Movables:
+        clone = object.__new__(Movables)
+        clone.__dict__.update({key: value for key, value in values.items() if key != "_hash"})
+        return clone
+
+    def _gathered(self, index: IntArray) -> Movables:
+        """The objects (N,) at an index each, which are distinct."""
+        values = {name: frozen(getattr(self, name)[index]) for name in (*_ONE_EACH, "ids")}
+        counts = np.diff(self.offsets)[index]
+        offsets = np.zeros(len(index) + 1, dtype=np.int64)
+        np.cumsum(counts, out=offsets[1:])
+        corners = np.arange(offsets[-1]) + np.repeat(self.offsets[index] - offsets[:-1], counts)
+        values["vertices"], values["offsets"] = frozen(self.vertices[corners]), frozen(offsets)
+        return self._unchecked(values)
+
+    def _index_of(self, ids: IntArray) -> IntArray:
+        """(N,) where objects with some ids are, -1 where there is none."""
+        if not len(self):
+            return np.full(len(ids), -1)
+        order = self._order
+        at = order[np.minimum(np.searchsorted(self.ids, ids, sorter=order), len(self) - 1)]
+        return np.where(self.ids[at] == ids, at, -1)
+
+    @cached_property
+    def _order(self) -> IntArray:
+        return np.argsort(self.ids)
+
+    def _has_outlines_of(self, others: Movables, at: IntArray) -> bool:
+        return all(
+            np.array_equal(self.outline(k), others.outline(j)) for j, k in enumerate(at.tolist())
         )
 
     @cached_property

@@ -61,6 +61,28 @@ def convex_outline(name: str, corners: ArrayLike) -> FloatArray:
     return points
 
 
+def grown_outline(corners: FloatArray, margin: float) -> FloatArray:
+    """A convex outline (N, 2) [m], counter-clockwise, grown by ``margin`` [m], as (M, 2) corners.
+
+    It holds all points within the margin, with a corner for each corner and two for sharp ones
+    (that turn by more than 100 degrees); at corners it reaches at most 1.56 margins away.
+    """
+    edges = np.roll(corners, -1, axis=0) - corners
+    after = edges / np.hypot(edges[:, 0], edges[:, 1])[:, None]  # (N, 2) directions
+    before = np.roll(after, 1, axis=0)
+    turns = np.arctan2(
+        before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0], (before * after).sum(axis=1)
+    )
+    sharp = turns > np.radians(100.0)
+    reach = np.tan(np.where(sharp, 0.25, 0.5) * turns)[:, None]  # to where the sides meet
+    outward = np.array([[0.0, -1.0], [1.0, 0.0]])  # a direction times this points outwards
+    first = corners + margin * (before @ outward + reach * before)
+    second = corners + margin * (after @ outward - reach * after)
+    keep = np.column_stack([np.ones(len(corners), dtype=np.bool_), sharp])
+    corners_of_both: FloatArray = np.stack([first, second], axis=1)[keep]
+    return corners_of_both
+
+
 def convex_outlines(name: str, outlines: Sequence[ArrayLike]) -> list[FloatArray]:
     """`convex_outline` of each of many outlines, called ``name`` and its index; much quicker."""
     points: list[FloatArray] = [

@@ -5,7 +5,7 @@ from __future__ import annotations
 import enum
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Annotated
 
@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 from pushplan.world.checked_fields import CheckedFields, Limits, NonNegativeFloat, PositiveFloat
 from pushplan.world.checks import ArrayRecord, FloatArray, IntArray, choice, number
 from pushplan.world.errors import InvalidInputError
-from pushplan.world.outline import convex_outline, flatten
+from pushplan.world.outline import convex_outline, flatten, grown_outline
 
 
 class Drive(enum.StrEnum):
@@ -25,6 +25,8 @@ class Drive(enum.StrEnum):
     """Always forward at ``max_speed``; only the turn rate is free (Maze robot, ship)."""
     DIFFERENTIAL = "differential"
     """Forward speed in [min_speed, max_speed] and turn rate are free; may turn on the spot."""
+    CAR = "car"
+    """Forward speed in [min_speed, max_speed] is free; turns on ``min_turning_radius`` at best."""
 
 
 Acceleration = Annotated[float, Limits(0.0, open_low=True, finite=False)]
@@ -44,6 +46,7 @@ class RobotModel(ArrayRecord, CheckedFields):
             drive has none other than ``max_speed``.
         max_acceleration: limit of |dv/dt| [m/s²]; infinite where speed can jump.
         max_turn_acceleration: limit of |dω/dt| [rad/s²].
+        min_turning_radius: of a car, to the body origin, at any speed [m]; 0 for other drives.
         wheel_separation: distance between the driven wheels [m], 0 if there are none.
         name: for logs and pictures.
 
@@ -61,6 +64,7 @@ class RobotModel(ArrayRecord, CheckedFields):
     min_speed: float = 0.0
     max_acceleration: Acceleration = math.inf
     max_turn_acceleration: Acceleration = math.inf
+    min_turning_radius: NonNegativeFloat = 0.0
     wheel_separation: NonNegativeFloat = 0.0
     name: str = "robot"
 
@@ -76,11 +80,30 @@ class RobotModel(ArrayRecord, CheckedFields):
             put(self, "min_speed", self.max_speed)
         else:  # it has to be able to stop
             number("robot.min_speed", self.min_speed, high=0.0)
+        if (self.drive is Drive.CAR) != (self.min_turning_radius > 0.0):
+            raise InvalidInputError(
+                "robot.min_turning_radius must be positive for a car and 0 for other drives, "
+                f"got {self.min_turning_radius:g} for the drive {self.drive.value!r}"
+            )
 
     @classmethod
     def from_outline(cls, outline: ArrayLike, **limits: object) -> RobotModel:
         """A robot whose footprint is one convex outline (N, 2) [m]; the rest as in the class."""
         return cls(parts=(np.asarray(outline),), **limits)  # type: ignore[arg-type]
+
+    def inflated(self, margin: float) -> RobotModel:
+        """The same robot with every part grown by ``margin`` [m], with sharp corners.
+
+        Whoever plans with it also predicts that it pushes with this footprint; `World.margin`
+        keeps away from what is static alone.
+
+        Raises:
+            InvalidInputError: if the margin is negative or not finite.
+        """
+        margin = number("margin", margin, low=0.0)
+        if margin == 0.0:
+            return self
+        return replace(self, parts=tuple(grown_outline(part, margin) for part in self.parts))
 
     @cached_property
     def _flat(self) -> tuple[FloatArray, IntArray]:
@@ -116,5 +139,10 @@ class RobotModel(ArrayRecord, CheckedFields):
 
     @property
     def turning_radius(self) -> float:
-        """Least turning radius at full speed [m]."""
-        return self.max_speed / self.max_turn_rate
+        """Least turning radius [m]: a car's own, that of other drives at full speed."""
+        return self.min_turning_radius or self.max_speed / self.max_turn_rate
+
+    @property
+    def can_stop(self) -> bool:
+        """Whether the robot may stand."""
+        return self.drive is not Drive.CONSTANT_SPEED

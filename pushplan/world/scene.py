@@ -8,7 +8,7 @@ from typing import Annotated, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pushplan.world.checked_fields import CheckedFields, Shape
+from pushplan.world.checked_fields import CheckedFields, NonNegativeFloat, Shape
 from pushplan.world.checks import ArrayRecord, BoolArray, FloatArray
 from pushplan.world.errors import InvalidInputError
 from pushplan.world.goals import (
@@ -42,6 +42,8 @@ class World(ArrayRecord, CheckedFields):
         goal: where the robot, or the objects, have to go.
         robot_twist: (3,) velocity in the world frame [m/s, m/s, rad/s]; at rest if None.
         time: [s].
+        margin: distance that the robot keeps from what is static where it can [m]. A robot that
+            is nearer may drive on and away; see `pushplan.motion.keep_out`.
 
     Raises:
         InvalidInputError: if a member has the wrong type or shape or is not finite.
@@ -56,6 +58,7 @@ class World(ArrayRecord, CheckedFields):
     goal: Goal
     robot_twist: Triple | None = None
     time: float = 0.0
+    margin: NonNegativeFloat = 0.0
 
     def __post_init__(self) -> None:
         if self.robot_twist is None:
@@ -135,3 +138,25 @@ class World(ArrayRecord, CheckedFields):
         if time is not None:
             changes["time"] = time
         return replace(self, **changes)
+
+    def updated(
+        self,
+        objects: Movables,
+        *,
+        removed: ArrayLike = (),
+        robot_pose: ArrayLike | None = None,
+        robot_twist: ArrayLike | None = None,
+        time: float | None = None,
+    ) -> World:
+        """The same scene with some objects changed, added or removed, at the cost of a copy.
+
+        Args:
+            objects: those that have changed, and new ones, by their ids; see `Movables.updated`.
+            removed: (R,) ids of objects that are gone.
+            robot_pose, robot_twist, time: as in `moved`.
+
+        Raises:
+            InvalidInputError: if an id in ``removed`` is unknown, or in ``objects`` too.
+        """
+        world = self.moved(robot_pose=robot_pose, robot_twist=robot_twist, time=time)
+        return replace(world, movables=self.movables.updated(objects, removed))

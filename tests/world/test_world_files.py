@@ -90,7 +90,7 @@ def change(path: str, value: object) -> dict:
         ("robot.max_sped", 1, "did you mean 'max_speed'"),
         ("robot.mass", KeyError, "required key 'mass'"),
         ("robot.mass", "1", "must be a number"),
-        ("robot.drive", "legs", "valid: constant_speed, differential"),
+        ("robot.drive", "legs", "valid: car, constant_speed, differential"),
         ("robot.parts", 3, "list of convex outlines"),
         ("robot.pose", [1, 2], "shape (3,)"),
         ("goal.kind", "disk", "did you mean 'disc'"),

@@ -27,6 +27,7 @@ class Limits(NamedTuple):
     max_turn_rate: float
     max_acceleration: float
     max_turn_acceleration: float
+    turning_radius: float  # That a car has at any speed [m]; 0 for other drives
 
 
 class Horizon(NamedTuple):
@@ -64,6 +65,7 @@ def limits_of(robot: RobotModel) -> Limits:
         robot.max_turn_rate,
         robot.max_acceleration,
         robot.max_turn_acceleration,
+        robot.min_turning_radius,
     )
 
 
@@ -188,7 +190,10 @@ def send(horizon: Horizon, v: float, w: float, held: float, ramps: bool, out: Fl
     if limits.constant:
         v = limits.max_speed
     out[0] = min(max(v, limits.min_speed), limits.max_speed)
-    out[1] = min(max(w, -limits.max_turn_rate), limits.max_turn_rate)
+    most = limits.max_turn_rate
+    if limits.turning_radius > 0.0:
+        most = min(most, abs(out[0]) / limits.turning_radius)
+    out[1] = min(max(w, -most), most)
     last[0], last[1] = out[0], out[1]
 
 

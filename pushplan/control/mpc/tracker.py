@@ -19,7 +19,7 @@ from pushplan.world.checks import expect
 
 @dataclass
 class MpcTracker:
-    """Model-predictive path tracking for constant-speed robots and differential drives.
+    """Model-predictive path tracking for constant-speed robots, differential drives and cars.
 
     Each call solves one quadratic program for the turn rates of the next N steps (and the speeds,
     if wanted), linearised about the last solution: linear time-varying MPC as in Falcone et al.
@@ -58,7 +58,7 @@ class MpcTracker:
     def command(self, world: World, plan: Plan) -> Twist:
         """See `pushplan.world.Controller`.
 
-        Past the end of the plan a differential drive stops; a constant-speed robot drives on
+        Past the end of the plan the robot stops; a constant-speed robot drives on
         along the last heading.
         """
         return self._clock.command_for(world, lambda _: self._follow(world, plan))
@@ -113,7 +113,7 @@ def _tuning(robot: RobotModel, config: MpcConfig) -> Tuning:
         max_speed=robot.max_speed,
         max_turn_rate=robot.max_turn_rate,
         max_acceleration=robot.max_acceleration,
-        stops=robot.drive is Drive.DIFFERENTIAL,
+        stops=robot.can_stop,
         optimise_speed=_optimises_speed(robot, config),
         heading_weight=config.heading_weight,
         turn_weight=config.turn_weight,

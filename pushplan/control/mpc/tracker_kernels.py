@@ -83,11 +83,11 @@ def track_step(
     if tuning.stops and along >= track.lengths[-1] - 1e-9:
         horizon.counts[KNOWN] = 0
         send(horizon, 0.0, 0.0, held, True, out)
-    elif abs(error) > (_TURN_STOPPED if tuning.stops else _TURN_DRIVING):
+    elif abs(error) > _turn_from(memory):
         # too far from the path's heading for a linear model: turn towards it first
         horizon.counts[KNOWN] = 0
         turn = -tuning.max_turn_rate if error > 0.0 else tuning.max_turn_rate
-        send(horizon, 0.0, turn, held, True, out)
+        send(horizon, _turning_speed(horizon), turn, held, True, out)
     elif _solve(memory, track):
         horizon.counts[MISSED] = 0
         send(horizon, horizon.solution[0, 0], horizon.solution[0, 1], held, False, out)
@@ -95,6 +95,20 @@ def track_step(
         _fall_back(memory, track, pose, held, out)
     if memory.delay > 0.0:
         remember(horizon, time, time - memory.delay)
+
+
+@kernel
+def _turn_from(memory: TrackerMemory) -> float:
+    """The heading error from which the robot turns towards the path first [rad]."""
+    on_the_spot = memory.tuning.stops and memory.horizon.limits.turning_radius == 0.0
+    return _TURN_STOPPED if on_the_spot else _TURN_DRIVING
+
+
+@kernel
+def _turning_speed(horizon: Horizon) -> float:
+    """The speed at which a robot that can stop turns as fast as it can [m/s]."""
+    limits = horizon.limits
+    return min(limits.max_speed, limits.max_turn_rate * limits.turning_radius)
 
 
 @kernel
@@ -196,12 +210,13 @@ def pursue(memory: TrackerMemory, track: Track, pose: FloatArray) -> tuple[float
         y = poses[i, 1] + fraction * (poses[i + 1, 1] - poses[i, 1])
     dx, dy = x - pose[0], y - pose[1]
     bearing = wrap_angle(np.arctan2(dy, dx) - pose[2])
-    if abs(bearing) > (_TURN_STOPPED if tuning.stops else _TURN_DRIVING):
-        return (
-            0.0 if tuning.stops else speed,
-            tuning.max_turn_rate if bearing > 0.0 else -tuning.max_turn_rate,
-        )
+    if abs(bearing) > _turn_from(memory):
+        turn = tuning.max_turn_rate if bearing > 0.0 else -tuning.max_turn_rate
+        return _turning_speed(memory.horizon) if tuning.stops else speed, turn
     curvature = 2.0 * np.sin(bearing) / max(np.sqrt(dx * dx + dy * dy), 1e-9)
+    radius = memory.horizon.limits.turning_radius
+    if radius > 0.0:
+        curvature = min(max(curvature, -1.0 / radius), 1.0 / radius)
     if tuning.stops and abs(curvature) * speed > tuning.max_turn_rate:
         speed = tuning.max_turn_rate / abs(curvature)
     return speed, speed * curvature

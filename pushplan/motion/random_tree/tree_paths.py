@@ -10,6 +10,7 @@ from pushplan.compiled import owned
 from pushplan.geometry import VisibilityGraph
 from pushplan.motion.coarse_path import coarse_path, reachable
 from pushplan.motion.collision import is_free, obstacles
+from pushplan.motion.keep_out import keep_out
 from pushplan.motion.path_improver import Candidate, PathImprover
 from pushplan.motion.polyline import polyline_plan
 from pushplan.motion.random_tree.kinodynamic_tree import TreeGrowth, TreeLimits
@@ -66,7 +67,7 @@ class TreePaths:
         among, shape = problem.walls, problem.footprint
         if np.isinf(push_weight):
             boxes = unflatten(world.movables.vertices_world, world.movables.offsets)
-            among = obstacles(world.static, boxes)
+            among = obstacles(keep_out(world), boxes)
             if not is_free(owned(world.robot_pose), shape, among, np.empty_like(shape.vertices)):
                 return None  # the robot touches an object already: only pushing helps
         coarse = coarse_path(world, push_weight)
@@ -104,7 +105,7 @@ class TreePaths:
     def _around_walls(self) -> FloatArray:
         """A path around the walls alone, where the coarse grid misses a narrow passage."""
         world = self._improver.world
-        graph = VisibilityGraph(world.static, world.robot.inscribed_radius)
+        graph = VisibilityGraph(keep_out(world), world.robot.inscribed_radius)
         start, improver = world.robot_pose[:2], self._improver
         corners = graph.to_goal(start, improver.goal, improver.stopped).points
         if len(corners) == 0:

@@ -9,6 +9,7 @@ from functools import cached_property
 
 import numpy as np
 
+from pushplan.motion.keep_out import keep_out
 from pushplan.motion.state_lattice.built_lattice import BuiltLattice
 from pushplan.motion.state_lattice.cost_map import FloeCosts
 from pushplan.motion.state_lattice.frame import Frame
@@ -172,7 +173,7 @@ class LatticeBuilder:
             run_first=covered.first,
             runs=flat_runs(covered.runs, stride),
             cost_sums=np.zeros(0),
-            blocked_sums=grid.blocked_sums(self.world.static, self.stopped),
+            blocked_sums=grid.blocked_sums(keep_out(self.world), self.stopped),
             stride=stride,
             planes=self._planes(),
             goal=self._goal(),

@@ -9,7 +9,7 @@ import numpy as np
 
 from pushplan.control import Progress
 from pushplan.interaction import InteractionModel
-from pushplan.world import Drive, Plan, World
+from pushplan.world import Plan, World
 from pushplan.world.checks import FloatArray
 from pushplan.world.polyline import path_length
 
@@ -113,7 +113,7 @@ def _stretch(
     if left <= 1e-9:
         return times, poses, twists
     robot, last = world.robot, poses[-1]
-    if robot.drive is Drive.DIFFERENTIAL:  # it stands until then
+    if robot.can_stop:  # it stands until then
         twists = np.concatenate([twists[:-1], np.zeros((2, 2))])
         return np.append(times, latency), np.concatenate([poses, last[None]]), twists
     steps = max(1, math.ceil(left * robot.max_speed / (_SPACING * robot.circumscribed_radius)))

@@ -8,6 +8,7 @@ import numpy as np
 
 from pushplan.geometry import VisibilityGraph
 from pushplan.geometry.shortest_path import leave_inflation
+from pushplan.motion.keep_out import keep_out
 from pushplan.motion.speed_profile import TIGHTEST
 from pushplan.world import Drive, GoalDisc, NavigationGoal, StaticMap, World
 from pushplan.world.checks import FloatArray
@@ -30,8 +31,8 @@ def lower_bound(world: World, stopped: Callable[[], bool] = lambda: False) -> fl
     around = 0.0
     clearance = (1.0 - _SLIM) * world.robot.inscribed_radius
     start = world.robot_pose[:2]
-    if not stopped() and _is_clear(world.static, start, clearance):
-        path = VisibilityGraph(world.static, clearance).to_goal(start, goal, stopped)
+    if not stopped() and _is_clear(keep_out(world), start, clearance):
+        path = VisibilityGraph(keep_out(world), clearance).to_goal(start, goal, stopped)
         length = float(path.length)
         around = length / (1.0 + _TOO_LONG) if np.isfinite(length) else 0.0
     radius = world.robot.turning_radius

@@ -8,6 +8,7 @@ import numpy as np
 
 from pushplan.compiled import owned
 from pushplan.motion.dubins_warm_start import warm_start
+from pushplan.motion.keep_out import keep_out
 from pushplan.motion.path_improver import Candidate, PathImprover
 from pushplan.motion.random_tree.tree_paths import TreePaths
 from pushplan.planners.push_aware.best_first import Branching, make_search
@@ -102,7 +103,7 @@ class PushAwareSearch:
 
     def _table(self) -> CostToGo | None:
         """Lengths to the goal without objects; the same for every call on this map."""
-        robot, static = self.world.robot, self.world.static
+        robot, static = self.world.robot, keep_out(self.world)
         inset = self.config.inset * self.size
         maker = cost_to_go_maker(robot, static, self.improver.goal, self._radius, inset)
         return maker.make(self.improver.stopped)

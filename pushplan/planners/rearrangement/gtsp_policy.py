@@ -10,6 +10,7 @@ import numpy as np
 from pushplan.control import EpisodeClock, LegFollower, clamp_twist
 from pushplan.geometry import VisibilityGraph
 from pushplan.gtsp import solve_gtsp
+from pushplan.motion.keep_out import keep_out
 from pushplan.planners.rearrangement.push_poses import pose_behind
 from pushplan.planners.rearrangement.push_scene import PushScene, check_world
 from pushplan.planners.rearrangement.rearrangement_config import RearrangementConfig
@@ -92,7 +93,7 @@ class Gtsp:
         tour = solve_gtsp(costs, [*clusters, [count]], stop=MaxIterations(300))
         at = list(tour.nodes).index(count)
         points = [world.robot_pose[:2]]
-        graph = VisibilityGraph(world.static, clearance=world.robot.inscribed_radius)
+        graph = VisibilityGraph(keep_out(world), clearance=world.robot.inscribed_radius)
         for n in [*tour.nodes[at + 1 :], *tour.nodes[:at]]:
             _, start, end = nodes[int(n)]
             path = graph.shortest_path(points[-1], start)

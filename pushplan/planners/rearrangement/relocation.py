@@ -62,12 +62,9 @@ def relocating_pushes(
         if found is None and cache.searches >= scene.config.max_searches:
             return []
     if found is None:
-        search = _RelocationSearch(scene, k, approach, thorough)
-        found = search.run()
+        found = _RelocationSearch(scene, k, approach, thorough).run()
         if cache is not None and not scene.budget.interrupted:
-            cache.keep_primitives(
-                int(movables.ids[k]), around, robot.tobytes(), search.exhaustive, found
-            )
+            cache.keep_primitives(int(movables.ids[k]), around, robot.tobytes(), thorough, found)
     return [
         replace(push, cost=push.cost + extra)
         for path, extra in found
@@ -115,17 +112,12 @@ class _State:
 
 
 class _RelocationSearch:
-    """The search for one object of a scene.
-
-    Attributes:
-        exhaustive: whether a thorough search would have looked at nothing more.
-    """
+    """The search for one object of a scene."""
 
     def __init__(
         self, scene: PushScene, k: int, approach: ApproachTree, thorough: bool = False
     ) -> None:
         self._scene, self._k, self._approach = scene, k, approach
-        self.exhaustive = True
         self._slack = math.inf if thorough else scene.config.relocation.slack * scene.size
         self._config = scene.config.relocation
         self._horizon = self._config.horizon * scene.size
@@ -158,7 +150,6 @@ class _RelocationSearch:
                 break
             state = heapq.heappop(self._open)[2]
             if state.cost > best + self._slack:
-                self.exhaustive = False
                 break
             if state.depth and not self._has_moved(state):
                 continue

@@ -52,7 +52,7 @@ class _Relocations(NamedTuple):
 
     around: bytes
     robot: bytes
-    exhaustive: bool
+    thorough: bool
     found: list[Primitive]
 
 
@@ -75,19 +75,19 @@ class RolloutCache:
     ) -> list[Primitive] | None:
         """Drives found for an object, if that was with the same around it.
 
-        That there are none counts only for the robot in the same place: it may get to others. A
-        thorough search asks for what an exhaustive one has found.
+        That there are none counts only for the robot in the same place: it may get to others. What
+        a thorough search has found counts for every other one too.
         """
         known = self._primitives.get(target)
-        if known is None or known.around != around or (thorough and not known.exhaustive):
+        if known is None or known.around != around or thorough > known.thorough:
             return None
         return known.found if known.found or known.robot == robot else None
 
     def keep_primitives(
-        self, target: int, around: bytes, robot: bytes, exhaustive: bool, found: list[Primitive]
+        self, target: int, around: bytes, robot: bytes, thorough: bool, found: list[Primitive]
     ) -> None:
         """Keep the drives found for an object."""
-        self._primitives[target] = _Relocations(around, robot, exhaustive, found)
+        self._primitives[target] = _Relocations(around, robot, thorough, found)
         self.searches += 1
 
     def __len__(self) -> int:

@@ -11,6 +11,7 @@ import numpy as np
 from pushplan.control import Legs
 from pushplan.control.leg_follower import turn_to
 from pushplan.motion.collision import footprint, obstacles
+from pushplan.motion.keep_out import keep_out
 from pushplan.planners.rearrangement.approach import ApproachTree, arrival_poses
 from pushplan.planners.rearrangement.pose_grid import pose_at
 from pushplan.planners.rearrangement.push_scene import PushScene
@@ -49,7 +50,7 @@ class RoutePlanner:
             arm=scene.arm,
             shape=footprint(robot, margin),
             tight=footprint(robot, 0.5 * margin),
-            among=obstacles(scene.world.static),
+            among=obstacles(keep_out(scene.world)),
             poses=scene.poses,
             bodies=scene.bodies,
             weights=scene.contact_weights,

@@ -10,6 +10,7 @@ from ompl import base, geometric
 from pushplan.compiled import kernel, owned
 from pushplan.geometry import core_distance
 from pushplan.motion.collision import ConvexObstacles, obstacles
+from pushplan.motion.keep_out import keep_out
 from pushplan.motion.polyline import polyline_plan, polyline_status
 from pushplan.motion.random_tree.ompl_lock import own_state, seeded_ompl
 from pushplan.motion.speed_profile import start_margin
@@ -78,7 +79,7 @@ class GeometricRRT:
         wide, narrow = config.clearance * size, world.robot.inscribed_radius
         passes = [(boxes, wide), ([], wide), ([], min(size, wide)), ([], min(narrow, wide))]
         for blocked, radius in passes:
-            among = obstacles(world.static, blocked)
+            among = obstacles(keep_out(world), blocked)
             if _near(start, among, radius):
                 continue  # the robot starts closer to something than this pass allows
             points, used = self._grow(call, among, radius, iterations)

@@ -13,6 +13,7 @@ from pushplan.interaction import InteractionModel
 from pushplan.interaction.path_sweepers import path_sweeper
 from pushplan.motion.coarse_path import reachable
 from pushplan.motion.collision import first_blocked, footprint, is_free, obstacles
+from pushplan.motion.keep_out import keep_out
 from pushplan.motion.path_problem import SweptPath
 from pushplan.motion.speed_profile import check_turns, timed_plan, turning_radius
 from pushplan.motion.state_lattice.built_lattice import BuiltLattice
@@ -69,7 +70,7 @@ class ShipLatticeCall:
 
     def _run(self) -> PlanStatus | None:
         world = self.world
-        shape, walls = footprint(world.robot), obstacles(world.static)
+        shape, walls = footprint(world.robot), obstacles(keep_out(world))
         if not is_free(owned(world.robot_pose), shape, walls, np.empty_like(shape.vertices)):
             return PlanStatus.START_BLOCKED
         if self.goal.distance(*(float(v) for v in world.robot_pose[:2])) <= 0.0:
@@ -152,7 +153,7 @@ class ShipLatticeCall:
             low = np.where(self.goal.normal < -0.7, world.static.bounds[:2], low)
         start = world.robot_pose[:2]
         low, high = np.minimum(low, start), np.maximum(high, start)
-        shape, walls = footprint(world.robot), obstacles(world.static)
+        shape, walls = footprint(world.robot), obstacles(keep_out(world))
         walls = walls._replace(
             bounds=np.concatenate([low - 1e-6 * self.size, high + 1e-6 * self.size])
         )

@@ -1,0 +1,255 @@
+"""A `Runner` at the wheel of a MuJoCo robot in another process, in real time.
+
+    python benchmarks/robot_loop.py [--seconds S] [--rate HZ] [--kill] [--policies NAME ...]
+
+The other process simulates the robot, at the wall clock's pace: every period it sends what it sees
+over UDP, on loopback, and drives what it was sent last. An episode that has ended is followed by
+another one. Here, one thread receives worlds and another one asks for commands, as on a robot.
+
+Per policy it writes how long `Runner.command` took (median, 99.9th percentile and worst), how much
+of that the thread computed itself at worst (the rest is the machine doing other work), how many
+commands were late, what was compiled after `start`, by how much memory grew after the first tenth,
+and how the episodes ended. With --kill every planning thread is ended from outside now and then, by
+an exception that nobody catches.
+"""
+
+from __future__ import annotations
+
+import argparse
+import ctypes
+import multiprocessing
+import socket
+import threading
+import time
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import replace
+from multiprocessing.connection import Connection
+from pathlib import Path
+
+import numpy as np
+
+from pushplan.compiled import watching
+from pushplan.evaluation import JobSettings
+from pushplan.runtime import Runner
+from pushplan.scenarios import Scenario, suite
+from pushplan.world import Twist, World
+from pushplan.world.checks import FloatArray
+
+SUITES = {
+    "push-aware": "maze-3d-3",
+    "kinodynamic-rrt": "maze-3d-3",
+    "gtsp-mpc": "area-clearing-3d-10",
+    "ship-predictive": "ship-ice-3d-20",
+}
+ADDRESS = "127.0.0.1"
+_KILL_EVERY_S = 20.0
+_LARGEST = 65_000  # bytes of a datagram
+
+
+def main() -> None:
+    """Measure, write the table."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--seconds", type=float, default=1000.0)
+    parser.add_argument("--rate", type=float, default=20.0)
+    parser.add_argument("--seed", type=int, default=1000)
+    parser.add_argument("--kill", action="store_true")
+    parser.add_argument("--policies", nargs="+", default=list(SUITES), choices=list(SUITES))
+    options = parser.parse_args()
+    print(
+        "| policy | suite | commands | median | p99.9 | worst | own worst | late | compiled | "
+        "memory | killed | failures | episodes |"
+    )
+    print("|---" * 13 + "|")
+    for policy in options.policies:
+        print(row(policy, options), flush=True)
+
+
+def row(policy: str, options: argparse.Namespace) -> str:
+    """Drive with one policy; its line of the table."""
+    scenarios = suite(SUITES[policy], episodes=500, first_seed=options.seed).scenarios
+    period = 1.0 / options.rate
+    ours, theirs = multiprocessing.get_context("spawn").Pipe()
+    robot = multiprocessing.get_context("spawn").Process(
+        target=simulate, args=(theirs, policy, scenarios, period), daemon=True
+    )
+    robot.start()
+    loop = _Loop(Runner(policy, period=period), ours, period, options.kill)
+    try:
+        loop.run(options.seconds)
+    finally:
+        robot.terminate()
+        robot.join()
+    took, own = 1e3 * np.array(loop.took), 1e3 * np.array(loop.own)
+    cells = [
+        policy,
+        SUITES[policy],
+        str(len(took)),
+        *(f"{value:.2f} ms" for value in (np.median(took), np.quantile(took, 0.999), took.max())),
+        f"{own.max():.2f} ms",
+        str(loop.late),
+        str(len(loop.compiled)),
+        f"{loop.growth_mb:+.1f} MB",
+        str(loop.killed),
+        str(loop.failures),
+        ", ".join(f"{count} {reason}" for reason, count in loop.reasons.items()) or "none ended",
+    ]
+    return "| " + " | ".join(cells) + " |"
+
+
+def simulate(pipe: Connection, policy: str, scenarios: Sequence[Scenario], period: float) -> None:
+    """The other process: the robot, its world, and its wheels.
+
+    What never changes goes through the pipe once an episode; what does over UDP.
+    """
+    start = replace(scenarios[0], variations={**scenarios[0].variations, "control_step": period})
+    env = JobSettings().environment(start, Runner(policy, period=period).policy)
+    receiver = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    receiver.bind((ADDRESS, 0))
+    receiver.setblocking(False)
+    pipe.send(receiver.getsockname()[1])
+    there = (ADDRESS, pipe.recv())
+    for number, scenario in enumerate(scenarios):
+        env.reset(seed=scenario.seed)
+        pipe.send((number, env.world))
+        pipe.recv()
+        due, twist = time.perf_counter(), Twist(0.0, 0.0)
+        over = False
+        while not over:
+            *_, terminated, truncated, info = env.step(env.encode(twist))
+            over = terminated or truncated
+            due = max(due + period, time.perf_counter())
+            time.sleep(max(0.0, due - time.perf_counter()))
+            receiver.sendto(message(number, env.world), there)
+            twist = newest(receiver, number, twist)
+        pipe.send((number, str(info.get("reason", ""))))
+
+
+def message(number: int, world: World) -> bytes:
+    """What is seen, as numbers."""
+    movables = world.movables
+    head = [number, world.time, len(movables), *world.robot_pose, *world.robot_twist]
+    return np.concatenate([head, movables.ids, movables.poses.ravel()]).tobytes()
+
+
+def seen(data: bytes, start: World) -> World:
+    """The world of a message, with what never changes taken from the start of the episode."""
+    values: FloatArray = np.frombuffer(data)
+    count = int(values[2])
+    ids, poses = values[9 : 9 + count], values[9 + count :].reshape(-1, 3)
+    movables = start.movables
+    if count != len(movables):
+        movables = movables.select(np.isin(movables.ids, ids))
+    return replace(
+        start,
+        time=float(values[1]),
+        robot_pose=values[3:6],
+        robot_twist=values[6:9],
+        movables=movables.moved_to(poses),
+    )
+
+
+def newest(receiver: socket.socket, number: int, last: Twist) -> Twist:
+    """The command that came last, of those for this episode."""
+    while True:
+        try:
+            episode, linear, angular = np.frombuffer(receiver.recv(_LARGEST))
+        except BlockingIOError:
+            return last
+        if int(episode) == number:
+            last = Twist(float(linear), float(angular))
+
+
+class _Loop:
+    """The robot's loop: one thread that receives, one that drives."""
+
+    def __init__(self, runner: Runner, pipe: Connection, period: float, kill: bool) -> None:
+        self.runner, self._pipe, self._period, self._kill = runner, pipe, period, kill
+        self.took: list[float] = []
+        self.own: list[float] = []
+        self.compiled: list[str] = []
+        self.reasons: Counter[str] = Counter()
+        self.late = self.killed = self.failures = 0
+        self.growth_mb = 0.0
+        self._number = -1
+        self._offset = self._now = 0.0
+        self._start: World | None = None
+
+    def run(self, seconds: float) -> None:
+        """Drive for so long."""
+        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self._socket.bind((ADDRESS, 0))
+        there = (ADDRESS, self._pipe.recv())
+        self._pipe.send(self._socket.getsockname()[1])
+        self._begin()
+        threading.Thread(target=self._receive, daemon=True).start()
+        with watching(lambda kernel, loaded: self.compiled.append(kernel)):
+            self._drive(seconds, there)
+        self.failures += self.runner.failures
+        self.runner.close(20.0)
+
+    def _begin(self) -> None:
+        """Take up an episode; its clock is that of the other process."""
+        number, world = self._pipe.recv()
+        self.failures += self.runner.failures
+        self.runner.start(world)
+        self._start, self._number = world, number
+        self._offset, self._now = time.perf_counter() - world.time, world.time
+        self._pipe.send(None)
+
+    def _receive(self) -> None:
+        while True:
+            data = self._socket.recv(_LARGEST)
+            start, number = self._start, self._number
+            if start is not None and int(np.frombuffer(data, count=1)[0]) == number:
+                world = seen(data, start)
+                self._offset = max(self._offset, time.perf_counter() - world.time - self._period)
+                self.runner.update(world)
+
+    def _drive(self, seconds: float, there: tuple[str, int]) -> None:
+        began = due = time.perf_counter()
+        memory, next_kill = None, began + _KILL_EVERY_S
+        while time.perf_counter() < began + seconds:
+            if self._pipe.poll():
+                _, reason = self._pipe.recv()
+                self.reasons[reason] += 1
+                self._begin()
+                due = time.perf_counter()
+            before, own = time.perf_counter(), time.thread_time()
+            # the simulation may fall behind the wall clock, but its clock never goes back
+            self._now = max(self._now, before - self._offset)
+            command = self.runner.command(self._now)
+            self.own.append(time.thread_time() - own)
+            self.took.append(time.perf_counter() - before)
+            self.late += command.late
+            values = [self._number, command.twist.linear, command.twist.angular]
+            self._socket.sendto(np.array(values).tobytes(), there)
+            if self._kill and before > next_kill and kill_planning():
+                self.killed += 1
+                next_kill = before + _KILL_EVERY_S
+            if memory is None and before > began + 0.1 * seconds:
+                memory = resident_mb()
+            due += self._period
+            time.sleep(max(0.0, due - time.perf_counter()))
+        self.growth_mb = resident_mb() - (memory or resident_mb())
+
+
+def kill_planning() -> bool:
+    """End the planning thread that runs, if one does, by an exception from outside."""
+    for thread in threading.enumerate():
+        if thread.name == "pushplan planning" and thread.ident is not None:
+            raised = ctypes.pythonapi.PyThreadState_SetAsyncExc(
+                ctypes.c_ulong(thread.ident), ctypes.py_object(SystemExit)
+            )
+            return bool(raised)
+    return False
+
+
+def resident_mb() -> float:
+    """Memory of this process [MB]."""
+    pages = int(Path("/proc/self/statm").read_text().split()[1])
+    return 4096.0 * pages / 1e6
+
+
+if __name__ == "__main__":
+    main()

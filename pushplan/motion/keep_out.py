@@ -1,0 +1,87 @@
+"""`keep_out`: what is static, grown by the margin of a world."""
+
+from __future__ import annotations
+
+import functools
+
+import numpy as np
+
+from pushplan.world import StaticMap, World
+from pushplan.world.checks import FloatArray
+from pushplan.world.outline import grown_outline
+
+_LEVELS = 4  # fractions of the margin that an obstacle near the robot may keep
+
+
+def keep_out(world: World) -> StaticMap:
+    """What the robot keeps away from: every obstacle grown by ``world.margin``.
+
+    An obstacle that the robot is nearer to than that grows by a fraction of the margin: as many
+    quarters as leave the robot a quarter more, or nothing, so that it may always drive on along
+    the obstacle, and away. Objects do not count: they may lie at a wall. Corners are sharp
+    (`grown_outline`).
+    """
+    static, margin = world.static, world.margin
+    if margin == 0.0:
+        return static
+    outlines = world.robot_outline_world()
+    reach = world.robot.circumscribed_radius + 2.0 * margin
+    low, high = _boxes(static)
+    at = world.robot_pose[:2]
+    near = ((low < at + reach) & (high > at - reach)).all(axis=1)
+    fractions = []
+    for k in np.flatnonzero(near).tolist():
+        for level in range(_LEVELS, -1, -1):
+            grown = _grown_part(static, k, margin * level / _LEVELS)
+            if level == 0 or not any(_overlap(grown, part) for part in outlines):
+                break
+        if level < _LEVELS:
+            fractions.append((k, max(level - 1, 0)))
+    return _grown(static, margin, tuple(fractions))
+
+
+@functools.lru_cache(maxsize=32)
+def _grown(static: StaticMap, margin: float, fractions: tuple[tuple[int, int], ...]) -> StaticMap:
+    """The map with all obstacles grown by the margin, but some by so many quarters of it."""
+    if fractions:
+        whole = _grown(static, margin, ())
+        polygons, radii = list(whole.polygons), np.array(whole.radii)
+    else:
+        polygons = [grown_outline(polygon, margin) for polygon in static.polygons]
+        radii = static.radii + margin
+    for k, level in fractions:
+        part, segment = margin * level / _LEVELS, k - len(polygons)
+        if segment < 0:
+            polygons[k] = grown_outline(static.polygons[k], part) if level else static.polygons[k]
+        else:
+            radii[segment] = static.radii[segment] + part
+    return StaticMap(tuple(polygons), static.segments, radii, static.bounds)
+
+
+@functools.lru_cache(maxsize=32)
+def _boxes(static: StaticMap) -> tuple[FloatArray, FloatArray]:
+    """(S, 2) lower and (S, 2) upper corners of the boxes around all obstacles [m]."""
+    parts = static.convex_parts
+    return (
+        np.array([part.min(axis=0) for part in parts]).reshape(-1, 2),
+        np.array([part.max(axis=0) for part in parts]).reshape(-1, 2),
+    )
+
+
+def _grown_part(static: StaticMap, k: int, margin: float) -> FloatArray:
+    """Obstacle ``k`` as planners see it when it has grown."""
+    if k < len(static.polygons):
+        return grown_outline(static.polygons[k], margin)
+    j = k - len(static.polygons)
+    one = StaticMap((), static.segments[j : j + 1], static.radii[j : j + 1] + margin, static.bounds)
+    return one.convex_parts[0]
+
+
+def _overlap(one: FloatArray, other: FloatArray) -> bool:
+    """Whether two convex outlines overlap: no side of either has the other one beyond it."""
+    for a, b in ((one, other), (other, one)):
+        edges = np.roll(a, -1, axis=0) - a
+        normals = np.column_stack([edges[:, 1], -edges[:, 0]])
+        if ((b @ normals.T).min(axis=0) >= (a * normals).sum(axis=1)).any():
+            return False
+    return True
