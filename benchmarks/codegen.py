@@ -36,7 +36,8 @@ def main() -> None:
     parser.add_argument("--steps", type=int, default=400)
     steps = parser.parse_args().steps
     print(
-        "| controller | N | flags | Python [µs] | C [µs] | ratio | code [kB] | struct [kB] | stack [kB] |"
+        "| controller | N | flags | Python [µs] | C [µs] | ratio "
+        "| code [kB] | struct [kB] | stack [kB] |"
     )
     print("|---|---|---|---|---|---|---|---|---|")
     for count in (10, 20, 40):

@@ -27,7 +27,7 @@ def add(commands: Any) -> None:
     parser.add_argument(
         "--world",
         metavar="WORLD.yaml",
-        help="world file with the robot and the box (default: a TurtleBot3 Burger and a box of 8 cm)",
+        help="world file with robot and box (default: a TurtleBot3 Burger, a box of 8 cm)",
     )
     parser.add_argument("--box", type=int, metavar="ID", help="of the box (default: the first)")
     parser.add_argument(

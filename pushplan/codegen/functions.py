@@ -19,6 +19,7 @@ from pushplan.codegen.c_types import (
 )
 from pushplan.codegen.expressions import Expressions, Library, Term, unsupported
 
+_SCALARS: dict[Any, CType] = {float: DOUBLE, int: INT, bool: BOOL}
 _ROUNDS = 2  # passes over a function until the types of its variables are known
 
 
@@ -43,8 +44,8 @@ class Function:
         self.returns = _returned(hints.get("return"))
         self._types: dict[str, CType] = {}
         for parameter, kind in zip(self._parameters, types, strict=True):
-            hint = hints.get(parameter)
-            self._types[parameter] = {float: DOUBLE, int: INT, bool: BOOL}.get(hint, kind)
+            hint: Any = hints.get(parameter)
+            self._types[parameter] = _SCALARS.get(hint, kind)
         self._all = dict(self._types)
         for _ in range(_ROUNDS):
             self._lines: list[str] = []
@@ -243,8 +244,8 @@ def _read(node: ast.expr) -> ast.expr:
 def _returned(hint: Any) -> CType:
     if hint is None or hint is type(None):
         return VOID
-    if hint in (float, int, bool):
-        return {float: DOUBLE, int: INT, bool: BOOL}[hint]
+    if hint in _SCALARS:
+        return _SCALARS[hint]
     if isinstance(hint, type) and hasattr(hint, "_fields"):
         return record_type(hint)
     return values_type(tuple(_returned(part) for part in hint.__args__))

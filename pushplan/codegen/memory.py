@@ -61,10 +61,8 @@ class MemoryStruct:
                 lines.append(f"    self->{name} = {literal(value)[0]};")
             elif value.size and (value == value.flat[0]).all():
                 if value.flat[0] != 0:
-                    each = literal(value.flat[0].item())[0]
-                    lines.append(
-                        f"    for (i = 0; i < {value.size}; i++) self->{name}[i] = {each};"
-                    )
+                    each, size = literal(value.flat[0].item())[0], value.size
+                    lines.append(f"    for (i = 0; i < {size}; i++) self->{name}[i] = {each};")
             elif value.size:
                 for i, each in enumerate(value.ravel().tolist()):
                     if each != 0:
