@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from pushplan import __version__
 from pushplan.cli import (
     bench,
+    codegen,
     compiling,
     gtsp,
     ice,
@@ -23,7 +24,21 @@ from pushplan.cli import (
     train,
 )
 
-COMMANDS = (run, teleop, plan, bench, stress, listing, score, report, ice, gtsp, train, compiling)
+COMMANDS = (
+    run,
+    teleop,
+    plan,
+    bench,
+    stress,
+    listing,
+    score,
+    report,
+    ice,
+    gtsp,
+    train,
+    compiling,
+    codegen,
+)
 
 _DESCRIPTION = "Plan, push, score and compare: baselines for robots that push things."
 _EXAMPLES = """\

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 from scipy.optimize import linear_sum_assignment
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
 
 from pushplan.world.checks import FloatArray, IntArray
 
-_SIZE_SPREAD = 0.2  # relative difference of two sizes that counts as much as the whole gate
+_SIZE_SPREAD = 0.2  # standard deviation of the relative difference of two sizes
 
 
 def assign(
@@ -17,7 +20,7 @@ def assign(
     seen_places: FloatArray,
     seen_sizes: FloatArray,
 ) -> tuple[IntArray, IntArray]:
-    """Pair tracks with sightings: as many as the gates allow, at the least sum of costs.
+    """Pair tracks with sightings: as many as the gates allow, most likely.
 
     Args:
         places: (K, 2) where the objects are expected [m].
@@ -29,20 +32,30 @@ def assign(
     Returns:
         (P,) indices of tracks and (P,) of sightings.
     """
-    away = np.linalg.norm(places[:, None] - seen_places[None], axis=2)  # (K, M)
-    open_ = away <= gates[:, None]
-    rows, columns = open_.sum(axis=1), open_.sum(axis=0)
-    alone = open_ & (rows[:, None] == 1) & (columns == 1)
-    first, second = np.nonzero(alone)
-    hard = np.flatnonzero((rows > 0) & ~alone.any(axis=1))
-    if len(hard):
-        other = np.flatnonzero((columns > 0) & ~alone.any(axis=0))
-        pairs = np.ix_(hard, other)
-        ratio = np.log(seen_sizes[other] / sizes[hard, None]) / _SIZE_SPREAD
-        cost = (away[pairs] / gates[hard, None]) ** 2 + np.minimum(ratio**2, 1.0)
-        closed = 3.0 * (1 + min(cost.shape))  # dearer than all open pairs together
-        chosen = linear_sum_assignment(np.where(open_[pairs], cost, closed))
-        kept = open_[pairs][chosen]
-        first = np.append(first, hard[chosen[0][kept]])
-        second = np.append(second, other[chosen[1][kept]])
+    near = cKDTree(seen_places).query_ball_point(places, gates)
+    ks = np.repeat(np.arange(len(places)), [len(some) for some in near])
+    js = np.concatenate([np.array(some, dtype=np.int64) for some in near])
+    alone = (np.bincount(ks, minlength=len(places))[ks] == 1) & (np.bincount(js)[js] == 1)
+    first, second = ks[alone], js[alone]
+    ks, js = ks[~alone], js[~alone]
+    away = np.hypot(*(places[ks] - seen_places[js]).T)
+    ratio = np.log(seen_sizes[js] / sizes[ks]) / _SIZE_SPREAD
+    # of a normal distribution with a third of the gate: a wide gate must not win by its width
+    unlikely = 4.5 * (away / gates[ks]) ** 2 + 2.0 * np.log(gates[ks] / gates.min())
+    costs = unlikely + np.minimum(0.5 * ratio**2, 2.0)
+    # tracks and sightings that no chain of pairs within gates connects do not compete
+    count = len(places) + len(seen_places)
+    edges = csr_array((np.ones(len(ks)), (ks, len(places) + js)), shape=(count, count))
+    _, labels = connected_components(edges, directed=False)
+    for group in np.unique(labels[ks]).tolist():
+        mine = labels[ks] == group
+        tracks, k = np.unique(ks[mine], return_inverse=True)
+        seen, j = np.unique(js[mine], return_inverse=True)
+        top = costs[mine].max()
+        table = np.full((len(tracks), len(seen)), (top + 1.0) * (1 + min(len(tracks), len(seen))))
+        table[k, j] = costs[mine]  # the others are dearer than all open pairs together
+        chosen = linear_sum_assignment(table)
+        kept = table[chosen] <= top
+        first = np.append(first, tracks[chosen[0][kept]])
+        second = np.append(second, seen[chosen[1][kept]])
     return first, second

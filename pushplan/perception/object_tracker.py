@@ -12,10 +12,10 @@ from numpy.typing import ArrayLike
 
 from pushplan.perception.assignment import assign
 from pushplan.perception.contour_alignment import Contour
-from pushplan.perception.track import Track
+from pushplan.perception.track import Track, see_all
 from pushplan.world import InvalidInputError, Movables
 from pushplan.world.checks import FloatArray, array, boolean, frozen, integer, number
-from pushplan.world.outline import areas_and_centroids, flatten, signed_area
+from pushplan.world.outline import areas_and_centroids, flatten, next_corner, signed_area
 
 _FLAT = 1e-6  # least area of an outline [squared sides of the box around it]
 _SAME_SIZE = 0.2  # relative difference of sizes up to which a jump may be of the same object
@@ -169,15 +169,21 @@ class ObjectTracker:
         return self._movables
 
     def _sightings(self, points: Sequence[FloatArray], labels: FloatArray | None) -> list[Sighting]:
-        solid = [i for i, corners in enumerate(points) if _has_area(corners)]
+        closed = [i for i, corners in enumerate(points) if len(corners) >= 3]
+        if not closed:
+            self.flat += len(points)
+            return []
+        areas, centres, signs, sizes = _measured([points[i] for i in closed])
+        solid = np.flatnonzero(areas > _FLAT * sizes**2).tolist()
         self.flat += len(points) - len(solid)
-        hulls = [_hull(points[i]) for i in solid]
-        areas, centres = areas_and_centroids(*flatten(hulls))
         return [
             Sighting(
-                _contour(points[i]), complex(*centre), area, None if labels is None else labels[i]
+                _contour(points[closed[i]], signs[i]),
+                complex(*centres[i]),
+                float(areas[i]),
+                None if labels is None else int(labels[i]),
             )
-            for i, centre, area in zip(solid, centres.tolist(), areas.tolist(), strict=True)
+            for i in solid
         ]
 
     def _match(self, sightings: list[Sighting]) -> list[Sighting]:
@@ -200,11 +206,13 @@ class ObjectTracker:
             known = [one.label for one in tracks]
             labels = [int(one.label) for one in sightings if one.label is not None]
             _, *pairs = np.intersect1d(np.array(known), np.array(labels), return_indices=True)
-        taken = set()
-        for k, i in zip(pairs[0].tolist(), pairs[1].tolist(), strict=True):
-            if abs(tracks[k].centre - sightings[i].centre) <= gates[k]:
-                tracks[k].see(sightings[i].contour)
-                taken.add(i)
+        near = [
+            (k, i)
+            for k, i in zip(pairs[0].tolist(), pairs[1].tolist(), strict=True)
+            if abs(tracks[k].centre - sightings[i].centre) <= gates[k]
+        ]
+        see_all([tracks[k] for k, _ in near], [sightings[i].contour for _, i in near])
+        taken = {i for _, i in near}
         return [one for i, one in enumerate(sightings) if i not in taken]
 
     def _doubt(self, sightings: list[Sighting]) -> None:
@@ -222,7 +230,7 @@ class ObjectTracker:
                 near, key=lambda one: abs(one.sighting.centre - sighting.centre), default=None
             )
             if old is not None:
-                before.remove(old)
+                before = [one for one in before if one is not old]
             found = Candidate(
                 sighting,
                 self._time if old is None else old.since,
@@ -232,7 +240,8 @@ class ObjectTracker:
                 self._candidates.append(found)
                 continue
             if lost is not None and (sighting.label is not None or lost.seen_at <= found.since):
-                lost.jump(sighting.contour, sighting.centre)
+                lost.jump(sighting.centre)
+                see_all([lost], [sighting.contour])
             else:
                 self._add(sighting)
 
@@ -301,11 +310,29 @@ def _plane(points: Sequence[complex]) -> FloatArray:
     return np.column_stack([values.real, values.imag])
 
 
-def _has_area(corners: FloatArray) -> bool:
-    if len(corners) < 3:
-        return False
-    hull = shapely.MultiPoint(corners).convex_hull
-    return bool(hull.area > _FLAT * float(np.ptp(corners, axis=0).max()) ** 2)
+def _measured(points: Sequence[FloatArray]) -> tuple[FloatArray, ...]:
+    """Of M outlines with three corners or more: what tells a hull from a line, and where it lies.
+
+    Returns:
+        (M,) areas [m²] and (M, 2) centroids [m] of the hulls, (M,) positive where the corners run
+        counter-clockwise, and (M,) longer sides of the boxes around them [m].
+    """
+    vertices, offsets = flatten(points)
+    counts = np.diff(offsets)
+    clouds = np.full(len(points), shapely.MultiPoint())
+    owners = np.repeat(np.arange(len(points)), counts)
+    shapely.multipoints(shapely.points(vertices), indices=owners, out=clouds)
+    hulls = shapely.convex_hull(clouds)
+    starts = offsets[:-1]
+    shifted = vertices - np.repeat(vertices[starts], counts, axis=0)
+    after = shifted[next_corner(offsets)]
+    cross = shifted[:, 0] * after[:, 1] - shifted[:, 1] * after[:, 0]
+    return (
+        shapely.area(hulls),
+        shapely.get_coordinates(shapely.centroid(hulls)),
+        np.add.reduceat(cross, starts),
+        (np.maximum.reduceat(vertices, starts) - np.minimum.reduceat(vertices, starts)).max(axis=1),
+    )
 
 
 def _hull(corners: FloatArray) -> FloatArray:
@@ -315,9 +342,9 @@ def _hull(corners: FloatArray) -> FloatArray:
     return hull if signed_area(hull) > 0.0 else np.ascontiguousarray(hull[::-1])
 
 
-def _contour(corners: FloatArray) -> Contour:
+def _contour(corners: FloatArray, sign: float) -> Contour:
     """Corners as a contour, counter-clockwise, without the first one repeated at the end."""
     if (corners[0] == corners[-1]).all():
         corners = corners[:-1]
     points = corners[:, 0] + 1j * corners[:, 1]
-    return points if signed_area(corners) > 0.0 else points[::-1]
+    return points if sign >= 0.0 else points[::-1]

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import cmath
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
-from pushplan.perception.contour_alignment import Contour, align
+from pushplan.perception.contour_alignment import Alignments, Contour, align, resampled
 
 _MOST_SIGHTINGS = 100  # over so many a shape is averaged
 _LEAST_NOISE = 1e-4  # standard deviation of a corner [radii]
@@ -38,6 +39,11 @@ class Axis:
         self.variance += step * (2.0 * self.shared + step * (self.of_rate + q * step * step / 4.0))
         self.shared += step * (self.of_rate + q * step * step / 2.0)
         self.of_rate += q * step * step
+
+    def slow(self, stays: float) -> None:
+        """Come nearer to rest: only a part of the rate stays."""
+        self.shared *= stays
+        self.of_rate *= stays * stays
 
     def correct(self, variance: float) -> tuple[float, float]:
         """Gains for the quantity and for its rate [1/s], given the variance of an observation."""
@@ -94,52 +100,82 @@ class Track:
     def predict(self, time: float) -> None:
         """Move on as before; an object that was not seen lately comes to rest."""
         step = time - self.time
-        stays = math.exp(-step / _COASTING) if self.time > self.seen_at else 1.0
-        self.velocity *= stays
-        self.turn_rate *= stays
+        if self.time > self.seen_at:
+            stays = math.exp(-step / _COASTING)
+            self.velocity *= stays
+            self.turn_rate *= stays
+            self.place.slow(stays)
+            self.direction.slow(stays)
         self.centre += step * self.velocity
         self.heading += step * self.turn_rate
         self.place.predict(step)
         self.direction.predict(step)
         self.time = time
 
-    def see(self, seen: Contour) -> None:
-        """Take in a contour (M,) of this object, seen now."""
-        spread = math.sqrt(_SPREAD**2 + self.direction.variance)
-        found = align(self.shape, seen, self.heading, self.variance, spread)
-        self._average(seen, found.centre, self.heading + found.turn, found.corners)
+    @property
+    def spread(self) -> float:
+        """Standard deviation of the heading, as far as contours are to be told from each other."""
+        return math.sqrt(_SPREAD**2 + self.direction.variance)
+
+    def see(self, seen: Contour, found: Alignments, k: int) -> None:
+        """Take in a contour (M,) of this object, seen now, by its ``k``-th alignment."""
+        centre, turn = complex(found.centres[k]), float(found.turns[k])
+        variance, points = float(found.variances[k]), min(len(self.shape), len(seen))
+        self._average(seen, centre, self.heading + turn, int(found.orders[k]))
         self.sightings += 1
-        if found.corners is not None:
+        if len(self.shape) == len(seen):
             least = (_LEAST_NOISE * self.radius) ** 2
-            part = 1.0 / min(self.sightings - 1, 20)
-            self.variance += part * (max(found.variance, least) - self.variance)
-        noise = max(self.variance, found.variance)
-        gain, rate_gain = self.place.correct(noise / min(found.points, len(seen)))
-        away = found.centre - self.centre
+            part = 1.0 / min(self.sightings - 1, 20) if self.sightings > 1 else 1.0
+            self.variance += part * (max(variance, least) - self.variance)
+        noise = max(self.variance, variance)
+        gain, rate_gain = self.place.correct(noise / points)
+        away = centre - self.centre
         self.centre += gain * away
         self.velocity += rate_gain * away
-        gain, rate_gain = self.direction.correct(noise / self._moment)
-        self.heading += gain * found.turn
-        self.turn_rate += rate_gain * found.turn
+        gain, rate_gain = self.direction.correct(noise / float(found.moments[k]))
+        self.heading += gain * turn
+        self.turn_rate += rate_gain * turn
         self.seen_at = self.time
 
-    def jump(self, seen: Contour, centre: complex) -> None:
-        """Take in a contour (M,) of this object, seen far from where it was expected."""
+    def jump(self, centre: complex) -> None:
+        """Expect the object elsewhere, where it lies in any direction."""
         self.velocity, self.turn_rate, self.centre = 0j, 0.0, centre
         self.place.restart(self.radius**2)
         self.direction.restart(math.pi**2)
-        self.see(seen)
 
-    def _average(
-        self, seen: Contour, centre: complex, heading: float, corners: Contour | None
-    ) -> None:
+    def _average(self, seen: Contour, centre: complex, heading: float, order: int) -> None:
         """Bring the shape nearer to what is seen; the number of corners is a majority vote."""
         into_body = cmath.exp(-1j * heading)
-        if corners is not None:
+        if len(self.shape) == len(seen):
             self.votes = min(self.votes + 1, _MOST_SIGHTINGS)
             part = 1.0 / min(self.sightings + 1, _MOST_SIGHTINGS)
+            corners = np.concatenate([seen[order:], seen[:order]])
             self.shape = self.shape + part * ((corners - centre) * into_body - self.shape)
             return
         self.votes -= 1
         if self.votes < 0:
             self.shape, self.votes, self.sightings = (seen - centre) * into_body, 1, 0
+
+
+def see_all(tracks: Sequence[Track], contours: Sequence[Contour]) -> None:
+    """Take in a contour of each of some tracks; all with equal numbers of corners at once."""
+    groups: dict[int, list[int]] = {}
+    for k, (track, seen) in enumerate(zip(tracks, contours, strict=True)):
+        same = len(track.shape) == len(seen)
+        groups.setdefault(len(seen) if same else 0, []).append(k)
+    for corners, members in groups.items():
+        some = [tracks[k] for k in members]
+        shapes, seen_there = [one.shape for one in some], [contours[k] for k in members]
+        if not corners:
+            shapes = [resampled(shape) for shape in shapes]
+            seen_there = [resampled(seen) for seen in seen_there]
+        found = align(
+            np.array(shapes),
+            np.array(seen_there),
+            np.array([one.heading for one in some]),
+            np.array([one.variance for one in some]),
+            np.array([one.spread for one in some]),
+            sampled=not corners,
+        )
+        for i, k in enumerate(members):
+            tracks[k].see(contours[k], found, i)

@@ -14,7 +14,18 @@ import pytest
 from pushplan.cli import main
 from pushplan.world import Drive, GoalDisc, Movables, RobotModel, StaticMap, World, save_world
 
-COMMANDS = ("run", "plan", "bench", "list", "score", "report", "compile", "ice", "teleop")
+COMMANDS = (
+    "run",
+    "plan",
+    "bench",
+    "list",
+    "score",
+    "report",
+    "compile",
+    "codegen",
+    "ice",
+    "teleop",
+)
 SQUARE = np.array([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]])
 
 

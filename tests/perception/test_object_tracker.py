@@ -10,7 +10,7 @@ import shapely
 from numpy.typing import NDArray
 
 from pushplan.perception import ObjectTracker
-from pushplan.perception.contour_alignment import align
+from pushplan.perception.contour_alignment import align, resampled
 from pushplan.world import InvalidInputError, Movables
 from pushplan.world.outline import transform
 
@@ -32,9 +32,16 @@ def sighting(
 def overlap(movables: Movables, k: int, truth: Array) -> float:
     """Intersection over union of an object's outline and the true one, laid on each other."""
     shape, real_shape = (points @ np.array([1.0, 1.0j]) for points in (movables.outline(k), truth))
-    found = align(shape, real_shape, float(movables.poses[k, 2]), 1e-6, 0.5)
-    heading = float(movables.poses[k, 2]) + found.turn
-    laid = transform((found.centre.real, found.centre.imag, heading), movables.outline(k))
+    same = len(shape) == len(real_shape)
+    pair = (
+        [shape[None], real_shape[None]]
+        if same
+        else [resampled(shape)[None], resampled(real_shape)[None]]
+    )
+    near = movables.poses[k : k + 1, 2]
+    found = align(*pair, near, np.full(1, 1e-6), np.full(1, 0.5), sampled=not same)
+    centre, heading = found.centres[0], float(near[0] + found.turns[0])
+    laid = transform((centre.real, centre.imag, heading), movables.outline(k))
     seen, real = shapely.Polygon(laid), shapely.Polygon(truth)
     return float(seen.intersection(real).area / seen.union(real).area)
 
@@ -120,6 +127,15 @@ def test_a_single_sighting_elsewhere_is_doubted_and_a_second_one_is_believed() -
     assert tracker.update([far, at], 0.6).ids.tolist() == [0, 1]  # both are there: a new one
 
 
+def test_several_objects_may_appear_at_once() -> None:
+    tracker = ObjectTracker()
+    places = [transform((0.3 * k, 0.0, 0.0), BOX) for k in range(4)]
+    tracker.update(places[:1], 0.0)
+    assert len(tracker.update(places, 0.1)) == 1
+    found = tracker.update(places[::-1], 0.2)
+    assert sorted(found.poses[:, 0].tolist()) == pytest.approx([0.0, 0.3, 0.6, 0.9])
+
+
 def test_labels_of_perception_are_kept() -> None:
     tracker = ObjectTracker()
     at, far = transform((0.0, 0.0, 0.0), BOX), transform((1.0, 0.0, 0.0), BOX)
@@ -150,8 +166,11 @@ def test_shapes_stay_the_same_arrays_between_their_improvements() -> None:
 def test_outlines_without_area_count_as_unseen() -> None:
     tracker = ObjectTracker()
     tracker.update([BOX], 0.0)
-    found = tracker.update([[(0.0, 0.0), (0.1, 0.1), (0.2, 0.2)], [(0.0, 0.0)]], 0.1)
-    assert len(found) == 1 and tracker.flat == 2
+    found = tracker.update([[(0.0, 0.0), (0.1, 0.1), (0.2, 0.2)], [(0.0, 0.0)], [], BOX], 0.1)
+    assert len(found) == 1 and tracker.flat == 3
+    assert tracker.unseen_s.tolist() == [0.0]
+    tracker.update([[]], 0.2)
+    assert tracker.flat == 4
 
 
 def test_what_is_collected_is_what_the_planners_take() -> None:

@@ -9,10 +9,10 @@ import numpy as np
 from pushplan.compiled import owned
 from pushplan.control.episode_clock import EpisodeClock
 from pushplan.control.limits import driven_twist
-from pushplan.control.mpc.horizon import FAILED, KNOWN, make_horizon, track_of
+from pushplan.control.mpc.horizon import FAILED, make_horizon, track_of
 from pushplan.control.mpc.kernels import Tuning, assembly_memory
 from pushplan.control.mpc.mpc_config import MpcConfig
-from pushplan.control.mpc.tracker_kernels import TrackerMemory, track_step
+from pushplan.control.mpc.tracker_kernels import TrackerMemory, begin_track, track_step
 from pushplan.world import Drive, Plan, RobotModel, Twist, World
 from pushplan.world.checks import expect
 
@@ -74,8 +74,7 @@ class MpcTracker:
         assert memory is not None
         if plan is not self._plan:
             self._plan, self._track = plan, track_of(plan)
-            memory.place[0] = 0.0
-            memory.horizon.counts[KNOWN] = 0
+            begin_track(memory)
         pose = owned(world.robot_pose)
         track_step(memory, self._track, pose, world.time, self._clock.held, out)
         return Twist(float(out[0]), float(out[1]))

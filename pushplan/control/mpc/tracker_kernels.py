@@ -54,6 +54,13 @@ class TrackerMemory(NamedTuple):
 
 
 @kernel
+def begin_track(memory: TrackerMemory) -> None:
+    """Begin a path."""
+    memory.place[0] = 0.0
+    memory.horizon.counts[KNOWN] = 0
+
+
+@kernel
 def track_step(
     memory: TrackerMemory,
     track: Track,

@@ -175,15 +175,15 @@ def add_command_costs(
     k, g, tau, moves = step.k, step.g, step.tau, nominal.shape[0]
     value = 0.0
     rate = units[1] * weights.length / weights.max_speed
-    asked = (step.wanted / units[0], step.turn / units[1])
     first = k == 0 or problem.groups[k - 1] != g
     for kind in range(2):
         i = g + kind * moves
         z = nominal[g, kind] / units[kind]
+        asked = (step.wanted if kind == 0 else step.turn) / units[kind]
         cost = tau * (weights.speed if kind == 0 else weights.turn * rate * rate)
         hessian[i, i] += cost
-        gradient[i] -= cost * asked[kind]
-        value += 0.5 * cost * (z - asked[kind]) ** 2
+        gradient[i] -= cost * asked
+        value += 0.5 * cost * (z - asked) ** 2
         if not first:
             continue
         change = SPEED_SMOOTHNESS if kind == 0 else rate * rate

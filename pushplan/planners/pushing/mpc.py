@@ -10,7 +10,7 @@ import numpy as np
 from pushplan.compiled import owned
 from pushplan.control.episode_clock import EpisodeClock
 from pushplan.control.limits import driven_twist
-from pushplan.control.mpc.horizon import FAILED, KNOWN, MISSED, remember, send, track_of
+from pushplan.control.mpc.horizon import FAILED, remember, send, track_of
 from pushplan.geometry.obstacles import obstacles_of
 from pushplan.planners.pushing.model import PushModel, PushState
 from pushplan.planners.pushing.problem import pushing_horizon, pushing_memory
@@ -20,8 +20,8 @@ from pushplan.planners.pushing.push_kernels import (
     SLOWED,
     VALUE,
     PushingMemory,
+    begin_push,
     push_step,
-    take_face,
 )
 from pushplan.planners.pushing.pushing_config import PushingConfig
 from pushplan.world import Drive, InvalidInputError, Plan, RobotModel, Twist, World
@@ -142,8 +142,7 @@ class PushingMpc:
         self._memory, self._models = pushing_memory(
             world.robot, world.movables.outline(k), self.config, self._horizon
         )
-        self._horizon.counts[MISSED] = self._horizon.counts[KNOWN] = 0
-        take_face(self._memory, float(world.robot_pose[2] - world.movables.poses[k, 2]))
+        begin_push(self._memory, float(world.robot_pose[2] - world.movables.poses[k, 2]))
 
     def _step(self, world: World, pose: FloatArray, box: FloatArray) -> None:
         """Fill the command."""

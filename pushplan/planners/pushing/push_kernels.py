@@ -290,6 +290,14 @@ def send_push(
 
 
 @kernel
+def begin_push(memory: PushingMemory, direction: float) -> None:
+    """Begin a path with a push along ``direction`` [rad, box frame]."""
+    memory.told[ALONG], memory.told[SLOWED] = 0.0, 1.0
+    memory.horizon.counts[MISSED] = memory.horizon.counts[KNOWN] = 0
+    take_face(memory, direction)
+
+
+@kernel
 def push_step(
     memory: PushingMemory,
     track: Track,
