@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import time
 from typing import Any
 
 from pushplan.cli.common import add_command, say
@@ -11,6 +12,7 @@ from pushplan.cli.kernel_progress import kernel_progress
 _EXAMPLES = """\
   pushplan compile
   pushplan compile kinodynamic-rrt push-aware
+  pushplan compile --planners push-aware gtsp-mpc
 """
 
 
@@ -22,13 +24,23 @@ def add(commands: Any) -> None:
     parser.add_argument(
         "names", nargs="*", metavar="NAME", help="policies, observations, metrics (default: all)"
     )
+    parser.add_argument(
+        "--planners",
+        action="store_true",
+        help="only what planners and policies run themselves, as on a robot: needs no simulator",
+    )
 
 
 def run(options: argparse.Namespace) -> int:
     """One line for each thing that was run to compile it."""
-    from pushplan.evaluation.warmup import names, warm_up
+    if options.planners:
+        from pushplan.planners import policy_names
 
-    wanted = options.names or names()
+        wanted, warm_up = options.names or policy_names(), _warm_up_planner
+    else:
+        from pushplan.evaluation import warmup
+
+        wanted, warm_up = options.names or warmup.names(), warmup.warm_up
     with kernel_progress(*wanted) as progress:
         for name in wanted:
             compiled, loaded = progress.compiled, progress.loaded
@@ -37,3 +49,12 @@ def run(options: argparse.Namespace) -> int:
             compiled, loaded = progress.compiled - compiled, progress.loaded - loaded
             say(f"{name}: {took:.1f} s, {compiled} kernels compiled, {loaded} loaded")
     return 0
+
+
+def _warm_up_planner(name: str) -> float:
+    """Run a planner in small worlds; how long that took [s]."""
+    from pushplan.planners import warm_up
+
+    begin = time.perf_counter()
+    warm_up(name)
+    return time.perf_counter() - begin

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import math
 
-from ruckig import ControlInterface, InputParameter, Ruckig, RuckigError, Trajectory
-
 from pushplan.world import Drive, RobotModel, Twist, World
 from pushplan.world.checks import number
+
+try:
+    import ruckig
+except ImportError:
+    ruckig = None
 
 
 def clamp_twist(robot: RobotModel, linear: float, angular: float) -> Twist:
@@ -81,7 +84,8 @@ class TwistLimiter:
     Ruckig (Berscheid and Kröger, "Jerk-limited Real-time Trajectory Generation with Arbitrary
     Target States", RSS 2021) gives the time-optimal change from the present to the wanted speed;
     the command is where that change has got to after one period. Speed and turn rate change
-    independently; one whose acceleration is unlimited gets what is wanted at once.
+    independently; one whose acceleration is unlimited gets what is wanted at once. Where there is
+    no Ruckig (it has no wheel for Linux on ARM) accelerations are limited and jerk is not.
 
     Args:
         robot: gives the limits.
@@ -121,10 +125,10 @@ class _AxisLimiter:
     def __init__(self, limit: float, jerk_time: float) -> None:
         self.limit = limit
         self.velocity = self.acceleration = 0.0
-        if math.isfinite(limit):
-            self._solver = Ruckig(1)
-            self._input = InputParameter(1)
-            self._input.control_interface = ControlInterface.Velocity
+        if math.isfinite(limit) and ruckig is not None:
+            self._solver = ruckig.Ruckig(1)
+            self._input = ruckig.InputParameter(1)
+            self._input.control_interface = ruckig.ControlInterface.Velocity
             self._input.max_acceleration = [limit]
             self._input.max_jerk = [limit / jerk_time]
             self._input.target_acceleration = [0.0]
@@ -136,16 +140,23 @@ class _AxisLimiter:
         if not math.isfinite(self.limit):
             self.velocity = wanted
             return wanted
+        if ruckig is None:
+            return self._ramp(wanted, period)
         self._input.current_velocity = [self.velocity]
         self._input.current_acceleration = [self.acceleration]
         self._input.target_velocity = [wanted]
-        change = Trajectory(1)
+        change = ruckig.Trajectory(1)
         try:
             self._solver.calculate(self._input, change)
             _, velocity, acceleration = change.at_time(min(period, change.duration))
             self.velocity, self.acceleration = velocity[0], acceleration[0]
-        except (RuckigError, ValueError):  # limits beyond its numbers: a plain ramp keeps them too
-            reach = self.limit * period
-            self.velocity += min(max(wanted - self.velocity, -reach), reach)
-            self.acceleration = 0.0
+        except (ruckig.RuckigError, ValueError):  # limits beyond its numbers
+            return self._ramp(wanted, period)
+        return self.velocity
+
+    def _ramp(self, wanted: float, period: float) -> float:
+        """Keep the acceleration alone within its limit."""
+        reach = self.limit * period
+        self.velocity += min(max(wanted - self.velocity, -reach), reach)
+        self.acceleration = 0.0
         return self.velocity

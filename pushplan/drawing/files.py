@@ -12,6 +12,7 @@ from PIL import Image
 
 from pushplan.world import InvalidInputError
 from pushplan.world.checks import number
+from pushplan.world.libraries import need
 
 Frame = NDArray[np.uint8]
 ENDINGS = (".png", ".gif", ".mp4")
@@ -74,8 +75,7 @@ def _write_gif(path: Path, first: Frame, rest: Iterable[Frame], fps: float) -> N
 
 
 def _write_mp4(path: Path, first: Frame, rest: Iterable[Frame], fps: float) -> None:
-    import imageio_ffmpeg
-
+    imageio_ffmpeg = need("imageio_ffmpeg")
     height, width = first.shape[:2]
     command = [
         imageio_ffmpeg.get_ffmpeg_exe(),

@@ -9,9 +9,11 @@ packages, so either import this package first, or let Gymnasium do it::
 
 from __future__ import annotations
 
+from importlib.util import find_spec
 from typing import TYPE_CHECKING
 
 from pushplan.world.lazy_names import lazy_names
+from pushplan.world.libraries import need
 
 if TYPE_CHECKING:
     from pushplan.envs.making import make
@@ -34,13 +36,15 @@ __getattr__, __dir__ = lazy_names(
 
 def register_all() -> None:
     """Tell Gymnasium about every task; does nothing where it knows already."""
-    from gymnasium.envs.registration import register, registry
-
+    registration = need("gymnasium.envs.registration")
     from pushplan.envs.registry import GYM_IDS
 
     for gym_id, task in GYM_IDS.items():
-        if gym_id not in registry:
-            register(id=gym_id, entry_point="pushplan.envs.making:make_env", kwargs={"task": task})
+        if gym_id not in registration.registry:
+            registration.register(
+                id=gym_id, entry_point="pushplan.envs.making:make_env", kwargs={"task": task}
+            )
 
 
-register_all()
+if find_spec("gymnasium") is not None:
+    register_all()

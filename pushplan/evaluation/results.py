@@ -28,6 +28,7 @@ from pushplan.evaluation.tables import (
 from pushplan.metrics import compute
 from pushplan.world import Episode, InvalidInputError
 from pushplan.world.files import write_atomic
+from pushplan.world.libraries import need
 
 
 @dataclass(frozen=True)
@@ -97,9 +98,9 @@ class Results(RunRecord):
 
         Raises:
             InvalidInputError: if the folder is the directory of a run with other rows.
+            MissingDependencyError: without Matplotlib.
         """
         from pushplan.evaluation.page import write_page
-        from pushplan.evaluation.plots import write_plots
 
         folder = Path(out) if out is not None else self.path or Path()
         self._check_same_run(folder)
@@ -111,7 +112,7 @@ class Results(RunRecord):
         write_atomic(
             folder / "differences.csv", differences_csv(self.compare(), self.titles).encode()
         )
-        plots = write_plots(self, folder)
+        plots = need("pushplan.evaluation.plots").write_plots(self, folder)
         return write_page(self, tables, plots, folder)
 
     def _check_same_run(self, folder: Path) -> None:

@@ -18,7 +18,8 @@ from pushplan.interaction.occupancy import (
 )
 from pushplan.interaction.occupancy_kernels import Patch
 from pushplan.world.checks import FloatArray, integer
-from pushplan.world.errors import InvalidInputError, MissingDependencyError
+from pushplan.world.errors import InvalidInputError
+from pushplan.world.libraries import need
 
 SHIPPED = "ice_network.onnx"
 _GREATEST_BATCH = 256
@@ -96,12 +97,7 @@ class IceNetwork:
 @functools.lru_cache(maxsize=4)
 def _session(path: Path, threads: int, changed: int) -> Any:
     """An ONNX Runtime session, checked; one for each state of a file in a process."""
-    try:
-        import onnxruntime
-    except ImportError as error:
-        raise MissingDependencyError(
-            "the ice network needs ONNX Runtime: pip install onnxruntime"
-        ) from error
+    onnxruntime = need("onnxruntime")
     if not path.is_file():
         raise InvalidInputError(f"there is no network in {path}")
     options = onnxruntime.SessionOptions()

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pushplan.learned.onnx_guard import NotOnnxError
-from pushplan.world import MissingDependencyError
+from pushplan.world.libraries import need
 
 GREATEST_MEMORY = 256 * 2**20
 """Bytes that all networks of a process may use for weights and values together."""
@@ -106,12 +106,7 @@ class Network:
 @functools.lru_cache(maxsize=1)
 def _runtime() -> Any:
     """The library, with one allocator that stops at `GREATEST_MEMORY`."""
-    try:
-        import onnxruntime
-    except ImportError as error:
-        raise MissingDependencyError(
-            "networks need ONNX Runtime: pip install onnxruntime"
-        ) from error
+    onnxruntime = need("onnxruntime")
     where = onnxruntime.OrtMemoryInfo(
         "Cpu", onnxruntime.OrtAllocatorType.ORT_ARENA_ALLOCATOR, 0, onnxruntime.OrtMemType.DEFAULT
     )

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
 import json
 import logging
 import os
@@ -15,7 +14,8 @@ from numpy.typing import NDArray
 
 from pushplan.learned.network_policy import NetworkPolicy
 from pushplan.learned.specification import METADATA_KEY, Specification
-from pushplan.world import InvalidInputError, MissingDependencyError
+from pushplan.world import InvalidInputError
+from pushplan.world.libraries import need
 
 TRUST_VARIABLE = "PUSHPLAN_TRUST_PICKLES"
 """Set to 1 in the environment of the process, it says that pickles may be loaded."""
@@ -108,12 +108,7 @@ def _look(path: Path) -> tuple[Specification, str]:
 
 
 def _load(path: Path, algorithm: str) -> Any:
-    try:
-        library = importlib.import_module("stable_baselines3")
-    except ImportError as error:
-        raise MissingDependencyError(
-            "sb3:FILE needs Stable-Baselines3: pip install 'pushplan[learn]'"
-        ) from error
+    library = need("stable_baselines3")
     try:
         return getattr(library, algorithm).load(path, device="cpu")
     except Exception as error:  # whatever unpickling raises

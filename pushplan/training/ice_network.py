@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 from pushplan.interaction.occupancy import CELLS_PER_LENGTH, CHANNELS, PATCH_CELLS
 from pushplan.training.ice_data import LEVELS, IcePairs, read_shards
-from pushplan.training.libraries import need, parameter_count, write_onnx
+from pushplan.training.libraries import parameter_count, write_onnx
 from pushplan.world.checked_fields import (
     CheckedFields,
     NonNegativeFloat,
@@ -25,6 +25,7 @@ from pushplan.world.checked_fields import (
     PositiveFloat,
     PositiveInt,
 )
+from pushplan.world.libraries import need
 
 if TYPE_CHECKING:
     from pushplan.training.ice_unet import IceUNet

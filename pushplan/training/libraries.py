@@ -2,29 +2,15 @@
 
 from __future__ import annotations
 
-import importlib
 import warnings
 from pathlib import Path
 from typing import Any
 
-from pushplan.world import InvalidInputError, MissingDependencyError
+from pushplan.world import InvalidInputError
+from pushplan.world.libraries import need
 
 OPSET = 17
 """Of the ONNX files that are written."""
-
-
-def need(name: str) -> Any:
-    """A library of the extra ``learn``.
-
-    Raises:
-        MissingDependencyError: if it is not installed.
-    """
-    try:
-        return importlib.import_module(name)
-    except ImportError as error:
-        raise MissingDependencyError(
-            f"training needs {name.partition('.')[0]}: pip install 'pushplan[learn]'"
-        ) from error
 
 
 def chosen_device(name: str) -> str:

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Mapping
-from importlib import import_module
 from typing import Any
 
 from pushplan.world.errors import UnknownNameError
+from pushplan.world.libraries import need
 
 
 def lazy_names(
@@ -24,7 +24,7 @@ def lazy_names(
     def load(name: str) -> Any:
         if name not in modules:
             raise AttributeError(f"module {package!r} has no attribute {name!r}")
-        return getattr(import_module(f"{package}.{modules[name]}"), name)
+        return getattr(need(f"{package}.{modules[name]}"), name)
 
     return load, lambda: list(sys.modules[package].__all__)
 
@@ -34,8 +34,9 @@ def look_up(kind: str, table: Mapping[str, str], name: object) -> Any:
 
     Raises:
         UnknownNameError: if it is not in the table; the message calls it a ``kind``.
+        MissingDependencyError: if a library that it needs is not installed.
     """
     if not isinstance(name, str) or name not in table:
         raise UnknownNameError(kind, name, table)
     module, _, attribute = table[name].partition(":")
-    return getattr(import_module(module), attribute)
+    return getattr(need(module), attribute)

@@ -29,6 +29,7 @@ from pushplan.planners.ship_lattice.shortcut_proposals import ShortcutProblem
 from pushplan.search.astar import FOUND, PAUSED
 from pushplan.world import GoalLine, Plan, PlanStatus
 from pushplan.world.checks import FloatArray
+from pushplan.world.libraries import need
 from pushplan.world.planning_call import PlanningCall
 
 _SPREAD = 0.6  # typical sideways displacement of a shortcut [R]
@@ -205,8 +206,7 @@ class ShipLatticeCall:
 
     def _refine(self, builder: LatticeBuilder) -> None:
         """Optimise the best path in continuous space; it is kept if the sweep says it is better."""
-        from pushplan.planners.ship_lattice.continuous import cost_field, refine
-
+        continuous = need("pushplan.planners.ship_lattice.continuous")
         assert self.improver is not None and self.improver.best is not None
         built, best = builder.build(), self.improver.best
         lattice = built.lattice
@@ -214,12 +214,12 @@ class ShipLatticeCall:
         hull = max(1, round(2.0 * self.world.robot.inscribed_radius / cell))
         row, column, heading = built.start
         origin = lattice.corner + np.array([row, column]) * lattice.cells
-        field = cost_field(
+        field = continuous.cost_field(
             lattice.cost_sums, lattice.stride, lattice.cells, cell, hull, origin.astype(np.float64)
         )
         across = built.frame.from_world(best.poses[:, :2])[:, 1]
         reach = 2.0 * self.size
-        arcs = refine(
+        arcs = continuous.refine(
             field,
             np.column_stack([np.diff(best.lengths), best.curvatures[1:]]),
             heading,

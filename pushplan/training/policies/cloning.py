@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pushplan.training.libraries import need
 from pushplan.training.policies.config import TrainingConfig
 from pushplan.training.policies.dataset import episodes, read_metadata
 from pushplan.training.policies.environment import TrainingEnv
@@ -17,6 +16,7 @@ from pushplan.training.policies.options import BcOptions
 from pushplan.training.policies.run import Learned, TrainingRun, Until, train_chunks
 from pushplan.training.policies.sb3_training import chunk_seed
 from pushplan.world import InvalidInputError
+from pushplan.world.libraries import need
 
 log = logging.getLogger(__name__)
 

@@ -23,7 +23,6 @@ from pushplan.envs import PushEnv
 from pushplan.learned.builders import builder_from_dict, builder_to_dict
 from pushplan.learned.specification import RobotSpec
 from pushplan.observation import ObservationBuilder
-from pushplan.training.libraries import need
 from pushplan.training.policies.environment import TRAINING_SEEDS
 from pushplan.world import (
     ChoosesActions,
@@ -34,6 +33,7 @@ from pushplan.world import (
 )
 from pushplan.world.checked_fields import CheckedFields, Fraction, NonNegativeInt, PositiveInt
 from pushplan.world.checks import known_keys
+from pushplan.world.libraries import need
 
 SCHEMA = "pushplan-dataset/1"
 METADATA = "metadata.json"

@@ -11,10 +11,11 @@ from numpy.typing import NDArray
 
 from pushplan.learned import OnnxPolicy, Specification
 from pushplan.learned.specification import METADATA_KEY
-from pushplan.training.libraries import need, write_onnx
+from pushplan.training.libraries import write_onnx
 from pushplan.training.policies.config import TrainingConfig
 from pushplan.training.policies.environment import TrainingEnv
 from pushplan.world import InvalidInputError
+from pushplan.world.libraries import need
 
 PARITY = 1e-4
 """Greatest difference between PyTorch and ONNX Runtime, relative to the greatest output."""

@@ -6,8 +6,8 @@ from typing import Any
 
 from pushplan.learned.loading import learned_file, learned_names, weights_of
 from pushplan.learned.onnx_guard import inspect
-from pushplan.training.libraries import need
 from pushplan.world import InvalidInputError
+from pushplan.world.libraries import need
 
 
 def load_weights(network: Any, source: str) -> None:

@@ -17,11 +17,11 @@ from typing import Any, NamedTuple
 import numpy as np
 import yaml
 
-from pushplan.training.libraries import need
 from pushplan.training.policies.config import TrainingConfig, read_config
 from pushplan.training.policies.environment import TrainingEnv
 from pushplan.world import InvalidInputError
 from pushplan.world.files import write_atomic
+from pushplan.world.libraries import need
 
 CONFIG, CURVE, PICTURE = "config.yaml", "curve.csv", "curve.png"
 CHECKPOINT, BEST, POLICY, RECORD = "checkpoint.pt", "best.pt", "policy.onnx", "training.json"

@@ -15,7 +15,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pushplan.observation.channels import MOVABLE
-from pushplan.training.libraries import need
 from pushplan.training.policies.config import TrainingConfig
 from pushplan.training.policies.environment import TrainingEnv
 from pushplan.training.policies.initial import load_weights
@@ -24,6 +23,7 @@ from pushplan.training.policies.replay import Lookahead, ReplayBuffer
 from pushplan.training.policies.run import CurvePoint, Learned, TrainingRun, Until, train_chunks
 from pushplan.training.policies.sb3_training import chunk_seed
 from pushplan.world import InvalidInputError, stream
+from pushplan.world.libraries import need
 
 log = logging.getLogger(__name__)
 

@@ -9,11 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from pushplan.training.libraries import need
 from pushplan.training.policies.config import TrainingConfig
 from pushplan.training.policies.environment import TrainingEnv
 from pushplan.training.policies.options import PpoOptions, SacOptions
 from pushplan.training.policies.run import Learned, TrainingRun, Until, train_chunks
+from pushplan.world.libraries import need
 
 log = logging.getLogger(__name__)
 

@@ -8,11 +8,12 @@ from pathlib import Path
 from typing import Any
 
 from pushplan.learned.sb3_policy import attach
-from pushplan.training.libraries import chosen_device, hardware, need, parameter_count
+from pushplan.training.libraries import chosen_device, hardware, parameter_count
 from pushplan.training.policies.config import TrainingConfig
 from pushplan.training.policies.environment import TrainingEnv
 from pushplan.training.policies.run import CURVE, PICTURE, POLICY, TrainingRun, Until
 from pushplan.world import InvalidInputError
+from pushplan.world.libraries import need
 
 
 def train_policy(

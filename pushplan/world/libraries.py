@@ -1,0 +1,42 @@
+"""Libraries of the extras: one line says what to install where one is missing."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import Any
+
+from pushplan.world.errors import MissingDependencyError
+
+EXTRAS = {
+    "gymnasium": "sim",
+    "mujoco": "sim",
+    "pymunk": "sim",
+    "casadi": "ships",
+    "onnxruntime": "learned",
+    "imageio_ffmpeg": "plots",
+    "matplotlib": "plots",
+    "h5py": "learn",
+    "minari": "learn",
+    "onnx": "learn",
+    "stable_baselines3": "learn",
+    "tensorboard": "learn",
+    "torch": "learn",
+}
+"""Library -> the extra of pushplan that brings it."""
+
+
+def need(module: str) -> Any:
+    """Import a module: a library of an extra, or one of ours that needs such a library.
+
+    Raises:
+        MissingDependencyError: if the library is not installed; it names the extra.
+    """
+    try:
+        return import_module(module)
+    except ModuleNotFoundError as error:
+        library = (error.name or "").partition(".")[0]
+        if library not in EXTRAS:
+            raise
+        raise MissingDependencyError(
+            f"this needs {library}: pip install 'pushplan[{EXTRAS[library]}]'"
+        ) from error

@@ -1,0 +1,93 @@
+"""What works without the libraries of the extras, and what is said where one is missing."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+import pytest
+
+WITHOUT = """
+import sys
+
+sys.modules.update(dict.fromkeys({absent!r}))  # as if they were not there
+{code}
+"""
+EXTRAS = (
+    "gymnasium",
+    "pymunk",
+    "mujoco",
+    "casadi",
+    "onnxruntime",
+    "matplotlib",
+    "imageio_ffmpeg",
+    "ruckig",
+    "torch",
+    "stable_baselines3",
+)
+
+ROBOT = """
+import numpy as np
+import pushplan.control, pushplan.learned, pushplan.metrics, pushplan.perception
+from pushplan.cli import main
+from pushplan.control import TwistLimiter
+from pushplan.planners import make_policy, policy_names
+from pushplan.runtime import Runner
+from pushplan.world import RobotModel, Twist, load_world
+
+for name in policy_names():
+    make_policy(name)
+world = load_world("examples/room.yaml")
+with Runner("straight", period=0.05) as runner:
+    assert runner.start(world).status in ("waiting", "driving")
+robot = RobotModel.from_outline(
+    [[0, 0], [1, 0], [0, 1]], mass=1, drive="differential", max_speed=1, max_turn_rate=1,
+    max_acceleration=0.5,
+)
+limiter = TwistLimiter(robot)
+assert limiter.step(Twist(1.0, 0.0), 0.1).linear == 0.05
+assert main(["list", "tasks"]) == 0
+assert main(["list", "suites"]) == 0
+assert main(["plan", "examples/room.yaml", "--planner", "straight"]) == 0
+"""
+
+
+def without(absent, code: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "-c", WITHOUT.format(absent=set(absent), code=code)],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+
+
+@pytest.mark.warm("straight")
+def test_a_robot_needs_none_of_the_extras():
+    done = without(EXTRAS, ROBOT)
+    assert done.returncode == 0, done.stderr
+
+
+@pytest.mark.parametrize(
+    ("absent", "arguments", "extra"),
+    [
+        ("gymnasium", ["bench", "smoke", "--policies", "straight"], "sim"),
+        ("pymunk", ["run", "maze-2d-3", "--policy", "straight"], "sim"),
+        ("mujoco", ["run", "maze-3d-3", "--policy", "straight"], "sim"),
+        ("onnxruntime", ["run", "maze-2d-3", "--policy", "maze-ppo"], "learned"),
+        ("torch", ["train", "ppo", "--task", "maze", "--out", "never-made"], "learn"),
+    ],
+)
+def test_a_missing_library_is_one_line_that_names_the_extra(absent, arguments, extra):
+    code = f"from pushplan.cli import main\nsys.exit(main({arguments!r}))"
+    done = without([absent], code)
+    assert done.returncode != 0
+    assert done.stderr.strip().count("\n") == 0, done.stderr
+    assert f"pip install 'pushplan[{extra}]'" in done.stderr
+    assert absent in done.stderr
+
+
+def test_another_missing_module_is_no_matter_of_extras():
+    from pushplan.world.libraries import need
+
+    with pytest.raises(ModuleNotFoundError, match="nowhere"):
+        need("nowhere")
