@@ -19,6 +19,7 @@ from pushplan.planners import make_policy, policy_for
 from pushplan.planners.kernel_warmup import warm_up_policy
 from pushplan.runtime.command import Command, CommandStatus
 from pushplan.runtime.held_actions import HeldActions
+from pushplan.runtime.object_memory import ObjectMemory
 from pushplan.runtime.state_estimator import StateEstimator
 from pushplan.runtime.thread_executor import ThreadExecutor
 from pushplan.world import (
@@ -86,6 +87,7 @@ class Runner:
             believed; less than 1 smooths noisy poses. By default 1, and 0.3 where there is noise.
             A policy that `ExpectsNoise` is told what is left.
         margin: distance that plans keep from what is static [m]; that of the worlds if None.
+        keep_unseen: for how long an object is taken to be there that is missing in the worlds [s].
         log: keeps worlds, plans and commands.
         executor: runs planning calls; a thread by default, another one for simulation.
         clock: returns seconds, by which planning calls are timed.
@@ -122,6 +124,7 @@ class Runner:
         heading_noise: float = 0.0,
         observer_gain: float | None = None,
         margin: float | None = None,
+        keep_unseen: float = 0.0,
         log: RunLog | None = None,
         executor: PlanningExecutor | None = None,
         clock: Callable[[], float] = time.perf_counter,
@@ -131,6 +134,7 @@ class Runner:
         self.max_age = number("max_age", max_age, low=0.0, open_low=True)
         self.on_stale = choice("on_stale", on_stale, ("stop", "continue"))
         self.margin = None if margin is None else number("margin", margin, low=0.0)
+        self.keep_unseen = number("keep_unseen", keep_unseen, low=0.0)
         delay = number("delay", delay, low=0.0)
         noise = [
             number("position_noise", position_noise, low=0.0),
@@ -186,6 +190,8 @@ class Runner:
         self._estimator.reset()
         self._forget()
         self._estimator.observe(world)
+        self._memory = ObjectMemory(self.keep_unseen)
+        self._memory.complete(world, world)
         self._begin(world)
         if self._switch_interval is None:
             self._switch_interval = sys.getswitchinterval()
@@ -271,7 +277,8 @@ class Runner:
         with self._lock:
             newest = self._newest
         if newest is not self._observed:
-            self._estimator.observe(newest)
+            predicted = self._estimator.at(newest.time)
+            self._estimator.observe(self._memory.complete(newest, predicted))
             self._observed = newest
         held = self.period if last is None else now - last.time
         world = self._estimator.at(now + self._delay)

@@ -2,11 +2,14 @@
 
 import math
 from collections.abc import Sequence
+from dataclasses import fields
 from typing import Any
 
 import numpy as np
 import pytest
 import shapely
+from hypothesis import given
+from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from pushplan.perception import ObjectTracker
@@ -211,3 +214,24 @@ def test_bad_input_is_refused_and_forgotten(
 def test_bad_settings_are_refused(bad: dict[str, Any]) -> None:
     with pytest.raises(InvalidInputError, match=next(iter(bad))):
         ObjectTracker(**bad)
+
+
+@given(st.integers(0, 10**6))
+def test_whatever_is_seen_gives_valid_objects(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    tracker = ObjectTracker(confirm=int(rng.integers(1, 4)), keep=float(rng.uniform(0.0, 1.0)))
+    size, origin = 10.0 ** rng.uniform(-3.0, 3.0), rng.uniform(-1.0, 1.0, 2) * 1e5
+    labelled, stamp = bool(rng.random() < 0.5), 0.0
+    for _ in range(8):
+        stamp += float(rng.choice([0.0, 1e-6, 0.1, 3.0]))
+        seen = []
+        for _ in range(int(rng.integers(0, 6))):
+            corners = rng.normal(size=(int(rng.integers(0, 9)), 2))
+            if rng.random() < 0.2:
+                corners = corners.round()  # repeated corners, corners on one line
+            seen.append(origin + size * (corners + rng.integers(0, 4, 2) * (rng.random() < 0.8)))
+        ids = rng.permutation(8)[: len(seen)] if labelled else None
+        found = tracker.update(seen, stamp, ids)
+        names = [field.name for field in fields(Movables)]
+        assert Movables(**{name: getattr(found, name) for name in names}) == found
+        assert len(tracker.unseen_s) == len(found)
