@@ -105,8 +105,7 @@ class ObjectTracker:
         self._candidates: list[Candidate] = []
         self._next = 0
         self._movables = Movables.empty()
-        self._shown: list[tuple[int, int, int]] = []
-        self._middles: Contour = np.zeros(0, dtype=np.complex128)
+        self._shown: dict[int, tuple[int, int]] = {}
 
     @property
     def time(self) -> float | None:
@@ -265,34 +264,32 @@ class ObjectTracker:
         self._tracks.append(Track(label, contour, centre, area, self._time, self._accelerations))
 
     def _collected(self) -> Movables:
-        """The tracks as `Movables`; outlines are made anew when a mean has become better."""
-        tracks = self._tracks
-        shown = [(one.label, len(one.shape), one.sightings.bit_length()) for one in tracks]
-        if shown != self._shown:
-            hulls = [_hull(np.column_stack([one.shape.real, one.shape.imag])) for one in tracks]
+        """The tracks as `Movables`; outlines are made anew where a mean has become better."""
+        shown = {one.label: (len(one.shape), one.sightings.bit_length()) for one in self._tracks}
+        better = [one for one in self._tracks if self._shown.get(one.label) != shown[one.label]]
+        gone = [label for label in self._shown if label not in shown]
+        movables, self._shown = self._movables, shown
+        if better or gone:
+            hulls = [_hull(np.column_stack([one.shape.real, one.shape.imag])) for one in better]
             areas, centres = areas_and_centroids(*flatten(hulls))
-            self._middles = centres[:, 0] + 1j * centres[:, 1]
-            for one, area in zip(tracks, areas.tolist(), strict=True):
-                one.area = area
-        poses, twists = self._states()
-        if shown == self._shown:
-            return self._movables.moved_to(poses, twists)
-        self._shown = shown
-        return Movables.from_outlines(
-            [hull - centre for hull, centre in zip(hulls, centres, strict=True)],
-            poses,
-            twists=twists,
-            density=self._density,
-            wheeled=np.full(len(tracks), self._wheeled),
-            ids=np.array([one.label for one in tracks], dtype=np.int64),
-        )
+            for one, area, centre in zip(better, areas.tolist(), centres.tolist(), strict=True):
+                one.area, one.middle = area, complex(*centre)
+            changed = Movables.from_outlines(
+                [hull - centre for hull, centre in zip(hulls, centres, strict=True)],
+                np.zeros((len(better), 3)),
+                density=self._density,
+                wheeled=np.full(len(better), self._wheeled),
+                ids=np.array([one.label for one in better], dtype=np.int64),
+            )
+            movables = movables.updated(changed, np.array(gone, dtype=np.int64))
+        return movables.moved_to(*self._states())
 
     def _states(self) -> tuple[FloatArray, FloatArray]:
         """(K, 3) poses and twists of the centroids."""
         tracks = self._tracks
         headings = np.array([one.heading for one in tracks], dtype=float)
         rates = np.array([one.turn_rate for one in tracks], dtype=float)
-        arms = self._middles * np.exp(1j * headings)
+        arms = np.array([one.middle for one in tracks], dtype=complex) * np.exp(1j * headings)
         places = np.array([one.centre for one in tracks], dtype=complex) + arms
         speeds = np.array([one.velocity for one in tracks], dtype=complex) + 1j * rates * arms
         return (

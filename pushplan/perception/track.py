@@ -78,6 +78,7 @@ class Track:
     ) -> None:
         self.label, self.area = label, area
         self.centre, self.heading = centre, 0.0
+        self.middle = 0j  # centroid of the shape's hull, in the frame of the body
         self.velocity, self.turn_rate = 0j, 0.0
         self.shape = seen - centre
         self.radius = float(np.abs(self.shape).max())

@@ -141,8 +141,9 @@ class Runner:
             observer_gain = _SMOOTHING if any(noise) else 1.0
         gain = number("observer_gain", observer_gain, low=0.0, high=1.0, open_low=True)
         self.policy = _policy_of(policy, self.max_age)
+        left = math.sqrt(gain / (2.0 - gain))  # of white noise, after a filter of that gain
+        self._goal_inset = 3.0 * left * noise[0]
         if any(noise) and isinstance(self.policy, ExpectsNoise):
-            left = math.sqrt(gain / (2.0 - gain))  # of white noise, after a filter of that gain
             self.policy.expect_noise(left * noise[0], left * noise[1])
         self._believed = max(self.max_age, _BLIND if self.on_stale == "continue" else 0.0)
         self._estimator = StateEstimator(delay, gain, self._believed)
@@ -203,7 +204,13 @@ class Runner:
         self.policy.plan_with(self._executor)
 
     def _with_margin(self, world: World) -> World:
+        """The world as the policy plans in it: with the margin, and sure to be in the goal."""
         world = expect("world", world, World)
+        goal, inset = world.goal, self._goal_inset
+        if isinstance(goal, GoalDisc) and inset > 0.0:
+            world = replace(
+                world, goal=GoalDisc(goal.center, max(goal.radius - inset, 0.5 * goal.radius))
+            )
         return world if self.margin is None else replace(world, margin=self.margin)
 
     def update(self, world: World) -> bool:

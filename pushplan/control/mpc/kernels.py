@@ -205,6 +205,9 @@ def assemble(
         asked = (wanted / tuning.max_speed, turning / tuning.max_turn_rate)
         before = twist[1] / tuning.max_turn_rate
         _add_input_costs(hessian, gradient, k, count, asked, before, tau, tuning)
+    for j in range(n):
+        for i in range(j):
+            hessian[i, j] = hessian[j, i]
 
 
 @kernel
@@ -245,7 +248,6 @@ def _add_input_costs(
         gradient[0] -= smoothness * before
     else:
         hessian[k - 1, k - 1] += smoothness
-        hessian[k - 1, k] -= smoothness
         hessian[k, k - 1] -= smoothness
 
 
@@ -259,7 +261,7 @@ def _add(
     tuning: Tuning,
     weight: float,
 ) -> None:
-    """Add weight/2 (value + row (z - z_nominal))² to the cost."""
+    """Add weight/2 (value + row (z - z_nominal))² to the cost, to the lower half of P."""
     count, n = nominal.shape[0], row.shape[0]
     for j in range(n):  # later inputs have no influence, and may not be known yet
         if row[j] != 0.0:
@@ -272,10 +274,10 @@ def _add(
     for j in range(n):
         if row[j] == 0.0:
             continue
-        part = weight * row[j]
+        part, target = weight * row[j], hessian[j]
         gradient[j] += part * value
-        for i in range(n):
-            hessian[i, j] += part * row[i]
+        for i in range(j + 1):
+            target[i] += part * row[i]
 
 
 @kernel

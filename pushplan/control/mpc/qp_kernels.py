@@ -39,7 +39,7 @@ class QpMemory(NamedTuple):
     x: FloatArray  # (n,) start, and solution
     y: FloatArray  # (n + B M,) multipliers, kept
     rho: FloatArray  # (1,) step size, kept
-    factor: FloatArray  # (n, n) Cholesky factor of the linear system
+    factor: FloatArray  # (n, n) Cholesky factor, its diagonal inverted, in both halves
     wide: FloatArray  # (5, n + B M) scratch: z, weights of rows, z before, A x, change of y
     narrow: FloatArray  # (3, n) scratch: right side, P x, Aᵀ y
 
@@ -156,8 +156,8 @@ def _factorise(memory: QpMemory) -> None:
     for r in range(memory.y.shape[0]):
         weights[r] = rho * (_STIFF if memory.high[r] - memory.low[r] < _EQUAL else 1.0)
     for i in range(n):
-        for j in range(i + 1):
-            factor[i, j] = memory.hessian[j, i]
+        for j in range(i, n):
+            factor[i, j] = memory.hessian[i, j]
         factor[i, i] += _SIGMA + weights[i]
     for b in range(memory.blocks.shape[0]):
         first, row = memory.blocks[b], n + b * moves
@@ -165,33 +165,38 @@ def _factorise(memory: QpMemory) -> None:
             factor[first + i, first + i] += weights[row + i]
             if i > 0:
                 factor[first + i - 1, first + i - 1] += weights[row + i]
-                factor[first + i, first + i - 1] -= weights[row + i]
+                factor[first + i - 1, first + i] -= weights[row + i]
+    for k in range(n):  # the factor Lᵀ, row by row, in the upper half
+        top = factor[k]
+        top[k] = 1.0 / np.sqrt(top[k])
+        for j in range(k + 1, n):
+            top[j] *= top[k]
+        for i in range(k + 1, n):
+            part, target = top[i], factor[i]
+            for j in range(i, n):
+                target[j] -= part * top[j]
     for i in range(n):
-        row_i = factor[i]
-        for j in range(i + 1):
-            row_j = factor[j]
-            total = row_i[j]
-            for k in range(j):
-                total -= row_i[k] * row_j[k]
-            row_i[j] = np.sqrt(total) if i == j else total / row_j[j]
+        for j in range(i):
+            factor[i, j] = factor[j, i]
 
 
 @kernel
 def _back_substitute(memory: QpMemory, side: FloatArray) -> None:
     """Solve the factorised system in place."""
     factor, n = memory.factor, side.shape[0]
-    for i in range(n):
-        row = factor[i]
-        total = side[i]
-        for k in range(i):
-            total -= row[k] * side[k]
-        side[i] = total / row[i]
+    for k in range(n):
+        row = factor[k]
+        side[k] *= row[k]
+        part = side[k]
+        for i in range(k + 1, n):
+            side[i] -= row[i] * part
     for back in range(n):
-        i = n - 1 - back
-        row = factor[i]
-        side[i] /= row[i]
-        for k in range(i):
-            side[k] -= row[k] * side[i]
+        k = n - 1 - back
+        row = factor[k]
+        side[k] *= row[k]
+        part = side[k]
+        for i in range(k):
+            side[i] -= row[i] * part
 
 
 @kernel

@@ -61,7 +61,12 @@ def flush_angle(contact: Contact, offset: float) -> float:
 @kernel
 def standoff(contact: Contact, offset: float, angle: float) -> tuple[float, float]:
     """X of the box's centre when it touches the bumper [m], and where it does, along t [m]."""
-    c, s = np.cos(angle), np.sin(angle)
+    return standoff_turned(contact, offset, np.cos(angle), np.sin(angle))
+
+
+@kernel
+def standoff_turned(contact: Contact, offset: float, c: float, s: float) -> tuple[float, float]:
+    """`standoff` of an angle whose cosine and sine are known."""
     low, high = line(contact, offset)
     if low >= high:
         low = high = min(max(0.0, contact.low), contact.high)
@@ -118,18 +123,33 @@ def contact_velocity(
     out: FloatArray,  # (6,) of a box that touches the bumper
 ) -> None:
     """Fill v_n, v_t [m/s], ω [rad/s], pressure centre [m], mode, shear over normal force."""
-    x, touch = standoff(contact, offset, angle)
-    c, s = np.cos(angle), np.sin(angle)
+    _velocity(contact, offset, angle, np.cos(angle), np.sin(angle), v, w, dt, out)
+
+
+@kernel
+def _velocity(
+    contact: Contact,
+    offset: float,
+    angle: float,
+    c: float,  # cosine and sine of the angle
+    s: float,
+    v: float,
+    w: float,
+    dt: float,
+    out: FloatArray,
+) -> float:
+    """`contact_velocity`; returns the x of the box's centre [m]."""
+    x, touch = standoff_turned(contact, offset, c, s)
     ux, uy = v - w * offset, w * x
     un, ut = c * ux + s * uy, c * uy - s * ux
     low, high = line(contact, offset)
     curvature, a, square = contact.curvature, contact.depth, contact.spread * contact.spread
     if low >= high:
         _corner(contact, touch, 0.0, un, ut, w, out)
-        return
+        return x
     if curvature < 0.0:  # a nose: one point that rolls along the face
         _corner(contact, touch, 0.0, un, ut, w, out)
-        return
+        return x
     off = angle - flush_angle(contact, offset)
     slope = -curvature / (1.0 - curvature * a)
     closing = w - off / dt
@@ -153,13 +173,14 @@ def contact_velocity(
     if low <= pressure <= high:
         out[0], out[1], out[2] = normal, vt, omega
         out[3], out[4], out[5] = pressure, float(mode), shear / normal
-        return
+        return x
     y = high if pressure > high else low
     tilt = 0.0
     if (y == contact.high and y == high) or (y == contact.low and y == low):
         lateral = offset - a * s + y * c
         tilt = -curvature * lateral - angle  # the box's corner on the bumper, not the bumper's end
     _corner(contact, y, tilt, un, ut, w, out)
+    return x
 
 
 @kernel
@@ -180,22 +201,27 @@ def _leave(
     """Offset, angle and gap when the robot has moved for ``dt`` and the box, at x ahead, stood."""
     turn = w * dt
     half = 0.5 * turn
-    chord = v * dt * (np.sin(half) / half if abs(half) > 1e-9 else 1.0)
-    dx, dy = ahead - chord * np.cos(half), state[3] - chord * np.sin(half)
-    c, s = np.cos(turn), np.sin(turn)
+    ch, sh = np.cos(half), np.sin(half)
+    chord = v * dt * (sh / half if abs(half) > 1e-9 else 1.0)
+    dx, dy = ahead - chord * ch, state[3] - chord * sh
+    c, s = ch * ch - sh * sh, 2.0 * ch * sh
     offset, angle = c * dy - s * dx, state[4] - turn
     return offset, angle, c * dx + s * dy - standoff(contact, offset, angle)[0]
 
 
 @kernel
-def push_step(
-    contact: Contact, state: FloatArray, v: float, w: float, dt: float, out: FloatArray
+def _push(
+    contact: Contact,
+    state: FloatArray,
+    c: float,
+    s: float,
+    v: float,
+    w: float,
+    dt: float,
+    out: FloatArray,
 ) -> None:
-    """One substep of a box that touches the bumper."""
-    contact_velocity(contact, state[3], state[4], v, w, dt, out)
-    x = standoff(contact, state[3], state[4])[0]
-    uy = w * x
-    c, s = np.cos(state[4]), np.sin(state[4])
+    """One substep of a box that touches the bumper at an angle of known cosine and sine."""
+    uy = w * _velocity(contact, state[3], state[4], c, s, v, w, dt, out)
     before = state[4] - flush_angle(contact, state[3])
     state[3] += dt * (out[0] * s + out[1] * c - uy)
     state[4] += dt * (out[2] - w)
@@ -203,7 +229,6 @@ def push_step(
         flush = flush_angle(contact, state[3])
         if before * (state[4] - flush) < 0.0:
             state[4] = flush  # the other end touches before the step is over
-    _drive(state, v, w, dt)
 
 
 @kernel
@@ -216,6 +241,15 @@ def advance(
     out: FloatArray,  # (6,) of the last substep; of mode `FREE` without contact
 ) -> None:
     """Move robot and box on by ``dt`` [s] under one command; ``out`` as in `contact_velocity`."""
+    advance_box(contact, state, v, w, dt, out)
+    _drive(state, v, w, dt)  # one arc, whatever the box does
+
+
+@kernel
+def advance_box(
+    contact: Contact, state: FloatArray, v: float, w: float, dt: float, out: FloatArray
+) -> None:
+    """`advance` of the box in the robot's frame alone: offset, angle and gap."""
     reach = contact.front + contact.depth
     travel = abs(v) * dt + abs(w) * dt * reach
     count = max(1, min(_SUBSTEPS, int(np.ceil(travel / (_SUBSTEP * reach)))))
@@ -223,20 +257,20 @@ def advance(
     out[:] = 0.0
     for _ in range(count):
         gap = max(state[5], 0.0)
-        ahead = standoff(contact, state[3], state[4])[0] + gap
+        c, s = np.cos(state[4]), np.sin(state[4])
+        ahead = standoff_turned(contact, state[3], c, s)[0] + gap
         left = _leave(contact, state, ahead, v, w, step)
         if left[2] >= 1e-9:
             state[3], state[4], state[5] = left
-            _drive(state, v, w, step)
             out[:] = 0.0
             continue
         fraction = gap / (gap - left[2]) if gap > 1e-9 and gap > left[2] else 0.0
         if fraction > 0.0:
             state[3], state[4], _ = _leave(contact, state, ahead, v, w, fraction * step)
-            _drive(state, v, w, fraction * step)
+            c, s = np.cos(state[4]), np.sin(state[4])
         state[5] = 0.0
         if fraction < 1.0:
-            push_step(contact, state, v, w, (1.0 - fraction) * step, out)
+            _push(contact, state, c, s, v, w, (1.0 - fraction) * step, out)
 
 
 @kernel

@@ -12,7 +12,13 @@ import numpy as np
 
 from pushplan.compiled import copy_into, kernel
 from pushplan.control.mpc.kernels import arc, errors, locate
-from pushplan.planners.pushing.contact_kernels import Contact, advance, flush_angle, standoff
+from pushplan.planners.pushing.contact_kernels import (
+    Contact,
+    advance,
+    advance_box,
+    flush_angle,
+    standoff,
+)
 from pushplan.planners.pushing.cost_kernels import (
     ROWS,
     Memory,
@@ -35,9 +41,8 @@ def _relative(
 ) -> tuple[float, float]:
     """Offset and angle after a step that begins in contact. ``work`` is (12,) memory."""
     state, out = work[:6], work[6:]
-    state[0] = state[1] = state[2] = state[5] = 0.0
-    state[3], state[4] = s, angle
-    advance(contact, state, v, w, dt, out)
+    state[3], state[4], state[5] = s, angle, 0.0
+    advance_box(contact, state, v, w, dt, out)
     return state[3], state[4]
 
 

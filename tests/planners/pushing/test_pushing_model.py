@@ -253,7 +253,9 @@ def test_nonlinear_expressions_are_those_of_the_kernels():
             v, w = 0.2, rng.uniform(-1.0, 1.0)
             found = np.asarray(made(row[:5], [v, w, 0.1])).ravel()
             for _ in range(2):
-                contact_kernels.push_step(model.contact, row, v, w, 0.05, np.empty(6))
+                c, s = math.cos(row[4]), math.sin(row[4])
+                contact_kernels._push(model.contact, row, c, s, v, w, 0.05, np.empty(6))
+                contact_kernels._drive(row, v, w, 0.05)
             assert found == pytest.approx(row[:5], abs=1e-9)
 
 
