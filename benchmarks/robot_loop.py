@@ -9,14 +9,13 @@ another one. Here, one thread receives worlds and another one asks for commands,
 Per policy it writes how long `Runner.command` took (median, 99.9th percentile and worst), how much
 of that the thread computed itself at worst (the rest is the machine doing other work), how many
 commands were late, what was compiled after `start`, by how much memory grew after the first tenth,
-and how the episodes ended. With --kill every planning thread is ended from outside now and then, by
-an exception that nobody catches.
+and how the episodes ended. With --kill a planning thread is ended now and then in the middle of its
+call, by an exception that no planner catches.
 """
 
 from __future__ import annotations
 
 import argparse
-import ctypes
 import multiprocessing
 import socket
 import threading
@@ -32,8 +31,9 @@ import numpy as np
 from pushplan.compiled import watching
 from pushplan.evaluation import JobSettings
 from pushplan.runtime import Runner
+from pushplan.runtime.runner import PLAN_STOP
 from pushplan.scenarios import Scenario, suite
-from pushplan.world import Twist, World
+from pushplan.world import Stop, StopCheck, Twist, World
 from pushplan.world.checks import FloatArray
 
 SUITES = {
@@ -74,7 +74,9 @@ def row(policy: str, options: argparse.Namespace) -> str:
         target=simulate, args=(theirs, policy, scenarios, period), daemon=True
     )
     robot.start()
-    loop = _Loop(Runner(policy, period=period), ours, period, options.kill)
+    killer = Killer()
+    runner = Runner(policy, period=period, plan_stop=PLAN_STOP | killer)
+    loop = _Loop(runner, ours, period, killer, options.kill)
     try:
         loop.run(options.seconds)
     finally:
@@ -90,7 +92,7 @@ def row(policy: str, options: argparse.Namespace) -> str:
         str(loop.late),
         str(len(loop.compiled)),
         f"{loop.growth_mb:+.1f} MB",
-        str(loop.killed),
+        str(killer.killed),
         str(loop.failures),
         ", ".join(f"{count} {reason}" for reason, count in loop.reasons.items()) or "none ended",
     ]
@@ -163,13 +165,16 @@ def newest(receiver: socket.socket, number: int, last: Twist) -> Twist:
 class _Loop:
     """The robot's loop: one thread that receives, one that drives."""
 
-    def __init__(self, runner: Runner, pipe: Connection, period: float, kill: bool) -> None:
-        self.runner, self._pipe, self._period, self._kill = runner, pipe, period, kill
+    def __init__(
+        self, runner: Runner, pipe: Connection, period: float, killer: Killer, kill: bool
+    ) -> None:
+        self.runner, self._pipe, self._period = runner, pipe, period
+        self.killer, self._kill = killer, kill
         self.took: list[float] = []
         self.own: list[float] = []
         self.compiled: list[str] = []
         self.reasons: Counter[str] = Counter()
-        self.late = self.killed = self.failures = 0
+        self.late = self.failures = 0
         self.growth_mb = 0.0
         self._number = -1
         self._offset = self._now = 0.0
@@ -224,8 +229,8 @@ class _Loop:
             self.late += command.late
             values = [self._number, command.twist.linear, command.twist.angular]
             self._socket.sendto(np.array(values).tobytes(), there)
-            if self._kill and before > next_kill and kill_planning():
-                self.killed += 1
+            if self._kill and before > next_kill:
+                self.killer.due = True
                 next_kill = before + _KILL_EVERY_S
             if memory is None and before > began + 0.1 * seconds:
                 memory = resident_mb()
@@ -234,15 +239,22 @@ class _Loop:
         self.growth_mb = resident_mb() - (memory or resident_mb())
 
 
-def kill_planning() -> bool:
-    """End the planning thread that runs, if one does, by an exception from outside."""
-    for thread in threading.enumerate():
-        if thread.name == "pushplan planning" and thread.ident is not None:
-            raised = ctypes.pythonapi.PyThreadState_SetAsyncExc(
-                ctypes.c_ulong(thread.ident), ctypes.py_object(SystemExit)
-            )
-            return bool(raised)
-    return False
+class Killer(Stop):
+    """A stop rule that ends the thread of the planning call that looks at it next, when told to."""
+
+    def __init__(self) -> None:
+        self.due, self.killed = False, 0
+
+    def start(self) -> StopCheck:
+        """See `pushplan.world.Stop`."""
+        return self._check
+
+    def _check(self, iterations: int, cost: float) -> bool:
+        if self.due:
+            self.due = False
+            self.killed += 1
+            raise SystemExit("ended from outside")
+        return False
 
 
 def resident_mb() -> float:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import math
 import sys
 import threading
@@ -177,7 +178,9 @@ class Runner:
         """Begin an episode: load all kernels, and give the first command.
 
         That may take seconds in a new process, and minutes after an installation; nothing is
-        compiled afterwards. The robot is taken to drive as the world says.
+        compiled afterwards. The robot is taken to drive as the world says. Until `close` threads
+        of this process take shorter turns, and what is in memory now is no matter of Python's
+        garbage collector, so that neither delays commands.
 
         Args:
             world: the first snapshot. Its clock is that of `update` and `command`.
@@ -196,6 +199,8 @@ class Runner:
         if self._switch_interval is None:
             self._switch_interval = sys.getswitchinterval()
             sys.setswitchinterval(min(_SWITCH, self._switch_interval))
+            gc.collect()
+            gc.freeze()  # else a collection amid driving goes through all modules and kernels
         self._newest = self._observed = world
         self.worlds = 1
         return self.command(world.time)
@@ -252,6 +257,7 @@ class Runner:
         if self._switch_interval is not None:
             sys.setswitchinterval(self._switch_interval)
             self._switch_interval = None
+            gc.unfreeze()
         return self._executor.close(timeout) if isinstance(self._executor, ThreadExecutor) else True
 
     def command(self, now: float) -> Command:
