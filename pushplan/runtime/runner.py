@@ -190,6 +190,7 @@ class Runner:
         """
         world = self._with_margin(world)
         warm_up_policy(self.policy)
+        self._estimator.warm_up(world)
         self._estimator.reset()
         self._forget()
         self._estimator.observe(world)
