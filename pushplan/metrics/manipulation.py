@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-import networkx as nx
 import numpy as np
 
 from pushplan.geometry import VisibilityGraph, goal_distances
@@ -110,13 +109,18 @@ def spanning_tree_length(static: StaticMap, points: list[FloatArray]) -> float:
     Edges are shortest paths of a point around what is static.
     """
     paths, is_free = VisibilityGraph(static), not len(static.polygons) and not len(static.segments)
-    graph: nx.Graph[int] = nx.Graph()
+    lengths = np.zeros((len(points), len(points)))
     for k, a in enumerate(points):
         for j, b in enumerate(points[:k]):
             length = math.dist(a, b) if is_free else paths.shortest_path(a, b).length
-            graph.add_edge(j, k, weight=length)
-    edges = nx.minimum_spanning_edges(graph, algorithm="prim")
-    return float(sum(data["weight"] for *_, data in edges))
+            lengths[j, k] = lengths[k, j] = length
+    to_tree, outside, total = lengths[0], list(range(1, len(points))), 0.0
+    while outside:  # Prim: the nearest point joins the tree
+        nearest = min(outside, key=to_tree.__getitem__)
+        outside.remove(nearest)
+        total += float(to_tree[nearest])
+        to_tree = np.minimum(to_tree, lengths[nearest])
+    return total
 
 
 def efficiency(tree_m: float, driven_m: float, *, everything: bool) -> float:

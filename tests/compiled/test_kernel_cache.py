@@ -36,8 +36,8 @@ def module(tmp_path: Path) -> Path:
     return path
 
 
-def _run(path: Path, cache: Path | str) -> tuple[str, str]:
-    environment = {**os.environ, "NUMBA_CACHE_DIR": str(cache)}
+def _run(path: Path, cache: Path | str, **more: str) -> tuple[str, str]:
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(cache), **more}
     done = subprocess.run(
         [sys.executable, path], env=environment, capture_output=True, text=True, check=True
     )
@@ -103,6 +103,23 @@ def test_damaged_files_are_one_warning_each_and_replaced(module: Path, tmp_path:
     assert out == _COMPILED
     assert errors.count("\n") == errors.count("is damaged, and compiled anew") == 1
     assert _run(module, cache) == (_LOADED, "")
+
+
+_HOST = """
+import llvmlite.binding
+llvmlite.binding.get_host_cpu_name = lambda: {name!r}
+"""
+
+
+def test_kernels_for_a_generic_processor_load_on_every_one(module: Path, tmp_path: Path) -> None:
+    cache = tmp_path / "cache"
+    generic = {"NUMBA_CPU_NAME": "generic"}
+    for host, said in (("one", _COMPILED), ("other", _LOADED)):
+        module.write_text(_HOST.format(name=host) + _TWICE)
+        assert _run(module, cache, **generic) == (said, "")
+    module.write_text(_TWICE)
+    assert _run(module, cache) == (_COMPILED, "")  # and those of this one are others
+    assert _run(module, cache, **generic) == (_LOADED, "")  # which take nothing away
 
 
 def test_a_folder_that_cannot_be_made_is_one_warning(module: Path, tmp_path: Path) -> None:
