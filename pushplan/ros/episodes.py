@@ -9,7 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from pushplan.ros.mcap_writer import COMMAND, EPISODE, SCHEMA, STATE, WORLD, McapWriter
+from pushplan.ros.mcap_writer import COMMAND, EPISODE, SCHEMA, STATE, TOPICS, WORLD, McapWriter
+from pushplan.ros.message_types import RosbagsTypes
 from pushplan.world import Episode, GoalDisc, GoalLine, SchemaError, World
 from pushplan.world.checks import FloatArray
 from pushplan.world.files import world_from_dict
@@ -51,8 +52,8 @@ def load_episode(path: str | Path) -> Episode:
         MissingDependencyError: if `mcap` is not installed.
     """
     by_topic: dict[str, list[Any]] = {topic: [] for topic in (WORLD, STATE, COMMAND, EPISODE)}
-    for topic, content in _messages(Path(path), list(by_topic)):
-        by_topic[topic].append(content)
+    for topic, message in _messages(Path(path), list(by_topic)):
+        by_topic[topic].append(message)
     if not by_topic[WORLD] or not by_topic[STATE]:
         raise SchemaError(f"{path} holds no world: the robot's loop ended before the first one")
     try:
@@ -63,8 +64,8 @@ def load_episode(path: str | Path) -> Episode:
 
 
 def _messages(path: Path, topics: list[str]) -> Iterator[tuple[str, Any]]:
-    """Topic and content of the JSON messages of some topics, in the order of their times."""
-    library = need("mcap.reader")
+    """The messages of some of our topics, in the order of their times."""
+    library, types = need("mcap.reader"), RosbagsTypes()
     try:
         file = path.open("rb")
     except OSError as error:
@@ -83,7 +84,7 @@ def _messages(path: Path, topics: list[str]) -> Iterator[tuple[str, Any]]:
             )
         try:
             for _, channel, message in reader.iter_messages(topics=topics):
-                yield channel.topic, json.loads(message.data)
+                yield channel.topic, types.deserialize(message.data, TOPICS[channel.topic])
         except Exception as error:
             raise _unreadable(path, error) from error
 
@@ -97,26 +98,24 @@ def _unreadable(path: Path, error: Exception) -> SchemaError:
 
 
 def _episode(logged: Mapping[str, list[Any]]) -> Episode:
-    world = world_from_dict(logged[WORLD][0])
-    states = logged[STATE]
-    later = [thing for state in states for thing in state["new"]]
-    if later:
-        whole = {**logged[WORLD][0], "movables": [*logged[WORLD][0]["movables"], *later]}
-        world = world_from_dict(whole)
+    first, states = json.loads(logged[WORLD][0].json), logged[STATE]
+    for state in states:
+        if state.new_objects:
+            first["movables"] += json.loads(state.new_objects)
+    world = world_from_dict(first)
     poses = np.empty((len(states), len(world.movables), 3))
     rows = {number: k for k, number in enumerate(world.movables.ids.tolist())}
     now: FloatArray = np.array(world.movables.poses)
     for index, state in enumerate(states):
-        if state["ids"]:
-            now[[rows[number] for number in state["ids"]]] = state["object_poses"]
+        now[[rows[number] for number in state.ids.tolist()]] = state.object_poses.reshape(-1, 3)
         poses[index] = now
     recorded: dict[str, Any] = {
-        "times": np.array([state["time"] for state in states]),
-        "robot_poses": np.array([state["robot_pose"] for state in states]),
+        "times": np.array([state.time for state in states]),
+        "robot_poses": np.array([state.robot_pose for state in states]),
         "object_poses": poses,
     }
     if logged[EPISODE]:
-        end = dict(logged[EPISODE][-1])
+        end = json.loads(logged[EPISODE][-1].json)
         actions = np.reshape(end.pop("actions"), (-1, end.pop("action_size")))
         return Episode(world=world, **recorded, actions=actions, **end)
     return _driven(world, recorded, logged[COMMAND])
@@ -133,8 +132,8 @@ def _driven(world: World, recorded: dict[str, Any], commands: list[Any]) -> Epis
     else:
         completed = last.completed
         success = bool(completed.all())
-    ended = commands[-1]["status"] if commands else "no command"
-    actions = [[command["linear"], command["angular"]] for command in commands]
+    ended = commands[-1].status if commands else "no command"
+    actions = [[command.linear, command.angular] for command in commands]
     return Episode(
         world=world,
         **recorded,

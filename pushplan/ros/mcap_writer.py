@@ -21,35 +21,20 @@ from pushplan.world.libraries import need
 WORLD, STATE, COMMAND, EPISODE = (
     f"/pushplan/{name}" for name in ("world", "state", "command", "episode")
 )
-"""Topics of JSON messages, in which numbers are exact; all others are messages of ROS 2."""
-SCHEMA = "pushplan-log/1"
-_ROS = {
+"""Topics from which an episode comes back."""
+TOPICS = {
+    WORLD: "pushplan_msgs/msg/World",
+    STATE: "pushplan_msgs/msg/State",
+    COMMAND: "pushplan_msgs/msg/Command",
+    EPISODE: "pushplan_msgs/msg/Episode",
     "/tf": "tf2_msgs/msg/TFMessage",
     "/scene": "visualization_msgs/msg/MarkerArray",
     "/objects": "visualization_msgs/msg/MarkerArray",
     "/plan": "nav_msgs/msg/Path",
     "/cmd_vel": "geometry_msgs/msg/TwistStamped",
 }
-_NUMBERS = {"type": "array", "items": {"type": "number"}}
-_FIELDS: dict[str, dict[str, Any]] = {
-    WORLD: {},
-    STATE: {
-        "time": {"type": "number"},
-        "robot_pose": _NUMBERS,
-        "robot_twist": _NUMBERS,
-        "ids": _NUMBERS,
-        "object_poses": {"type": "array", "items": _NUMBERS},
-        "new": {"type": "array", "items": {"type": "object"}},
-    },
-    COMMAND: {
-        **{key: {"type": "number"} for key in ("time", "linear", "angular")},
-        **{key: {"type": "number"} for key in ("plan_age", "world_age")},
-        "status": {"type": "string"},
-        "reason": {"type": "string"},
-        "late": {"type": "boolean"},
-    },
-    EPISODE: {"success": {"type": "boolean"}, "reason": {"type": "string"}},
-}
+"""Topic -> its type."""
+SCHEMA = "pushplan-log/1"
 
 
 class McapWriter:
@@ -74,23 +59,17 @@ class McapWriter:
             raise InvalidInputError(f"cannot write {path}: {error.strerror}") from error
         self._writer = library.Writer(self._file)
         self._writer.start(profile="ros2", library="pushplan")
-        self._channels = {topic: self._channel(topic) for topic in (*_ROS, *_FIELDS)}
+        self._channels = {topic: self._channel(topic) for topic in TOPICS}
         self._counts = dict.fromkeys(self._channels, 0)
         self._scene: World | None = None
         self._known: set[int] = set()
         self._shown: dict[int, FloatArray] = {}
 
     def _channel(self, topic: str) -> int:
-        if topic in _ROS:
-            name, encoding, data = _ROS[topic], "ros2msg", self._types.definition(_ROS[topic])
-        else:
-            name, encoding = f"pushplan.{topic.rpartition('/')[2].title()}", "jsonschema"
-            schema = {"title": name, "type": "object", "properties": _FIELDS[topic]}
-            data = json.dumps(schema)
-        schema_id = self._writer.register_schema(name, encoding, data.encode())
-        coding = "cdr" if topic in _ROS else "json"
-        metadata = {"schema": SCHEMA}
-        return int(self._writer.register_channel(topic, coding, schema_id, metadata))
+        name = TOPICS[topic]
+        text = self._types.definition(name)
+        schema = self._writer.register_schema(name, "ros2msg", text.encode())
+        return int(self._writer.register_channel(topic, "cdr", schema, {"schema": SCHEMA}))
 
     def world(self, world: World) -> None:
         """Write a snapshot: the scene where it is another one, and where everything is."""
@@ -124,15 +103,16 @@ class McapWriter:
         ids = objects.ids.tolist()
         new = [k for k, number in enumerate(ids) if number not in self._known]
         self._known.update(ids)
-        content = {
-            "time": time,
-            "robot_pose": robot_pose.tolist(),
-            "robot_twist": twist.tolist(),
-            "ids": ids,
-            "object_poses": objects.poses.tolist(),
-            "new": _described(world, new),
-        }
-        self._put_json(STATE, time, content)
+        state = self._own(
+            STATE,
+            time,
+            robot_pose=np.asarray(robot_pose, dtype=np.float64),
+            robot_twist=np.asarray(twist, dtype=np.float64),
+            ids=np.asarray(objects.ids, dtype=np.int64),
+            object_poses=objects.poses.ravel(),
+            new_objects=json.dumps(_described(world, new)) if new else "",
+        )
+        self._put(STATE, time, state)
         outlines = {number: objects.outline(k) for k, number in enumerate(ids)}
         changed = [
             k
@@ -154,17 +134,18 @@ class McapWriter:
 
     def command(self, command: Command) -> None:
         """Write a command, and how old it was what it rests on."""
-        content = {
-            "time": command.time,
-            "linear": command.twist.linear,
-            "angular": command.twist.angular,
-            "status": command.status.value,
-            "reason": command.reason,
-            "plan_age": command.plan_age,
-            "world_age": command.world_age,
-            "late": command.late,
-        }
-        self._put_json(COMMAND, command.time, content)
+        own = self._own(
+            COMMAND,
+            command.time,
+            linear=command.twist.linear,
+            angular=command.twist.angular,
+            status=command.status.value,
+            reason=command.reason,
+            plan_age=command.plan_age,
+            world_age=command.world_age,
+            late=command.late,
+        )
+        self._put(COMMAND, command.time, own)
         twist = self._messages.twist_stamped(command.twist, command.time)
         self._put("/cmd_vel", command.time, twist)
 
@@ -180,14 +161,15 @@ class McapWriter:
             self._file.close()
 
     def _put_json(self, topic: str, time: float, content: dict[str, Any]) -> None:
-        self._add(topic, time, json.dumps(content, allow_nan=False).encode())
+        kind, header = self._types(TOPICS[topic]), self._messages.header(time)
+        self._put(topic, time, kind(header=header, json=json.dumps(content, allow_nan=False)))
+
+    def _own(self, topic: str, time: float, **fields: Any) -> Any:
+        header = self._messages.header(time)
+        return self._types(TOPICS[topic])(header=header, time=time, **fields)
 
     def _put(self, topic: str, time: float, message: Any) -> None:
-        self._add(topic, time, self._types.serialize(message))
-
-    def _add(self, topic: str, time: float, data: bytes) -> None:
-        if not 0.0 <= time < 2.0**31:
-            raise InvalidInputError(f"times of an MCAP log must be 0 to 2^31 s, got {time:g} s")
+        data = self._types.serialize(message)
         stamp, number = round(time * 1e9), self._counts[topic]
         self._counts[topic] += 1
         self._writer.add_message(self._channels[topic], stamp, data, stamp, number)
@@ -195,8 +177,6 @@ class McapWriter:
 
 def _described(world: World, which: list[int]) -> list[Any]:
     """Some objects of a world as in a world file."""
-    if not which:
-        return []
     chosen = np.zeros(len(world.movables), dtype=np.bool_)
     chosen[which] = True
     bare = StaticMap.build(bounds=world.static.bounds)

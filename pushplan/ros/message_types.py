@@ -13,6 +13,32 @@ from pushplan.world import MissingDependencyError, SchemaError, UnknownNameError
 from pushplan.world.checks import IntArray
 from pushplan.world.libraries import need
 
+OWN_MESSAGES = {
+    "pushplan_msgs/msg/World": "std_msgs/Header header\nstring json",
+    "pushplan_msgs/msg/State": (
+        "std_msgs/Header header\n"
+        "float64 time\n"
+        "float64[3] robot_pose\n"
+        "float64[3] robot_twist\n"
+        "int64[] ids\n"
+        "float64[] object_poses\n"
+        "string new_objects"
+    ),
+    "pushplan_msgs/msg/Command": (
+        "std_msgs/Header header\n"
+        "float64 time\n"
+        "float64 linear\n"
+        "float64 angular\n"
+        "string status\n"
+        "string reason\n"
+        "float64 plan_age\n"
+        "float64 world_age\n"
+        "bool late"
+    ),
+    "pushplan_msgs/msg/Episode": "std_msgs/Header header\nstring json",
+}
+"""Messages of pushplan's logs, in which numbers are exact; a log holds their definitions."""
+
 
 class MessageTypes(Protocol):
     """Gives the classes of messages by their names, such as ``nav_msgs/msg/Path``."""
@@ -99,4 +125,7 @@ class RclpyTypes:
 @cache
 def _store() -> Any:
     typesys = need("rosbags.typesys")
-    return typesys.get_typestore(typesys.Stores.ROS2_JAZZY)
+    store = typesys.get_typestore(typesys.Stores.ROS2_JAZZY)
+    for name, text in OWN_MESSAGES.items():
+        store.register(typesys.get_types_from_msg(text, name))
+    return store

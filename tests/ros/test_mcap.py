@@ -216,7 +216,7 @@ def test_bad_input_of_a_log_is_one_clear_error(tmp_path: Path) -> None:
     with pytest.raises(InvalidInputError, match="world"):
         log.world("world")
     log.command(Command(-1.0, Twist(0, 0), CommandStatus.DRIVING))
-    with pytest.raises(InvalidInputError, match=r"cannot write the log: times .* got -1 s"):
+    with pytest.raises(InvalidInputError, match=r"cannot write the log: time must .* got -1"):
         log.close()
     with pytest.raises(InvalidInputError, match="closed"):
         log.world(make_u_maze())
