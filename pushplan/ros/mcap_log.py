@@ -29,9 +29,10 @@ class McapLog:
         MissingDependencyError: if `mcap` or `rosbags` is not installed.
 
     Example:
-        >>> with McapLog("run.mcap") as log, Runner("push-aware", period=0.05, log=log) as runner:
-        ...     log.world(world)  # doctest: +SKIP
-        ...     runner.start(world)  # doctest: +SKIP
+        >>> log = McapLog("run.mcap")  # doctest: +SKIP
+        >>> with log, Runner("push-aware", period=0.05, log=log) as runner:  # doctest: +SKIP
+        ...     log.world(world)
+        ...     runner.start(world)
     """
 
     def __init__(self, path: str | Path, *, frame_id: str = "map") -> None:
