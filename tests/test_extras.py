@@ -21,6 +21,8 @@ EXTRAS = (
     "onnxruntime",
     "matplotlib",
     "imageio_ffmpeg",
+    "mcap",
+    "rosbags",
     "ruckig",
     "torch",
     "stable_baselines3",
@@ -74,6 +76,8 @@ def test_a_robot_needs_none_of_the_extras():
         ("pymunk", ["run", "maze-2d-3", "--policy", "straight"], "sim"),
         ("mujoco", ["run", "maze-3d-3", "--policy", "straight"], "sim"),
         ("onnxruntime", ["run", "maze-2d-3", "--policy", "maze-ppo"], "learned"),
+        ("mcap", ["score", "robot.mcap"], "ros"),
+        ("rosbags", ["run", "maze-2d-3", "--policy", "straight", "--out", "a.mcap"], "ros"),
         ("torch", ["train", "ppo", "--task", "maze", "--out", "never-made"], "learn"),
     ],
 )

@@ -109,6 +109,46 @@ def check_folder(path: str | None) -> None:
         raise InvalidInputError(f"there is no folder {Path(path).parent} for {path!r}")
 
 
+def check_episode_file(path: str | None) -> None:
+    """Refuse a file for an episode that cannot be written.
+
+    Raises:
+        InvalidInputError: if its folder does not exist.
+        MissingDependencyError: if it is to be MCAP and a library for that is missing.
+    """
+    from pushplan.world.libraries import need
+
+    check_folder(path)
+    if path is not None and is_mcap(path):
+        need("mcap")
+        need("rosbags")
+
+
+def load_episode(path: str) -> Episode:
+    """Read an episode: MCAP by the ending ``.mcap``, else what `Episode.save` wrote."""
+    from pushplan.world import Episode
+
+    if not is_mcap(path):
+        return Episode.load(path)
+    from pushplan.ros import load_episode
+
+    return load_episode(path)
+
+
+def save_episode(episode: Episode, path: str) -> None:
+    """Write an episode, as MCAP if the file ends in ``.mcap``."""
+    if not is_mcap(path):
+        return episode.save(path)
+    from pushplan.ros import save_episode
+
+    return save_episode(episode, path)
+
+
+def is_mcap(path: str) -> bool:
+    """Whether a file is a log as robots keep them, by its ending."""
+    return path.lower().endswith(".mcap")
+
+
 def say(text: str) -> None:
     """Write a line to standard output."""
     sys.stdout.write(text + "\n")

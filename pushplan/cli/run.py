@@ -5,7 +5,15 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING, Any
 
-from pushplan.cli.common import add_command, add_latency, add_trust, check_folder, milliseconds, say
+from pushplan.cli.common import (
+    add_command,
+    add_latency,
+    add_trust,
+    check_episode_file,
+    milliseconds,
+    save_episode,
+    say,
+)
 from pushplan.cli.kernel_progress import kernel_progress
 from pushplan.cli.scenario_options import add_scenario_options, scenario_of
 
@@ -37,7 +45,7 @@ def add(commands: Any) -> None:
     add_trust(parser)
     parser.add_argument("--render", metavar="FILE", help="picture or film: .png, .gif or .mp4")
     parser.add_argument("--live", action="store_true", help="show the episode in a window")
-    parser.add_argument("--out", metavar="episode.npz", help="write the recorded episode")
+    parser.add_argument("--out", metavar="FILE", help="write the episode: .npz or .mcap")
 
 
 def run(options: argparse.Namespace) -> int:
@@ -47,7 +55,7 @@ def run(options: argparse.Namespace) -> int:
     from pushplan.evaluation.execute import dry_run
 
     scenario = scenario_of(options)
-    check_folder(options.out)
+    check_episode_file(options.out)
     camera = Camera(options.render) if options.render else None
     spec = parse_policy(options.policy)
     policy = spec.make()
@@ -64,7 +72,7 @@ def run(options: argparse.Namespace) -> int:
         env.close()
     _print(spec.label, scenario, episode)
     if options.out:
-        episode.save(options.out)
+        save_episode(episode, options.out)
         say(f"wrote {options.out}")
     if camera is not None:
         camera.write(episode)

@@ -5,12 +5,21 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
-from pushplan.cli.common import add_command, say_scores
+from pushplan.cli.common import (
+    add_command,
+    check_episode_file,
+    load_episode,
+    save_episode,
+    say,
+    say_scores,
+)
 
 _EXAMPLES = """\
   pushplan score episode.npz
   pushplan score runs/first/episodes/*.npz
   pushplan score episode.npz --metrics E_nav,my_metrics:jerk
+  pushplan score robot.mcap
+  pushplan score episode.npz --out episode.mcap
 """
 
 
@@ -19,18 +28,29 @@ def add(commands: Any) -> None:
     parser = add_command(
         commands, "score", "compute the metrics of stored episodes", _EXAMPLES, run
     )
-    parser.add_argument("episodes", nargs="+", metavar="EPISODE.npz")
+    parser.add_argument(
+        "episodes", nargs="+", metavar="EPISODE", help=".npz, or .mcap as robots log"
+    )
     parser.add_argument(
         "--metrics", metavar="A,B", help="names or 'module:function'; all registered by default"
+    )
+    parser.add_argument(
+        "--out", metavar="FILE", help="write the one episode in another format: .mcap or .npz"
     )
 
 
 def run(options: argparse.Namespace) -> int:
     """One block of lines an episode."""
-    from pushplan.world import Episode
+    from pushplan.world import InvalidInputError
 
+    if options.out and len(options.episodes) > 1:
+        raise InvalidInputError(f"--out writes one episode, got {len(options.episodes)}")
+    check_episode_file(options.out)
     names = options.metrics.split(",") if options.metrics else None
     for path in options.episodes:
-        episode = Episode.load(path)
+        episode = load_episode(path)
         say_scores(episode, names, f"{path}: ")
+        if options.out:
+            save_episode(episode, options.out)
+            say(f"wrote {options.out}")
     return 0

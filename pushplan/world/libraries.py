@@ -15,6 +15,8 @@ EXTRAS = {
     "onnxruntime": "learned",
     "imageio_ffmpeg": "plots",
     "matplotlib": "plots",
+    "mcap": "ros",
+    "rosbags": "ros",
     "h5py": "learn",
     "minari": "learn",
     "onnx": "learn",

@@ -1,0 +1,34 @@
+"""ROS 2: its messages, with or without ROS installed, and logs that Foxglove opens."""
+
+from pushplan.ros.episodes import load_episode, save_episode
+from pushplan.ros.mcap_log import McapLog
+from pushplan.ros.message_types import MessageTypes, RclpyTypes, RosbagsTypes
+from pushplan.ros.messages import Messages
+from pushplan.ros.reading import (
+    frame_of,
+    path_from,
+    plan_from,
+    polygon_from,
+    pose_from,
+    static_map_from,
+    time_from,
+    twist_from,
+)
+
+__all__ = [
+    "McapLog",
+    "MessageTypes",
+    "Messages",
+    "RclpyTypes",
+    "RosbagsTypes",
+    "frame_of",
+    "load_episode",
+    "path_from",
+    "plan_from",
+    "polygon_from",
+    "pose_from",
+    "save_episode",
+    "static_map_from",
+    "time_from",
+    "twist_from",
+]

@@ -1,0 +1,145 @@
+"""Episodes as MCAP files, and MCAP files as episodes."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from pushplan.ros.mcap_writer import COMMAND, EPISODE, SCHEMA, STATE, TOPICS, WORLD, McapWriter
+from pushplan.ros.message_types import RosbagsTypes
+from pushplan.world import Episode, GoalDisc, GoalLine, SchemaError, World
+from pushplan.world.checks import FloatArray
+from pushplan.world.files import world_from_dict
+from pushplan.world.libraries import need
+
+_KEPT = ("completed", "actions", "rewards", "act_times_s", "plan_times_s")
+
+
+def save_episode(episode: Episode, path: str | Path) -> None:
+    """Write an episode as MCAP, which `load_episode` reads back exactly.
+
+    Raises:
+        InvalidInputError: if the file cannot be written.
+        MissingDependencyError: if `mcap` or `rosbags` is not installed.
+    """
+    writer = McapWriter(path)
+    try:
+        writer.scene(episode.world)
+        for index, time in enumerate(episode.times.tolist()):
+            world = episode.world_at(index)
+            writer.state(time, world.robot_pose, np.zeros(3), world)
+        content: dict[str, Any] = {key: getattr(episode, key).tolist() for key in _KEPT}
+        content |= {"success": episode.success, "reason": episode.reason}
+        content |= {"about": dict(episode.about), "action_size": episode.actions.shape[1]}
+        writer.episode(float(episode.times[-1]), content)
+    finally:
+        writer.close()
+
+
+def load_episode(path: str | Path) -> Episode:
+    """Read an MCAP log as an episode: one that `save_episode` wrote, or of a `McapLog`.
+
+    A robot's log does not say whether it succeeded: it did if the last world is at the goal. Its
+    actions are the commands. An object that is not seen keeps its last pose, and one that
+    is seen first later stands there from the start.
+
+    Raises:
+        SchemaError: if the file is missing, truncated, or no log of pushplan.
+        MissingDependencyError: if `mcap` is not installed.
+    """
+    by_topic: dict[str, list[Any]] = {topic: [] for topic in (WORLD, STATE, COMMAND, EPISODE)}
+    for topic, message in _messages(Path(path), list(by_topic)):
+        by_topic[topic].append(message)
+    if not by_topic[WORLD] or not by_topic[STATE]:
+        raise SchemaError(f"{path} holds no world: the robot's loop ended before the first one")
+    try:
+        return _episode(by_topic)
+    except (KeyError, TypeError, ValueError) as error:
+        why = f"no {error}" if isinstance(error, KeyError) else str(error)
+        raise SchemaError(f"{path} is not a log of this version of pushplan: {why}") from error
+
+
+def _messages(path: Path, topics: list[str]) -> Iterator[tuple[str, Any]]:
+    """The messages of some of our topics, in the order of their times."""
+    library, types = need("mcap.reader"), RosbagsTypes()
+    try:
+        file = path.open("rb")
+    except OSError as error:
+        raise SchemaError(f"cannot read {path}: {error.strerror}") from error
+    with file:
+        try:
+            reader = library.make_reader(file, validate_crcs=True)
+            summary = reader.get_summary()
+            found = {} if summary is None else {c.topic: c for c in summary.channels.values()}
+        except Exception as error:  # of many kinds, by where the bytes are wrong
+            raise _unreadable(path, error) from error
+        if WORLD not in found or found[WORLD].metadata.get("schema") != SCHEMA:
+            raise SchemaError(
+                f"{path} is no log of this version of pushplan: it needs topic {WORLD} with schema "
+                f"{SCHEMA!r}, found {', '.join(sorted(found)) or 'no topic'}"
+            )
+        try:
+            for _, channel, message in reader.iter_messages(topics=topics):
+                yield channel.topic, types.deserialize(message.data, TOPICS[channel.topic])
+        except Exception as error:
+            raise _unreadable(path, error) from error
+
+
+def _unreadable(path: Path, error: Exception) -> SchemaError:
+    why = " ".join(str(error).split()) or type(error).__name__
+    return SchemaError(
+        f"{path} is not a whole MCAP file ({why}); 'mcap recover' of the MCAP tools saves the "
+        "part of a truncated one that is there"
+    )
+
+
+def _episode(logged: Mapping[str, list[Any]]) -> Episode:
+    first, states = json.loads(logged[WORLD][0].json), logged[STATE]
+    for state in states:
+        if state.new_objects:
+            first["movables"] += json.loads(state.new_objects)
+    world = world_from_dict(first)
+    poses = np.empty((len(states), len(world.movables), 3))
+    rows = {number: k for k, number in enumerate(world.movables.ids.tolist())}
+    now: FloatArray = np.array(world.movables.poses)
+    for index, state in enumerate(states):
+        now[[rows[number] for number in state.ids.tolist()]] = state.object_poses.reshape(-1, 3)
+        poses[index] = now
+    recorded: dict[str, Any] = {
+        "times": np.array([state.time for state in states]),
+        "robot_poses": np.array([state.robot_pose for state in states]),
+        "object_poses": poses,
+    }
+    if logged[EPISODE]:
+        end = json.loads(logged[EPISODE][-1].json)
+        actions = np.reshape(end.pop("actions"), (-1, end.pop("action_size")))
+        return Episode(world=world, **recorded, actions=actions, **end)
+    return _driven(world, recorded, logged[COMMAND])
+
+
+def _driven(world: World, recorded: dict[str, Any], commands: list[Any]) -> Episode:
+    """The episode of a robot, from what it saw and the commands that it got."""
+    last = world.moved(
+        robot_pose=recorded["robot_poses"][-1], movable_poses=recorded["object_poses"][-1]
+    )
+    if isinstance(world.goal, GoalDisc | GoalLine):
+        x, y, _ = last.robot_pose.tolist()
+        completed, success = None, world.goal.distance(x, y) == 0.0
+    else:
+        completed = last.completed
+        success = bool(completed.all())
+    ended = commands[-1].status if commands else "no command"
+    actions = [[command.linear, command.angular] for command in commands]
+    return Episode(
+        world=world,
+        **recorded,
+        success=success,
+        reason="goal" if success else ended,
+        completed=completed,
+        actions=np.reshape(actions, (-1, 2)),
+        about={"source": "a robot's log"},
+    )

@@ -1,0 +1,140 @@
+"""Outlines of a world as ``visualization_msgs/Marker``, which 3D views show without plugins."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+import numpy as np
+
+from pushplan.ros.messages import Messages
+from pushplan.world import ClearanceArea, GoalDisc, Receptacle, World
+from pushplan.world.checks import FloatArray
+
+_TRIANGLES, _ADD, _DELETE = 11, 0, 2  # of visualization_msgs/Marker: type, and actions
+_COLOURS = {
+    "robot": (0.2, 0.5, 0.9, 1.0),
+    "static": (0.35, 0.35, 0.38, 1.0),
+    "goal": (0.3, 0.75, 0.4, 0.4),
+    "object": (0.85, 0.6, 0.3, 1.0),
+}
+_CIRCLE = np.linspace(0.0, 2.0 * np.pi, 33)[:-1]
+
+
+def scene_markers(messages: Messages, world: World) -> Any:
+    """``MarkerArray`` of the robot, in its own frame, what is static, and the goal."""
+    goal = world.goal
+    area: list[FloatArray] = []
+    if isinstance(goal, GoalDisc):
+        area = [goal.center + goal.radius * np.stack([np.cos(_CIRCLE), np.sin(_CIRCLE)], axis=1)]
+    elif isinstance(goal, Receptacle | ClearanceArea):
+        area = [goal.polygon]
+    base, frame, time = messages.base_frame, messages.frame_id, world.time
+    return _array(
+        messages,
+        [
+            _marker(messages, "robot", 0, base, time, world.robot.parts),
+            _marker(messages, "static", 0, frame, time, world.static.convex_parts),
+            _marker(messages, "goal", 0, frame, time, area),
+        ],
+    )
+
+
+def object_markers(messages: Messages, world: World, which: Sequence[int], gone: set[int]) -> Any:
+    """``MarkerArray`` of objects, each in its own frame.
+
+    Args:
+        messages: makes them.
+        world: where they are.
+        which: indices of those that are new or have another outline.
+        gone: ids of those that are not there any more.
+    """
+    objects, time = world.movables, world.time
+    shown = [
+        _marker(messages, "object", number, object_frame(number), time, [objects.outline(k)])
+        for k, number in ((k, int(objects.ids[k])) for k in which)
+    ]
+    hidden = [
+        _marker(messages, "object", number, object_frame(number), time, [], _DELETE)
+        for number in sorted(gone)
+    ]
+    return _array(messages, shown + hidden)
+
+
+def object_frame(number: int) -> str:
+    """The body frame of an object."""
+    return f"object_{number}"
+
+
+def transforms(messages: Messages, time: float, poses: Iterable[tuple[str, FloatArray]]) -> Any:
+    """``tf2_msgs/TFMessage`` from the world frame to the frames of bodies at (3,) poses."""
+    return messages.make(
+        "tf2_msgs/TFMessage",
+        transforms=[
+            messages.make(
+                "geometry_msgs/TransformStamped",
+                header=messages.header(time),
+                child_frame_id=name,
+                transform=messages.make(
+                    "geometry_msgs/Transform",
+                    translation=_vector(messages, float(pose[0]), float(pose[1]), 0.0),
+                    rotation=messages.quaternion(float(pose[2])),
+                ),
+            )
+            for name, pose in poses
+        ],
+    )
+
+
+def _array(messages: Messages, markers: list[Any]) -> Any:
+    return messages.make("visualization_msgs/MarkerArray", markers=markers)
+
+
+def _vector(messages: Messages, x: float, y: float, z: float) -> Any:
+    return messages.make("geometry_msgs/Vector3", x=x, y=y, z=z)
+
+
+def _marker(
+    messages: Messages,
+    kind: str,
+    number: int,
+    frame: str,
+    time: float,
+    outlines: Iterable[FloatArray],
+    action: int = _ADD,
+) -> Any:
+    """Convex outlines, each (N, 2) [m], filled with triangles."""
+    make = messages.make
+    corners = [
+        make("geometry_msgs/Point", x=x, y=y, z=0.0)
+        for outline in outlines
+        for k in range(1, len(outline) - 1)
+        for x, y in outline[[0, k, k + 1]].tolist()
+    ]
+    r, g, b, a = _COLOURS[kind]
+    now, never = messages.stamp(time), messages.stamp(0.0)
+    header = make("std_msgs/Header", stamp=never, frame_id="")
+    return make(
+        "visualization_msgs/Marker",
+        header=make("std_msgs/Header", stamp=now, frame_id=frame),
+        ns=kind,
+        id=number,
+        type=_TRIANGLES,
+        action=action if corners else _DELETE,
+        pose=messages.pose((0.0, 0.0, 0.0)),
+        scale=_vector(messages, 1.0, 1.0, 1.0),
+        color=make("std_msgs/ColorRGBA", r=r, g=g, b=b, a=a),
+        lifetime=make("builtin_interfaces/Duration", sec=0, nanosec=0),
+        frame_locked=True,
+        points=corners,
+        colors=[],
+        texture_resource="",
+        texture=make(
+            "sensor_msgs/CompressedImage", header=header, format="", data=np.zeros(0, np.uint8)
+        ),
+        uv_coordinates=[],
+        text="",
+        mesh_resource="",
+        mesh_file=make("visualization_msgs/MeshFile", filename="", data=np.zeros(0, np.uint8)),
+        mesh_use_embedded_materials=False,
+    )

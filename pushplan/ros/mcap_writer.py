@@ -1,0 +1,184 @@
+"""`McapWriter`: worlds, plans and commands as messages of an MCAP file."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from pushplan.ros.markers import object_frame, object_markers, scene_markers, transforms
+from pushplan.ros.message_types import RosbagsTypes
+from pushplan.ros.messages import Messages
+from pushplan.runtime import Command
+from pushplan.world import InvalidInputError, Plan, StaticMap, World
+from pushplan.world.checks import FloatArray
+from pushplan.world.files import world_to_dict
+from pushplan.world.libraries import need
+
+WORLD, STATE, COMMAND, EPISODE = (
+    f"/pushplan/{name}" for name in ("world", "state", "command", "episode")
+)
+"""Topics from which an episode comes back."""
+TOPICS = {
+    WORLD: "pushplan_msgs/msg/World",
+    STATE: "pushplan_msgs/msg/State",
+    COMMAND: "pushplan_msgs/msg/Command",
+    EPISODE: "pushplan_msgs/msg/Episode",
+    "/tf": "tf2_msgs/msg/TFMessage",
+    "/scene": "visualization_msgs/msg/MarkerArray",
+    "/objects": "visualization_msgs/msg/MarkerArray",
+    "/plan": "nav_msgs/msg/Path",
+    "/cmd_vel": "geometry_msgs/msg/TwistStamped",
+}
+"""Topic -> its type."""
+SCHEMA = "pushplan-log/1"
+
+
+class McapWriter:
+    """Writes an MCAP file; one thread at a time.
+
+    Args:
+        path: the file; one that is there is replaced.
+        frame_id: the world frame.
+
+    Raises:
+        InvalidInputError: if the file cannot be written.
+        MissingDependencyError: if `mcap` or `rosbags` is not installed.
+    """
+
+    def __init__(self, path: str | Path, frame_id: str = "map") -> None:
+        self._types = RosbagsTypes()
+        self._messages = Messages(self._types, frame_id=frame_id)
+        library = need("mcap.writer")
+        try:
+            self._file = Path(path).open("wb")
+        except OSError as error:
+            raise InvalidInputError(f"cannot write {path}: {error.strerror}") from error
+        self._writer = library.Writer(self._file)
+        self._writer.start(profile="ros2", library="pushplan")
+        self._channels = {topic: self._channel(topic) for topic in TOPICS}
+        self._counts = dict.fromkeys(self._channels, 0)
+        self._scene: World | None = None
+        self._known: set[int] = set()
+        self._shown: dict[int, FloatArray] = {}
+
+    def _channel(self, topic: str) -> int:
+        name = TOPICS[topic]
+        text = self._types.definition(name)
+        schema = self._writer.register_schema(name, "ros2msg", text.encode())
+        return int(self._writer.register_channel(topic, "cdr", schema, {"schema": SCHEMA}))
+
+    def world(self, world: World) -> None:
+        """Write a snapshot: the scene where it is another one, and where everything is."""
+        self.scene(world)
+        assert world.robot_twist is not None
+        self.state(world.time, world.robot_pose, world.robot_twist, world)
+
+    def scene(self, world: World) -> None:
+        """Write robot, map, goal and objects, unless they are those of the last scene."""
+        old = self._scene
+        if old is not None and all(
+            getattr(old, key) is getattr(world, key) or getattr(old, key) == getattr(world, key)
+            for key in ("robot", "static", "goal", "margin")
+        ):
+            return
+        self._scene = world
+        self._known.update(world.movables.ids.tolist())
+        self._put_json(WORLD, world.time, world_to_dict(world))
+        self._put("/scene", world.time, scene_markers(self._messages, world))
+
+    def state(self, time: float, robot_pose: FloatArray, twist: FloatArray, world: World) -> None:
+        """Write where robot and objects are.
+
+        Args:
+            time: [s].
+            robot_pose: (3,) x, y [m], theta [rad].
+            twist: (3,) of the robot in the world frame [m/s, m/s, rad/s].
+            world: holds the objects.
+        """
+        objects = world.movables
+        ids = objects.ids.tolist()
+        new = [k for k, number in enumerate(ids) if number not in self._known]
+        self._known.update(ids)
+        state = self._own(
+            STATE,
+            time,
+            robot_pose=np.asarray(robot_pose, dtype=np.float64),
+            robot_twist=np.asarray(twist, dtype=np.float64),
+            ids=np.asarray(objects.ids, dtype=np.int64),
+            object_poses=objects.poses.ravel(),
+            new_objects=json.dumps(_described(world, new)) if new else "",
+        )
+        self._put(STATE, time, state)
+        outlines = {number: objects.outline(k) for k, number in enumerate(ids)}
+        changed = [
+            k
+            for k, number in enumerate(ids)
+            if not np.array_equal(self._shown.get(number, ()), outlines[number])
+        ]
+        gone = self._shown.keys() - outlines.keys()
+        if changed or gone:
+            markers = object_markers(self._messages, world, changed, set(gone))
+            self._put("/objects", time, markers)
+        self._shown = outlines
+        bodies = [(self._messages.base_frame, robot_pose)]
+        bodies += [(object_frame(n), pose) for n, pose in zip(ids, objects.poses, strict=True)]
+        self._put("/tf", time, transforms(self._messages, time, bodies))
+
+    def plan(self, plan: Plan, time: float) -> None:
+        """Write a plan that was taken up."""
+        self._put("/plan", time, self._messages.path(plan, time))
+
+    def command(self, command: Command) -> None:
+        """Write a command, and how old it was what it rests on."""
+        own = self._own(
+            COMMAND,
+            command.time,
+            linear=command.twist.linear,
+            angular=command.twist.angular,
+            status=command.status.value,
+            reason=command.reason,
+            plan_age=command.plan_age,
+            world_age=command.world_age,
+            late=command.late,
+        )
+        self._put(COMMAND, command.time, own)
+        twist = self._messages.twist_stamped(command.twist, command.time)
+        self._put("/cmd_vel", command.time, twist)
+
+    def episode(self, time: float, content: dict[str, Any]) -> None:
+        """Write what is known of an episode when it has ended."""
+        self._put_json(EPISODE, time, content)
+
+    def close(self) -> None:
+        """Write the index that every reader needs, and close the file."""
+        try:
+            self._writer.finish()
+        finally:
+            self._file.close()
+
+    def _put_json(self, topic: str, time: float, content: dict[str, Any]) -> None:
+        kind, header = self._types(TOPICS[topic]), self._messages.header(time)
+        self._put(topic, time, kind(header=header, json=json.dumps(content, allow_nan=False)))
+
+    def _own(self, topic: str, time: float, **fields: Any) -> Any:
+        header = self._messages.header(time)
+        return self._types(TOPICS[topic])(header=header, time=time, **fields)
+
+    def _put(self, topic: str, time: float, message: Any) -> None:
+        data = self._types.serialize(message)
+        stamp, number = round(time * 1e9), self._counts[topic]
+        self._counts[topic] += 1
+        self._writer.add_message(self._channels[topic], stamp, data, stamp, number)
+
+
+def _described(world: World, which: list[int]) -> list[Any]:
+    """Some objects of a world as in a world file."""
+    chosen = np.zeros(len(world.movables), dtype=np.bool_)
+    chosen[which] = True
+    bare = StaticMap.build(bounds=world.static.bounds)
+    some = replace(world, static=bare, movables=world.movables.select(chosen))
+    return list(world_to_dict(some)["movables"])

@@ -1,0 +1,214 @@
+"""What ROS 2 messages say, of `rosbags` or of `rclpy`, in the types of pushplan."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pushplan.world import InvalidInputError, Plan, RobotModel, StaticMap, Twist
+from pushplan.world.checks import FloatArray, array
+from pushplan.world.polyline import arc_lengths, path_length
+
+_TILT = math.cos(math.radians(15.0))  # steepest floor that still counts as a plane
+_LATERAL = 1e-6  # speed that counts as none [m/s, rad/s]
+
+
+def time_from(message: Any) -> float:
+    """Time of a message with a header [s]."""
+    stamp = _header(message).stamp
+    return float(stamp.sec) + 1e-9 * float(stamp.nanosec)
+
+
+def frame_of(message: Any) -> str:
+    """The frame that a message with a header is in."""
+    return str(_header(message).frame_id)
+
+
+def pose_from(message: Any, frame: str | None = None) -> FloatArray:
+    """(3,) x, y [m], theta [rad] of a ``Pose``, ``PoseStamped`` or one with covariance.
+
+    Args:
+        message: of any of these types.
+        frame: the frame that it has to be in; any if None.
+
+    Raises:
+        InvalidInputError: if it is another message, in another frame, tilted by more than 15
+            degrees, or its quaternion has not the length 1.
+    """
+    _in_frame(message, frame)
+    pose, name = message, _name(message)
+    if name not in (
+        "geometry_msgs/Pose",
+        "geometry_msgs/PoseStamped",
+        "geometry_msgs/PoseWithCovariance",
+        "geometry_msgs/PoseWithCovarianceStamped",
+    ):
+        raise _wrong(name, "geometry_msgs/Pose, PoseStamped or PoseWithCovariance(Stamped)")
+    while hasattr(pose, "pose"):
+        pose = pose.pose
+    return array("pose", [pose.position.x, pose.position.y, _heading(pose.orientation)], (3,))
+
+
+def path_from(message: Any, frame: str | None = None) -> tuple[FloatArray, FloatArray]:
+    """Times (N,) [s] and poses (N, 3) of a ``nav_msgs/Path``.
+
+    Args:
+        message: the path. Poses without a frame of their own are in that of the path.
+        frame: the frame that it has to be in; any if None.
+
+    Raises:
+        InvalidInputError: if it is another message, empty, in another frame, or a pose is refused
+            by `pose_from`.
+    """
+    _expect(message, "nav_msgs/Path")
+    if not message.poses:
+        raise InvalidInputError("a path needs at least one pose, got none")
+    own = frame_of(message)
+    _in_frame(message, frame)
+    for pose in message.poses:
+        _in_frame(pose, own if frame_of(pose) else None)
+    times: FloatArray = array("path times", [time_from(pose) for pose in message.poses], (None,))
+    poses: FloatArray = array("path", [pose_from(pose) for pose in message.poses], (None, 3))
+    return times, poses
+
+
+def plan_from(message: Any, robot: RobotModel, frame: str | None = None) -> Plan:
+    """A plan to follow from a ``nav_msgs/Path``.
+
+    Where the stamps of the poses increase they are the times; else, as in the paths of Nav2, the
+    robot drives as fast as it can and turns no faster than it can.
+
+    Args:
+        message: the path.
+        robot: who is to drive it.
+        frame: the frame that it has to be in; any if None.
+
+    Raises:
+        InvalidInputError: as `path_from`.
+    """
+    times, poses = path_from(message, frame)
+    lengths = np.diff(arc_lengths(poses))
+    turns = (np.diff(poses[:, 2]) + np.pi) % (2.0 * np.pi) - np.pi
+    steps = np.diff(times)
+    if len(steps) == 0 or (steps < 0.0).any() or not steps.any():
+        steps = np.maximum(lengths / robot.max_speed, np.abs(turns) / robot.max_turn_rate)
+    moving = steps > 0.0
+    rates = np.zeros((2, len(poses)))
+    rates[:, :-1][:, moving] = np.stack([lengths, turns])[:, moving] / steps[moving]
+    return Plan(
+        times=np.concatenate([[0.0], np.cumsum(steps)]),
+        poses=poses,
+        speeds=rates[0],
+        turn_rates=rates[1],
+        travel_cost=robot.mass * path_length(poses),
+    )
+
+
+def twist_from(message: Any) -> Twist:
+    """The velocity in the body frame that a ``Twist`` or ``TwistStamped`` asks for.
+
+    Raises:
+        InvalidInputError: if it is another message, or asks for more than driving ahead and
+            turning about z.
+    """
+    name = _name(message)
+    if name not in ("geometry_msgs/Twist", "geometry_msgs/TwistStamped"):
+        raise _wrong(name, "geometry_msgs/Twist or TwistStamped")
+    twist = message.twist if name.endswith("Stamped") else message
+    linear, angular = twist.linear, twist.angular
+    others = (linear.y, linear.z, angular.x, angular.y)
+    if not max(abs(value) for value in others) <= _LATERAL:
+        raise InvalidInputError(
+            "a twist holds linear.x and angular.z alone, got linear.y, linear.z, angular.x, "
+            f"angular.y = {', '.join(f'{value:g}' for value in others)}"
+        )
+    return Twist(linear.x, angular.z)
+
+
+def polygon_from(message: Any, frame: str | None = None) -> FloatArray:
+    """(N, 2) corners [m] of a ``PolygonStamped`` or ``Polygon``; heights do not count.
+
+    Raises:
+        InvalidInputError: if it is another message, or in another frame than ``frame``.
+    """
+    name = _name(message)
+    if name not in ("geometry_msgs/Polygon", "geometry_msgs/PolygonStamped"):
+        raise _wrong(name, "geometry_msgs/Polygon or PolygonStamped")
+    _in_frame(message, frame)
+    polygon = message.polygon if name.endswith("Stamped") else message
+    corners = [[point.x, point.y] for point in polygon.points]
+    return array("polygon", np.reshape(corners, (-1, 2)), (None, 2))
+
+
+def static_map_from(
+    message: Any, frame: str | None = None, *, occupied: int = 65, unknown: str = "obstacle"
+) -> StaticMap:
+    """The map of a ``nav_msgs/OccupancyGrid``; see `StaticMap.from_occupancy`.
+
+    Raises:
+        InvalidInputError: if it is another message, in another frame, its data have not the size
+            that it states, or are refused.
+    """
+    _expect(message, "nav_msgs/OccupancyGrid")
+    _in_frame(message, frame)
+    height, width = int(message.info.height), int(message.info.width)
+    cells: NDArray[np.int8] = np.asarray(message.data, dtype=np.int8)
+    if height * width != len(cells):
+        raise InvalidInputError(
+            f"an OccupancyGrid of height {height} and width {width} needs {height * width} cells, "
+            f"got {len(cells)}"
+        )
+    side = float(str(np.float32(message.info.resolution)))  # 0.05 is meant, not 0.0500000007
+    place = message.info.origin
+    origin = [place.position.x, place.position.y, _heading(place.orientation)]
+    return StaticMap.from_occupancy(
+        cells.reshape(height, width), side, origin, occupied=occupied, unknown=unknown
+    )
+
+
+def _heading(q: Any) -> float:
+    """Heading [rad] of a quaternion."""
+    length = math.sqrt(q.x * q.x + q.y * q.y + q.z * q.z + q.w * q.w)
+    if not abs(length - 1.0) <= 1e-3:
+        raise InvalidInputError(
+            f"a quaternion must have length 1, got x, y, z, w = {q.x:g}, {q.y:g}, {q.z:g}, {q.w:g}"
+        )
+    if 1.0 - 2.0 * (q.x * q.x + q.y * q.y) < _TILT:
+        raise InvalidInputError(
+            "poses lie in the ground plane, got one tilted by more than 15 degrees: "
+            f"x, y, z, w = {q.x:g}, {q.y:g}, {q.z:g}, {q.w:g}"
+        )
+    return math.atan2(2.0 * (q.w * q.z + q.x * q.y), 1.0 - 2.0 * (q.y * q.y + q.z * q.z))
+
+
+def _name(message: Any) -> str:
+    """``package/Name`` of a message of `rosbags` or `rclpy`, or what it is instead."""
+    kind = type(message)
+    if hasattr(kind, "__msgtype__"):
+        return str(kind.__msgtype__).replace("/msg/", "/")
+    return f"{kind.__module__.partition('.')[0]}/{kind.__name__}"
+
+
+def _wrong(name: str, wanted: str) -> InvalidInputError:
+    return InvalidInputError(f"this takes a message {wanted}, got {name}")
+
+
+def _expect(message: Any, wanted: str) -> None:
+    if _name(message) != wanted:
+        raise _wrong(_name(message), wanted)
+
+
+def _header(message: Any) -> Any:
+    if not hasattr(message, "header"):
+        raise _wrong(_name(message), "with a header")
+    return message.header
+
+
+def _in_frame(message: Any, frame: str | None) -> None:
+    if frame is not None and frame_of(message) != frame:
+        raise InvalidInputError(
+            f"a message must be in frame {frame!r}, got one in {frame_of(message)!r}: transform it"
+        )

@@ -1,0 +1,197 @@
+"""Messages against the library's own types, CDR and back."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from conftest import make_robot, make_u_maze
+from hypothesis import given
+from hypothesis import strategies as st
+
+from pushplan.ros import (
+    Messages,
+    RosbagsTypes,
+    frame_of,
+    path_from,
+    plan_from,
+    polygon_from,
+    pose_from,
+    static_map_from,
+    time_from,
+    twist_from,
+)
+from pushplan.world import (
+    InvalidInputError,
+    Plan,
+    PushplanError,
+    SchemaError,
+    StaticMap,
+    Twist,
+    UnknownNameError,
+)
+
+MESSAGES = Messages()
+TYPES = RosbagsTypes()
+COORDINATES = st.floats(-1e4, 1e4)
+POSES = st.tuples(COORDINATES, COORDINATES, st.floats(-math.pi, math.pi))
+
+
+def sent(message):
+    """A message that went over the wire."""
+    data = TYPES.serialize(message)
+    read = TYPES.deserialize(data, message.__msgtype__)
+    assert TYPES.serialize(read) == data
+    return read
+
+
+def some_plan() -> Plan:
+    times = np.array([0.0, 0.5, 1.25, 2.0])
+    poses = np.array([[0.0, 0, 0], [0.1, 0, 0.3], [0.25, 0.1, -3.1], [0.3, 0.1, 3.1]])
+    return Plan(times, poses, np.ones(4), np.zeros(4), travel_cost=1.0)
+
+
+@given(POSES, st.floats(0.0, 2e9))
+def test_a_pose_comes_back(pose, time):
+    read = sent(MESSAGES.pose_stamped(pose, time))
+    assert type(read).__name__ == "geometry_msgs__msg__PoseStamped"
+    back = pose_from(read, "map")
+    assert back[:2].tolist() == list(pose[:2])
+    assert math.cos(back[2] - pose[2]) == pytest.approx(1.0, abs=1e-12)
+    assert abs(math.sin(back[2] - pose[2])) < 1e-12
+    assert time_from(read) == pytest.approx(time, abs=5e-7)
+    assert pose_from(read.pose).tolist() == back.tolist()
+
+
+@given(st.floats(-10, 10), st.floats(-10, 10), st.floats(0, 1e6))
+def test_a_twist_comes_back(linear, angular, time):
+    twist = Twist(linear, angular)
+    read = sent(MESSAGES.twist_stamped(twist, time))
+    assert twist_from(read) == twist == twist_from(sent(MESSAGES.twist(twist)))
+    assert frame_of(read) == "base_link"
+
+
+def test_a_plan_comes_back_as_a_path():
+    plan = some_plan()
+    read = sent(MESSAGES.path(plan, 12.5))
+    assert [pose.header.frame_id for pose in read.poses] == ["map"] * 4
+    times, poses = path_from(read, "map")
+    np.testing.assert_allclose(times, 12.5 + plan.times, atol=1e-9)
+    np.testing.assert_allclose(poses, plan.poses, atol=1e-12)
+    again = plan_from(read, make_robot())
+    np.testing.assert_allclose(again.times, plan.times, atol=1e-9)
+    assert again.travel_cost == pytest.approx(plan.length)
+    assert again.turn_rates[2] == pytest.approx((6.2 - 2 * math.pi) / 0.75)  # the short way round
+
+
+def test_a_path_without_times_is_driven_at_the_robots_speed():
+    robot = make_robot(max_speed=0.5, max_turn_rate=1.0)
+    poses = np.array([[0.0, 0, 0], [1, 0, 0], [1, 0, 1.5]])
+    still = Plan(np.zeros(3), poses, np.zeros(3), np.zeros(3), travel_cost=1.0)
+    plan = plan_from(sent(MESSAGES.path(still, 3.0)), robot)
+    assert plan.times.tolist() == pytest.approx([0.0, 2.0, 3.5])
+    assert plan.speeds.tolist() == pytest.approx([0.5, 0.0, 0.0])
+    assert plan.turn_rates.tolist() == pytest.approx([0.0, 1.0, 0.0])
+
+
+def test_outlines_come_back_in_single_precision():
+    corners = np.array([[0.1, 0.2], [3.0, 0.2], [3.0, 4.4]])
+    read = sent(MESSAGES.polygon(corners, 1.0))
+    assert polygon_from(read, "map").tolist() == corners.astype(np.float32).tolist()
+    assert polygon_from(read.polygon).shape == (3, 2)
+
+
+@pytest.mark.parametrize("origin", [(0.0, 0.0, 0.0), (-3.0, 2.5, 0.7)])
+def test_a_grid_becomes_the_same_map(origin):
+    grid = np.random.default_rng(4).choice([-1, 0, 100, 64, 65], size=(7, 11))
+    read = sent(MESSAGES.occupancy(grid, 0.05, origin))
+    assert read.data.dtype == np.int8 and (read.info.width, read.info.height) == (11, 7)
+    for unknown in ("obstacle", "free"):
+        seen = static_map_from(read, "map", unknown=unknown)
+        meant = StaticMap.from_occupancy(grid, 0.05, origin, unknown=unknown)
+        np.testing.assert_allclose(seen.bounds, meant.bounds, atol=1e-12)
+        assert len(seen.polygons) == len(meant.polygons)
+        for a, b in zip(seen.polygons, meant.polygons, strict=True):
+            np.testing.assert_allclose(a, b, atol=1e-12)
+
+
+def bad(name):
+    pose = MESSAGES.pose_stamped((0, 0, 0), 0.0)
+    path, grid = MESSAGES.path(some_plan()), MESSAGES.occupancy(np.zeros((2, 3), int), 0.1)
+    twist = MESSAGES.twist(Twist(1, 0))
+    if name == "tilted":
+        pose.pose.orientation.x = 1.0
+        pose.pose.orientation.w = 0.0
+        return pose_from, pose
+    if name == "quaternion":
+        pose.pose.orientation.w = 0.0
+        return pose_from, pose
+    if name == "nan":
+        pose.pose.position.x = math.nan
+        return pose_from, pose
+    if name == "nan quaternion":
+        pose.pose.orientation.z = math.nan
+        return pose_from, pose
+    if name == "frame":
+        return lambda message: path_from(message, "odom"), path
+    if name == "frame within":
+        path.poses[2].header.frame_id = "odom"
+        return path_from, path
+    if name == "empty":
+        path.poses.clear()
+        return path_from, path
+    if name == "cells":
+        grid.info.width = 4
+        return static_map_from, grid
+    if name == "type":
+        return static_map_from, path
+    if name == "no message":
+        return pose_from, "pose"
+    if name == "sideways":
+        twist.linear.y = 0.2
+        return twist_from, twist
+    twist.linear.x = math.inf
+    return twist_from, twist
+
+
+@pytest.mark.parametrize(
+    ("name", "says"),
+    [
+        ("tilted", "15 degrees"),
+        ("quaternion", "length 1"),
+        ("nan", "finite"),
+        ("nan quaternion", "length 1"),
+        ("frame", "'odom', got one in 'map'"),
+        ("frame within", "'map', got one in 'odom'"),
+        ("empty", "at least one pose"),
+        ("cells", "needs 8 cells, got 6"),
+        ("type", "OccupancyGrid, got nav_msgs/Path"),
+        ("no message", "got builtins/str"),
+        ("sideways", "linear.y"),
+        ("infinite", "finite"),
+    ],
+)
+def test_a_bad_message_is_one_clear_error(name, says):
+    read, message = bad(name)
+    with pytest.raises(InvalidInputError, match=says) as caught:
+        read(message)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("call", "error", "says"),
+    [
+        (lambda: MESSAGES.stamp(-1.0), InvalidInputError, "time must lie"),
+        (lambda: MESSAGES.pose((0, math.nan, 0)), InvalidInputError, "finite"),
+        (lambda: MESSAGES.occupancy([[101]], 0.1), InvalidInputError, "101"),
+        (lambda: MESSAGES.occupancy([[0.5]], 0.1), InvalidInputError, "whole numbers"),
+        (lambda: MESSAGES.path(make_u_maze()), InvalidInputError, "plan"),
+        (lambda: TYPES("nav_msgs/msg/Pat"), UnknownNameError, "nav_msgs/msg/Path"),
+        (lambda: TYPES.deserialize(b"\0\1\0\0ab", "nav_msgs/msg/Path"), SchemaError, "no nav_msgs"),
+    ],
+)
+def test_what_cannot_be_a_message_is_one_clear_error(call, error, says):
+    with pytest.raises(error, match=says):
+        call()
+    assert issubclass(error, PushplanError)
