@@ -104,7 +104,8 @@ def _check(hint: Any) -> tuple[Callable[..., Any] | None, Shape | None]:
     if isinstance(note, OneOf):
         return partial(choice, valid=note.valid), None
     if isinstance(note, Shape):
-        dtype = np.dtype(get_args(get_args(base)[1])[0])
+        kind = get_args(base)[-1]  # of an NDArray: a dtype, and since NumPy 2.5 its scalar
+        dtype = np.dtype((get_args(kind) or (kind,))[0])
         if any(isinstance(side, str) for side in note):
             return partial(array, dtype=dtype), note
         plain = tuple(side for side in note if not isinstance(side, str))
