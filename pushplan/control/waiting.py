@@ -45,9 +45,7 @@ def waiting_twist(world: World) -> Twist:
         at[:] = world.robot_pose
         return step * _clear_steps(step, turn, first, most, shape, walls, at, scratch) - ahead
 
-    arcs = [
-        clamp_twist(robot, robot.max_speed, share * robot.max_turn_rate) for share in _TURNS
-    ]
+    arcs = [clamp_twist(robot, robot.max_speed, share * robot.max_turn_rate) for share in _TURNS]
     for ahead in _AHEAD:
         for arc in arcs[-2:]:
             if clear(arc, circle, ahead * shape.radius) >= circle:
