@@ -10,13 +10,16 @@ Per policy it writes how long `Runner.command` took (median, 99.9th percentile a
 of that the thread computed itself at worst (the rest is the machine doing other work), how many
 commands were late, what was compiled after `start`, by how much memory grew after the first tenth,
 and how the episodes ended. With --kill a planning thread is ended now and then in the middle of its
-call, by an exception that no planner catches.
+call, by an exception that no planner catches. With --realtime the loop has the highest real-time
+priority, the simulator the next and the planning thread the lowest, as on a robot; other work on
+the machine then delays none of them. That needs the right to set priorities.
 """
 
 from __future__ import annotations
 
 import argparse
 import multiprocessing
+import os
 import socket
 import threading
 import time
@@ -43,6 +46,7 @@ SUITES = {
     "ship-predictive": "ship-ice-3d-20",
 }
 ADDRESS = "127.0.0.1"
+PLANNING = "pushplan planning"  # name of the threads of planning calls
 _KILL_EVERY_S = 20.0
 _LARGEST = 65_000  # bytes of a datagram
 
@@ -54,6 +58,7 @@ def main() -> None:
     parser.add_argument("--rate", type=float, default=20.0)
     parser.add_argument("--seed", type=int, default=1000)
     parser.add_argument("--kill", action="store_true")
+    parser.add_argument("--realtime", action="store_true", help="Linux real-time priorities")
     parser.add_argument("--policies", nargs="+", default=list(SUITES), choices=list(SUITES))
     options = parser.parse_args()
     print(
@@ -77,6 +82,9 @@ def row(policy: str, options: argparse.Namespace) -> str:
     killer = Killer()
     runner = Runner(policy, period=period, plan_stop=PLAN_STOP | killer)
     loop = _Loop(runner, ours, period, killer, options.kill)
+    if options.realtime:
+        set_priority(0, 30)
+        set_priority(robot.pid, 20)
     try:
         loop.run(options.seconds)
     finally:
@@ -239,6 +247,16 @@ class _Loop:
         self.growth_mb = resident_mb() - (memory or resident_mb())
 
 
+def set_priority(process: int | None, priority: int) -> None:
+    """Real-time priority of a process, or of this thread (0) and those that it starts."""
+    os.sched_setscheduler(process or 0, os.SCHED_FIFO, os.sched_param(priority))
+
+
+def is_realtime() -> bool:
+    """Whether this thread has a real-time priority."""
+    return os.sched_getscheduler(0) == os.SCHED_FIFO
+
+
 class Killer(Stop):
     """A stop rule that ends the thread of the planning call that looks at it next, when told to."""
 
@@ -246,7 +264,9 @@ class Killer(Stop):
         self.due, self.killed = False, 0
 
     def start(self) -> StopCheck:
-        """See `pushplan.world.Stop`."""
+        """See `pushplan.world.Stop`; planning gives way to the loop whose priority it inherits."""
+        if threading.current_thread().name == PLANNING and is_realtime():
+            set_priority(0, 10)
         return self._check
 
     def _check(self, iterations: int, cost: float) -> bool:

@@ -15,6 +15,7 @@ from pushplan.control.pure_pursuit import PurePursuit
 from pushplan.control.recovery import Recovery
 from pushplan.control.retreat import Retreat
 from pushplan.control.tracking import Progress
+from pushplan.control.waiting import waiting_twist
 from pushplan.world.lazy_names import lazy_names
 
 if TYPE_CHECKING:
@@ -39,6 +40,7 @@ __all__ = [
     "StallChecker",
     "TwistLimiter",
     "clamp_twist",
+    "waiting_twist",
 ]
 
 __getattr__, __dir__ = lazy_names(__name__, {"mpc": "MpcConfig MpcTracker"})

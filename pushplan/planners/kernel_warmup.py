@@ -9,6 +9,7 @@ from typing import Protocol, runtime_checkable
 
 import numpy as np
 
+from pushplan.control import waiting_twist
 from pushplan.control.recovery import warm_up_recovery
 from pushplan.planners.following.plan_follower import PlanFollower
 from pushplan.planners.following.renewing_follower import RenewingFollower
@@ -88,6 +89,7 @@ def _plan_and_follow(policy: PlanFollower, world: World) -> None:
         moved = world.moved(robot_pose=pose, time=0.1 * step)
         planner.plan(moved, stop=fewer)
         policy.act(moved)
+        waiting_twist(moved)
     if isinstance(policy, RenewingFollower):  # it compares plans, farther on than this
         policy.interaction.sweep(world, np.array(_POSES))
 

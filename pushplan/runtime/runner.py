@@ -14,7 +14,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from pushplan.control import clamp_twist
+from pushplan.control import waiting_twist
 from pushplan.control.limits import driven_twist, ramp_twist
 from pushplan.planners import make_policy, policy_for
 from pushplan.planners.kernel_warmup import warm_up_policy
@@ -69,7 +69,8 @@ class Runner:
 
     `command` never plans and never waits: planning goes on in another thread, and what was planned
     last is driven until then. Whatever happens there, the robot gets a command; where nothing
-    can be driven it is brought to a stop within its accelerations, with a reason.
+    can be driven it is brought to a stop within its accelerations, with a reason. A robot that
+    cannot stand circles where there is room: `pushplan.control.waiting_twist`.
 
     `start` and `command` are called by one thread, the robot's loop; `update` and `cancel` by any.
 
@@ -290,7 +291,8 @@ class Runner:
             self._observed = newest
         held = self.period if last is None else now - last.time
         world = self._estimator.at(now + self._delay)
-        wanted, status, reason = self._choose(world, now, now - newest.time)
+        chosen, status, reason = self._choose(world, now, now - newest.time)
+        wanted = waiting_twist(world) if chosen is None else chosen
         before = driven_twist(newest) if last is None else last.twist
         twist = ramp_twist(world.robot, before, wanted.linear, wanted.angular, held)
         self._estimator.sent(now, twist)
@@ -313,27 +315,28 @@ class Runner:
         self._note("command", command)
         return command
 
-    def _choose(self, world: World, now: float, age: float) -> tuple[Twist, CommandStatus, str]:
-        """The velocity that is wanted, before the limits of acceleration."""
-        halt = clamp_twist(world.robot, 0.0, 0.0)
+    def _choose(
+        self, world: World, now: float, age: float
+    ) -> tuple[Twist | None, CommandStatus, str]:
+        """The velocity that is wanted, before the limits of acceleration; None is to wait."""
         if self._cancelled:
-            return halt, CommandStatus.CANCELLED, self._cancelled
+            return None, CommandStatus.CANCELLED, self._cancelled
         if abs(age) > self._believed:
             why = "old" if age > 0.0 else "ahead of the clock of the commands"
-            return halt, CommandStatus.STALE, f"the newest world is {abs(age):.3g} s {why}"
+            return None, CommandStatus.STALE, f"the newest world is {abs(age):.3g} s {why}"
         running, budget = self._running_s, self.plan_stop.seconds
         if running > 2.0 * budget + 0.5:
             reason = f"a planning call has run for {running:.2g} s, its rule allows {budget:g} s"
-            return halt, CommandStatus.FAILED, reason
+            return None, CommandStatus.FAILED, reason
         if now < self._retry_at:
-            return halt, CommandStatus.FAILED, self._failure
+            return None, CommandStatus.FAILED, self._failure
         try:
             wanted = expect("the action of the policy", self.policy.act(world, None), Twist)
         except Exception as error:
             self.failures += 1
             self._failure, self._retry_at = describe(error), now + _RETRY
             self._begin(world)
-            return halt, CommandStatus.FAILED, self._failure
+            return None, CommandStatus.FAILED, self._failure
         if _is_done(world):
             return wanted, CommandStatus.DONE, ""
         if self._running_s and wanted.linear == 0.0 == wanted.angular:

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from pushplan.control import EpisodeClock, ImmediateExecutor, PathFollower, clamp_twist
+from pushplan.control import EpisodeClock, ImmediateExecutor, PathFollower, waiting_twist
 from pushplan.control.limits import driven_twist, ramp_twist
 from pushplan.control.tracking import Progress
 from pushplan.interaction import InteractionModel, QuasiStatic
@@ -141,9 +141,17 @@ class PlanFollower:
             away = self._recover(world)
         if away is not None:
             return away
-        if self.current_plan is None:
-            return clamp_twist(world.robot, 0.0, 0.0)
+        if self.current_plan is None or self._is_past(world, self.current_plan):
+            return waiting_twist(world)
         return self.controller.command(world, self.current_plan)
+
+    def _is_past(self, world: World, plan: Plan) -> bool:
+        """Whether a robot that cannot stand is at the end of its plan, the next on its way."""
+        if world.robot.can_stop or self._pending is None:
+            return False
+        assert self._progress is not None
+        x, y = (float(value) for value in world.robot_pose[:2])
+        return self._progress.update(plan, x, y) >= self._progress.total - 1e-9
 
     def _update_plan(self, world: World) -> None:
         """Ask for a plan where one is wanted, and take up the one that is there."""

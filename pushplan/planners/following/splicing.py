@@ -7,7 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from pushplan.control import Progress
+from pushplan.control import Progress, waiting_twist
+from pushplan.geometry.transforms import arc_step
 from pushplan.interaction import InteractionModel
 from pushplan.world import Plan, World
 from pushplan.world.checks import FloatArray
@@ -25,8 +26,7 @@ def world_ahead(
 ) -> tuple[World, Plan | None]:
     """The world after some more time on the present plan, and the plan of that stretch.
 
-    A robot that has no plan, or comes to its end, waits: a differential drive stands, a
-    constant-speed robot goes straight on.
+    A robot that has no plan, or comes to its end, waits: see `pushplan.control.waiting_twist`.
 
     Args:
         world: the world now.
@@ -113,16 +113,15 @@ def _stretch(
     if left <= 1e-9:
         return times, poses, twists
     robot, last = world.robot, poses[-1]
-    if robot.can_stop:  # it stands until then
-        twists = np.concatenate([twists[:-1], np.zeros((2, 2))])
-        return np.append(times, latency), np.concatenate([poses, last[None]]), twists
-    steps = max(1, math.ceil(left * robot.max_speed / (_SPACING * robot.circumscribed_radius)))
-    share = np.arange(1, steps + 1)[:, None] / steps
-    heading = np.array([math.cos(last[2]), math.sin(last[2]), 0.0])
-    straight = last + share * left * robot.max_speed * heading
-    twists = np.concatenate([twists[:-1], np.tile([robot.max_speed, 0.0], (steps + 1, 1))])
-    times = np.concatenate([times, times[-1] + share[:, 0] * left])
-    return times, np.concatenate([poses, straight]), twists
+    waits = waiting_twist(world.moved(robot_pose=last))
+    speed = abs(waits.linear)
+    steps = math.ceil(left * speed / (_SPACING * robot.circumscribed_radius)) or 1
+    share = np.arange(steps + 1)[:, None] / steps
+    arc = np.empty((steps + 1, 3))
+    for pose, part in zip(arc, left * share[:, 0], strict=True):
+        arc_step(last, waits.linear * part, waits.angular * part, pose)
+    twists = np.concatenate([twists[:-1], np.tile([waits.linear, waits.angular], (steps + 1, 1))])
+    return np.append(times, times[-1] + left * share[1:]), np.concatenate([poses, arc[1:]]), twists
 
 
 def _on_plan(plan: Plan, along: float, latency: float) -> tuple[FloatArray, FloatArray, FloatArray]:

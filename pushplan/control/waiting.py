@@ -1,0 +1,72 @@
+"""`waiting_twist`: what a robot drives that has nothing to drive yet."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from pushplan.compiled import kernel
+from pushplan.control.limits import clamp_twist
+from pushplan.geometry.transforms import arc_step
+from pushplan.motion.collision import ConvexObstacles, Footprint, footprint, is_free, obstacles
+from pushplan.world import Twist, World
+from pushplan.world.checks import FloatArray
+
+_AHEAD = (1.0, 0.5, 0.25, 0.0)
+"""Where circles are tried, that far straight ahead [circumscribed radii]."""
+_TURNS = (0.0, 0.5, -0.5, 1.0, -1.0)
+"""Where none fits: turn rates of the arcs, as fractions of the greatest; of equals the first."""
+_SPACING = 0.15  # distance between the poses that are looked at [circumscribed radii]
+
+
+def waiting_twist(world: World) -> Twist:
+    """Stand still; a robot that cannot drives where it can go on for longest.
+
+    It goes straight as long as there is room a little ahead for the tightest circle that it can
+    drive, and then drives that. Where no circle fits it takes the arc that stays clear of what is
+    static for longest.
+
+    Args:
+        world: the scene now.
+    """
+    robot = world.robot
+    if robot.can_stop:
+        return Twist(0.0, 0.0)
+    shape, walls = footprint(robot), obstacles(world.static)
+    scratch, at = np.empty_like(shape.vertices), np.empty(3)
+    circle = math.tau * robot.turning_radius
+    step = min(_SPACING * shape.radius, circle / 16.0)
+
+    def clear(twist: Twist, length: float, ahead: float = 0.0) -> float:
+        """How far an arc is clear, up to ``length``, that begins straight ahead of the robot."""
+        turn = step * twist.angular / twist.linear
+        first, most = math.ceil(ahead / step), math.ceil((ahead + length) / step)
+        at[:] = world.robot_pose
+        return step * _clear_steps(step, turn, first, most, shape, walls, at, scratch) - ahead
+
+    arcs = [clamp_twist(robot, robot.max_speed, share * robot.max_turn_rate) for share in _TURNS]
+    for ahead in _AHEAD:
+        for arc in arcs[-2:]:
+            if clear(arc, circle, ahead * shape.radius) >= circle:
+                return arcs[0] if ahead else arc
+    return max(arcs, key=lambda arc: clear(arc, circle + shape.radius))
+
+
+@kernel
+def _clear_steps(
+    step: float,
+    turn: float,
+    first: int,
+    most: int,
+    shape: Footprint,
+    walls: ConvexObstacles,
+    at: FloatArray,  # (3,) where it begins; ends where it touches
+    scratch: FloatArray,  # (V, 2) memory for the corners
+) -> int:
+    """How many steps the robot can go, the first ones straight, before it touches a wall."""
+    for done in range(most):
+        arc_step(at, step, turn if done >= first else 0.0, at)
+        if not is_free(at, shape, walls, scratch):
+            return done
+    return most
