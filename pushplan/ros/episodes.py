@@ -3,13 +3,23 @@
 from __future__ import annotations
 
 import json
+from collections import defaultdict
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from pushplan.ros.mcap_writer import COMMAND, EPISODE, SCHEMA, STATE, TOPICS, WORLD, McapWriter
+from pushplan.ros.mcap_writer import (
+    COMMAND,
+    DROPPED,
+    EPISODE,
+    SCHEMA,
+    STATE,
+    TOPICS,
+    WORLD,
+    McapWriter,
+)
 from pushplan.ros.message_types import RosbagsTypes
 from pushplan.world import Episode, GoalDisc, GoalLine, SchemaError, World
 from pushplan.world.checks import FloatArray
@@ -51,8 +61,8 @@ def load_episode(path: str | Path) -> Episode:
         SchemaError: if the file is missing, truncated, or no log of pushplan.
         MissingDependencyError: if `mcap` is not installed.
     """
-    by_topic: dict[str, list[Any]] = {topic: [] for topic in (WORLD, STATE, COMMAND, EPISODE)}
-    for topic, message in _messages(Path(path), list(by_topic)):
+    by_topic: defaultdict[str, list[Any]] = defaultdict(list)
+    for topic, message in _messages(Path(path)):
         by_topic[topic].append(message)
     if not by_topic[WORLD] or not by_topic[STATE]:
         raise SchemaError(f"{path} holds no world: the robot's loop ended before the first one")
@@ -63,8 +73,8 @@ def load_episode(path: str | Path) -> Episode:
         raise SchemaError(f"{path} is not a log of this version of pushplan: {why}") from error
 
 
-def _messages(path: Path, topics: list[str]) -> Iterator[tuple[str, Any]]:
-    """The messages of some of our topics, in the order of their times."""
+def _messages(path: Path) -> Iterator[tuple[str, Any]]:
+    """The messages of our own topics, in the order of their times, and what was lost."""
     library, types = need("mcap.reader"), RosbagsTypes()
     try:
         file = path.open("rb")
@@ -83,8 +93,10 @@ def _messages(path: Path, topics: list[str]) -> Iterator[tuple[str, Any]]:
                 f"{SCHEMA!r}, found {', '.join(sorted(found)) or 'no topic'}"
             )
         try:
-            for _, channel, message in reader.iter_messages(topics=topics):
+            for _, channel, message in reader.iter_messages([WORLD, STATE, COMMAND, EPISODE]):
                 yield channel.topic, types.deserialize(message.data, TOPICS[channel.topic])
+            for record in reader.iter_metadata():
+                yield record.name, record.metadata["notes"]
         except Exception as error:
             raise _unreadable(path, error) from error
 
@@ -118,10 +130,13 @@ def _episode(logged: Mapping[str, list[Any]]) -> Episode:
         end = json.loads(logged[EPISODE][-1].json)
         actions = np.reshape(end.pop("actions"), (-1, end.pop("action_size")))
         return Episode(world=world, **recorded, actions=actions, **end)
-    return _driven(world, recorded, logged[COMMAND])
+    about = {"source": "a robot's log", "dropped": sum(map(int, logged[DROPPED]))}
+    return _driven(world, recorded, logged[COMMAND], about)
 
 
-def _driven(world: World, recorded: dict[str, Any], commands: list[Any]) -> Episode:
+def _driven(
+    world: World, recorded: dict[str, Any], commands: list[Any], about: dict[str, Any]
+) -> Episode:
     """The episode of a robot, from what it saw and the commands that it got."""
     last = world.moved(
         robot_pose=recorded["robot_poses"][-1], movable_poses=recorded["object_poses"][-1]
@@ -141,5 +156,5 @@ def _driven(world: World, recorded: dict[str, Any], commands: list[Any]) -> Epis
         reason="goal" if success else ended,
         completed=completed,
         actions=np.reshape(actions, (-1, 2)),
-        about={"source": "a robot's log"},
+        about=about,
     )

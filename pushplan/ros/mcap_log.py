@@ -11,18 +11,23 @@ from queue import SimpleQueue
 from pushplan.ros.mcap_writer import McapWriter
 from pushplan.runtime import Command
 from pushplan.world import InvalidInputError, Plan, World
-from pushplan.world.checks import expect
+from pushplan.world.checks import expect, integer
 
 
 class McapLog:
     """Keeps worlds, plans, commands and their ages; a `pushplan.runtime.RunLog`.
 
     Its methods may be called by any thread and never wait for the disk: another thread encodes
-    and writes. A log holds one episode, and `pushplan.ros.load_episode` reads it.
+    and writes. What comes in while ``backlog`` notes are waiting is dropped and counted. A log
+    holds one episode, and `pushplan.ros.load_episode` reads it.
 
     Args:
         path: the file; one that is there is replaced.
         frame_id: the world frame.
+        backlog: how many notes may wait to be written.
+
+    Attributes:
+        dropped: how many notes were lost because the disk was too slow; the file says it too.
 
     Raises:
         InvalidInputError: if the file cannot be written; later also if writing has failed.
@@ -31,16 +36,17 @@ class McapLog:
     Example:
         >>> log = McapLog("run.mcap")  # doctest: +SKIP
         >>> with log, Runner("push-aware", period=0.05, log=log) as runner:  # doctest: +SKIP
-        ...     log.world(world)
         ...     runner.start(world)
     """
 
-    def __init__(self, path: str | Path, *, frame_id: str = "map") -> None:
+    def __init__(self, path: str | Path, *, frame_id: str = "map", backlog: int = 1000) -> None:
+        self._backlog = integer("backlog", backlog, low=1)
+        self.dropped = 0
         self._writer = McapWriter(path, frame_id)
         self._newest = -1.0
         self._error: Exception | None = None
         self._tasks: SimpleQueue[Callable[[], None] | None] = SimpleQueue()
-        self._lock = threading.Lock()
+        self._lock = threading.RLock()
         self._closed = False
         self._thread = threading.Thread(target=self._write, name="pushplan log", daemon=True)
         self._thread.start()
@@ -84,7 +90,11 @@ class McapLog:
         if self._closed:
             raise InvalidInputError("the log is closed")
         self._check()
-        self._tasks.put(task)
+        with self._lock:
+            if self._tasks.qsize() < self._backlog:
+                self._tasks.put(task)
+            else:
+                self.dropped += 1
 
     def _check(self) -> None:
         if self._error is not None:
@@ -97,6 +107,6 @@ class McapLog:
         except Exception as error:  # said by the next call
             self._error = error
         try:
-            self._writer.close()
+            self._writer.close(self.dropped)
         except Exception as error:
             self._error = self._error or error

@@ -35,6 +35,8 @@ TOPICS = {
 }
 """Topic -> its type."""
 SCHEMA = "pushplan-log/1"
+DROPPED = "pushplan dropped"
+"""Name of the metadata that say how much a log has lost."""
 
 
 class McapWriter:
@@ -153,9 +155,11 @@ class McapWriter:
         """Write what is known of an episode when it has ended."""
         self._put_json(EPISODE, time, content)
 
-    def close(self) -> None:
-        """Write the index that every reader needs, and close the file."""
+    def close(self, dropped: int = 0) -> None:
+        """Write the index that every reader needs, and how much was dropped; close the file."""
         try:
+            if dropped:
+                self._writer.add_metadata(DROPPED, {"notes": str(dropped)})
             self._writer.finish()
         finally:
             self._file.close()

@@ -205,6 +205,7 @@ class Runner:
             gc.freeze()  # else a collection amid driving goes through all modules and kernels
         self._newest = self._observed = world
         self.worlds = 1
+        self._note("world", world)
         return self.command(world.time)
 
     def _begin(self, world: World) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 import time
 from dataclasses import replace
 from pathlib import Path
@@ -132,7 +133,6 @@ def test_an_independent_reader_finds_messages_of_ros(tmp_path: Path) -> None:
 def test_a_runner_is_logged_and_scored(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path, world = tmp_path / "log.mcap", make_u_maze()
     with McapLog(path) as log, Runner("straight", period=0.1, log=log) as runner:
-        log.world(world)
         command = runner.start(world)
         for step in range(1, 20):
             pose = world.robot_pose + np.array([0.0, 0.01 * step, 0.0])
@@ -147,6 +147,27 @@ def test_a_runner_is_logged_and_scored(tmp_path: Path, capsys: pytest.CaptureFix
         f"path_length_m           {compute(episode)['path_length_m']:.6g}"
         in capsys.readouterr().out
     )
+
+
+def test_a_log_that_cannot_keep_up_drops_and_counts(tmp_path: Path) -> None:
+    path, world = tmp_path / "log.mcap", make_u_maze()
+    log, disk = McapLog(path, backlog=3), threading.Event()
+    write = log._writer.world
+    log._writer.world = lambda world: (disk.wait(), write(world))  # a disk that hangs
+    log.world(world)
+    while log._tasks.qsize():
+        time.sleep(0.001)
+    began = time.thread_time()
+    for step in range(1, 101):
+        log.world(world.moved(time=0.1 * step))
+    assert log.dropped == 97 and time.thread_time() - began < 0.5
+    disk.set()
+    log.close()
+    episode = load_episode(path)
+    np.testing.assert_allclose(episode.times, [0.0, 0.1, 0.2, 0.3], atol=1e-12)
+    assert episode.about["dropped"] == 97
+    with pytest.raises(InvalidInputError, match="backlog must be at least 1, got 0"):
+        McapLog(path, backlog=0)
 
 
 def test_commands_write_and_score_mcap(
