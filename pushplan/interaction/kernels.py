@@ -20,7 +20,6 @@ from pushplan.interaction.contact import contacts, least_overlap
 from pushplan.interaction.separation import drag_along, separate
 from pushplan.world.checks import FloatArray, IntArray
 
-
 _NEARBY = 3.0  # how far beyond the robot's reach objects are nearby at first [robot radii]
 
 
