@@ -50,4 +50,6 @@ def missing(error: BaseException) -> MissingDependencyError | None:
     library = (name or "").partition(".")[0]
     if library not in EXTRAS:
         return None
-    return MissingDependencyError(f"this needs {library}: pip install 'pushplan[{EXTRAS[library]}]'")
+    return MissingDependencyError(
+        f"this needs {library}: pip install 'pushplan[{EXTRAS[library]}]'"
+    )

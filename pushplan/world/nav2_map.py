@@ -88,7 +88,7 @@ def read_nav2_grid(path: str | Path) -> tuple[IntArray, float, FloatArray]:
 
 def _picture(path: Path) -> tuple[FloatArray, FloatArray | None]:
     """Mean of the colours (rows, columns) in [0, 1], top row first, and opacity where there is."""
-    Image = need("PIL.Image")  # noqa: N806
+    Image = need("PIL.Image")
     try:
         with Image.open(path) as image:
             pixels: Any = _pixels(image)
