@@ -40,6 +40,7 @@ COMMANDS = (
     codegen,
 )
 
+_USER_OS_ERRORS = (FileNotFoundError, FileExistsError, PermissionError, IsADirectoryError)
 _DESCRIPTION = "Plan, push, score and compare: baselines for robots that push things."
 _EXAMPLES = """\
 examples:
@@ -59,7 +60,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         arguments: what follows the program's name; from the command line if None.
 
     Returns:
-        0 on success, 1 for a failure, 2 for bad usage, 130 after Ctrl-C.
+        0 on success, 1 for a failure, 2 for what the user can put right, 130 after Ctrl-C.
     """
     try:
         options = _parser().parse_args(arguments)
@@ -75,13 +76,19 @@ def main(arguments: Sequence[str] | None = None) -> int:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 1
     except Exception as error:
-        from pushplan.world import PushplanError, UnknownNameError
+        from pushplan.world.errors import (
+            InvalidInputError,
+            MissingDependencyError,
+            PushplanError,
+            UnknownNameError,
+        )
         from pushplan.world.libraries import missing
 
         error = missing(error) or error
         if not isinstance(error, PushplanError | OSError):
             raise
-        return _fail(str(error), 2 if isinstance(error, UnknownNameError) else 1)
+        users = (InvalidInputError, UnknownNameError, MissingDependencyError, *_USER_OS_ERRORS)
+        return _fail(str(error), 2 if isinstance(error, users) else 1)
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -99,5 +106,7 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def _fail(message: str, code: int) -> int:
-    sys.stderr.write(f"pushplan: {' '.join(message.split())}\n")
+    from pushplan.world.errors import one_line
+
+    sys.stderr.write(f"pushplan: {one_line(message)}\n")
     return code

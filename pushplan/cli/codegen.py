@@ -75,9 +75,8 @@ def _outline(world: World, box: int | None) -> Any:
 
 def _changed(config: Any, changes: list[str]) -> Any:
     """A configuration with changes NAME=VALUE."""
-    import yaml
-
     from pushplan.world import InvalidInputError, UnknownNameError
+    from pushplan.world.safe_files import parse_yaml
 
     known = {field.name for field in fields(config)} - {"parameters"}
     friction = {field.name for field in fields(getattr(config, "parameters", config))}
@@ -89,7 +88,9 @@ def _changed(config: Any, changes: list[str]) -> Any:
             raise InvalidInputError(f"--set takes NAME=VALUE, got {change!r}")
         if name not in known | friction:
             raise UnknownNameError("parameter", name, sorted(known | friction))
-        (values if name in known else inner)[name] = yaml.safe_load(text)
+        (values if name in known else inner)[name] = parse_yaml(
+            text, f"{text!r:.60} of --set {name}"
+        )
     if inner:
         values["parameters"] = replace(config.parameters, **inner)
     return replace(config, **values)

@@ -63,15 +63,12 @@ def scenario_of(options: argparse.Namespace) -> Scenario:
 
 
 def _variation(text: str) -> tuple[str, Any]:
-    import yaml
-
     from pushplan.world import InvalidInputError
+    from pushplan.world.safe_files import parse_yaml
 
     name, equals, value = text.partition("=")
     if not equals or not name:
-        raise InvalidInputError(f"--set takes NAME=VALUE, got {text!r}")
-    try:
-        return name, float(value) if _SCIENTIFIC.fullmatch(value) else yaml.safe_load(value)
-    except yaml.YAMLError as error:
-        problem = " ".join(str(error).split())
-        raise InvalidInputError(f"--set {name}: cannot read {value!r}: {problem}") from error
+        raise InvalidInputError(f"--set takes NAME=VALUE, got {text!r:.80}")
+    if _SCIENTIFIC.fullmatch(value):
+        return name, float(value)
+    return name, parse_yaml(value, f"{value!r:.60} of --set {name!r:.60}")

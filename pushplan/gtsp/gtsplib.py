@@ -13,6 +13,7 @@ import numpy as np
 
 from pushplan.gtsp.distances import COORDINATE_TYPES
 from pushplan.gtsp.instance import GtspInstance
+from pushplan.world import safe_files
 from pushplan.world.checks import FloatArray
 from pushplan.world.errors import InvalidInputError, SchemaError, unknown_name_message
 
@@ -115,20 +116,16 @@ def read_text(path: str | Path) -> TsplibText:
     """Split a TSPLIB file into keywords and sections.
 
     Raises:
-        InvalidInputError: if the file cannot be read.
-        SchemaError: if a line is neither.
+        SchemaError: if the file cannot be read, or a line is neither.
     """
     text = TsplibText(Path(path))
-    try:
-        lines = text.path.read_text(encoding="utf-8-sig").splitlines()
-    except (OSError, UnicodeDecodeError) as error:
-        raise InvalidInputError(f"cannot read {path}: {error}") from error
+    lines = safe_files.read_text(path, "instance").splitlines()
     rows: list[tuple[int, list[str]]] | None = None
     for number, line in enumerate(lines, start=1):
         words = line.split()
         if not words:
             continue
-        head = words[0].rstrip(":").upper()
+        head = words[0].rstrip(":").upper() or ":"
         if head == "EOF":
             break
         if head in _SECTIONS:
@@ -159,8 +156,8 @@ def read_gtsp(path: str | Path) -> GtspInstance:
     file and from 0 in the result.
 
     Raises:
-        InvalidInputError: if the file cannot be read.
-        SchemaError: if it breaks a rule of the format; file, line and rule are named.
+        SchemaError: if the file cannot be read or breaks a rule of the format; file, line and rule
+            are named.
     """
     text = read_text(path)
     text.choice("TYPE", TYPES)

@@ -85,7 +85,7 @@ def read_tour(path: str | Path) -> tuple[int, ...]:
     text = read_text(path)
     text.choice("TYPE", ("TOUR",))
     begin, rows = text.section("TOUR_SECTION")
-    nodes: list[int] = []
+    nodes: dict[int, None] = {}
     ended = False
     for line, words in rows:
         for word in words:
@@ -99,7 +99,7 @@ def read_tour(path: str | Path) -> tuple[int, ...]:
             elif value - 1 in nodes:
                 raise text.wrong(line, f"node {value} is visited twice")
             else:
-                nodes.append(value - 1)
+                nodes[value - 1] = None
     if not nodes:
         raise text.wrong(begin, "the tour has no node")
     if "DIMENSION" in text.keywords:

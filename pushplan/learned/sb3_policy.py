@@ -16,6 +16,7 @@ from pushplan.learned.network_policy import NetworkPolicy
 from pushplan.learned.specification import METADATA_KEY, Specification
 from pushplan.world import InvalidInputError
 from pushplan.world.libraries import need
+from pushplan.world.safe_files import read_text
 
 TRUST_VARIABLE = "PUSHPLAN_TRUST_PICKLES"
 """Set to 1 in the environment of the process, it says that pickles may be loaded."""
@@ -91,7 +92,7 @@ def _look(path: Path) -> tuple[Specification, str]:
     except _UNREADABLE as error:
         raise InvalidInputError(f"{path} is no readable zip: {error}") from error
     if text is None and beside.is_file():
-        text = beside.read_text(encoding="utf-8")
+        text = read_text(beside, "specification")
     if text is None:
         raise InvalidInputError(
             f"{path} does not say what it observes and how it acts: put a specification beside it "

@@ -14,6 +14,7 @@ from pushplan.observation import ObservationBuilder
 from pushplan.world import InvalidInputError, RobotModel, SchemaError
 from pushplan.world.checked_fields import CheckedFields, PositiveFloat
 from pushplan.world.checks import known_keys, number
+from pushplan.world.safe_files import parse_json
 
 FORMAT = "pushplan-policy/1"
 METADATA_KEY = "pushplan"
@@ -114,10 +115,7 @@ class Specification:
         """
         if len(text) > LONGEST_TEXT:
             raise SchemaError(f"the specification is longer than {LONGEST_TEXT} characters")
-        try:
-            data = json.loads(text)
-        except (ValueError, RecursionError) as error:
-            raise SchemaError(f"the specification is not JSON: {error}") from error
+        data = parse_json(text, "the specification")
         if not isinstance(data, dict) or data.get("format") != FORMAT:
             found = data.get("format") if isinstance(data, dict) else data
             raise SchemaError(

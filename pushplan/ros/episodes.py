@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import json
+import io
 from collections import defaultdict
 from collections.abc import Iterator, Mapping
 from pathlib import Path
@@ -25,6 +25,7 @@ from pushplan.world import Episode, GoalDisc, GoalLine, SchemaError, World
 from pushplan.world.checks import FloatArray
 from pushplan.world.files import world_from_dict
 from pushplan.world.libraries import need
+from pushplan.world.safe_files import MAX_BYTES, parse_json, read_bytes
 
 _KEPT = ("completed", "actions", "rewards", "act_times_s", "plan_times_s")
 
@@ -76,14 +77,13 @@ def load_episode(path: str | Path) -> Episode:
 def _messages(path: Path) -> Iterator[tuple[str, Any]]:
     """The messages of our own topics, in the order of their times, and what was lost."""
     library, types = need("mcap.reader"), RosbagsTypes()
-    try:
-        file = path.open("rb")
-    except OSError as error:
-        raise SchemaError(f"cannot read {path}: {error.strerror}") from error
-    with file:
+    with io.BytesIO(read_bytes(path, "log")) as file:
         try:
             reader = library.make_reader(file, validate_crcs=True)
             summary = reader.get_summary()
+            chunks = [] if summary is None else summary.chunk_indexes
+            if sum(chunk.uncompressed_size for chunk in chunks) > MAX_BYTES:
+                raise ValueError(f"its chunks hold more than {MAX_BYTES:,} bytes")
             found = {} if summary is None else {c.topic: c for c in summary.channels.values()}
         except Exception as error:  # of many kinds, by where the bytes are wrong
             raise _unreadable(path, error) from error
@@ -110,10 +110,10 @@ def _unreadable(path: Path, error: Exception) -> SchemaError:
 
 
 def _episode(logged: Mapping[str, list[Any]]) -> Episode:
-    first, states = json.loads(logged[WORLD][0].json), logged[STATE]
+    first, states = parse_json(logged[WORLD][0].json), logged[STATE]
     for state in states:
         if state.new_objects:
-            first["movables"] += json.loads(state.new_objects)
+            first["movables"] += parse_json(state.new_objects)
     world = world_from_dict(first)
     poses = np.empty((len(states), len(world.movables), 3))
     rows = {number: k for k, number in enumerate(world.movables.ids.tolist())}
@@ -127,7 +127,7 @@ def _episode(logged: Mapping[str, list[Any]]) -> Episode:
         "object_poses": poses,
     }
     if logged[EPISODE]:
-        end = json.loads(logged[EPISODE][-1].json)
+        end = parse_json(logged[EPISODE][-1].json)
         actions = np.reshape(end.pop("actions"), (-1, end.pop("action_size")))
         return Episode(world=world, **recorded, actions=actions, **end)
     about = {"source": "a robot's log", "dropped": sum(map(int, logged[DROPPED]))}

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import json
-import zipfile
-import zlib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -15,17 +13,15 @@ import shapely
 from pushplan.scenarios.ice_field import IceField
 from pushplan.world import InvalidInputError, SchemaError
 from pushplan.world.checks import FloatArray, array, checked_bounds, known_keys
+from pushplan.world.errors import short
 from pushplan.world.outline import flatten, signed_area, unflatten, well_formed
+from pushplan.world.safe_files import read_data, read_npy, read_npz
 
 SCHEMA = "pushplan-ice/1"
 """Name and version of the JSON form; files of another version are refused."""
+_MAX_BYTES = 10**8
 ENDINGS = (".json", ".npz", ".npy")
 _OVERLAP = 1e-6  # floes may overlap by this fraction of the smaller one: rounding, where they touch
-_MAX_BYTES = 10**8
-_READ_ERRORS = (
-    *(OSError, ValueError, EOFError, KeyError, MemoryError, RecursionError, RuntimeError),
-    *(zipfile.BadZipFile, zlib.error),
-)
 
 
 def load_ice(path: str | Path, *, hull: bool = False) -> IceField:
@@ -57,11 +53,10 @@ def load_ice(path: str | Path, *, hull: bool = False) -> IceField:
         )
     try:
         polygons, bounds = _READERS[path.suffix.lower()](path)
+    except SchemaError:
+        raise
     except InvalidInputError as error:
         raise SchemaError(f"{path}: {error}") from error
-    except _READ_ERRORS as error:
-        problem = " ".join(str(error).split()) or type(error).__name__
-        raise SchemaError(f"cannot read ice field {path}: {problem}") from error
     try:
         floes = _clean(polygons, hull)
         field = IceField(floes, _bounds(floes, bounds))
@@ -107,30 +102,24 @@ def _path(path: object) -> Path:
 
 
 def _read_json(path: Path) -> tuple[Sequence[Any], object]:
-    data = json.loads(path.read_text(encoding="utf-8"))
+    data = read_data(path, "ice field")
     bounds: object = None
     if isinstance(data, Mapping):
-        known_keys("ice field", data, ("schema", "bounds", "polygons"), ("polygons",))
+        known_keys(f"ice field {path}", data, ("schema", "bounds", "polygons"), ("polygons",))
         if data.get("schema", SCHEMA) != SCHEMA:
-            raise SchemaError(f"this pushplan reads schema {SCHEMA!r}, got {data['schema']!r}")
+            raise SchemaError(
+                f"{path}: this pushplan reads schema {SCHEMA!r}, got {short(data['schema'])}"
+            )
         data, bounds = data["polygons"], data.get("bounds")
     if not isinstance(data, list):
-        raise SchemaError(f"polygons must be a list of lists of corners, got {data!r:.60}")
+        raise SchemaError(f"{path}: polygons must be a list of lists of corners, got {short(data)}")
     return data, bounds
 
 
 def _read_npz(path: Path) -> tuple[Sequence[Any], object]:
-    with np.load(path, allow_pickle=False) as archive:
-        if not isinstance(archive, np.lib.npyio.NpzFile):
-            raise SchemaError("this is no .npz archive")
-        members = archive.zip.infolist() if archive.zip else []
-        unpacked = sum(item.file_size for item in members)
-        if unpacked > _MAX_BYTES:
-            raise SchemaError(f"an archive may hold {_MAX_BYTES:,} bytes at most, got {unpacked:,}")
-        known_keys("ice field", archive, ("vertices", "offsets", "bounds"), ("vertices", "offsets"))
-        vertices = array("vertices", archive["vertices"], (None, 2))
-        offsets = array("offsets", archive["offsets"], (None,), dtype=np.int64)
-        bounds = archive["bounds"] if "bounds" in archive else None
+    arrays = read_npz(path, "ice field", ("vertices", "offsets"), ("bounds",), _MAX_BYTES)
+    vertices = array("vertices", arrays["vertices"], (None, 2))
+    offsets = array("offsets", arrays["offsets"], (None,), dtype=np.int64)
     if (
         len(offsets) == 0
         or offsets[0] != 0
@@ -138,16 +127,14 @@ def _read_npz(path: Path) -> tuple[Sequence[Any], object]:
         or (np.diff(offsets) < 0).any()
     ):
         raise SchemaError(
-            f"offsets must rise from 0 to the number of vertices, {len(vertices)}, "
+            f"{path}: offsets must rise from 0 to the number of vertices, {len(vertices)}, "
             f"got {offsets.tolist()!s:.60}"
         )
-    return unflatten(vertices, offsets), bounds
+    return unflatten(vertices, offsets), arrays.get("bounds")
 
 
 def _read_npy(path: Path) -> tuple[Sequence[Any], object]:
-    data = np.load(path, allow_pickle=False)
-    if not isinstance(data, np.ndarray):
-        raise SchemaError("this is no .npy array")
+    data = read_npy(path, "ice field")
     polygons: FloatArray = array("the array of polygons", data, (None, None, 2))
     return list(polygons), None
 

@@ -15,6 +15,8 @@ import yaml
 
 from pushplan.world import SchemaError
 from pushplan.world.checks import integer, known_keys
+from pushplan.world.errors import short
+from pushplan.world.safe_files import read_data
 
 SCHEMA = "pushplan-scenarios/1"
 """Name and version of the file format; files of another version are refused."""
@@ -72,18 +74,20 @@ class Scenario:
         for key in ("task", "simulator", "preset"):
             value = getattr(self, key)
             if not isinstance(value, str) or not _NAME.fullmatch(value):
-                raise SchemaError(f"scenario.{key} must be a plain name, got {value!r}")
+                raise SchemaError(f"scenario.{key} must be a plain name, got {short(value)}")
         if not isinstance(self.variations, Mapping):
-            raise SchemaError(f"scenario.variations must be a mapping, got {self.variations!r}")
+            raise SchemaError(
+                f"scenario.variations must be a mapping, got {short(self.variations)}"
+            )
         for name, value in self.variations.items():
             if not isinstance(name, str):
-                raise SchemaError(f"the name of a variation must be a text, got {name!r}")
+                raise SchemaError(f"the name of a variation must be a text, got {short(name)}")
             if not isinstance(value, bool | int | float | str) or (
                 isinstance(value, float) and not math.isfinite(value)
             ):
                 raise SchemaError(
-                    f"variation {name!r} must be a truth value, a finite number or a text, "
-                    f"got {value!r}"
+                    f"variation {short(name)} must be a truth value, a finite number or a text, "
+                    f"got {short(value)}"
                 )
         object.__setattr__(self, "variations", Variations(self.variations))
         object.__setattr__(self, "seed", integer("scenario.seed", self.seed, low=0))
@@ -129,14 +133,10 @@ def load_scenarios(path: str | Path) -> tuple[Scenario, ...]:
     Raises:
         SchemaError: if the file is missing, not YAML, or off the schema.
     """
-    try:
-        data = yaml.safe_load(Path(path).read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
-        problem = " ".join(str(error).split())
-        raise SchemaError(f"cannot read scenario file {path}: {problem}") from error
+    data = read_data(path, "scenario file")
     known_keys(f"scenario file {path}", data, ("schema", "scenarios"), ("schema", "scenarios"))
     if data["schema"] != SCHEMA:
-        raise SchemaError(f"this pushplan reads schema {SCHEMA!r}, got {data['schema']!r}")
+        raise SchemaError(f"this pushplan reads schema {SCHEMA!r}, got {short(data['schema'])}")
     if not isinstance(data["scenarios"], list):
         raise SchemaError(f"{path}: scenarios must be a list")
     return tuple(Scenario.from_dict(item) for item in data["scenarios"])

@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 from pushplan.training.ice_passages import SPLITS, voyage_passages
 from pushplan.world import InvalidInputError
 from pushplan.world.checks import choice, integer
+from pushplan.world.safe_files import read_npz
 
 log = logging.getLogger(__name__)
 
@@ -119,11 +120,7 @@ def read_shards(folder: str | Path, split: str, limit: int | None = None) -> Ice
 
 
 def _read(path: Path) -> IcePairs:
-    try:
-        with np.load(path, allow_pickle=False) as data:
-            pairs = IcePairs(data["patches"], data["after"], data["work"])
-    except Exception as error:  # a zip file can be broken in many ways
-        raise InvalidInputError(f"{path} is not a shard of ice passages: {error}") from error
+    pairs = IcePairs(**read_npz(path, "shard of ice passages", ("patches", "after", "work")))
     count = len(pairs.work)
     if pairs.patches.shape[:2] != (count, 3) or pairs.after.shape[0] != count:
         raise InvalidInputError(f"{path} is not a shard of ice passages: shapes disagree")

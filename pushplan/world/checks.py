@@ -11,7 +11,7 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
-from pushplan.world.errors import InvalidInputError, SchemaError, unknown_name_message
+from pushplan.world.errors import InvalidInputError, SchemaError, short, unknown_name_message
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -26,7 +26,7 @@ def expect(name: str, value: object, kind: type[_T]) -> _T:
         InvalidInputError: naming the value and the type otherwise.
     """
     if not isinstance(value, kind):
-        raise InvalidInputError(f"{name} must be a {kind.__name__}, got {_short(value)}")
+        raise InvalidInputError(f"{name} must be a {kind.__name__}, got {short(value)}")
     return value
 
 
@@ -47,7 +47,7 @@ def number(
     if type(value) is float and low < value < high and -math.inf < value < math.inf:
         return value  # most often; the rest sorts out what is wrong
     if isinstance(value, bool) or not isinstance(value, numbers.Real):
-        raise InvalidInputError(f"{name} must be a number, got {_short(value)}")
+        raise InvalidInputError(f"{name} must be a number, got {short(value)}")
     try:
         result = float(value)
     except OverflowError:
@@ -67,11 +67,11 @@ def integer(name: str, value: object, *, low: int | None = None, high: int | Non
         InvalidInputError: if it is not a whole number or out of range.
     """
     if isinstance(value, bool) or not isinstance(value, numbers.Integral):
-        raise InvalidInputError(f"{name} must be a whole number, got {value!r}")
+        raise InvalidInputError(f"{name} must be a whole number, got {short(value)}")
     result = int(value)
     if (low is not None and result < low) or (high is not None and result > high):
         limits = f"at least {low}" if high is None else f"in [{low}, {high}]"
-        raise InvalidInputError(f"{name} must be {limits}, got {result}")
+        raise InvalidInputError(f"{name} must be {limits}, got {short(result)}")
     return result
 
 
@@ -82,7 +82,7 @@ def boolean(name: str, value: object) -> bool:
         InvalidInputError: if it is anything else.
     """
     if not isinstance(value, bool | np.bool_):
-        raise InvalidInputError(f"{name} must be true or false, got {value!r}")
+        raise InvalidInputError(f"{name} must be true or false, got {short(value)}")
     return bool(value)
 
 
@@ -93,7 +93,7 @@ def word(name: str, value: object) -> str:
         InvalidInputError: if it is not.
     """
     if not isinstance(value, str):
-        raise InvalidInputError(f"{name} must be a text, got {value!r:.60}")
+        raise InvalidInputError(f"{name} must be a text, got {short(value)}")
     return value
 
 
@@ -139,7 +139,7 @@ def array(
     except (TypeError, ValueError, OverflowError) as error:
         raise InvalidInputError(
             f"{name} must be an array of {wanted.name} of shape {_shape_text(shape)}, "
-            f"got {_short(value)}"
+            f"got {short(value)}"
         ) from error
     if result.size == 0 and result.ndim != len(shape) and shape[0] is None:
         result = result.reshape((0, *(n or 0 for n in shape[1:])))
@@ -184,7 +184,7 @@ def known_keys(kind: str, data: object, valid: Sequence[str], required: Sequence
         SchemaError: if it is no mapping, a required key is missing, or a key is unknown.
     """
     if not isinstance(data, Mapping):
-        raise SchemaError(f"{kind} must be a mapping, got {_short(data)}")
+        raise SchemaError(f"{kind} must be a mapping, got {short(data)}")
     for key in data:
         if key not in valid:
             raise SchemaError(unknown_name_message(f"key in {kind}", key, valid))
@@ -196,11 +196,6 @@ def known_keys(kind: str, data: object, valid: Sequence[str], required: Sequence
 def _shape_text(shape: tuple[int | None, ...]) -> str:
     inner = ", ".join("N" if n is None else str(n) for n in shape)
     return f"({inner},)" if len(shape) == 1 else f"({inner})"
-
-
-def _short(value: object) -> str:
-    text = repr(value)
-    return text if len(text) <= 60 else text[:57] + "..."
 
 
 class ArrayRecord:

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import json
-import zipfile
-import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -16,20 +14,10 @@ from pushplan.world.checked_fields import CheckedFields, Shape
 from pushplan.world.checks import ArrayRecord, BoolArray, FloatArray, array, known_keys
 from pushplan.world.errors import InvalidInputError, SchemaError
 from pushplan.world.files import world_from_dict, world_to_dict
+from pushplan.world.safe_files import parse_json, read_npz
 from pushplan.world.scene import World
 
 SCHEMA = "pushplan-episode/1"
-_UNREADABLE = (
-    OSError,
-    KeyError,
-    ValueError,
-    TypeError,
-    EOFError,
-    NotImplementedError,
-    RecursionError,
-    zipfile.BadZipFile,
-    zlib.error,
-)
 _ARRAYS = (
     "times",
     "robot_poses",
@@ -125,14 +113,15 @@ class Episode(ArrayRecord, CheckedFields):
         """Read what `save` wrote.
 
         Raises:
-            SchemaError: if the file is missing, truncated, or not an episode of this version.
+            SchemaError: if the file is missing, truncated, over a limit, or not an episode of this
+                version.
         """
+        arrays = read_npz(path, "episode file", ("header", *_ARRAYS))
         try:
-            with np.load(path, allow_pickle=False) as data:
-                header = json.loads(str(data["header"]))
-                arrays = {key: data[key] for key in _ARRAYS}
-        except _UNREADABLE as error:
-            raise SchemaError(f"{path} is not a readable episode file: {error}") from error
+            text = str(arrays.pop("header"))
+        except ValueError as error:
+            raise SchemaError(f"cannot read episode file {path}: {error}") from error
+        header = parse_json(text, f"the header of {path}")
         if not isinstance(header, dict) or header.get("schema") != SCHEMA:
             raise SchemaError(f"{path}: this pushplan reads schema {SCHEMA!r}")
         keys = ("schema", "world", "success", "reason", "about")

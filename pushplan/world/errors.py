@@ -3,11 +3,23 @@
 from __future__ import annotations
 
 import difflib
+import reprlib
 from collections.abc import Iterable
+
+LONGEST_MESSAGE = 300
+"""Most characters of a message; of a longer one, the middle is left out."""
+MOST_CHOICES = 12
+"""Most choices that a message lists; of more, those next to the name that was given."""
 
 
 class PushplanError(Exception):
-    """Root of every error that pushplan raises on purpose."""
+    """Root of every error that pushplan raises on purpose.
+
+    Its text is one line of `LONGEST_MESSAGE` at most, in which nothing moves a terminal's cursor.
+    """
+
+    def __str__(self) -> str:
+        return one_line(" ".join(map(str, self.args)))
 
 
 class InvalidInputError(PushplanError, ValueError):
@@ -22,9 +34,6 @@ class UnknownNameError(PushplanError, KeyError):
         self.name = name
         self.choices = tuple(sorted(choices))
         super().__init__(unknown_name_message(kind, name, self.choices))
-
-    def __str__(self) -> str:  # KeyError would show the repr of the message
-        return str(self.args[0])
 
     def __reduce__(self) -> tuple[type[UnknownNameError], tuple[str, object, tuple[str, ...]]]:
         return type(self), (self.kind, self.name, self.choices)
@@ -43,15 +52,45 @@ class MissingDependencyError(PushplanError, ImportError):
 
 
 def unknown_name_message(kind: str, name: object, choices: Iterable[str]) -> str:
-    """One line that names the unknown value, the nearest valid one and every choice."""
+    """One line that names the unknown value, and every choice or, of many, the nearest."""
     valid = sorted(choices)
-    near = difflib.get_close_matches(str(name), valid, n=1, cutoff=0.5)
+    near = difflib.get_close_matches(str(name)[:80], valid, n=5, cutoff=0.5)
     hint = f"; did you mean {near[0]!r}?" if near else ""
-    return f"unknown {kind} {name!r}{hint} (valid: {', '.join(valid) or 'none'})"
+    if len(valid) <= MOST_CHOICES:
+        return f"unknown {kind} {short(name)}{hint} (valid: {', '.join(valid) or 'none'})"
+    shown = f"nearest of {len(valid)}: {', '.join(near)}"
+    if not near:
+        shown = f"{len(valid)} are valid, such as {', '.join(valid[:3])}"
+    return f"unknown {kind} {short(name)}{hint} ({shown})"
 
 
 def describe(error: BaseException) -> str:
     """One line for an exception: its type and its message."""
-    text = " ".join(str(error).split())
+    text = one_line(str(error))
     name = type(error).__name__
     return f"{name}: {text}" if text else name
+
+
+def one_line(text: str) -> str:
+    """A text on one line, with its control characters escaped, and without its middle if long."""
+    text = " ".join(text.split())
+    if len(text) > LONGEST_MESSAGE:
+        text = f"{text[: LONGEST_MESSAGE // 2]} ... {text[5 - LONGEST_MESSAGE // 2 :]}"
+    if text.isprintable():
+        return text
+    visible = "".join(c if c.isprintable() else ascii(c)[1:-1] for c in text)
+    return one_line(visible)  # longer by what was escaped
+
+
+class _Short(reprlib.Repr):
+    def __init__(self) -> None:
+        super().__init__()
+        self.maxstring = self.maxother = 60
+        self.maxlevel = 3
+
+    def repr_int(self, x: int, level: int) -> str:
+        return repr(x) if x.bit_length() < 200 else f"a number of {x.bit_length()} bits"
+
+
+short = _Short().repr
+"""The ``repr`` of a value, without its middle where it is long; never costly."""

@@ -13,12 +13,13 @@ import numpy as np
 import yaml
 
 from pushplan.world.checks import array, integer, known_keys, number, word
-from pushplan.world.errors import InvalidInputError, SchemaError, unknown_name_message
+from pushplan.world.errors import InvalidInputError, SchemaError, short, unknown_name_message
 from pushplan.world.goals import ClearanceArea, Goal, GoalDisc, GoalLine, Receptacle
 from pushplan.world.movables import Movables
 from pushplan.world.nav2_map import load_nav2_map
 from pushplan.world.outline import convex_outline, signed_area
 from pushplan.world.robot import Drive, RobotModel
+from pushplan.world.safe_files import read_data
 from pushplan.world.scene import World
 from pushplan.world.static_map import StaticMap
 
@@ -114,7 +115,7 @@ def world_from_dict(data: object, folder: str | Path = ".") -> World:
     )
     assert isinstance(data, Mapping)
     if data["schema"] != SCHEMA:
-        raise SchemaError(f"this pushplan reads schema {SCHEMA!r}, got {data['schema']!r}")
+        raise SchemaError(f"this pushplan reads schema {SCHEMA!r}, got {short(data['schema'])}")
     robot, pose, twist = _robot(data["robot"])
     return World(
         robot=robot,
@@ -132,24 +133,14 @@ def load_world(path: str | Path) -> World:
     """Read a world from a ``.json``, ``.yaml`` or ``.yml`` file.
 
     Raises:
-        SchemaError: if the file is missing, not readable as JSON or YAML, or off the schema.
+        SchemaError: if the file is missing, over a limit of `safe_files`, not readable as JSON or
+            YAML, or off the schema.
     """
-    path = Path(path)
-    try:
-        text = path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        raise SchemaError(f"cannot read world file {path}: {error}") from error
-    try:
-        data = json.loads(text) if path.suffix == ".json" else yaml.safe_load(text)
-    except (ValueError, RecursionError, yaml.YAMLError) as error:
-        problem = " ".join(str(error).split())
-        raise SchemaError(f"{path} is not valid {path.suffix[1:] or 'YAML'}: {problem}") from error
+    data, path = read_data(path, "world file"), Path(path)
     try:
         return world_from_dict(data, path.parent)
-    except SchemaError as error:
-        raise SchemaError(f"{path}: {error}") from error
     except InvalidInputError as error:
-        raise InvalidInputError(f"{path}: {error}") from error
+        raise type(error)(f"{path}: {error}") from error
 
 
 def save_world(world: World, path: str | Path) -> None:
@@ -262,5 +253,5 @@ def _goal(data: object) -> Goal:
 
 def _list(name: str, value: object) -> Sequence[Any]:
     if not isinstance(value, list):
-        raise SchemaError(f"{name} must be a list, got {value!r}")
+        raise SchemaError(f"{name} must be a list, got {short(value)}")
     return value

@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
+import io
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import yaml
 
-from pushplan.world.checks import FloatArray, IntArray, array, choice, known_keys, number
-from pushplan.world.errors import InvalidInputError, SchemaError
+from pushplan.world.checks import FloatArray, IntArray, array, choice, known_keys, number, word
+from pushplan.world.errors import InvalidInputError, SchemaError, describe
 from pushplan.world.libraries import need
+from pushplan.world.safe_files import read_bytes, read_data
 from pushplan.world.static_map import StaticMap
 
 _MODES = ("trinary", "scale", "raw")
+_FORMATS = ("PPM", "PNG", "BMP")
+_MAX_PIXELS = 4096**2
 _REQUIRED = ("image", "resolution", "origin", "negate", "occupied_thresh", "free_thresh")
 
 
@@ -48,11 +51,7 @@ def read_nav2_grid(path: str | Path) -> tuple[IntArray, float, FloatArray]:
     Raises:
         As `load_nav2_map`.
     """
-    path = Path(path)
-    try:
-        data = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
-        raise SchemaError(f"cannot read map file {path}: {' '.join(str(error).split())}") from error
+    data, path = read_data(path, "map file"), Path(path)
     try:
         known_keys("map file", data, (*_REQUIRED, "mode"), _REQUIRED)
         mode = choice("map mode", data.get("mode", "trinary"), _MODES)
@@ -65,7 +64,7 @@ def read_nav2_grid(path: str | Path) -> tuple[IntArray, float, FloatArray]:
             raise InvalidInputError(f"free_thresh must be below occupied_thresh, got {low}, {high}")
         side = number("resolution", data["resolution"], low=0.0, open_low=True)
         origin: FloatArray = array("origin", data["origin"], (3,))
-        shade, alpha = _picture(path.parent / str(data["image"]))
+        shade, alpha = _picture(path.parent / word("image", data["image"]))
     except SchemaError as error:
         raise SchemaError(f"{path}: {error}") from error
     except InvalidInputError as error:
@@ -89,11 +88,16 @@ def read_nav2_grid(path: str | Path) -> tuple[IntArray, float, FloatArray]:
 def _picture(path: Path) -> tuple[FloatArray, FloatArray | None]:
     """Mean of the colours (rows, columns) in [0, 1], top row first, and opacity where there is."""
     Image = need("PIL.Image")
+    data = read_bytes(path, "the picture of the map,")
     try:
-        with Image.open(path) as image:
+        with Image.open(io.BytesIO(data), formats=_FORMATS) as image:
+            if image.width * image.height > _MAX_PIXELS:
+                raise ValueError(f"{image.width} x {image.height} pixels, {_MAX_PIXELS:,} are most")
             pixels: Any = _pixels(image)
-    except (OSError, ValueError, SyntaxError, Image.DecompressionBombError) as error:
-        raise SchemaError(f"cannot read the picture of the map, {path}: {error}") from error
+    except Exception as error:  # a decoder of pictures raises errors of many kinds
+        raise SchemaError(
+            f"cannot read the picture of the map, {path}: {describe(error)}"
+        ) from error
     if pixels.ndim == 2:
         return pixels, None
     opaque = pixels[..., -1] if pixels.shape[2] in (2, 4) else None

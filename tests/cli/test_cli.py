@@ -125,12 +125,12 @@ def test_errors_are_one_line_with_a_code(
 ) -> None:
     assert main(["plan", str(room), "--planner", "kinodynamic-rtt"]) == 2
     assert "did you mean 'kinodynamic-rrt'" in one_line(capsys)
-    assert main(["plan", str(tmp_path / "none.yaml"), "--planner", "straight"]) == 1
+    assert main(["plan", str(tmp_path / "none.yaml"), "--planner", "straight"]) == 2
     assert "cannot read world file" in one_line(capsys)
-    assert main(["report", str(tmp_path)]) == 1
+    assert main(["report", str(tmp_path)]) == 2
     assert "holds no results" in one_line(capsys)
-    assert main(["score", str(room)]) == 1
-    assert "not a readable episode" in one_line(capsys)
+    assert main(["score", str(room)]) == 2
+    assert "cannot read episode file" in one_line(capsys)
     assert main(["bench", "maze-2d-7", "--policies", "straight"]) == 2
     assert "unknown suite 'maze-2d-7'" in one_line(capsys)
     assert main(["bench", "smoke", "--policies", "nobody.py:Me"]) == 2

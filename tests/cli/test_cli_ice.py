@@ -49,7 +49,7 @@ def test_a_field_is_made_checked_and_drawn(
 def test_one_line_says_what_is_wrong(
     arguments: list[str], text: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert main(["ice", *arguments]) == 1
+    assert main(["ice", *arguments]) == 2
     said = capsys.readouterr().err
     assert said.startswith("pushplan: ") and said.count("\n") == 1 and text in said
 

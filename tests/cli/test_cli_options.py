@@ -14,8 +14,8 @@ RUN = ["run", "--task", "box_delivery", "--policy", "random"]
 @pytest.mark.parametrize(
     ("arguments", "text"),
     [
-        (["--set", "wheeled=["], "--set wheeled: cannot read '['"),
-        (["--set", "wheeled=*x"], "--set wheeled: cannot read"),
+        (["--set", "wheeled=["], "cannot read '[' of --set 'wheeled'"),
+        (["--set", "wheeled=*x"], "cannot read '*x' of --set"),
         (["--set", "wheeled"], "--set takes NAME=VALUE"),
         (["--set", "boxes=3", "--boxes", "4"], "variation 'boxes' is given twice"),
         (["--set", "box_size=1e-9"], "box_size must be at least 0.0044 m"),
@@ -27,7 +27,7 @@ RUN = ["run", "--task", "box_delivery", "--policy", "random"]
 def test_one_line_says_what_is_wrong(
     arguments: list[str], text: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert main([*RUN, *arguments]) == 1
+    assert main([*RUN, *arguments]) == 2
     said = capsys.readouterr()
     assert said.out == "" and said.err.count("\n") == 1
     assert said.err.startswith("pushplan: ") and text in said.err

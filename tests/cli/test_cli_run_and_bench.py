@@ -65,9 +65,9 @@ def test_run_takes_a_task_with_variations(
     scene = ["--task", "maze", "--boxes", "2", "--shape", "z", "--set", "random_start=true"]
     assert main(["run", *scene, "--policy", "straight", "--render", str(film)]) == 0
     assert film.read_bytes().startswith(b"GIF8")
-    assert main(["run", *scene[:2], "--boxes", "900", "--policy", "straight"]) == 1
-    assert main(["run", "smoke", "--boxes", "2", "--policy", "straight"]) == 1
-    assert main(["run", "smoke", "--policy", "straight", "--render", "film.avi"]) == 1
+    assert main(["run", *scene[:2], "--boxes", "900", "--policy", "straight"]) == 2
+    assert main(["run", "smoke", "--boxes", "2", "--policy", "straight"]) == 2
+    assert main(["run", "smoke", "--policy", "straight", "--render", "film.avi"]) == 2
     errors = capsys.readouterr().err
     assert errors.count("\n") == 3 and errors.count("pushplan: ") == 3
 
@@ -90,7 +90,7 @@ def test_bench_with_a_file_of_ones_own(tmp_path: Path, capsys: pytest.CaptureFix
     assert main(["report", str(out)]) == 0
     assert main(["report", str(out), "--metrics", "E_nav_to_goal_point"]) == 0
     changed = [*options, "--timeout", "7"]
-    assert main(["bench", "maze-2d-3", "--policies", names, *changed]) == 1
+    assert main(["bench", "maze-2d-3", "--policies", names, *changed]) == 2
     assert "timeout_s was 300.0, is now 7.0" in capsys.readouterr().err
 
 

@@ -222,7 +222,7 @@ def test_without_a_display_there_is_one_clear_error(
 ) -> None:
     pytest.importorskip("tkinter")
     without_display(monkeypatch)
-    assert main(["teleop", "--task", "maze"]) == 1
+    assert main(["teleop", "--task", "maze"]) == 2
     error = capsys.readouterr().err
     assert error.count("\n") == 1 and "display" in error
 
@@ -230,9 +230,9 @@ def test_without_a_display_there_is_one_clear_error(
 @pytest.mark.parametrize(
     ("arguments", "code", "text"),
     [
-        (["teleop"], 1, "SUITE"),
+        (["teleop"], 2, "SUITE"),
         (["teleop", "--task", "mazes"], 2, "did you mean 'maze'"),
-        (["teleop", "--task", "maze", "--out", "/no/such/folder/e.npz"], 1, "no folder"),
+        (["teleop", "--task", "maze", "--out", "/no/such/folder/e.npz"], 2, "no folder"),
         (["teleop", "--task", "area_clearing", "--action", "turn_rate"], 2, "velocity"),
         (["teleop", "--task", "maze", "--speed", "0"], 2, "positive"),
     ],

@@ -175,7 +175,7 @@ def test_command_writes_a_tour(tmp_path: Path, capsys: pytest.CaptureFixture[str
     assert main(["gtsp", str(path), "--iterations", "10", "--out", str(out)]) == 0
     assert "optimal, cost 10, lower bound 10" in capsys.readouterr().out
     assert sorted(read_tour(out)) == [0, 1, 3]
-    assert main(["gtsp", str(tmp_path / "none.gtsp")]) == 1
+    assert main(["gtsp", str(tmp_path / "none.gtsp")]) == 2
     assert "cannot read" in capsys.readouterr().err
 
 

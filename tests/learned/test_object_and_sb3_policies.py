@@ -99,7 +99,7 @@ class TestSb3:
     def test_the_command_line(self, model, monkeypatch, capsys):
         monkeypatch.setenv(TRUST_VARIABLE, "0")  # so that it is put back
         call = ["run", "--task", "maze", "--boxes", "2", "--policy", f"sb3:{model.path}"]
-        assert main(call) == 1
+        assert main(call) == 2
         assert "--trust-pickles" in capsys.readouterr().err
         assert main([*call, "--trust-pickles"]) == 0
         assert "E_nav" in capsys.readouterr().out

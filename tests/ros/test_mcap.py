@@ -180,7 +180,7 @@ def test_commands_write_and_score_mcap(
     assert main(["score", log, "--out", again]) == 0
     assert before == capsys.readouterr().out.replace(f"{log}: ", "").replace(f"wrote {again}\n", "")
     same(maze, Episode.load(again))
-    assert main(["score", plain, log, "--out", log]) == 1
+    assert main(["score", plain, log, "--out", log]) == 2
     assert "--out writes one episode" in capsys.readouterr().err
 
 

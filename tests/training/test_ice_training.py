@@ -84,7 +84,7 @@ class TestShards:
         with pytest.raises(InvalidInputError, match="no shards"):
             read_shards(tmp_path, "train")
         (tmp_path / "train-00000.npz").write_bytes(b"PK\x03\x04 cut")
-        with pytest.raises(InvalidInputError, match="not a shard"):
+        with pytest.raises(InvalidInputError, match="shard of ice passages"):
             read_shards(tmp_path, "train")
         with pytest.raises(InvalidInputError):
             read_shards(tmp_path, "test")

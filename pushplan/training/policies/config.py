@@ -11,8 +11,6 @@ from importlib import resources
 from pathlib import Path
 from typing import Annotated, Any
 
-import yaml
-
 from pushplan.envs.registry import SIMULATORS, TASKS, default_preset
 from pushplan.learned.builders import builder_from_dict
 from pushplan.learned.outputs import OUTPUTS
@@ -26,6 +24,7 @@ from pushplan.world.checked_fields import (
     PositiveInt,
 )
 from pushplan.world.checks import choice, integer, known_keys
+from pushplan.world.safe_files import read_data
 
 ALGORITHMS = tuple(OPTIONS)
 _SCIENTIFIC = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)[eE][-+]?\d+")
@@ -131,15 +130,9 @@ def read_config(path: str | Path) -> TrainingConfig:
     """A configuration from a YAML file.
 
     Raises:
-        InvalidInputError: if there is no such file, or something in it is wrong.
+        SchemaError: if it cannot be read, or something in it is wrong.
     """
-    path = Path(path)
-    if not path.is_file():
-        raise InvalidInputError(f"there is no configuration {path}")
-    try:
-        data = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
-        raise SchemaError(f"{path}: {' '.join(str(error).split())}") from error
+    data = read_data(path, "configuration")
     try:
         return TrainingConfig.from_dict(data)
     except InvalidInputError as error:

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import json
 import warnings
-import zipfile
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -34,6 +33,7 @@ from pushplan.world import (
 from pushplan.world.checked_fields import CheckedFields, Fraction, NonNegativeInt, PositiveInt
 from pushplan.world.checks import known_keys
 from pushplan.world.libraries import need
+from pushplan.world.safe_files import read_data, read_npz
 
 SCHEMA = "pushplan-dataset/1"
 METADATA = "metadata.json"
@@ -42,7 +42,6 @@ _KEYS = (
     *("format", "task", "simulator", "preset", "scenarios", "policy", "action_mode", "observation"),
     *("robot", "control_step", "total_episodes", "total_steps", "successes", "first_seed", "noise"),
 )
-_UNREADABLE = (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile)
 
 
 @dataclass(frozen=True)
@@ -184,10 +183,7 @@ def read_metadata(folder: str | Path) -> dict[str, Any]:
         SchemaError: if the folder holds no data set.
     """
     path = Path(folder) / METADATA
-    try:
-        data = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
-        raise SchemaError(f"{folder} is no data set: {error}") from error
+    data = read_data(path, "data set")
     if not isinstance(data, dict) or data.get("format") != SCHEMA:
         raise SchemaError(f"{folder} is no data set of format {SCHEMA!r}")
     known_keys("the metadata of a data set", data, _KEYS, _KEYS)
@@ -203,11 +199,7 @@ def episodes(folder: str | Path) -> Iterator[EpisodeData]:
     about = read_metadata(folder)
     for number_ in range(int(about["total_episodes"])):
         path = Path(folder) / "data" / f"episode_{number_:05d}.npz"
-        try:
-            with np.load(path, allow_pickle=False) as file:
-                arrays = {name: file[name] for name in ARRAYS}
-        except _UNREADABLE as error:
-            raise SchemaError(f"{path} is no episode: {error}") from error
+        arrays = read_npz(path, "episode of a data set", ARRAYS)
         lengths = {len(arrays[name]) for name in ARRAYS[1:]}
         if lengths != {len(arrays["observations"]) - 1}:
             raise SchemaError(f"{path}: the arrays have lengths that do not belong together")

@@ -1,0 +1,230 @@
+"""Files that strangers wrote: every door reads through here, within limits and with one error.
+
+A file is a regular one below a size; YAML and JSON are bounded in depth and number of values and
+name no key twice; arrays are those that their file has room for.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+import math
+import os
+import re
+import stat
+import zipfile
+from collections.abc import Sequence
+from pathlib import Path
+from typing import IO, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pushplan.world.checks import known_keys
+from pushplan.world.errors import InvalidInputError, SchemaError, describe, short
+
+MAX_BYTES = 200_000_000
+"""Greatest size of a file, and of the arrays that are packed in it."""
+MAX_TEXT = 32_000_000
+"""Greatest size of a file of text [bytes]."""
+MAX_VALUES = 1_000_000
+"""Most values in a JSON file."""
+MAX_DEPTH = 64
+"""Deepest nesting of lists and mappings, in JSON and YAML."""
+LONGEST_NUMBER = 400
+"""Most characters of a number in JSON and YAML: floats written out have 310."""
+_MEMBERS = 1000
+_TEXT = re.compile(rb'"[^"\\]*(?:\\.[^"\\]*)*"')
+_LONG_NUMBER = re.compile(rb"\d{%d}" % LONGEST_NUMBER)
+_STEPS = np.zeros(256, dtype=np.int8)
+_STEPS[[ord("["), ord("{")]] = 1
+_STEPS[[ord("]"), ord("}")]] = -1
+
+
+def read_bytes(path: str | Path, what: str = "file", limit: int = MAX_BYTES) -> bytes:
+    """The content of a regular file.
+
+    Args:
+        path: the file.
+        what: what errors call it, such as ``"world file"``.
+        limit: its greatest size [bytes].
+
+    Raises:
+        SchemaError: if it cannot be read, is no regular file, or is greater.
+    """
+    if not isinstance(path, str | os.PathLike):
+        raise InvalidInputError(f"the path of a {what} must be a text, got {short(path)}")
+    try:
+        with open(path, "rb", opener=_open_at_once) as file:
+            status = os.fstat(file.fileno())
+            if not stat.S_ISREG(status.st_mode):
+                kind = "a pipe" if stat.S_ISFIFO(status.st_mode) else "a device"
+                raise OSError(0, f"it is {kind}, not a regular file")
+            if status.st_size > limit:
+                raise OSError(
+                    0, f"it has {status.st_size:,} bytes, {limit:,} are the greatest size"
+                )
+            return file.read(status.st_size)
+    except (OSError, ValueError) as error:
+        why = getattr(error, "strerror", None) or error
+        raise SchemaError(f"cannot read {what} {path}: {why}") from error
+
+
+def _open_at_once(path: str, flags: int) -> int:
+    """Open without waiting for who writes to a pipe."""
+    return os.open(path, flags | os.O_NONBLOCK | os.O_NOCTTY)
+
+
+def read_text(path: str | Path, what: str = "file", limit: int = MAX_TEXT) -> str:
+    """The content of a text file in UTF-8, with or without a byte order mark.
+
+    Raises:
+        SchemaError: as `read_bytes`, or if it is not UTF-8.
+    """
+    try:
+        return read_bytes(path, what, limit).decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise SchemaError(f"cannot read {what} {path}: it is not UTF-8: {error}") from error
+
+
+def read_data(path: str | Path, what: str = "file") -> Any:
+    """Values of a JSON file, by the ending ``.json``, or a YAML file.
+
+    Raises:
+        SchemaError: as `read_text`, `parse_json` and `parse_yaml`.
+    """
+    text = read_text(path, what)
+    parse = parse_json if str(path).endswith(".json") else parse_yaml
+    return parse(text, f"{what} {path}")
+
+
+def parse_json(text: str, what: str = "text") -> Any:
+    """Values of a text in JSON.
+
+    Raises:
+        SchemaError: if it is not JSON, names a key twice, or is over `MAX_VALUES`, `MAX_DEPTH` or
+            `LONGEST_NUMBER`.
+    """
+    try:
+        _check_json(text.encode("utf-8"))
+        return json.loads(text, object_pairs_hook=_without_doubles)
+    except (ValueError, RecursionError) as error:
+        raise SchemaError(f"cannot read {what}: it is not valid JSON: {error}") from error
+
+
+def parse_yaml(text: str, what: str = "text") -> Any:
+    """Values of a text in YAML, of plain types; see `pushplan.world.safe_yaml`.
+
+    Raises:
+        SchemaError: if it is not YAML, names a key twice, or is over a limit.
+    """
+    from pushplan.world.safe_yaml import load
+
+    try:
+        return load(text)
+    except Exception as error:  # what PyYAML makes values with raises errors of many kinds
+        raise SchemaError(f"cannot read {what}: it is not valid YAML: {error}") from error
+
+
+def read_npz(
+    path: str | Path,
+    what: str,
+    required: Sequence[str],
+    optional: Sequence[str] = (),
+    limit: int = MAX_BYTES,
+) -> dict[str, NDArray[Any]]:
+    """The arrays of a ``.npz`` file: numbers, truth values and texts, never pickles.
+
+    Args:
+        path: the file.
+        what: what errors call it.
+        required: names of arrays that must be there.
+        optional: names that may be there; no others may.
+        limit: greatest size of the file, and of its arrays together [bytes].
+
+    Raises:
+        SchemaError: if it is no such file, or an array is not what its header says.
+    """
+    data = read_bytes(path, what, limit)
+    try:
+        if data.count(b"PK\1\2") > _MEMBERS:  # each entry costs memory before it can be counted
+            raise SchemaError(f"it has more than {_MEMBERS} members")
+        with zipfile.ZipFile(io.BytesIO(data)) as archive:
+            members = {info.filename.removesuffix(".npy"): info for info in archive.infolist()}
+            if len(members) < len(archive.infolist()):
+                raise SchemaError("an array is there twice")
+            known_keys("it", members, (*required, *optional), required)
+            arrays: dict[str, NDArray[Any]] = {}
+            for name, info in members.items():
+                if info.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
+                    raise SchemaError(f"{name!r} must be stored or deflated")
+                with archive.open(info) as member:
+                    arrays[name] = _array(member, limit)
+                limit -= arrays[name].nbytes
+            return arrays
+    except SchemaError as error:
+        raise SchemaError(f"cannot read {what} {path}: {error}") from error
+    except Exception as error:  # a zip file can be broken in many ways
+        raise SchemaError(f"cannot read {what} {path}: {describe(error)}") from error
+
+
+def read_npy(path: str | Path, what: str) -> NDArray[Any]:
+    """The array of a ``.npy`` file, as `read_npz` reads its arrays."""
+    data = read_bytes(path, what)
+    try:
+        return _array(io.BytesIO(data), MAX_BYTES)
+    except Exception as error:
+        raise SchemaError(f"cannot read {what} {path}: {describe(error)}") from error
+
+
+def _array(file: IO[bytes], limit: int) -> NDArray[Any]:
+    """An array, after its header has been compared with the limit."""
+    version = np.lib.format.read_magic(file)
+    readers = {
+        (1, 0): np.lib.format.read_array_header_1_0,
+        (2, 0): np.lib.format.read_array_header_2_0,
+    }
+    if version not in readers:
+        raise SchemaError(f"this pushplan reads .npy files of version 1.0 and 2.0, got {version}")
+    shape, fortran, kind = readers[version](file)
+    if kind.kind not in "biufU":
+        raise SchemaError(f"arrays hold numbers, truth values or texts, got {kind}")
+    count = math.prod(shape)
+    size = count * max(kind.itemsize, 1)
+    if min(shape, default=0) < 0 or size > limit:
+        raise SchemaError(f"an array of shape {shape} needs {size:,} bytes, {limit:,} are left")
+    values = np.empty(count, kind)
+    room, filled = values.view(np.uint8), 0
+    while filled < room.size:
+        got = file.readinto(room[filled : filled + 2**20])  # type: ignore[attr-defined]
+        if not got:
+            raise SchemaError(f"an array of shape {shape} needs {size:,} bytes, got {filled:,}")
+        filled += got
+    return values.reshape(shape, order="F" if fortran else "C")
+
+
+def _check_json(data: bytes) -> None:
+    """Refuse what would take much memory or a deep stack, before it is parsed."""
+    for text in (data, _TEXT.sub(b'""', data)):  # what stands in texts counts only if it must
+        count = text.count(b",") + text.count(b"[") + text.count(b"{")
+        depth = 0
+        if count <= MAX_VALUES:
+            steps = _STEPS[np.frombuffer(text, dtype=np.uint8)]
+            depth = int(np.cumsum(steps[steps != 0], dtype=np.int64).max(initial=0))
+        long = _LONG_NUMBER.search(text)
+        if count <= MAX_VALUES and depth <= MAX_DEPTH and long is None:
+            return
+    if count > MAX_VALUES:
+        raise ValueError(f"{MAX_VALUES:,} values are the most, got {count:,}")
+    if long is not None:
+        raise ValueError(f"a number may have {LONGEST_NUMBER} digits at most")
+    raise ValueError(f"lists and mappings may be nested {MAX_DEPTH} deep, got {depth:,}")
+
+
+def _without_doubles(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    data = dict(pairs)
+    if len(data) < len(pairs):
+        names = [name for name, _ in pairs]
+        twice = next(name for name in names if names.count(name) > 1)
+        raise ValueError(f"the key {twice!r} stands in one mapping twice")
+    return data
