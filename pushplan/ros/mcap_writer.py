@@ -87,8 +87,9 @@ class McapWriter:
             for key in ("robot", "static", "goal", "margin")
         ):
             return
+        if old is None:
+            self._known.update(world.movables.ids.tolist())
         self._scene = world
-        self._known.update(world.movables.ids.tolist())
         self._put_json(WORLD, world.time, world_to_dict(world))
         self._put("/scene", world.time, scene_markers(self._messages, world))
 

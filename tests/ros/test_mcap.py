@@ -20,7 +20,7 @@ from pushplan.planners import make_policy
 from pushplan.ros import McapLog, load_episode, plan_from, save_episode, twist_from
 from pushplan.runtime import Command, CommandStatus, Runner
 from pushplan.scenarios import Scenario
-from pushplan.world import Episode, InvalidInputError, Plan, SchemaError, Twist, World
+from pushplan.world import Episode, GoalDisc, InvalidInputError, Plan, SchemaError, Twist, World
 from pushplan.world.outline import signed_area
 
 
@@ -96,6 +96,15 @@ def test_a_robots_log_is_an_episode(tmp_path: Path) -> None:
     assert compute(episode)["interaction_work_kg_m"] == pytest.approx(3.0)
     short = logged(tmp_path / "short.mcap", worlds[:2], CommandStatus.STALE)
     assert not short.success and short.reason == "stale"
+
+
+def test_an_object_that_comes_with_another_goal_is_in_the_episode(tmp_path: Path) -> None:
+    start = make_u_maze([[3, 3, 0], [5, 5, 0.5]])
+    few = replace(start, movables=start.movables.select(np.array([True, False])))
+    worlds = [few, replace(start, goal=GoalDisc([4.0, 4.0], 1.0), time=1.0)]
+    episode = logged(tmp_path / "log.mcap", worlds, CommandStatus.DRIVING)
+    assert episode.object_poses[:, 1].tolist() == [[5, 5, 0.5]] * 2
+    assert episode.world.goal == start.goal
 
 
 def test_an_independent_reader_finds_messages_of_ros(tmp_path: Path) -> None:
