@@ -8,11 +8,11 @@ another one. Here, one thread receives worlds and another one asks for commands,
 
 Per policy it writes how long `Runner.command` took (median, 99.9th percentile and worst), how much
 of that the thread computed itself at worst (the rest is the machine doing other work), how many
-commands were late, what was compiled after `start`, by how much memory grew from a tenth of
-the time to half of it and from there to the end, and how the episodes ended. With --kill a planning thread is ended now and then in the middle of its
-call, by an exception that no planner catches. With --realtime the loop and the simulator have
-real-time priorities, as on a robot, so that other work on the machine delays them less; planning has
-none. That needs the right to set priorities.
+commands were late, what was compiled after `start`, by how much memory grew from a tenth of the
+time to half of it and from there to the end, and how the episodes ended. With --kill a planning
+thread is ended now and then in the middle of its call, by an exception that no planner catches.
+With --realtime the loop and the simulator have real-time priorities, as on a robot, so that other
+work on the machine delays them less; planning has none. That needs the right to set priorities.
 """
 
 from __future__ import annotations

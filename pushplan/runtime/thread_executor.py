@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+import weakref
 from collections.abc import Callable
 from queue import SimpleQueue
 from typing import Any, Generic, TypeVar
@@ -36,8 +37,8 @@ class ThreadExecutor:
     def __init__(self, stop: Stop, clock: Callable[[], float]) -> None:
         self._stop, self._clock = stop, clock
         self._took = ExpectedTime()
-        self._calls: SimpleQueue[ThreadCall[Any] | None] = SimpleQueue()
-        self._thread: threading.Thread | None = None
+        self._worker = _Worker()
+        weakref.finalize(self, self._worker.calls.put, None)  # an executor that nobody closes
         self.latest: ThreadCall[Any] | None = None
 
     def expected(self, stop: Stop | None) -> float:
@@ -57,21 +58,10 @@ class ThreadExecutor:
             return result
 
         self.latest = pending = ThreadCall(run, rule, self._clock())
-        if self._thread is None or not self._thread.is_alive():
-            self._start()
-        self._calls.put(pending)
+        if not self._worker.is_alive:
+            self._worker.start()
+        self._worker.calls.put(pending)
         return pending
-
-    def _start(self) -> None:
-        self._thread = threading.Thread(target=self._work, name="pushplan planning", daemon=True)
-        self._thread.start()
-
-    def _work(self) -> None:
-        """Run calls until one is None, or ends the thread; that leaves the rest to another one."""
-        while (call := self._calls.get()) is not None:
-            if not call.run():
-                self._start()
-                return
 
     @property
     def running_s(self) -> float:
@@ -88,16 +78,38 @@ class ThreadExecutor:
         Returns:
             Whether no thread is left.
         """
-        if self._thread is None:
-            return True
         if self.latest is not None:
             self.latest.abandon()
-        self._calls.put(None)
-        self._thread.join(timeout)
-        left = self._thread.is_alive()
-        if not left:
-            self._thread = None
-        return not left
+        return self._worker.end(timeout)
+
+
+class _Worker:
+    """A thread that runs calls one after another, and ends with a call that is None."""
+
+    def __init__(self) -> None:
+        self.calls: SimpleQueue[ThreadCall[Any] | None] = SimpleQueue()
+        self._thread: threading.Thread | None = None
+
+    @property
+    def is_alive(self) -> bool:
+        return self._thread is not None and self._thread.is_alive()
+
+    def start(self) -> None:
+        self._thread = threading.Thread(target=self._work, name="pushplan planning", daemon=True)
+        self._thread.start()
+
+    def _work(self) -> None:
+        while (call := self.calls.get()) is not None:
+            if not call.run():
+                self.start()  # the rest is for another thread
+                return
+
+    def end(self, timeout: float) -> bool:
+        """Whether no thread is left after so long [s]."""
+        if self._thread is not None and self._thread.is_alive():
+            self.calls.put(None)
+            self._thread.join(timeout)
+        return not self.is_alive
 
 
 class ThreadCall(Generic[T]):
