@@ -14,6 +14,8 @@ sys.modules.update(dict.fromkeys({absent!r}))  # as if they were not there
 {code}
 """
 EXTRAS = (
+    "PIL",
+    "rich",
     "gymnasium",
     "pymunk",
     "mujoco",
@@ -73,6 +75,11 @@ def test_a_robot_needs_none_of_the_extras():
     ("absent", "arguments", "extra"),
     [
         ("gymnasium", ["bench", "smoke", "--policies", "straight"], "sim"),
+        (
+            "PIL",
+            ["plan", "examples/room.yaml", "--planner", "straight", "--render", "no.png"],
+            "pictures",
+        ),
         ("pymunk", ["run", "maze-2d-3", "--policy", "straight"], "sim"),
         ("mujoco", ["run", "maze-3d-3", "--policy", "straight"], "sim"),
         ("onnxruntime", ["run", "maze-2d-3", "--policy", "maze-ppo"], "learned"),

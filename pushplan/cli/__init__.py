@@ -76,7 +76,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 1
     except Exception as error:
         from pushplan.world import PushplanError, UnknownNameError
+        from pushplan.world.libraries import missing
 
+        error = missing(error) or error
         if not isinstance(error, PushplanError | OSError):
             raise
         return _fail(str(error), 2 if isinstance(error, UnknownNameError) else 1)

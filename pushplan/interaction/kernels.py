@@ -20,6 +20,8 @@ from pushplan.interaction.contact import contacts, least_overlap
 from pushplan.interaction.separation import drag_along, separate
 from pushplan.world.checks import FloatArray, IntArray
 
+_NEARBY = 3.0  # how far beyond the robot's reach objects are nearby at first [robot radii]
+
 
 class Bodies(NamedTuple):
     """What the kernels know of the robot, the objects and the walls; arrays in SI units."""
@@ -48,32 +50,6 @@ class Settings(NamedTuple):
     static_friction: float = 0.0  # Coulomb coefficient between objects and walls
 
 
-@kernel
-def _gather_near(
-    bodies: Bodies,
-    poses: FloatArray,
-    x: float,
-    y: float,
-    reach: float,
-    active: IntArray,
-    count: int,
-) -> int:
-    """Add to ``active`` every object whose disc comes within ``reach`` of (x, y)."""
-    for k in range(poses.shape[0]):
-        dx, dy = poses[k, 0] - x, poses[k, 1] - y
-        far = reach + bodies.radii[k]
-        if dx * dx + dy * dy < far * far:
-            known = False
-            for i in range(count):
-                if active[i] == k:
-                    known = True
-                    break
-            if not known:
-                active[count] = k
-                count += 1
-    return count
-
-
 class Scratch(NamedTuple):
     """Memory that one caller reuses from step to step."""
 
@@ -85,7 +61,10 @@ class Scratch(NamedTuple):
     fixed: FloatArray  # (3,) a pose that stands for whatever cannot move
     here: FloatArray  # (3,) where a small step begins
     there: FloatArray  # (3,) where it ends
-    saved: FloatArray  # (K, 3) poses before it
+    saved: FloatArray  # (K, 3) poses before it, of the objects nearby
+    near: IntArray  # (K,) objects nearby, in order: no other one is touched or moves
+    nearby: IntArray  # (1,) how many
+    disc: FloatArray  # (3,) x, y, radius: every object whose disc reaches into it is nearby
     tests: IntArray
     """(1,) pairs of outlines that were tested so far: a measure of time without a clock."""
 
@@ -104,8 +83,62 @@ def make_scratch(bodies: Bodies) -> Scratch:
         np.empty(3),
         np.empty(3),
         np.empty((count, 3)),
+        np.empty(count, np.int64),
+        np.zeros(1, np.int64),
+        np.empty(3),
         np.zeros(1, np.int64),
     )
+
+
+@kernel
+def _gather(
+    x: float, y: float, reach: float, poses: FloatArray, bodies: Bodies, scratch: Scratch
+) -> None:
+    """Make every object nearby whose disc comes within ``reach`` of (x, y)."""
+    count = 0
+    for k in range(poses.shape[0]):
+        dx, dy = poses[k, 0] - x, poses[k, 1] - y
+        far = reach + bodies.radii[k]
+        if dx * dx + dy * dy < far * far:
+            scratch.near[count] = k
+            count += 1
+    scratch.nearby[0] = count
+    scratch.disc[0], scratch.disc[1], scratch.disc[2] = x, y, reach
+
+
+@kernel
+def _touching(
+    x: float, y: float, reach: float, poses: FloatArray, bodies: Bodies, scratch: Scratch
+) -> int:
+    """How many objects nearby come within ``reach`` of (x, y); they become the active ones."""
+    count = 0
+    for i in range(scratch.nearby[0]):
+        k = scratch.near[i]
+        dx, dy = poses[k, 0] - x, poses[k, 1] - y
+        far = reach + bodies.radii[k]
+        if dx * dx + dy * dy < far * far:
+            scratch.active[count] = k
+            count += 1
+    return count
+
+
+@kernel
+def _widen(k: int, count: int, poses: FloatArray, bodies: Bodies, scratch: Scratch) -> None:
+    """Make every object nearby where object ``k`` may touch one that is not; ``count`` are active.
+
+    Only active objects have moved since the small step began.
+    """
+    disc = scratch.disc
+    dx, dy, room = poses[k, 0] - disc[0], poses[k, 1] - disc[1], disc[2] - bodies.radii[k]
+    if room > 0.0 and dx * dx + dy * dy < room * room:
+        return
+    _gather(disc[0], disc[1], np.inf, poses, bodies, scratch)
+    for other in range(poses.shape[0]):
+        moves = False
+        for i in range(count):
+            moves = moves or scratch.active[i] == other
+        if not moves:
+            copy_into(scratch.saved[other], poses[other])
 
 
 @kernel
@@ -181,7 +214,9 @@ def _against_objects(
     first, end = bodies.offsets[k], bodies.offsets[k + 1]
     body, outline = bodies.vertices[first:end], scratch.outlines[first:end]
     transform_points(poses[k], body, outline)
-    for other in range(poses.shape[0]):
+    _widen(k, count, poses, bodies, scratch)
+    for place in range(scratch.nearby[0]):
+        other = scratch.near[place]
         dx, dy = poses[other, 0] - poses[k, 0], poses[other, 1] - poses[k, 1]
         reach = bodies.radii[other] + bodies.radii[k]
         if other == k or dx * dx + dy * dy >= reach * reach:
@@ -228,9 +263,7 @@ def _resolve(
 ) -> float:
     """One small robot step: move the objects out of the way; returns what overlap is left."""
     transform_points(robot_to, bodies.robot_vertices, scratch.robot)
-    count = _gather_near(
-        bodies, poses, robot_to[0], robot_to[1], bodies.robot_radius, scratch.active, 0
-    )
+    count = _touching(robot_to[0], robot_to[1], bodies.robot_radius, poses, bodies, scratch)
     for i in range(count):
         copy_into(scratch.before[scratch.active[i]], poses[scratch.active[i]])
     touched = count  # the robot itself reaches only these
@@ -275,7 +308,8 @@ def advance(
     motion = np.sqrt(dx * dx + dy * dy) + abs(turn) * bodies.robot_radius
     mid_x, mid_y = robot_from[0] + 0.5 * dx, robot_from[1] + 0.5 * dy
     reach = bodies.robot_radius + 0.5 * np.sqrt(dx * dx + dy * dy)
-    if _gather_near(bodies, poses, mid_x, mid_y, reach, scratch.active, 0) == 0:
+    _gather(mid_x, mid_y, reach + _NEARBY * bodies.robot_radius, poses, bodies, scratch)
+    if _touching(mid_x, mid_y, reach, poses, bodies, scratch) == 0:
         return True
     steps = max(1, int(np.ceil(motion / settings.max_step)))
     here, there, saved = scratch.here, scratch.there, scratch.saved
@@ -285,16 +319,20 @@ def advance(
         there[0] = robot_from[0] + part * dx
         there[1] = robot_from[1] + part * dy
         there[2] = robot_from[2] + part * turn
-        copy_into(saved, poses)
+        for i in range(scratch.nearby[0]):
+            copy_into(saved[scratch.near[i]], poses[scratch.near[i]])
         left = _resolve(here, there, poses, bodies, settings, scratch)
-        if left > settings.jam_depth:
-            copy_into(poses, saved)
-            return False
-        for k in range(poses.shape[0]):
-            if poses[k, 0] != saved[k, 0] or poses[k, 1] != saved[k, 1]:
+        jams = left > settings.jam_depth
+        for i in range(scratch.nearby[0]):
+            k = scratch.near[i]
+            if jams:
+                copy_into(poses[k], saved[k])
+            elif poses[k, 0] != saved[k, 0] or poses[k, 1] != saved[k, 1]:
                 lengths[k] += np.sqrt(
                     (poses[k, 0] - saved[k, 0]) ** 2 + (poses[k, 1] - saved[k, 1]) ** 2
                 )
+        if jams:
+            return False
         copy_into(here, there)
     return True
 

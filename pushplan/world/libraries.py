@@ -8,6 +8,8 @@ from typing import Any
 from pushplan.world.errors import MissingDependencyError
 
 EXTRAS = {
+    "PIL": "pictures",
+    "rich": "sim",
     "gymnasium": "sim",
     "mujoco": "sim",
     "pymunk": "sim",
@@ -36,9 +38,18 @@ def need(module: str) -> Any:
     try:
         return import_module(module)
     except ModuleNotFoundError as error:
-        library = (error.name or "").partition(".")[0]
-        if library not in EXTRAS:
+        told = missing(error)
+        if told is None:
             raise
-        raise MissingDependencyError(
-            f"this needs {library}: pip install 'pushplan[{EXTRAS[library]}]'"
-        ) from error
+        raise told from error
+
+
+def missing(error: BaseException) -> MissingDependencyError | None:
+    """What to say of an error that says that a library of an extra is missing; None of others."""
+    name = error.name if isinstance(error, ModuleNotFoundError) else None
+    library = (name or "").partition(".")[0]
+    if library not in EXTRAS:
+        return None
+    return MissingDependencyError(
+        f"this needs {library}: pip install 'pushplan[{EXTRAS[library]}]'"
+    )

@@ -9,7 +9,8 @@ import numpy as np
 import yaml
 
 from pushplan.world.checks import FloatArray, IntArray, array, choice, known_keys, number
-from pushplan.world.errors import InvalidInputError, MissingDependencyError, SchemaError
+from pushplan.world.errors import InvalidInputError, SchemaError
+from pushplan.world.libraries import need
 from pushplan.world.static_map import StaticMap
 
 _MODES = ("trinary", "scale", "raw")
@@ -87,12 +88,7 @@ def read_nav2_grid(path: str | Path) -> tuple[IntArray, float, FloatArray]:
 
 def _picture(path: Path) -> tuple[FloatArray, FloatArray | None]:
     """Mean of the colours (rows, columns) in [0, 1], top row first, and opacity where there is."""
-    try:
-        from PIL import Image
-    except ImportError as error:
-        raise MissingDependencyError(
-            "reading the picture of a map needs Pillow: pip install pillow"
-        ) from error
+    Image = need("PIL.Image")
     try:
         with Image.open(path) as image:
             pixels: Any = _pixels(image)
