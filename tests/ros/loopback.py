@@ -85,7 +85,7 @@ def main():
     executor.add_node(robot)
     spinning = threading.Thread(target=executor.spin, daemon=True)
     spinning.start()
-    assert plan.wait_for_server(120.0) and drive.wait_for_server(10.0)
+    assert plan.wait_for_server(600.0) and drive.wait_for_server(10.0)
     time.sleep(1.0)  # map and odometry
     report = {}
 

@@ -12,6 +12,7 @@ import shutil
 import signal
 import subprocess
 import sys
+import tomllib
 from pathlib import Path
 
 import pytest
@@ -50,7 +51,9 @@ def python(tmp_path_factory: pytest.TempPathFactory) -> Path:
             pytest.skip("the wheels of ROS 2 need python3.12, which is not there")
         folder = str(tmp_path_factory.mktemp("ros") / "venv")
         assert run(maker, "-m", "venv", folder).returncode == 0
-        made = run(f"{folder}/bin/pip", "install", "-q", f"{ROOT}[ros]", *WHEELS)
+        project = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
+        needs = [*project["dependencies"], *project["optional-dependencies"]["ros"], *WHEELS]
+        made = run(f"{folder}/bin/pip", "install", "-q", *needs)
         if made.returncode:
             pytest.skip(f"the wheels of ROS 2 cannot be installed: {made.stderr.strip()[-300:]}")
     path = Path(folder) / "bin" / "python"
