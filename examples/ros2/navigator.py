@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import threading
 import time
 from dataclasses import dataclass
 from typing import Any
@@ -124,6 +125,7 @@ class Navigator:
         self._runner_options: dict[str, Any] = {"period": period, "max_age": max_age, "log": log}
         self._runners: dict[str, Runner] = {}
         self._path = GivenPath()
+        self._handing_over = threading.Lock()
         self._driven = ""
         self._goal: GoalDisc | None = None
         self._outcome = ("", "")
@@ -203,17 +205,15 @@ class Navigator:
             return
         if name == PATH:
             self._path.given, self._path.made = plan, time_from(path)
-        try:
-            runner = self._runner(name)
-            runner.start(world)
-        except (
-            InvalidInputError,
-            UnknownNameError,
-        ) as error:  # no policy, or none for such a robot or goal
-            raise NavigationError("INVALID_CONTROLLER", str(error)) from error
+        with self._handing_over:  # what comes in meanwhile has the goal of before
+            try:
+                runner = self._runner(name)
+                runner.start(world)
+            except InvalidInputError as error:  # not a policy for such a robot or goal
+                raise NavigationError("INVALID_CONTROLLER", str(error)) from error
+            self._driven, self._goal, self._outcome = name, goal, ("", "")
         if before is not None and before is not runner:
             before.cancel()
-        self._driven, self._goal, self._outcome = name, goal, ("", "")
         self._checker = PoseProgressChecker(robot)
         self._began, self._driveable_at = world.time, -math.inf
         self.see()
@@ -225,9 +225,12 @@ class Navigator:
 
     def see(self) -> None:
         """Tell the robot's loop that odometry has come in."""
-        runner, goal = self._runners.get(self._driven), self._goal
-        if runner is not None and goal is not None:
-            runner.update(self.scene.world(goal))
+        if self._handing_over.acquire(blocking=False):
+            try:
+                if self._goal is not None:
+                    self._runners[self._driven].update(self.scene.world(self._goal))
+            finally:
+                self._handing_over.release()
 
     def cancel(self) -> None:
         """Bring the robot to a stand; `step` says when it has."""

@@ -117,10 +117,18 @@ def main():
             time.sleep(0.005)
         return future.result()
 
+    def under_way(left, seconds=60.0):
+        """Wait until the robot drives, and is some way from where it stood."""
+        end, begun = time.monotonic() + seconds, robot.pose[:2].copy()
+        while robot.twist[0] < 0.2 or math.dist(robot.pose[:2], begun) < left:
+            assert time.monotonic() < end, "the robot does not drive"
+            time.sleep(0.005)
+        return robot.twist[0]
+
     # through the door, on the path as it was planned, until another path displaces it
     _, first = sent(computed("first", 3.0, 2.2))
-    time.sleep(5.0)
-    path, before = computed("second", 3.0, 0.75), robot.twist[0]
+    before = under_way(0.5)
+    path = computed("second", 3.0, 0.75)
     robot.slowest, heard = math.inf, []
     _, second = sent(path, feedback=lambda message: heard.append(message.feedback))
     report["displaced"] = told(wait(first), before=before)
@@ -136,8 +144,7 @@ def main():
     )
     # back, on plans of the controller's own; canceled on the way
     handle, future = sent(computed("back", 1.0, 0.75), "straight")
-    time.sleep(4.0)
-    before = robot.twist[0]
+    before = under_way(0.2)
     assert wait(handle.cancel_goal_async()).goals_canceling
     report["canceled"] = told(wait(future), before=before, last=robot.twist)
     # errors
