@@ -10,12 +10,12 @@ from typing import Any
 
 import numpy as np
 import shapely
+from given_path import GivenPath
 from scene import NavigationError, Scene
 
 from pushplan.control import ImmediateExecutor, PoseProgressChecker, PurePursuit
 from pushplan.planners import PlanFollower, make_planner, planner_names, warm_up
-from pushplan.planners.following.replanning import Replanning, rest_of
-from pushplan.planners.following.splicing import passed
+from pushplan.planners.following.replanning import Replanning
 from pushplan.planners.kernel_warmup import warm_up_policy
 from pushplan.ros import Messages, plan_from, pose_from, time_from
 from pushplan.runtime import Command, CommandStatus, RunLog, Runner
@@ -25,7 +25,6 @@ from pushplan.world import (
     InvalidInputError,
     OwnBudget,
     Plan,
-    PlanResult,
     PlanStatus,
     Stop,
     Twist,
@@ -33,7 +32,6 @@ from pushplan.world import (
     World,
 )
 from pushplan.world.checks import FloatArray
-from pushplan.world.plan import PlanStats
 
 PLANNERS = planner_names(open_water=False)
 """What plans, and what drives on plans of its own."""
@@ -62,24 +60,6 @@ class Step:
     distance: float
     outcome: str = ""
     reason: str = ""
-
-
-class GivenPath:
-    """A planner that returns the path that it was given, from where the robot is on it."""
-
-    def __init__(self) -> None:
-        self.given: Plan | None = None
-        self.made = 0.0
-
-    def plan(
-        self, world: World, *, stop: Stop | None = None, rng: np.random.Generator | None = None
-    ) -> PlanResult:
-        """The rest of the path."""
-        if self.given is None:
-            return PlanResult(PlanStatus.TIMED_OUT, None, PlanStats(0.0))
-        index = passed(world, self.given, max(0.0, world.time - self.made))
-        rest = rest_of(self.given, index, None)
-        return PlanResult(PlanStatus.SOLVED, rest, PlanStats(0.0))
 
 
 class Navigator:
