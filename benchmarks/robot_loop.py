@@ -8,11 +8,11 @@ another one. Here, one thread receives worlds and another one asks for commands,
 
 Per policy it writes how long `Runner.command` took (median, 99.9th percentile and worst), how much
 of that the thread computed itself at worst (the rest is the machine doing other work), how many
-commands were late, what was compiled after `start`, by how much memory grew after the first tenth,
-and how the episodes ended. With --kill a planning thread is ended now and then in the middle of its
-call, by an exception that no planner catches. With --realtime the loop has the highest real-time
-priority, the simulator the next and the planning thread the lowest, as on a robot; other work on
-the machine then delays none of them. That needs the right to set priorities.
+commands were late, what was compiled after `start`, by how much memory grew from a tenth of the
+time to half of it and from there to the end, and how the episodes ended. With --kill a planning
+thread is ended now and then in the middle of its call, by an exception that no planner catches.
+With --realtime the loop and the simulator have real-time priorities, as on a robot, so that other
+work on the machine delays them less; planning has none. That needs the right to set priorities.
 """
 
 from __future__ import annotations
@@ -46,8 +46,8 @@ SUITES = {
     "ship-predictive": "ship-ice-3d-20",
 }
 ADDRESS = "127.0.0.1"
-PLANNING = "pushplan planning"  # name of the threads of planning calls
 _KILL_EVERY_S = 20.0
+_MEMORY_AT = (0.1, 0.5, 0.98, np.inf)  # of the time
 _LARGEST = 65_000  # bytes of a datagram
 
 
@@ -99,7 +99,7 @@ def row(policy: str, options: argparse.Namespace) -> str:
         f"{own.max():.2f} ms",
         str(loop.late),
         str(len(loop.compiled)),
-        f"{loop.growth_mb:+.1f} MB",
+        ", ".join(f"{mb:+.1f}" for mb in np.diff(loop.memory)) + " MB",
         str(killer.killed),
         str(loop.failures),
         ", ".join(f"{count} {reason}" for reason, count in loop.reasons.items()) or "none ended",
@@ -183,7 +183,7 @@ class _Loop:
         self.compiled: list[str] = []
         self.reasons: Counter[str] = Counter()
         self.late = self.failures = 0
-        self.growth_mb = 0.0
+        self.memory: list[float] = []
         self._number = -1
         self._offset = self._now = 0.0
         self._start: World | None = None
@@ -221,7 +221,7 @@ class _Loop:
 
     def _drive(self, seconds: float, there: tuple[str, int]) -> None:
         began = due = time.perf_counter()
-        memory, next_kill = None, began + _KILL_EVERY_S
+        next_kill = began + _KILL_EVERY_S
         while time.perf_counter() < began + seconds:
             if self._pipe.poll():
                 _, reason = self._pipe.recv()
@@ -240,21 +240,16 @@ class _Loop:
             if self._kill and before > next_kill:
                 self.killer.due = True
                 next_kill = before + _KILL_EVERY_S
-            if memory is None and before > began + 0.1 * seconds:
-                memory = resident_mb()
+            if before > began + _MEMORY_AT[len(self.memory)] * seconds:
+                self.memory.append(resident_mb())
             due += self._period
             time.sleep(max(0.0, due - time.perf_counter()))
-        self.growth_mb = resident_mb() - (memory or resident_mb())
 
 
 def set_priority(process: int | None, priority: int) -> None:
-    """Real-time priority of a process, or of this thread (0) and those that it starts."""
-    os.sched_setscheduler(process or 0, os.SCHED_FIFO, os.sched_param(priority))
-
-
-def is_realtime() -> bool:
-    """Whether this thread has a real-time priority."""
-    return os.sched_getscheduler(0) == os.SCHED_FIFO
+    """Real-time priority of a process, or of this thread (0), but not of what it starts."""
+    policy = os.SCHED_FIFO | os.SCHED_RESET_ON_FORK
+    os.sched_setscheduler(process or 0, policy, os.sched_param(priority))
 
 
 class Killer(Stop):
@@ -264,9 +259,7 @@ class Killer(Stop):
         self.due, self.killed = False, 0
 
     def start(self) -> StopCheck:
-        """See `pushplan.world.Stop`; planning gives way to the loop whose priority it inherits."""
-        if threading.current_thread().name == PLANNING and is_realtime():
-            set_priority(0, 10)
+        """See `pushplan.world.Stop`."""
         return self._check
 
     def _check(self, iterations: int, cost: float) -> bool:

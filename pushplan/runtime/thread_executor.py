@@ -1,9 +1,11 @@
-"""`ThreadExecutor`: planning calls in threads of their own, one after another."""
+"""`ThreadExecutor`: planning calls in a thread of their own, one after another."""
 
 from __future__ import annotations
 
 import threading
+import weakref
 from collections.abc import Callable
+from queue import SimpleQueue
 from typing import Any, Generic, TypeVar
 
 from pushplan.control.executors import ExpectedTime
@@ -14,13 +16,13 @@ T = TypeVar("T")
 
 
 class PlanningError(PushplanError):
-    """A planning call raised, or its thread has died; the cause is attached."""
+    """A planning call raised, or was abandoned; the cause is attached."""
 
 
 class ThreadExecutor:
-    """Runs each planning call in a new thread, once the call before has ended.
+    """Runs planning calls one after another in a thread of its own.
 
-    A thread that dies takes its own call along and no other.
+    A call that ends its thread takes no other call along: the next one has a new thread.
 
     Args:
         stop: rule that every call has to obey beside its own.
@@ -35,6 +37,8 @@ class ThreadExecutor:
     def __init__(self, stop: Stop, clock: Callable[[], float]) -> None:
         self._stop, self._clock = stop, clock
         self._took = ExpectedTime()
+        self._worker = _Worker()
+        weakref.finalize(self, self._worker.calls.put, None)  # an executor that nobody closes
         self.latest: ThreadCall[Any] | None = None
 
     def expected(self, stop: Stop | None) -> float:
@@ -46,27 +50,27 @@ class ThreadExecutor:
     ) -> ThreadCall[T]:
         """See `pushplan.world.PlanningExecutor`."""
         rule = (OwnBudget() if stop is None else stop) | self._stop
-        before = None if self.latest is None else self.latest.thread
 
         def run(rule: Stop) -> T:
-            if before is not None:
-                before.join()
             began = self._clock()
             result = call(rule)
             self._took.add(self._clock() - began)
             return result
 
         self.latest = pending = ThreadCall(run, rule, self._clock())
+        if not self._worker.is_alive:
+            self._worker.start()
+        self._worker.calls.put(pending)
         return pending
 
     @property
     def running_s(self) -> float:
-        """For how long the call that was submitted last has been running [s]; 0 if none is."""
+        """For how long the call that was submitted last has not ended [s]; 0 if it has."""
         call = self.latest
-        return self._clock() - call.began if call is not None and call.thread.is_alive() else 0.0
+        return 0.0 if call is None or call.ended else self._clock() - call.began
 
     def close(self, timeout: float) -> bool:
-        """End the call that runs.
+        """End the call that runs, and the thread.
 
         Args:
             timeout: how long to wait for that [s].
@@ -74,43 +78,75 @@ class ThreadExecutor:
         Returns:
             Whether no thread is left.
         """
-        if self.latest is None:
-            return True
-        self.latest.abandon()
-        self.latest.thread.join(timeout)
-        return not self.latest.thread.is_alive()
+        if self.latest is not None:
+            self.latest.abandon()
+        return self._worker.end(timeout)
+
+
+class _Worker:
+    """A thread that runs calls one after another, and ends with a call that is None."""
+
+    def __init__(self) -> None:
+        self.calls: SimpleQueue[ThreadCall[Any] | None] = SimpleQueue()
+        self._thread: threading.Thread | None = None
+
+    @property
+    def is_alive(self) -> bool:
+        return self._thread is not None and self._thread.is_alive()
+
+    def start(self) -> None:
+        self._thread = threading.Thread(target=self._work, name="pushplan planning", daemon=True)
+        self._thread.start()
+
+    def _work(self) -> None:
+        while (call := self.calls.get()) is not None:
+            if not call.run():
+                self.start()  # the rest is for another thread
+                return
+
+    def end(self, timeout: float) -> bool:
+        """Whether no thread is left after so long [s]."""
+        if self._thread is not None and self._thread.is_alive():
+            self.calls.put(None)
+            self._thread.join(timeout)
+        return not self.is_alive
 
 
 class ThreadCall(Generic[T]):
-    """A call in a thread of its own.
+    """A call that a thread runs.
 
     Args:
         call: takes the stop rule.
         stop: the rule; the call is cancelled when it is abandoned, too.
         began: when it was asked for, by the clock of the executor [s].
+
+    Attributes:
+        ended: whether it is over, in whatever way.
     """
 
     def __init__(self, call: Callable[[Stop], T], stop: Stop, began: float) -> None:
-        self.began = began
+        self.began, self.ended = began, False
         self._token = Cancellation()
         self._call, self._rule = call, stop | self._token
         self._result: T | None = None
         self._error: BaseException | None = None
         self._done = False
-        self.thread = threading.Thread(target=self._run, name="pushplan planning", daemon=True)
-        self.thread.start()
 
-    def _run(self) -> None:
+    def run(self) -> bool:
+        """Run it, unless it was abandoned; False where that was meant to end the thread."""
         try:
             if not self._token.cancelled:
                 self._result = self._call(self._rule)
                 self._done = True
         except BaseException as error:  # of any kind: nobody else would see it
             self._error = error
+        finally:
+            self.ended = True
+        return self._error is None or isinstance(self._error, Exception)
 
     def ready(self, time: float) -> bool:
         """Whether the call has ended, in whatever way."""
-        return self._done or not self.thread.is_alive()
+        return self.ended
 
     def result(self) -> T:
         """What it returned.
@@ -120,7 +156,7 @@ class ThreadCall(Generic[T]):
         """
         if self._done:
             return self._result  # type: ignore[return-value]
-        why = "its thread died" if self._error is None else describe(self._error)
+        why = "it was abandoned" if self._error is None else describe(self._error)
         raise PlanningError(f"planning failed: {why}") from self._error
 
     def abandon(self) -> None:
