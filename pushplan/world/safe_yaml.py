@@ -33,7 +33,7 @@ class _Loader(_Safe):
         self._sizes: dict[str, int] = {}  # nodes below an anchor, once it has been composed
 
     def compose_node(self, parent: Any, index: Any) -> Any:
-        event = self.peek_event()
+        event: Any = self.peek_event()
         before, anchor = self._nodes, event.anchor
         alias = self.check_event(yaml.AliasEvent)
         if alias and anchor in self.anchors and anchor not in self._sizes:

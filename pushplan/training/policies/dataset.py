@@ -199,7 +199,7 @@ def episodes(folder: str | Path) -> Iterator[EpisodeData]:
     about = read_metadata(folder)
     for number_ in range(int(about["total_episodes"])):
         path = Path(folder) / "data" / f"episode_{number_:05d}.npz"
-        arrays = read_npz(path, "episode of a data set", ARRAYS)
+        arrays: dict[str, Any] = {**read_npz(path, "episode of a data set", ARRAYS)}
         lengths = {len(arrays[name]) for name in ARRAYS[1:]}
         if lengths != {len(arrays["observations"]) - 1}:
             raise SchemaError(f"{path}: the arrays have lengths that do not belong together")
