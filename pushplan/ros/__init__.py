@@ -1,4 +1,4 @@
-"""ROS 2: its messages, with or without ROS installed, and logs that Foxglove opens."""
+"""ROS 2: its messages, with or without ROS installed, and logs as MCAP."""
 
 from pushplan.ros.episodes import load_episode, save_episode
 from pushplan.ros.mcap_log import McapLog

@@ -39,9 +39,8 @@ def save_episode(episode: Episode, path: str | Path) -> None:
     writer = McapWriter(path)
     try:
         writer.scene(episode.world)
-        for index, time in enumerate(episode.times.tolist()):
-            world = episode.world_at(index)
-            writer.state(time, world.robot_pose, np.zeros(3), world)
+        for index in range(len(episode.times)):
+            writer.world(episode.world_at(index))
         content: dict[str, Any] = {key: getattr(episode, key).tolist() for key in _KEPT}
         content |= {"success": episode.success, "reason": episode.reason}
         content |= {"about": dict(episode.about), "action_size": episode.actions.shape[1]}

@@ -77,7 +77,7 @@ def transforms(messages: Messages, time: float, poses: Iterable[tuple[str, Float
                 child_frame_id=name,
                 transform=messages.make(
                     "geometry_msgs/Transform",
-                    translation=_vector(messages, float(pose[0]), float(pose[1]), 0.0),
+                    translation=messages.vector(float(pose[0]), float(pose[1]), 0.0),
                     rotation=messages.quaternion(float(pose[2])),
                 ),
             )
@@ -88,10 +88,6 @@ def transforms(messages: Messages, time: float, poses: Iterable[tuple[str, Float
 
 def _array(messages: Messages, markers: list[Any]) -> Any:
     return messages.make("visualization_msgs/MarkerArray", markers=markers)
-
-
-def _vector(messages: Messages, x: float, y: float, z: float) -> Any:
-    return messages.make("geometry_msgs/Vector3", x=x, y=y, z=z)
 
 
 def _marker(
@@ -122,7 +118,7 @@ def _marker(
         type=_TRIANGLES,
         action=action if corners else _DELETE,
         pose=messages.pose((0.0, 0.0, 0.0)),
-        scale=_vector(messages, 1.0, 1.0, 1.0),
+        scale=messages.vector(1.0, 1.0, 1.0),
         color=make("std_msgs/ColorRGBA", r=r, g=g, b=b, a=a),
         lifetime=make("builtin_interfaces/Duration", sec=0, nanosec=0),
         frame_locked=True,

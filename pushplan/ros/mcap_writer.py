@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +12,7 @@ from pushplan.ros.markers import object_frame, object_markers, scene_markers, tr
 from pushplan.ros.message_types import RosbagsTypes
 from pushplan.ros.messages import Messages
 from pushplan.runtime import Command
-from pushplan.world import InvalidInputError, Plan, StaticMap, World
+from pushplan.world import InvalidInputError, Plan, World
 from pushplan.world.checks import FloatArray
 from pushplan.world.files import world_to_dict
 from pushplan.world.libraries import need
@@ -73,12 +72,6 @@ class McapWriter:
         schema = self._writer.register_schema(name, "ros2msg", text.encode())
         return int(self._writer.register_channel(topic, "cdr", schema, {"schema": SCHEMA}))
 
-    def world(self, world: World) -> None:
-        """Write a snapshot: the scene where it is another one, and where everything is."""
-        self.scene(world)
-        assert world.robot_twist is not None
-        self.state(world.time, world.robot_pose, world.robot_twist, world)
-
     def scene(self, world: World) -> None:
         """Write robot, map, goal and objects, unless they are those of the last scene."""
         old = self._scene
@@ -87,32 +80,29 @@ class McapWriter:
             for key in ("robot", "static", "goal", "margin")
         ):
             return
+        if old is None:
+            self._known.update(world.movables.ids.tolist())
         self._scene = world
-        self._known.update(world.movables.ids.tolist())
         self._put_json(WORLD, world.time, world_to_dict(world))
         self._put("/scene", world.time, scene_markers(self._messages, world))
 
-    def state(self, time: float, robot_pose: FloatArray, twist: FloatArray, world: World) -> None:
-        """Write where robot and objects are.
-
-        Args:
-            time: [s].
-            robot_pose: (3,) x, y [m], theta [rad].
-            twist: (3,) of the robot in the world frame [m/s, m/s, rad/s].
-            world: holds the objects.
-        """
+    def world(self, world: World) -> None:
+        """Write a snapshot: the scene where it is another one, and where everything is."""
+        self.scene(world)
+        time = world.time
         objects = world.movables
         ids = objects.ids.tolist()
         new = [k for k, number in enumerate(ids) if number not in self._known]
         self._known.update(ids)
+        described = world_to_dict(world)["movables"] if new else []
         state = self._own(
             STATE,
             time,
-            robot_pose=np.asarray(robot_pose, dtype=np.float64),
-            robot_twist=np.asarray(twist, dtype=np.float64),
-            ids=np.asarray(objects.ids, dtype=np.int64),
+            robot_pose=world.robot_pose,
+            robot_twist=world.robot_twist,
+            ids=objects.ids,
             object_poses=objects.poses.ravel(),
-            new_objects=json.dumps(_described(world, new)) if new else "",
+            new_objects=json.dumps([described[k] for k in new]),
         )
         self._put(STATE, time, state)
         outlines = {number: objects.outline(k) for k, number in enumerate(ids)}
@@ -126,7 +116,7 @@ class McapWriter:
             markers = object_markers(self._messages, world, changed, set(gone))
             self._put("/objects", time, markers)
         self._shown = outlines
-        bodies = [(self._messages.base_frame, robot_pose)]
+        bodies = [(self._messages.base_frame, world.robot_pose)]
         bodies += [(object_frame(n), pose) for n, pose in zip(ids, objects.poses, strict=True)]
         self._put("/tf", time, transforms(self._messages, time, bodies))
 
@@ -177,12 +167,3 @@ class McapWriter:
         stamp, number = round(time * 1e9), self._counts[topic]
         self._counts[topic] += 1
         self._writer.add_message(self._channels[topic], stamp, data, stamp, number)
-
-
-def _described(world: World, which: list[int]) -> list[Any]:
-    """Some objects of a world as in a world file."""
-    chosen = np.zeros(len(world.movables), dtype=np.bool_)
-    chosen[which] = True
-    bare = StaticMap.build(bounds=world.static.bounds)
-    some = replace(world, static=bare, movables=world.movables.select(chosen))
-    return list(world_to_dict(some)["movables"])

@@ -63,6 +63,10 @@ class Messages:
         frame = self.frame_id if frame_id is None else frame_id
         return self.make("std_msgs/Header", stamp=self.stamp(time), frame_id=frame)
 
+    def vector(self, x: float, y: float, z: float) -> Any:
+        """``geometry_msgs/Vector3``."""
+        return self.make("geometry_msgs/Vector3", x=x, y=y, z=z)
+
     def quaternion(self, theta: float) -> Any:
         """``geometry_msgs/Quaternion`` of a heading [rad]."""
         z, w = math.sin(0.5 * theta), math.cos(0.5 * theta)
@@ -99,8 +103,8 @@ class Messages:
         expect("twist", twist, Twist)
         return self.make(
             "geometry_msgs/Twist",
-            linear=self.make("geometry_msgs/Vector3", x=twist.linear, y=0.0, z=0.0),
-            angular=self.make("geometry_msgs/Vector3", x=0.0, y=0.0, z=twist.angular),
+            linear=self.vector(twist.linear, 0.0, 0.0),
+            angular=self.vector(0.0, 0.0, twist.angular),
         )
 
     def twist_stamped(self, twist: Twist, time: float) -> Any:

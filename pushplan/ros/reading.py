@@ -28,10 +28,10 @@ def frame_of(message: Any) -> str:
 
 
 def pose_from(message: Any, frame: str | None = None) -> FloatArray:
-    """(3,) x, y [m], theta [rad] of a ``Pose``, ``PoseStamped`` or one with covariance.
+    """(3,) x, y [m], theta [rad] of a ``Pose``, or of a message that has one.
 
     Args:
-        message: of any of these types.
+        message: a ``Pose``, ``PoseStamped``, one with covariance, ``Odometry``, ``Marker``...
         frame: the frame that it has to be in; any if None.
 
     Raises:
@@ -39,16 +39,11 @@ def pose_from(message: Any, frame: str | None = None) -> FloatArray:
             degrees, or its quaternion has not the length 1.
     """
     _in_frame(message, frame)
-    pose, name = message, _name(message)
-    if name not in (
-        "geometry_msgs/Pose",
-        "geometry_msgs/PoseStamped",
-        "geometry_msgs/PoseWithCovariance",
-        "geometry_msgs/PoseWithCovarianceStamped",
-    ):
-        raise _wrong(name, "geometry_msgs/Pose, PoseStamped or PoseWithCovariance(Stamped)")
+    pose = message
     while hasattr(pose, "pose"):
         pose = pose.pose
+    if _name(pose) != "geometry_msgs/Pose":
+        raise _wrong(_name(message), "geometry_msgs/Pose, or one that has a pose")
     return array("pose", [pose.position.x, pose.position.y, _heading(pose.orientation)], (3,))
 
 

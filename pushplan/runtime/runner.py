@@ -190,7 +190,8 @@ class Runner:
             InvalidInputError: if the policy cannot be used in such a world.
         """
         world = self._with_margin(world)
-        warm_up_policy(self.policy)
+        if not self.worlds:  # the first time
+            warm_up_policy(self.policy)
         self._estimator.warm_up(world)
         self._estimator.reset()
         self._forget()

@@ -10,7 +10,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 from conftest import make_boxes, make_u_maze
+from mcap.reader import make_reader
+from mcap.well_known import MessageEncoding, Profile, SchemaEncoding
 from mcap.writer import Writer
+from mcap_ros2.decoder import DecoderFactory
 from rosbags.highlevel import AnyReader
 
 from pushplan.cli import main
@@ -20,7 +23,7 @@ from pushplan.planners import make_policy
 from pushplan.ros import McapLog, load_episode, plan_from, save_episode, twist_from
 from pushplan.runtime import Command, CommandStatus, Runner
 from pushplan.scenarios import Scenario
-from pushplan.world import Episode, InvalidInputError, Plan, SchemaError, Twist, World
+from pushplan.world import Episode, GoalDisc, InvalidInputError, Plan, SchemaError, Twist, World
 from pushplan.world.outline import signed_area
 
 
@@ -98,6 +101,15 @@ def test_a_robots_log_is_an_episode(tmp_path: Path) -> None:
     assert not short.success and short.reason == "stale"
 
 
+def test_an_object_that_comes_with_another_goal_is_in_the_episode(tmp_path: Path) -> None:
+    start = make_u_maze([[3, 3, 0], [5, 5, 0.5]])
+    few = replace(start, movables=start.movables.select(np.array([True, False])))
+    worlds = [few, replace(start, goal=GoalDisc([4.0, 4.0], 1.0), time=1.0)]
+    episode = logged(tmp_path / "log.mcap", worlds, CommandStatus.DRIVING)
+    assert episode.object_poses[:, 1].tolist() == [[5, 5, 0.5]] * 2
+    assert episode.world.goal == start.goal
+
+
 def test_an_independent_reader_finds_messages_of_ros(tmp_path: Path) -> None:
     start = make_u_maze([[3, 3, 0]])
     path = tmp_path / "log.mcap"
@@ -127,6 +139,53 @@ def test_an_independent_reader_finds_messages_of_ros(tmp_path: Path) -> None:
     area = 0.5 * np.abs(np.linalg.det(sides)).sum()
     assert area == pytest.approx(sum(signed_area(part) for part in start.static.convex_parts))
     assert [m.action for m in found["/objects"][1][1].markers] == [2]  # gone
+
+
+def test_a_file_is_what_foxglove_documents(tmp_path: Path) -> None:
+    """What docs.foxglove.dev (3D panel) and mcap.dev (registry of the format) ask for.
+
+    Every message is decoded by the definitions in the file alone, by another decoder than the one
+    that wrote them.
+    """
+    start, path = make_u_maze([[3, 3, 0], [5, 5, 0.5]]), tmp_path / "log.mcap"
+    moved = start.moved(movable_poses=[[3, 3.1, 0], [5, 5, 0.6]], time=1.0)
+    gone = replace(moved, movables=moved.movables.select(np.array([True, False])), time=2.0)
+    logged(path, [start, moved, gone], CommandStatus.DRIVING)
+    known_since: dict[str, float] = {"map": 0.0}
+    shown: list[tuple[str, float]] = []
+    with path.open("rb") as file:
+        reader = make_reader(file, decoder_factories=[DecoderFactory()])
+        assert reader.get_header().profile == Profile.ROS2
+        summary = reader.get_summary()
+        assert summary.chunk_indexes and summary.statistics.channel_count == 9
+        for channel in summary.channels.values():
+            schema = summary.schemas[channel.schema_id]
+            assert channel.message_encoding == MessageEncoding.CDR
+            assert schema.encoding == SchemaEncoding.ROS2
+        for schema, channel, record, message in reader.iter_decoded_messages():
+            if channel.topic.startswith("/pushplan/"):
+                continue
+            assert schema.name == SCHEMAS[channel.topic]
+            inside = getattr(message, "transforms", getattr(message, "markers", [message]))
+            for one in inside:
+                stamp = one.header.stamp.sec + 1e-9 * one.header.stamp.nanosec
+                assert stamp == 1e-9 * record.log_time == 1e-9 * record.publish_time
+                if channel.topic == "/tf":
+                    assert one.header.frame_id == "map"
+                    known_since.setdefault(one.child_frame_id, stamp)
+                else:
+                    shown.append((one.header.frame_id, stamp))
+    assert len(shown) > 8 and {"map", "base_link", "object_0", "object_1"} == set(known_since)
+    assert all(known_since[frame] <= stamp for frame, stamp in shown)
+
+
+SCHEMAS = {
+    "/tf": "tf2_msgs/msg/TFMessage",
+    "/scene": "visualization_msgs/msg/MarkerArray",
+    "/objects": "visualization_msgs/msg/MarkerArray",
+    "/plan": "nav_msgs/msg/Path",
+    "/cmd_vel": "geometry_msgs/msg/TwistStamped",
+}
 
 
 @pytest.mark.warm("straight")

@@ -1,0 +1,282 @@
+"""The logic of the ROS 2 node, in a closed loop without ROS."""
+
+from __future__ import annotations
+
+import math
+import sys
+import time
+from pathlib import Path
+from types import SimpleNamespace as Some
+
+import numpy as np
+import pytest
+
+from pushplan.ros import Messages, path_from
+from pushplan.world import Cancellation, InvalidInputError, Twist
+from pushplan.world.robots import turtlebot3_burger
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "examples" / "ros2"))
+from navigator import NavigationError, Navigator
+from scene import Scene
+
+MESSAGES = Messages()
+LIMITS = {"max_acceleration": 0.5, "max_turn_acceleration": 3.0}
+PERIOD = 0.05
+
+
+def room():
+    """4 m by 3 m with walls, and a wall in the middle that leaves a door of 1 m at y > 1.9."""
+    grid = np.zeros((60, 80), dtype=int)
+    grid[[0, -1]] = 100
+    grid[:, [0, -1]] = 100
+    grid[:38, 39:41] = 100
+    return MESSAGES.occupancy(grid, 0.05)
+
+
+def odometry(pose, twist, time):
+    nothing = np.zeros(36)
+    make = MESSAGES.make
+    velocity = MESSAGES.twist(twist)
+    return make(
+        "nav_msgs/Odometry",
+        header=MESSAGES.header(time),
+        child_frame_id="base_link",
+        pose=make("geometry_msgs/PoseWithCovariance", pose=MESSAGES.pose(pose), covariance=nothing),
+        twist=make("geometry_msgs/TwistWithCovariance", twist=velocity, covariance=nothing),
+    )
+
+
+class Robot:
+    """A differential drive without noise, and a navigator at its wheel."""
+
+    def __init__(self, pose=(1.0, 0.75, 0.0), *, stamped=100.0, **options):
+        self.scene = Scene(turtlebot3_burger(**LIMITS))
+        options = {"planner": "straight", **options}
+        self.navigator = Navigator(self.scene, MESSAGES, period=PERIOD, **options)
+        self.pose, self.twist, self.now = np.array(pose), Twist(0.0, 0.0), stamped
+        self.scene.take_map(room())
+        self.see()
+
+    def see(self):
+        self.scene.take_odometry(odometry(self.pose, self.twist, self.now))
+        self.navigator.see()
+
+    def drive(self, *, steps=600, sees=True, moves=True, until=None, pause=0.0):
+        """Commands and what was said of them until the robot stands."""
+        said = []
+        for _ in range(steps):
+            step = self.navigator.step(self.now)
+            gain = abs(step.twist.linear - self.twist.linear)
+            assert gain <= LIMITS["max_acceleration"] * PERIOD + 1e-9
+            assert step.twist.linear <= 0.22
+            self.twist = step.twist
+            said.append(step)
+            if step.outcome or (until is not None and until(step)):
+                break
+            self.now += PERIOD
+            if moves:
+                self.pose[2] += PERIOD * self.twist.angular
+                heading = np.array([math.cos(self.pose[2]), math.sin(self.pose[2])])
+                self.pose[:2] += PERIOD * self.twist.linear * heading
+            if sees:
+                self.see()
+            time.sleep(pause)
+        return said
+
+    def path(self, x, y, **options):
+        return self.navigator.compute_path(pose(x, y), **options)[0]
+
+
+def pose(x, y, theta=0.0):
+    return MESSAGES.pose_stamped((x, y, theta), 0.0)
+
+
+def code_of(call):
+    with pytest.raises(NavigationError) as caught:
+        call()
+    assert "\n" not in str(caught.value) and str(caught.value)
+    return caught.value.code
+
+
+def test_a_path_leads_through_the_door():
+    robot = Robot()
+    message, seconds = robot.navigator.compute_path(pose(3.0, 0.75))
+    _, poses = path_from(message, "map")
+    at_wall = poses[np.abs(poses[:, 0] - 2.0) < 0.1]
+    assert len(at_wall) and (at_wall[:, 1] > 1.9).all()
+    assert math.dist(poses[-1, :2], (3.0, 0.75)) <= 0.1 and seconds > 0.0
+    other = robot.path(3.0, 0.75, start=pose(3.0, 2.0))
+    assert path_from(other)[1][0, :2].tolist() == [3.0, 2.0]
+
+
+@pytest.mark.parametrize(
+    ("code", "call"),
+    [
+        ("INVALID_PLANNER", lambda r: r.path(3, 1, planner_id="straigth")),
+        ("INVALID_PLANNER", lambda r: r.path(3, 1, planner_id="ship-predictive")),
+        ("GOAL_OUTSIDE_MAP", lambda r: r.path(9, 1)),
+        ("START_OUTSIDE_MAP", lambda r: r.path(3, 1, start=pose(-2, 1))),
+        ("GOAL_OCCUPIED", lambda r: r.path(2.0, 0.75)),
+        ("START_OCCUPIED", lambda r: r.path(3, 1, start=pose(2.0, 0.75))),
+        ("TF_ERROR", lambda r: r.navigator.compute_path(in_frame("odom"))),
+        ("CANCELED", lambda r: r.path(3, 1, stop=cancelled())),
+        ("INVALID_PATH", lambda r: r.navigator.follow(MESSAGES.make("nav_msgs/Path", **EMPTY))),
+        ("INVALID_CONTROLLER", lambda r: r.navigator.follow(r.path(3, 1), "gtsp-mpc")),
+        ("INVALID_CONTROLLER", lambda r: r.navigator.follow(r.path(3, 1), "paht")),
+    ],
+)
+def test_what_cannot_be_served_has_the_code_of_nav2(code, call):
+    robot = Robot()
+    assert code_of(lambda: call(robot)) == code
+    assert not robot.navigator.is_driving
+
+
+EMPTY = {"header": MESSAGES.header(0.0), "poses": []}
+
+
+def in_frame(frame):
+    message = pose(3, 1)
+    message.header.frame_id = frame
+    return message
+
+
+def cancelled():
+    token = Cancellation()
+    token.cancel()
+    return token
+
+
+def test_a_goal_that_comes_before_the_map_or_the_odometry_is_refused():
+    scene = Scene(turtlebot3_burger())
+    navigator = Navigator(scene, MESSAGES, planner="straight")
+    assert code_of(lambda: navigator.compute_path(pose(3, 1))) == "UNKNOWN"
+    scene.take_map(room())
+    assert code_of(lambda: navigator.compute_path(pose(3, 1))) == "TF_ERROR"
+    with pytest.raises(InvalidInputError, match="OccupancyGrid"):
+        scene.take_map(pose(0, 0))
+
+
+@pytest.mark.warm("straight")
+def test_a_path_is_driven_to_its_end():
+    robot = Robot()
+    robot.navigator.follow(robot.path(3.0, 0.75))
+    said = robot.drive()
+    assert said[-1].outcome == "SUCCEEDED" and not robot.navigator.is_driving
+    assert math.dist(robot.pose[:2], (3.0, 0.75)) <= 0.1
+    assert said[0].distance == pytest.approx(3.3, abs=0.3) and said[-1].distance < 0.2
+    assert max(step.twist.linear for step in said) > 0.2
+
+
+@pytest.mark.warm("straight")
+def test_another_path_is_taken_up_without_a_stop():
+    robot = Robot()
+    robot.navigator.follow(robot.path(3.0, 0.75))
+    robot.drive(steps=100)
+    before = robot.twist.linear
+    assert before > 0.15
+    began = time.thread_time()
+    robot.navigator.follow(robot.path(3.0, 2.2))
+    assert time.thread_time() - began < 1.0
+    said = robot.drive()
+    assert abs(said[0].twist.linear - before) < 0.03 and said[-1].outcome == "SUCCEEDED"
+    assert math.dist(robot.pose[:2], (3.0, 2.2)) <= 0.1
+
+
+@pytest.mark.warm("straight")
+def test_a_policy_drives_on_plans_of_its_own():
+    robot = Robot()
+    path = robot.path(3.0, 0.75)
+    robot.navigator.follow(path, "straight")
+    said = robot.drive(steps=60, pause=0.005)
+    robot.navigator.follow(path, "straight")  # the same goal once more changes nothing
+    said += robot.drive(pause=0.005)
+    assert said[-1].outcome == "SUCCEEDED"
+    assert [step.twist.linear for step in said[40:80]] != [0.0] * 40
+
+
+@pytest.mark.warm("straight")
+@pytest.mark.parametrize(
+    ("outcome", "options"),
+    [
+        ("CANCELED", {}),
+        ("TF_ERROR", {"sees": False}),
+        ("FAILED_TO_MAKE_PROGRESS", {"moves": False}),
+    ],
+)
+def test_the_robot_brakes_before_a_goal_ends_early(outcome, options):
+    robot = Robot(patience=(4.0, 0.5))
+    robot.navigator.follow(robot.path(3.0, 0.75))
+    said = robot.drive(steps=100)
+    assert robot.twist.linear > 0.15
+    if outcome == "CANCELED":
+        robot.navigator.cancel()
+    said = robot.drive(**options)
+    assert said[-1].outcome == outcome and said[-1].reason
+    assert said[-1].twist == Twist(0.0, 0.0) and len(said) > 5
+    assert not robot.navigator.is_driving
+
+
+@pytest.mark.warm("straight")
+def test_odometry_that_comes_in_while_a_path_is_taken_up_does_not_end_it() -> None:
+    robot = Robot()
+    robot.navigator.follow(robot.path(1.0, 1.5))
+    robot.drive(until=lambda step: step.distance < 0.03)
+    runner = robot.navigator._runners["path"]
+    start = runner.start
+
+    def slow_start(world):
+        command = start(world)
+        robot.scene.take_odometry(odometry(robot.pose, robot.twist, robot.now + 0.02))
+        robot.navigator.see()  # by another thread, at the goal of before
+        return command
+
+    runner.start = slow_start
+    robot.navigator.follow(robot.path(3.0, 2.2))
+    robot.drive(steps=3, sees=False)
+    assert robot.drive()[-1].outcome == "SUCCEEDED"
+    assert math.dist(robot.pose[:2], (3.0, 2.2)) <= 0.1
+
+
+@pytest.mark.warm("straight")
+def test_a_path_that_is_refused_leaves_the_old_one():
+    robot = Robot()
+    path = robot.path(3.0, 0.75)
+    robot.navigator.follow(path)
+    robot.drive(steps=100)
+    assert code_of(lambda: robot.navigator.follow(path, "gtsp-mpc")) == "INVALID_CONTROLLER"
+    assert robot.navigator.is_driving and robot.drive()[-1].outcome == "SUCCEEDED"
+
+
+def test_markers_become_objects_that_keep_their_ids():
+    robot = Robot()
+    corners = [(-0.1, -0.1), (0.1, -0.1), (0.0, 0.2)]
+    for x in (1.5, 1.5, 1.52):
+        markers = [marker(7, (x, 1.0, 0.3), cube=0.2), marker(3, (1.0, 2.0, 0.0), corners)]
+        array = MESSAGES.make("visualization_msgs/MarkerArray", markers=markers)
+        robot.scene.take_objects(array, 0.0)
+    world = robot.scene.world(robot.navigator._disc(np.array([3.0, 1.0])))
+    by_id = dict(zip(world.movables.ids.tolist(), range(2), strict=True))
+    assert sorted(by_id) == [3, 7]
+    box = world.movables.outline_world(by_id[7])
+    np.testing.assert_allclose(box.mean(axis=0), [1.5, 1.0], atol=0.03)
+    np.testing.assert_allclose(np.hypot(*(box - box.mean(axis=0)).T), 0.1 * math.sqrt(2), atol=0.01)
+    assert len(world.movables.outline(by_id[3])) == 3
+    wrong = marker(1, (0.0, 0.0, 0.0), cube=0.1, frame="camera")
+    with pytest.raises(InvalidInputError, match="'camera'"):
+        robot.scene.take_objects(
+            MESSAGES.make("visualization_msgs/MarkerArray", markers=[wrong]), 1.0
+        )
+
+
+STAMPS = iter(range(1, 10**6))
+
+
+def marker(number, at, corners=(), *, cube=0.0, frame="map"):
+    make = MESSAGES.make
+    vector = make("geometry_msgs/Vector3", x=cube, y=cube, z=0.1)
+    points = [make("geometry_msgs/Point", x=x, y=y, z=0.0) for x, y in corners]
+    header = MESSAGES.header(0.1 * next(STAMPS), frame)
+    return Some(
+        header=header, id=number, type=1 if cube else 4, pose=MESSAGES.pose(at), scale=vector,
+        points=points,
+    )  # fmt: skip
