@@ -2,9 +2,8 @@
 
     python benchmarks/robot_loop.py [--seconds S] [--rate HZ] [--kill] [--policies NAME ...]
 
-The other process simulates the robot, at the wall clock's pace: every period it sends what it sees
-over UDP, on loopback, and drives what it was sent last. An episode that has ended is followed by
-another one. Here, one thread receives worlds and another one asks for commands, as on a robot.
+The other process is `examples/robot_process.py`. An episode that has ended is followed by another
+one. Here, one thread receives worlds and another one asks for commands, as on a robot.
 
 Per policy it writes how long `Runner.command` took (median, 99.9th percentile and worst), how much
 of that the thread computed itself at worst (the rest is the machine doing other work), how many
@@ -18,26 +17,25 @@ work on the machine delays them less; planning has none. That needs the right to
 from __future__ import annotations
 
 import argparse
-import multiprocessing
 import os
 import socket
+import sys
 import threading
 import time
 from collections import Counter
-from collections.abc import Sequence
-from dataclasses import replace
 from multiprocessing.connection import Connection
 from pathlib import Path
 
 import numpy as np
 
 from pushplan.compiled import watching
-from pushplan.evaluation import JobSettings
 from pushplan.runtime import Runner
 from pushplan.runtime.runner import PLAN_STOP
-from pushplan.scenarios import Scenario, suite
-from pushplan.world import Stop, StopCheck, Twist, World
-from pushplan.world.checks import FloatArray
+from pushplan.scenarios import suite
+from pushplan.world import Stop, StopCheck, World
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "examples"))
+from robot_process import ADDRESS, LARGEST, command_bytes, seen, start_robot
 
 SUITES = {
     "push-aware": "maze-3d-3",
@@ -45,10 +43,8 @@ SUITES = {
     "gtsp-mpc": "area-clearing-3d-10",
     "ship-predictive": "ship-ice-3d-20",
 }
-ADDRESS = "127.0.0.1"
 _KILL_EVERY_S = 20.0
 _MEMORY_AT = (0.1, 0.5, 0.98, np.inf)  # of the time
-_LARGEST = 65_000  # bytes of a datagram
 
 
 def main() -> None:
@@ -74,11 +70,7 @@ def row(policy: str, options: argparse.Namespace) -> str:
     """Drive with one policy; its line of the table."""
     scenarios = suite(SUITES[policy], episodes=500, first_seed=options.seed).scenarios
     period = 1.0 / options.rate
-    ours, theirs = multiprocessing.get_context("spawn").Pipe()
-    robot = multiprocessing.get_context("spawn").Process(
-        target=simulate, args=(theirs, policy, scenarios, period), daemon=True
-    )
-    robot.start()
+    robot, ours = start_robot(policy, scenarios, period)
     killer = Killer()
     runner = Runner(policy, period=period, plan_stop=PLAN_STOP | killer)
     loop = _Loop(runner, ours, period, killer, options.kill)
@@ -105,69 +97,6 @@ def row(policy: str, options: argparse.Namespace) -> str:
         ", ".join(f"{count} {reason}" for reason, count in loop.reasons.items()) or "none ended",
     ]
     return "| " + " | ".join(cells) + " |"
-
-
-def simulate(pipe: Connection, policy: str, scenarios: Sequence[Scenario], period: float) -> None:
-    """The other process: the robot, its world, and its wheels.
-
-    What never changes goes through the pipe once an episode; what does over UDP.
-    """
-    start = replace(scenarios[0], variations={**scenarios[0].variations, "control_step": period})
-    env = JobSettings().environment(start, Runner(policy, period=period).policy)
-    receiver = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-    receiver.bind((ADDRESS, 0))
-    receiver.setblocking(False)
-    pipe.send(receiver.getsockname()[1])
-    there = (ADDRESS, pipe.recv())
-    for number, scenario in enumerate(scenarios):
-        env.reset(seed=scenario.seed)
-        pipe.send((number, env.world))
-        pipe.recv()
-        due, twist = time.perf_counter(), Twist(0.0, 0.0)
-        over = False
-        while not over:
-            *_, terminated, truncated, info = env.step(env.encode(twist))
-            over = terminated or truncated
-            due = max(due + period, time.perf_counter())
-            time.sleep(max(0.0, due - time.perf_counter()))
-            receiver.sendto(message(number, env.world), there)
-            twist = newest(receiver, number, twist)
-        pipe.send((number, str(info.get("reason", ""))))
-
-
-def message(number: int, world: World) -> bytes:
-    """What is seen, as numbers."""
-    movables = world.movables
-    head = [number, world.time, len(movables), *world.robot_pose, *world.robot_twist]
-    return np.concatenate([head, movables.ids, movables.poses.ravel()]).tobytes()
-
-
-def seen(data: bytes, start: World) -> World:
-    """The world of a message, with what never changes taken from the start of the episode."""
-    values: FloatArray = np.frombuffer(data)
-    count = int(values[2])
-    ids, poses = values[9 : 9 + count], values[9 + count :].reshape(-1, 3)
-    movables = start.movables
-    if count != len(movables):
-        movables = movables.select(np.isin(movables.ids, ids))
-    return replace(
-        start,
-        time=float(values[1]),
-        robot_pose=values[3:6],
-        robot_twist=values[6:9],
-        movables=movables.moved_to(poses),
-    )
-
-
-def newest(receiver: socket.socket, number: int, last: Twist) -> Twist:
-    """The command that came last, of those for this episode."""
-    while True:
-        try:
-            episode, linear, angular = np.frombuffer(receiver.recv(_LARGEST))
-        except BlockingIOError:
-            return last
-        if int(episode) == number:
-            last = Twist(float(linear), float(angular))
 
 
 class _Loop:
@@ -212,7 +141,7 @@ class _Loop:
 
     def _receive(self) -> None:
         while True:
-            data = self._socket.recv(_LARGEST)
+            data = self._socket.recv(LARGEST)
             start, number = self._start, self._number
             if start is not None and int(np.frombuffer(data, count=1)[0]) == number:
                 world = seen(data, start)
@@ -235,8 +164,7 @@ class _Loop:
             self.own.append(time.thread_time() - own)
             self.took.append(time.perf_counter() - before)
             self.late += command.late
-            values = [self._number, command.twist.linear, command.twist.angular]
-            self._socket.sendto(np.array(values).tobytes(), there)
+            self._socket.sendto(command_bytes(self._number, command.twist), there)
             if self._kill and before > next_kill:
                 self.killer.due = True
                 next_kill = before + _KILL_EVERY_S

@@ -41,6 +41,7 @@ ORDER = (
     "gtsp_and_pushing",
     "learned_against_classical",
     "planner_in_a_control_loop",
+    "robot_through_faults",
 )
 COLOURS = 96
 """Of a picture: flat drawings look the same with few, and are a third of the size."""
@@ -48,7 +49,7 @@ DPI = 110
 HEAD = """\
 # Notebooks
 
-Six of them, in [`notebooks/`](../notebooks): open one with Jupyter. They are kept without outputs
+Seven of them, in [`notebooks/`](../notebooks): open one with Jupyter. They are kept without outputs
 and run as tests, each in less than a minute. This page is what they say and show, made by
 `python notebooks/render.py` on a 2-core machine that was busy with other work, which makes every
 time on it longer.

@@ -216,8 +216,9 @@ class Runner:
     def _with_margin(self, world: World) -> World:
         """The world as the policy plans in it: with the margin, and sure to be in the goal."""
         world = expect("world", world, World)
-        goal, inset = world.goal, self._goal_inset
-        if isinstance(goal, GoalDisc) and inset > 0.0:
+        goal = world.goal
+        inset = self._goal_inset + world.robot.max_speed * self.period  # the last command acts
+        if isinstance(goal, GoalDisc):
             world = replace(
                 world, goal=GoalDisc(goal.center, max(goal.radius - inset, 0.5 * goal.radius))
             )

@@ -6,6 +6,7 @@ import threading
 import weakref
 from collections.abc import Callable
 from queue import SimpleQueue
+from traceback import format_tb
 from typing import Any, Generic, TypeVar
 
 from pushplan.control.executors import ExpectedTime
@@ -139,7 +140,8 @@ class ThreadCall(Generic[T]):
                 self._result = self._call(self._rule)
                 self._done = True
         except BaseException as error:  # of any kind: nobody else would see it
-            self._error = error
+            error.add_note("".join(format_tb(error.__traceback__)))
+            self._error = error.with_traceback(None)  # whose frames keep the worlds of the call
         finally:
             self.ended = True
         return self._error is None or isinstance(self._error, Exception)

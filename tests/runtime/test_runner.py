@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import gc
 import json
 import math
 import subprocess
 import sys
 import threading
 import time
+import weakref
 from dataclasses import replace
 
 import numpy as np
@@ -129,6 +131,27 @@ def test_a_planner_that_raises_stops_the_robot_with_a_reason_and_is_asked_again(
     assert commands[-1].status is CommandStatus.DRIVING
     assert commands[-1].twist.linear > 0.0
     assert runner.failures >= 1
+
+
+def test_a_call_that_fails_keeps_nothing_of_its_worlds():
+    """Else memory grows with each failure until the garbage collector comes round."""
+    kept = []
+
+    class Fails(Straight):
+        def plan(self, world, *, stop=None, rng=None):
+            kept.append(weakref.ref(world))
+            raise ValueError("no")
+
+    world = maze()
+    with Runner(Fails(), period=PERIOD) as runner:
+        gc.disable()
+        try:
+            runner.start(world)
+            drive(runner, later(world, STILL), 60)
+            assert len(kept) > 3
+            assert sum(ref() is not None for ref in kept) <= 2
+        finally:
+            gc.enable()
 
 
 @pytest.mark.parametrize("death", [SystemExit, KeyboardInterrupt, MemoryError])

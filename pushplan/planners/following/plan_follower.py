@@ -163,9 +163,10 @@ class PlanFollower:
                 self._receive(world)
 
     def _is_waiting(self, world: World) -> bool:
-        """Whether the robot need not get on: it is there, or a plan is on its way."""
+        """Whether the robot need not get on: it is there, or its first plan is on its way."""
         if self.current_plan is None:
-            return self._pending is not None
+            found_none = bool(self.plan_log) and self.plan_log[-1].plan is None
+            return self._pending is not None and not found_none
         goal, (x, y, _) = world.goal, world.robot_pose
         there = isinstance(goal, GoalDisc | GoalLine) and goal.distance(float(x), float(y)) == 0.0
         return there or self.replanning.never

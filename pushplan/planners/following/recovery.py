@@ -28,6 +28,7 @@ class RecoveryRule:
         self._recovery: Recovery | None = None
         self._place = world.robot_pose
         self._count = 0
+        self._told, self._held = 0.0, math.inf
 
     @property
     def idle(self) -> float:
@@ -58,12 +59,15 @@ class RecoveryRule:
 
         Args:
             world: the scene now.
-            held: for how long the command will be held [s].
+            held: for how long the last command was held [s]. Where that is more than twice as
+                long as before, the rule was not asked meanwhile, and the rest is nobody's delay.
         """
+        self._told += min(held, 2.0 * self._held)
+        self._held = held
         size = world.robot.circumscribed_radius
         if math.dist(world.robot_pose[:2], self._place[:2]) > _PLACE * size:
             self._place, self._count = world.robot_pose, 0
-        gets_on = self._checker.update(world.robot_pose, world.time)
+        gets_on = self._checker.update(world.robot_pose, self._told)
         if self._recovery is None:
             if gets_on or self.stuck or world.robot.drive is not Drive.DIFFERENTIAL:
                 return None

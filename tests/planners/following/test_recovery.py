@@ -11,7 +11,13 @@ import numpy as np
 import pytest
 from conftest import make_robot, make_u_maze
 
-from pushplan.control import MpcTracker, PathFollower, PoseProgressChecker, Recovery
+from pushplan.control import (
+    MpcTracker,
+    PathFollower,
+    PoseProgressChecker,
+    Recovery,
+    SimulatedExecutor,
+)
 from pushplan.envs import make
 from pushplan.interaction import QuasiStatic
 from pushplan.motion.collision import footprint, obstacles, static_depth
@@ -132,6 +138,30 @@ def test_no_policy_stands_for_good_with_a_plan(seed, period, delay, effect):
     assert robot.arrived
     assert max((t for what, t in done if what == "stands"), default=0.0) < 5.0
     assert max((t for what, t in done if what == "recovers"), default=0.0) < 10.0 / effect
+
+
+def test_a_robot_recovers_although_fruitless_calls_follow_one_another():
+    """It stands at a wall; from there no plan is found, and each call begins as the last ends."""
+    robot, policy = Unicycle(maze_testbed(5017), 0.05), follower(12)
+    policy.reset(robot.world, np.random.default_rng(0))
+    ticks = itertools.count(step=0.5)  # a call takes so long
+    policy.plan_with(SimulatedExecutor(1.0, lambda: next(ticks)))
+    recovered = False
+    while not robot.arrived and robot.world.time < 60.0:
+        robot.drive(policy.act(robot.world))
+        recovered = recovered or policy._recovery.is_on
+    assert recovered and robot.arrived
+
+
+def test_time_in_which_nobody_asks_is_no_lack_of_progress():
+    world = maze_testbed(5017)
+    rule = RecoveryRule(world)
+    for step in range(40):  # it is told to stand for so long by somebody else
+        assert rule.command(world.moved(time=0.05 * step), 0.05) is None
+        if 0.05 * step > 0.5 * rule.patience:
+            break
+    assert rule.command(world.moved(time=60.0), 60.0) is None
+    assert rule.idle < rule.patience
 
 
 @pytest.mark.parametrize("seed", range(5010, 5020))
