@@ -17,7 +17,6 @@ if TYPE_CHECKING:
     from pushplan.evaluation.jobs import Job, JobResult, JobSettings
     from pushplan.evaluation.paper import Comparison, bench_paper
     from pushplan.evaluation.policies import PolicySpec, parse_policies, parse_policy
-    from pushplan.evaluation.pool import WorkerPool
     from pushplan.evaluation.results import Results
     from pushplan.evaluation.rows import TIMING_COLUMNS, ResultRow, Status, columns
     from pushplan.evaluation.statistics import Estimate, Proportion, bootstrap_interval, wilson
@@ -44,7 +43,6 @@ __all__ = [
     "ScoreSheet",
     "Status",
     "UnusablePolicyError",
-    "WorkerPool",
     "bench",
     "bench_paper",
     "bootstrap_interval",
@@ -67,7 +65,6 @@ __getattr__, __dir__ = lazy_names(
         "jobs": "Job JobResult JobSettings",
         "paper": "Comparison bench_paper",
         "policies": "PolicySpec parse_policies parse_policy",
-        "pool": "WorkerPool",
         "results": "Results",
         "rows": "TIMING_COLUMNS ResultRow Status columns",
         "statistics": "Estimate Proportion bootstrap_interval wilson",

@@ -22,12 +22,18 @@ from pushplan.evaluation.jobs import (
     failed_result,
     timeout_reason,
 )
-from pushplan.evaluation.pool import WorkerDiedError, WorkerOverranError, WorkerPool
+from pushplan.evaluation.pool import WorkerPool
 from pushplan.evaluation.rows import ResultRow, Status, setting_of
 from pushplan.evaluation.store import RunDirectory
 from pushplan.evaluation.worker import WORKER_VARIABLE
+from pushplan.evaluation.worker_process import (
+    WorkerDiedError,
+    WorkerOutOfMemoryError,
+    WorkerOverranError,
+)
 from pushplan.world import InvalidInputError
 from pushplan.world.checks import integer, number
+from pushplan.world.errors import describe
 
 Progress = Callable[[int, int, ResultRow | None], None]
 """Called with jobs done, jobs in all, and the row just stored (None at the beginning)."""
@@ -42,6 +48,10 @@ PRELOAD = (
     "pushplan.envs.simulators.pymunk_simulator",
 )
 """What a worker imports before its first job, so that no job's time holds it."""
+_TURN = 20
+"""So many jobs of a policy follow each other where policies do not share a process."""
+
+Submit = Callable[[Job], "Future[JobResult]"]
 
 
 def run_batch(
@@ -70,7 +80,8 @@ def run_batch(
         executor: runs the jobs instead of our own processes; ``workers`` then says how many jobs
             it is given at a time.
         settings: environment, observation and time limit of all jobs.
-        memory_limit_mb: private memory of a worker at which allocations fail [MB].
+        memory_limit_mb: private memory of a worker at which allocations fail, and memory of it and
+            what it started, shared or not, at which it is ended [MB].
         retry_failed: run jobs again whose row says that they failed.
         about: what else the results depend on; has to be the same when a run is continued.
         progress: told of every row.
@@ -161,18 +172,25 @@ class _Batch:
         """One after the other in this process."""
         while self._jobs:
             job = self._jobs.popleft()
-            self._keep(execute(job, self._settings))
+            self._keep(execute(job, self._settings).checked(job))
 
     def run(self, executor: Executor | None, window: int) -> None:
         """Through an executor, ``window`` jobs at a time; through our own pool if None."""
         if executor is None:
+            self._jobs = _in_turns(self._jobs)
             with _closing(self._pool(window)) as pool:
                 # one job waits for each worker, so that none is idle while a row is stored
-                self._drain(pool, 2 * window, None)
-        elif suspects := self._drain(executor, window, os.getpid()):
-            self._clear(suspects)
-            _log.warning("the executor broke; its jobs go on in %d processes of our own", window)
-            self.run(None, window)
+                self._drain(_sending(pool, self._settings), 2 * window, foreign=False)
+        else:
+            settings, owner = self._settings, os.getpid()
+
+            def submit(job: Job) -> Future[JobResult]:
+                return executor.submit(execute, job, settings, owner)
+
+            if suspects := self._drain(submit, window, foreign=True):
+                self._clear(suspects)
+                _log.warning("the executor broke; its jobs go on in %d processes of ours", window)
+                self.run(None, window)
 
     def _pool(self, workers: int) -> WorkerPool:
         logs = self._store.path / "logs"
@@ -185,7 +203,7 @@ class _Batch:
             log_dir=logs,
         )
 
-    def _drain(self, executor: Executor, window: int, owner_pid: int | None) -> list[Job]:
+    def _drain(self, submit: Submit, window: int, *, foreign: bool) -> list[Job]:
         """Run jobs until there are none; those in flight when the executor broke otherwise."""
         flying: dict[Future[JobResult], Job] = {}
         suspects: list[Job] = []
@@ -193,44 +211,47 @@ class _Batch:
             while self._jobs and len(flying) < window:
                 job = self._jobs.popleft()
                 try:
-                    flying[_submit(executor, job, self._settings, owner_pid)] = job
+                    flying[_sent(submit, job)] = job
                 except BrokenExecutor:
                     suspects.append(job)
                     break
             done, _ = wait(flying, return_when=FIRST_COMPLETED)
             for future in done:
                 job = flying.pop(future)
-                outcome = self._outcome(job, future, owner_pid)
+                outcome = self._outcome(job, future, foreign)
                 if outcome is None:
                     suspects.append(job)
                 else:
                     self._keep(outcome)
         return [*suspects, *flying.values()]
 
-    def _outcome(
-        self, job: Job, future: Future[JobResult], owner_pid: int | None
-    ) -> JobResult | None:
+    def _outcome(self, job: Job, future: Future[JobResult], foreign: bool) -> JobResult | None:
         """What became of a job; None if its executor broke and it may be innocent."""
         try:
-            return future.result()
+            return future.result().checked(job)
         except WorkerOverranError as error:
             reason = timeout_reason(self._settings.timeout_s)
             detail = "The process did not react and was ended.\n" + error.log
             return failed_result(job, Status.TIMEOUT, reason, detail)
         except WorkerDiedError as error:
-            detail = f"{error}\n{error.log}"
-            return failed_result(job, Status.CRASHED, str(error), detail)
+            memory = isinstance(error, WorkerOutOfMemoryError)
+            status = Status.OUT_OF_MEMORY if memory else Status.CRASHED
+            return failed_result(job, status, str(error), f"{error}\n{error.log}")
         except BrokenExecutor as error:
-            if owner_pid is None:
+            if not foreign:
                 raise InvalidInputError(f"no worker process can be started: {error}") from error
             return None
+        except InvalidInputError:
+            raise  # a worker cannot load what it was sent: nothing can run
+        except Exception as error:
+            return failed_result(job, Status.CRASHED, describe(error))
 
     def _clear(self, suspects: Sequence[Job]) -> None:
         """Run jobs that were in flight when a process died each alone in a fresh process."""
         for job in suspects:
             with _closing(self._pool(1)) as pool:
-                future = _submit(pool, job, self._settings, None)
-                outcome = self._outcome(job, future, None)
+                future = _sent(_sending(pool, self._settings), job)
+                outcome = self._outcome(job, future, foreign=False)
                 assert outcome is not None
                 self._keep(outcome)
 
@@ -252,13 +273,27 @@ def _closing(pool: WorkerPool) -> Iterator[WorkerPool]:
     pool.shutdown()
 
 
-def _submit(
-    executor: Executor, job: Job, settings: JobSettings, owner_pid: int | None
-) -> Future[JobResult]:
+def _sending(pool: WorkerPool, settings: JobSettings) -> Submit:
+    return lambda job: pool.submit(job.policy.group, execute, job, settings)
+
+
+def _sent(submit: Submit, job: Job) -> Future[JobResult]:
     try:
-        return executor.submit(execute, job, settings, owner_pid)
+        return submit(job)
     except (pickle.PicklingError, AttributeError, TypeError) as error:
         raise InvalidInputError(
             f"policy {job.policy.label!r} cannot be sent to a worker process ({error}): define it "
             "at the top level of a file, name it as 'file.py:Class', or use workers=0"
         ) from error
+
+
+def _in_turns(jobs: Iterable[Job]) -> deque[Job]:
+    """The jobs in runs of policies that may share a process: a change takes a new process."""
+    waiting: dict[str, deque[Job]] = {}
+    for job in jobs:
+        waiting.setdefault(job.policy.group, deque()).append(job)
+    turns: deque[Job] = deque()
+    while any(waiting.values()):
+        for queue in waiting.values():
+            turns.extend(queue.popleft() for _ in range(min(_TURN, len(queue))))
+    return turns

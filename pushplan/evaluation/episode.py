@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import time
 from collections.abc import Callable
 from typing import Any, Protocol, runtime_checkable
@@ -212,7 +213,9 @@ class Recording:
 
     def _begin(self, world: World) -> None:
         self.started = True
-        self._world = world
+        self._world = copy.deepcopy(
+            world
+        )  # what a policy does to the one that it is shown is its own
         self._times = [np.array([world.time])]
         self._robot = [np.array(world.robot_pose)[None]]
         self._objects = [np.array(world.movables.poses)[None]]

@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 import contextlib
+import io
 import os
 import random
-import re
-import tempfile
 import time
 import traceback
-from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 
@@ -21,17 +18,21 @@ from pushplan.evaluation.episode import (
     Recording,
     plan_times,
 )
-from pushplan.evaluation.jobs import Job, JobResult, JobSettings, failed_result, timeout_reason
+from pushplan.evaluation.jobs import (
+    Job,
+    JobResult,
+    JobSettings,
+    clipped,
+    failed_result,
+    timeout_reason,
+)
 from pushplan.evaluation.limits import EpisodeTimeout, hard_limit, soft_limit
-from pushplan.evaluation.rows import Status, blank_row, scored_row
+from pushplan.evaluation.rows import Status, blank_row, clean_reason, scored_row
 from pushplan.world.errors import describe
 from pushplan.world.policy_abilities import WarmsUp
 
 DRY_RUN_STEPS = 2
 _dry_runs: set[tuple[str, str, str]] = set()
-
-REASON_LENGTH = 300
-"""A reason in the results is cut to this many characters; the detail file has all of it."""
 
 
 def execute(job: Job, settings: JobSettings, owner_pid: int | None = None) -> JobResult:
@@ -50,10 +51,11 @@ def execute(job: Job, settings: JobSettings, owner_pid: int | None = None) -> Jo
     except EpisodeTimeout:
         reason = timeout_reason(settings.timeout_s)
         return failed_result(job, Status.TIMEOUT, reason, traceback.format_exc())
-    except MemoryError:
-        return failed_result(
-            job, Status.OUT_OF_MEMORY, "an allocation failed", traceback.format_exc()
-        )
+    except MemoryError as error:
+        error.__traceback__ = None  # its frames hold what took the memory
+        return failed_result(job, Status.OUT_OF_MEMORY, "an allocation failed")
+    except (Exception, SystemExit) as error:  # what a policy left behind trips whoever reads it
+        return failed_result(job, Status.POLICY_ERROR, describe(error), traceback.format_exc())
 
 
 def _execute(job: Job, settings: JobSettings) -> JobResult:
@@ -67,9 +69,7 @@ def _execute(job: Job, settings: JobSettings) -> JobResult:
     except MemoryError:
         raise
     except (Exception, SystemExit) as error:
-        return failed_result(
-            job, Status.POLICY_ERROR, _short(describe(error)), traceback.format_exc()
-        )
+        return failed_result(job, Status.POLICY_ERROR, describe(error), traceback.format_exc())
     recording = Recording(
         policy, job.scenario, job.policy.label, latency_factor=settings.latency_factor
     )
@@ -87,14 +87,22 @@ def _execute(job: Job, settings: JobSettings) -> JobResult:
     except Exception as error:
         status, reason = _failure(error)
         detail = traceback.format_exc()
-    row = blank_row(job.policy.label, job.scenario, status, _short(reason or recording.reason))
+    reason = None if reason is None else clean_reason(reason)
+    row = blank_row(
+        job.policy.label,
+        job.scenario,
+        status,
+        clean_reason(recording.reason if reason is None else reason),
+    )
     row = replace(row, wall_time_s=time.perf_counter() - begin)
     if not recording.started:
         return JobResult(row, detail=detail)
     episode = recording.episode(reason)
     calls = plan_times(policy)
     row = scored_row(row, episode, None if calls is None else len(calls))
-    return JobResult(row, _as_bytes(episode.save), detail)
+    trace = io.BytesIO()
+    episode.save(trace)
+    return JobResult(row, trace.getvalue(), clipped(detail))
 
 
 def dry_run(job: Job, settings: JobSettings) -> None:
@@ -122,19 +130,6 @@ def _failure(error: Exception) -> tuple[Status, str]:
     if isinstance(error, PolicyError):
         return Status.POLICY_ERROR, str(error)
     return Status.ENV_ERROR, describe(error)
-
-
-def _short(reason: str) -> str:
-    # addresses of objects differ from run to run
-    reason = re.sub(r"0x[0-9a-f]{6,}", "0x...", reason)
-    return reason if len(reason) <= REASON_LENGTH else reason[: REASON_LENGTH - 3] + "..."
-
-
-def _as_bytes(save: Callable[[Path], None]) -> bytes:
-    with tempfile.TemporaryDirectory(prefix="pushplan-") as folder:
-        path = Path(folder) / "episode.npz"
-        save(path)
-        return path.read_bytes()
 
 
 def _nothing() -> None:

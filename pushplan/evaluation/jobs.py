@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass
 from typing import Any
 
 from pushplan.evaluation.episode import wanted_observation
 from pushplan.evaluation.loading import load_object
 from pushplan.evaluation.policies import PolicySpec
-from pushplan.evaluation.rows import ResultRow, Status, blank_row
+from pushplan.evaluation.rows import ResultRow, Status, blank_row, checked_row, clean_reason
 from pushplan.world import ChecksEnvironment, ChoosesActions, Policy
 from pushplan.world.checked_fields import CheckedFields, NonNegativeFloat, PositiveFloat
 
 DEFAULT_ENV = "pushplan.envs:make"
+DETAIL_HALF = 10_000  # characters of a traceback that are kept at its beginning and at its end
 
 
 @dataclass(frozen=True)
@@ -108,10 +109,44 @@ class JobResult:
         """Whether the process that ran the job should not run another one."""
         return self.row.status in (Status.TIMEOUT, Status.OUT_OF_MEMORY)
 
+    def to_message(self) -> tuple[dict[str, Any], bytes]:
+        """As JSON values and raw bytes."""
+        header = {"row": asdict(self.row), "traced": self.trace is not None, "detail": self.detail}
+        return header, self.trace or b""
+
+    @classmethod
+    def from_message(cls, header: Mapping[str, Any], body: bytes) -> JobResult:
+        """Read what `to_message` gave, from somebody who is not trusted.
+
+        Raises:
+            KeyError, TypeError, ValueError: if it is no result.
+        """
+        return cls(checked_row(header["row"]), body if header["traced"] else None, header["detail"])
+
+    def checked(self, job: Job) -> JobResult:
+        """This result, or a failure if it cannot be one of that job."""
+        try:
+            row = checked_row(asdict(self.row))
+            mine = blank_row(job.policy.label, job.scenario, Status.DONE, "")
+            for name in ("policy", "task", "simulator", "scenario", "seed"):
+                if getattr(row, name) != getattr(mine, name):
+                    raise ValueError(f"{name} is {getattr(row, name)!r:.60}")
+        except (KeyError, TypeError, ValueError) as error:
+            return failed_result(job, Status.POLICY_ERROR, f"impossible result: {error}")
+        return JobResult(row, self.trace, clipped(self.detail))
+
+
+def clipped(detail: str) -> str:
+    """A traceback without its middle, if it is long."""
+    if len(detail) <= 2 * DETAIL_HALF:
+        return detail
+    return f"{detail[:DETAIL_HALF]}\n...\n{detail[-DETAIL_HALF:]}"
+
 
 def failed_result(job: Job, status: Status, reason: str, detail: str = "") -> JobResult:
     """The outcome of a job of which nothing was recorded."""
-    return JobResult(blank_row(job.policy.label, job.scenario, status, reason), detail=detail)
+    row = blank_row(job.policy.label, job.scenario, status, clean_reason(reason))
+    return JobResult(row, detail=clipped(detail))
 
 
 def timeout_reason(timeout_s: float | None) -> str:

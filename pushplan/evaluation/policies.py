@@ -69,6 +69,12 @@ class PolicySpec:
         return ":" not in self.source or self.network is not None
 
     @property
+    def group(self) -> str:
+        """What may share a process: code of ours, else this policy alone."""
+        ours = self.is_ours and not str(self.source).startswith("sb3:")  # such a file holds code
+        return "" if ours else self.label
+
+    @property
     def network(self) -> Path | None:
         """The file of the network, if it is one."""
         return _network_file(self.source) if isinstance(self.source, str) else None

@@ -1,135 +1,51 @@
-"""A process pool that survives its workers: a dead or hanging one costs its own call only."""
+"""Processes for jobs: a dead or hanging one costs its own job only."""
 
 from __future__ import annotations
 
-import contextlib
 import itertools
 import math
 import os
 import pickle
-import queue
-import signal
-import subprocess
 import sys
 import threading
-import time
+from collections import deque
 from collections.abc import Callable, Sequence
-from concurrent.futures import BrokenExecutor, Executor, Future
-from multiprocessing import Pipe
+from concurrent.futures import BrokenExecutor, Future
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from pushplan.evaluation.worker import THREAD_VARIABLES, WORKER_VARIABLE, Reply, WorkerSetup
-from pushplan.world import PushplanError
+from pushplan.evaluation.jobs import JobResult
+from pushplan.evaluation.worker import WorkerSetup
+from pushplan.evaluation.worker_process import WorkerDiedError, WorkerProcess
+from pushplan.world import InvalidInputError
 
-_POLL_S = 0.2
 _STARTS = 2  # so many workers in a row may end before they are ready until a call gives up
-_LOG_TAIL = 6000
-_TRACE_S = 0.2  # time that a worker has to write where it hangs before it is ended
 
 
-class WorkerDiedError(PushplanError):
-    """The process that ran a call ended.
-
-    Attributes:
-        log: what it had written to its standard error.
-    """
-
-    def __init__(self, message: str, log: str = "") -> None:
-        super().__init__(message)
-        self.log = log
+@dataclass
+class _Call:
+    group: str
+    payload: bytes
+    future: Future[JobResult]
+    tries: int = 2  # so often it may lose its worker to somebody outside
 
 
-class WorkerOverranError(WorkerDiedError):
-    """The process that ran a call was ended because the call took too long."""
+class WorkerPool:
+    """Runs calls that return a `JobResult` in processes of its own, one at a time in each.
 
-
-class _Worker:
-    """A process that answers one call after the other, and writes into a log."""
-
-    def __init__(self, setup: WorkerSetup, log: Path | None) -> None:
-        self._log, self._log_start = log, 0
-        self._connection, theirs = Pipe(duplex=True)
-        environment = {**os.environ, WORKER_VARIABLE: "1", "PYTHONUNBUFFERED": "1"}
-        environment.update(dict.fromkeys(THREAD_VARIABLES, "1"))
-        code = (
-            f"import sys; sys.path[:] = {sys.path!r}\n"
-            f"from pushplan.evaluation.worker import main; main({theirs.fileno()})"
-        )
-        with theirs, open(log or os.devnull, "wb") as output:
-            self.process = subprocess.Popen(
-                [sys.executable, "-c", code],
-                stdin=subprocess.DEVNULL,
-                stdout=output,
-                stderr=output,
-                env=environment,
-                pass_fds=(theirs.fileno(),),
-            )
-        self._connection.send_bytes(pickle.dumps(setup))
-
-    def ask(self, payload: bytes, limit_s: float) -> Reply:
-        """The answer to a call.
-
-        Raises:
-            WorkerDiedError: if it has ended, or was ended because it took too long.
-        """
-        self._log_start = self._log.stat().st_size if self._log else 0
-        with contextlib.suppress(OSError):  # it has died: `receive` finds out how
-            self._connection.send_bytes(payload)
-        answer = self.receive(limit_s)
-        try:
-            reply: Reply = pickle.loads(answer)
-        except Exception as error:  # an exception that pickles but does not unpickle
-            return Reply(error=RuntimeError(f"a reply cannot be read: {error}"))
-        return reply
-
-    def receive(self, limit_s: float) -> bytes:
-        """What it sends next; see `ask`."""
-        until = time.monotonic() + limit_s + _TRACE_S
-        try:
-            while not self._connection.poll(_POLL_S):
-                # it may die without closing its socket
-                if self.process.poll() is not None and not self._connection.poll():
-                    raise EOFError
-                if time.monotonic() > until:
-                    log = self._tail()
-                    self.end(force=True)
-                    raise WorkerOverranError(f"not done after {limit_s:g} s", log)
-            return self._connection.recv_bytes()
-        except (EOFError, OSError):
-            self.end()
-            raise WorkerDiedError(_describe_exit(self.process.returncode), self._tail()) from None
-
-    def end(self, *, force: bool = False) -> None:
-        """Let it finish, or not; its log stays if there is something in it."""
-        self._connection.close()
-        try:
-            self.process.wait(0.0 if force else 1.0)
-        except subprocess.TimeoutExpired:
-            self.process.kill()
-            self.process.wait()
-        if self._log is not None and self._log.exists() and self._log.stat().st_size == 0:
-            self._log.unlink()
-
-    def _tail(self) -> str:
-        if self._log is None or not self._log.exists():
-            return ""
-        text = self._log.read_bytes()[self._log_start :]
-        return text[-_LOG_TAIL:].decode(errors="replace")
-
-
-class WorkerPool(Executor):
-    """Runs calls in processes of its own, one call at a time in each.
-
-    Unlike `concurrent.futures.ProcessPoolExecutor` it knows which call a process was running
-    when it died, ends calls that take too long, replaces processes, and does not import the
-    main module of the program unless a call needs it. Workers ignore Ctrl-C and end when their
-    owner does. Results with a true attribute ``tainted`` retire the worker they come from.
+    Unlike the executors of the standard library, Pebble and loky it reads nothing from its workers
+    that could run code, and knows groups of calls: a process answers calls of one group only. It
+    ends calls that take too long or too much memory, with everything that they started, and tries
+    a call again whose process was killed from outside. It does not import the main module of the
+    program unless a call needs it. Workers ignore Ctrl-C and end when their owner does. Results
+    with a true attribute ``tainted`` retire the worker they come from.
 
     Args:
         workers: number of processes.
         limit_s: wall-clock time after which a call is ended by force [s].
-        memory_limit_mb: private memory of a worker at which allocations fail [MB].
+        memory_limit_mb: private memory of a worker at which allocations fail, and memory of it and
+            its children, shared or not, at which it is ended [MB].
         preload: modules that each worker imports before its first call.
         log_dir: folder for what workers write to standard output and error; discarded if None.
     """
@@ -152,96 +68,115 @@ class WorkerPool(Executor):
         )
         self._most, self._log_dir = workers, log_dir
         self._limit_s = math.inf if limit_s is None else limit_s
-        self._calls: queue.SimpleQueue[tuple[Future[Any], bytes] | None] = queue.SimpleQueue()
+        self._calls: deque[_Call] = deque()
         self._threads: list[threading.Thread] = []  # one for each worker
-        self._workers: list[_Worker] = []  # all that were ever started
-        self._lock = threading.Lock()
+        self._workers: dict[threading.Thread, WorkerProcess] = {}
+        self._changed = threading.Condition()
         self._closing = self._killed = False
         self._numbers = itertools.count(1)
 
-    def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
-        """Queue one call. Arguments and result have to be picklable."""
-        future: Future[Any] = Future()
-        payload = pickle.dumps((fn, args, kwargs))
-        with self._lock:
+    def submit(
+        self, group: str, function: Callable[..., JobResult], *arguments: Any
+    ) -> Future[JobResult]:
+        """Queue one call.
+
+        Args:
+            group: calls of another one never run in the same process.
+            function: what to call; picklable.
+            arguments: for it; picklable.
+        """
+        call = _Call(group, pickle.dumps((function, arguments)), Future())
+        with self._changed:
             if self._closing:
                 raise RuntimeError("cannot submit to a pool that has been shut down")
-            self._calls.put((future, payload))
+            self._calls.append(call)
             if len(self._threads) < self._most:
                 self._threads.append(threading.Thread(target=self._serve, daemon=True))
                 self._threads[-1].start()
-        return future
+            self._changed.notify()
+        return call.future
 
-    def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
-        """Finish the queue, or drop it, and end the workers."""
-        with self._lock:
+    def shutdown(self) -> None:
+        """Finish the queue and end the workers."""
+        with self._changed:
             self._closing = True
-            if cancel_futures:
-                with contextlib.suppress(queue.Empty):
-                    while True:
-                        if (call := self._calls.get_nowait()) is not None:
-                            call[0].cancel()
-            for _ in self._threads:
-                self._calls.put(None)
-        for thread in self._threads if wait else ():
+            self._changed.notify_all()
+        for thread in self._threads:
             thread.join()
 
     def kill(self) -> None:
-        """End the workers at once, whatever they are doing."""
-        with self._lock:
+        """End the workers at once, whatever they are doing, and drop the queue."""
+        with self._changed:
             self._killed = True
-            for worker in self._workers:
-                worker.process.kill()
-        self.shutdown(cancel_futures=True)
+            for call in self._calls:
+                call.future.cancel()
+            self._calls.clear()
+            for worker in self._workers.values():
+                worker.kill()
+        self.shutdown()
 
     def _serve(self) -> None:
         """Hand calls to a worker of this thread's own until there are no more."""
-        worker: _Worker | None = None
-        while (call := self._calls.get()) is not None:
-            future, payload = call
-            if not future.set_running_or_notify_cancel():
-                continue
+        name = f"worker-{next(self._numbers)}.log"
+        log = None if self._log_dir is None else self._log_dir / name
+        worker: WorkerProcess | None = None
+        while (call := self._next(worker)) is not None:
             try:
-                if worker is None or worker.process.poll() is not None:
-                    worker = self._start()
-                reply = worker.ask(payload, self._limit_s)
-            except Exception as error:
+                if worker is not None and worker.group != call.group:
+                    worker.end()
+                    worker = None
+                if worker is None:
+                    worker = self._start(log)
+                    worker.group = call.group
+                result = worker.ask(call.payload, self._limit_s)
+            except InvalidInputError as error:
+                call.future.set_exception(error)
+            except BaseException as error:
                 worker = None
-                future.set_exception(error)
-                continue
-            if reply.last:
-                worker.end()
-                worker = None
-            if reply.error is not None:
-                future.set_exception(reply.error)
+                call.tries -= 1
+                again = isinstance(error, WorkerDiedError) and error.from_outside and call.tries
+                with self._changed:
+                    if again and not self._killed:
+                        self._calls.appendleft(call)
+                        continue
+                call.future.set_exception(error)
             else:
-                future.set_result(reply.result)
+                if result.tainted:
+                    worker.end()
+                    worker = None
+                call.future.set_result(result)
         if worker is not None:
             worker.end(force=self._killed)
 
-    def _start(self) -> _Worker:
+    def _next(self, worker: WorkerProcess | None) -> _Call | None:
+        """The call to run next, if there is one of a worker's own group; None at the end."""
+        group = None if worker is None else worker.group
+        with self._changed:
+            while True:
+                while not self._calls and not self._closing:
+                    self._changed.wait()
+                if not self._calls:
+                    return None
+                same = (i for i, call in enumerate(self._calls) if call.group == group)
+                at = next(same, 0)
+                call = self._calls[at]
+                del self._calls[at]
+                if call.future.running() or call.future.set_running_or_notify_cancel():
+                    return call
+
+    def _start(self, log: Path | None) -> WorkerProcess:
         """A worker that is ready."""
         ending = ""
         for _ in range(_STARTS):
-            name = f"worker-{os.getpid()}-{next(self._numbers)}.log"
-            worker = _Worker(self._setup, None if self._log_dir is None else self._log_dir / name)
-            with self._lock:
-                self._workers.append(worker)
+            worker = WorkerProcess(self._setup, log)
+            with self._changed:
+                self._workers[threading.current_thread()] = worker
                 if self._killed:
-                    worker.process.kill()
+                    worker.kill()
             try:
-                worker.receive(math.inf)
+                worker.begin()
             except WorkerDiedError as error:
                 ending = f"{error} while it started: {error.log[-500:]}"
             else:
                 return worker
         raise BrokenExecutor(ending)
-
-
-def _describe_exit(code: int | None) -> str:
-    if code is not None and code < 0:
-        try:
-            return f"the worker process was ended by {signal.Signals(-code).name}"
-        except ValueError:
-            return f"the worker process was ended by signal {-code}"
-    return f"the worker process exited with code {code}"

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import enum
 import io
+import math
 import re
 import zlib
 from collections.abc import Iterable, Mapping, Sequence
@@ -16,6 +17,16 @@ import numpy as np
 from pushplan.envs.registry import goal_kind
 from pushplan.metrics import METRICS, Role, compute, metric_names
 from pushplan.world import Episode
+from pushplan.world.errors import one_line
+
+REASON_LENGTH = 300
+"""A reason in the results is cut to this many characters; the detail file has all of it."""
+
+
+def clean_reason(reason: object) -> str:
+    """A reason as it is stored: one line of printable text without addresses of objects."""
+    text = re.sub(r"0x[0-9a-fA-F]{6,}", "0x...", one_line(str(reason)))
+    return text if len(text) <= REASON_LENGTH else text[: REASON_LENGTH - 3] + "..."
 
 
 def csv_text(header: Sequence[str], lines: Iterable[Sequence[object]]) -> str:
@@ -130,6 +141,7 @@ class ResultRow:
         return self.status != Status.DONE
 
 
+_ROUNDING = 1e-6
 _OWN = tuple(item.name for item in fields(ResultRow))
 TIMING_COLUMNS = tuple(
     name for name in _OWN if name.startswith(("wall_time", "plan_time", "decision_time"))
@@ -147,6 +159,36 @@ def columns() -> tuple[str, ...]:
 def setting_of(scenario: str, seed: int) -> str:
     """The key of a scenario without its seed."""
     return scenario.removesuffix(f"-{seed}")
+
+
+def checked_row(values: Mapping[str, Any]) -> ResultRow:
+    """The row with these values, if they can be one.
+
+    Raises:
+        KeyError, TypeError, ValueError: if a value is missing, of another type or out of range.
+    """
+    row = ResultRow(**{name: values[name] for name in _OWN})
+    for name in ("policy", "task", "simulator", "scenario", "status", "reason"):
+        if type(getattr(row, name)) is not str and not isinstance(getattr(row, name), Status):
+            raise TypeError(f"{name} is {getattr(row, name)!r:.60}")
+    Status(row.status)
+    if type(row.success) is not bool or type(row.seed) is not int:
+        raise TypeError(f"success is {row.success!r:.60} and seed {row.seed!r:.60}")
+    for name in TIMING_COLUMNS + ("plan_calls",):
+        value = getattr(row, name)
+        if value is not None and not 0.0 <= _number(name, value) < math.inf:
+            raise ValueError(f"{name} is {value!r:.60}")
+    for name, value in row.metrics.items():
+        low, high = METRICS[name].low, METRICS[name].high
+        if not low - _ROUNDING <= _number(name, value) <= high + _ROUNDING:
+            raise ValueError(f"{name} is {value:.6g}, not between {low:g} and {high:g}")
+    return replace(row, reason=clean_reason(row.reason))
+
+
+def _number(name: str, value: object) -> float:
+    if type(value) not in (int, float):
+        raise TypeError(f"{name} is {value!r:.60}")
+    return value  # type: ignore[return-value]
 
 
 def blank_row(policy: str, scenario: Any, status: Status, reason: str) -> ResultRow:

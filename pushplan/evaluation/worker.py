@@ -6,16 +6,25 @@ import contextlib
 import ctypes
 import faulthandler
 import importlib
+import os
 import pickle
 import runpy
 import signal
+import socket
 import sys
 import types
 from dataclasses import dataclass
-from multiprocessing.connection import Connection
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
+from pushplan.evaluation.channel import Channel
 from pushplan.world import InvalidInputError
+from pushplan.world.errors import describe
+
+if TYPE_CHECKING:
+    from pushplan.evaluation.jobs import JobResult
+
+_DIE_WITH_OWNER = 1  # PR_SET_PDEATHSIG of Linux, however the owner ends
+_ADOPT_ORPHANS = 36  # PR_SET_CHILD_SUBREAPER: what a policy leaves behind can still be found
 
 THREAD_VARIABLES = (
     "OMP_NUM_THREADS",
@@ -41,49 +50,56 @@ class WorkerSetup:
     trace_after_s: float | None  # a call that takes this long has its stack written to the log [s]
 
 
-@dataclass(frozen=True)
-class Reply:
-    """What a worker sends after a call."""
-
-    result: Any = None  # what the call returned
-    error: BaseException | None = None  # what it raised
-    last: bool = False  # whether the worker ends now
-
-
 def main(descriptor: int) -> None:
     """Answer calls that come through an inherited socket until it closes."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the owner's business
     faulthandler.enable()
-    _die_with_owner()
-    with Connection(descriptor) as connection, contextlib.suppress(EOFError, BrokenPipeError):
-        setup: WorkerSetup = pickle.loads(connection.recv_bytes())
+    for option, value in ((_DIE_WITH_OWNER, int(signal.SIGKILL)), (_ADOPT_ORPHANS, 1)):
+        with contextlib.suppress(OSError, AttributeError):
+            ctypes.CDLL(None).prctl(option, value, 0, 0, 0)
+    os.set_inheritable(descriptor, False)
+    channel = Channel(socket.socket(fileno=descriptor))
+    with contextlib.suppress(EOFError, OSError):
+        _, payload = channel.receive()
+        setup: WorkerSetup = pickle.loads(payload)
         for name in setup.preload:
             with contextlib.suppress(ImportError):  # a job that needs it will say so
                 importlib.import_module(name)
         from pushplan.evaluation.limits import limit_memory
 
         limit_memory(setup.memory_limit_mb)
-        connection.send_bytes(pickle.dumps("ready"))
-        reply = Reply()
-        while not reply.last:
-            payload = connection.recv_bytes()
-            reply = _answer(payload, setup)
-            connection.send_bytes(_packed(reply))
-            sys.stdout.flush()
-            sys.stderr.flush()
+        channel.send({"kind": "ready"})
+        last = False
+        while not last:
+            _, payload = channel.receive()
+            last = _answer(channel, payload, setup)
+            for stream in (sys.stdout, sys.stderr):
+                with contextlib.suppress(OSError):
+                    stream.flush()
 
 
-def _answer(payload: bytes, setup: WorkerSetup) -> Reply:
+def _answer(channel: Channel, payload: bytes, setup: WorkerSetup) -> bool:
+    """Run a call and send what it returned; whether this worker ends with it."""
     try:
         if setup.trace_after_s is not None:
             faulthandler.dump_traceback_later(setup.trace_after_s)
-        function, arguments, keywords = _unpacked(payload, setup.main)
-        result = function(*arguments, **keywords)
+        try:
+            function, arguments = _unpacked(payload, setup.main)
+        except InvalidInputError as error:
+            channel.send({"kind": "refused", "text": str(error)})
+            return False
+        channel.send({"kind": "running"})
+        result: JobResult = function(*arguments)
+        header, body = result.to_message()
+        channel.send({"kind": "result", **header}, body)
+        return result.tainted
+    except MemoryError:
+        channel.send({"kind": "out of memory"})
     except (Exception, SystemExit) as error:
-        return Reply(error=error, last=isinstance(error, MemoryError))
+        channel.send({"kind": "error", "text": describe(error)})
     finally:
         faulthandler.cancel_dump_traceback_later()
-    return Reply(result=result, last=bool(getattr(result, "tainted", False)))
+    return True
 
 
 def _unpacked(payload: bytes, main_path: str | None) -> Any:
@@ -96,14 +112,6 @@ def _unpacked(payload: bytes, main_path: str | None) -> Any:
             f"a worker process cannot load what it was sent ({error}): define it at the top level "
             "of a file, name it as 'file.py:Class', or use workers=0"
         ) from error
-
-
-def _packed(reply: Reply) -> bytes:
-    try:
-        return pickle.dumps(reply)
-    except Exception as error:
-        text = f"the result of a call cannot be sent back: {type(error).__name__}: {error}"
-        return pickle.dumps(Reply(error=RuntimeError(text), last=reply.last))
 
 
 def _import_main(path: str) -> None:
@@ -122,9 +130,3 @@ def _import_main(path: str) -> None:
             "`if __name__ == '__main__':`"
         ) from error
     sys.modules["__main__"] = sys.modules["__mp_main__"] = module
-
-
-def _die_with_owner() -> None:
-    """Ask the kernel to end this process when its owner ends, however that happens (Linux)."""
-    with contextlib.suppress(OSError, AttributeError):
-        ctypes.CDLL(None).prctl(1, int(signal.SIGKILL), 0, 0, 0)  # PR_SET_PDEATHSIG

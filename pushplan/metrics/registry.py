@@ -43,6 +43,8 @@ class Metric:
             below this has one, so that failures do not raise the mean.
         until_failure: whether what was recorded before a job failed still counts.
         whole: whether values are whole numbers.
+        low: least value that it can have.
+        high: greatest value that it can have.
     """
 
     function: str
@@ -54,6 +56,8 @@ class Metric:
     if_failed: float | None = None
     until_failure: bool = False
     whole: bool = False
+    low: float = 0.0
+    high: float = math.inf
 
 
 _NAVIGATION = "pushplan.metrics.navigation"
@@ -62,11 +66,11 @@ _FACTS = "pushplan.metrics.lengths"
 
 METRICS: dict[str, Metric] = {
     "success": Metric(f"{_FACTS}:success", Role.ON_REQUEST),
-    "E_nav": Metric(f"{_NAVIGATION}:e_nav", goal="robot", if_failed=0.0),
-    "I_nav": Metric(f"{_NAVIGATION}:i_nav", goal="robot"),
-    "S_manip": Metric(f"{_MANIPULATION}:s_manip", goal="objects", if_failed=0.0),
+    "E_nav": Metric(f"{_NAVIGATION}:e_nav", goal="robot", if_failed=0.0, high=1.0),
+    "I_nav": Metric(f"{_NAVIGATION}:i_nav", goal="robot", high=1.0),
+    "S_manip": Metric(f"{_MANIPULATION}:s_manip", goal="objects", if_failed=0.0, high=1.0),
     "E_manip": Metric(f"{_MANIPULATION}:e_manip", goal="objects", if_failed=0.0),
-    "I_manip": Metric(f"{_MANIPULATION}:i_manip", goal="objects"),
+    "I_manip": Metric(f"{_MANIPULATION}:i_manip", goal="objects", high=1.0),
     "E_nav_to_goal_point": Metric(
         f"{_NAVIGATION}:e_nav_to_goal_point", Role.ON_REQUEST, goal="robot"
     ),

@@ -6,7 +6,7 @@ import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, BinaryIO
 
 import numpy as np
 
@@ -95,7 +95,7 @@ class Episode(ArrayRecord, CheckedFields):
             time=float(self.times[index]),
         )
 
-    def save(self, path: str | Path) -> None:
+    def save(self, path: str | Path | BinaryIO) -> None:
         """Write to a compressed ``.npz`` file that holds no pickles."""
         header = {
             "schema": SCHEMA,

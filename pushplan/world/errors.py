@@ -66,7 +66,10 @@ def unknown_name_message(kind: str, name: object, choices: Iterable[str]) -> str
 
 def describe(error: BaseException) -> str:
     """One line for an exception: its type and its message."""
-    text = one_line(str(error))
+    try:
+        text = one_line(str(error))
+    except Exception:  # its text may be code of a stranger
+        text = ""
     name = type(error).__name__
     return f"{name}: {text}" if text else name
 

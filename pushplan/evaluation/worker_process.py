@@ -1,0 +1,239 @@
+"""A worker process as its owner sees it."""
+
+from __future__ import annotations
+
+import contextlib
+import math
+import os
+import pickle
+import signal
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from pushplan.evaluation.channel import Channel, ChannelError
+from pushplan.evaluation.jobs import JobResult
+from pushplan.evaluation.worker import THREAD_VARIABLES, WORKER_VARIABLE, WorkerSetup
+from pushplan.world import InvalidInputError, PushplanError
+
+_LOG_TAIL = 6000
+_LOG_MOST = 1_000_000
+_TRACE_S = 0.2  # time that a worker has to write where it hangs before it is ended
+_FAREWELL_S = 1.0
+
+
+class WorkerDiedError(PushplanError):
+    """The process that ran a call ended, or had to be ended.
+
+    Attributes:
+        log: what it had written to its standard error.
+        from_outside: whether somebody else may have killed it.
+    """
+
+    def __init__(self, message: str, log: str = "", *, from_outside: bool = False) -> None:
+        super().__init__(message)
+        self.log = log
+        self.from_outside = from_outside
+
+
+class WorkerOverranError(WorkerDiedError):
+    """The call took too long."""
+
+
+class WorkerOutOfMemoryError(WorkerDiedError):
+    """The call needed more memory than it may have."""
+
+
+class WorkerProcess:
+    """A process that answers one call after the other, and writes into a log.
+
+    It leads a process group, which ends with it.
+
+    Args:
+        setup: what it is told first.
+        log: file for what it writes to standard output and error; discarded if None.
+    """
+
+    def __init__(self, setup: WorkerSetup, log: Path | None) -> None:
+        self.group: str | None = None  # of the calls that it answers; None before the first
+        self._setup = setup
+        self._log, self._log_start = log, 0
+        ours, theirs = socket.socketpair()
+        self._channel = Channel(ours)
+        environment = {**os.environ, WORKER_VARIABLE: "1", "PYTHONUNBUFFERED": "1"}
+        environment.update(dict.fromkeys(THREAD_VARIABLES, "1"))
+        code = (
+            f"import sys; sys.path[:] = {sys.path!r}\n"
+            f"from pushplan.evaluation.worker import main; main({theirs.fileno()})"
+        )
+        with theirs, open(log or os.devnull, "ab") as output:
+            self._process = subprocess.Popen(
+                [sys.executable, "-c", code],
+                stdin=subprocess.DEVNULL,
+                stdout=output,
+                stderr=output,
+                env=environment,
+                pass_fds=(theirs.fileno(),),
+                start_new_session=True,
+            )
+
+    def begin(self) -> None:
+        """Wait until it is ready.
+
+        Raises:
+            WorkerDiedError: if it ends before.
+        """
+        with contextlib.suppress(OSError):  # it has died: `_receive` finds out how
+            self._channel.send({}, pickle.dumps(self._setup))
+        self._receive(math.inf)
+
+    def ask(self, payload: bytes, limit_s: float) -> JobResult:
+        """The answer to a call.
+
+        Raises:
+            InvalidInputError: if it cannot load what it was sent; it is well.
+            WorkerDiedError: if it has ended, or was ended.
+        """
+        self._log_start = self._trimmed_log()
+        begin = time.monotonic()
+        with contextlib.suppress(OSError):
+            self._channel.send({}, payload)
+        header, body = self._receive(limit_s)
+        if header.get("kind") == "refused":
+            raise InvalidInputError(str(header.get("text")))
+        if header.get("kind") == "running":
+            header, body = self._receive(limit_s + begin - time.monotonic(), limit_s)
+            if header.get("kind") == "error":
+                raise self._died(WorkerDiedError, str(header.get("text")))
+            if header.get("kind") == "out of memory":
+                raise self._died(WorkerOutOfMemoryError, "an allocation failed")
+        try:
+            return JobResult.from_message(header, body)
+        except (KeyError, TypeError, ValueError) as error:
+            raise self._died(WorkerDiedError, f"its message is no result: {error}") from error
+
+    def _receive(self, left_s: float, limit_s: float = math.inf) -> tuple[dict[str, Any], bytes]:
+        until = time.monotonic() + left_s + _TRACE_S
+        limit_mb = self._setup.memory_limit_mb
+
+        def waiting() -> None:
+            if self._has_ended():  # it may die without closing its socket
+                raise EOFError
+            if time.monotonic() > until:
+                raise self._died(WorkerOverranError, f"not done after {min(limit_s, left_s):g} s")
+            if limit_mb is not None and (used := self._memory_mb()) > limit_mb:
+                text = f"{used:.0f} MB in use, the limit is {limit_mb:.0f} MB"
+                raise self._died(WorkerOutOfMemoryError, text)
+            self._trimmed_log()
+
+        try:
+            return self._channel.receive(waiting)
+        except ChannelError as error:
+            text = f"the worker process sent what is no message: {error}"
+            raise self._died(WorkerDiedError, text) from error
+        except (EOFError, OSError):
+            code = self.end()
+            raise WorkerDiedError(
+                _describe_exit(code),
+                self._tail(),
+                from_outside=code in (-signal.SIGKILL, -signal.SIGTERM),
+            ) from None
+
+    def _died(self, kind: type[WorkerDiedError], reason: str) -> WorkerDiedError:
+        """End it for a reason."""
+        log = self._tail()
+        self.end(force=True)
+        return kind(reason, log)
+
+    def end(self, *, force: bool = False) -> int:
+        """Let it finish, or not, and end what it started; its log stays if it holds anything.
+
+        Returns:
+            Its exit code.
+        """
+        self._channel.close()
+        deadline = time.monotonic() + (0.0 if force else _FAREWELL_S)
+        children = _descendants(self._process.pid)
+        while not self._has_ended() and time.monotonic() < deadline:
+            time.sleep(0.005)
+        self.kill()
+        for child in children:
+            with contextlib.suppress(OSError):
+                os.kill(child, signal.SIGKILL)
+        code = self._process.wait()
+        if self._log is not None and self._log.exists() and self._log.stat().st_size == 0:
+            self._log.unlink()
+        return code
+
+    def kill(self) -> None:
+        """End its process group at once, from any thread."""
+        if self._process.returncode is None:  # not waited for yet, so that the number is its own
+            with contextlib.suppress(OSError):
+                os.killpg(self._process.pid, signal.SIGKILL)
+
+    def _has_ended(self) -> bool:
+        # without waiting for it, so that nothing else gets its number
+        how = os.WEXITED | os.WNOHANG | os.WNOWAIT
+        try:
+            return os.waitid(os.P_PID, self._process.pid, how) is not None
+        except ChildProcessError:
+            return True
+
+    def _memory_mb(self) -> float:
+        pids = (self._process.pid, *_descendants(self._process.pid))
+        return sum(map(_resident_kb, pids)) * 1024 / 1e6
+
+    def _trimmed_log(self) -> int:
+        """Bytes in the log, of which the beginning is dropped when they are too many."""
+        if self._log is None or not self._log.exists():
+            return 0
+        size = self._log.stat().st_size
+        if size > _LOG_MOST:
+            tail = self._tail()
+            os.truncate(self._log, 0)
+            with self._log.open("ab") as file:
+                file.write(tail.encode())
+            self._log_start, size = 0, len(tail)
+        return size
+
+    def _tail(self) -> str:
+        if self._log is None or not self._log.exists():
+            return ""
+        with self._log.open("rb") as file:
+            size = file.seek(0, os.SEEK_END)
+            file.seek(max(self._log_start, size - _LOG_TAIL))
+            return file.read(_LOG_TAIL).decode(errors="replace")
+
+
+def _descendants(pid: int) -> tuple[int, ...]:
+    """Processes that a process started, and those that they started (Linux)."""
+    return tuple(_below(pid))
+
+
+def _below(pid: int) -> Iterator[int]:
+    for file in Path(f"/proc/{pid}/task").glob("*/children"):
+        with contextlib.suppress(OSError):
+            for child in map(int, file.read_text().split()):
+                yield child
+                yield from _below(child)
+
+
+def _resident_kb(pid: int) -> int:
+    """Memory of a process that is no file, shared or not [KiB]."""
+    with contextlib.suppress(OSError):
+        lines = Path(f"/proc/{pid}/status").read_text().splitlines()
+        return sum(int(line.split()[1]) for line in lines if line.startswith(("RssA", "RssS")))
+    return 0
+
+
+def _describe_exit(code: int) -> str:
+    if code < 0:
+        try:
+            return f"the worker process was ended by {signal.Signals(-code).name}"
+        except ValueError:
+            return f"the worker process was ended by signal {-code}"
+    return f"the worker process exited with code {code}"
