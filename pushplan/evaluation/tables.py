@@ -212,8 +212,10 @@ def aggregate_table(rows: Sequence[ResultRow], policies: Sequence[str]) -> Table
         for name in shown:
             mine, base = strata.get((label, name)), strata.get((first, name))
             line.append(_aggregate(interquartile_mean(mine), 3) if mine else "")
-            compares = mine and base and label != first
-            line.append(_aggregate(probability_of_improvement(mine, base), 2) if compares else "")
+            better = ""
+            if mine and base and label != first:
+                better = _aggregate(probability_of_improvement(mine, base), 2)
+            line.append(better)
         if any(line[1:]):
             cells.append(tuple(line))
     title = f"All {len(settings)} settings together"

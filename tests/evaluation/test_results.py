@@ -113,7 +113,7 @@ def test_the_paired_table_says_what_its_rows_are(results: Results) -> None:
     table = next(t for t in results.tables() if t.title.startswith("Paired"))
     assert table.note.startswith("second policy minus first")
     line = next(cells for cells in table.cells if cells[0] == "E_nav")
-    assert line[1] == "better - plain" and line[2].startswith("+0.1")
+    assert line[1] == "better - plain" and line[2] == "+0.061 *"
 
 
 def test_several_settings_have_one_aggregate(results: Results) -> None:
