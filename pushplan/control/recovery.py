@@ -21,8 +21,9 @@ _DEEPER = 1e-3  # by how much the robot may get deeper into a wall [circumscribe
 class Recovery:
     """Drives back, along a curve or ahead; where no such way is left, along a searched path.
 
-    The ways are those of `Retreat`, the path that of `recovery_path`; a car has the ways alone. It ends when the robot has
-    got away, and when nothing is left to try; each part of it ends where something stops the robot.
+    The ways are those of `Retreat`, the path that of `recovery_path`; a car has the ways alone. It
+    ends when the robot has got away, and when nothing is left to try; each part of it ends where
+    something stops the robot.
 
     Args:
         world: where the robot is stuck; a differential drive, or a car that reverses.

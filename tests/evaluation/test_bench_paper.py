@@ -182,8 +182,8 @@ def test_bad_options_of_the_comparison(
         ([*paper, "--policies", "nope"], 2, "unknown policy 'nope'"),
         ([*paper, "--markdown", "."], 2, "is a folder"),
         ([*paper, "--latency", "1"], 2, "latency"),
-        ([*paper, "--only", "maze-2d-3", "--out", "file"], 1, "file"),
-        ([*paper, "--only", "maze-2d-3", "--markdown", "gone/a.md"], 1, "no folder gone"),
+        ([*paper, "--only", "maze-2d-3", "--out", "file"], 2, "file"),
+        ([*paper, "--only", "maze-2d-3", "--markdown", "gone/a.md"], 2, "no folder gone"),
     ):
         assert main(options) == code, options
         assert said in capsys.readouterr().err
