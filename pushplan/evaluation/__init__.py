@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from pushplan.evaluation.benchmark import bench
     from pushplan.evaluation.compatibility import UnusablePolicyError
     from pushplan.evaluation.episode import InvalidActionError, PolicyError, run_episode
-    from pushplan.evaluation.experiment import Experiment, ScenarioSet
+    from pushplan.evaluation.experiment import Experiment
     from pushplan.evaluation.jobs import Job, JobResult, JobSettings
     from pushplan.evaluation.paper import Comparison, bench_paper
     from pushplan.evaluation.policies import PolicySpec, parse_policies, parse_policy
@@ -43,7 +43,6 @@ __all__ = [
     "Proportion",
     "ResultRow",
     "Results",
-    "ScenarioSet",
     "ScoreSheet",
     "Status",
     "UnusablePolicyError",
@@ -67,7 +66,7 @@ __getattr__, __dir__ = lazy_names(
         "benchmark": "bench",
         "compatibility": "UnusablePolicyError",
         "episode": "InvalidActionError PolicyError run_episode",
-        "experiment": "Experiment ScenarioSet",
+        "experiment": "Experiment",
         "jobs": "Job JobResult JobSettings",
         "paper": "Comparison bench_paper",
         "policies": "PolicySpec parse_policies parse_policy",

@@ -10,7 +10,7 @@ import pytest
 import yaml
 
 from pushplan.cli import main
-from pushplan.evaluation import Experiment, UnusablePolicyError
+from pushplan.evaluation import Experiment, UnusablePolicyError, bench
 from pushplan.planners import make_planner, make_policy
 from pushplan.world import InvalidInputError, PushplanError, SchemaError, UnknownNameError
 
@@ -85,7 +85,7 @@ def changed(**entries: Any) -> dict[str, Any]:
         (changed(suites=[3]), SchemaError, "suite must be a mapping"),
         (changed(policies=["stright"]), UnknownNameError, "straight"),
         (changed(policies=["straight", "straight"]), InvalidInputError, "label=policy"),
-        (changed(policies=[{"policy": "gtsp-mpc"}]), UnusablePolicyError, "fits no suite"),
+        (changed(policies=[{"policy": "gtsp-mpc"}]), UnusablePolicyError, "cannot run maze"),
         (
             changed(policies=[{"policy": "straight", "parameters": {"spacin": 1}}]),
             UnusablePolicyError,
@@ -134,3 +134,8 @@ def test_a_policy_takes_fields_of_its_planners_config() -> None:
     assert make_planner("push-aware", push_weight=2.0).config.push_weight == 2.0
     with pytest.raises(UnknownNameError, match="push_weight"):
         make_policy("push-aware", push_wight=2.0)
+
+
+def test_bench_takes_several_suites() -> None:
+    found = bench("maze-2d-3, maze-2d-5", "straight", episodes=2, seed=1000, workers=0)
+    assert len(found.rows) == 4 and found.about["configuration"]["suite"] == "maze-2d-3,maze-2d-5"
