@@ -12,6 +12,7 @@ from pushplan.cli import (
     bench,
     codegen,
     compiling,
+    experiment,
     gtsp,
     ice,
     listing,
@@ -29,6 +30,7 @@ COMMANDS = (
     teleop,
     plan,
     bench,
+    experiment,
     stress,
     listing,
     score,
@@ -62,8 +64,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Returns:
         0 on success, 1 for a failure, 2 for what the user can put right, 130 after Ctrl-C.
     """
+    parser = _parser()
+    if "_ARGCOMPLETE" in os.environ:  # the shell asks how a line may go on
+        from pushplan.world.libraries import need
+
+        need("argcomplete").autocomplete(parser)
     try:
-        options = _parser().parse_args(arguments)
+        options = parser.parse_args(arguments)
     except SystemExit as error:  # argparse has written why
         return error.code if isinstance(error.code, int) else 2
     try:

@@ -43,7 +43,7 @@ _LINE_EVERY_S = 10.0
 def add(commands: Any) -> None:
     """Add the command."""
     parser = add_command(commands, "bench", "compare policies on a suite", _EXAMPLES, run)
-    parser.add_argument("suite", metavar="SUITE", help="see 'pushplan list suites'; or 'paper'")
+    parser.add_argument("suite", metavar="SUITE,...", help="see 'pushplan list suites'; or 'paper'")
     parser.add_argument(
         "--policies",
         metavar="A,B",

@@ -11,7 +11,7 @@ from pushplan.control.retreat import Retreat
 from pushplan.geometry.transforms import arc_step
 from pushplan.motion.collision import footprint, obstacles, static_depth
 from pushplan.motion.recovery_path import recovery_path
-from pushplan.world import GoalDisc, Movables, StaticMap, Twist, World, box_delivery_robot
+from pushplan.world import Drive, GoalDisc, Movables, StaticMap, Twist, World, box_delivery_robot
 from pushplan.world.checks import FloatArray
 
 _LOOK, _POSES = 0.3, 3  # how far ahead walls are looked for [circumscribed radii], and how often
@@ -21,11 +21,12 @@ _DEEPER = 1e-3  # by how much the robot may get deeper into a wall [circumscribe
 class Recovery:
     """Drives back, along a curve or ahead; where no such way is left, along a searched path.
 
-    The ways are those of `Retreat`, the path that of `recovery_path`. It ends when the robot has
-    got away, and when nothing is left to try; each part of it ends where something stops the robot.
+    The ways are those of `Retreat`, the path that of `recovery_path`; a car has the ways alone. It
+    ends when the robot has got away, and when nothing is left to try; each part of it ends where
+    something stops the robot.
 
     Args:
-        world: where the robot is stuck; a differential drive.
+        world: where the robot is stuck; a differential drive, or a car that reverses.
         distance: to get away by [m].
         skip: how many ways to leave to the end, because they have not helped before.
         response: time in which an error from the path is driven off [s].
@@ -61,7 +62,8 @@ class Recovery:
             command = self._retreat.command(world.robot_pose, world.time, held)
             if command is not None:
                 return command
-            path = None if self._retreat.got_away else recovery_path(world, 0.0)
+            turns = world.robot.drive is Drive.DIFFERENTIAL  # on the spot, as the path asks for
+            path = recovery_path(world, 0.0) if turns and not self._retreat.got_away else None
             self._retreat = None
             if path is not None:
                 self._path = PoseFollower(world.robot, path, self._response)

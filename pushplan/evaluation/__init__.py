@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from pushplan.evaluation.benchmark import bench
     from pushplan.evaluation.compatibility import UnusablePolicyError
     from pushplan.evaluation.episode import InvalidActionError, PolicyError, run_episode
+    from pushplan.evaluation.experiment import Experiment
     from pushplan.evaluation.jobs import Job, JobResult, JobSettings
     from pushplan.evaluation.paper import Comparison, bench_paper
     from pushplan.evaluation.policies import PolicySpec, parse_policies, parse_policy
@@ -29,6 +30,7 @@ __all__ = [
     "Comparison",
     "Condition",
     "Estimate",
+    "Experiment",
     "InvalidActionError",
     "Job",
     "JobResult",
@@ -62,6 +64,7 @@ __getattr__, __dir__ = lazy_names(
         "benchmark": "bench",
         "compatibility": "UnusablePolicyError",
         "episode": "InvalidActionError PolicyError run_episode",
+        "experiment": "Experiment",
         "jobs": "Job JobResult JobSettings",
         "paper": "Comparison bench_paper",
         "policies": "PolicySpec parse_policies parse_policy",

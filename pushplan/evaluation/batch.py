@@ -23,6 +23,7 @@ from pushplan.evaluation.jobs import (
     timeout_reason,
 )
 from pushplan.evaluation.pool import WorkerPool
+from pushplan.evaluation.provenance import provenance
 from pushplan.evaluation.rows import ResultRow, Status, setting_of
 from pushplan.evaluation.store import RunDirectory
 from pushplan.evaluation.worker import WORKER_VARIABLE
@@ -109,6 +110,8 @@ def run_batch(
             store.forget_failures()
         done = store.done()
         pending = [job for job in jobs if job.id not in done]
+        if pending:
+            store.append("runs", provenance(workers))
         if progress is not None:
             progress(len(jobs) - len(pending), len(jobs), None)
         batch = _Batch(pending, store, settings, memory_limit_mb, len(jobs), progress)

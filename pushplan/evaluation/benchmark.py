@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from pushplan.evaluation.batch import Progress, run_batch
-from pushplan.evaluation.compatibility import usable_policies
-from pushplan.evaluation.jobs import Job, JobSettings
+from pushplan.evaluation.batch import Progress
+from pushplan.evaluation.compatibility import read_policies
+from pushplan.evaluation.experiment import Experiment
+from pushplan.evaluation.jobs import JobSettings
 from pushplan.evaluation.policies import PolicySpec
 from pushplan.evaluation.results import Results
+
+if TYPE_CHECKING:
+    from pushplan.scenarios import Suite
 
 Given = str | Callable[..., Any] | PolicySpec
 
@@ -40,7 +43,8 @@ def bench(
         2
 
     Args:
-        suite: name of a suite, a `pushplan.scenarios.Suite`, or a list of scenarios.
+        suite: name of a suite, or several with commas between them; a `pushplan.scenarios.Suite`;
+            or a list of scenarios.
         policies: names, ``"module:Class"``, ``"file.py:Class"``, each with ``label=`` in front
             if wanted, or callables that make a policy.
         episodes: scenarios of a suite by name; the suite's own number if None.
@@ -61,36 +65,27 @@ def bench(
         UnusablePolicyError: if a policy cannot be made, or for none of the scenarios.
         InvalidInputError: as `run_batch`.
     """
-    settings = JobSettings(
-        observation=observation, timeout_s=timeout_s, latency_factor=latency_factor
+    suites = suites_of(suite, episodes, seed)
+    versions = [one.version for one in suites]
+    experiment = Experiment(
+        ",".join(one.name for one in suites),
+        suites,
+        tuple(read_policies(policies)),
+        JobSettings(observation=observation, timeout_s=timeout_s, latency_factor=latency_factor),
+        memory_limit_mb=memory_limit_mb,
+        about={
+            "suite_version": suites[0].version if len(suites) == 1 else versions,
+            "first_seed": seed,
+        },
     )
-    name, version, scenarios = scenarios_of(suite, episodes, seed)
-    specs = usable_policies(policies, scenarios, settings)
-    # all policies of a scenario close together: a run that is cut short still compares them
-    jobs = [Job(spec, scenario) for scenario in scenarios for spec in specs]
-    options: dict[str, Any] = {
-        "workers": workers,
-        "settings": settings,
-        "memory_limit_mb": memory_limit_mb,
-        "retry_failed": retry_failed,
-        "about": {"suite": name, "suite_version": version, "first_seed": seed},
-        "progress": progress,
-    }
-    if out is not None:
-        run_batch(jobs, out=out, **options)
-        return Results.load(out)
-    with tempfile.TemporaryDirectory(prefix="pushplan-") as folder:
-        run_batch(jobs, out=folder, **options)
-        loaded = Results.load(folder)
-    return Results(loaded.rows, loaded.about, None)
+    return experiment.run(out, workers=workers, retry_failed=retry_failed, progress=progress)
 
 
-def scenarios_of(given: Any, episodes: int | None, seed: int) -> tuple[str, int, Sequence[Any]]:
-    """Name, version and scenarios of a suite by name, a suite, or a list of scenarios."""
+def suites_of(given: Any, episodes: int | None, seed: int) -> tuple[Suite, ...]:
+    """Suites by name, with commas between them, a suite, or a list of scenarios."""
     from pushplan.scenarios import Suite, suite
 
     if isinstance(given, str):
-        given = suite(given, episodes=episodes, first_seed=seed)
-    if isinstance(given, Suite):
-        return given.name, given.version, given.scenarios
-    return "scenarios", 1, list(given)
+        names = [name.strip() for name in given.split(",")]
+        return tuple(suite(name, episodes=episodes, first_seed=seed) for name in names)
+    return (given if isinstance(given, Suite) else Suite("scenarios", 1, tuple(given)),)

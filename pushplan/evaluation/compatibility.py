@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from pushplan.evaluation.episode import PolicyError, Recording
 from pushplan.evaluation.jobs import Job, JobSettings
@@ -13,34 +13,52 @@ from pushplan.evaluation.policies import PolicySpec, parse_policies
 from pushplan.world import ChecksScenario, InvalidInputError, Policy, PushplanError
 from pushplan.world.errors import describe
 
+if TYPE_CHECKING:
+    from pushplan.scenarios import Suite
+
 
 class UnusablePolicyError(InvalidInputError):
     """A policy cannot be made, or is made for nothing that it is asked to run."""
 
 
-def usable_policies(
-    given: Any, scenarios: Sequence[Any], settings: JobSettings
-) -> list[PolicySpec]:
-    """Read policies, and make each once, so that what cannot run is refused before anything runs.
+def misfits(
+    specs: Sequence[PolicySpec],
+    suites: Sequence[Suite],
+    settings: JobSettings,
+    *,
+    allow_all: bool = False,
+) -> dict[tuple[str, str], str]:
+    """Make each policy once for each kind of scene, so that what cannot run is known before.
+
+    Args:
+        specs: the policies.
+        suites: what they are to run.
+        settings: of the environments.
+        allow_all: whether a policy may fit no suite at all.
+
+    Returns:
+        (suite, label) -> why that policy can run none of the suite's scenarios.
 
     Raises:
-        UnknownNameError: if there is no policy of a name.
-        UnusablePolicyError: if a policy cannot be made, or for none of the scenarios.
+        UnusablePolicyError: if a policy cannot be made, or fits no suite.
     """
-    specs = read_policies(given)
+    known: dict[tuple[str, str], str | None] = {}
+    found: dict[tuple[str, str], str] = {}
     for spec in specs:
-        starts = {Job(spec, scenario).title: scenario for scenario in scenarios}
-        reasons: dict[str, str] = {}
-        for title, scenario in starts.items():
-            reason = incompatibility(spec, scenario, settings)
-            if reason is None:
-                reasons.clear()
-                break
-            reasons[title] = reason
-        if reasons:
-            title, reason = next(iter(reasons.items()))
-            raise UnusablePolicyError(f"policy {spec.label!r} cannot run {title}: {reason}")
-    return specs
+        first = ""
+        for suite in suites:
+            starts = {Job(spec, scenario).title: scenario for scenario in suite.scenarios}
+            for title, scenario in starts.items():
+                if (spec.label, title) not in known:
+                    known[spec.label, title] = incompatibility(spec, scenario, settings)
+                if (reason := known[spec.label, title]) is None:
+                    found.pop((suite.name, spec.label), None)
+                    break
+                found[suite.name, spec.label] = reason
+                first = first or f"{title}: {reason}"
+        if not allow_all and all((suite.name, spec.label) in found for suite in suites):
+            raise UnusablePolicyError(f"policy {spec.label!r} cannot run {first}")
+    return found
 
 
 def read_policies(given: Any) -> list[PolicySpec]:

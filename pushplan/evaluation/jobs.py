@@ -7,11 +7,11 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from pushplan.evaluation.episode import wanted_observation
-from pushplan.evaluation.loading import load_object
 from pushplan.evaluation.policies import PolicySpec
 from pushplan.evaluation.rows import ResultRow, Status, blank_row, checked_row, clean_reason
 from pushplan.world import ChecksEnvironment, ChoosesActions, Policy
 from pushplan.world.checked_fields import CheckedFields, NonNegativeFloat, PositiveFloat
+from pushplan.world.named_objects import load_object
 
 DEFAULT_ENV = "pushplan.envs:make"
 DETAIL_HALF = 10_000  # characters of a traceback that are kept at its beginning and at its end

@@ -7,6 +7,7 @@ import html
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+from pushplan.evaluation.provenance import in_words
 from pushplan.evaluation.rows import ResultRow
 from pushplan.evaluation.run_record import RunRecord
 from pushplan.evaluation.tables import Table
@@ -80,8 +81,14 @@ def _head(run: RunRecord) -> str:
     return (
         f"<h1>{html.escape(_title(run))}</h1>\n"
         f'<p class="about">{html.escape(text)}. All rows: <a href="results.csv">results.csv</a>.'
-        f"</p>" + (f"<ul>{sources}</ul>" if sources else "")
+        f"</p>" + (f"<ul>{sources}</ul>" if sources else "") + _runs(run)
     )
+
+
+def _runs(run: RunRecord) -> str:
+    """Where the rows come from, a line for each call that ran jobs."""
+    lines = "".join(f"<li>{html.escape(in_words(one))}</li>" for one in run.about.get("runs", ()))
+    return f'<details class="about"><summary>Runs</summary><ul>{lines}</ul></details>' * bool(lines)
 
 
 def _table(table: Table) -> str:

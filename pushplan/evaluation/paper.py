@@ -6,14 +6,14 @@ import tempfile
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
-from pushplan.evaluation.batch import Progress, run_batch
+from pushplan.evaluation.batch import Progress
 from pushplan.evaluation.benchmark import Given
-from pushplan.evaluation.compatibility import UnusablePolicyError, incompatibility, read_policies
+from pushplan.evaluation.compatibility import read_policies
+from pushplan.evaluation.experiment import Experiment
 from pushplan.evaluation.jobs import Job, JobSettings
 from pushplan.evaluation.paper_tables import overview, paper_table, preface, training_cost
-from pushplan.evaluation.policies import PolicySpec, policy_names
+from pushplan.evaluation.policies import policy_names
 from pushplan.evaluation.published import PublishedTable, chosen_tables
 from pushplan.evaluation.results import Results
 from pushplan.evaluation.rows import ResultRow, setting_of
@@ -111,70 +111,38 @@ def bench_paper(
         UnusablePolicyError: if a policy cannot be made, or was named and is made for no suite.
         InvalidInputError: as `run_batch`.
     """
+    from pushplan.scenarios import suite
+
     tables = chosen_tables(only)
-    settings = JobSettings(timeout_s=timeout_s)
-    scenarios = {table.suite: _scenarios(table, episodes, seed) for table in tables}
     specs = read_policies(list(policy_names()) if policies is None else policies)
-    incompatible = _incompatible(specs, scenarios, settings)
-    for spec in specs if policies is not None else ():
-        reasons = [incompatible.get((table.suite, spec.label)) for table in tables]
-        if all(reasons):
-            raise UnusablePolicyError(f"policy {spec.label!r} fits no chosen suite: {reasons[0]}")
-    jobs = [
-        Job(spec, scenario)
-        for suite, starts in scenarios.items()
-        for scenario in starts
-        for spec in specs
-        if (suite, spec.label) not in incompatible
-    ]
+    experiment = Experiment(
+        "paper",
+        tuple(suite(table.suite, episodes=episodes, first_seed=seed) for table in tables),
+        tuple(specs),
+        JobSettings(timeout_s=timeout_s),
+        memory_limit_mb=memory_limit_mb,
+        about={"first_seed": seed},
+        allow_misfits=policies is None,
+    )
     with tempfile.TemporaryDirectory(prefix="pushplan-") as temporary:
         folder = Path(temporary if out is None else out)
-        run_batch(
-            jobs,
-            out=folder,
-            workers=workers,
-            settings=settings,
-            memory_limit_mb=memory_limit_mb,
-            retry_failed=retry_failed,
-            about={"suite": "paper", "first_seed": seed},
-            progress=progress,
+        found = experiment.run(
+            folder, workers=workers, retry_failed=retry_failed, progress=progress
         )
-        results = _chosen(Results.load(folder), jobs, None if out is None else folder)
+        results = _chosen(found, experiment.jobs, None if out is None else folder)
         points = _to_goal_point(results.rows, folder)
     training = {spec.label: training_cost(spec.network) for spec in specs if spec.network}
-    comparison = Comparison(results, tables, incompatible, points, training, command)
+    comparison = Comparison(results, tables, experiment.skipped, points, training, command)
     if out is not None:
         write_atomic(folder / "paper.md", comparison.markdown().encode())
     return comparison
 
 
-def _scenarios(table: PublishedTable, episodes: int, seed: int) -> Sequence[Any]:
+def _setting(table: PublishedTable) -> str:
     from pushplan.scenarios import suite
 
-    return suite(table.suite, episodes=episodes, first_seed=seed).scenarios
-
-
-def _setting(table: PublishedTable) -> str:
-    first = _scenarios(table, 1, 0)[0]
+    first = suite(table.suite, episodes=1).scenarios[0]
     return setting_of(first.key, first.seed)
-
-
-def _incompatible(
-    specs: Sequence[PolicySpec], scenarios: Mapping[str, Sequence[Any]], settings: JobSettings
-) -> dict[tuple[str, str], str]:
-    """(suite, label) -> why; suites of one task, preset and simulator differ in nothing here."""
-    known: dict[tuple[str, ...], str | None] = {}
-    found = {}
-    for suite, starts in scenarios.items():
-        first = starts[0]
-        for spec in specs:
-            kind = (spec.label, first.task, first.preset, first.simulator)
-            if kind not in known:
-                known[kind] = incompatibility(spec, first, settings)
-            reason = known[kind]
-            if reason is not None:
-                found[suite, spec.label] = reason
-    return found
 
 
 def _chosen(results: Results, jobs: Sequence[Job], path: Path | None) -> Results:

@@ -10,8 +10,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, cast
 
-from pushplan.evaluation.loading import load_object
 from pushplan.world import InvalidInputError, Policy, UnknownNameError
+from pushplan.world.named_objects import load_object
 
 _LABEL = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.+@-]{0,63}")
 

@@ -17,6 +17,7 @@ from pushplan.evaluation.summary import (
 )
 from pushplan.evaluation.tables import (
     Table,
+    aggregate_table,
     difference_tables,
     differences_csv,
     markdown,
@@ -26,7 +27,7 @@ from pushplan.evaluation.tables import (
     text,
 )
 from pushplan.metrics import compute
-from pushplan.world import Episode, InvalidInputError
+from pushplan.world import InvalidInputError
 from pushplan.world.files import write_atomic
 from pushplan.world.libraries import need
 
@@ -69,7 +70,9 @@ class Results(RunRecord):
         for row in self.rows:
             if row.failed:
                 continue
-            episode = Episode.load(self.path / row.trace_file)
+            episode = self.episode(row)
+            if episode is None:
+                raise InvalidInputError(f"{self.path} has no trace of {row.policy} {row.scenario}")
             for name, value in compute(episode, metrics).items():
                 values.setdefault((row.setting, row.policy, name), []).append(value)
         estimates = {key: estimate(found) for key, found in values.items()}
@@ -78,7 +81,9 @@ class Results(RunRecord):
     def tables(self, *, wide: bool = False) -> list[Table]:
         """Scores of the policies, then their paired differences."""
         titles = self.titles
+        together = aggregate_table(self.rows, self.policies) if wide else None
         return [
+            *([together] if together else []),
             *score_tables(self.summary(), titles, wide=wide),
             *difference_tables(self.compare(), titles, wide=wide),
         ]

@@ -174,7 +174,7 @@ def checked_row(values: Mapping[str, Any]) -> ResultRow:
     Status(row.status)
     if type(row.success) is not bool or type(row.seed) is not int:
         raise TypeError(f"success is {row.success!r:.60} and seed {row.seed!r:.60}")
-    for name in TIMING_COLUMNS + ("plan_calls",):
+    for name in (*TIMING_COLUMNS, "plan_calls"):
         value = getattr(row, name)
         if value is not None and not 0.0 <= _number(name, value) < math.inf:
             raise ValueError(f"{name} is {value!r:.60}")

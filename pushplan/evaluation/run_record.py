@@ -9,6 +9,7 @@ from typing import Any
 
 from pushplan.evaluation.rows import ResultRow
 from pushplan.evaluation.summary import policies_of, settings_of
+from pushplan.world import Episode
 
 
 @dataclass(frozen=True)
@@ -36,3 +37,13 @@ class RunRecord:
     def rows_of(self, setting: str) -> list[ResultRow]:
         """The rows of one setting."""
         return [row for row in self.rows if row.setting == setting]
+
+    def episode(self, row: ResultRow) -> Episode | None:
+        """The recorded episode of a row; None if none was kept.
+
+        Raises:
+            SchemaError: if it cannot be read.
+        """
+        if self.path is None or not (self.path / row.trace_file).is_file():
+            return None
+        return Episode.load(self.path / row.trace_file)

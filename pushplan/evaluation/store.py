@@ -126,6 +126,10 @@ class RunDirectory:
         """Add entries to a JSON mapping about the run."""
         self.note(key, {**read_about(self._db).get(key, {}), **entries})
 
+    def append(self, key: str, value: Any) -> None:
+        """Add a value to a JSON list about the run."""
+        self.note(key, [*read_about(self._db).get(key, []), value])
+
     def done(self) -> set[tuple[str, str, int]]:
         """(policy, scenario, seed) of every job that has a row."""
         return set(self._db.execute("SELECT policy, scenario, seed FROM results"))

@@ -14,8 +14,8 @@ import numpy as np
 
 from pushplan.envs.registry import variation_names
 from pushplan.evaluation.batch import Progress, run_batch
-from pushplan.evaluation.benchmark import scenarios_of
-from pushplan.evaluation.compatibility import usable_policies
+from pushplan.evaluation.benchmark import suites_of
+from pushplan.evaluation.compatibility import misfits
 from pushplan.evaluation.jobs import Job, JobSettings
 from pushplan.evaluation.policies import PolicySpec, parse_policy
 from pushplan.evaluation.rows import ResultRow
@@ -179,12 +179,13 @@ def stress(
         UnusablePolicyError: if the policy cannot run in any of the scenarios.
     """
     rate = number("rate", rate, low=0.0, open_low=True)
-    name, _, scenarios = scenarios_of(suite, episodes, seed)
+    (chosen,) = suites_of(suite, episodes, seed)
+    name, scenarios = chosen.name, chosen.scenarios
     if not scenarios:
         raise InvalidInputError("a stress test needs at least one scenario")
     wanted = _conditions(conditions, scenarios)
     spec = parse_policy(policy)
-    usable_policies([spec], scenarios, JobSettings())
+    misfits([spec], [chosen], JobSettings())
     jobs = []
     for label, condition in wanted.items():
         period = 1.0 / (condition.rate or rate)

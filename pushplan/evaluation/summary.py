@@ -10,7 +10,15 @@ import numpy as np
 
 from pushplan.evaluation.rows import ResultRow
 from pushplan.evaluation.statistics import Estimate, Proportion, estimate, wilson
+from pushplan.evaluation.statistics_paired import (
+    ENOUGH,
+    LEVEL,
+    holm,
+    pairs_needed,
+    signed_rank_test,
+)
 from pushplan.metrics import METRICS, Role, metric_names
+from pushplan.world.checks import FloatArray
 
 TIMINGS = (
     "plan_time_median_s",
@@ -53,9 +61,13 @@ class PairedDifference:
         first: label of one policy.
         second: label of the other.
         difference: of second minus first, over the scenarios where both have a value.
-        wins: scenarios in which the second has the better value; the greater one of a metric of
-            which neither is better.
-        losses: scenarios in which it has the worse one.
+        better: scenarios in which the second has the better value, by the metric's direction.
+        worse: scenarios in which it has the worse one.
+        p_value: of `signed_rank_test`.
+        p_corrected: by `holm`, over all pairs and settings of the metric.
+        effect: rank-biserial correlation in [-1, 1], 1 where the second is better every time.
+        needed: scenarios with which the pair is separated, see `pairs_needed`; None if no number
+            does.
     """
 
     setting: str
@@ -63,13 +75,26 @@ class PairedDifference:
     first: str
     second: str
     difference: Estimate
-    wins: int
-    losses: int
+    better: int
+    worse: int
+    p_value: float
+    p_corrected: float
+    effect: float
+    needed: int | None
 
     @property
-    def clear(self) -> bool:
-        """Whether the 95 % interval of the difference leaves out 0."""
-        return self.difference.low > 0.0 or self.difference.high < 0.0
+    def significant(self) -> bool:
+        """Whether the corrected p value is below 0.05, with 10 scenarios at least."""
+        return self.difference.count >= ENOUGH and self.p_corrected < LEVEL
+
+    @property
+    def verdict(self) -> str:
+        """What the second policy is: "better", "worse", "equal" or "not separated"."""
+        if self.better == self.worse == 0:
+            return "equal"
+        if not self.significant:
+            return "not separated"
+        return "better" if self.effect > 0.0 else "worse"
 
 
 def summarise(rows: Sequence[ResultRow], order: Sequence[str] = ()) -> list[PolicySummary]:
@@ -79,28 +104,66 @@ def summarise(rows: Sequence[ResultRow], order: Sequence[str] = ()) -> list[Poli
         rows: of a run.
         order: labels in the order in which policies are shown; others follow by name.
     """
-    summaries = []
-    for setting in settings_of(rows):
-        for policy in policies_of(rows, order):
-            mine = [r for r in rows if r.policy == policy and r.setting == setting]
-            if mine:
-                summaries.append(_summary(setting, policy, mine))
-    return summaries
+    groups = grouped(rows)
+    return [
+        _summary(setting, policy, groups[setting, policy])
+        for setting in settings_of(rows)
+        for policy in policies_of(rows, order)
+        if (setting, policy) in groups
+    ]
 
 
 def paired_differences(
     rows: Sequence[ResultRow], order: Sequence[str] = ()
 ) -> list[PairedDifference]:
-    """Every pair of policies on the scenarios that both ran, for each score and for the work."""
+    """Every pair of policies on the scenarios that both ran, for success, scores and lengths.
+
+    Metrics of which neither direction is better are left out.
+    """
     labels = policies_of(rows, order)
     pairs = [(a, b) for i, a in enumerate(labels) for b in labels[i + 1 :]]
-    found = [
-        _pair(setting, metric, first, second, rows)
-        for setting in settings_of(rows)
-        for metric in metric_names(Role.SCORE, Role.DETAIL)
-        for first, second in pairs
-    ]
-    return [pair for pair in found if pair is not None]
+    groups = grouped(rows)
+    found: list[PairedDifference] = []
+    for metric in ("success", *metric_names(Role.SCORE, Role.DETAIL)):
+        if (higher := METRICS[metric].higher_is_better) is None:
+            continue
+        values = {key: _by_scenario(mine, metric) for key, mine in groups.items()}
+        gaps: dict[tuple[str, str, str], FloatArray] = {}
+        for setting in settings_of(rows):
+            for first, second in pairs:
+                one, two = values.get((setting, first), {}), values.get((setting, second), {})
+                if common := sorted(one.keys() & two.keys()):
+                    gaps[setting, first, second] = np.array([two[k] - one[k] for k in common])
+        tested = [signed_rank_test(gap) for gap in gaps.values()]
+        sign = 1.0 if higher else -1.0
+        for ((setting, first, second), gap), (p_value, effect), corrected in zip(
+            gaps.items(), tested, holm([p for p, _ in tested]), strict=True
+        ):
+            found.append(
+                PairedDifference(
+                    setting=setting,
+                    metric=metric,
+                    first=first,
+                    second=second,
+                    difference=estimate(gap),
+                    better=int((sign * gap > 0.0).sum()),
+                    worse=int((sign * gap < 0.0).sum()),
+                    p_value=p_value,
+                    p_corrected=corrected,
+                    effect=sign * effect,
+                    needed=pairs_needed(gap, len(tested)),
+                )
+            )
+    place = {setting: i for i, setting in enumerate(settings_of(rows))}
+    return sorted(found, key=lambda pair: place[pair.setting])
+
+
+def grouped(rows: Sequence[ResultRow]) -> dict[tuple[str, str], list[ResultRow]]:
+    """The rows by setting and policy."""
+    groups: dict[tuple[str, str], list[ResultRow]] = {}
+    for row in rows:
+        groups.setdefault((row.setting, row.policy), []).append(row)
+    return groups
 
 
 def policies_of(rows: Sequence[ResultRow], order: Sequence[str] = ()) -> list[str]:
@@ -127,40 +190,19 @@ def _summary(setting: str, policy: str, rows: Sequence[ResultRow]) -> PolicySumm
     )
 
 
-def _pair(
-    setting: str, metric: str, first: str, second: str, rows: Sequence[ResultRow]
-) -> PairedDifference | None:
-    def by_scenario(label: str) -> dict[tuple[str, int], float]:
-        return {
-            (row.scenario, row.seed): float(value)
-            for row in rows
-            if row.policy == label and row.setting == setting
-            if (value := getattr(row, metric)) is not None
-        }
-
-    one, two = by_scenario(first), by_scenario(second)
-    common = sorted(one.keys() & two.keys())
-    if not common:
-        return None
-    better = -1.0 if METRICS[metric].higher_is_better is False else 1.0
-    gaps = np.array([two[key] - one[key] for key in common])
-    return PairedDifference(
-        setting=setting,
-        metric=metric,
-        first=first,
-        second=second,
-        difference=estimate(gaps),
-        wins=int((better * gaps > 0.0).sum()),
-        losses=int((better * gaps < 0.0).sum()),
-    )
+def _by_scenario(rows: Sequence[ResultRow], metric: str) -> dict[tuple[str, int], float]:
+    return {
+        (row.scenario, row.seed): float(value)
+        for row in rows
+        if (value := getattr(row, metric)) is not None
+    }
 
 
 def settings_of(rows: Sequence[ResultRow]) -> list[str]:
     """The settings that occur, with numbers in their order."""
-    seen = {row.setting: None for row in sorted(rows, key=_natural)}
-    return list(seen)
+    return sorted({row.setting for row in rows}, key=_natural)
 
 
-def _natural(row: ResultRow) -> list[object]:
-    parts = re.split(r"(\d+)", row.setting)
-    return [(0, int(p), "") if p.isdigit() else (1, 0, p) for p in parts]
+def _natural(setting: str) -> list[tuple[int, int, str]]:
+    parts = re.split(r"(\d+)", setting)
+    return [(0, int(p), "") if p.isdecimal() else (1, 0, p) for p in parts]

@@ -7,10 +7,24 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from pushplan.evaluation.rows import csv_text
+import numpy as np
+
+from pushplan.evaluation.rows import ResultRow, csv_text
 from pushplan.evaluation.statistics import Estimate
-from pushplan.evaluation.summary import PairedDifference, PolicySummary
+from pushplan.evaluation.statistics_aggregate import (
+    Aggregate,
+    interquartile_mean,
+    probability_of_improvement,
+)
+from pushplan.evaluation.summary import (
+    PairedDifference,
+    PolicySummary,
+    grouped,
+    settings_of,
+    values_of,
+)
 from pushplan.metrics import METRICS, Role, metric_names
+from pushplan.world.checks import FloatArray
 
 if TYPE_CHECKING:
     from rich.table import Table as RichTable
@@ -47,8 +61,18 @@ MEASURED_NOTE = (
     "the mean below; med is the median"
 )
 PAIR_NOTE = (
-    "same scenarios, second policy minus first: mean with 95 % bootstrap interval; * where the "
-    "interval leaves out 0; wins are scenarios in which the second policy has the better value"
+    "second policy minus first on the same scenarios: mean, 95 % bootstrap interval; better and "
+    "worse count the scenarios in which the second policy has the better or worse value, by the "
+    "metric's own direction; p is of the signed-rank test (sign test for success), corrected by "
+    "Holm over all pairs and settings of a metric; effect is the rank-biserial correlation, "
+    "1 where the second is better every time; * where p < 0.05 with 10 scenarios at least; more is "
+    "how many further scenarios would separate the pair, were the differences to go on like this "
+    "(power 0.8)"
+)
+AGGREGATE_NOTE = (
+    "interquartile mean over all episodes of all settings with its 95 % stratified bootstrap "
+    "interval; P is the probability that an episode of the policy has a better value than one of "
+    "{first} in the same setting, ties one half (Agarwal et al., 2021)"
 )
 
 
@@ -118,24 +142,91 @@ def difference_tables(
     """One table a setting with a row for each pair of policies and metric."""
     tables = []
     if not wide:
-        pairs = [pair for pair in pairs if METRICS[pair.metric].role is Role.SCORE]
+        pairs = [p for p in pairs if METRICS[p.metric].role is not Role.DETAIL]
     for setting in dict.fromkeys(pair.setting for pair in pairs):
         cells = tuple(
             (
                 heading(pair.metric),
                 f"{pair.second} - {pair.first}",
                 _number(pair.difference.mean, _digits(pair.metric), sign=True)
-                + (" *" if pair.clear else ""),
+                + (" *" if pair.significant else ""),
                 _interval(pair.difference, _digits(pair.metric), sign=True),
-                f"{pair.wins} / {pair.losses} / {pair.difference.count}",
+                f"{pair.better} / {pair.worse} / {pair.difference.count}",
+                "< 0.001" if pair.p_corrected < 0.001 else f"{pair.p_corrected:.3f}",
+                f"{pair.effect:+.2f}",
+                _more(pair),
             )
             for pair in pairs
             if pair.setting == setting
         )
-        headings = ("metric", "pair", "difference", "95 % interval", "wins / losses / of")
+        headings = (
+            *("metric", "pair", "difference", "95 % interval"),
+            *("better / worse / of", "p", "effect", "more"),
+        )
         title = f"Paired differences: {titles.get(setting, setting)}"
         tables.append(Table(title, headings, cells, PAIR_NOTE))
     return tables
+
+
+def _more(pair: PairedDifference) -> str:
+    """Further scenarios that the pair needs."""
+    if pair.significant:
+        return ""
+    if pair.needed is None:
+        return "-"
+    more = max(pair.needed - pair.difference.count, 1)
+    return f"{more}" if more <= 10_000 else "> 10000"
+
+
+def aggregate_table(rows: Sequence[ResultRow], policies: Sequence[str]) -> Table | None:
+    """Scores over all settings, one row for each policy that has a score in every one.
+
+    Args:
+        rows: of a run.
+        policies: labels in order; improvement is over the first of them.
+
+    Returns:
+        None if there is nothing to compare or only one setting.
+    """
+    groups, settings = grouped(rows), settings_of(rows)
+    if len(settings) < 2:
+        return None
+    strata: dict[tuple[str, str], list[FloatArray]] = {}
+    for label in policies:
+        for name in metric_names(Role.SCORE):
+            values = [
+                np.array(values_of(groups.get((setting, label), []), name)) for setting in settings
+            ]
+            if all(len(found) for found in values):
+                strata[label, name] = values
+    shown = [n for n in metric_names(Role.SCORE) if any(name == n for _, name in strata)]
+    if not shown:
+        return None
+    first = policies[0]
+    headings = ["policy"]
+    for name in shown:
+        headings += [heading(name), f"P({name})"]
+    cells = []
+    for label in policies:
+        line = [label]
+        for name in shown:
+            mine, base = strata.get((label, name)), strata.get((first, name))
+            line.append(_aggregate(interquartile_mean(mine), 3) if mine else "")
+            better = ""
+            if mine and base and label != first:
+                better = _aggregate(probability_of_improvement(mine, base), 2)
+            line.append(better)
+        if any(line[1:]):
+            cells.append(tuple(line))
+    title = f"All {len(settings)} settings together"
+    return Table(title, tuple(headings), tuple(cells), AGGREGATE_NOTE.format(first=first))
+
+
+def _aggregate(value: Aggregate, digits: int) -> str:
+    return (
+        f"{_number(value.value, digits)}\n"
+        f"[{_number(value.low, digits)}, {_number(value.high, digits)}]"
+    )
 
 
 def markdown(tables: Sequence[Table]) -> str:
@@ -164,12 +255,16 @@ def summary_csv(summaries: Sequence[PolicySummary], titles: dict[str, str]) -> s
 
 def differences_csv(pairs: Sequence[PairedDifference], titles: dict[str, str]) -> str:
     """One line for each setting, metric and pair of policies, with all digits."""
-    names = "setting,metric,first,second,count,mean,sd,median,low,high,wins,losses"
+    names = (
+        "setting,metric,first,second,count,mean,sd,median,low,high,better,worse,p_value,"
+        "p_corrected,effect,needed,verdict"
+    )
     lines = [
         (
             *(titles.get(pair.setting, pair.setting), pair.metric, pair.first, pair.second),
             *_numbers(pair.difference),
-            *(pair.wins, pair.losses),
+            *(pair.better, pair.worse, pair.p_value, pair.p_corrected, pair.effect),
+            *("" if pair.needed is None else pair.needed, pair.verdict),
         )
         for pair in pairs
     ]

@@ -3,7 +3,7 @@
 from pushplan.metrics.lengths import interaction_work, object_path_lengths, path_length
 from pushplan.metrics.manipulation import ManipulationScores, manipulation_scores
 from pushplan.metrics.navigation import NavigationScores, navigation_scores
-from pushplan.metrics.registry import METRICS, Metric, Role, compute, metric_names
+from pushplan.metrics.registry import METRICS, Metric, Role, compute, metric_function, metric_names
 
 __all__ = [
     "METRICS",
@@ -14,6 +14,7 @@ __all__ = [
     "compute",
     "interaction_work",
     "manipulation_scores",
+    "metric_function",
     "metric_names",
     "navigation_scores",
     "object_path_lengths",

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import enum
-import importlib
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Literal, cast
 
 from pushplan.world import ClearanceArea, Episode, InvalidInputError, Receptacle, UnknownNameError
+from pushplan.world.errors import short
+from pushplan.world.named_objects import load_object
 
 GoalKind = Literal["robot", "objects"]
 
@@ -103,8 +104,8 @@ def compute(episode: Episode, names: Iterable[str] | None = None) -> Mapping[str
 
     Args:
         episode: the recorded run.
-        names: metrics by name, or functions as ``"module:function"``; all registered ones if
-            None.
+        names: metrics by name, or functions as ``"module:function"`` or
+            ``"file.py:function"``; all registered ones if None.
 
     Raises:
         UnknownNameError: if there is no such metric.
@@ -113,7 +114,7 @@ def compute(episode: Episode, names: Iterable[str] | None = None) -> Mapping[str
     kind = "objects" if isinstance(episode.world.goal, Receptacle | ClearanceArea) else "robot"
     values: dict[str, float] = {}
     for name in METRICS if names is None else names:
-        function = _load(name)
+        function = metric_function(name)
         if name in METRICS and METRICS[name].goal not in (kind, None):
             continue
         value = function(episode)
@@ -130,12 +131,20 @@ def compute(episode: Episode, names: Iterable[str] | None = None) -> Mapping[str
     return values
 
 
-def _load(name: str) -> Any:
+def metric_function(name: str) -> Callable[[Episode], float | None]:
+    """A metric by name, ``"module:function"`` or ``"file.py:function"``.
+
+    Raises:
+        UnknownNameError: if there is no such metric.
+        InvalidInputError: if there is no such file, module or function.
+    """
     target = METRICS[name].function if name in METRICS else name
-    module, colon, attribute = target.partition(":")
-    if not colon:
+    if ":" not in target:
         raise UnknownNameError("metric", name, METRICS)
     try:
-        return getattr(importlib.import_module(module), attribute)
-    except (ImportError, AttributeError) as error:
+        function = load_object(target)
+    except (ImportError, InvalidInputError) as error:
         raise InvalidInputError(f"cannot load metric {name!r}: {error}") from error
+    if not callable(function):
+        raise InvalidInputError(f"metric {name!r} is no function, but {short(function)}")
+    return cast("Callable[[Episode], float | None]", function)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+from dataclasses import fields, is_dataclass, replace
 from typing import Any, cast
 
 from pushplan.world import Planner, Policy, UnknownNameError
@@ -69,7 +70,7 @@ def make_planner(name: str, **options: Any) -> Planner:
 
     Args:
         name: one of `planner_names()`.
-        options: keyword arguments of the planner's class.
+        options: keyword arguments of the planner's class, or fields of its config to change.
 
     Raises:
         UnknownNameError: if there is no such planner, or it has no such option.
@@ -82,7 +83,8 @@ def make_policy(name: str, **options: Any) -> Policy:
 
     Args:
         name: one of `policy_names()`.
-        options: keyword arguments of the policy's factory.
+        options: keyword arguments of the policy's factory, or fields of the config of the policy
+            or of its planner to change: ``make_policy("push-aware", push_weight=2.0)``.
 
     Raises:
         UnknownNameError: if there is no such policy, or it has no such option.
@@ -93,8 +95,27 @@ def make_policy(name: str, **options: Any) -> Policy:
 def _made(kind: str, name: str, table: dict[str, str], options: dict[str, Any]) -> Any:
     factory = look_up(kind, table, name)
     known = inspect.signature(factory).parameters
-    checks_itself = any(p.kind is p.VAR_KEYWORD for p in known.values())
-    for option in () if checks_itself else options:
-        if option not in known:
-            raise UnknownNameError(f"option of {kind} {name!r}", option, known)
-    return factory(**options)
+    if any(p.kind is p.VAR_KEYWORD for p in known.values()):  # it knows its settings
+        return factory(**options)
+    made = factory(**{key: options[key] for key in options if key in known})
+    changes = {key: options[key] for key in options if key not in known}
+    if not changes:
+        return made
+    owner = getattr(made, "planner", made)
+    settings: Any = getattr(owner, "config", None if owner is made else owner)
+    plain = is_dataclass(settings) and not isinstance(settings, type)
+    names = [field.name for field in fields(settings)] if plain else []
+    for option in changes:
+        if option not in names:
+            raise UnknownNameError(f"option of {kind} {name!r}", option, [*known, *names])
+    changed: Any = replace(settings, **changes)
+    if settings is not owner:
+        changed = (
+            replace(cast(Any, owner), config=changed)
+            if is_dataclass(owner)
+            else type(owner)(changed)
+        )
+    if owner is made:
+        return changed
+    made.planner = changed
+    return made

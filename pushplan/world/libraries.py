@@ -9,6 +9,7 @@ from pushplan.world.errors import MissingDependencyError
 
 EXTRAS = {
     "PIL": "pictures",
+    "argcomplete": "completion",
     "rich": "sim",
     "gymnasium": "sim",
     "mujoco": "sim",

@@ -12,6 +12,7 @@ import math
 import os
 import re
 import stat
+import sys
 import zipfile
 from collections.abc import Sequence
 from pathlib import Path
@@ -200,6 +201,10 @@ def _array(file: IO[bytes], limit: int) -> NDArray[Any]:
         if not got:
             raise SchemaError(f"an array of shape {shape} needs {size:,} bytes, got {filled:,}")
         filled += got
+    if kind.kind == "U" and values.size:
+        codes = values.view(np.dtype(np.uint32).newbyteorder(kind.byteorder))
+        if int(codes.max(initial=0)) > sys.maxunicode:
+            raise SchemaError(f"a text holds {codes.max():#x}, which is no character")
     return values.reshape(shape, order="F" if fortran else "C")
 
 

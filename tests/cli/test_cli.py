@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import subprocess
 import sys
 import time
@@ -82,7 +83,38 @@ def test_help_is_fast_and_loads_nothing_heavy() -> None:
 )
 def test_list(kind: str, name: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["list", kind]) == 0
-    assert name in capsys.readouterr().out.splitlines()
+    lines = capsys.readouterr().out.splitlines()
+    (line,) = (line for line in lines if line.split()[0] == name)
+    assert len(line.split()) > 4  # facts and a description stand beside it
+    assert main(["list", kind, "--names"]) == 0
+    assert capsys.readouterr().out.splitlines() == [line.split()[0] for line in lines]
+
+
+def test_list_says_what_each_policy_and_suite_is_for(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["list"]) == 0
+    lines = {line.split()[0]: line for line in capsys.readouterr().out.splitlines()}
+    assert "box_delivery,area_clearing  velocity " in lines["gtsp-mpc"]
+    assert " ship_ice " in lines["ship-predictive"] and " any " in lines["random"]
+    assert " box_delivery " in lines["box-delivery-sac"] and "SAC" in lines["box-delivery-sac"]
+    assert " maze " in lines["maze-2d-5"] and " turn_rate " in lines["maze-2d-5"]
+
+
+def test_the_shell_completes_commands_and_kinds() -> None:
+    pytest.importorskip("argcomplete")
+    for line, words in (("pushplan li", ["list"]), ("pushplan list su", ["suites"])):
+        asked = {"_ARGCOMPLETE": "1", "_ARGCOMPLETE_IFS": "\n", "COMP_LINE": line}
+        done = subprocess.run(
+            [sys.executable, "-c", "from pushplan.cli import main; main()"],
+            env={
+                **os.environ,
+                **asked,
+                "COMP_POINT": str(len(line)),
+                "_ARGCOMPLETE_STDOUT_FILENAME": "/dev/stdout",
+            },
+            capture_output=True,
+            text=True,
+        )
+        assert done.stdout.split() == words
 
 
 def test_plan_writes_a_plan(room: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -141,7 +173,6 @@ def test_errors_are_one_line_with_a_code(
     "arguments",
     [
         [],
-        ["list"],
         ["list", "things"],
         ["plan", "room.yaml"],
         ["plan", "room.yaml", "--planner", "straight", "--deadline", "0"],

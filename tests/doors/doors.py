@@ -179,7 +179,7 @@ def _read_specification(path: Path) -> Any:
 
 
 def _read_name(path: Path) -> Any:
-    from pushplan.evaluation.loading import load_object
+    from pushplan.world.named_objects import load_object
 
     return load_object(path.read_bytes().decode("utf-8", "surrogateescape"))
 

@@ -87,9 +87,40 @@ def test_differences_are_taken_scenario_by_scenario(results: Results) -> None:
     # the spread between scenarios is far greater than the difference, and cancels
     assert pair.difference.mean == pytest.approx(0.1)
     assert pair.difference.high - pair.difference.low < 1e-9
-    assert (pair.wins, pair.losses, pair.difference.count, pair.clear) == (19, 0, 19, True)
+    assert (pair.better, pair.worse, pair.difference.count, pair.verdict) == (19, 0, 19, "better")
+    assert pair.effect == 1.0 and pair.p_corrected < 0.001
     same = next(p for p in results.compare() if p.setting == "maze-10" and p.metric == "I_nav")
-    assert (same.wins, same.losses, same.clear) == (0, 0, False)
+    assert (same.better, same.worse, same.verdict, same.needed) == (0, 0, "equal", None)
+
+
+def test_less_work_is_better_and_nothing_is_starred_below_ten(results: Results) -> None:
+    def lighter(row: ResultRow) -> ResultRow:
+        work = 1.0 - 0.01 * (row.seed + 1) if row.policy == "better" else 1.0
+        return replace(row, metrics={**row.metrics, "interaction_work_kg_m": work})
+
+    rows = tuple(map(lighter, results.rows))
+    pair = next(p for p in Results(rows).compare() if p.metric == "interaction_work_kg_m")
+    assert {pair.first, pair.second} == {"plain", "better"}
+    sign = 1 if pair.second == "better" else -1
+    assert sign * pair.difference.mean < 0.0
+    assert (pair.verdict, pair.effect) == ("better" if sign > 0 else "worse", float(sign))
+    few = Results(tuple(row for row in rows if row.seed < 9)).compare()
+    assert {p.verdict for p in few} == {"equal", "not separated"}
+    assert all(p.needed is None or p.needed >= 10 for p in few)
+
+
+def test_the_paired_table_says_what_its_rows_are(results: Results) -> None:
+    table = next(t for t in results.tables() if t.title.startswith("Paired"))
+    assert table.note.startswith("second policy minus first")
+    line = next(cells for cells in table.cells if cells[0] == "E_nav")
+    assert line[1] == "better - plain" and line[2] == "+0.061 *"
+
+
+def test_several_settings_have_one_aggregate(results: Results) -> None:
+    table = results.tables(wide=True)[0]
+    assert table.title == "All 2 settings together"
+    assert [row[0] for row in table.cells] == ["plain", "better"]
+    assert table.cells[0][2] == ""  # over itself
 
 
 def test_the_table_shows_means_spreads_and_intervals(results: Results) -> None:

@@ -46,9 +46,9 @@ class TestJson:
     @pytest.mark.parametrize(
         ("text", "message"),
         [
-            ("", "not JSON"),
+            ("", "not valid JSON"),
             ("[1, 2]", "format"),
-            ("[" * 5000, "not JSON"),
+            ("[" * 5000, "nested 64 deep"),
             (changed(format="pushplan-policy/99"), "reads 'pushplan-policy/1'"),
             (changed(extra=1), "unknown key in the specification 'extra'"),
             (changed(tasks="maze"), "list of names"),

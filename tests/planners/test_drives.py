@@ -104,6 +104,20 @@ def test_plans_for_every_kind_of_robot_keep_its_turning_radius(kind, name):
 
 
 @pytest.mark.warm("push-aware")
+def test_a_car_that_reverses_backs_off_from_a_wall_that_it_faces():
+    """No forward path begins there."""
+    world = make_u_maze([], robot=ROBOTS["car that reverses"])
+    x = world.static.bounds[2] - 0.75
+    world = world.moved(robot_pose=[x, 3.0, 0.0])
+    plan = make_planner("push-aware").plan(world, stop=MaxIterations(2000))
+    assert plan.plan is None
+    policy = PlanFollower(make_planner("push-aware"), stop=MaxIterations(2000))
+    world, twists = drive(world, policy, 120.0)
+    assert min(twist.linear for twist in twists) < 0.0
+    assert world.goal.distance(*world.robot_pose[:2]) == 0.0
+
+
+@pytest.mark.warm("push-aware")
 @pytest.mark.parametrize("controller", [PathFollower, PurePursuit, MpcTracker])
 @pytest.mark.parametrize("kind", ["car", "car that reverses", "disc", "several parts"])
 def test_controllers_bring_every_kind_of_robot_to_its_goal(kind, controller):

@@ -72,6 +72,7 @@ class PlanFollower:
     """
 
     actions = ("turn_rate", "velocity")
+    goal_kind = "robot"
 
     def __init__(
         self,

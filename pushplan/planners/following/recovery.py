@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from pushplan.control import PoseProgressChecker, Recovery
-from pushplan.world import Drive, Twist, World
+from pushplan.world import Drive, RobotModel, Twist, World
 
 _DISTANCE = 1.0  # by which a recovery takes the robot away [circumscribed radii]
 _PLACE = 2.0  # recoveries that are no farther apart are at the same place [circumscribed radii]
@@ -17,7 +17,7 @@ class RecoveryRule:
 
     A robot that has recovered as often as there are ways, and is still at the same place, is
     `stuck`: it stays with its plans alone until they bring it elsewhere. A constant-speed robot
-    cannot recover.
+    cannot recover, nor can a car that does not reverse.
 
     Args:
         world: at the start of the episode.
@@ -69,7 +69,7 @@ class RecoveryRule:
             self._place, self._count = world.robot_pose, 0
         gets_on = self._checker.update(world.robot_pose, self._told)
         if self._recovery is None:
-            if gets_on or self.stuck or world.robot.drive is not Drive.DIFFERENTIAL:
+            if gets_on or self.stuck or not _can_back_off(world.robot):
                 return None
             self._recovery = Recovery(world, _DISTANCE * size, skip=self._count)
             self._count += 1
@@ -78,3 +78,9 @@ class RecoveryRule:
             self._recovery = None
             self._checker.reset()
         return command
+
+
+def _can_back_off(robot: RobotModel) -> bool:
+    if robot.drive is Drive.CAR:
+        return robot.min_speed < 0.0
+    return robot.drive is Drive.DIFFERENTIAL

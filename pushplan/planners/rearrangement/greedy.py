@@ -46,6 +46,7 @@ class GreedyPusher:
     """
 
     actions = ("velocity",)
+    goal_kind = "objects"
 
     def __init__(self, config: RearrangementConfig | None = None) -> None:
         self.config = expect("config", config or RearrangementConfig(), RearrangementConfig)

@@ -46,6 +46,7 @@ class GtspMpc:
     """
 
     actions = ("velocity",)
+    goal_kind = "objects"
 
     def __init__(
         self,

@@ -32,6 +32,7 @@ class Gtsp:
     """
 
     actions = ("velocity",)
+    goal_kind = "objects"
 
     def __init__(self, config: RearrangementConfig | None = None) -> None:
         self.config = expect("config", config or RearrangementConfig(), RearrangementConfig)

@@ -10,8 +10,9 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from pushplan.world import InvalidInputError
-from pushplan.world.errors import unknown_name_message
+from pushplan.world.errors import InvalidInputError, unknown_name_message
+
+_DEEPEST = 32  # parts of a module's name: Python imports each within the one before it
 
 
 def load_object(spec: str) -> Any:
@@ -24,8 +25,11 @@ def load_object(spec: str) -> Any:
         InvalidInputError: if the text has no such form, or there is no such file or name.
     """
     where, colon, name = spec.rpartition(":")
-    if not colon or not where or not name.isidentifier():
+    relative = where.startswith(".") and not where.endswith(".py")
+    if not colon or not where or relative or not name.isidentifier():
         raise InvalidInputError(f"expected 'module:Name' or 'path/to/file.py:Name', got {spec!r}")
+    if where.count(".") >= _DEEPEST:
+        raise InvalidInputError(f"a module has at most {_DEEPEST} parts in its name, got {spec!r}")
     module = _load_file(Path(where)) if where.endswith(".py") else _load_module(where, spec)
     if not hasattr(module, name):
         choices = [key for key in vars(module) if not key.startswith("_")]

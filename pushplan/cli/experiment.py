@@ -1,0 +1,75 @@
+"""``pushplan experiment``: run what an experiment file says."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from pathlib import Path
+from typing import Any
+
+from pushplan.cli.bench import progress_of
+from pushplan.cli.common import add_command, add_trust, say, whole
+
+_EXAMPLES = """\
+  pushplan experiment study.yaml
+  pushplan experiment study.yaml --check
+  pushplan experiment study.yaml --workers 8 --out runs/study
+
+A run that was interrupted or killed continues when the same command is given again; suites,
+policies and episodes may be added to the file. See docs/experiments.md for its format.
+"""
+
+
+def add(commands: Any) -> None:
+    """Add the command."""
+    parser = add_command(commands, "experiment", "run an experiment file", _EXAMPLES, run)
+    parser.add_argument("file", metavar="FILE.yaml", help="suites, policies, parameters, metrics")
+    parser.add_argument("--out", metavar="DIR", help="run directory (default: runs/NAME of FILE)")
+    parser.add_argument(
+        "--workers",
+        type=whole(0),
+        default=os.cpu_count() or 1,
+        metavar="W",
+        help="processes (default: all %(default)s cores; 0: this process)",
+    )
+    parser.add_argument("--check", action="store_true", help="say what would be run, and end")
+    parser.add_argument(
+        "--retry-failed", action="store_true", help="run jobs again that raised, hung or crashed"
+    )
+    add_trust(parser)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Check the file, run its jobs, print the tables, write plots and page."""
+    from pushplan.cli.report import show
+    from pushplan.evaluation import Experiment
+    from pushplan.evaluation.tables import text
+
+    experiment = Experiment.load(options.file)
+    jobs = experiment.jobs
+    for (title, label), why in experiment.skipped.items():
+        say(f"left out: {label} in {title}: {why}")
+    if options.check:
+        for suite in experiment.suites:
+            skipped = experiment.skipped
+            labels = [p.label for p in experiment.policies if (suite.name, p.label) not in skipped]
+            say(f"{suite.name}: {len(suite.scenarios)} scenarios, {', '.join(labels)}")
+        say(f"{len(jobs)} jobs")
+        return 0
+    out = options.out or os.path.join("runs", Path(options.file).stem)
+    with progress_of("") as progress:
+        try:
+            results = experiment.run(
+                out,
+                workers=options.workers,
+                retry_failed=options.retry_failed,
+                progress=progress,
+            )
+        except KeyboardInterrupt:
+            sys.stderr.write(f"stopped; the same command continues the run in {out}\n")
+            raise
+    show(results)
+    if experiment.metrics:
+        say(text(results.measure(experiment.metrics)))
+    return 0

@@ -1,0 +1,131 @@
+"""`Experiment`: several suites, policies with parameters, and what is measured."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from pushplan.evaluation.batch import Progress, run_batch
+from pushplan.evaluation.compatibility import misfits, read_policies
+from pushplan.evaluation.jobs import Job, JobSettings
+from pushplan.evaluation.policies import PolicySpec
+from pushplan.evaluation.results import Results
+from pushplan.metrics import metric_function
+from pushplan.world import InvalidInputError
+from pushplan.world.checks import expect
+from pushplan.world.safe_files import read_data
+
+if TYPE_CHECKING:
+    from pushplan.scenarios import Suite
+
+
+@dataclass(frozen=True)
+class Experiment:
+    """Every policy on every scenario that it is made for.
+
+    Args:
+        name: what the report is called.
+        suites: the scenarios.
+        policies: each with its parameters, under a label of its own.
+        settings: what all jobs share.
+        metrics: beside those that every run has: names of `pushplan.metrics`, or functions as
+            ``"module:function"`` or ``"file.py:function"``.
+        memory_limit_mb: private memory of a worker at which allocations fail [MB].
+        about: what else is noted about the run; has to be the same when it is continued.
+        allow_misfits: whether a policy that fits no suite is left out; else it is refused.
+        skipped: (suite, policy label) -> why that pair is not run.
+
+    Raises:
+        InvalidInputError: if there is nothing to run, or two policies share a label.
+        UnknownNameError: if there is no such metric.
+        UnusablePolicyError: if a policy cannot be made, or fits no suite.
+    """
+
+    name: str
+    suites: tuple[Suite, ...]
+    policies: tuple[PolicySpec, ...]
+    settings: JobSettings = field(default_factory=JobSettings)
+    metrics: tuple[str, ...] = ()
+    memory_limit_mb: float | None = None
+    about: Mapping[str, Any] = field(default_factory=dict)
+    allow_misfits: bool = False
+    skipped: Mapping[tuple[str, str], str] = field(init=False)
+
+    def __post_init__(self) -> None:
+        expect("settings", self.settings, JobSettings)
+        if not self.suites:
+            raise InvalidInputError("an experiment needs at least one suite")
+        for metric in self.metrics:
+            metric_function(metric)
+        object.__setattr__(self, "policies", tuple(read_policies(self.policies)))
+        found = misfits(self.policies, self.suites, self.settings, allow_all=self.allow_misfits)
+        object.__setattr__(self, "skipped", found)
+
+    @classmethod
+    def load(cls, path: str | Path) -> Experiment:
+        """Read a YAML file; files that it names are looked for beside it.
+
+        Raises:
+            SchemaError: if it is missing, not YAML, or off the schema.
+            UnknownNameError: if there is no suite, policy, parameter, variation or metric of a
+                name.
+            UnusablePolicyError: as the class.
+        """
+        return cls.from_dict(read_data(path, "experiment file"), Path(path).parent)
+
+    @classmethod
+    def from_dict(cls, data: object, folder: Path = Path()) -> Experiment:
+        """Read plain values, as in a file of that folder; errors as `load`."""
+        from pushplan.evaluation.experiment_file import fields_of
+
+        return cls(**fields_of(data, folder))
+
+    @property
+    def jobs(self) -> list[Job]:
+        """What is run: the policies of a scenario close together."""
+        return [
+            Job(spec, scenario)
+            for suite in self.suites
+            for scenario in suite.scenarios
+            for spec in self.policies
+            if (suite.name, spec.label) not in self.skipped
+        ]
+
+    def run(
+        self,
+        out: str | Path | None = None,
+        *,
+        workers: int | None = None,
+        retry_failed: bool = False,
+        progress: Progress | None = None,
+    ) -> Results:
+        """Run what has not been run yet in the run directory ``out``; see `run_batch`.
+
+        Suites, policies and episodes may be added to an experiment that was run before.
+
+        Args:
+            out: run directory; if None only the rows are kept, and traces are dropped.
+            workers: processes, all cores by default; 0 runs in this process.
+            retry_failed: run jobs again whose row says that they failed.
+            progress: told of every row.
+
+        Returns:
+            All rows of the run directory.
+        """
+        with tempfile.TemporaryDirectory(prefix="pushplan-") as temporary:
+            folder = Path(temporary if out is None else out)
+            run_batch(
+                self.jobs,
+                out=folder,
+                workers=workers,
+                settings=self.settings,
+                memory_limit_mb=self.memory_limit_mb,
+                retry_failed=retry_failed,
+                about={"suite": self.name, **self.about},
+                progress=progress,
+            )
+            results = Results.load(folder)
+        return results if out is not None else Results(results.rows, results.about, None)

@@ -1,0 +1,142 @@
+"""Experiment files: YAML that says what is run; read for `Experiment.load`."""
+
+from __future__ import annotations
+
+import itertools
+import math
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from pushplan.evaluation.jobs import JobSettings
+from pushplan.evaluation.policies import PolicySpec, parse_policy
+from pushplan.world import Deadline, SchemaError
+from pushplan.world.checks import expect, integer, known_keys, number
+from pushplan.world.errors import short
+
+if TYPE_CHECKING:
+    from pushplan.scenarios import Suite
+
+SCHEMA = "pushplan-experiment/1"
+"""Name and version of the file format; files of another version are refused."""
+EPISODES = 20
+MOST_POLICIES = 1000
+
+_KEYS = ("schema", "name", "suites", "policies", "episodes", "seed", "metrics", "timeout_s")
+_MORE = ("observation", "latency_factor", "memory_limit_mb")
+_POLICY = ("policy", "label", "parameters", "sweep", "deadline_s")
+_SUITE = ("suite", "scenarios", "episodes", "seed", "variations")
+
+
+def fields_of(data: object, folder: Path) -> dict[str, Any]:
+    """The arguments of `Experiment` that plain values give; see its ``from_dict``."""
+    known_keys("experiment", data, (*_KEYS, *_MORE), ("schema", "suites", "policies"))
+    assert isinstance(data, Mapping)
+    if data["schema"] != SCHEMA:
+        raise SchemaError(f"this pushplan reads schema {SCHEMA!r}, got {short(data['schema'])}")
+    episodes = integer("episodes", data.get("episodes", EPISODES), low=1)
+    seed = integer("seed", data.get("seed", 0), low=0)
+    names = ("timeout_s", "observation", "latency_factor")
+    policies = [_policies(one, folder) for one in _list("policies", data["policies"])]
+    suites = [_suite(one, episodes, seed, folder) for one in _list("suites", data["suites"])]
+    metrics = _texts("metrics", data.get("metrics", ()))
+    return {
+        "name": str(data.get("name", "experiment")),
+        "suites": tuple(suites),
+        "policies": tuple(itertools.chain.from_iterable(policies)),
+        "settings": JobSettings(**{name: data[name] for name in names if name in data}),
+        "metrics": tuple(_beside(one, folder) for one in metrics),
+        "memory_limit_mb": data.get("memory_limit_mb"),
+    }
+
+
+def _list(what: str, value: object) -> Sequence[Any]:
+    if not isinstance(value, Sequence) or isinstance(value, str) or not value:
+        raise SchemaError(f"{what} must be a list with at least one entry, got {short(value)}")
+    return value
+
+
+def _texts(what: str, value: object) -> Sequence[str]:
+    if isinstance(value, str) or not isinstance(value, Sequence):
+        raise SchemaError(f"{what} must be a list of texts, got {short(value)}")
+    return [expect(what, one, str) for one in value]
+
+
+def _beside(source: str, folder: Path) -> str:
+    """A text that may name a ``file.py`` beside the experiment file, made absolute."""
+    label, equals, rest = source.rpartition("=")
+    where, colon, name = rest.rpartition(":")
+    if not where.endswith((".py", ".onnx", ".zip")) and not name.endswith((".onnx", ".zip")):
+        return source
+    prefix, colon_too, file = where.rpartition(":")
+    if name.endswith((".onnx", ".zip")):  # onnx:FILE, sb3:FILE
+        return f"{label}{equals}{where}{colon}{_path(name, folder)}"
+    return f"{label}{equals}{prefix}{colon_too}{_path(file, folder)}{colon}{name}"
+
+
+def _path(file: str, folder: Path) -> Path:
+    path = Path(file).expanduser()
+    return path if path.is_absolute() else (folder / path).resolve()
+
+
+def _suite(given: object, episodes: int, seed: int, folder: Path) -> Suite:
+    """Read an entry of ``suites``: a name, or a mapping."""
+    from pushplan.scenarios import Suite, load_scenarios, suite
+
+    entry = {"suite": given} if isinstance(given, str) else given
+    known_keys("suite", entry, _SUITE, ())
+    assert isinstance(entry, Mapping)
+    if ("suite" in entry) == ("scenarios" in entry):
+        raise SchemaError(
+            "an entry of suites has either 'suite', a name, or 'scenarios', a file: "
+            f"got {short(dict(entry))}"
+        )
+    if "scenarios" in entry:
+        path = _path(expect("scenarios", entry["scenarios"], str), folder)
+        found = Suite(path.stem, 1, tuple(load_scenarios(path)))
+    else:
+        episodes = integer("episodes", entry.get("episodes", episodes), low=1)
+        first = integer("seed", entry.get("seed", seed), low=0)
+        found = suite(entry["suite"], episodes=episodes, first_seed=first)
+    changes = entry.get("variations", {})
+    if not isinstance(changes, Mapping):
+        raise SchemaError(f"variations must be a mapping, got {short(changes)}")
+    scenarios = tuple(
+        replace(one, variations={**one.variations, **changes}) for one in found.scenarios
+    )
+    words = ",".join(f"{key}={value}" for key, value in changes.items())
+    return Suite(f"{found.name}[{words}]" if words else found.name, found.version, scenarios)
+
+
+def _policies(given: object, folder: Path) -> Iterable[PolicySpec]:
+    """Read an entry of ``policies``: a text, or a mapping; a sweep gives one for each value."""
+    entry = {"policy": given} if isinstance(given, str) else given
+    known_keys("policy", entry, _POLICY, ("policy",))
+    assert isinstance(entry, Mapping)
+    source = _beside(expect("policy", entry["policy"], str), folder)
+    label = f"{entry['label']}=" if "label" in entry else ""
+    spec = parse_policy(label + source)
+    options = {**spec.options, **_mapping("parameters", entry.get("parameters", {}))}
+    if "deadline_s" in entry:
+        options["stop"] = Deadline(number("deadline_s", entry["deadline_s"], low=0.0))
+    sweep = _mapping("sweep", entry.get("sweep", {}))
+    values = [_list(f"sweep of {name}", given) for name, given in sweep.items()]
+    if (count := math.prod(len(one) for one in values)) > MOST_POLICIES:
+        raise SchemaError(f"a sweep may give {MOST_POLICIES} policies, this one gives {count}")
+    for combination in itertools.product(*values):
+        chosen = dict(zip(sweep, combination, strict=True))
+        words = "".join(f"@{name}-{_word(value)}" for name, value in chosen.items())
+        yield PolicySpec(f"{spec.label}{words}"[:64], spec.source, {**options, **chosen})
+
+
+def _mapping(what: str, value: object) -> dict[str, Any]:
+    if not isinstance(value, Mapping) or not all(isinstance(key, str) for key in value):
+        raise SchemaError(f"{what} must be a mapping from names to values, got {short(value)}")
+    return dict(value)
+
+
+def _word(value: object) -> str:
+    text = f"{value:g}" if isinstance(value, int | float) else str(value)
+    return re.sub(r"[^A-Za-z0-9_.+-]", "_", text)

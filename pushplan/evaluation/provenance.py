@@ -1,0 +1,102 @@
+"""Where results come from: code, machine, packages and command of each call that ran jobs."""
+
+from __future__ import annotations
+
+import os
+import platform
+import shlex
+import subprocess
+import sys
+from datetime import UTC, datetime
+from importlib import metadata
+from pathlib import Path
+from typing import Any
+
+import pushplan
+
+PACKAGES = (
+    "gymnasium",
+    "mujoco",
+    "numba",
+    "numpy",
+    "ompl",
+    "onnxruntime",
+    "pymunk",
+    "ruckig",
+    "scipy",
+    "shapely",
+    "torch",
+)
+"""Packages that results may depend on; those that are installed are named."""
+_GIT_S = 5.0
+
+
+def provenance(workers: int) -> dict[str, Any]:
+    """What to note about a run that begins now, as JSON values.
+
+    Args:
+        workers: processes that run the jobs.
+
+    Returns:
+        ``began`` (ISO 8601, UTC), ``command``, ``pushplan`` (version), ``commit`` and ``changed``
+        (whether files differ from it; both None outside of a checkout), ``python``, ``system``,
+        ``machine``, ``cores``, ``load`` (of the last minute, None if unknown), ``workers`` and
+        ``packages`` (name -> version).
+    """
+    commit, changed = _checkout(Path(pushplan.__file__).resolve().parents[1])
+    return {
+        "began": datetime.now(UTC).isoformat(timespec="seconds"),
+        "command": shlex.join([Path(sys.argv[0]).name, *sys.argv[1:]]) if sys.argv[0] else "",
+        "pushplan": pushplan.__version__,
+        "commit": commit,
+        "changed": changed,
+        "python": platform.python_version(),
+        "system": platform.platform(terse=True),
+        "machine": platform.machine(),
+        "cores": os.cpu_count(),
+        "load": round(os.getloadavg()[0], 2) if hasattr(os, "getloadavg") else None,
+        "workers": workers,
+        "packages": {name: found for name in PACKAGES if (found := _version(name)) is not None},
+    }
+
+
+def in_words(run: dict[str, Any]) -> str:
+    """One line of what `provenance` gave."""
+    commit = run["commit"]
+    code = run["pushplan"] + (f" at {commit[:12]}" if commit else "")
+    packages = ", ".join(f"{name} {version}" for name, version in run["packages"].items())
+    return (
+        f"{run['began']}: {run['command'] or 'Python'}; pushplan {code}"
+        f"{' with changes' if run['changed'] else ''}; {run['workers']} workers on "
+        f"{run['cores']} cores at load {run['load']}, {run['system']} {run['machine']}, Python "
+        f"{run['python']}; {packages}"
+    )
+
+
+def _version(name: str) -> str | None:
+    try:
+        return metadata.version(name)
+    except metadata.PackageNotFoundError:
+        return None
+
+
+def _checkout(root: Path) -> tuple[str | None, bool | None]:
+    """Commit of the code that runs, and whether it has been changed."""
+    if not (root / ".git").exists():
+        return None, None
+    try:
+        commit = _git(root, "rev-parse", "HEAD")
+        return commit, bool(_git(root, "status", "--porcelain", "--untracked-files=no"))
+    except (OSError, subprocess.SubprocessError):
+        return None, None
+
+
+def _git(root: Path, *words: str) -> str:
+    done = subprocess.run(
+        ["git", "-C", str(root), *words],
+        capture_output=True,
+        text=True,
+        check=True,
+        timeout=_GIT_S,
+    )
+    return done.stdout.strip()
