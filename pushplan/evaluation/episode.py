@@ -213,9 +213,7 @@ class Recording:
 
     def _begin(self, world: World) -> None:
         self.started = True
-        self._world = copy.deepcopy(
-            world
-        )  # what a policy does to the one that it is shown is its own
+        self._world = copy.deepcopy(world)  # the one that a policy is shown is the policy's
         self._times = [np.array([world.time])]
         self._robot = [np.array(world.robot_pose)[None]]
         self._objects = [np.array(world.movables.poses)[None]]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import io
 import os
 import random
 import time
@@ -53,7 +52,7 @@ def execute(job: Job, settings: JobSettings, owner_pid: int | None = None) -> Jo
         return failed_result(job, Status.TIMEOUT, reason, traceback.format_exc())
     except MemoryError as error:
         error.__traceback__ = None  # its frames hold what took the memory
-        return failed_result(job, Status.OUT_OF_MEMORY, "an allocation failed")
+        return failed_result(job, Status.OUT_OF_MEMORY, "an allocation failed", "MemoryError")
     except (Exception, SystemExit) as error:  # what a policy left behind trips whoever reads it
         return failed_result(job, Status.POLICY_ERROR, describe(error), traceback.format_exc())
 
@@ -100,9 +99,7 @@ def _execute(job: Job, settings: JobSettings) -> JobResult:
     episode = recording.episode(reason)
     calls = plan_times(policy)
     row = scored_row(row, episode, None if calls is None else len(calls))
-    trace = io.BytesIO()
-    episode.save(trace)
-    return JobResult(row, trace.getvalue(), clipped(detail))
+    return JobResult(row, episode.to_bytes(), clipped(detail))
 
 
 def dry_run(job: Job, settings: JobSettings) -> None:

@@ -116,12 +116,13 @@ class JobResult:
 
     @classmethod
     def from_message(cls, header: Mapping[str, Any], body: bytes) -> JobResult:
-        """Read what `to_message` gave, from somebody who is not trusted.
+        """Read what `to_message` gave, from somebody who is not trusted: see `checked`.
 
         Raises:
-            KeyError, TypeError, ValueError: if it is no result.
+            KeyError, TypeError: if it is no result.
         """
-        return cls(checked_row(header["row"]), body if header["traced"] else None, header["detail"])
+        row = ResultRow(**header["row"])
+        return cls(row, body if header["traced"] else None, str(header["detail"]))
 
     def checked(self, job: Job) -> JobResult:
         """This result, or a failure if it cannot be one of that job."""

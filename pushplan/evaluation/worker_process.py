@@ -113,7 +113,7 @@ class WorkerProcess:
                 raise self._died(WorkerOutOfMemoryError, "an allocation failed")
         try:
             return JobResult.from_message(header, body)
-        except (KeyError, TypeError, ValueError) as error:
+        except (KeyError, TypeError) as error:
             raise self._died(WorkerDiedError, f"its message is no result: {error}") from error
 
     def _receive(self, left_s: float, limit_s: float = math.inf) -> tuple[dict[str, Any], bytes]:

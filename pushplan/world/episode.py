@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import io
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Any, BinaryIO
+from typing import Annotated, Any
 
 import numpy as np
 
@@ -95,8 +96,12 @@ class Episode(ArrayRecord, CheckedFields):
             time=float(self.times[index]),
         )
 
-    def save(self, path: str | Path | BinaryIO) -> None:
+    def save(self, path: str | Path) -> None:
         """Write to a compressed ``.npz`` file that holds no pickles."""
+        Path(path).write_bytes(self.to_bytes())
+
+    def to_bytes(self) -> bytes:
+        """What `save` writes."""
         header = {
             "schema": SCHEMA,
             "world": world_to_dict(self.world),
@@ -105,8 +110,9 @@ class Episode(ArrayRecord, CheckedFields):
             "about": dict(self.about),
         }
         arrays: dict[str, Any] = {key: getattr(self, key) for key in _ARRAYS}
-        with Path(path).open("wb") as file:
-            np.savez_compressed(file, header=np.array(json.dumps(header)), **arrays)
+        file = io.BytesIO()
+        np.savez_compressed(file, header=np.array(json.dumps(header)), **arrays)
+        return file.getvalue()
 
     @classmethod
     def load(cls, path: str | Path) -> Episode:

@@ -126,7 +126,6 @@ class Reweighs(Ahead):
     def reset(self, world: World, rng: np.random.Generator) -> None:
         super().reset(world, rng)
         object.__setattr__(world.movables, "masses", world.movables.masses * 1e-9)
-        object.__setattr__(world, "robot_pose", np.array([5.0, 0.0, 0.0]))
 
 
 class Boasts(Ahead):
