@@ -165,6 +165,7 @@ class WorkerProcess:
             with contextlib.suppress(OSError):
                 os.kill(child, signal.SIGKILL)
         code = self._process.wait()
+        self._trimmed_log()
         if self._log is not None and self._log.exists() and self._log.stat().st_size == 0:
             self._log.unlink()
         return code
