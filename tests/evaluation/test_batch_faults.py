@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -18,11 +19,14 @@ from pushplan.evaluation import Job, JobSettings, ResultRow, parse_policies, run
 SETTINGS = JobSettings(make_env=f"{DOUBLES}:make_env", timeout_s=5.0, grace_s=0.5, dry_run=False)
 
 
-def run(out: Path, names: str, *, workers: int = 1, **options: object) -> dict[str, ResultRow]:
+def run(
+    out: Path, names: str, *, workers: int = 1, timeout_s: float = 5.0, **options: object
+) -> dict[str, ResultRow]:
     files = {"Ahead": DOUBLES, "Raises": DOUBLES}
     specs = parse_policies([f"{files.get(name, HERE)}:{name}" for name in names.split()])
     jobs = [Job(spec, LineScenario(0)) for spec in specs]
-    rows = run_batch(jobs, out=out, workers=workers, settings=SETTINGS, **options)  # type: ignore[arg-type]
+    settings = replace(SETTINGS, timeout_s=timeout_s)
+    rows = run_batch(jobs, out=out, workers=workers, settings=settings, **options)  # type: ignore[arg-type]
     assert len(rows) == len(jobs)
     return {row.policy: row for row in rows}
 
@@ -43,7 +47,8 @@ def test_limits_that_a_policy_sets_hold_nobody_else_up(tmp_path: Path) -> None:
 
 
 def test_memory_that_is_gone_for_good_is_a_row(tmp_path: Path) -> None:
-    rows = run(tmp_path, "OutOfMemoryForGood Ahead", memory_limit_mb=1500.0)
+    # filling so much takes about a second, and far longer where others compute
+    rows = run(tmp_path, "OutOfMemoryForGood Ahead", memory_limit_mb=1500.0, timeout_s=60.0)
     assert rows["OutOfMemoryForGood"].status == "out_of_memory"
     assert rows["Ahead"].status == "done"
 
