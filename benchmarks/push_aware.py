@@ -138,11 +138,8 @@ def quality(
 
 def scores(results: Results, policies: list[str]) -> dict[str, dict[str, list[float]]]:
     """For each policy, values by scenario; episodes that failed count as E = 0, I = 1."""
-    from pushplan.evaluation.jobs import file_stem
     from pushplan.metrics import compute
-    from pushplan.world import Episode
 
-    assert results.path is not None
     found: dict[str, dict[str, list[float]]] = {}
     for policy in policies:
         columns: dict[str, list[float]] = {key: [] for key in (*METRICS, "success", "ms")}
@@ -151,8 +148,8 @@ def scores(results: Results, policies: list[str]) -> dict[str, dict[str, list[fl
             if one.failed:
                 values = {"E_nav": 0.0, "E_nav_to_goal_point": 0.0, "I_nav": 1.0}
             else:
-                stem = file_stem(one.policy, one.scenario, one.seed)
-                episode = Episode.load(results.path / "episodes" / f"{stem}.npz")
+                episode = results.episode(one)
+                assert episode is not None
                 values = compute(episode, METRICS)
             for key in METRICS:
                 columns[key].append(values[key])

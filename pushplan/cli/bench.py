@@ -14,6 +14,7 @@ from pushplan.cli import paper
 from pushplan.cli.common import (
     add_command,
     add_latency,
+    add_run_options,
     add_trust,
     batch_options,
     positive,
@@ -54,13 +55,6 @@ def add(commands: Any) -> None:
     parser.add_argument(
         "--episodes", type=whole(1), metavar="N", help="default: the suite's own; paper: 100 each"
     )
-    parser.add_argument(
-        "--workers",
-        type=whole(0),
-        default=os.cpu_count() or 1,
-        metavar="W",
-        help="processes (default: all %(default)s cores; 0: this process)",
-    )
     parser.add_argument("--out", metavar="DIR", help="run directory (default: runs/SUITE)")
     parser.add_argument(
         "--seed", type=whole(0), default=0, metavar="FIRST", help="seed of the first scenario"
@@ -83,9 +77,7 @@ def add(commands: Any) -> None:
     )
     add_latency(parser)
     add_trust(parser)
-    parser.add_argument(
-        "--retry-failed", action="store_true", help="run jobs again that raised, hung or crashed"
-    )
+    add_run_options(parser)
     paper.add_options(parser)
     parser.set_defaults(usage=parser.print_usage)
 

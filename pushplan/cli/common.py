@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import os
 import sys
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
@@ -30,11 +31,50 @@ def batch_options(options: argparse.Namespace) -> dict[str, Any]:
     """What ``bench`` and ``bench paper`` hand to the batch runner under the same names."""
     return {
         "seed": options.seed,
-        "workers": options.workers,
         "timeout_s": options.timeout,
         "memory_limit_mb": options.memory,
-        "retry_failed": options.retry_failed,
+        **run_options(options),
     }
+
+
+def add_run_options(parser: argparse.ArgumentParser) -> None:
+    """Add the options of commands that run jobs in a run directory."""
+    parser.add_argument(
+        "--workers",
+        type=whole(0),
+        default=os.cpu_count() or 1,
+        metavar="W",
+        help="processes (default: all %(default)s cores; 0: this process)",
+    )
+    parser.add_argument(
+        "--retry-failed", action="store_true", help="run jobs again that raised, hung or crashed"
+    )
+    parser.add_argument(
+        "--any-version",
+        action="store_true",
+        help="take results as they are that other versions of pushplan or its packages made",
+    )
+    parser.add_argument(
+        "--shard",
+        type=_shard,
+        metavar="K/N",
+        help="only the K-th of N parts of the jobs, as on one of N machines; see 'pushplan merge'",
+    )
+
+
+def run_options(options: argparse.Namespace) -> dict[str, Any]:
+    """What `add_run_options` read, as `Experiment.run` takes it."""
+    names = ("workers", "retry_failed", "any_version", "shard")
+    return {name: getattr(options, name) for name in names}
+
+
+def _shard(text: str) -> tuple[int, int]:
+    part, _, parts = text.partition("/")
+    if not (part.isascii() and part.isdigit() and parts.isascii() and parts.isdigit()):
+        raise argparse.ArgumentTypeError(f"a part is given as K/N, such as 3/16, got {text!r}")
+    if not 1 <= int(part) <= int(parts):
+        raise argparse.ArgumentTypeError(f"K must be between 1 and N, got {text}")
+    return int(part), int(parts)
 
 
 def add_latency(parser: argparse.ArgumentParser) -> None:

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from pushplan.cli.bench import progress_of
-from pushplan.cli.common import add_command, add_trust, say, whole
+from pushplan.cli.common import add_command, add_run_options, add_trust, run_options, say
 
 _EXAMPLES = """\
   pushplan experiment study.yaml
@@ -17,7 +17,7 @@ _EXAMPLES = """\
   pushplan experiment study.yaml --workers 8 --out runs/study
 
 A run that was interrupted or killed continues when the same command is given again; suites,
-policies and episodes may be added to the file. See docs/experiments.md for its format.
+policies and episodes may be added to the file. See docs/evaluation.md for its format.
 """
 
 
@@ -26,17 +26,8 @@ def add(commands: Any) -> None:
     parser = add_command(commands, "experiment", "run an experiment file", _EXAMPLES, run)
     parser.add_argument("file", metavar="FILE.yaml", help="suites, policies, parameters, metrics")
     parser.add_argument("--out", metavar="DIR", help="run directory (default: runs/NAME of FILE)")
-    parser.add_argument(
-        "--workers",
-        type=whole(0),
-        default=os.cpu_count() or 1,
-        metavar="W",
-        help="processes (default: all %(default)s cores; 0: this process)",
-    )
     parser.add_argument("--check", action="store_true", help="say what would be run, and end")
-    parser.add_argument(
-        "--retry-failed", action="store_true", help="run jobs again that raised, hung or crashed"
-    )
+    add_run_options(parser)
     add_trust(parser)
 
 
@@ -60,12 +51,7 @@ def run(options: argparse.Namespace) -> int:
     out = options.out or os.path.join("runs", Path(options.file).stem)
     with progress_of("") as progress:
         try:
-            results = experiment.run(
-                out,
-                workers=options.workers,
-                retry_failed=options.retry_failed,
-                progress=progress,
-            )
+            results = experiment.run(out, progress=progress, **run_options(options))
         except KeyboardInterrupt:
             sys.stderr.write(f"stopped; the same command continues the run in {out}\n")
             raise

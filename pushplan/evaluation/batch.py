@@ -9,11 +9,18 @@ from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, wait
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import pushplan
+from pushplan.evaluation.database import DATABASE
 from pushplan.evaluation.execute import execute
+from pushplan.evaluation.job_identity import (
+    IdentifiedJob,
+    differences,
+    same_but_versions,
+    settings_dict,
+)
 from pushplan.evaluation.jobs import (
     DEFAULT_ENV,
     Job,
@@ -64,17 +71,23 @@ def run_batch(
     settings: JobSettings | None = None,
     memory_limit_mb: float | None = None,
     retry_failed: bool = False,
+    any_version: bool = False,
     about: Mapping[str, Any] | None = None,
     progress: Progress | None = None,
 ) -> list[ResultRow]:
-    """Run jobs and store one row for each; jobs that have a row already are not run again.
+    """Run jobs and store one row for each. What is done is not run again, what has changed is.
 
     A job that raises, returns nonsense, takes too long or ends its process becomes a row with a
     status and a reason, and the batch goes on. Killed at any instant, it continues with the next
     call and ends with the same results.
 
+    A job is known by a hash of all that its result depends on (`job_identity.job_spec`): the
+    policy's code and parameters, the scenario, the settings, and versions. A row shows the result
+    that was asked for last of its policy label, scenario and seed; other ones stay stored, and
+    count at once when they are asked for again.
+
     Args:
-        jobs: what to run; a job is known by policy label, scenario key and seed.
+        jobs: what to run; policy label, scenario key and seed tell them apart.
         out: run directory, new or to be continued.
         workers: processes; all cores by default. 0 runs the jobs in this process, where a
             policy that never returns to the interpreter cannot be ended.
@@ -84,15 +97,16 @@ def run_batch(
         memory_limit_mb: private memory of a worker at which allocations fail, and memory of it and
             what it started, shared or not, at which it is ended [MB].
         retry_failed: run jobs again whose row says that they failed.
-        about: what else the results depend on; has to be the same when a run is continued.
+        any_version: take results that differ only in versions of pushplan and of packages.
+        about: what else to note about the run: JSON values.
         progress: told of every row.
 
     Returns:
         All rows of the run directory, sorted.
 
     Raises:
-        InvalidInputError: if the directory holds a run with another configuration, two jobs are
-            the same, or a policy cannot be sent to a process.
+        InvalidInputError: if another process writes into the directory, two jobs are the same, or
+            a policy cannot be sent to a process.
     """
     jobs = list(jobs)
     settings = JobSettings() if settings is None else settings
@@ -101,17 +115,13 @@ def run_batch(
         number("memory_limit_mb", memory_limit_mb, low=1.0)
     _check(jobs)
     with RunDirectory(out) as store:
-        store.configure(
-            _configuration(settings, memory_limit_mb, about),
-            {job.policy.label: job.policy.identity for job in jobs},
-        )
-        store.extend("settings", {setting_of(*job.id[1:]): job.title for job in jobs})
+        _note(store, jobs, settings, memory_limit_mb, about)
         if retry_failed:
             store.forget_failures()
-        done = store.done()
-        pending = [job for job in jobs if job.id not in done]
+        pending = _pending(jobs, store, settings, any_version)
         if pending:
-            store.append("runs", provenance(workers))
+            begun = {**provenance(workers), "jobs": len(jobs), "done": len(jobs) - len(pending)}
+            store.append("runs", begun)
         if progress is not None:
             progress(len(jobs) - len(pending), len(jobs), None)
         batch = _Batch(pending, store, settings, memory_limit_mb, len(jobs), progress)
@@ -119,6 +129,7 @@ def run_batch(
             batch.run_here()
         elif pending:
             batch.run(executor, max(1, min(workers, len(pending))))
+        store.tidy()
         store.write_csv()
         return store.rows()
 
@@ -131,24 +142,51 @@ def _check(jobs: Sequence[Job]) -> None:
         )
     seen: set[tuple[str, str, int]] = set()
     for job in jobs:
-        if job.id in seen:
-            raise InvalidInputError(f"two jobs are the same: policy, scenario, seed = {job.id}")
-        seen.add(job.id)
+        if job.key in seen:
+            raise InvalidInputError(f"two jobs are the same: policy, scenario, seed = {job.key}")
+        seen.add(job.key)
 
 
-def _configuration(
-    settings: JobSettings, memory_limit_mb: float | None, about: Mapping[str, Any] | None
-) -> dict[str, Any]:
-    make = settings.make_env
-    return {
-        "pushplan": pushplan.__version__,
-        "make_env": make if isinstance(make, str) else getattr(make, "__qualname__", "callable"),
-        "observation": settings.observation,
-        "timeout_s": settings.timeout_s,
-        "memory_limit_mb": memory_limit_mb,
-        **({} if settings.latency_factor is None else {"latency_factor": settings.latency_factor}),
-        **(about or {}),
-    }
+def _note(
+    store: RunDirectory,
+    jobs: Sequence[Job],
+    settings: JobSettings,
+    memory_limit_mb: float | None,
+    about: Mapping[str, Any] | None,
+) -> None:
+    configuration = {**settings_dict(settings), "memory_limit_mb": memory_limit_mb, **(about or {})}
+    store.note("configuration", configuration)
+    store.extend("policies", {job.policy.label: job.policy.identity for job in jobs})
+    factor = settings.latency_factor
+    mode = "" if factor is None else f", latency-aware x {factor:g}"
+    store.extend("settings", {setting_of(*job.key[1:]): job.title + mode for job in jobs})
+
+
+def _pending(
+    jobs: Sequence[Job], store: RunDirectory, settings: JobSettings, any_version: bool
+) -> list[IdentifiedJob]:
+    """The jobs without a result; those of the others count from now on."""
+    asked = [IdentifiedJob.of(job, settings) for job in jobs]
+    done = {job: job for job in store.done()}
+    if any_version:
+        done |= {same_but_versions(spec): job for job, spec in store.specs().items()}
+
+    def found(one: IdentifiedJob) -> str | None:
+        other = same_but_versions(one.spec) if any_version else one.id
+        return done.get(one.id, done.get(other))
+
+    there = [found(one) for one in asked]
+    store.show(job for job in there if job is not None)
+    pending = [one for one, job in zip(asked, there, strict=True) if job is None]
+    keys = store.keys()
+    if changed := [one for one in pending if one.job.key in keys]:
+        *_, before = store.specs(changed[0].job.key).values()
+        _log.warning(
+            "%d of %d jobs have results in %s from before a change: %s; they are run again, and "
+            "the old results stay in %s",
+            *(len(changed), len(jobs), store.path, differences(before, changed[0].spec), DATABASE),
+        )
+    return pending
 
 
 class _Batch:
@@ -156,14 +194,15 @@ class _Batch:
 
     def __init__(
         self,
-        jobs: Sequence[Job],
+        jobs: Sequence[IdentifiedJob],
         store: RunDirectory,
         settings: JobSettings,
         memory_limit_mb: float | None,
         total: int,
         progress: Progress | None,
     ) -> None:
-        self._jobs = deque(jobs)
+        self._jobs = deque(one.job for one in jobs)
+        self._identities = {one.job.key: one for one in jobs}
         self._store = store
         self._settings = settings
         self._memory_limit_mb = memory_limit_mb
@@ -175,7 +214,8 @@ class _Batch:
         """One after the other in this process."""
         while self._jobs:
             job = self._jobs.popleft()
-            self._keep(execute(job, self._settings).checked(job))
+            self._begin(job)
+            self._keep(job, execute(job, self._settings).checked(job))
 
     def run(self, executor: Executor | None, window: int) -> None:
         """Through an executor, ``window`` jobs at a time; through our own pool if None."""
@@ -213,6 +253,7 @@ class _Batch:
         while (self._jobs or flying) and not suspects:
             while self._jobs and len(flying) < window:
                 job = self._jobs.popleft()
+                self._begin(job)
                 try:
                     flying[_sent(submit, job)] = job
                 except BrokenExecutor:
@@ -225,7 +266,7 @@ class _Batch:
                 if outcome is None:
                     suspects.append(job)
                 else:
-                    self._keep(outcome)
+                    self._keep(job, outcome)
         return [*suspects, *flying.values()]
 
     def _outcome(self, job: Job, future: Future[JobResult], foreign: bool) -> JobResult | None:
@@ -256,13 +297,18 @@ class _Batch:
                 future = _sent(_sending(pool, self._settings), job)
                 outcome = self._outcome(job, future, foreign=False)
                 assert outcome is not None
-                self._keep(outcome)
+                self._keep(job, outcome)
 
-    def _keep(self, outcome: JobResult) -> None:
-        self._store.add(outcome.row, outcome.trace, outcome.detail)
+    def _begin(self, job: Job) -> None:
+        self._store.begin(self._identities[job.key].id, " ".join(map(str, job.key[:2])))
+
+    def _keep(self, job: Job, outcome: JobResult) -> None:
+        identity = self._identities[job.key]
+        row = replace(outcome.row, job=identity.id, trace="")
+        row = self._store.add(row, outcome.trace, outcome.detail, identity.spec)
         self._left -= 1
         if self._progress is not None:
-            self._progress(self._total - self._left, self._total, outcome.row)
+            self._progress(self._total - self._left, self._total, row)
 
 
 @contextmanager

@@ -31,6 +31,8 @@ def bench(
     observation: str = "auto",
     memory_limit_mb: float | None = None,
     retry_failed: bool = False,
+    any_version: bool = False,
+    shard: tuple[int, int] | None = None,
     latency_factor: float | None = None,
     progress: Progress | None = None,
 ) -> Results:
@@ -56,6 +58,7 @@ def bench(
         observation: ``"auto"``, ``"image"`` or ``"state"``, see `JobSettings`.
         memory_limit_mb: private memory of a worker at which allocations fail [MB].
         retry_failed: run jobs again whose row says that they failed.
+        any_version, shard: as for `Experiment.run`.
         latency_factor: seconds of the world's clock for each second that a policy computes; None
             for a world that stands still meanwhile. See `run_episode`.
         progress: told of every row.
@@ -78,7 +81,14 @@ def bench(
             "first_seed": seed,
         },
     )
-    return experiment.run(out, workers=workers, retry_failed=retry_failed, progress=progress)
+    return experiment.run(
+        out,
+        workers=workers,
+        retry_failed=retry_failed,
+        any_version=any_version,
+        shard=shard,
+        progress=progress,
+    )
 
 
 def suites_of(given: Any, episodes: int | None, seed: int) -> tuple[Suite, ...]:

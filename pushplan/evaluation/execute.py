@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import contextlib
 import os
+import platform
 import random
 import time
 import traceback
 from dataclasses import replace
+from datetime import UTC, datetime
 
 import numpy as np
 
@@ -72,7 +74,7 @@ def _execute(job: Job, settings: JobSettings) -> JobResult:
     recording = Recording(
         policy, job.scenario, job.policy.label, latency_factor=settings.latency_factor
     )
-    begin = time.perf_counter()
+    begin, began = time.perf_counter(), datetime.now(UTC)
     status, reason, detail = Status.DONE, None, ""
     try:
         env = settings.environment(job.scenario, policy)
@@ -93,7 +95,12 @@ def _execute(job: Job, settings: JobSettings) -> JobResult:
         status,
         clean_reason(recording.reason if reason is None else reason),
     )
-    row = replace(row, wall_time_s=time.perf_counter() - begin)
+    row = replace(
+        row,
+        wall_time_s=time.perf_counter() - begin,
+        began=began.strftime("%Y-%m-%dT%H:%M:%S.") + f"{began.microsecond // 1000:03d}Z",
+        host=platform.node(),
+    )
     if not recording.started:
         return JobResult(row, detail=detail)
     episode = recording.episode(reason)

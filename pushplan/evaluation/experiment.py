@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Mapping
+import zlib
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -15,7 +16,7 @@ from pushplan.evaluation.policies import PolicySpec
 from pushplan.evaluation.results import Results
 from pushplan.metrics import metric_function
 from pushplan.world import InvalidInputError
-from pushplan.world.checks import expect
+from pushplan.world.checks import expect, integer
 from pushplan.world.safe_files import read_data
 
 if TYPE_CHECKING:
@@ -34,7 +35,7 @@ class Experiment:
         metrics: beside those that every run has: names of `pushplan.metrics`, or functions as
             ``"module:function"`` or ``"file.py:function"``.
         memory_limit_mb: private memory of a worker at which allocations fail [MB].
-        about: what else is noted about the run; has to be the same when it is continued.
+        about: what else is noted about the run: JSON values.
         allow_misfits: whether a policy that fits no suite is left out; else it is refused.
         skipped: (suite, policy label) -> why that pair is not run.
 
@@ -100,6 +101,8 @@ class Experiment:
         *,
         workers: int | None = None,
         retry_failed: bool = False,
+        any_version: bool = False,
+        shard: tuple[int, int] | None = None,
         progress: Progress | None = None,
     ) -> Results:
         """Run what has not been run yet in the run directory ``out``; see `run_batch`.
@@ -110,6 +113,9 @@ class Experiment:
             out: run directory; if None only the rows are kept, and traces are dropped.
             workers: processes, all cores by default; 0 runs in this process.
             retry_failed: run jobs again whose row says that they failed.
+            any_version: take results that differ only in versions of pushplan and of packages.
+            shard: (k, n): only the k-th of n parts of the jobs, k from 1; `merge` joins the run
+                directories of all parts.
             progress: told of every row.
 
         Returns:
@@ -118,14 +124,28 @@ class Experiment:
         with tempfile.TemporaryDirectory(prefix="pushplan-") as temporary:
             folder = Path(temporary if out is None else out)
             run_batch(
-                self.jobs,
+                self.jobs if shard is None else part_of(self.jobs, *shard),
                 out=folder,
                 workers=workers,
                 settings=self.settings,
                 memory_limit_mb=self.memory_limit_mb,
                 retry_failed=retry_failed,
+                any_version=any_version,
                 about={"suite": self.name, **self.about},
                 progress=progress,
             )
             results = Results.load(folder)
         return results if out is not None else Results(results.rows, results.about, None)
+
+
+def part_of(jobs: Sequence[Job], part: int, parts: int) -> list[Job]:
+    """The jobs of the ``part``-th of so many parts, counted from 1.
+
+    A job stays in its part when others are added: it is chosen by a hash of what tells it apart.
+
+    Raises:
+        InvalidInputError: if there is no such part.
+    """
+    integer("parts", parts, low=1)
+    integer("part", part, low=1, high=parts)
+    return [job for job in jobs if zlib.crc32(repr(job.key).encode()) % parts == part - 1]

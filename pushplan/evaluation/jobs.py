@@ -31,8 +31,8 @@ class Job:
     scenario: Any
 
     @property
-    def id(self) -> tuple[str, str, int]:
-        """What identifies the job in a run directory: policy, scenario key, seed."""
+    def key(self) -> tuple[str, str, int]:
+        """What tells the job apart from others of a batch: policy, scenario key, seed."""
         return (self.policy.label, str(self.scenario.key), int(self.scenario.seed))
 
     @property

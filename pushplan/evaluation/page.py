@@ -140,9 +140,9 @@ def _row(row: ResultRow, run: Path | None) -> str:
         f'<a href="{html.escape(place)}">{word}</a>'
         for word, place in (
             ("trace", row.trace_file),
-            ("traceback", f"failures/{row.file_stem}.txt"),
+            ("traceback", f"failures/{row.job}.txt"),
         )
-        if run is not None and (run / place).is_file()
+        if run is not None and place is not None and (run / place).is_file()
     ]
     cells = [row.policy, row.scenario, str(row.seed), row.status]
     plain = "".join(f"<td>{html.escape(cell)}</td>" for cell in cells)

@@ -91,6 +91,8 @@ def bench_paper(
     timeout_s: float | None = 600.0,
     memory_limit_mb: float | None = None,
     retry_failed: bool = False,
+    any_version: bool = False,
+    shard: tuple[int, int] | None = None,
     progress: Progress | None = None,
     command: str = "",
 ) -> Comparison:
@@ -101,7 +103,8 @@ def bench_paper(
         policies: as for `bench`; every policy that comes with pushplan if None.
         episodes: scenarios of each suite.
         seed: seed of the first scenario of each suite.
-        workers, timeout_s, memory_limit_mb, retry_failed, progress: as for `bench`.
+        workers, timeout_s, memory_limit_mb, retry_failed, any_version, shard, progress: as for
+            `bench`.
         out: run directory, continued if it holds this run already; suites, policies and episodes
             may be added to it. With it, ``paper.md`` and the report of `Results` are written.
         command: what the document says gives the same again.
@@ -127,7 +130,12 @@ def bench_paper(
     with tempfile.TemporaryDirectory(prefix="pushplan-") as temporary:
         folder = Path(temporary if out is None else out)
         found = experiment.run(
-            folder, workers=workers, retry_failed=retry_failed, progress=progress
+            folder,
+            workers=workers,
+            retry_failed=retry_failed,
+            any_version=any_version,
+            shard=shard,
+            progress=progress,
         )
         results = _chosen(found, experiment.jobs, None if out is None else folder)
         points = _to_goal_point(results.rows, folder)
@@ -147,7 +155,7 @@ def _setting(table: PublishedTable) -> str:
 
 def _chosen(results: Results, jobs: Sequence[Job], path: Path | None) -> Results:
     """Without what an earlier run of more suites, policies or episodes left there."""
-    wanted = {job.id for job in jobs}
+    wanted = {job.key for job in jobs}
     rows = tuple(r for r in results.rows if (r.policy, r.scenario, r.seed) in wanted)
     return Results(rows, results.about, path)
 
@@ -160,6 +168,7 @@ def _to_goal_point(rows: Sequence[ResultRow], folder: Path) -> dict[tuple[str, s
             continue
         value = 0.0
         if row.success:
+            assert row.trace_file is not None
             episode = Episode.load(folder / row.trace_file)
             value = compute(episode, [TO_GOAL_POINT])[TO_GOAL_POINT]
         values[row.policy, row.scenario, row.seed] = value

@@ -175,7 +175,7 @@ def _planning_time(run: RunRecord) -> tuple[str, Figure] | None:
 
 def _calls(run: RunRecord, row: ResultRow) -> Any:
     """Times of all planning calls of an episode [s], from its trace where there is one."""
-    if run.path is not None and (path := run.path / row.trace_file).is_file():
+    if row.trace_file and run.path is not None and (path := run.path / row.trace_file).is_file():
         with np.load(path, allow_pickle=False) as data:
             return np.maximum(data["plan_times_s"], 1e-6)
     return np.array([row.plan_time_median_s, row.plan_time_max_s])

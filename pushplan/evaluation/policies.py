@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import functools
 import hashlib
+import importlib.util
 import re
+import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -40,26 +42,28 @@ class PolicySpec:
                 f"not beginning with '.+@-', got {self.label!r}"
             )
 
-    @property
+    @functools.cached_property
     def identity(self) -> str:
-        """A text that tells sources apart when a run is resumed."""
+        """A text that tells sources apart, with a hash of the file that holds them.
+
+        A file that has been edited is another policy, one that was moved is not; what it imports
+        does not count.
+        """
         options = "".join(f" {key}={value!r}" for key, value in sorted(self.options.items()))
         if isinstance(self.source, str):
             if (file := _network_file(self.source)) is not None:
-                digest = hashlib.sha256(file.read_bytes()).hexdigest()[:12]
-                return f"{file.name} sha256:{digest}{options}"
+                return f"{file.name}{_digest(file)}{options}"
             where, _, name = self.source.rpartition(":")
-            if where.endswith(".py"):  # edited code is another policy, a moved file is not
-                digest = hashlib.sha256(Path(where).read_bytes()).hexdigest()[:12]
-                return f"{Path(where).name}:{name} sha256:{digest}{options}"
-            return f"{self.source}{options}"
+            if where.endswith(".py"):
+                return f"{Path(where).name}:{name}{_digest(Path(where))}{options}"
+            return f"{self.source}{_digest(_file_of(where))}{options}"
         source: Any = self.source
         while isinstance(source, functools.partial):
             options += f" {source.args!r} {sorted(source.keywords.items())!r}"
             source = source.func
         where = getattr(source, "__module__", type(source).__module__)
         name = getattr(source, "__qualname__", type(source).__qualname__)
-        return re.sub(r"0x[0-9a-f]+", "0x", f"{where}:{name}{options}")
+        return re.sub(r"0x[0-9a-f]+", "0x", f"{where}:{name}{_digest(_file_of(where))}{options}")
 
     @property
     def is_ours(self) -> bool:
@@ -134,6 +138,28 @@ def policy_names() -> tuple[str, ...]:
     from pushplan.planners import policy_names as classical_names
 
     return (*classical_names(), *learned_names())
+
+
+def _digest(file: Path | None) -> str:
+    """A hash of a file's content, in words; nothing for none."""
+    if file is None or not file.is_file():
+        return ""
+    return f" sha256:{hashlib.sha256(file.read_bytes()).hexdigest()[:12]}"
+
+
+def _file_of(module: str) -> Path | None:
+    """The file of a module that is not ours; None if there is none."""
+    if not module or module.partition(".")[0] == "pushplan":
+        return None
+    try:
+        if module in sys.modules:
+            found = getattr(sys.modules[module], "__file__", None)
+        else:
+            spec = importlib.util.find_spec(module)
+            found = None if spec is None else spec.origin
+    except (ImportError, ValueError, AttributeError):
+        return None
+    return None if found is None else Path(found)
 
 
 def _network_file(source: str) -> Path | None:

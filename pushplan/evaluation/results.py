@@ -6,9 +6,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from pushplan.evaluation.database import DATABASE
+from pushplan.evaluation.rows import rows_csv
 from pushplan.evaluation.run_record import RunRecord
 from pushplan.evaluation.statistics import estimate
-from pushplan.evaluation.store import DATABASE, open_results, rows_csv
+from pushplan.evaluation.store import open_results
 from pushplan.evaluation.summary import (
     PairedDifference,
     PolicySummary,

@@ -7,7 +7,6 @@ import enum
 import io
 import math
 import re
-import zlib
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from typing import Any
@@ -84,6 +83,10 @@ class ResultRow:
             for one, and the policy's own call.
         decision_time_mean_s: the same, over all steps [s].
         decision_time_max_s: the slowest step [s].
+        began: when the job began (ISO 8601, UTC); empty if its process died.
+        host: name of the machine that ran it.
+        job: content hash of everything that the result depends on, see `job_identity`.
+        trace: content hash of the recorded episode, which names its file; empty if none was kept.
     """
 
     policy: str
@@ -103,6 +106,10 @@ class ResultRow:
     decision_time_median_s: float | None = None
     decision_time_mean_s: float | None = None
     decision_time_max_s: float | None = None
+    began: str = ""
+    host: str = ""
+    job: str = ""
+    trace: str = ""
 
     def __getattr__(self, name: str) -> float | None:
         if name not in METRICS:
@@ -122,18 +129,9 @@ class ResultRow:
         return setting_of(self.scenario, self.seed)
 
     @property
-    def file_stem(self) -> str:
-        """Name, without ending, of the files that belong to the job."""
-        clean = re.sub(r"[^A-Za-z0-9_.+@=-]", "_", self.scenario)
-        if clean != self.scenario or len(clean) > 120:
-            clean = f"{clean[:110]}-{zlib.crc32(self.scenario.encode()):08x}"
-        ending = "" if re.search(rf"(^|[^0-9]){self.seed}$", clean) else f"--{self.seed}"
-        return f"{self.policy}--{clean}{ending}"
-
-    @property
-    def trace_file(self) -> str:
-        """Where the recorded episode is in a run directory."""
-        return f"episodes/{self.file_stem}.npz"
+    def trace_file(self) -> str | None:
+        """Where the recorded episode is in a run directory; None if none was kept."""
+        return f"episodes/{self.trace}.npz" if self.trace else None
 
     @property
     def failed(self) -> bool:
@@ -142,11 +140,14 @@ class ResultRow:
 
 
 _ROUNDING = 1e-6
+_TEXTS = ("policy", "task", "simulator", "scenario", "status", "reason", "host", "job", "trace")
+_INSTANT = re.compile(r"(\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d\.\d{3}Z)?")
 _OWN = tuple(item.name for item in fields(ResultRow))
-TIMING_COLUMNS = tuple(
+_TIMES = tuple(
     name for name in _OWN if name.startswith(("wall_time", "plan_time", "decision_time"))
 )
-"""Columns that differ from run to run."""
+TIMING_COLUMNS = (*_TIMES, "began", "host", "trace")
+"""Columns that differ from run to run: times are in the recorded episodes too."""
 
 
 def columns() -> tuple[str, ...]:
@@ -154,6 +155,20 @@ def columns() -> tuple[str, ...]:
     at = _OWN.index("metrics")
     shown = metric_names(Role.SCORE, Role.DETAIL, Role.FACT)
     return (*_OWN[:at], *shown, *_OWN[at + 1 :])
+
+
+def rows_csv(rows: Iterable[ResultRow]) -> str:
+    """The rows as CSV with a header."""
+    names = columns()
+    return csv_text(names, ([_cell(getattr(row, name)) for name in names] for row in rows))
+
+
+def _cell(value: object) -> object:
+    if value is None:
+        return ""
+    if isinstance(value, bool):
+        return int(value)
+    return repr(value) if isinstance(value, float) else value
 
 
 def setting_of(scenario: str, seed: int) -> str:
@@ -168,13 +183,15 @@ def checked_row(values: Mapping[str, Any]) -> ResultRow:
         KeyError, TypeError, ValueError: if a value is missing, of another type or out of range.
     """
     row = ResultRow(**{name: values[name] for name in _OWN})
-    for name in ("policy", "task", "simulator", "scenario", "status", "reason"):
+    for name in _TEXTS:
         if type(getattr(row, name)) is not str and not isinstance(getattr(row, name), Status):
             raise TypeError(f"{name} is {getattr(row, name)!r:.60}")
     Status(row.status)
+    if not _INSTANT.fullmatch(row.began):
+        raise ValueError(f"began is {row.began!r:.60}")
     if type(row.success) is not bool or type(row.seed) is not int:
         raise TypeError(f"success is {row.success!r:.60} and seed {row.seed!r:.60}")
-    for name in (*TIMING_COLUMNS, "plan_calls"):
+    for name in (*_TIMES, "plan_calls"):
         value = getattr(row, name)
         if value is not None and not 0.0 <= _number(name, value) < math.inf:
             raise ValueError(f"{name} is {value!r:.60}")
@@ -182,7 +199,7 @@ def checked_row(values: Mapping[str, Any]) -> ResultRow:
         low, high = METRICS[name].low, METRICS[name].high
         if not low - _ROUNDING <= _number(name, value) <= high + _ROUNDING:
             raise ValueError(f"{name} is {value:.6g}, not between {low:g} and {high:g}")
-    return replace(row, reason=clean_reason(row.reason))
+    return replace(row, reason=clean_reason(row.reason), host=clean_reason(row.host)[:64])
 
 
 def _number(name: str, value: object) -> float:

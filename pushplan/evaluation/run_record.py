@@ -30,9 +30,7 @@ class RunRecord:
     def titles(self) -> dict[str, str]:
         """Words for each setting."""
         known = self.about.get("settings", {})
-        factor = self.about.get("configuration", {}).get("latency_factor")
-        mode = "" if factor is None else f", latency-aware x {factor:g}"
-        return {setting: known.get(setting, setting) + mode for setting in settings_of(self.rows)}
+        return {setting: known.get(setting, setting) for setting in settings_of(self.rows)}
 
     def rows_of(self, setting: str) -> list[ResultRow]:
         """The rows of one setting."""
@@ -44,6 +42,7 @@ class RunRecord:
         Raises:
             SchemaError: if it cannot be read.
         """
-        if self.path is None or not (self.path / row.trace_file).is_file():
+        if self.path is None or row.trace_file is None:
             return None
-        return Episode.load(self.path / row.trace_file)
+        path = self.path / row.trace_file
+        return Episode.load(path) if path.is_file() else None

@@ -4,27 +4,35 @@ from __future__ import annotations
 
 import contextlib
 import fcntl
+import hashlib
 import json
 import sqlite3
+import time
 from collections.abc import Iterable, Mapping
+from dataclasses import replace
 from pathlib import Path
 from types import TracebackType
 from typing import Any
 
-from pushplan.evaluation.rows import ResultRow, Status, columns, csv_text
-from pushplan.metrics import METRICS
+from pushplan.evaluation.database import (
+    DATABASE,
+    HIDE_OTHERS,
+    connect,
+    connect_to_read,
+    create,
+    insert,
+    read_about,
+    read_rows,
+)
+from pushplan.evaluation.rows import ResultRow, Status, rows_csv
 from pushplan.world import InvalidInputError, SchemaError
 from pushplan.world.files import write_atomic
 
-SCHEMA = "pushplan-run/1"
-DATABASE = "results.db"
 REPORT = (
     *("report.html", "summary.md", "summary.csv", "differences.csv"),
     *("tradeoff.png", "scores.png", "planning_time.png"),
 )
 """Files that `Results.report` derives from the rows, beside ``results.csv``."""
-_TYPES = dict.fromkeys(("policy", "task", "simulator", "scenario", "status", "reason"), "TEXT")
-_TYPES |= dict.fromkeys(("seed", "success", "plan_calls"), "INTEGER")
 
 
 class RunDirectory:
@@ -50,18 +58,13 @@ class RunDirectory:
             raise InvalidInputError(f"another process is writing into {path}") from error
         for leftover in [*self.path.glob("*.tmp"), *self.episodes.glob("*.tmp")]:
             leftover.unlink()
-        self._db = _connect(self.path / DATABASE)
-        names = columns()
-        kinds = ", ".join(f'"{name}" {_type(name)}' for name in names)
-        with self._db:
-            self._db.execute(
-                f"CREATE TABLE IF NOT EXISTS results ({kinds}, "
-                "PRIMARY KEY (policy, scenario, seed)) WITHOUT ROWID"
-            )
-            self._db.execute("CREATE TABLE IF NOT EXISTS about (key TEXT PRIMARY KEY, value TEXT)")
-            for name in names:  # a run that an earlier version began
-                if name not in _columns(self._db):
-                    self._db.execute(f'ALTER TABLE results ADD COLUMN "{name}" {_type(name)}')
+        self._db = connect(self.path / DATABASE)
+        try:
+            create(self._db)
+            self._db.execute("DELETE FROM running")
+        except BaseException:
+            self.close()
+            raise
 
     def __enter__(self) -> RunDirectory:
         return self
@@ -84,39 +87,6 @@ class RunDirectory:
         """Folder of the tracebacks of failed jobs."""
         return self.path / "failures"
 
-    def configure(self, configuration: Mapping[str, Any], policies: Mapping[str, str]) -> None:
-        """Note what the run is, or check that it is the run that was begun here.
-
-        Policies may be added to a run; a label may not change its meaning.
-
-        Args:
-            configuration: everything that results depend on; JSON values.
-            policies: label -> identity of its source.
-
-        Raises:
-            InvalidInputError: if something differs; the message says what.
-        """
-        known = read_about(self._db)
-        before = known.get("configuration")
-        if before is not None:
-            for key in sorted({*before, *configuration}):
-                old, new = before.get(key), json.loads(json.dumps(configuration.get(key)))
-                if old != new:
-                    raise self._differs(key, old, new)
-        sources = dict(known.get("policies", {}))
-        for label, source in policies.items():
-            if sources.setdefault(label, source) != source:
-                raise self._differs(f"policy {label!r}", sources[label], source)
-        self.note("schema", SCHEMA)
-        self.note("configuration", dict(configuration))
-        self.note("policies", sources)
-
-    def _differs(self, key: str, old: object, new: object) -> InvalidInputError:
-        return InvalidInputError(
-            f"{self.path} holds a run with another configuration: {key} was {old!r}, is now "
-            f"{new!r}; choose another directory, or the old value to continue that run"
-        )
-
     def note(self, key: str, value: Any) -> None:
         """Keep a JSON value about the run."""
         with self._db:
@@ -130,26 +100,78 @@ class RunDirectory:
         """Add a value to a JSON list about the run."""
         self.note(key, [*read_about(self._db).get(key, []), value])
 
-    def done(self) -> set[tuple[str, str, int]]:
-        """(policy, scenario, seed) of every job that has a row."""
-        return set(self._db.execute("SELECT policy, scenario, seed FROM results"))
+    def done(self) -> set[str]:
+        """Every job that has a result."""
+        return {job for (job,) in self._db.execute("SELECT job FROM results")}
 
-    def add(self, row: ResultRow, trace: bytes | None = None, detail: str = "") -> None:
-        """Store what became of one job, in one transaction."""
+    def keys(self) -> set[tuple[str, str, int]]:
+        """(policy, scenario, seed) of every result."""
+        return set(self._db.execute("SELECT DISTINCT policy, scenario, seed FROM results"))
+
+    def specs(self, key: tuple[str, str, int] | None = None) -> dict[str, dict[str, Any]]:
+        """Job -> what `job_spec` said, of all results or those of a policy, scenario and seed."""
+        where = "" if key is None else " WHERE (policy, scenario, seed) = (?, ?, ?)"
+        found = self._db.execute(f"SELECT job, spec FROM results{where}", key or ())
+        return {job: json.loads(spec) for job, spec in found}
+
+    def show(self, jobs: Iterable[str]) -> None:
+        """Let these results be the ones that count for their policies and scenarios."""
+        with self._db:
+            self._db.executemany(HIDE_OTHERS, ((job, job) for job in jobs))
+
+    def begin(self, job: str, title: str) -> None:
+        """Note that a job is being run."""
+        with self._db:
+            self._db.execute(
+                "INSERT OR REPLACE INTO running VALUES (?, ?, ?)", (job, title, time.time())
+            )
+
+    def add(
+        self,
+        row: ResultRow,
+        trace: bytes | None = None,
+        detail: str = "",
+        spec: Mapping[str, Any] | None = None,
+    ) -> ResultRow:
+        """Store what became of one job, in one transaction.
+
+        Args:
+            row: its result; ``row.job`` says which it was.
+            trace: the recorded episode.
+            detail: traceback of a failure.
+            spec: what `job_spec` said about the job.
+
+        Returns:
+            The row as it is stored: with the name of its trace.
+        """
         if trace is not None:
+            row = replace(row, trace=hashlib.sha256(trace).hexdigest()[:32])
+            assert row.trace_file is not None
             write_atomic(self.path / row.trace_file, trace)
         if detail:
-            write_atomic(self.failures / f"{row.file_stem}.txt", detail.encode(errors="replace"))
-        marks = ", ".join("?" * len(columns()))
-        names = ", ".join(f'"{name}"' for name in columns())
-        values = [getattr(row, name) for name in columns()]
+            write_atomic(self.failures / f"{row.job}.txt", detail.encode(errors="replace"))
         with self._db:
-            self._db.execute(f"INSERT OR REPLACE INTO results ({names}) VALUES ({marks})", values)
+            insert(self._db, row, json.dumps(spec or {}))
+            self._db.execute(HIDE_OTHERS, (row.job, row.job))
+            self._db.execute("DELETE FROM running WHERE job = ?", (row.job,))
+        return row
 
     def forget_failures(self) -> None:
-        """Remove the rows of jobs that did not end by the rules of their task."""
+        """Remove the results of jobs that did not end by the rules of their task."""
         with self._db:
             self._db.execute("DELETE FROM results WHERE status != ?", (str(Status.DONE),))
+
+    def tidy(self) -> None:
+        """Remove recorded episodes that no result names: of calls that were killed or forgotten."""
+        named = {f"{trace}.npz" for (trace,) in self._db.execute("SELECT trace FROM results")}
+        for path in self.episodes.iterdir():
+            if path.name not in named:
+                path.unlink()
+
+    def measure(self, values: Iterable[tuple[str, str, float]]) -> None:
+        """Keep values of metrics that are no columns: job, metric, value."""
+        with self._db:
+            self._db.executemany("INSERT OR REPLACE INTO measured VALUES (?, ?, ?)", values)
 
     def rows(self) -> list[ResultRow]:
         """All rows, sorted."""
@@ -182,64 +204,8 @@ def open_results(path: str | Path) -> tuple[list[ResultRow], Mapping[str, Any]]:
     file = Path(path) / DATABASE
     if not file.is_file():
         raise InvalidInputError(f"{path} holds no results: there is no {file.name} in it")
-    db = _connect(file)
-    try:
-        return read_rows(db), read_about(db)
-    except sqlite3.Error as error:
-        raise SchemaError(f"{file} holds no readable results: {error}") from error
-    finally:
-        db.close()
-
-
-def read_rows(db: sqlite3.Connection) -> list[ResultRow]:
-    """All rows of a database, sorted; a column that it lacks is empty."""
-    there = [name for name in columns() if name in _columns(db)]
-    names = ", ".join(f'"{name}"' for name in there)
-    query = f"SELECT {names} FROM results ORDER BY policy, task, simulator, seed, scenario"
-    rows = []
-    for values in db.execute(query):
-        data = dict(zip(there, values, strict=True))
-        data["success"] = bool(data["success"])
-        rows.append(ResultRow.from_columns(data))
-    return rows
-
-
-def _type(column: str) -> str:
-    whole = column in METRICS and METRICS[column].whole
-    return _TYPES.get(column, "INTEGER" if whole else "REAL")
-
-
-def _columns(db: sqlite3.Connection) -> set[str]:
-    return {row[1] for row in db.execute("PRAGMA table_info(results)")}
-
-
-def read_about(db: sqlite3.Connection) -> dict[str, Any]:
-    """What was noted about a run."""
-    about = {key: json.loads(value) for key, value in db.execute("SELECT key, value FROM about")}
-    if about.get("schema", SCHEMA) != SCHEMA:
-        raise SchemaError(f"this pushplan reads schema {SCHEMA!r}, got {about['schema']!r}")
-    return about
-
-
-def rows_csv(rows: Iterable[ResultRow]) -> str:
-    """The rows as CSV with a header."""
-    names = columns()
-    return csv_text(names, ([_cell(getattr(row, name)) for name in names] for row in rows))
-
-
-def _cell(value: object) -> object:
-    if value is None:
-        return ""
-    if isinstance(value, bool):
-        return int(value)
-    return repr(value) if isinstance(value, float) else value
-
-
-def _connect(path: Path) -> sqlite3.Connection:
-    try:
-        db = sqlite3.connect(path, timeout=30.0)
-        db.execute("PRAGMA journal_mode=WAL")
-        db.execute("PRAGMA synchronous=NORMAL")
-    except sqlite3.Error as error:
-        raise SchemaError(f"cannot open {path}: {error}") from error
-    return db
+    with contextlib.closing(connect_to_read(file)) as db:
+        try:
+            return read_rows(db), read_about(db)
+        except sqlite3.Error as error:
+            raise SchemaError(f"{file} holds no readable results: {error}") from error

@@ -194,7 +194,7 @@ def stress(
         for scenario in scenarios:
             varied = replace(scenario, variations=Variations({**scenario.variations, **changes}))
             jobs.append(Job(PolicySpec(label, make), varied))
-    jobs.sort(key=lambda job: job.id[2])  # a test that is cut short still compares conditions
+    jobs.sort(key=lambda job: job.key[2])  # a test that is cut short still compares conditions
     options: dict[str, Any] = {"settings": JobSettings(timeout_s=timeout_s), "progress": progress}
     if out is not None:
         rows = run_batch(jobs, out=out, workers=workers, **options)

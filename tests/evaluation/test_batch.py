@@ -7,6 +7,7 @@ import subprocess
 import sys
 import time
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+from dataclasses import replace
 from multiprocessing import get_context
 from pathlib import Path
 
@@ -22,6 +23,7 @@ from pushplan.evaluation import (
     parse_policies,
     run_batch,
 )
+from pushplan.evaluation.job_identity import versions
 from pushplan.world import Episode, InvalidInputError
 
 SETTINGS = JobSettings(make_env=f"{HERE}:make_env", timeout_s=3.0, grace_s=0.5)
@@ -50,7 +52,7 @@ def test_a_run_directory_holds_rows_and_traces(tmp_path: Path) -> None:
         "policy,task,simulator,scenario,seed,status,reason,success,E_nav,I_nav,S_manip,E_manip,"
         "I_manip,path_length_m,interaction_work_kg_m,steps,sim_time_s,wall_time_s,plan_calls,"
         "plan_time_median_s,plan_time_p99_s,plan_time_max_s,"
-        "decision_time_median_s,decision_time_mean_s,decision_time_max_s"
+        "decision_time_median_s,decision_time_mean_s,decision_time_max_s,began,host,job,trace"
     )
     assert header == ",".join(columns())
     assert [(row.policy, row.seed) for row in rows] == [
@@ -60,7 +62,8 @@ def test_a_run_directory_holds_rows_and_traces(tmp_path: Path) -> None:
     assert (rows[2].plan_calls, rows[2].plan_time_median_s, rows[2].plan_time_max_s) == (
         3, 0.002, 0.009,
     )  # fmt: skip
-    episode = Episode.load(tmp_path / "episodes" / "Ahead--line-1.npz")
+    assert rows[1].trace_file is not None and rows[1].began and rows[1].host
+    episode = Episode.load(tmp_path / rows[1].trace_file)
     assert episode.about["policy"] == "Ahead" and episode.success
     assert rows[1].path_length_m == pytest.approx(0.5 * len(episode.actions))
 
@@ -101,9 +104,9 @@ def test_whatever_a_policy_does_becomes_a_row(tmp_path: Path) -> None:
     assert found["Sleeps"].reason == found["HoldsGil"].reason
     notes = {path.stem: path.read_text() for path in (tmp_path / "failures").iterdir()}
     assert len(notes) == len(bad)
-    assert "raise ValueError" in notes["Raises--line-0"]
+    assert "raise ValueError" in notes[found["Raises"].job]
     for name in ("HoldsGil", "Swallows", "Segfaults"):  # where it happened, from C
-        assert "in misbehave" in notes[f"{name}--line-0"]
+        assert "in misbehave" in notes[found[name].job]
 
 
 def test_an_environment_that_raises_is_told_from_a_policy_that_does(tmp_path: Path) -> None:
@@ -164,17 +167,39 @@ def test_failed_jobs_are_run_again_on_request(tmp_path: Path) -> None:
     assert row.status == "done"
 
 
-def test_another_configuration_is_refused(tmp_path: Path) -> None:
-    run_batch(jobs_of("Ahead"), out=tmp_path, workers=0, settings=SETTINGS)
-    other = JobSettings(make_env=SETTINGS.make_env, timeout_s=9.0)
-    with pytest.raises(InvalidInputError, match=r"timeout_s was 3\.0, is now 9\.0"):
-        run_batch(jobs_of("Ahead"), out=tmp_path, workers=0, settings=other)
+def test_what_has_changed_is_run_again_and_the_old_result_stays(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    (first,) = run_batch(jobs_of("Ahead", range(1)), out=tmp_path, workers=0, settings=SETTINGS)
+    other = replace(SETTINGS, timeout_s=9.0)
+    (second,) = run_batch(jobs_of("Ahead", range(1)), out=tmp_path, workers=0, settings=other)
+    assert second.job != first.job and second.began > first.began
+    assert "settings timeout_s 3.0 -> 9.0; they are run again" in caplog.text
     changed = [Job(parse_policies(f"Ahead={HERE}:Logs")[0], LineScenario(0))]
-    with pytest.raises(InvalidInputError, match="policy 'Ahead' was"):
-        run_batch(changed, out=tmp_path, workers=0, settings=SETTINGS)
-    twice = jobs_of("Ahead") * 2
+    (third,) = run_batch(changed, out=tmp_path, workers=0, settings=SETTINGS)
+    assert third.plan_calls == 3 and third.job not in (first.job, second.job)
+    assert len(list((tmp_path / "episodes").iterdir())) == 3
+    caplog.clear()
+    again = run_batch(jobs_of("Ahead", range(1)), out=tmp_path, workers=0, settings=SETTINGS)
+    assert again == [first] and not caplog.text
+
+
+def test_other_versions_count_on_request(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (first,) = run_batch(jobs_of("Ahead", range(1)), out=tmp_path, workers=0, settings=SETTINGS)
+    monkeypatch.setattr("pushplan.__version__", "99.0")
+    versions.cache_clear()
+    again = run_batch(
+        jobs_of("Ahead", range(1)), out=tmp_path, workers=0, settings=SETTINGS, any_version=True
+    )
+    assert again == [first]
+    (new,) = run_batch(jobs_of("Ahead", range(1)), out=tmp_path, workers=0, settings=SETTINGS)
+    assert new.job != first.job
+    versions.cache_clear()
+
+
+def test_two_jobs_that_are_the_same_are_refused(tmp_path: Path) -> None:
     with pytest.raises(InvalidInputError, match="two jobs are the same"):
-        run_batch(twice, out=tmp_path / "new", workers=0, settings=SETTINGS)
+        run_batch(jobs_of("Ahead") * 2, out=tmp_path, workers=0, settings=SETTINGS)
 
 
 def test_a_policy_that_cannot_be_sent_is_an_error_with_a_remedy(tmp_path: Path) -> None:

@@ -237,14 +237,17 @@ class TestBatch:
 
     def test_frozen_results_do_not_mention_it(self, tmp_path):
         results = bench([MAZE], [straight], workers=0, out=tmp_path)
-        assert "latency_factor" not in results.about["configuration"]
-        assert "honest" not in results.table()
+        assert results.about["configuration"]["latency_factor"] is None
+        assert "latency" not in results.table()
 
-    def test_a_run_is_not_continued_in_another_mode(self, tmp_path):
+    def test_another_mode_is_another_result(self, tmp_path):
         jobs = [Job(parse_policy(straight), MAZE)]
-        run_batch(jobs, out=tmp_path, workers=0)
-        with pytest.raises(InvalidInputError, match="latency_factor was None, is now 1"):
-            run_batch(jobs, out=tmp_path, workers=0, settings=JobSettings(latency_factor=1.0))
+        (still,) = run_batch(jobs, out=tmp_path, workers=0)
+        (goes_on,) = run_batch(
+            jobs, out=tmp_path, workers=0, settings=JobSettings(latency_factor=1.0)
+        )
+        assert goes_on.job != still.job
+        assert "latency-aware x 1" in Results.load(tmp_path).table()
 
     def test_the_columns_are_the_same(self, tmp_path):
         for name, factor in (("frozen", None), ("honest", 1.0)):

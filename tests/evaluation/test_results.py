@@ -39,6 +39,7 @@ def rows_of(policy: str, shift: float, seeds: int = 20, setting: str = "maze-5")
             plan_time_median_s=0.01,
             plan_time_p99_s=0.02,
             plan_time_max_s=0.02,
+            job=f"{policy}-{setting}-{seed}",
         )
         for seed in range(seeds)
     ]
@@ -47,7 +48,8 @@ def rows_of(policy: str, shift: float, seeds: int = 20, setting: str = "maze-5")
 @pytest.fixture
 def results(tmp_path: Path) -> Results:
     with RunDirectory(tmp_path / "run") as store:
-        store.configure({"suite": "maze-2d-5"}, {"plain": "plain", "better": "mine.py:Better"})
+        store.note("configuration", {"suite": "maze-2d-5"})
+        store.note("policies", {"plain": "plain", "better": "mine.py:Better"})
         store.extend("settings", {"maze-5": "maze, 5 boxes", "maze-10": "maze, 10 boxes"})
         for setting in ("maze-10", "maze-5"):
             for row in [
@@ -169,7 +171,7 @@ def test_the_page_needs_no_network_and_links_to_failures(results: Results) -> No
     parsed.feed(text)
     assert len(parsed.sources) == 3
     assert all(source.startswith("data:image/png;base64,") for source in parsed.sources)
-    assert "failures/better--maze-5-19.txt" in parsed.links
+    assert "failures/better-maze-5-19.txt" in parsed.links
     assert all((page.parent / link).is_file() for link in parsed.links)
     assert "ended by &lt;SIGKILL&gt;" in text
 
