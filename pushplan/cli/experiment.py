@@ -35,7 +35,6 @@ def run(options: argparse.Namespace) -> int:
     """Check the file, run its jobs, print the tables, write plots and page."""
     from pushplan.cli.report import show
     from pushplan.evaluation import Experiment
-    from pushplan.evaluation.tables import text
 
     experiment = Experiment.load(options.file)
     jobs = experiment.jobs
@@ -56,6 +55,4 @@ def run(options: argparse.Namespace) -> int:
             sys.stderr.write(f"stopped; the same command continues the run in {out}\n")
             raise
     show(results)
-    if experiment.metrics:
-        say(text(results.measure(experiment.metrics)))
     return 0

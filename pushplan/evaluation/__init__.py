@@ -16,11 +16,15 @@ if TYPE_CHECKING:
     from pushplan.evaluation.episode import InvalidActionError, PolicyError, run_episode
     from pushplan.evaluation.experiment import Experiment
     from pushplan.evaluation.jobs import Job, JobResult, JobSettings
+    from pushplan.evaluation.merging import Merged, merge
     from pushplan.evaluation.paper import Comparison, bench_paper
     from pushplan.evaluation.policies import PolicySpec, parse_policies, parse_policy
+    from pushplan.evaluation.reproduction import Reproduction, reproduce
+    from pushplan.evaluation.rescoring import Rescored, rescore
     from pushplan.evaluation.results import Results
     from pushplan.evaluation.rows import TIMING_COLUMNS, ResultRow, Status, columns
     from pushplan.evaluation.statistics import Estimate, Proportion, bootstrap_interval, wilson
+    from pushplan.evaluation.status import RunStatus, run_status
     from pushplan.evaluation.stress_testing import CONDITIONS, Condition, ScoreSheet, stress
     from pushplan.evaluation.summary import PairedDifference, PolicySummary
 
@@ -35,13 +39,17 @@ __all__ = [
     "Job",
     "JobResult",
     "JobSettings",
+    "Merged",
     "PairedDifference",
     "PolicyError",
     "PolicySpec",
     "PolicySummary",
     "Proportion",
+    "Reproduction",
+    "Rescored",
     "ResultRow",
     "Results",
+    "RunStatus",
     "ScoreSheet",
     "Status",
     "UnusablePolicyError",
@@ -49,10 +57,14 @@ __all__ = [
     "bench_paper",
     "bootstrap_interval",
     "columns",
+    "merge",
     "parse_policies",
     "parse_policy",
+    "reproduce",
+    "rescore",
     "run_batch",
     "run_episode",
+    "run_status",
     "stress",
     "wilson",
 ]
@@ -66,11 +78,15 @@ __getattr__, __dir__ = lazy_names(
         "episode": "InvalidActionError PolicyError run_episode",
         "experiment": "Experiment",
         "jobs": "Job JobResult JobSettings",
+        "merging": "Merged merge",
         "paper": "Comparison bench_paper",
         "policies": "PolicySpec parse_policies parse_policy",
+        "reproduction": "Reproduction reproduce",
+        "rescoring": "Rescored rescore",
         "results": "Results",
         "rows": "TIMING_COLUMNS ResultRow Status columns",
         "statistics": "Estimate Proportion bootstrap_interval wilson",
+        "status": "RunStatus run_status",
         "stress_testing": "CONDITIONS Condition ScoreSheet stress",
         "summary": "PairedDifference PolicySummary",
     },

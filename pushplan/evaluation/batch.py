@@ -31,7 +31,7 @@ from pushplan.evaluation.jobs import (
 )
 from pushplan.evaluation.pool import WorkerPool
 from pushplan.evaluation.provenance import provenance
-from pushplan.evaluation.rows import ResultRow, Status, setting_of
+from pushplan.evaluation.rows import ResultRow, Status, instant, setting_of
 from pushplan.evaluation.store import RunDirectory
 from pushplan.evaluation.worker import WORKER_VARIABLE
 from pushplan.evaluation.worker_process import (
@@ -202,6 +202,7 @@ class _Batch:
         progress: Progress | None,
     ) -> None:
         self._jobs = deque(one.job for one in jobs)
+        self._began: dict[tuple[str, str, int], str] = {}
         self._identities = {one.job.key: one for one in jobs}
         self._store = store
         self._settings = settings
@@ -300,11 +301,13 @@ class _Batch:
                 self._keep(job, outcome)
 
     def _begin(self, job: Job) -> None:
+        self._began[job.key] = instant()
         self._store.begin(self._identities[job.key].id, " ".join(map(str, job.key[:2])))
 
     def _keep(self, job: Job, outcome: JobResult) -> None:
         identity = self._identities[job.key]
-        row = replace(outcome.row, job=identity.id, trace="")
+        began = self._began.pop(job.key)
+        row = replace(outcome.row, job=identity.id, trace="", began=outcome.row.began or began)
         row = self._store.add(row, outcome.trace, outcome.detail, identity.spec)
         self._left -= 1
         if self._progress is not None:

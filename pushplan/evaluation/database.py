@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import json
 import sqlite3
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from pushplan.evaluation.rows import ResultRow, columns
 from pushplan.metrics import METRICS
-from pushplan.world import SchemaError
+from pushplan.world import InvalidInputError, SchemaError
 
 SCHEMA = "pushplan-run/2"
 DATABASE = "results.db"
@@ -24,10 +26,22 @@ _TYPES |= dict.fromkeys(("seed", "success", "plan_calls"), "INTEGER")
 _TABLES = """
 CREATE TABLE IF NOT EXISTS results ({columns}, spec TEXT, current INTEGER, PRIMARY KEY (job));
 CREATE INDEX IF NOT EXISTS shown ON results (policy, scenario, seed);
-CREATE TABLE IF NOT EXISTS measured (job TEXT, metric TEXT, value REAL, PRIMARY KEY (job, metric))
-    WITHOUT ROWID;
+CREATE TABLE IF NOT EXISTS measured
+    (job TEXT, metric TEXT, source TEXT, value REAL, PRIMARY KEY (job, metric)) WITHOUT ROWID;
 CREATE TABLE IF NOT EXISTS running (job TEXT PRIMARY KEY, title TEXT, began REAL);
 """
+
+
+def database_of(path: str | Path) -> Path:
+    """The database of a run directory.
+
+    Raises:
+        InvalidInputError: if there is none.
+    """
+    file = Path(path) / DATABASE
+    if not file.is_file():
+        raise InvalidInputError(f"{path} holds no results: there is no {DATABASE} in it")
+    return file
 
 
 def connect(path: Path) -> sqlite3.Connection:
@@ -82,32 +96,68 @@ def create(db: sqlite3.Connection) -> None:
         db.execute("INSERT OR REPLACE INTO about VALUES ('schema', ?)", (json.dumps(SCHEMA),))
 
 
-def insert(db: sqlite3.Connection, row: ResultRow, spec: str) -> None:
-    """Add a row that is not shown yet."""
+def insert(db: sqlite3.Connection, row: ResultRow, spec: str, current: int = 0) -> None:
+    """Add a row, or replace that of its job."""
     names = columns()
     listed = ", ".join(f'"{name}"' for name in names)
     marks = ", ".join("?" * (len(names) + 2))
     values = [getattr(row, name) for name in names]
     db.execute(
         f"INSERT OR REPLACE INTO results ({listed}, spec, current) VALUES ({marks})",
-        (*values, spec, 0),
+        (*values, spec, current),
     )
+
+
+@dataclass(frozen=True)
+class StoredResult:
+    """A result as it is stored.
+
+    Attributes:
+        row: the row.
+        spec: what `job_spec` said about its job.
+        current: whether it is the one that counts for its policy and scenario.
+        measured: metric, its source and its value, of metrics that are no columns.
+    """
+
+    row: ResultRow
+    spec: Mapping[str, Any]
+    current: bool
+    measured: tuple[tuple[str, str, float | None], ...] = ()
+
+
+def read_results(db: sqlite3.Connection) -> list[StoredResult]:
+    """Every result, also those that do not count now."""
+    measured: dict[str, list[tuple[str, str, float | None]]] = {}
+    for job, *value in db.execute("SELECT job, metric, source, value FROM measured"):
+        measured.setdefault(job, []).append((value[0], value[1], value[2]))
+    return [
+        StoredResult(row, json.loads(spec), bool(current), tuple(measured.get(row.job, ())))
+        for row, spec, current in _rows(db, "spec, current", "ORDER BY job")
+    ]
 
 
 def read_rows(db: sqlite3.Connection) -> list[ResultRow]:
     """All rows that count, sorted; a column that the database lacks is empty."""
+    order = "WHERE current ORDER BY policy, task, simulator, seed, scenario"
+    return [row for row, _ in _rows(db, "1", order)]
+
+
+def read_measured(db: sqlite3.Connection) -> dict[str, dict[str, float]]:
+    """Job -> its metrics that are no columns."""
+    found: dict[str, dict[str, float]] = {}
+    for job, metric, value in db.execute("SELECT job, metric, value FROM measured"):
+        if value is not None:
+            found.setdefault(job, {})[metric] = value
+    return found
+
+
+def _rows(db: sqlite3.Connection, more: str, rest: str) -> Iterator[tuple[Any, ...]]:
     there = [name for name in columns() if name in _columns(db)]
     names = ", ".join(f'"{name}"' for name in there)
-    query = (
-        f"SELECT {names} FROM results WHERE current "
-        "ORDER BY policy, task, simulator, seed, scenario"
-    )
-    rows = []
-    for values in db.execute(query):
-        data = dict(zip(there, values, strict=True))
+    for values in db.execute(f"SELECT {names}, {more} FROM results {rest}"):
+        data = dict(zip(there, values, strict=False))
         data["success"] = bool(data["success"])
-        rows.append(ResultRow.from_columns(data))
-    return rows
+        yield ResultRow.from_columns(data), *values[len(there) :]
 
 
 def _type(column: str) -> str:

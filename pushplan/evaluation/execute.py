@@ -9,7 +9,6 @@ import random
 import time
 import traceback
 from dataclasses import replace
-from datetime import UTC, datetime
 
 import numpy as np
 
@@ -28,7 +27,7 @@ from pushplan.evaluation.jobs import (
     timeout_reason,
 )
 from pushplan.evaluation.limits import EpisodeTimeout, hard_limit, soft_limit
-from pushplan.evaluation.rows import Status, blank_row, clean_reason, scored_row
+from pushplan.evaluation.rows import Status, blank_row, clean_reason, instant, scored_row
 from pushplan.world.errors import describe
 from pushplan.world.policy_abilities import WarmsUp
 
@@ -74,7 +73,7 @@ def _execute(job: Job, settings: JobSettings) -> JobResult:
     recording = Recording(
         policy, job.scenario, job.policy.label, latency_factor=settings.latency_factor
     )
-    begin, began = time.perf_counter(), datetime.now(UTC)
+    begin, began = time.perf_counter(), instant()
     status, reason, detail = Status.DONE, None, ""
     try:
         env = settings.environment(job.scenario, policy)
@@ -98,7 +97,7 @@ def _execute(job: Job, settings: JobSettings) -> JobResult:
     row = replace(
         row,
         wall_time_s=time.perf_counter() - begin,
-        began=began.strftime("%Y-%m-%dT%H:%M:%S.") + f"{began.microsecond // 1000:03d}Z",
+        began=began,
         host=platform.node(),
     )
     if not recording.started:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import tempfile
 import zlib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,6 +13,7 @@ from pushplan.evaluation.batch import Progress, run_batch
 from pushplan.evaluation.compatibility import misfits, read_policies
 from pushplan.evaluation.jobs import Job, JobSettings
 from pushplan.evaluation.policies import PolicySpec
+from pushplan.evaluation.rescoring import rescore
 from pushplan.evaluation.results import Results
 from pushplan.metrics import metric_function
 from pushplan.world import InvalidInputError
@@ -134,8 +135,10 @@ class Experiment:
                 about={"suite": self.name, **self.about},
                 progress=progress,
             )
+            if self.metrics:
+                rescore(folder, self.metrics, columns=False)
             results = Results.load(folder)
-        return results if out is not None else Results(results.rows, results.about, None)
+        return results if out is not None else replace(results, path=None)
 
 
 def part_of(jobs: Sequence[Job], part: int, parts: int) -> list[Job]:

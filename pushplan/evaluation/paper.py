@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import tempfile
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from pushplan.evaluation.batch import Progress
@@ -157,7 +157,7 @@ def _chosen(results: Results, jobs: Sequence[Job], path: Path | None) -> Results
     """Without what an earlier run of more suites, policies or episodes left there."""
     wanted = {job.key for job in jobs}
     rows = tuple(r for r in results.rows if (r.policy, r.scenario, r.seed) in wanted)
-    return Results(rows, results.about, path)
+    return replace(results, rows=rows, path=path)
 
 
 def _to_goal_point(rows: Sequence[ResultRow], folder: Path) -> dict[tuple[str, str, int], float]:

@@ -54,16 +54,15 @@ class PolicySpec:
             if (file := _network_file(self.source)) is not None:
                 return f"{file.name}{_digest(file)}{options}"
             where, _, name = self.source.rpartition(":")
-            if where.endswith(".py"):
-                return f"{Path(where).name}:{name}{_digest(Path(where))}{options}"
-            return f"{self.source}{_digest(_file_of(where))}{options}"
+            shown = Path(where).name if where.endswith(".py") else where
+            return f"{shown}{':' if where else ''}{name}{source_digest(where)}{options}"
         source: Any = self.source
         while isinstance(source, functools.partial):
             options += f" {source.args!r} {sorted(source.keywords.items())!r}"
             source = source.func
         where = getattr(source, "__module__", type(source).__module__)
         name = getattr(source, "__qualname__", type(source).__qualname__)
-        return re.sub(r"0x[0-9a-f]+", "0x", f"{where}:{name}{_digest(_file_of(where))}{options}")
+        return re.sub(r"0x[0-9a-f]+", "0x", f"{where}:{name}{source_digest(where)}{options}")
 
     @property
     def is_ours(self) -> bool:
@@ -138,6 +137,11 @@ def policy_names() -> tuple[str, ...]:
     from pushplan.planners import policy_names as classical_names
 
     return (*classical_names(), *learned_names())
+
+
+def source_digest(where: str) -> str:
+    """A hash of what a ``file.py`` or a module holds, in words; nothing for modules of ours."""
+    return _digest(Path(where) if where.endswith(".py") else _file_of(where))
 
 
 def _digest(file: Path | None) -> str:

@@ -7,12 +7,12 @@ import platform
 import shlex
 import subprocess
 import sys
-from datetime import UTC, datetime
 from importlib import metadata
 from pathlib import Path
 from typing import Any
 
 import pushplan
+from pushplan.evaluation.rows import instant
 
 PACKAGES = (
     "gymnasium",
@@ -45,7 +45,7 @@ def provenance(workers: int) -> dict[str, Any]:
     """
     commit, changed = _checkout(Path(pushplan.__file__).resolve().parents[1])
     return {
-        "began": datetime.now(UTC).isoformat(timespec="seconds"),
+        "began": instant(),
         "command": shlex.join([Path(sys.argv[0]).name, *sys.argv[1:]]) if sys.argv[0] else "",
         "pushplan": pushplan.__version__,
         "commit": commit,

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from pushplan.evaluation.database import DATABASE
+from pushplan.evaluation.rescoring import metric_label, rescore
 from pushplan.evaluation.rows import rows_csv
 from pushplan.evaluation.run_record import RunRecord
 from pushplan.evaluation.statistics import estimate
@@ -28,7 +29,6 @@ from pushplan.evaluation.tables import (
     summary_csv,
     text,
 )
-from pushplan.metrics import compute
 from pushplan.world import InvalidInputError
 from pushplan.world.files import write_atomic
 from pushplan.world.libraries import need
@@ -45,8 +45,8 @@ class Results(RunRecord):
         Raises:
             InvalidInputError: if it holds no results.
         """
-        rows, about = open_results(path)
-        return cls(tuple(rows), about, Path(path))
+        rows, about, measured = open_results(path)
+        return cls(tuple(rows), about, Path(path), measured)
 
     def summary(self) -> list[PolicySummary]:
         """What the rows say about each policy in each setting."""
@@ -57,28 +57,38 @@ class Results(RunRecord):
         return paired_differences(self.rows, self.policies)
 
     def measure(self, metrics: Sequence[str]) -> list[Table]:
-        """Metrics that are no columns, from the stored traces of jobs that did not fail.
+        """Metrics that are no columns, from the stored episodes of jobs that did not fail.
+
+        They are kept in the run directory, where later reports show them; see `rescore`.
 
         Args:
-            metrics: names of `pushplan.metrics`, or functions as ``"module:function"``.
+            metrics: names of `pushplan.metrics`, or functions as ``"module:function"`` or
+                ``"file.py:function"``.
 
         Raises:
             UnknownNameError: if there is no such metric.
-            InvalidInputError: if these results have no run directory.
+            InvalidInputError: if these results have no run directory, or it holds no episodes.
         """
         if self.path is None:
             raise InvalidInputError("metrics of stored episodes need a run directory")
+        done = rescore(self.path, metrics, columns=False)
+        measured = Results.load(self.path).measured
+        if done.unreadable or not measured:
+            raise InvalidInputError(
+                f"{self.path} has no readable episode of {len(done.unreadable) or 'any'} jobs"
+            )
+        return self._measured_tables([metric_label(metric) for metric in metrics], measured)
+
+    def _measured_tables(
+        self, metrics: Sequence[str], measured: Mapping[str, Mapping[str, float]]
+    ) -> list[Table]:
         values: dict[tuple[str, str, str], list[float]] = {}
         for row in self.rows:
-            if row.failed:
-                continue
-            episode = self.episode(row)
-            if episode is None:
-                raise InvalidInputError(f"{self.path} has no trace of {row.policy} {row.scenario}")
-            for name, value in compute(episode, metrics).items():
-                values.setdefault((row.setting, row.policy, name), []).append(value)
+            for name in metrics:
+                if (value := measured.get(row.job, {}).get(name)) is not None:
+                    values.setdefault((row.setting, row.policy, name), []).append(value)
         estimates = {key: estimate(found) for key, found in values.items()}
-        return measured_tables(estimates, self.policies, metrics, self.titles)
+        return measured_tables(estimates, self.policies, metrics, self.titles) if values else []
 
     def tables(self, *, wide: bool = False) -> list[Table]:
         """Scores of the policies, then their paired differences."""
@@ -87,12 +97,31 @@ class Results(RunRecord):
         return [
             *([together] if together else []),
             *score_tables(self.summary(), titles, wide=wide),
+            *self._measured_tables(self.about.get("metrics", []), self.measured),
             *difference_tables(self.compare(), titles, wide=wide),
         ]
 
     def table(self, width: int = 160) -> str:
         """Scores and paired differences as text of at most ``width`` characters a line."""
         return text(self.tables(), width)
+
+    def export(self, path: str | Path) -> int:
+        """Write all rows, and metrics that are no columns, as CSV or Parquet.
+
+        Args:
+            path: ends in ``.csv`` or ``.parquet``.
+
+        Returns:
+            How many rows there are.
+
+        Raises:
+            InvalidInputError: if the file ends otherwise, or its folder does not exist.
+            MissingDependencyError: for Parquet, without PyArrow.
+        """
+        from pushplan.evaluation.exporting import export
+
+        export(self, Path(path))
+        return len(self.rows)
 
     def report(self, out: str | Path | None = None) -> Path:
         """Write ``report.html``, its plots, the summaries and ``results.csv``, all of these rows.
@@ -125,7 +154,7 @@ class Results(RunRecord):
     def _check_same_run(self, folder: Path) -> None:
         if not (folder / DATABASE).is_file():
             return
-        there, _ = open_results(folder)
+        there, _, _ = open_results(folder)
         if set(there) != set(self.rows):
             raise InvalidInputError(
                 f"{folder} is the directory of a run with {len(there)} rows, which are not the "

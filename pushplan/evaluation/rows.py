@@ -9,6 +9,7 @@ import math
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
+from datetime import UTC, datetime
 from typing import Any
 
 import numpy as np
@@ -26,6 +27,11 @@ def clean_reason(reason: object) -> str:
     """A reason as it is stored: one line of printable text without addresses of objects."""
     text = re.sub(r"0x[0-9a-fA-F]{6,}", "0x...", one_line(str(reason)))
     return text if len(text) <= REASON_LENGTH else text[: REASON_LENGTH - 3] + "..."
+
+
+def instant() -> str:
+    """The time now, ISO 8601, UTC."""
+    return datetime.now(UTC).isoformat(timespec="milliseconds").replace("+00:00", "Z")
 
 
 def csv_text(header: Sequence[str], lines: Iterable[Sequence[object]]) -> str:
@@ -157,10 +163,14 @@ def columns() -> tuple[str, ...]:
     return (*_OWN[:at], *shown, *_OWN[at + 1 :])
 
 
-def rows_csv(rows: Iterable[ResultRow]) -> str:
-    """The rows as CSV with a header."""
-    names = columns()
-    return csv_text(names, ([_cell(getattr(row, name)) for name in names] for row in rows))
+def rows_csv(rows: Sequence[ResultRow], more: Mapping[str, Sequence[object]] | None = None) -> str:
+    """The rows as CSV with a header, and further columns behind."""
+    names, more = columns(), more or {}
+    lines = (
+        [_cell(value) for value in (*(getattr(row, name) for name in names), *rest)]
+        for row, *rest in zip(rows, *more.values(), strict=True)
+    )
+    return csv_text([*names, *more], lines)
 
 
 def _cell(value: object) -> object:

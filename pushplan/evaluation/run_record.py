@@ -20,6 +20,8 @@ class RunRecord:
     # configuration, policies and titles of the settings
     about: Mapping[str, Any] = field(default_factory=dict)
     path: Path | None = None  # the run directory; None for rows that come from elsewhere
+    # job -> value by name of metrics that are no columns
+    measured: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
 
     @property
     def policies(self) -> list[str]:

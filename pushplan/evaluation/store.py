@@ -12,16 +12,20 @@ from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path
 from types import TracebackType
-from typing import Any
+from typing import IO, Any
 
 from pushplan.evaluation.database import (
     DATABASE,
     HIDE_OTHERS,
+    StoredResult,
     connect,
     connect_to_read,
     create,
+    database_of,
     insert,
     read_about,
+    read_measured,
+    read_results,
     read_rows,
 )
 from pushplan.evaluation.rows import ResultRow, Status, rows_csv
@@ -38,24 +42,28 @@ REPORT = (
 class RunDirectory:
     """The one writer of a run directory. Safe against being killed at any instant.
 
+    Args:
+        path: the folder.
+        new: whether it may be one without results.
+
     Raises:
-        InvalidInputError: if another process is writing there.
+        InvalidInputError: if another process is writing there, or there are no results.
         SchemaError: if the folder holds results of another version.
     """
 
-    def __init__(self, path: str | Path) -> None:
+    def __init__(self, path: str | Path, *, new: bool = True) -> None:
         self.path = Path(path)
+        if not new:
+            database_of(path)
         try:
             self.episodes.mkdir(parents=True, exist_ok=True)
             self.failures.mkdir(exist_ok=True)
         except OSError as error:
             raise InvalidInputError(f"cannot use {path} as a run directory: {error}") from error
         self._lock = (self.path / ".lock").open("w")
-        try:
-            fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError as error:
+        if not _locked(self._lock):
             self._lock.close()
-            raise InvalidInputError(f"another process is writing into {path}") from error
+            raise InvalidInputError(f"another process is writing into {path}")
         for leftover in [*self.path.glob("*.tmp"), *self.episodes.glob("*.tmp")]:
             leftover.unlink()
         self._db = connect(self.path / DATABASE)
@@ -132,6 +140,8 @@ class RunDirectory:
         trace: bytes | None = None,
         detail: str = "",
         spec: Mapping[str, Any] | None = None,
+        *,
+        show: bool = True,
     ) -> ResultRow:
         """Store what became of one job, in one transaction.
 
@@ -140,19 +150,21 @@ class RunDirectory:
             trace: the recorded episode.
             detail: traceback of a failure.
             spec: what `job_spec` said about the job.
+            show: whether it is the result that counts for its policy and scenario.
 
         Returns:
             The row as it is stored: with the name of its trace.
         """
         if trace is not None:
-            row = replace(row, trace=hashlib.sha256(trace).hexdigest()[:32])
+            row = replace(row, trace=trace_digest(trace))
             assert row.trace_file is not None
             write_atomic(self.path / row.trace_file, trace)
         if detail:
             write_atomic(self.failures / f"{row.job}.txt", detail.encode(errors="replace"))
         with self._db:
             insert(self._db, row, json.dumps(spec or {}))
-            self._db.execute(HIDE_OTHERS, (row.job, row.job))
+            if show:
+                self._db.execute(HIDE_OTHERS, (row.job, row.job))
             self._db.execute("DELETE FROM running WHERE job = ?", (row.job,))
         return row
 
@@ -168,10 +180,26 @@ class RunDirectory:
             if path.name not in named:
                 path.unlink()
 
-    def measure(self, values: Iterable[tuple[str, str, float]]) -> None:
-        """Keep values of metrics that are no columns: job, metric, value."""
+    def rescore(self, row: ResultRow) -> None:
+        """Replace a row by one of the same job."""
+        ((spec, current),) = self._db.execute(
+            "SELECT spec, current FROM results WHERE job = ?", (row.job,)
+        )
         with self._db:
-            self._db.executemany("INSERT OR REPLACE INTO measured VALUES (?, ?, ?)", values)
+            insert(self._db, row, spec, current)
+
+    def measure(self, values: Iterable[tuple[str, str, str, float | None]]) -> None:
+        """Keep values of metrics that are no columns: job, metric, its source, value."""
+        with self._db:
+            self._db.executemany("INSERT OR REPLACE INTO measured VALUES (?, ?, ?, ?)", values)
+
+    def about(self) -> dict[str, Any]:
+        """What was noted about the run."""
+        return read_about(self._db)
+
+    def results(self) -> list[StoredResult]:
+        """Every result, also those that do not count now."""
+        return read_results(self._db)
 
     def rows(self) -> list[ResultRow]:
         """All rows, sorted."""
@@ -195,17 +223,37 @@ class RunDirectory:
         self._lock.close()
 
 
-def open_results(path: str | Path) -> tuple[list[ResultRow], Mapping[str, Any]]:
+def trace_digest(trace: bytes) -> str:
+    """The hash that names a recorded episode, 32 hexadecimal digits."""
+    return hashlib.sha256(trace).hexdigest()[:32]
+
+
+def _locked(file: IO[str]) -> bool:
+    """Take the lock of a run directory; a process that only looks at it holds it for a moment."""
+    for _ in range(5):
+        try:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            return True
+        except OSError:
+            time.sleep(0.05)
+    return False
+
+
+def open_results(
+    path: str | Path,
+) -> tuple[list[ResultRow], Mapping[str, Any], Mapping[str, Mapping[str, float]]]:
     """Read the rows of a run directory, and what was noted about the run.
+
+    Returns:
+        Rows, notes, and for each job its metrics that are no columns.
 
     Raises:
         InvalidInputError: if there are no results.
     """
-    file = Path(path) / DATABASE
-    if not file.is_file():
-        raise InvalidInputError(f"{path} holds no results: there is no {file.name} in it")
+    file = database_of(path)
     with contextlib.closing(connect_to_read(file)) as db:
         try:
-            return read_rows(db), read_about(db)
+            about = read_about(db)
+            return read_rows(db), about, read_measured(db)
         except sqlite3.Error as error:
             raise SchemaError(f"{file} holds no readable results: {error}") from error

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Literal, cast
 
 from pushplan.world import ClearanceArea, Episode, InvalidInputError, Receptacle, UnknownNameError
-from pushplan.world.errors import short
+from pushplan.world.errors import describe, short
 from pushplan.world.named_objects import load_object
 
 GoalKind = Literal["robot", "objects"]
@@ -117,7 +117,7 @@ def compute(episode: Episode, names: Iterable[str] | None = None) -> Mapping[str
         function = metric_function(name)
         if name in METRICS and METRICS[name].goal not in (kind, None):
             continue
-        value = function(episode)
+        value = function(episode) if name in METRICS else _own_value(name, function, episode)
         if value is None:
             continue
         try:
@@ -129,6 +129,15 @@ def compute(episode: Episode, names: Iterable[str] | None = None) -> Mapping[str
         if math.isnan(values[name]):
             del values[name]
     return values
+
+
+def _own_value(
+    name: str, function: Callable[[Episode], float | None], episode: Episode
+) -> float | None:
+    try:
+        return function(episode)
+    except Exception as error:
+        raise InvalidInputError(f"metric {name!r} raised {describe(error)}") from error
 
 
 def metric_function(name: str) -> Callable[[Episode], float | None]:

@@ -20,6 +20,7 @@ EXTRAS = {
     "matplotlib": "plots",
     "mcap": "ros",
     "rosbags": "ros",
+    "pyarrow": "parquet",
     "h5py": "learn",
     "minari": "learn",
     "onnx": "learn",

@@ -18,8 +18,8 @@ _DEEPEST = 32  # parts of a module's name: Python imports each within the one be
 def load_object(spec: str) -> Any:
     """Import what a text names.
 
-    A file is imported once a process, with its folder on the import path, so that it may import
-    its neighbours. Whatever the file raises passes through.
+    A file is imported once a process, and again when its content has changed, with its folder on
+    the import path, so that it may import its neighbours. Whatever the file raises passes through.
 
     Raises:
         InvalidInputError: if the text has no such form, or there is no such file or name.
@@ -50,7 +50,8 @@ def _load_file(path: Path) -> ModuleType:
     path = path.expanduser().resolve()
     if not path.is_file():
         raise InvalidInputError(f"there is no file {path}")
-    digest = hashlib.sha256(str(path).encode()).hexdigest()[:8]
+    source = path.read_bytes()
+    digest = hashlib.sha256(str(path).encode() + b"\0" + source).hexdigest()[:8]
     name = f"pushplan_user_{path.stem}_{digest}"
     if name in sys.modules:
         return sys.modules[name]
@@ -61,7 +62,7 @@ def _load_file(path: Path) -> ModuleType:
         sys.path.append(str(path.parent))
     sys.modules[name] = module
     try:
-        spec.loader.exec_module(module)
+        exec(compile(source, path, "exec"), module.__dict__)
     except BaseException:
         del sys.modules[name]
         raise

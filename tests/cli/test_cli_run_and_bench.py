@@ -89,9 +89,6 @@ def test_bench_with_a_file_of_ones_own(tmp_path: Path, capsys: pytest.CaptureFix
     assert rows["planner", 6].reason == "ValueError: no plan today"
     assert main(["report", str(out)]) == 0
     assert main(["report", str(out), "--metrics", "E_nav_to_goal_point"]) == 0
-    changed = [*options, "--timeout", "7"]
-    assert main(["bench", "maze-2d-3", "--policies", names, *changed]) == 2
-    assert "timeout_s was 300.0, is now 7.0" in capsys.readouterr().err
 
 
 def test_the_same_from_python() -> None:

@@ -1,0 +1,119 @@
+"""Join run directories, such as those of several machines."""
+
+from __future__ import annotations
+
+import contextlib
+import sqlite3
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from pushplan.evaluation.database import (
+    StoredResult,
+    connect_to_read,
+    database_of,
+    read_about,
+    read_results,
+)
+from pushplan.evaluation.rows import TIMING_COLUMNS, ResultRow, columns
+from pushplan.evaluation.store import RunDirectory, trace_digest
+from pushplan.world import InvalidInputError, SchemaError
+
+
+@dataclass(frozen=True)
+class Merged:
+    """What `merge` did.
+
+    Attributes:
+        added: results that were not there.
+        known: results that were there already.
+        differing: jobs, of those known, whose two results differ in more than times; the result
+            that was there first is kept.
+        incomplete: jobs that were left out because their recorded episode is missing or damaged.
+    """
+
+    added: int
+    known: int
+    differing: tuple[str, ...]
+    incomplete: tuple[str, ...]
+
+
+def merge(out: str | Path, sources: Sequence[str | Path]) -> Merged:
+    """Take the results of run directories into another one, with their episodes and notes.
+
+    Killed at any instant, it goes on when it is called again. Where two directories have results of
+    one policy, scenario and seed that came about differently, those of the last one count.
+
+    Args:
+        out: run directory, new or with results of its own.
+        sources: run directories; they are only read.
+
+    Raises:
+        InvalidInputError: if there is no source, one holds no results, or ``out`` is among them.
+        SchemaError: if one cannot be read.
+    """
+    folders = [Path(source) for source in sources]
+    if not folders:
+        raise InvalidInputError("merge needs at least one run directory to read")
+    for folder in folders:
+        database_of(folder)
+        if folder.resolve() == Path(out).resolve():
+            raise InvalidInputError(f"{folder} cannot be merged into itself")
+    added, known = 0, 0
+    differing: list[str] = []
+    incomplete: list[str] = []
+    with RunDirectory(out) as store:
+        for folder in folders:
+            with contextlib.closing(connect_to_read(database_of(folder))) as db:
+                there = {one.row.job: one.row for one in store.results()}
+                for one in _read(db, folder):
+                    if one.row.job in there:
+                        known += 1
+                        if _timeless(one.row) != _timeless(there[one.row.job]):
+                            differing.append(one.row.job)
+                    elif _copy(one, folder, store):
+                        added += 1
+                    else:
+                        incomplete.append(one.row.job)
+                _note(db, store)
+        store.write_csv()
+    return Merged(added, known, tuple(differing), tuple(incomplete))
+
+
+def _read(db: sqlite3.Connection, folder: Path) -> list[StoredResult]:
+    try:
+        read_about(db)
+        return read_results(db)
+    except sqlite3.Error as error:
+        raise SchemaError(f"{folder} holds no readable results: {error}") from error
+
+
+def _copy(one: StoredResult, folder: Path, store: RunDirectory) -> bool:
+    """Take over a result; False if its episode is not what its name says."""
+    trace = None
+    if one.row.trace_file is not None:
+        path = folder / one.row.trace_file
+        trace = path.read_bytes() if path.is_file() else b""
+        if trace_digest(trace) != one.row.trace:
+            return False
+    note = folder / "failures" / f"{one.row.job}.txt"
+    detail = note.read_text(errors="replace") if note.is_file() else ""
+    store.add(one.row, trace, detail, one.spec, show=one.current)
+    store.measure((one.row.job, *value) for value in one.measured)
+    return True
+
+
+def _note(db: sqlite3.Connection, store: RunDirectory) -> None:
+    about = read_about(db)
+    for key in ("policies", "settings"):
+        store.extend(key, about.get(key, {}))
+    mine = store.about()
+    if "configuration" not in mine and "configuration" in about:
+        store.note("configuration", about["configuration"])
+    runs = [*mine.get("runs", []), *about.get("runs", [])]
+    distinct = [run for index, run in enumerate(runs) if run not in runs[:index]]
+    store.note("runs", sorted(distinct, key=lambda run: str(run["began"])))
+
+
+def _timeless(row: ResultRow) -> list[object]:
+    return [getattr(row, name) for name in columns() if name not in TIMING_COLUMNS]

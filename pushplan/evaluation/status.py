@@ -1,0 +1,101 @@
+"""How far a run is, seen from another process."""
+
+from __future__ import annotations
+
+import contextlib
+import fcntl
+import sqlite3
+import time
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+
+from pushplan.evaluation.database import connect_to_read, database_of, read_about
+from pushplan.evaluation.rows import Status
+from pushplan.world import SchemaError
+
+
+@dataclass(frozen=True)
+class RunStatus:
+    """How far a run is.
+
+    Attributes:
+        active: whether a process writes into the directory now.
+        jobs: jobs of the last call that ran any.
+        done: of these, how many have a result.
+        failed: results in the directory, of whatever call, that are failures.
+        per_minute: results a minute since that call began; 0 before the first.
+        left_s: what that lets expect [s]; None before the first result, or if nothing is left.
+        running: jobs in hand, longest first: title, seconds since they were handed to a worker.
+        slowest: results of the directory that took longest: title, seconds.
+    """
+
+    active: bool
+    jobs: int
+    done: int
+    failed: int
+    per_minute: float
+    left_s: float | None
+    running: tuple[tuple[str, float], ...]
+    slowest: tuple[tuple[str, float], ...]
+
+
+def run_status(path: str | Path, slowest: int = 3) -> RunStatus:
+    """Look at a run directory, perhaps while another process writes into it.
+
+    Args:
+        path: run directory.
+        slowest: how many slow episodes to name.
+
+    Raises:
+        InvalidInputError: if it holds no results.
+        SchemaError: if they cannot be read.
+    """
+    file = database_of(path)
+    active = _locked(Path(path) / ".lock")
+    with contextlib.closing(connect_to_read(file)) as db:
+        try:
+            return _look(db, active, slowest)
+        except sqlite3.Error as error:
+            raise SchemaError(f"{file} holds no readable results: {error}") from error
+
+
+def _look(db: sqlite3.Connection, active: bool, slowest: int) -> RunStatus:
+    *_, call = read_about(db).get("runs", []) or [{}]
+    began = str(call.get("began", ""))
+    ((failed,),) = db.execute("SELECT count(*) FROM results WHERE status != ?", (str(Status.DONE),))
+    ((new, last),) = db.execute(
+        "SELECT count(*), max(began) FROM results WHERE began >= ?", (began,)
+    )
+    end = datetime.now(UTC) if active or not last else datetime.fromisoformat(last)
+    elapsed = (end - datetime.fromisoformat(began)).total_seconds() if began else 0.0
+    jobs = int(call.get("jobs", 0))
+    done = min(jobs, int(call.get("done", 0)) + new)
+    rate = new / elapsed if elapsed > 0.0 else 0.0
+    flying = db.execute("SELECT title, began FROM running ORDER BY began").fetchall()
+    took = db.execute(
+        "SELECT policy || ' ' || scenario, wall_time_s FROM results WHERE wall_time_s IS NOT NULL "
+        "ORDER BY wall_time_s DESC LIMIT ?",
+        (slowest,),
+    )
+    return RunStatus(
+        active=active,
+        jobs=jobs,
+        done=done,
+        failed=failed,
+        per_minute=60.0 * rate,
+        left_s=(jobs - done) / rate if rate and done < jobs else None,
+        running=tuple((title, time.time() - at) for title, at in flying) if active else (),
+        slowest=tuple((title, seconds) for title, seconds in took),
+    )
+
+
+def _locked(path: Path) -> bool:
+    try:
+        with path.open("r") as file:
+            fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return True
+    except OSError:
+        return False
+    return False

@@ -1,0 +1,240 @@
+"""What can be done with run directories: join, score again, reproduce, export, look at."""
+
+from __future__ import annotations
+
+import csv
+import json
+import sqlite3
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from evaluation_doubles import HERE, LineScenario
+
+from pushplan.cli import main
+from pushplan.evaluation import (
+    TIMING_COLUMNS,
+    Experiment,
+    Job,
+    JobSettings,
+    PolicySpec,
+    Results,
+    merge,
+    parse_policies,
+    reproduce,
+    rescore,
+    run_batch,
+    run_status,
+)
+from pushplan.scenarios import suite
+from pushplan.world import InvalidInputError, SchemaError
+
+SETTINGS = JobSettings(make_env=f"{HERE}:make_env", timeout_s=5.0, dry_run=False)
+
+
+def run(out: Path, seeds: range, names: str = "Ahead Raises", **changes: object) -> None:
+    specs = parse_policies([f"{HERE}:{name}" for name in names.split()])
+    jobs = [Job(spec, LineScenario(seed)) for seed in seeds for spec in specs]
+    run_batch(jobs, out=out, workers=0, settings=replace(SETTINGS, **changes))  # type: ignore[arg-type]
+
+
+def timeless(path: Path) -> list[dict[str, str]]:
+    with (path / "results.csv").open() as file:
+        return [
+            {name: value for name, value in line.items() if name not in TIMING_COLUMNS}
+            for line in csv.DictReader(file)
+        ]
+
+
+@pytest.fixture(scope="module")
+def study() -> Experiment:
+    specs = (PolicySpec("straight", "straight"), PolicySpec("random", "random"))
+    return Experiment("study", (suite("maze-2d-3", episodes=3),), specs, JobSettings())
+
+
+@pytest.fixture(scope="module")
+def stored(study: Experiment, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("stored") / "run"
+    study.run(folder, workers=0)
+    return folder
+
+
+class TestMerge:
+    def test_parts_give_what_one_machine_gives(self, tmp_path: Path) -> None:
+        specs = parse_policies([f"{HERE}:{name}" for name in ("Ahead", "Raises", "Logs")])
+        jobs = [Job(spec, LineScenario(seed)) for seed in range(6) for spec in specs]
+        run_batch(jobs, out=tmp_path / "whole", workers=0, settings=SETTINGS)
+        for part in range(3):
+            mine = jobs[part::3]
+            run_batch(mine, out=tmp_path / str(part), workers=0, settings=SETTINGS)
+        parts = [tmp_path / str(part) for part in range(3)]
+        done = merge(tmp_path / "all", parts)
+        assert (done.added, done.known, done.differing, done.incomplete) == (18, 0, (), ())
+        assert timeless(tmp_path / "all") == timeless(tmp_path / "whole")
+        for row in Results.load(tmp_path / "all").rows:
+            note = tmp_path / "all" / "failures" / f"{row.job}.txt"
+            assert note.is_file() == row.failed
+            assert (Results.load(tmp_path / "all").episode(row) is not None) == bool(row.trace)
+        assert len(Results.load(tmp_path / "all").about["runs"]) == 3
+        again = merge(tmp_path / "all", parts)
+        assert (again.added, again.known, again.differing) == (0, 18, ())
+
+    def test_the_parts_of_an_experiment_are_all_of_it(self, study: Experiment) -> None:
+        from pushplan.evaluation.experiment import part_of
+
+        parts = [part_of(study.jobs, part, 3) for part in (1, 2, 3)]
+        assert sorted(job.key for part in parts for job in part) == sorted(
+            job.key for job in study.jobs
+        )
+        for wrong in ((0, 3), (4, 3), (1, 0)):
+            with pytest.raises(InvalidInputError, match="part"):
+                part_of(study.jobs, *wrong)
+
+    def test_a_result_that_differs_is_named_and_stays(self, tmp_path: Path) -> None:
+        for name in ("a", "b"):
+            run(tmp_path / name, range(1), "Ahead")
+        with sqlite3.connect(tmp_path / "b" / "results.db") as db:
+            db.execute("UPDATE results SET E_nav = 0.5")
+        done = merge(tmp_path / "a", [tmp_path / "b"])
+        (row,) = Results.load(tmp_path / "a").rows
+        assert done.differing == (row.job,) and row.E_nav != 0.5
+
+    def test_a_damaged_episode_is_left_out(self, tmp_path: Path) -> None:
+        run(tmp_path / "a", range(2), "Ahead")
+        first, second = Results.load(tmp_path / "a").rows
+        assert first.trace_file is not None
+        (tmp_path / "a" / first.trace_file).write_bytes(b"torn")
+        done = merge(tmp_path / "b", [tmp_path / "a"])
+        assert done.incomplete == (first.job,)
+        assert Results.load(tmp_path / "b").rows == (second,)
+        assert main(["merge", str(tmp_path / "c"), str(tmp_path / "a")]) == 1
+
+    def test_the_last_of_two_settings_counts(self, tmp_path: Path) -> None:
+        run(tmp_path / "a", range(1), "Ahead")
+        run(tmp_path / "b", range(1), "Ahead", timeout_s=9.0)
+        (other,) = Results.load(tmp_path / "b").rows
+        merge(tmp_path / "a", [tmp_path / "b"])
+        assert Results.load(tmp_path / "a").rows == (other,)
+
+    def test_what_is_no_run_directory_is_refused(self, tmp_path: Path) -> None:
+        run(tmp_path / "a", range(1), "Ahead")
+        with pytest.raises(InvalidInputError, match="into itself"):
+            merge(tmp_path / "a", [tmp_path / "a"])
+        with pytest.raises(InvalidInputError, match="holds no results"):
+            merge(tmp_path / "new", [tmp_path / "none"])
+        assert not (tmp_path / "new").exists()
+        with sqlite3.connect(tmp_path / "a" / "results.db") as db:
+            db.execute("UPDATE about SET value = '\"pushplan-run/1\"' WHERE key = 'schema'")
+        with pytest.raises(SchemaError, match="pushplan-run/2"):
+            merge(tmp_path / "new", [tmp_path / "a"])
+
+
+class TestReproduce:
+    def test_a_job_comes_out_the_same(self, stored: Path) -> None:
+        for row in Results.load(stored).rows[::3]:
+            again = reproduce(stored, row.job[:10])
+            assert again.same and not again.changed
+            assert again.again.E_nav == row.E_nav
+
+    def test_what_differs_is_named(
+        self, stored: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    ) -> None:
+        merge(tmp_path, [stored])
+        row = Results.load(tmp_path).rows[0]
+        with sqlite3.connect(tmp_path / "results.db") as db:
+            (text,) = db.execute("SELECT spec FROM results WHERE job = ?", (row.job,)).fetchone()
+            spec = json.loads(text)
+            spec["versions"]["numpy"] = "0.9"
+            db.execute("UPDATE results SET E_nav = 0.25, spec = ?", (json.dumps(spec),))
+        found = reproduce(tmp_path, row.job)
+        assert found.differing == ("E_nav",) and "numpy '0.9' ->" in found.changed
+        assert main(["reproduce", str(tmp_path), "--job", row.job]) == 1
+        assert "not the same: E_nav" in capsys.readouterr().err
+
+    def test_what_cannot_be_made_again_is_said(self, tmp_path: Path) -> None:
+        run(tmp_path, range(2), "Ahead")
+        for job in ("", "zz"):
+            with pytest.raises(InvalidInputError, match="must be the beginning of one job"):
+                reproduce(tmp_path, job)
+        with pytest.raises(InvalidInputError, match="none of pushplan's own"):
+            reproduce(tmp_path, Results.load(tmp_path).rows[0].job)
+
+
+class TestRescore:
+    def test_columns_come_from_the_episodes(self, stored: Path, tmp_path: Path) -> None:
+        merge(tmp_path, [stored])
+        before = Results.load(tmp_path).rows
+        done = rescore(tmp_path)
+        assert (done.episodes, done.changed, done.unreadable) == (6, (), ())
+        with sqlite3.connect(tmp_path / "results.db") as db:
+            db.execute("UPDATE results SET path_length_m = 1.0 WHERE job = ?", (before[2].job,))
+        assert rescore(tmp_path).changed == (before[2].job,)
+        assert Results.load(tmp_path).rows == before
+
+    def test_ones_own_metric_is_kept_until_its_file_changes(
+        self, stored: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    ) -> None:
+        merge(tmp_path / "run", [stored])
+        file = tmp_path / "mine.py"
+        file.write_text("def steps(episode):\n    return len(episode.actions)\n")
+        metric = f"{file}:steps"
+        assert rescore(tmp_path / "run", [metric], columns=False).episodes == 6
+        assert rescore(tmp_path / "run", [metric], columns=False).episodes == 0
+        results = Results.load(tmp_path / "run")
+        row = results.rows[0]
+        assert results.measured[row.job]["mine.py:steps"] == row.steps
+        assert "mine.py:steps" in results.table()
+        file.write_text("def steps(episode):\n    return 2 * len(episode.actions)\n")
+        assert main(["rescore", str(tmp_path / "run"), "--metrics", metric]) == 0
+        assert "6 episodes scored, 0 rows changed" in capsys.readouterr().out
+        again = Results.load(tmp_path / "run").measured[row.job]["mine.py:steps"]
+        assert row.steps is not None and again == 2 * row.steps
+
+    def test_a_metric_that_raises_is_one_line(self, stored: Path, tmp_path: Path) -> None:
+        merge(tmp_path / "run", [stored])
+        file = tmp_path / "bad.py"
+        file.write_text("def bad(episode):\n    raise KeyError('wheels')\n")
+        with pytest.raises(InvalidInputError, match=r"bad.py:bad' raised KeyError"):
+            rescore(tmp_path / "run", [f"{file}:bad"])
+
+
+class TestExport:
+    def test_csv_and_parquet_hold_all_rows(self, stored: Path, tmp_path: Path) -> None:
+        from pyarrow import parquet
+
+        merge(tmp_path / "run", [stored])
+        rescore(tmp_path / "run", ["E_nav_to_goal_point"])
+        results = Results.load(tmp_path / "run")
+        for name in ("rows.csv", "rows.parquet"):
+            assert main(["export", str(tmp_path / "run"), str(tmp_path / name)]) == 0
+        table = parquet.read_table(tmp_path / "rows.parquet").to_pylist()
+        lines = list(csv.DictReader((tmp_path / "rows.csv").open()))
+        for row, cells, line in zip(results.rows, table, lines, strict=True):
+            assert cells["job"] == line["job"] == row.job
+            assert cells["E_nav"] == float(line["E_nav"]) == row.E_nav
+            value = results.measured[row.job]["E_nav_to_goal_point"]
+            assert cells["E_nav_to_goal_point"] == float(line["E_nav_to_goal_point"]) == value
+
+    def test_other_files_are_refused(self, stored: Path, tmp_path: Path) -> None:
+        for name, said in (("rows.xlsx", "csv or .parquet"), ("no/rows.csv", "there is no folder")):
+            with pytest.raises(InvalidInputError, match=said):
+                Results.load(stored).export(tmp_path / name)
+
+
+def test_status_says_how_far_a_run_is(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    seen = []
+    specs = parse_policies([f"{HERE}:{name}" for name in ("Ahead", "Raises")])
+    jobs = [Job(spec, LineScenario(seed)) for seed in range(2) for spec in specs]
+
+    def look(done: int, total: int, row: object) -> None:
+        seen.append(run_status(tmp_path))
+
+    run_batch(jobs, out=tmp_path, workers=0, settings=SETTINGS, progress=look)
+    assert [one.done for one in seen] == [0, 1, 2, 3, 4]
+    assert all(one.active and one.jobs == 4 for one in seen)
+    assert seen[2].left_s is not None and seen[2].left_s > 0.0 and seen[2].per_minute > 0.0
+    rest = run_status(tmp_path)
+    assert (rest.active, rest.done, rest.failed, rest.running) == (False, 4, 2, ())
+    assert main(["status", str(tmp_path)]) == 0
+    assert "at rest: 4 of 4 jobs done" in capsys.readouterr().out
+    assert main(["status", str(tmp_path / "none")]) == 2
