@@ -1,4 +1,4 @@
-"""Commands on run directories: ``status``, ``merge``, ``rescore``, ``reproduce``, ``export``."""
+"""Commands on run directories: ``status``, ``merge``, ``rescore``, ``reproduce``, ``salvage``..."""
 
 from __future__ import annotations
 
@@ -41,6 +41,10 @@ def add(commands: Any) -> None:
     parser.add_argument(
         "--job", metavar="ID", required=True, help="column 'job' of results.csv, or its beginning"
     )
+    examples = "  pushplan salvage runs/torn runs/saved\n"
+    parser = add_command(commands, "salvage", "save what a damaged run holds", examples, _salvage)
+    parser.add_argument("directory", metavar="DIR", help="the damaged run directory")
+    parser.add_argument("out", metavar="NEW", help="a folder without a run")
     examples = "  pushplan export runs/study study.parquet\n"
     parser = add_command(commands, "export", "all rows as CSV or Parquet", examples, _export)
     parser.add_argument("directory", metavar="DIR", help=_RUN)
@@ -105,6 +109,16 @@ def _reproduce(options: argparse.Namespace) -> int:
         return 0
     sys.stderr.write(f"pushplan: not the same: {', '.join(found.differing)}\n")
     return 1
+
+
+def _salvage(options: argparse.Namespace) -> int:
+    from pushplan.evaluation import salvage
+
+    found = salvage(options.directory, options.out)
+    say(f"{found.rows} results saved in {options.out}, {found.from_csv} of them from results.csv")
+    if found.without_episode:
+        say(f"{len(found.without_episode)} without their episode: {found.without_episode[0]} ...")
+    return 0
 
 
 def _export(options: argparse.Namespace) -> int:

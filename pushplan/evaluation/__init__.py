@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from pushplan.evaluation.batch import run_batch
     from pushplan.evaluation.benchmark import bench
     from pushplan.evaluation.compatibility import UnusablePolicyError
+    from pushplan.evaluation.database import DamagedResultsError
     from pushplan.evaluation.episode import InvalidActionError, PolicyError, run_episode
     from pushplan.evaluation.experiment import Experiment
     from pushplan.evaluation.jobs import Job, JobResult, JobSettings
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
     from pushplan.evaluation.rescoring import Rescored, rescore
     from pushplan.evaluation.results import Results
     from pushplan.evaluation.rows import TIMING_COLUMNS, ResultRow, Status, columns
+    from pushplan.evaluation.salvaging import Salvaged, salvage
     from pushplan.evaluation.statistics import Estimate, Proportion, bootstrap_interval, wilson
     from pushplan.evaluation.status import RunStatus, run_status
     from pushplan.evaluation.stress_testing import CONDITIONS, Condition, ScoreSheet, stress
@@ -33,6 +35,7 @@ __all__ = [
     "TIMING_COLUMNS",
     "Comparison",
     "Condition",
+    "DamagedResultsError",
     "Estimate",
     "Experiment",
     "InvalidActionError",
@@ -50,6 +53,7 @@ __all__ = [
     "ResultRow",
     "Results",
     "RunStatus",
+    "Salvaged",
     "ScoreSheet",
     "Status",
     "UnusablePolicyError",
@@ -65,6 +69,7 @@ __all__ = [
     "run_batch",
     "run_episode",
     "run_status",
+    "salvage",
     "stress",
     "wilson",
 ]
@@ -75,6 +80,7 @@ __getattr__, __dir__ = lazy_names(
         "batch": "run_batch",
         "benchmark": "bench",
         "compatibility": "UnusablePolicyError",
+        "database": "DamagedResultsError",
         "episode": "InvalidActionError PolicyError run_episode",
         "experiment": "Experiment",
         "jobs": "Job JobResult JobSettings",
@@ -86,6 +92,7 @@ __getattr__, __dir__ = lazy_names(
         "results": "Results",
         "rows": "TIMING_COLUMNS ResultRow Status columns",
         "statistics": "Estimate Proportion bootstrap_interval wilson",
+        "salvaging": "Salvaged salvage",
         "status": "RunStatus run_status",
         "stress_testing": "CONDITIONS Condition ScoreSheet stress",
         "summary": "PairedDifference PolicySummary",

@@ -5,16 +5,20 @@ from __future__ import annotations
 import json
 import sqlite3
 from collections.abc import Iterator, Mapping
+from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from pushplan.evaluation.rows import ResultRow, columns
+from pushplan.evaluation.rows import ResultRow, checked_row, columns
 from pushplan.metrics import METRICS
-from pushplan.world import InvalidInputError, SchemaError
+from pushplan.world import InvalidInputError, PushplanError, SchemaError
+from pushplan.world.errors import describe
 
 SCHEMA = "pushplan-run/2"
 DATABASE = "results.db"
+WAIT_S = 30.0
+"""How long a writer waits for another program that holds the database [s]."""
 HIDE_OTHERS = (
     "UPDATE results SET current = (job = ?) WHERE (policy, scenario, seed) = "
     "(SELECT policy, scenario, seed FROM results WHERE job = ?)"
@@ -44,45 +48,91 @@ def database_of(path: str | Path) -> Path:
     return file
 
 
-def connect(path: Path) -> sqlite3.Connection:
-    """Open the database of a run directory.
+class DamagedResultsError(SchemaError):
+    """The database of a run directory is torn, or holds what no run wrote."""
+
+
+@contextmanager
+def clear_errors(path: Path) -> Iterator[None]:
+    """Let what goes wrong with a run directory's database be one clear line.
 
     Raises:
-        SchemaError: if that fails.
+        InvalidInputError: if it cannot be used now: locked, no space, no right.
+        DamagedResultsError: if it is damaged.
     """
     try:
-        db = sqlite3.connect(path, timeout=30.0)
-        db.execute("PRAGMA journal_mode=WAL")
-        db.execute("PRAGMA synchronous=NORMAL")
-    except sqlite3.Error as error:
-        raise SchemaError(f"cannot open {path}: {error}") from error
-    return db
+        yield
+    except PushplanError:
+        raise
+    except (sqlite3.OperationalError, OSError) as error:
+        if "malformed" in str(error):
+            raise _damaged(path, error) from error
+        raise InvalidInputError(
+            f"cannot use {path}: {error}; what was stored is kept, and the same command goes on"
+        ) from error
+    except (sqlite3.Error, KeyError, TypeError, ValueError, OverflowError) as error:
+        raise _damaged(path, error) from error
 
 
-def connect_to_read(path: Path) -> sqlite3.Connection:
-    """Open the database of a run directory, perhaps on a disk that cannot be written.
+def _damaged(path: Path, error: BaseException) -> DamagedResultsError:
+    return DamagedResultsError(
+        f"{path} is damaged ({describe(error)}): 'pushplan salvage {path.parent} NEW' saves what "
+        "can be read"
+    )
+
+
+def connect(path: Path) -> sqlite3.Connection:
+    """Open the database of a run directory, make its tables where they are missing, check it.
 
     Raises:
-        SchemaError: if that fails.
+        SchemaError: if it is damaged or of another version.
+        InvalidInputError: if it cannot be written.
     """
-    uri = path.absolute().as_uri()
-    for mode in ("mode=ro", "immutable=1"):  # reading a log beside it needs a file to share
-        db = sqlite3.connect(f"{uri}?{mode}", uri=True, timeout=30.0)
+    db = None
+    with clear_errors(path):
         try:
-            db.execute("SELECT name FROM sqlite_master").fetchall()
+            db = sqlite3.connect(path, timeout=WAIT_S)
+            db.execute("PRAGMA journal_mode=WAL")
+            db.execute("PRAGMA synchronous=NORMAL")
+            ((verdict,),) = db.execute("PRAGMA quick_check(1)")
+            if verdict != "ok":
+                raise sqlite3.DatabaseError(verdict)
+            _create(db)
             return db
-        except sqlite3.Error as error:
-            failure = error
-            db.close()
-    raise SchemaError(f"cannot open {path}: {failure}")
+        except BaseException:
+            if db is not None:
+                db.close()
+            raise
+    raise AssertionError("unreachable")
 
 
-def create(db: sqlite3.Connection) -> None:
-    """Make the tables, or add the columns of metrics that have come since they were made.
+@contextmanager
+def reading(path: str | Path) -> Iterator[sqlite3.Connection]:
+    """The database of a run directory, perhaps on a disk that cannot be written.
 
     Raises:
-        SchemaError: if the database is of another version.
+        InvalidInputError: if there are no results.
+        SchemaError: if it is damaged or of another version.
     """
+    file = database_of(path)
+    with clear_errors(file), closing(_connect_to_read(file)) as db:
+        read_about(db)
+        yield db
+
+
+def _connect_to_read(path: Path) -> sqlite3.Connection:
+    uri = path.absolute().as_uri()
+    db = sqlite3.connect(f"{uri}?mode=ro", uri=True, timeout=WAIT_S)
+    try:
+        db.execute("SELECT name FROM sqlite_master").fetchall()
+        return db
+    except sqlite3.OperationalError:  # the log beside it needs a file that cannot be made here
+        db.close()
+        return sqlite3.connect(f"{uri}?immutable=1", uri=True)
+
+
+def _create(db: sqlite3.Connection) -> None:
+    """Make the tables, or add the columns of metrics that have come since they were made."""
     names = columns()
     kinds = ", ".join(f'"{name}" {_type(name)}' for name in names)
     with db:
@@ -157,7 +207,7 @@ def _rows(db: sqlite3.Connection, more: str, rest: str) -> Iterator[tuple[Any, .
     for values in db.execute(f"SELECT {names}, {more} FROM results {rest}"):
         data = dict(zip(there, values, strict=False))
         data["success"] = bool(data["success"])
-        yield ResultRow.from_columns(data), *values[len(there) :]
+        yield checked_row(ResultRow.from_columns(data)), *values[len(there) :]
 
 
 def _type(column: str) -> str:

@@ -127,7 +127,7 @@ class JobResult:
     def checked(self, job: Job) -> JobResult:
         """This result, or a failure if it cannot be one of that job."""
         try:
-            row = checked_row(asdict(self.row))
+            row = checked_row(self.row)
             mine = blank_row(job.policy.label, job.scenario, Status.DONE, "")
             for name in ("policy", "task", "simulator", "scenario", "seed"):
                 if getattr(row, name) != getattr(mine, name):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import sqlite3
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -10,14 +9,14 @@ from pathlib import Path
 
 from pushplan.evaluation.database import (
     StoredResult,
-    connect_to_read,
     database_of,
     read_about,
     read_results,
+    reading,
 )
 from pushplan.evaluation.rows import TIMING_COLUMNS, ResultRow, columns
 from pushplan.evaluation.store import RunDirectory, trace_digest
-from pushplan.world import InvalidInputError, SchemaError
+from pushplan.world import InvalidInputError
 
 
 @dataclass(frozen=True)
@@ -64,9 +63,9 @@ def merge(out: str | Path, sources: Sequence[str | Path]) -> Merged:
     incomplete: list[str] = []
     with RunDirectory(out) as store:
         for folder in folders:
-            with contextlib.closing(connect_to_read(database_of(folder))) as db:
+            with reading(folder) as db:
                 there = {one.row.job: one.row for one in store.results()}
-                for one in _read(db, folder):
+                for one in read_results(db):
                     if one.row.job in there:
                         known += 1
                         if _timeless(one.row) != _timeless(there[one.row.job]):
@@ -78,14 +77,6 @@ def merge(out: str | Path, sources: Sequence[str | Path]) -> Merged:
                 _note(db, store)
         store.write_csv()
     return Merged(added, known, tuple(differing), tuple(incomplete))
-
-
-def _read(db: sqlite3.Connection, folder: Path) -> list[StoredResult]:
-    try:
-        read_about(db)
-        return read_results(db)
-    except sqlite3.Error as error:
-        raise SchemaError(f"{folder} holds no readable results: {error}") from error
 
 
 def _copy(one: StoredResult, folder: Path, store: RunDirectory) -> bool:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import tempfile
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from pushplan.evaluation.batch import run_batch
-from pushplan.evaluation.database import StoredResult, connect_to_read, database_of, read_results
+from pushplan.evaluation.database import StoredResult, read_results, reading
 from pushplan.evaluation.job_identity import differences, job_of, job_spec
 from pushplan.evaluation.rows import TIMING_COLUMNS, ResultRow, columns
 from pushplan.world import Episode, InvalidInputError
@@ -66,7 +65,7 @@ def reproduce(path: str | Path, job: str) -> Reproduction:
 
 
 def _find(path: Path, job: str) -> StoredResult:
-    with contextlib.closing(connect_to_read(database_of(path))) as db:
+    with reading(path) as db:
         found = [one for one in read_results(db) if one.row.job.startswith(job)]
     if not job or len(found) != 1:
         few = ", ".join(one.row.job[:12] for one in found[:3])

@@ -186,13 +186,33 @@ def setting_of(scenario: str, seed: int) -> str:
     return scenario.removesuffix(f"-{seed}")
 
 
-def checked_row(values: Mapping[str, Any]) -> ResultRow:
-    """The row with these values, if they can be one.
+def row_from_texts(texts: Mapping[str, str | None]) -> ResultRow:
+    """The row that a line of ``results.csv`` holds, by column.
 
     Raises:
-        KeyError, TypeError, ValueError: if a value is missing, of another type or out of range.
+        KeyError, TypeError, ValueError: if it can be none.
     """
-    row = ResultRow(**{name: values[name] for name in _OWN})
+    values: dict[str, Any] = {}
+    for name in columns():
+        text = texts.get(name) or ""
+        whole = name in ("seed", "plan_calls") or (name in METRICS and METRICS[name].whole)
+        if name in _TEXTS or name == "began":
+            values[name] = text
+        elif name == "success":
+            values[name] = {"1": True, "0": False}[text]
+        else:
+            values[name] = (int if whole else float)(text) if text else None
+    return checked_row(ResultRow.from_columns(values))
+
+
+def checked_row(row: ResultRow) -> ResultRow:
+    """The row with a clean reason, if its values can be those of one.
+
+    Raises:
+        KeyError, TypeError, ValueError: if a value is of another type or out of range.
+    """
+    if not isinstance(row.metrics, Mapping):
+        raise TypeError(f"metrics is {row.metrics!r:.60}")
     for name in _TEXTS:
         if type(getattr(row, name)) is not str and not isinstance(getattr(row, name), Status):
             raise TypeError(f"{name} is {getattr(row, name)!r:.60}")

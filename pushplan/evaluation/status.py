@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import fcntl
 import sqlite3
 import time
@@ -10,9 +9,8 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 
-from pushplan.evaluation.database import connect_to_read, database_of, read_about
+from pushplan.evaluation.database import read_about, reading
 from pushplan.evaluation.rows import Status
-from pushplan.world import SchemaError
 
 
 @dataclass(frozen=True)
@@ -51,13 +49,9 @@ def run_status(path: str | Path, slowest: int = 3) -> RunStatus:
         InvalidInputError: if it holds no results.
         SchemaError: if they cannot be read.
     """
-    file = database_of(path)
     active = _locked(Path(path) / ".lock")
-    with contextlib.closing(connect_to_read(file)) as db:
-        try:
-            return _look(db, active, slowest)
-        except sqlite3.Error as error:
-            raise SchemaError(f"{file} holds no readable results: {error}") from error
+    with reading(path) as db:
+        return _look(db, active, slowest)
 
 
 def _look(db: sqlite3.Connection, active: bool, slowest: int) -> RunStatus:

@@ -8,7 +8,7 @@ import hashlib
 import json
 import sqlite3
 import time
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 from types import TracebackType
@@ -18,18 +18,18 @@ from pushplan.evaluation.database import (
     DATABASE,
     HIDE_OTHERS,
     StoredResult,
+    clear_errors,
     connect,
-    connect_to_read,
-    create,
     database_of,
     insert,
     read_about,
     read_measured,
     read_results,
     read_rows,
+    reading,
 )
 from pushplan.evaluation.rows import ResultRow, Status, rows_csv
-from pushplan.world import InvalidInputError, SchemaError
+from pushplan.world import InvalidInputError
 from pushplan.world.files import write_atomic
 
 REPORT = (
@@ -60,19 +60,20 @@ class RunDirectory:
             self.failures.mkdir(exist_ok=True)
         except OSError as error:
             raise InvalidInputError(f"cannot use {path} as a run directory: {error}") from error
-        self._lock = (self.path / ".lock").open("w")
+        with clear_errors(self.path):
+            self._lock = (self.path / ".lock").open("w")
         if not _locked(self._lock):
             self._lock.close()
             raise InvalidInputError(f"another process is writing into {path}")
         for leftover in [*self.path.glob("*.tmp"), *self.episodes.glob("*.tmp")]:
             leftover.unlink()
-        self._db = connect(self.path / DATABASE)
         try:
-            create(self._db)
-            self._db.execute("DELETE FROM running")
+            self._db = connect(self.path / DATABASE)
         except BaseException:
-            self.close()
+            self._lock.close()
             raise
+        with self._use() as db:
+            db.execute("DELETE FROM running")
 
     def __enter__(self) -> RunDirectory:
         return self
@@ -95,44 +96,51 @@ class RunDirectory:
         """Folder of the tracebacks of failed jobs."""
         return self.path / "failures"
 
+    @contextlib.contextmanager
+    def _use(self) -> Iterator[sqlite3.Connection]:
+        """The database, in a transaction; what goes wrong there, or on the disk, is one line."""
+        with clear_errors(self.path / DATABASE), self._db:
+            yield self._db
+
     def note(self, key: str, value: Any) -> None:
         """Keep a JSON value about the run."""
-        with self._db:
-            self._db.execute("INSERT OR REPLACE INTO about VALUES (?, ?)", (key, json.dumps(value)))
+        with self._use() as db:
+            db.execute("INSERT OR REPLACE INTO about VALUES (?, ?)", (key, json.dumps(value)))
 
     def extend(self, key: str, entries: Mapping[str, str]) -> None:
         """Add entries to a JSON mapping about the run."""
-        self.note(key, {**read_about(self._db).get(key, {}), **entries})
+        self.note(key, {**self.about().get(key, {}), **entries})
 
     def append(self, key: str, value: Any) -> None:
         """Add a value to a JSON list about the run."""
-        self.note(key, [*read_about(self._db).get(key, []), value])
+        self.note(key, [*self.about().get(key, []), value])
 
     def done(self) -> set[str]:
         """Every job that has a result."""
-        return {job for (job,) in self._db.execute("SELECT job FROM results")}
+        with self._use() as db:
+            return {job for (job,) in db.execute("SELECT job FROM results")}
 
     def keys(self) -> set[tuple[str, str, int]]:
         """(policy, scenario, seed) of every result."""
-        return set(self._db.execute("SELECT DISTINCT policy, scenario, seed FROM results"))
+        with self._use() as db:
+            return set(db.execute("SELECT DISTINCT policy, scenario, seed FROM results"))
 
     def specs(self, key: tuple[str, str, int] | None = None) -> dict[str, dict[str, Any]]:
         """Job -> what `job_spec` said, of all results or those of a policy, scenario and seed."""
         where = "" if key is None else " WHERE (policy, scenario, seed) = (?, ?, ?)"
-        found = self._db.execute(f"SELECT job, spec FROM results{where}", key or ())
-        return {job: json.loads(spec) for job, spec in found}
+        with self._use() as db:
+            found = db.execute(f"SELECT job, spec FROM results{where}", key or ())
+            return {job: json.loads(spec) for job, spec in found}
 
     def show(self, jobs: Iterable[str]) -> None:
         """Let these results be the ones that count for their policies and scenarios."""
-        with self._db:
-            self._db.executemany(HIDE_OTHERS, ((job, job) for job in jobs))
+        with self._use() as db:
+            db.executemany(HIDE_OTHERS, ((job, job) for job in jobs))
 
     def begin(self, job: str, title: str) -> None:
         """Note that a job is being run."""
-        with self._db:
-            self._db.execute(
-                "INSERT OR REPLACE INTO running VALUES (?, ?, ?)", (job, title, time.time())
-            )
+        with self._use() as db:
+            db.execute("INSERT OR REPLACE INTO running VALUES (?, ?, ?)", (job, title, time.time()))
 
     def add(
         self,
@@ -155,64 +163,68 @@ class RunDirectory:
         Returns:
             The row as it is stored: with the name of its trace.
         """
-        if trace is not None:
-            row = replace(row, trace=trace_digest(trace))
-            assert row.trace_file is not None
-            write_atomic(self.path / row.trace_file, trace)
-        if detail:
-            write_atomic(self.failures / f"{row.job}.txt", detail.encode(errors="replace"))
-        with self._db:
-            insert(self._db, row, json.dumps(spec or {}))
+        with self._use() as db:
+            if trace is not None:
+                row = replace(row, trace=trace_digest(trace))
+                assert row.trace_file is not None
+                write_atomic(self.path / row.trace_file, trace)
+            if detail:
+                write_atomic(self.failures / f"{row.job}.txt", detail.encode(errors="replace"))
+            insert(db, row, json.dumps(spec or {}))
             if show:
-                self._db.execute(HIDE_OTHERS, (row.job, row.job))
-            self._db.execute("DELETE FROM running WHERE job = ?", (row.job,))
+                db.execute(HIDE_OTHERS, (row.job, row.job))
+            db.execute("DELETE FROM running WHERE job = ?", (row.job,))
         return row
 
     def forget_failures(self) -> None:
         """Remove the results of jobs that did not end by the rules of their task."""
-        with self._db:
-            self._db.execute("DELETE FROM results WHERE status != ?", (str(Status.DONE),))
+        with self._use() as db:
+            db.execute("DELETE FROM results WHERE status != ?", (str(Status.DONE),))
 
     def tidy(self) -> None:
         """Remove recorded episodes that no result names: of calls that were killed or forgotten."""
-        named = {f"{trace}.npz" for (trace,) in self._db.execute("SELECT trace FROM results")}
-        for path in self.episodes.iterdir():
-            if path.name not in named:
-                path.unlink()
+        with self._use() as db:
+            named = {f"{trace}.npz" for (trace,) in db.execute("SELECT trace FROM results")}
+            for path in self.episodes.iterdir():
+                if path.name not in named:
+                    path.unlink()
 
     def rescore(self, row: ResultRow) -> None:
         """Replace a row by one of the same job."""
-        ((spec, current),) = self._db.execute(
-            "SELECT spec, current FROM results WHERE job = ?", (row.job,)
-        )
-        with self._db:
-            insert(self._db, row, spec, current)
+        with self._use() as db:
+            query = "SELECT spec, current FROM results WHERE job = ?"
+            ((spec, current),) = db.execute(query, (row.job,))
+            insert(db, row, spec, current)
 
     def measure(self, values: Iterable[tuple[str, str, str, float | None]]) -> None:
         """Keep values of metrics that are no columns: job, metric, its source, value."""
-        with self._db:
-            self._db.executemany("INSERT OR REPLACE INTO measured VALUES (?, ?, ?, ?)", values)
+        with self._use() as db:
+            db.executemany("INSERT OR REPLACE INTO measured VALUES (?, ?, ?, ?)", values)
 
     def about(self) -> dict[str, Any]:
         """What was noted about the run."""
-        return read_about(self._db)
+        with self._use() as db:
+            return read_about(db)
 
     def results(self) -> list[StoredResult]:
         """Every result, also those that do not count now."""
-        return read_results(self._db)
+        with self._use() as db:
+            return read_results(db)
 
     def rows(self) -> list[ResultRow]:
         """All rows, sorted."""
-        return read_rows(self._db)
+        with self._use() as db:
+            return read_rows(db)
 
     def write_csv(self) -> Path:
         """Write ``results.csv`` from the database; a report of other rows is removed."""
         path = self.path / "results.csv"
-        text = rows_csv(self.rows()).encode()
-        if not path.is_file() or path.read_bytes() != text:
-            for name in REPORT:
-                (self.path / name).unlink(missing_ok=True)
-            write_atomic(path, text)
+        with self._use() as db:
+            text = rows_csv(read_rows(db)).encode()
+            if not path.is_file() or path.read_bytes() != text:
+                for name in REPORT:
+                    (self.path / name).unlink(missing_ok=True)
+                write_atomic(path, text)
         return path
 
     def close(self) -> None:
@@ -250,10 +262,5 @@ def open_results(
     Raises:
         InvalidInputError: if there are no results.
     """
-    file = database_of(path)
-    with contextlib.closing(connect_to_read(file)) as db:
-        try:
-            about = read_about(db)
-            return read_rows(db), about, read_measured(db)
-        except sqlite3.Error as error:
-            raise SchemaError(f"{file} holds no readable results: {error}") from error
+    with reading(path) as db:
+        return read_rows(db), read_about(db), read_measured(db)
