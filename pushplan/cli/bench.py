@@ -73,7 +73,11 @@ def add(commands: Any) -> None:
         help="what the environment observes; auto: what the policy asks for, else state",
     )
     parser.add_argument(
-        "--memory", type=positive, metavar="MB", help="memory of a worker beyond which it fails"
+        "--memory",
+        type=positive,
+        default=4000.0,
+        metavar="MB",
+        help="memory of a worker beyond which its episode fails (default %(default)g)",
     )
     add_latency(parser)
     add_trust(parser)

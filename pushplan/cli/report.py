@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 _EXAMPLES = """\
   pushplan report runs/first
   pushplan report runs/first --metrics E_nav_to_goal_point,my_metrics:jerk
+  pushplan report runs/first --format latex > tables.tex
 """
 
 
@@ -30,17 +31,27 @@ def add(commands: Any) -> None:
         help="only print these, computed from the stored episodes: names ('pushplan list "
         "metrics') or 'module:function'",
     )
+    parser.add_argument(
+        "--format",
+        choices=("text", "markdown", "latex"),
+        help="only print the tables, as a document (LaTeX needs booktabs and makecell)",
+    )
 
 
 def run(options: argparse.Namespace) -> int:
     """Print the table and write the files."""
-    from pushplan.evaluation import Results
+    from pushplan.evaluation import Results, table_formats
 
     results = Results.load(options.directory)
-    if options.metrics:
-        _print(results.measure(options.metrics.split(",")))
-    else:
+    if options.metrics is None and options.format is None:
         show(results)
+        return 0
+    wanted = options.metrics
+    tables = results.measure(wanted.split(",")) if wanted else results.tables()
+    if options.format is None:
+        _print(tables)
+    else:
+        say(getattr(table_formats, options.format)(tables).rstrip())
     return 0
 
 
@@ -58,7 +69,7 @@ def _print(tables: Sequence[Table]) -> None:
     """In colour and to the width of a terminal, or as plain text."""
     from rich.console import Console
 
-    from pushplan.evaluation.tables import rich_table, text
+    from pushplan.evaluation.table_formats import rich_table, text
 
     if not sys.stdout.isatty():
         say(text(tables))

@@ -84,7 +84,7 @@ def _merge(options: argparse.Namespace) -> int:
 
 def _rescore(options: argparse.Namespace) -> int:
     from pushplan.evaluation import Results, rescore
-    from pushplan.evaluation.tables import text
+    from pushplan.evaluation.table_formats import text
 
     metrics = [name for name in options.metrics.split(",") if name]
     done = rescore(options.directory, metrics)

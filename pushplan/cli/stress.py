@@ -71,7 +71,7 @@ def add(commands: Any) -> None:
 def run(options: argparse.Namespace) -> int:
     """Run the test, print the score sheet."""
     from pushplan.evaluation import stress
-    from pushplan.evaluation.tables import markdown, text
+    from pushplan.evaluation.table_formats import markdown, text
 
     with progress_of(options.policy) as progress:
         sheet = stress(

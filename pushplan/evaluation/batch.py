@@ -29,6 +29,7 @@ from pushplan.evaluation.jobs import (
     failed_result,
     timeout_reason,
 )
+from pushplan.evaluation.limits import MEMORY_MB
 from pushplan.evaluation.pool import WorkerPool
 from pushplan.evaluation.provenance import provenance
 from pushplan.evaluation.rows import ResultRow, Status, instant, setting_of
@@ -69,7 +70,7 @@ def run_batch(
     workers: int | None = None,
     executor: Executor | None = None,
     settings: JobSettings | None = None,
-    memory_limit_mb: float | None = None,
+    memory_limit_mb: float | None = MEMORY_MB,
     retry_failed: bool = False,
     any_version: bool = False,
     about: Mapping[str, Any] | None = None,
@@ -95,7 +96,7 @@ def run_batch(
             it is given at a time.
         settings: environment, observation and time limit of all jobs.
         memory_limit_mb: private memory of a worker at which allocations fail, and memory of it and
-            what it started, shared or not, at which it is ended [MB].
+            what it started, shared or not, at which it is ended [MB]; None for no limit.
         retry_failed: run jobs again whose row says that they failed.
         any_version: take results that differ only in versions of pushplan and of packages.
         about: what else to note about the run: JSON values.
@@ -115,7 +116,7 @@ def run_batch(
         number("memory_limit_mb", memory_limit_mb, low=1.0)
     _check(jobs)
     with RunDirectory(out) as store:
-        _note(store, jobs, settings, memory_limit_mb, about)
+        _note(store, jobs, settings, about)
         if retry_failed:
             store.forget_failures()
         pending = _pending(jobs, store, settings, any_version)
@@ -151,11 +152,9 @@ def _note(
     store: RunDirectory,
     jobs: Sequence[Job],
     settings: JobSettings,
-    memory_limit_mb: float | None,
     about: Mapping[str, Any] | None,
 ) -> None:
-    configuration = {**settings_dict(settings), "memory_limit_mb": memory_limit_mb, **(about or {})}
-    store.note("configuration", configuration)
+    store.note("configuration", {**settings_dict(settings), **(about or {})})
     store.extend("policies", {job.policy.label: job.policy.identity for job in jobs})
     factor = settings.latency_factor
     mode = "" if factor is None else f", latency-aware x {factor:g}"

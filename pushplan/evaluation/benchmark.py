@@ -10,6 +10,7 @@ from pushplan.evaluation.batch import Progress
 from pushplan.evaluation.compatibility import read_policies
 from pushplan.evaluation.experiment import Experiment
 from pushplan.evaluation.jobs import JobSettings
+from pushplan.evaluation.limits import MEMORY_MB
 from pushplan.evaluation.policies import PolicySpec
 from pushplan.evaluation.results import Results
 
@@ -29,7 +30,7 @@ def bench(
     out: str | Path | None = None,
     timeout_s: float | None = 300.0,
     observation: str = "auto",
-    memory_limit_mb: float | None = None,
+    memory_limit_mb: float | None = MEMORY_MB,
     retry_failed: bool = False,
     any_version: bool = False,
     shard: tuple[int, int] | None = None,
@@ -56,7 +57,8 @@ def bench(
             kept and traces are dropped.
         timeout_s: wall-clock limit of one episode [s].
         observation: ``"auto"``, ``"image"`` or ``"state"``, see `JobSettings`.
-        memory_limit_mb: private memory of a worker at which allocations fail [MB].
+        memory_limit_mb: private memory of a worker at which allocations fail [MB]; None for no
+            limit.
         retry_failed: run jobs again whose row says that they failed.
         any_version, shard: as for `Experiment.run`.
         latency_factor: seconds of the world's clock for each second that a policy computes; None

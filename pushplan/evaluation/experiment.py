@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 from pushplan.evaluation.batch import Progress, run_batch
 from pushplan.evaluation.compatibility import misfits, read_policies
 from pushplan.evaluation.jobs import Job, JobSettings
+from pushplan.evaluation.limits import MEMORY_MB
 from pushplan.evaluation.policies import PolicySpec
 from pushplan.evaluation.rescoring import rescore
 from pushplan.evaluation.results import Results
@@ -35,7 +36,8 @@ class Experiment:
         settings: what all jobs share.
         metrics: beside those that every run has: names of `pushplan.metrics`, or functions as
             ``"module:function"`` or ``"file.py:function"``.
-        memory_limit_mb: private memory of a worker at which allocations fail [MB].
+        memory_limit_mb: private memory of a worker at which allocations fail [MB]; None for no
+            limit.
         about: what else is noted about the run: JSON values.
         allow_misfits: whether a policy that fits no suite is left out; else it is refused.
         skipped: (suite, policy label) -> why that pair is not run.
@@ -51,7 +53,7 @@ class Experiment:
     policies: tuple[PolicySpec, ...]
     settings: JobSettings = field(default_factory=JobSettings)
     metrics: tuple[str, ...] = ()
-    memory_limit_mb: float | None = None
+    memory_limit_mb: float | None = MEMORY_MB
     about: Mapping[str, Any] = field(default_factory=dict)
     allow_misfits: bool = False
     skipped: Mapping[tuple[str, str], str] = field(init=False)

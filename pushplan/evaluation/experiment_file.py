@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from pushplan.evaluation.jobs import JobSettings
+from pushplan.evaluation.limits import MEMORY_MB
 from pushplan.evaluation.policies import PolicySpec, parse_policy
 from pushplan.world import Deadline, SchemaError
 from pushplan.world.checks import expect, integer, known_keys, number
@@ -48,7 +49,7 @@ def fields_of(data: object, folder: Path) -> dict[str, Any]:
         "policies": tuple(itertools.chain.from_iterable(policies)),
         "settings": JobSettings(**{name: data[name] for name in names if name in data}),
         "metrics": tuple(_beside(one, folder) for one in metrics),
-        "memory_limit_mb": data.get("memory_limit_mb"),
+        "memory_limit_mb": data.get("memory_limit_mb", MEMORY_MB),
     }
 
 

@@ -10,6 +10,9 @@ import threading
 from collections.abc import Iterator
 from types import FrameType
 
+MEMORY_MB = 4000.0
+"""Memory of a worker beyond which a job fails, unless something else is asked for [MB]."""
+
 
 class EpisodeTimeout(BaseException):
     """Raised inside a job that takes too long.

@@ -12,12 +12,14 @@ from pushplan.evaluation.benchmark import Given
 from pushplan.evaluation.compatibility import read_policies
 from pushplan.evaluation.experiment import Experiment
 from pushplan.evaluation.jobs import Job, JobSettings
+from pushplan.evaluation.limits import MEMORY_MB
 from pushplan.evaluation.paper_tables import overview, paper_table, preface, training_cost
 from pushplan.evaluation.policies import policy_names
 from pushplan.evaluation.published import PublishedTable, chosen_tables
 from pushplan.evaluation.results import Results
 from pushplan.evaluation.rows import ResultRow, setting_of
-from pushplan.evaluation.tables import Table, markdown, text
+from pushplan.evaluation.table_formats import markdown, text
+from pushplan.evaluation.tables import Table
 from pushplan.metrics import compute
 from pushplan.world import Episode
 from pushplan.world.files import write_atomic
@@ -89,7 +91,7 @@ def bench_paper(
     workers: int | None = None,
     out: str | Path | None = None,
     timeout_s: float | None = 600.0,
-    memory_limit_mb: float | None = None,
+    memory_limit_mb: float | None = MEMORY_MB,
     retry_failed: bool = False,
     any_version: bool = False,
     shard: tuple[int, int] | None = None,

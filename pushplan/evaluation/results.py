@@ -18,16 +18,13 @@ from pushplan.evaluation.summary import (
     paired_differences,
     summarise,
 )
+from pushplan.evaluation.table_formats import differences_csv, markdown, summary_csv, text
 from pushplan.evaluation.tables import (
     Table,
     aggregate_table,
     difference_tables,
-    differences_csv,
-    markdown,
     measured_tables,
     score_tables,
-    summary_csv,
-    text,
 )
 from pushplan.world import InvalidInputError
 from pushplan.world.files import write_atomic

@@ -1,15 +1,13 @@
-"""Tables of a run as plain data, and as Markdown, CSV and text."""
+"""Tables of a run as plain data."""
 
 from __future__ import annotations
 
-import io
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pushplan.evaluation.rows import ResultRow, csv_text
+from pushplan.evaluation.rows import ResultRow
 from pushplan.evaluation.statistics import Estimate
 from pushplan.evaluation.statistics_aggregate import (
     Aggregate,
@@ -25,9 +23,6 @@ from pushplan.evaluation.summary import (
 )
 from pushplan.metrics import METRICS, Role, metric_names
 from pushplan.world.checks import FloatArray
-
-if TYPE_CHECKING:
-    from rich.table import Table as RichTable
 
 _TIMING_HEADINGS = {
     "plan_time_median_s": "plan [ms]",
@@ -229,90 +224,6 @@ def _aggregate(value: Aggregate, digits: int) -> str:
     )
 
 
-def markdown(tables: Sequence[Table]) -> str:
-    """The tables as a Markdown document."""
-    blocks = []
-    for table in tables:
-        lines = [f"## {table.title}", "", _line(table.headings)]
-        lines.append(_line(["---"] * len(table.headings)))
-        lines += [_line([cell.replace("\n", "<br>") for cell in row]) for row in table.cells]
-        if table.note:
-            lines += ["", f"{table.note[0].upper()}{table.note[1:]}."]
-        blocks.append("\n".join(lines))
-    return "\n\n".join(blocks) + "\n"
-
-
-def summary_csv(summaries: Sequence[PolicySummary], titles: dict[str, str]) -> str:
-    """One line for each setting, policy and metric, with all digits."""
-    lines: list[Sequence[object]] = []
-    for summary in summaries:
-        who = (titles.get(summary.setting, summary.setting), summary.policy)
-        rate = summary.success
-        lines.append((*who, "success", rate.count, rate.fraction, "", "", rate.low, rate.high))
-        lines += [(*who, name, *_numbers(value)) for name, value in summary.metrics.items()]
-    return csv_text("setting,policy,metric,count,mean,sd,median,low,high".split(","), lines)
-
-
-def differences_csv(pairs: Sequence[PairedDifference], titles: dict[str, str]) -> str:
-    """One line for each setting, metric and pair of policies, with all digits."""
-    names = (
-        "setting,metric,first,second,count,mean,sd,median,low,high,better,worse,p_value,"
-        "p_corrected,effect,needed,verdict"
-    )
-    lines = [
-        (
-            *(titles.get(pair.setting, pair.setting), pair.metric, pair.first, pair.second),
-            *_numbers(pair.difference),
-            *(pair.better, pair.worse, pair.p_value, pair.p_corrected, pair.effect),
-            *("" if pair.needed is None else pair.needed, pair.verdict),
-        )
-        for pair in pairs
-    ]
-    return csv_text(names.split(","), lines)
-
-
-def _numbers(value: Estimate) -> tuple[float, ...]:
-    return value.count, value.mean, value.sd, value.median, value.low, value.high
-
-
-def rich_table(table: Table) -> RichTable:
-    """The table for a terminal."""
-    from rich import box
-    from rich.table import Table as RichTable
-    from rich.text import Text
-
-    rich = RichTable(
-        title=Text(table.title),
-        box=box.SIMPLE_HEAD,
-        show_edge=False,
-        title_justify="left",
-        padding=(0, 1, 0, 0),
-    )
-    for i, heading in enumerate(table.headings):
-        rich.add_column(Text(heading), justify="left" if i == 0 else "right", no_wrap=i == 0)
-    for row in table.cells:
-        rich.add_row(*(Text(cell) for cell in row))
-    return rich
-
-
-def text(tables: Sequence[Table], width: int = 160) -> str:
-    """The tables as plain text."""
-    from rich.console import Console
-
-    console = Console(
-        file=io.StringIO(),
-        width=width,
-        force_terminal=False,
-        force_jupyter=False,
-        color_system=None,
-    )
-    with console.capture() as capture:
-        for table in tables:
-            console.print(rich_table(table))
-            console.print()
-    return "\n".join(line.rstrip() for line in capture.get().rstrip().splitlines()) + "\n"
-
-
 def _policy_cells(summary: PolicySummary, metrics: Sequence[str], wide: bool) -> tuple[str, ...]:
     failed = f"\n{summary.failed} failed" if summary.failed else ""
     rate = summary.success
@@ -356,7 +267,3 @@ def _number(value: float, digits: int, *, sign: bool = False) -> str:
 def _milliseconds(seconds: float) -> str:
     value = 1e3 * seconds
     return f"{value:.0f}" if value >= 100.0 else f"{value:.3g}"
-
-
-def _line(cells: Sequence[str]) -> str:
-    return "| " + " | ".join(cells) + " |"

@@ -8,8 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from pushplan.cli import main
 from pushplan.evaluation import ResultRow, Results, bench
 from pushplan.evaluation.store import RunDirectory
+from pushplan.evaluation.table_formats import latex
+from pushplan.evaluation.tables import Table
 from pushplan.world import InvalidInputError
 
 
@@ -148,6 +151,22 @@ def test_report_files(results: Results) -> None:
     before = (folder / "differences.csv").read_bytes()
     results.report()
     assert (folder / "differences.csv").read_bytes() == before
+
+
+def test_tables_for_documents(results: Results, capsys: pytest.CaptureFixture[str]) -> None:
+    folder = str(results.path)
+    better = next(s for s in results.summary() if s.policy == "better").metrics["E_nav"]
+    assert main(["report", folder, "--format", "markdown"]) == 0
+    assert f"{better.mean:.3f} ± {better.sd:.3f}<br>[" in capsys.readouterr().out
+    assert main(["report", folder, "--format", "latex"]) == 0
+    text = capsys.readouterr().out
+    assert rf"{better.mean:.3f} $\pm$ {better.sd:.3f}\\{{}}[" in text
+    assert text.count(r"\begin{table}") == text.count(r"\end{table}") == len(results.tables())
+    for line in text.splitlines():
+        assert line.count("&") in (0, line.count(r"\&") + line.rstrip("\\").count(" & "))
+    odd = Table("100 % of A_1 & B^2", ("policy", "x"), (("a\\b~c", "{1}"),), "50 #")
+    for piece in (r"100 \% of A\_1 \& B\textasciicircum{}2", r"a\textbackslash{}b", r"\{1\}"):
+        assert piece in latex([odd])
 
 
 class _Page(html.parser.HTMLParser):

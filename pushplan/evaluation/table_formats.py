@@ -1,0 +1,140 @@
+"""Tables as Markdown, LaTeX, CSV and text."""
+
+from __future__ import annotations
+
+import io
+import re
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from pushplan.evaluation.rows import csv_text
+from pushplan.evaluation.statistics import Estimate
+from pushplan.evaluation.summary import PairedDifference, PolicySummary
+from pushplan.evaluation.tables import Table
+
+if TYPE_CHECKING:
+    from rich.table import Table as RichTable
+
+_LATEX = {
+    **{character: "\\" + character for character in "&%$#_{}"},
+    **{"\\": r"\textbackslash{}", "~": r"\textasciitilde{}", "^": r"\textasciicircum{}"},
+    **{"±": r"$\pm$", "<": "$<$", ">": "$>$"},
+}
+
+
+def markdown(tables: Sequence[Table]) -> str:
+    """The tables as a Markdown document."""
+    blocks = []
+    for table in tables:
+        lines = [f"## {table.title}", "", _line(table.headings)]
+        lines.append(_line(["---"] * len(table.headings)))
+        lines += [_line([cell.replace("\n", "<br>") for cell in row]) for row in table.cells]
+        if table.note:
+            lines += ["", f"{table.note[0].upper()}{table.note[1:]}."]
+        blocks.append("\n".join(lines))
+    return "\n\n".join(blocks) + "\n"
+
+
+def latex(tables: Sequence[Table]) -> str:
+    """The tables for a LaTeX document that loads ``booktabs`` and ``makecell``."""
+    blocks = []
+    for table in tables:
+        columns = "l" + "r" * (len(table.headings) - 1)
+        lines = [r"\begin{table}", r"\centering", rf"\caption{{{_latex(table.title)}}}"]
+        lines += [rf"\begin{{tabular}}{{{columns}}}", r"\toprule", _latex_line(table.headings)]
+        lines += [r"\midrule", *(_latex_line(row) for row in table.cells), r"\bottomrule"]
+        lines += [r"\end{tabular}"]
+        if table.note:
+            lines.append(rf"\par\smallskip\footnotesize {_latex(table.note)}.")
+        blocks.append("\n".join([*lines, r"\end{table}"]))
+    return "\n\n".join(blocks) + "\n"
+
+
+def _latex(text: str) -> str:
+    return re.sub(f"[{re.escape(''.join(_LATEX))}]", lambda found: _LATEX[found[0]], text)
+
+
+def _latex_line(cells: Sequence[str]) -> str:
+    return " & ".join(map(_latex_cell, cells)) + r" \\"
+
+
+def _latex_cell(cell: str) -> str:
+    lines = [_latex(line) for line in cell.split("\n")]
+    # a line that begins with a bracket would be an argument of the line break before it
+    joined = r"\\".join([lines[0], *(f"{{}}{line}" for line in lines[1:])])
+    return joined if len(lines) == 1 else rf"\makecell[r]{{{joined}}}"
+
+
+def summary_csv(summaries: Sequence[PolicySummary], titles: dict[str, str]) -> str:
+    """One line for each setting, policy and metric, with all digits."""
+    lines: list[Sequence[object]] = []
+    for summary in summaries:
+        who = (titles.get(summary.setting, summary.setting), summary.policy)
+        rate = summary.success
+        lines.append((*who, "success", rate.count, rate.fraction, "", "", rate.low, rate.high))
+        lines += [(*who, name, *_numbers(value)) for name, value in summary.metrics.items()]
+    return csv_text("setting,policy,metric,count,mean,sd,median,low,high".split(","), lines)
+
+
+def differences_csv(pairs: Sequence[PairedDifference], titles: dict[str, str]) -> str:
+    """One line for each setting, metric and pair of policies, with all digits."""
+    names = (
+        "setting,metric,first,second,count,mean,sd,median,low,high,better,worse,p_value,"
+        "p_corrected,effect,needed,verdict"
+    )
+    lines = [
+        (
+            *(titles.get(pair.setting, pair.setting), pair.metric, pair.first, pair.second),
+            *_numbers(pair.difference),
+            *(pair.better, pair.worse, pair.p_value, pair.p_corrected, pair.effect),
+            *("" if pair.needed is None else pair.needed, pair.verdict),
+        )
+        for pair in pairs
+    ]
+    return csv_text(names.split(","), lines)
+
+
+def _numbers(value: Estimate) -> tuple[float, ...]:
+    return value.count, value.mean, value.sd, value.median, value.low, value.high
+
+
+def rich_table(table: Table) -> RichTable:
+    """The table for a terminal."""
+    from rich import box
+    from rich.table import Table as RichTable
+    from rich.text import Text
+
+    rich = RichTable(
+        title=Text(table.title),
+        box=box.SIMPLE_HEAD,
+        show_edge=False,
+        title_justify="left",
+        padding=(0, 1, 0, 0),
+    )
+    for i, heading in enumerate(table.headings):
+        rich.add_column(Text(heading), justify="left" if i == 0 else "right", no_wrap=i == 0)
+    for row in table.cells:
+        rich.add_row(*(Text(cell) for cell in row))
+    return rich
+
+
+def text(tables: Sequence[Table], width: int = 160) -> str:
+    """The tables as plain text."""
+    from rich.console import Console
+
+    console = Console(
+        file=io.StringIO(),
+        width=width,
+        force_terminal=False,
+        force_jupyter=False,
+        color_system=None,
+    )
+    with console.capture() as capture:
+        for table in tables:
+            console.print(rich_table(table))
+            console.print()
+    return "\n".join(line.rstrip() for line in capture.get().rstrip().splitlines()) + "\n"
+
+
+def _line(cells: Sequence[str]) -> str:
+    return "| " + " | ".join(cells) + " |"
