@@ -81,7 +81,7 @@ def test_a_bench_runs(at, size, folder) -> None:
     episodes = int(arguments[arguments.index("--episodes") + 1])
     rows = (out / "results.csv").read_text().splitlines()
     assert len(rows) == 1 + episodes * (arguments[4].count(",") + 1)
-    assert (out / "report.html").exists() and (out / "tradeoff.png").exists()
+    assert (out / "report.html").exists() and (out / "tradeoff.svg").exists()
 
 
 @pytest.mark.parametrize(

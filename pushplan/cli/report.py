@@ -7,7 +7,7 @@ import sys
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
-from pushplan.cli.common import add_command, say
+from pushplan.cli.common import add_command, say, whole
 
 if TYPE_CHECKING:
     from pushplan.evaluation.tables import Table
@@ -16,6 +16,7 @@ _EXAMPLES = """\
   pushplan report runs/first
   pushplan report runs/first --metrics E_nav_to_goal_point,my_metrics:jerk
   pushplan report runs/first --format latex > tables.tex
+  pushplan report runs/first --replays beside --replay-most 1000
 """
 
 
@@ -36,6 +37,19 @@ def add(commands: Any) -> None:
         choices=("text", "markdown", "latex"),
         help="only print the tables, as a document (LaTeX needs booktabs and makecell)",
     )
+    parser.add_argument(
+        "--replays",
+        choices=("embed", "beside", "none"),
+        default="embed",
+        help="recorded episodes in the page (default), as files beside it, or not at all",
+    )
+    parser.add_argument(
+        "--replay-most",
+        type=whole(0),
+        default=40,
+        metavar="N",
+        help="replays of at most N episodes, scenarios with failures first (default %(default)s)",
+    )
 
 
 def run(options: argparse.Namespace) -> int:
@@ -44,7 +58,7 @@ def run(options: argparse.Namespace) -> int:
 
     results = Results.load(options.directory)
     if options.metrics is None and options.format is None:
-        show(results)
+        show(results, replays=options.replays, most=options.replay_most)
         return 0
     wanted = options.metrics
     tables = results.measure(wanted.split(",")) if wanted else results.tables()
@@ -55,13 +69,10 @@ def run(options: argparse.Namespace) -> int:
     return 0
 
 
-def show(results: Any) -> None:
+def show(results: Any, **options: Any) -> None:
     """Print the tables of a run, write its report, say where it is."""
     _print(results.tables())
-    page = results.report()
-    for name in ("tradeoff.png", "scores.png", "planning_time.png"):
-        if (page.parent / name).is_file():
-            say(f"picture: {page.parent / name}")
+    page = results.report(**options)
     say(f"page:    {page}")
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import math
 import os
 import pickle
 from collections import deque
@@ -40,7 +41,7 @@ from pushplan.evaluation.worker_process import (
     WorkerOutOfMemoryError,
     WorkerOverranError,
 )
-from pushplan.world import InvalidInputError
+from pushplan.world import InvalidInputError, Stop
 from pushplan.world.checks import integer, number
 from pushplan.world.errors import describe
 
@@ -156,6 +157,9 @@ def _note(
 ) -> None:
     store.note("configuration", {**settings_dict(settings), **(about or {})})
     store.extend("policies", {job.policy.label: job.policy.identity for job in jobs})
+    stops = {job.policy.label: job.policy.options.get("stop") for job in jobs}
+    limits = {label: stop.seconds for label, stop in stops.items() if isinstance(stop, Stop)}
+    store.extend("deadlines", {k: v for k, v in limits.items() if math.isfinite(v)})
     factor = settings.latency_factor
     mode = "" if factor is None else f", latency-aware x {factor:g}"
     store.extend("settings", {setting_of(*job.key[1:]): job.title + mode for job in jobs})

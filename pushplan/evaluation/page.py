@@ -1,68 +1,147 @@
-"""One page about a run that needs nothing beside it: tables, plots, links to what went wrong."""
+"""One page about a run that needs nothing beside it: tables, figures, every episode, replays."""
 
 from __future__ import annotations
 
-import base64
-import html
+import json
 from collections.abc import Mapping, Sequence
+from importlib.resources import files
 from pathlib import Path
+from typing import Any
 
+import pushplan
 from pushplan.evaluation.provenance import in_words
+from pushplan.evaluation.replays import chosen, packed, write_beside
 from pushplan.evaluation.rows import ResultRow
 from pushplan.evaluation.run_record import RunRecord
-from pushplan.evaluation.tables import Table
+from pushplan.evaluation.tables import Table, heading
+from pushplan.metrics import Role, metric_names
 from pushplan.world.files import write_atomic
+from pushplan.world.libraries import need
 
-LISTED = 200
-"""At most so many rows are listed in full."""
-
-_STYLE = """
-body { font: 15px/1.5 system-ui, sans-serif; color: #1b1f24; background: #fff;
-       max-width: 68rem; margin: 2rem auto; padding: 0 1rem; }
-h1 { font-size: 1.5rem; margin-bottom: .2rem; } h2 { font-size: 1.15rem; margin-top: 2.2rem; }
-.scroll { overflow-x: auto; }
-table { border-collapse: collapse; font-variant-numeric: tabular-nums; font-size: .88rem; }
-th, td { padding: .35rem .8rem; text-align: right; border-bottom: 1px solid #e3e6ea;
-         vertical-align: top; white-space: nowrap; }
-th:first-child, td:first-child { text-align: left; }
-.rows th, .rows td { text-align: left; } .rows td.why { white-space: normal; }
-thead th { border-bottom: 2px solid #8b949e; }
-td small, p.note, .about { color: #57606a; } p.note { font-size: .82rem; max-width: 50rem; }
-figure { margin: 1.5rem 0; } figcaption { font-weight: 600; margin-bottom: .4rem; }
-img { max-width: 100%; height: auto; } a { color: #0558b0; }
-code { font-size: .85em; }
-"""
+REPLAYS = ("embed", "beside", "none")
+_FILES = files("pushplan.evaluation") / "page_files"
+_TIMES = ("plan_time_median_s", "decision_time_median_s", "wall_time_s")
+_DIGITS = 5
 
 
 def write_page(
-    run: RunRecord, tables: Sequence[Table], plots: Mapping[str, Path], folder: Path
+    run: RunRecord,
+    tables: Sequence[Table],
+    figures: Mapping[str, Path],
+    folder: Path,
+    *,
+    replays: str = "embed",
+    most: int = 40,
 ) -> Path:
     """Write ``report.html`` and return its path.
 
     Args:
         run: whose page it is.
         tables: tables, scores first.
-        plots: caption -> PNG file; the pictures are embedded.
+        figures: caption -> SVG file; they are embedded.
         folder: where the page goes; links are relative to it.
+        replays: one of `REPLAYS`: in the page, as files beside it, or not at all.
+        most: how many episodes have a replay.
     """
+    from markupsafe import Markup
+
+    rows = [] if replays == "none" else chosen(run, most)
+    texts: list[str] = []
+    there: dict[str, int] = {}
+    if replays == "embed":
+        found = {row.job: text for row in rows if (text := packed(run, row)) is not None}
+        texts, there = list(found.values()), dict.fromkeys(found, 1)
+    elif replays == "beside":
+        there = dict.fromkeys(write_beside(run, rows, folder), 2)
     pairs = [table for table in tables if table.title.startswith("Paired")]
-    scores = [table for table in tables if table not in pairs]
-    parts = [
-        _head(run),
-        *(_table(table) for table in scores),
-        *(_figure(caption, path) for caption, path in plots.items()),
-        *(_table(table) for table in pairs),
-        _listing(run),
-    ]
-    title = html.escape(_title(run))
-    page = (
-        f'<!doctype html>\n<html lang="en"><head><meta charset="utf-8"><title>{title}</title>\n'
-        '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
-        f"<style>{_STYLE}</style></head>\n<body>\n" + "\n".join(parts) + "\n</body></html>\n"
+    page = need("jinja2").Environment(autoescape=True, trim_blocks=True, lstrip_blocks=True)
+    text = page.from_string(_file("page.html")).render(
+        version=pushplan.__version__,
+        title=_title(run),
+        facts=_facts(run),
+        style=Markup(_file("page.css")),
+        script=Markup(_file("page.js") + _file("replay.js") + "filter();\n"),
+        scores=[table for table in tables if table not in pairs],
+        pairs=pairs,
+        figures=[(c, p.name, Markup(_inline(p))) for c, p in figures.items()],
+        sources=[(k, v) for k, v in run.about.get("policies", {}).items() if k != v],
+        runs=[in_words(one) for one in run.about.get("runs", ())],
+        data=Markup(_script_json(page_data(run, there))),
+        replays=[Markup(_escaped(one)) for one in texts],
     )
     path = folder / "report.html"
-    write_atomic(path, page.encode())
+    write_atomic(path, text.encode())
     return path
+
+
+def page_data(run: RunRecord, replays: Mapping[str, int]) -> dict[str, Any]:
+    """What the scripts of the page read: the rows, column by column, texts as numbers of a list.
+
+    Args:
+        run: the rows.
+        replays: job -> 1 for a replay in the page, 2 for one beside it.
+    """
+    policies, titles = run.policies, run.titles
+    settings = {setting: index for index, setting in enumerate(titles)}
+    scenarios: dict[str, int] = {}
+    listed: list[tuple[str, int, int]] = []
+    for row in run.rows:
+        if row.scenario not in scenarios:
+            scenarios[row.scenario] = len(listed)
+            listed.append((row.scenario, settings[row.setting], row.seed))
+    reasons = {reason: i for i, reason in enumerate(dict.fromkeys(r.reason for r in run.rows))}
+    statuses = {status: i for i, status in enumerate(dict.fromkeys(r.status for r in run.rows))}
+    numbers = {label: index for index, label in enumerate(policies)}
+    values = _values(run)
+    return {
+        "folder": str(run.path) if run.path is not None else "DIR",
+        "policies": policies,
+        "settings": list(titles.values()),
+        "scenarios": listed,
+        "statuses": list(statuses),
+        "reasons": list(reasons),
+        "measures": [("outcome", "outcome"), *((name, _heading(name)) for name in values)],
+        "rows": {
+            "policy": [numbers[row.policy] for row in run.rows],
+            "scenario": [scenarios[row.scenario] for row in run.rows],
+            "status": [statuses[row.status] for row in run.rows],
+            "reason": [reasons[row.reason] for row in run.rows],
+            "success": [int(row.success) for row in run.rows],
+            "job": [row.job for row in run.rows],
+            "trace": [row.trace for row in run.rows],
+            "replay": [replays.get(row.job, 0) for row in run.rows],
+            "values": {"outcome": [_outcome(row) for row in run.rows], **values},
+        },
+    }
+
+
+def _values(run: RunRecord) -> dict[str, list[float | None]]:
+    """Columns that have values, rounded, and metrics that are no columns."""
+    found = {}
+    for name in (*metric_names(Role.SCORE, Role.DETAIL, Role.FACT), *_TIMES):
+        column = [_rounded(getattr(row, name)) for row in run.rows]
+        if any(value is not None for value in column):
+            found[name] = column
+    for name in run.about.get("metrics", ()):
+        found[name] = [_rounded(run.measured.get(row.job, {}).get(name)) for row in run.rows]
+    return found
+
+
+def _rounded(value: float | None) -> float | None:
+    return None if value is None else float(f"{value:.{_DIGITS}g}")
+
+
+def _outcome(row: ResultRow) -> str:
+    if row.failed:
+        return row.status
+    return "success" if row.success else row.reason
+
+
+def _heading(name: str) -> str:
+    try:
+        return heading(name) if name not in _TIMES else name.removesuffix("_s") + " [s]"
+    except KeyError:
+        return name
 
 
 def _title(run: RunRecord) -> str:
@@ -70,81 +149,27 @@ def _title(run: RunRecord) -> str:
     return f"pushplan: {name}" if name else "pushplan: results"
 
 
-def _head(run: RunRecord) -> str:
+def _facts(run: RunRecord) -> str:
     facts = {"episodes": len(run.rows), **run.about.get("configuration", {})}
-    text = ", ".join(f"{key} {value}" for key, value in facts.items() if value is not None)
-    sources = "".join(
-        f"<li><code>{html.escape(label)}</code>: {html.escape(str(source))}</li>"
-        for label, source in run.about.get("policies", {}).items()
-        if label != source
-    )
-    return (
-        f"<h1>{html.escape(_title(run))}</h1>\n"
-        f'<p class="about">{html.escape(text)}. All rows: <a href="results.csv">results.csv</a>.'
-        f"</p>" + (f"<ul>{sources}</ul>" if sources else "") + _runs(run)
-    )
+    return ", ".join(f"{key} {value}" for key, value in facts.items() if value is not None)
 
 
-def _runs(run: RunRecord) -> str:
-    """Where the rows come from, a line for each call that ran jobs."""
-    lines = "".join(f"<li>{html.escape(in_words(one))}</li>" for one in run.about.get("runs", ()))
-    return f'<details class="about"><summary>Runs</summary><ul>{lines}</ul></details>' * bool(lines)
+def _file(name: str) -> str:
+    return (_FILES / name).read_text(encoding="utf-8")
 
 
-def _table(table: Table) -> str:
-    head = "".join(f"<th>{html.escape(cell)}</th>" for cell in table.headings)
-    lines = ["<tr>" + "".join(f"<td>{_cell(c)}</td>" for c in row) + "</tr>" for row in table.cells]
-    note = f'<p class="note">{html.escape(table.note)}.</p>' if table.note else ""
-    return (
-        f"<h2>{html.escape(table.title)}</h2>\n"
-        f'<div class="scroll"><table><thead><tr>{head}</tr></thead>\n<tbody>'
-        + "\n".join(lines)
-        + f"</tbody></table></div>{note}"
-    )
+def _inline(path: Path) -> str:
+    """An SVG file without what stands before its root."""
+    text = path.read_text(encoding="utf-8")
+    return text[text.index("<svg") :]
 
 
-def _cell(text: str) -> str:
-    first, *rest = html.escape(text).split("\n")
-    return "<br>".join([first, *(f"<small>{line}</small>" for line in rest)])
+def _script_json(value: object) -> str:
+    return _escaped(json.dumps(value, separators=(",", ":")))
 
 
-def _figure(caption: str, path: Path) -> str:
-    data = base64.b64encode(path.read_bytes()).decode()
-    text = html.escape(caption)
-    return (
-        f"<figure><figcaption>{text}</figcaption>"
-        f'<img alt="{text}" src="data:image/png;base64,{data}"></figure>'
-    )
-
-
-def _listing(run: RunRecord) -> str:
-    """Jobs that failed, then episodes without success."""
-    failed = [row for row in run.rows if row.failed]
-    missed = [row for row in run.rows if not row.failed and not row.success]
-    if not failed and not missed:
-        return "<h2>Failures</h2>\n<p>None: every episode ended in success.</p>"
-    chosen = (failed + missed)[:LISTED]
-    rows = "\n".join(_row(row, run.path) for row in chosen)
-    more = len(failed) + len(missed) - len(chosen)
-    rest = f"<p>{more} more are in results.csv.</p>" if more else ""
-    return (
-        f"<h2>Failures: {len(failed)} failed jobs, {len(missed)} episodes without success</h2>\n"
-        '<div class="scroll"><table class="rows"><thead><tr><th>policy</th><th>scenario</th>'
-        "<th>seed</th><th>status</th><th>reason</th><th>files</th></tr></thead>\n"
-        f"<tbody>{rows}</tbody></table></div>{rest}"
-    )
-
-
-def _row(row: ResultRow, run: Path | None) -> str:
-    links = [
-        f'<a href="{html.escape(place)}">{word}</a>'
-        for word, place in (
-            ("trace", row.trace_file),
-            ("traceback", f"failures/{row.job}.txt"),
-        )
-        if run is not None and place is not None and (run / place).is_file()
-    ]
-    cells = [row.policy, row.scenario, str(row.seed), row.status]
-    plain = "".join(f"<td>{html.escape(cell)}</td>" for cell in cells)
-    why = html.escape(row.reason)
-    return f'<tr>{plain}<td class="why">{why}</td><td>{" ".join(links)}</td></tr>'
+def _escaped(text: str) -> str:
+    """JSON that ends no script element: the characters of tags as their codes."""
+    for character in "<>&\u2028\u2029":
+        text = text.replace(character, f"\\u{ord(character):04x}")
+    return text

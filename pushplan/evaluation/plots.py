@@ -3,19 +3,22 @@
 from __future__ import annotations
 
 import io
+import json
 import math
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib import rc_context
+from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 
 from pushplan.evaluation.rows import ResultRow
 from pushplan.evaluation.run_record import RunRecord
 from pushplan.evaluation.statistics import estimate
-from pushplan.evaluation.summary import values_of
+from pushplan.evaluation.statistics_aggregate import performance_profile
+from pushplan.evaluation.summary import grouped, values_of
 from pushplan.evaluation.tables import heading
 from pushplan.metrics import Role, metric_names
 from pushplan.world.files import write_atomic
@@ -26,31 +29,34 @@ MARKERS = ("o", "s", "^", "D", "v", "P", "X", "*")
 PANEL = (4.6, 3.9)
 """Width and height of one panel [inch]."""
 _DPI = 130
+_MANY = 1000  # so many dots in a panel are drawn as an image
+_TRACES = 300  # of so many episodes every planning call is read from the trace
 
 
 def write_plots(run: RunRecord, folder: Path) -> dict[str, Path]:
-    """Draw everything that the rows allow.
+    """Draw everything that the rows allow, with where the rows come from in the files.
 
     Returns:
-        Caption -> path of a PNG file.
+        Caption -> path of an SVG file.
     """
     plots: dict[str, Path] = {}
-    for kind, drawn in (
-        ("Efficiency against effort", _tradeoff(run)),
-        ("Scores of every episode", _spread(run)),
-        ("Time of a planning call", _planning_time(run)),
-    ):
-        if drawn is not None:
-            name, figure = drawn
-            plots[kind] = folder / name
-            write_atomic(plots[kind], _png(figure))
+    for name, (caption, _) in FIGURES.items():
+        if (figure := draw(run, name)) is not None:
+            plots[caption] = folder / f"{name}.svg"
+            write_atomic(plots[caption], _svg(figure, caption, run))
     return plots
 
 
-def _tradeoff(run: RunRecord) -> tuple[str, Figure] | None:
+def draw(run: RunRecord, name: str) -> Figure | None:
+    """One of `FIGURES`; None if the rows have nothing for it."""
+    figure: Figure | None = FIGURES[name][1](run)
+    return figure
+
+
+def _tradeoff(run: RunRecord) -> Figure | None:
     """E against I: one dot an episode, the mean with its intervals."""
 
-    def draw(axes: Any, rows: Sequence[ResultRow]) -> None:
+    def panel(axes: Any, rows: Sequence[ResultRow]) -> None:
         kind = "nav" if values_of(rows, "E_nav") else "manip"
         names = (f"I_{kind}", f"E_{kind}")
         for i, label in enumerate(run.policies):
@@ -65,7 +71,8 @@ def _tradeoff(run: RunRecord) -> tuple[str, Figure] | None:
                 continue
             xy = np.array(points, dtype=float)
             style = {"color": COLOURS[i % 8], "marker": MARKERS[(i + i // 8) % 8]}
-            axes.scatter(*xy.T, s=16, alpha=0.35, linewidths=0, **style)
+            many = len(xy) > _MANY
+            axes.scatter(*xy.T, s=16, alpha=0.35, linewidths=0, rasterized=many, **style)
             across, up = estimate(xy[:, 0]), estimate(xy[:, 1])
             axes.errorbar(
                 across.mean,
@@ -90,10 +97,10 @@ def _tradeoff(run: RunRecord) -> tuple[str, Figure] | None:
 
     if not any(values_of(run.rows, name) for name in ("I_nav", "I_manip")):
         return None
-    return "tradeoff.png", _panels(run, draw, legend=True)
+    return _panels(run, panel, legend=True)
 
 
-def _spread(run: RunRecord) -> tuple[str, Figure] | None:
+def _spread(run: RunRecord) -> Figure | None:
     """A box and all dots for each policy, one row of panels a metric."""
     metrics = [name for name in metric_names(Role.SCORE, Role.DETAIL) if values_of(run.rows, name)]
     if not metrics:
@@ -114,7 +121,7 @@ def _spread(run: RunRecord) -> tuple[str, Figure] | None:
             if line < len(metrics) - 1:
                 axes.tick_params(labelbottom=False)
     figure.tight_layout()
-    return "scores.png", figure
+    return figure
 
 
 def _boxes(
@@ -137,7 +144,16 @@ def _boxes(
             capprops={"color": colour},
         )
         places = i + rng.uniform(-0.18, 0.18, len(values))
-        axes.scatter(places, values, s=9, color=colour, alpha=0.55, linewidths=0, zorder=3)
+        many = len(values) > _MANY
+        axes.scatter(
+            *(places, values),
+            s=9,
+            color=colour,
+            alpha=0.55,
+            linewidths=0,
+            zorder=3,
+            rasterized=many,
+        )
     steep = len(labels) > 3
     axes.set_xticks(
         range(len(labels)),
@@ -150,34 +166,69 @@ def _boxes(
     _quiet(axes)
 
 
-def _planning_time(run: RunRecord) -> tuple[str, Figure] | None:
-    """Fraction of planning calls that took at most so long."""
+def _profiles(run: RunRecord) -> Figure | None:
+    """Performance profiles with bands (Agarwal et al., 2021), one panel a score."""
+    kinds = [name for name in metric_names(Role.SCORE) if values_of(run.rows, name)]
+    if not kinds:
+        return None
+    figure = Figure(figsize=(PANEL[0] * len(kinds), PANEL[1]))
+    thresholds = np.linspace(0.0, 1.0, 101)
+    for axes, name in zip(figure.subplots(1, len(kinds), squeeze=False)[0], kinds, strict=True):
+        for i, label in enumerate(run.policies):
+            strata = [
+                np.array(values)
+                for (_, policy), rows in grouped(run.rows).items()
+                if policy == label and (values := values_of(rows, name))
+            ]
+            if not strata:
+                continue
+            found = performance_profile(strata, thresholds)
+            axes.step(thresholds, found.fractions, where="post", color=COLOURS[i % 8], label=label)
+            band = {"step": "post", "color": COLOURS[i % 8], "alpha": 0.18, "linewidth": 0}
+            axes.fill_between(thresholds, found.low, found.high, **band)
+        axes.set_xlabel(f"{heading(name)} above")
+        axes.set_ylim(0.0, 1.02)
+        _quiet(axes)
+    figure.axes[0].set_ylabel("share of episodes")
+    figure.axes[0].legend(fontsize=8, frameon=False, loc="lower left")
+    figure.set_layout_engine("constrained")
+    return figure
+
+
+def _planning_time(run: RunRecord) -> Figure | None:
+    """Fraction of planning calls that took at most so long; deadlines are dotted.
+
+    Of long runs, each episode counts with its median and its slowest call.
+    """
+    read = len(run.rows) <= _TRACES
     if not values_of(run.rows, "plan_time_median_s"):
         return None
 
-    def draw(axes: Any, rows: Sequence[ResultRow]) -> None:
+    def panel(axes: Any, rows: Sequence[ResultRow]) -> None:
         for i, label in enumerate(run.policies):
             mine = [r for r in rows if r.policy == label and r.plan_time_max_s is not None]
-            times = np.sort(np.concatenate([_calls(run, row) for row in mine] or [[]]))
+            times = np.sort(np.concatenate([_calls(run, row, read) for row in mine] or [[]]))
             if len(times) == 0:
                 continue
             fractions = np.arange(1, len(times) + 1) / len(times)
-            text = f"{label} ({len(times)} calls)"
-            axes.step(1e3 * times, fractions, where="post", color=COLOURS[i % 8], label=text)
+            shown = np.unique(np.linspace(0, len(times) - 1, 500).round().astype(int))
+            colour, text = COLOURS[i % 8], f"{label} ({len(times)} calls)"
+            axes.step(1e3 * times[shown], fractions[shown], where="post", color=colour, label=text)
+            if (deadline := run.about.get("deadlines", {}).get(label)) is not None:
+                axes.axvline(1e3 * deadline, color=colour, linestyle=":", linewidth=1.2)
         axes.set_xscale("log")
         axes.xaxis.set_major_formatter("{x:g}")
         axes.set_ylim(0.0, 1.02)
         axes.set_xlabel("time of a planning call [ms]")
         axes.set_ylabel("fraction of calls")
 
-    return "planning_time.png", _panels(run, draw, legend=True)
+    return _panels(run, panel, legend=True)
 
 
-def _calls(run: RunRecord, row: ResultRow) -> Any:
+def _calls(run: RunRecord, row: ResultRow, read: bool) -> Any:
     """Times of all planning calls of an episode [s], from its trace where there is one."""
-    if row.trace_file and run.path is not None and (path := run.path / row.trace_file).is_file():
-        with np.load(path, allow_pickle=False) as data:
-            return np.maximum(data["plan_times_s"], 1e-6)
+    if read and (episode := run.episode(row)) is not None:
+        return np.maximum(episode.plan_times_s, 1e-6)
     return np.array([row.plan_time_median_s, row.plan_time_max_s])
 
 
@@ -220,8 +271,24 @@ def _quiet(axes: Any) -> None:
         axes.spines[side].set_visible(False)
 
 
-def _png(figure: Figure) -> bytes:
+def _svg(figure: Figure, title: str, run: RunRecord) -> bytes:
     buffer = io.BytesIO()
-    FigureCanvasAgg(figure)
-    figure.savefig(buffer, format="png", dpi=_DPI)
+    FigureCanvasSVG(figure)
+    source = json.dumps({"runs": run.about.get("runs", []), "policies": run.about.get("policies")})
+    with rc_context({"svg.fonttype": "none", "svg.hashsalt": title}):
+        figure.savefig(
+            buffer,
+            format="svg",
+            dpi=_DPI,
+            metadata={"Title": title, "Creator": "pushplan", "Description": source, "Date": None},
+        )
     return buffer.getvalue()
+
+
+FIGURES = {
+    "tradeoff": ("Efficiency against effort", _tradeoff),
+    "scores": ("Scores of every episode", _spread),
+    "profiles": ("Share of episodes above each score, all settings alike", _profiles),
+    "planning_time": ("Time of a planning call", _planning_time),
+}
+"""Name -> caption, and what draws it."""

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from pushplan.evaluation.database import DATABASE
 from pushplan.evaluation.rescoring import metric_label, rescore
@@ -26,7 +28,8 @@ from pushplan.evaluation.tables import (
     measured_tables,
     score_tables,
 )
-from pushplan.world import InvalidInputError
+from pushplan.world import InvalidInputError, UnknownNameError
+from pushplan.world.checks import choice, integer
 from pushplan.world.files import write_atomic
 from pushplan.world.libraries import need
 
@@ -47,10 +50,18 @@ class Results(RunRecord):
 
     def summary(self) -> list[PolicySummary]:
         """What the rows say about each policy in each setting."""
+        return list(self._summaries)
+
+    @functools.cached_property
+    def _summaries(self) -> list[PolicySummary]:
         return summarise(self.rows, self.policies)
 
     def compare(self) -> list[PairedDifference]:
         """Paired differences of all policies on the same scenarios."""
+        return list(self._differences)
+
+    @functools.cached_property
+    def _differences(self) -> list[PairedDifference]:
         return paired_differences(self.rows, self.policies)
 
     def measure(self, metrics: Sequence[str]) -> list[Table]:
@@ -102,6 +113,24 @@ class Results(RunRecord):
         """Scores and paired differences as text of at most ``width`` characters a line."""
         return text(self.tables(), width)
 
+    def figure(self, name: str) -> Any:
+        """One figure of the report, to show or to save.
+
+        Args:
+            name: ``"tradeoff"``, ``"scores"``, ``"profiles"`` or ``"planning_time"``.
+
+        Returns:
+            A `matplotlib.figure.Figure`; None if the rows have nothing for it.
+
+        Raises:
+            UnknownNameError: if there is no such figure.
+            MissingDependencyError: without Matplotlib.
+        """
+        plots = need("pushplan.evaluation.plots")
+        if name not in plots.FIGURES:
+            raise UnknownNameError("figure", name, plots.FIGURES)
+        return plots.draw(self, name)
+
     def export(self, path: str | Path) -> int:
         """Write all rows, and metrics that are no columns, as CSV or Parquet.
 
@@ -120,21 +149,27 @@ class Results(RunRecord):
         export(self, Path(path))
         return len(self.rows)
 
-    def report(self, out: str | Path | None = None) -> Path:
-        """Write ``report.html``, its plots, the summaries and ``results.csv``, all of these rows.
+    def report(
+        self, out: str | Path | None = None, *, replays: str = "embed", most: int = 40
+    ) -> Path:
+        """Write ``report.html``, its figures, the summaries and ``results.csv``, all of these rows.
 
         Args:
             out: folder; the run directory by default.
+            replays: ``"embed"`` in the page, ``"beside"`` it as files, or ``"none"``.
+            most: how many episodes have a replay: whole scenarios, those with failures first.
 
         Returns:
             The path of the page.
 
         Raises:
             InvalidInputError: if the folder is the directory of a run with other rows.
-            MissingDependencyError: without Matplotlib.
+            MissingDependencyError: without Matplotlib and Jinja.
         """
-        from pushplan.evaluation.page import write_page
+        from pushplan.evaluation.page import REPLAYS, write_page
 
+        choice("replays", replays, REPLAYS)
+        integer("most", most, low=0)
         folder = Path(out) if out is not None else self.path or Path()
         self._check_same_run(folder)
         folder.mkdir(parents=True, exist_ok=True)
@@ -146,7 +181,7 @@ class Results(RunRecord):
             folder / "differences.csv", differences_csv(self.compare(), self.titles).encode()
         )
         plots = need("pushplan.evaluation.plots").write_plots(self, folder)
-        return write_page(self, tables, plots, folder)
+        return write_page(self, tables, plots, folder, replays=replays, most=most)
 
     def _check_same_run(self, folder: Path) -> None:
         if not (folder / DATABASE).is_file():

@@ -34,7 +34,7 @@ from pushplan.world.files import write_atomic
 
 REPORT = (
     *("report.html", "summary.md", "summary.csv", "differences.csv"),
-    *("tradeoff.png", "scores.png", "planning_time.png"),
+    *("tradeoff.svg", "scores.svg", "profiles.svg", "planning_time.svg"),
 )
 """Files that `Results.report` derives from the rows, beside ``results.csv``."""
 
@@ -107,7 +107,7 @@ class RunDirectory:
         with self._use() as db:
             db.execute("INSERT OR REPLACE INTO about VALUES (?, ?)", (key, json.dumps(value)))
 
-    def extend(self, key: str, entries: Mapping[str, str]) -> None:
+    def extend(self, key: str, entries: Mapping[str, Any]) -> None:
         """Add entries to a JSON mapping about the run."""
         self.note(key, {**self.about().get(key, {}), **entries})
 

@@ -17,6 +17,7 @@ EXTRAS = {
     "casadi": "ships",
     "onnxruntime": "learned",
     "imageio_ffmpeg": "plots",
+    "jinja2": "plots",
     "matplotlib": "plots",
     "mcap": "ros",
     "rosbags": "ros",

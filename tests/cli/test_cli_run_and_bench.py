@@ -80,7 +80,7 @@ def test_bench_with_a_file_of_ones_own(tmp_path: Path, capsys: pytest.CaptureFix
     options = ["--episodes", "2", "--workers", "2", "--out", str(out), "--seed", "5"]
     assert main(["bench", "maze-2d-3", "--policies", names, *options]) == 0
     text = capsys.readouterr().out
-    assert "Spin - straight" in text and str(out / "tradeoff.png") in text
+    assert "Spin - straight" in text and str(out / "report.html") in text
     rows = {(row.policy, row.seed): row for row in Results.load(out).rows}
     assert {seed for _, seed in rows} == {5, 6}
     assert rows["straight", 5].success and rows["straight", 5].plan_calls == 1

@@ -1,0 +1,192 @@
+"""The page of a run, in a real browser: what one clicks, types and sees."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from synthetic_rows import many_rows
+
+from pushplan.cli import main
+from pushplan.evaluation import Results, bench
+from pushplan.evaluation.page import page_data
+from pushplan.evaluation.replays import chosen
+
+api = pytest.importorskip("playwright.sync_api", reason="needs Playwright")
+CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
+pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="needs Chromium")
+POLICIES = ["straight", "random", "kinodynamic-rrt"]
+LINES = "#matrix tbody tr:not(.space)"
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    out = tmp_path_factory.mktemp("page") / "run"
+    bench("maze-2d-3", POLICIES, episodes=3, workers=0, out=out).report()
+    return out
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    with api.sync_playwright() as play:
+        found = play.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
+        yield found
+        found.close()
+
+
+class Opened:
+    """A page, and everything that went wrong in it."""
+
+    def __init__(self, browser: Any, file: Path, **options: Any) -> None:
+        self.page = browser.new_context(**options).new_page()
+        self.wrong: list[str] = []
+        self.asked: list[str] = []
+        self.page.on("pageerror", lambda error: self.wrong.append(str(error)))
+        self.page.on("console", lambda m: m.type == "error" and self.wrong.append(m.text))
+        self.page.on("request", lambda request: self.asked.append(request.url))
+        self.page.goto(file.as_uri())
+        self.page.wait_for_selector("#matrix tbody td.missed, #matrix tbody td:nth-child(2)")
+
+    def cells(self, column: int) -> list[str]:
+        cells = self.page.locator(f"{LINES} td:nth-child({column})").all()
+        return [cell.inner_text() for cell in cells]
+
+    def state(self, text: str) -> Any:
+        return self.page.evaluate(text)
+
+
+@pytest.fixture
+def opened(browser: Any, folder: Path) -> Iterator[Opened]:
+    one = Opened(browser, folder / "report.html")
+    yield one
+    assert one.wrong == []
+    assert all(url.startswith("file:") for url in one.asked)
+
+
+def test_filters_and_sorting(opened: Opened) -> None:
+    page = opened.page
+    assert opened.cells(2) == ["success"] * 3
+    page.locator("#outcome").select_option("differ")
+    assert page.locator("#count").inner_text() == "3 of 3 scenarios"
+    page.keyboard.press("/")
+    page.keyboard.type("52cbe2a8-1")
+    assert page.locator("#count").inner_text() == "1 of 3 scenarios"
+    page.locator("#find").fill("")
+    page.locator("#measure").select_option("I_nav")
+    page.locator("#matrix th button", has_text="random").click()
+    values = [float(text.split()[0]) for text in opened.cells(3)]
+    assert values == sorted(values, reverse=True) and len(set(values)) > 1
+    page.locator("#matrix th button", has_text="random").click()
+    assert [float(text.split()[0]) for text in opened.cells(3)] == sorted(values)
+
+
+def test_a_table_sorts_by_its_numbers(opened: Opened) -> None:
+    table = opened.page.locator("#scores table").first
+    table.locator("th button", has_text="I_nav").click()
+    texts = [row.inner_text().split() for row in table.locator("tbody tr").all()]
+    assert sorted(line[0] for line in texts) == sorted(POLICIES)
+    column = [row.locator("td").nth(4).inner_text() for row in table.locator("tbody tr").all()]
+    values = [float(text.split()[0]) for text in column]
+    assert values == sorted(values, reverse=True)
+
+
+def test_an_episode_is_played_beside_another_in_step(opened: Opened, folder: Path) -> None:
+    page = opened.page
+    page.locator(f"{LINES} td:nth-child(2)").first.click()
+    page.wait_for_function("player.views.length === 2")
+    first = opened.state("player.views[0].replay.job")
+    row = next(row for row in Results.load(folder).rows if row.job == first)
+    episode = Results.load(folder).episode(row)
+    assert episode is not None
+    view = opened.state(
+        "(({poses, frames, times}) => [0, 1, 2].map((axis) =>"
+        " Array.from(poses.slice(axis * frames, (axis + 1) * frames))).concat([times]))"
+        "(player.views[0].replay)"
+    )
+    instants = episode.times - episode.times[0]
+    whole = [np.interp(view[3], instants, episode.robot_poses[:, axis]) for axis in (0, 1)]
+    assert np.abs(np.array(view[:2]) - whole).max() < 2e-3
+    before = opened.state("player.views.map((view) => view.canvas.toDataURL())")
+    page.evaluate("$('time').value = 500; $('time').dispatchEvent(new Event('input'))")
+    assert opened.state("player.time") == pytest.approx(opened.state("player.end") / 2)
+    after = opened.state("player.views.map((view) => view.canvas.toDataURL())")
+    assert before[0] != after[0] and before[1] != after[1]
+    page.locator("h1").click()
+    page.keyboard.press("Space")
+    page.wait_for_function(f"player.time > {opened.state('player.end') / 2}")
+    page.keyboard.press("Space")
+    assert opened.state("player.playing") is False
+
+
+def test_keys_move_in_the_matrix_and_choose(opened: Opened) -> None:
+    opened.page.locator("#matrix").focus()
+    for key in ("ArrowDown", "ArrowDown", "ArrowUp", "ArrowRight", "Enter"):
+        opened.page.keyboard.press(key)
+    assert opened.state("[state.line, state.column]") == [1, 1]
+    assert "random" in opened.page.locator("#chosen").inner_text()
+    opened.page.locator("h1").click()
+    ground = "getComputedStyle(document.body).backgroundColor"
+    light = opened.state(ground)
+    opened.page.keyboard.press("d")
+    assert opened.state(ground) != light
+
+
+@pytest.mark.parametrize(("width", "scheme"), [(390, "dark"), (1280, "light")])
+def test_nothing_is_cut_off(browser: Any, folder: Path, width: int, scheme: str) -> None:
+    one = Opened(
+        browser,
+        folder / "report.html",
+        viewport={"width": width, "height": 800},
+        color_scheme=scheme,
+    )
+    assert one.state("document.documentElement.scrollWidth") <= width
+    assert one.state("isDark()") == (scheme == "dark")
+
+
+def test_replays_beside_the_page(browser: Any, folder: Path, tmp_path: Path) -> None:
+    shutil.copytree(folder, tmp_path / "run")
+    assert main(["report", str(tmp_path / "run"), "--replays", "beside", "--replay-most", "6"]) == 0
+    assert len(list((tmp_path / "run" / "replays").iterdir())) == 6
+    one = Opened(browser, tmp_path / "run" / "report.html")
+    one.page.locator(f"{LINES} td:nth-child(2)").first.click()
+    one.page.wait_for_function("player.views.length === 2")
+    assert main(["report", str(tmp_path / "run"), "--replays", "none"]) == 0
+    bare = Opened(browser, tmp_path / "run" / "report.html")
+    bare.page.locator(f"{LINES} td:nth-child(2)").first.click()
+    assert "No replay" in bare.page.locator("#chosen").inner_text()
+    assert bare.page.locator("#player").is_hidden()
+
+
+@pytest.mark.slow
+def test_ten_thousand_rows_stay_usable(browser: Any, tmp_path: Path) -> None:
+    page = many_rows(10_000).report(tmp_path)
+    assert page.stat().st_size < 5e6
+    one = Opened(browser, page)
+    assert one.state("performance.now()") < 5000.0
+    assert one.page.locator("#count").inner_text() == "2000 of 2000 scenarios"
+    assert one.page.locator("#matrix tbody tr").count() < 60
+    began = one.state("performance.now()")
+    one.page.locator("#find").fill("suite-3")
+    assert one.page.locator("#count").inner_text() == "500 of 2000 scenarios"
+    one.page.locator("#matrix").evaluate("box => { box.scrollTop = 1e6; }")
+    one.page.wait_for_function("document.querySelector('#matrix').innerText.includes('suite-3-')")
+    assert one.state("performance.now()") - began < 3000.0
+    assert one.wrong == []
+
+
+def test_failures_come_first_and_replays_are_of_whole_scenarios(folder: Path) -> None:
+    results = Results.load(folder)
+    assert len(chosen(results, 40)) == 9
+    assert [row.scenario for row in chosen(results, 5)] == [results.rows[0].scenario] * 3
+    broken = [
+        replace(row, status="crashed", success=False) if row.seed == 2 else row
+        for row in results.rows
+    ]
+    assert {row.seed for row in chosen(replace(results, rows=tuple(broken)), 3)} == {2}
+    data = page_data(results, {})
+    assert len(data["rows"]["policy"]) == 9 and data["policies"] == POLICIES
