@@ -11,6 +11,7 @@ from pushplan import __version__
 from pushplan.cli import (
     bench,
     codegen,
+    compare,
     compiling,
     experiment,
     gtsp,
@@ -36,6 +37,7 @@ COMMANDS = (
     listing,
     score,
     report,
+    compare,
     stored,
     ice,
     gtsp,

@@ -42,8 +42,8 @@ def run(options: argparse.Namespace) -> int:
         say(f"left out: {label} in {title}: {why}")
     if options.check:
         for suite in experiment.suites:
-            skipped = experiment.skipped
-            labels = [p.label for p in experiment.policies if (suite.name, p.label) not in skipped]
+            scenario = suite.scenarios[0]
+            labels = [job.policy.label for job in jobs if job.scenario == scenario]
             say(f"{suite.name}: {len(suite.scenarios)} scenarios, {', '.join(labels)}")
         say(f"{len(jobs)} jobs")
         return 0

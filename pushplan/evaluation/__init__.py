@@ -12,6 +12,7 @@ from pushplan.world.lazy_names import lazy_names
 if TYPE_CHECKING:
     from pushplan.evaluation.batch import run_batch
     from pushplan.evaluation.benchmark import bench
+    from pushplan.evaluation.comparing import Rule, Verdict, compare_runs
     from pushplan.evaluation.compatibility import UnusablePolicyError
     from pushplan.evaluation.database import DamagedResultsError
     from pushplan.evaluation.episode import InvalidActionError, PolicyError, run_episode
@@ -52,15 +53,18 @@ __all__ = [
     "Rescored",
     "ResultRow",
     "Results",
+    "Rule",
     "RunStatus",
     "Salvaged",
     "ScoreSheet",
     "Status",
     "UnusablePolicyError",
+    "Verdict",
     "bench",
     "bench_paper",
     "bootstrap_interval",
     "columns",
+    "compare_runs",
     "merge",
     "parse_policies",
     "parse_policy",
@@ -79,6 +83,7 @@ __getattr__, __dir__ = lazy_names(
     {
         "batch": "run_batch",
         "benchmark": "bench",
+        "comparing": "Rule Verdict compare_runs",
         "compatibility": "UnusablePolicyError",
         "database": "DamagedResultsError",
         "episode": "InvalidActionError PolicyError run_episode",

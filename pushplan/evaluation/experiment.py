@@ -17,7 +17,7 @@ from pushplan.evaluation.policies import PolicySpec
 from pushplan.evaluation.rescoring import rescore
 from pushplan.evaluation.results import Results
 from pushplan.metrics import metric_function
-from pushplan.world import InvalidInputError
+from pushplan.world import InvalidInputError, UnknownNameError
 from pushplan.world.checks import expect, integer
 from pushplan.world.safe_files import read_data
 
@@ -39,6 +39,7 @@ class Experiment:
         memory_limit_mb: private memory of a worker at which allocations fail [MB]; None for no
             limit.
         about: what else is noted about the run: JSON values.
+        only: name of a suite -> labels of the policies that run on it; all that fit by default.
         allow_misfits: whether a policy that fits no suite is left out; else it is refused.
         skipped: (suite, policy label) -> why that pair is not run.
 
@@ -55,6 +56,7 @@ class Experiment:
     metrics: tuple[str, ...] = ()
     memory_limit_mb: float | None = MEMORY_MB
     about: Mapping[str, Any] = field(default_factory=dict)
+    only: Mapping[str, Sequence[str]] = field(default_factory=dict)
     allow_misfits: bool = False
     skipped: Mapping[tuple[str, str], str] = field(init=False)
 
@@ -67,6 +69,13 @@ class Experiment:
         object.__setattr__(self, "policies", tuple(read_policies(self.policies)))
         found = misfits(self.policies, self.suites, self.settings, allow_all=self.allow_misfits)
         object.__setattr__(self, "skipped", found)
+        labels, names = [p.label for p in self.policies], [one.name for one in self.suites]
+        for name, wanted in self.only.items():
+            if name not in names:
+                raise UnknownNameError("suite of this experiment", name, names)
+            for label in wanted:
+                if label not in labels:
+                    raise UnknownNameError("policy of this experiment", label, labels)
 
     @classmethod
     def load(cls, path: str | Path) -> Experiment:
@@ -96,6 +105,7 @@ class Experiment:
             for scenario in suite.scenarios
             for spec in self.policies
             if (suite.name, spec.label) not in self.skipped
+            and spec.label in self.only.get(suite.name, [spec.label])
         ]
 
     def run(

@@ -28,7 +28,7 @@ MOST_POLICIES = 1000
 _KEYS = ("schema", "name", "suites", "policies", "episodes", "seed", "metrics", "timeout_s")
 _MORE = ("observation", "latency_factor", "memory_limit_mb")
 _POLICY = ("policy", "label", "parameters", "sweep", "deadline_s")
-_SUITE = ("suite", "scenarios", "episodes", "seed", "variations")
+_SUITE = ("suite", "scenarios", "episodes", "seed", "variations", "policies")
 
 
 def fields_of(data: object, folder: Path) -> dict[str, Any]:
@@ -41,12 +41,19 @@ def fields_of(data: object, folder: Path) -> dict[str, Any]:
     seed = integer("seed", data.get("seed", 0), low=0)
     names = ("timeout_s", "observation", "latency_factor")
     policies = [_policies(one, folder) for one in _list("policies", data["policies"])]
-    suites = [_suite(one, episodes, seed, folder) for one in _list("suites", data["suites"])]
+    given = _list("suites", data["suites"])
+    suites = [_suite(one, episodes, seed, folder) for one in given]
+    only = {
+        suite.name: _texts("policies of a suite", one["policies"])
+        for suite, one in zip(suites, given, strict=True)
+        if isinstance(one, Mapping) and "policies" in one
+    }
     metrics = _texts("metrics", data.get("metrics", ()))
     return {
         "name": str(data.get("name", "experiment")),
         "suites": tuple(suites),
         "policies": tuple(itertools.chain.from_iterable(policies)),
+        "only": only,
         "settings": JobSettings(**{name: data[name] for name in names if name in data}),
         "metrics": tuple(_beside(one, folder) for one in metrics),
         "memory_limit_mb": data.get("memory_limit_mb", MEMORY_MB),

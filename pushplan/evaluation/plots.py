@@ -29,7 +29,7 @@ MARKERS = ("o", "s", "^", "D", "v", "P", "X", "*")
 PANEL = (4.6, 3.9)
 """Width and height of one panel [inch]."""
 _DPI = 130
-_MANY = 1000  # so many dots in a panel are drawn as an image
+_MANY = 300  # so many dots of a policy in a panel are drawn as an image
 _TRACES = 300  # of so many episodes every planning call is read from the trace
 
 

@@ -139,3 +139,17 @@ def test_a_policy_takes_fields_of_its_planners_config() -> None:
 def test_bench_takes_several_suites() -> None:
     found = bench("maze-2d-3, maze-2d-5", "straight", episodes=2, seed=1000, workers=0)
     assert len(found.rows) == 4 and found.about["configuration"]["suite"] == "maze-2d-3,maze-2d-5"
+
+
+def test_a_suite_may_name_its_policies() -> None:
+    data = {
+        "schema": "pushplan-experiment/1",
+        "suites": ["maze-2d-3", {"suite": "maze-2d-5", "policies": ["random"]}],
+        "policies": ["straight", "random"],
+        "episodes": 1,
+    }
+    jobs = Experiment.from_dict(data).jobs
+    assert [job.policy.label for job in jobs] == ["straight", "random", "random"]
+    data["suites"] = [{"suite": "maze-2d-5", "policies": ["randon"]}]
+    with pytest.raises(UnknownNameError, match="did you mean 'random'"):
+        Experiment.from_dict(data)
