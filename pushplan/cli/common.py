@@ -60,11 +60,16 @@ def add_run_options(parser: argparse.ArgumentParser) -> None:
         metavar="K/N",
         help="only the K-th of N parts of the jobs, as on one of N machines; see 'pushplan merge'",
     )
+    parser.add_argument(
+        "--dask",
+        metavar="WHERE",
+        help="run jobs on a Dask cluster: 'local:N', or the address of its scheduler",
+    )
 
 
 def run_options(options: argparse.Namespace) -> dict[str, Any]:
     """What `add_run_options` read, as `Experiment.run` takes it."""
-    names = ("workers", "retry_failed", "any_version", "shard")
+    names = ("workers", "retry_failed", "any_version", "shard", "dask")
     return {name: getattr(options, name) for name in names}
 
 

@@ -27,37 +27,21 @@ from pushplan.evaluation.jobs import (
     Job,
     JobResult,
     JobSettings,
-    failed_result,
-    timeout_reason,
 )
 from pushplan.evaluation.limits import MEMORY_MB
+from pushplan.evaluation.outcome import PRELOAD, outcome_of
 from pushplan.evaluation.pool import WorkerPool
 from pushplan.evaluation.provenance import provenance
-from pushplan.evaluation.rows import ResultRow, Status, instant, setting_of
+from pushplan.evaluation.rows import ResultRow, instant, setting_of
 from pushplan.evaluation.store import RunDirectory
 from pushplan.evaluation.worker import WORKER_VARIABLE
-from pushplan.evaluation.worker_process import (
-    WorkerDiedError,
-    WorkerOutOfMemoryError,
-    WorkerOverranError,
-)
 from pushplan.world import InvalidInputError, Stop
 from pushplan.world.checks import integer, number
-from pushplan.world.errors import describe
 
 Progress = Callable[[int, int, ResultRow | None], None]
 """Called with jobs done, jobs in all, and the row just stored (None at the beginning)."""
 
 _log = logging.getLogger(__name__)
-PRELOAD = (
-    "pushplan.evaluation.execute",
-    "pushplan.planners.push_aware.policies",
-    "pushplan.planners.rrt.policies",
-    "pushplan.planners.ship_predictive.policies",
-    "pushplan.envs.push_env",
-    "pushplan.envs.simulators.pymunk_simulator",
-)
-"""What a worker imports before its first job, so that no job's time holds it."""
 _TURN = 20
 """So many jobs of a policy follow each other where policies do not share a process."""
 
@@ -276,23 +260,11 @@ class _Batch:
     def _outcome(self, job: Job, future: Future[JobResult], foreign: bool) -> JobResult | None:
         """What became of a job; None if its executor broke and it may be innocent."""
         try:
-            return future.result().checked(job)
-        except WorkerOverranError as error:
-            reason = timeout_reason(self._settings.timeout_s)
-            detail = "The process did not react and was ended.\n" + error.log
-            return failed_result(job, Status.TIMEOUT, reason, detail)
-        except WorkerDiedError as error:
-            memory = isinstance(error, WorkerOutOfMemoryError)
-            status = Status.OUT_OF_MEMORY if memory else Status.CRASHED
-            return failed_result(job, status, str(error), f"{error}\n{error.log}")
+            return outcome_of(job, future, self._settings)
         except BrokenExecutor as error:
             if not foreign:
                 raise InvalidInputError(f"no worker process can be started: {error}") from error
             return None
-        except InvalidInputError:
-            raise  # a worker cannot load what it was sent: nothing can run
-        except Exception as error:
-            return failed_result(job, Status.CRASHED, describe(error))
 
     def _clear(self, suspects: Sequence[Job]) -> None:
         """Run jobs that were in flight when a process died each alone in a fresh process."""

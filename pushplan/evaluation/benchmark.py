@@ -34,6 +34,7 @@ def bench(
     retry_failed: bool = False,
     any_version: bool = False,
     shard: tuple[int, int] | None = None,
+    dask: str | None = None,
     latency_factor: float | None = None,
     progress: Progress | None = None,
 ) -> Results:
@@ -60,7 +61,7 @@ def bench(
         memory_limit_mb: private memory of a worker at which allocations fail [MB]; None for no
             limit.
         retry_failed: run jobs again whose row says that they failed.
-        any_version, shard: as for `Experiment.run`.
+        any_version, shard, dask: as for `Experiment.run`.
         latency_factor: seconds of the world's clock for each second that a policy computes; None
             for a world that stands still meanwhile. See `run_episode`.
         progress: told of every row.
@@ -89,6 +90,7 @@ def bench(
         retry_failed=retry_failed,
         any_version=any_version,
         shard=shard,
+        dask=dask,
         progress=progress,
     )
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import tempfile
 import zlib
 from collections.abc import Mapping, Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -116,6 +117,7 @@ class Experiment:
         retry_failed: bool = False,
         any_version: bool = False,
         shard: tuple[int, int] | None = None,
+        dask: str | None = None,
         progress: Progress | None = None,
     ) -> Results:
         """Run what has not been run yet in the run directory ``out``; see `run_batch`.
@@ -129,17 +131,26 @@ class Experiment:
             any_version: take results that differ only in versions of pushplan and of packages.
             shard: (k, n): only the k-th of n parts of the jobs, k from 1; `merge` joins the run
                 directories of all parts.
+            dask: ``"local:N"``, or the address of a Dask scheduler on whose workers jobs run.
             progress: told of every row.
 
         Returns:
             All rows of the run directory.
         """
-        with tempfile.TemporaryDirectory(prefix="pushplan-") as temporary:
+        with ExitStack() as stack:
+            temporary = stack.enter_context(tempfile.TemporaryDirectory(prefix="pushplan-"))
             folder = Path(temporary if out is None else out)
+            executor = None
+            if dask is not None:
+                from pushplan.evaluation.cluster import dask_executor
+
+                executor = stack.enter_context(dask_executor(dask, self.memory_limit_mb))
+                workers = executor.window
             run_batch(
                 self.jobs if shard is None else part_of(self.jobs, *shard),
                 out=folder,
                 workers=workers,
+                executor=executor,
                 settings=self.settings,
                 memory_limit_mb=self.memory_limit_mb,
                 retry_failed=retry_failed,

@@ -95,6 +95,7 @@ def bench_paper(
     retry_failed: bool = False,
     any_version: bool = False,
     shard: tuple[int, int] | None = None,
+    dask: str | None = None,
     progress: Progress | None = None,
     command: str = "",
 ) -> Comparison:
@@ -105,8 +106,8 @@ def bench_paper(
         policies: as for `bench`; every policy that comes with pushplan if None.
         episodes: scenarios of each suite.
         seed: seed of the first scenario of each suite.
-        workers, timeout_s, memory_limit_mb, retry_failed, any_version, shard, progress: as for
-            `bench`.
+        workers, timeout_s, memory_limit_mb, retry_failed, any_version, shard, dask, progress: as
+            for `bench`.
         out: run directory, continued if it holds this run already; suites, policies and episodes
             may be added to it. With it, ``paper.md`` and the report of `Results` are written.
         command: what the document says gives the same again.
@@ -137,6 +138,7 @@ def bench_paper(
             retry_failed=retry_failed,
             any_version=any_version,
             shard=shard,
+            dask=dask,
             progress=progress,
         )
         results = _chosen(found, experiment.jobs, None if out is None else folder)

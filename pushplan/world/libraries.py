@@ -22,6 +22,7 @@ EXTRAS = {
     "mcap": "ros",
     "rosbags": "ros",
     "pyarrow": "parquet",
+    "distributed": "cluster",
     "h5py": "learn",
     "minari": "learn",
     "onnx": "learn",
