@@ -36,12 +36,14 @@ from pushplan.evaluation.rows import ResultRow, instant, setting_of
 from pushplan.evaluation.store import RunDirectory
 from pushplan.evaluation.worker import WORKER_VARIABLE
 from pushplan.world import InvalidInputError, Stop
-from pushplan.world.checks import integer, number
+from pushplan.world.checks import choice, integer, number
 
 Progress = Callable[[int, int, ResultRow | None], None]
 """Called with jobs done, jobs in all, and the row just stored (None at the beginning)."""
 
 _log = logging.getLogger(__name__)
+TRACES = ("all", "failures", "none")
+"""Which recorded episodes are kept: of every job, of those without success, or of none."""
 _TURN = 20
 """So many jobs of a policy follow each other where policies do not share a process."""
 
@@ -58,6 +60,7 @@ def run_batch(
     memory_limit_mb: float | None = MEMORY_MB,
     retry_failed: bool = False,
     any_version: bool = False,
+    traces: str = "all",
     about: Mapping[str, Any] | None = None,
     progress: Progress | None = None,
 ) -> list[ResultRow]:
@@ -84,6 +87,7 @@ def run_batch(
             what it started, shared or not, at which it is ended [MB]; None for no limit.
         retry_failed: run jobs again whose row says that they failed.
         any_version: take results that differ only in versions of pushplan and of packages.
+        traces: which recorded episodes are kept, one of `TRACES`.
         about: what else to note about the run: JSON values.
         progress: told of every row.
 
@@ -99,6 +103,7 @@ def run_batch(
     workers = os.cpu_count() or 1 if workers is None else integer("workers", workers, low=0)
     if memory_limit_mb is not None:
         number("memory_limit_mb", memory_limit_mb, low=1.0)
+    choice("traces", traces, TRACES)
     _check(jobs)
     with RunDirectory(out) as store:
         _note(store, jobs, settings, about)
@@ -110,7 +115,7 @@ def run_batch(
             store.append("runs", begun)
         if progress is not None:
             progress(len(jobs) - len(pending), len(jobs), None)
-        batch = _Batch(pending, store, settings, memory_limit_mb, len(jobs), progress)
+        batch = _Batch(pending, store, settings, memory_limit_mb, traces, len(jobs), progress)
         if executor is None and workers == 0:
             batch.run_here()
         elif pending:
@@ -185,6 +190,7 @@ class _Batch:
         store: RunDirectory,
         settings: JobSettings,
         memory_limit_mb: float | None,
+        traces: str,
         total: int,
         progress: Progress | None,
     ) -> None:
@@ -194,6 +200,7 @@ class _Batch:
         self._store = store
         self._settings = settings
         self._memory_limit_mb = memory_limit_mb
+        self._traces = traces
         self._total = total
         self._left = len(jobs)
         self._progress = progress
@@ -283,7 +290,9 @@ class _Batch:
         identity = self._identities[job.key]
         began = self._began.pop(job.key)
         row = replace(outcome.row, job=identity.id, trace="", began=outcome.row.began or began)
-        row = self._store.add(row, outcome.trace, outcome.detail, identity.spec)
+        kept = self._traces == "all" or (self._traces == "failures" and not row.success)
+        trace = outcome.trace if kept else None
+        row = self._store.add(row, trace, outcome.detail, identity.spec)
         self._left -= 1
         if self._progress is not None:
             self._progress(self._total - self._left, self._total, row)

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from pushplan.evaluation.batch import Progress, run_batch
+from pushplan.evaluation.batch import TRACES, Progress, run_batch
 from pushplan.evaluation.compatibility import misfits, read_policies
 from pushplan.evaluation.jobs import Job, JobSettings
 from pushplan.evaluation.limits import MEMORY_MB
@@ -19,7 +19,7 @@ from pushplan.evaluation.rescoring import rescore
 from pushplan.evaluation.results import Results
 from pushplan.metrics import metric_function
 from pushplan.world import InvalidInputError, UnknownNameError
-from pushplan.world.checks import expect, integer
+from pushplan.world.checks import choice, expect, integer
 from pushplan.world.safe_files import read_data
 
 if TYPE_CHECKING:
@@ -40,6 +40,8 @@ class Experiment:
         memory_limit_mb: private memory of a worker at which allocations fail [MB]; None for no
             limit.
         about: what else is noted about the run: JSON values.
+        traces: which recorded episodes are kept: ``"all"``, ``"failures"`` (those without success)
+            or ``"none"``. Metrics of one's own, replays and `rescore` need them.
         only: name of a suite -> labels of the policies that run on it; all that fit by default.
         allow_misfits: whether a policy that fits no suite is left out; else it is refused.
         skipped: (suite, policy label) -> why that pair is not run.
@@ -57,12 +59,16 @@ class Experiment:
     metrics: tuple[str, ...] = ()
     memory_limit_mb: float | None = MEMORY_MB
     about: Mapping[str, Any] = field(default_factory=dict)
+    traces: str = "all"
     only: Mapping[str, Sequence[str]] = field(default_factory=dict)
     allow_misfits: bool = False
     skipped: Mapping[tuple[str, str], str] = field(init=False)
 
     def __post_init__(self) -> None:
         expect("settings", self.settings, JobSettings)
+        choice("traces", self.traces, TRACES)
+        if self.metrics and self.traces != "all":
+            raise InvalidInputError("metrics of one's own need traces: all")
         if not self.suites:
             raise InvalidInputError("an experiment needs at least one suite")
         for metric in self.metrics:
@@ -155,6 +161,7 @@ class Experiment:
                 memory_limit_mb=self.memory_limit_mb,
                 retry_failed=retry_failed,
                 any_version=any_version,
+                traces=self.traces,
                 about={"suite": self.name, **self.about},
                 progress=progress,
             )

@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING, Any
 
 from pushplan.evaluation.jobs import JobSettings
 from pushplan.evaluation.limits import MEMORY_MB
-from pushplan.evaluation.policies import PolicySpec, parse_policy
+from pushplan.evaluation.policies import PolicySpec, parse_policy, policy_names
 from pushplan.world import Deadline, SchemaError
-from pushplan.world.checks import expect, integer, known_keys, number
+from pushplan.world.checks import choice, expect, integer, known_keys, number
 from pushplan.world.errors import short
 
 if TYPE_CHECKING:
@@ -25,8 +25,11 @@ SCHEMA = "pushplan-experiment/1"
 EPISODES = 20
 MOST_POLICIES = 1000
 
+ALL = "all"
+"""An entry of ``policies``: every policy that comes with pushplan."""
 _KEYS = ("schema", "name", "suites", "policies", "episodes", "seed", "metrics", "timeout_s")
-_MORE = ("observation", "latency_factor", "memory_limit_mb")
+_MORE = ("observation", "latency_factor", "memory_limit_mb", "traces", "misfits")
+_MISFITS = ("refuse", "skip")
 _POLICY = ("policy", "label", "parameters", "sweep", "deadline_s")
 _SUITE = ("suite", "scenarios", "episodes", "seed", "variations", "policies")
 
@@ -56,6 +59,8 @@ def fields_of(data: object, folder: Path) -> dict[str, Any]:
         "only": only,
         "settings": JobSettings(**{name: data[name] for name in names if name in data}),
         "metrics": tuple(_beside(one, folder) for one in metrics),
+        "traces": data.get("traces", "all"),
+        "allow_misfits": choice("misfits", data.get("misfits", "refuse"), _MISFITS) == "skip",
         "memory_limit_mb": data.get("memory_limit_mb", MEMORY_MB),
     }
 
@@ -120,6 +125,9 @@ def _suite(given: object, episodes: int, seed: int, folder: Path) -> Suite:
 
 def _policies(given: object, folder: Path) -> Iterable[PolicySpec]:
     """Read an entry of ``policies``: a text, or a mapping; a sweep gives one for each value."""
+    if given == ALL:
+        yield from map(parse_policy, policy_names())
+        return
     entry = {"policy": given} if isinstance(given, str) else given
     known_keys("policy", entry, _POLICY, ("policy",))
     assert isinstance(entry, Mapping)

@@ -11,6 +11,9 @@ import yaml
 
 from pushplan.cli import main
 from pushplan.evaluation import Experiment, UnusablePolicyError, bench
+from pushplan.evaluation.paper import EPISODES
+from pushplan.evaluation.policies import policy_names
+from pushplan.evaluation.published import published_tables
 from pushplan.planners import make_planner, make_policy
 from pushplan.world import InvalidInputError, PushplanError, SchemaError, UnknownNameError
 
@@ -153,3 +156,31 @@ def test_a_suite_may_name_its_policies() -> None:
     data["suites"] = [{"suite": "maze-2d-5", "policies": ["randon"]}]
     with pytest.raises(UnknownNameError, match="did you mean 'random'"):
         Experiment.from_dict(data)
+
+
+def test_the_papers_comparison_is_an_experiment_file() -> None:
+    shipped = Experiment.load(Path(__file__).parents[2] / "examples" / "paper.yaml")
+    assert [one.name for one in shipped.suites] == [table.suite for table in published_tables()]
+    assert {len(one.scenarios) for one in shipped.suites} == {EPISODES}
+    assert [one.label for one in shipped.policies] == list(policy_names())
+    assert shipped.skipped and shipped.jobs
+
+
+@pytest.mark.parametrize(("traces", "kept"), [("all", 4), ("failures", 2), ("none", 0)])
+def test_only_wanted_episodes_are_kept(tmp_path: Path, traces: str, kept: int) -> None:
+    data = {
+        "schema": "pushplan-experiment/1",
+        "suites": ["maze-2d-3"],
+        "policies": ["straight", "random"],
+        "episodes": 2,
+        "traces": traces,
+    }
+    results = Experiment.from_dict(data).run(tmp_path, workers=0)
+    assert [row.success for row in results.rows] == [False, False, True, True]
+    assert len(list((tmp_path / "episodes").iterdir())) == kept
+    assert sum(results.episode(row) is not None for row in results.rows) == kept
+    assert results.report().is_file()
+    with pytest.raises(InvalidInputError, match="traces"):
+        Experiment.from_dict({**data, "traces": "some"})
+    with pytest.raises(InvalidInputError, match="misfits"):
+        Experiment.from_dict({**data, "misfits": "some"})
