@@ -17,6 +17,7 @@ from pushplan.cli.common import (
     add_run_options,
     add_trust,
     batch_options,
+    duration,
     positive,
     say,
     whole,
@@ -192,12 +193,18 @@ class _Lines:
     """Progress for a log file."""
 
     def __init__(self) -> None:
-        self._next = time.monotonic() + _LINE_EVERY_S
+        self._began = time.monotonic()
+        self._next = self._began + _LINE_EVERY_S
+        self._there = 0
 
     def __call__(self, done: int, total: int, row: ResultRow | None) -> None:
         now = time.monotonic()
-        if row is None and done:
-            sys.stderr.write(f"{done} of {total} episodes are there already\n")
-        elif row is not None and (done == total or now >= self._next):
+        if row is None:
+            self._began, self._there = now, done
+            if done:
+                sys.stderr.write(f"{done} of {total} episodes are there already\n")
+        elif done == total or now >= self._next:
             self._next = now + _LINE_EVERY_S
-            sys.stderr.write(f"{done} of {total} episodes\n")
+            rate = (done - self._there) / max(now - self._began, 1e-3)
+            left = f", about {duration((total - done) / rate)} left" if done < total else ""
+            sys.stderr.write(f"{done} of {total} episodes, {60.0 * rate:.3g} a minute{left}\n")

@@ -212,3 +212,11 @@ def milliseconds(seconds: float) -> str:
     """A time in words."""
     value = 1e3 * seconds
     return f"{value:.0f} ms" if value >= 100.0 else f"{value:.3g} ms"
+
+
+def duration(seconds: float) -> str:
+    """A time in words."""
+    if seconds < 60.0:
+        return f"{seconds:.3g} s"
+    minutes = round(seconds / 60.0)
+    return f"{minutes} min" if minutes < 120 else f"{minutes / 60.0:.1f} h"

@@ -6,7 +6,7 @@ import argparse
 import sys
 from typing import Any
 
-from pushplan.cli.common import add_command, say
+from pushplan.cli.common import add_command, duration, say
 
 _RUN = "run directory of 'pushplan bench' or 'pushplan experiment'"
 
@@ -126,11 +126,3 @@ def _export(options: argparse.Namespace) -> int:
 
     say(f"{Results.load(options.directory).export(options.file)} rows in {options.file}")
     return 0
-
-
-def duration(seconds: float) -> str:
-    """A time in words."""
-    if seconds < 60.0:
-        return f"{seconds:.3g} s"
-    minutes = round(seconds / 60.0)
-    return f"{minutes} min" if minutes < 120 else f"{minutes / 60.0:.1f} h"
