@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import logging
-import math
 import os
 import pickle
 from collections import deque
@@ -14,14 +13,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from pushplan.evaluation.database import DATABASE
 from pushplan.evaluation.execute import execute
-from pushplan.evaluation.job_identity import (
-    IdentifiedJob,
-    differences,
-    same_but_versions,
-    settings_dict,
-)
+from pushplan.evaluation.job_identity import IdentifiedJob
 from pushplan.evaluation.jobs import (
     DEFAULT_ENV,
     Job,
@@ -30,12 +23,13 @@ from pushplan.evaluation.jobs import (
 )
 from pushplan.evaluation.limits import MEMORY_MB
 from pushplan.evaluation.outcome import PRELOAD, outcome_of
+from pushplan.evaluation.pending import note_batch, pending_jobs
 from pushplan.evaluation.pool import WorkerPool
 from pushplan.evaluation.provenance import provenance
-from pushplan.evaluation.rows import ResultRow, instant, setting_of
+from pushplan.evaluation.rows import ResultRow, instant
 from pushplan.evaluation.store import RunDirectory
 from pushplan.evaluation.worker import WORKER_VARIABLE
-from pushplan.world import InvalidInputError, Stop
+from pushplan.world import InvalidInputError
 from pushplan.world.checks import choice, integer, number
 
 Progress = Callable[[int, int, ResultRow | None], None]
@@ -106,10 +100,10 @@ def run_batch(
     choice("traces", traces, TRACES)
     _check(jobs)
     with RunDirectory(out) as store:
-        _note(store, jobs, settings, about)
+        note_batch(store, jobs, settings, about)
         if retry_failed:
             store.forget_failures()
-        pending = _pending(jobs, store, settings, any_version)
+        pending = pending_jobs(jobs, store, settings, any_version)
         if pending:
             begun = {**provenance(workers), "jobs": len(jobs), "done": len(jobs) - len(pending)}
             store.append("runs", begun)
@@ -136,49 +130,6 @@ def _check(jobs: Sequence[Job]) -> None:
         if job.key in seen:
             raise InvalidInputError(f"two jobs are the same: policy, scenario, seed = {job.key}")
         seen.add(job.key)
-
-
-def _note(
-    store: RunDirectory,
-    jobs: Sequence[Job],
-    settings: JobSettings,
-    about: Mapping[str, Any] | None,
-) -> None:
-    store.note("configuration", {**settings_dict(settings), **(about or {})})
-    store.extend("policies", {job.policy.label: job.policy.identity for job in jobs})
-    stops = {job.policy.label: job.policy.options.get("stop") for job in jobs}
-    limits = {label: stop.seconds for label, stop in stops.items() if isinstance(stop, Stop)}
-    store.extend("deadlines", {k: v for k, v in limits.items() if math.isfinite(v)})
-    factor = settings.latency_factor
-    mode = "" if factor is None else f", latency-aware x {factor:g}"
-    store.extend("settings", {setting_of(*job.key[1:]): job.title + mode for job in jobs})
-
-
-def _pending(
-    jobs: Sequence[Job], store: RunDirectory, settings: JobSettings, any_version: bool
-) -> list[IdentifiedJob]:
-    """The jobs without a result; those of the others count from now on."""
-    asked = [IdentifiedJob.of(job, settings) for job in jobs]
-    done = {job: job for job in store.done()}
-    if any_version:
-        done |= {same_but_versions(spec): job for job, spec in store.specs().items()}
-
-    def found(one: IdentifiedJob) -> str | None:
-        other = same_but_versions(one.spec) if any_version else one.id
-        return done.get(one.id, done.get(other))
-
-    there = [found(one) for one in asked]
-    store.show(job for job in there if job is not None)
-    pending = [one for one, job in zip(asked, there, strict=True) if job is None]
-    keys = store.keys()
-    if changed := [one for one in pending if one.job.key in keys]:
-        *_, before = store.specs(changed[0].job.key).values()
-        _log.warning(
-            "%d of %d jobs have results in %s from before a change: %s; they are run again, and "
-            "the old results stay in %s",
-            *(len(changed), len(jobs), store.path, differences(before, changed[0].spec), DATABASE),
-        )
-    return pending
 
 
 class _Batch:

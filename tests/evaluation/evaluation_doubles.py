@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import csv
 import ctypes
 import os
 import signal
 import time
 from dataclasses import dataclass
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 
+from pushplan.evaluation import TIMING_COLUMNS
 from pushplan.world import Drive, GoalDisc, Movables, RobotModel, StaticMap, Twist, World
 
 HERE = __file__
@@ -206,3 +209,12 @@ def make_broken_env(scenario: LineScenario, observation: str = "state") -> Broke
 
 def plain_policy() -> Ahead:
     return Ahead()
+
+
+def timeless(path: Path) -> list[dict[str, str]]:
+    """The lines of a run's ``results.csv`` without the columns that differ from run to run."""
+    with (path / "results.csv").open() as file:
+        return [
+            {name: value for name, value in line.items() if name not in TIMING_COLUMNS}
+            for line in csv.DictReader(file)
+        ]

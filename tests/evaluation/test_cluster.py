@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import os
 import shutil
 import signal
@@ -12,10 +11,9 @@ import time
 from pathlib import Path
 
 import pytest
-from evaluation_doubles import HERE, LineScenario
+from evaluation_doubles import HERE, LineScenario, timeless
 
 from pushplan.evaluation import (
-    TIMING_COLUMNS,
     Experiment,
     Job,
     JobSettings,
@@ -30,14 +28,6 @@ from pushplan.world import InvalidInputError
 distributed = pytest.importorskip("distributed", reason="needs the extra 'cluster'")
 pytestmark = pytest.mark.slow
 SETTINGS = JobSettings(make_env=f"{HERE}:make_env", timeout_s=3.0, grace_s=0.5)
-
-
-def timeless(path: Path) -> list[dict[str, str]]:
-    with (path / "results.csv").open() as file:
-        return [
-            {name: value for name, value in line.items() if name not in TIMING_COLUMNS}
-            for line in csv.DictReader(file)
-        ]
 
 
 def test_the_same_bytes_as_without(tmp_path: Path) -> None:

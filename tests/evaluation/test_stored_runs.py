@@ -9,11 +9,10 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from evaluation_doubles import HERE, LineScenario
+from evaluation_doubles import HERE, LineScenario, timeless
 
 from pushplan.cli import main
 from pushplan.evaluation import (
-    TIMING_COLUMNS,
     Experiment,
     Job,
     JobSettings,
@@ -36,14 +35,6 @@ def run(out: Path, seeds: range, names: str = "Ahead Raises", **changes: object)
     specs = parse_policies([f"{HERE}:{name}" for name in names.split()])
     jobs = [Job(spec, LineScenario(seed)) for seed in seeds for spec in specs]
     run_batch(jobs, out=out, workers=0, settings=replace(SETTINGS, **changes))  # type: ignore[arg-type]
-
-
-def timeless(path: Path) -> list[dict[str, str]]:
-    with (path / "results.csv").open() as file:
-        return [
-            {name: value for name, value in line.items() if name not in TIMING_COLUMNS}
-            for line in csv.DictReader(file)
-        ]
 
 
 @pytest.fixture(scope="module")
