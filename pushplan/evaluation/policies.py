@@ -42,7 +42,7 @@ class PolicySpec:
                 f"not beginning with '.+@-', got {self.label!r}"
             )
 
-    @functools.cached_property
+    @property
     def identity(self) -> str:
         """A text that tells sources apart, with a hash of the file that holds them.
 
@@ -148,6 +148,13 @@ def _digest(file: Path | None) -> str:
     """A hash of a file's content, in words; nothing for none."""
     if file is None or not file.is_file():
         return ""
+    found = file.stat()
+    return _content_hash(file, found.st_mtime_ns, found.st_size, found.st_ino)
+
+
+@functools.lru_cache(maxsize=256)
+def _content_hash(file: Path, *_version: int) -> str:
+    """`_digest` of a file as it is; jobs by the thousand ask for the same one."""
     return f" sha256:{hashlib.sha256(file.read_bytes()).hexdigest()[:12]}"
 
 
