@@ -88,6 +88,7 @@ def test_a_robot_needs_none_of_the_extras():
         ("torch", ["train", "ppo", "--task", "maze", "--out", "never-made"], "learn"),
     ],
 )
+@pytest.mark.slow
 def test_a_missing_library_is_one_line_that_names_the_extra(absent, arguments, extra):
     code = f"from pushplan.cli import main\nsys.exit(main({arguments!r}))"
     done = without([absent], code)

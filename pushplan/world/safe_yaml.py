@@ -9,7 +9,7 @@ from yaml.composer import Composer
 
 from pushplan.world.safe_files import LONGEST_NUMBER, MAX_DEPTH
 
-MAX_NODES = 100_000
+MAX_NODES = 60_000
 """Most values in a file, each counted as often as aliases repeat it."""
 _NUMBERS = ("tag:yaml.org,2002:int", "tag:yaml.org,2002:float")
 if hasattr(yaml, "CSafeLoader"):

@@ -72,6 +72,7 @@ def test_run_takes_a_task_with_variations(
     assert errors.count("\n") == 3 and errors.count("pushplan: ") == 3
 
 
+@pytest.mark.slow
 def test_bench_with_a_file_of_ones_own(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "mine.py").write_text(MINE)
     names = ",".join(["straight", *(f"{tmp_path}/mine.py:{n}" for n in ("Spin", "NotANumber"))])

@@ -307,6 +307,7 @@ def at_the_screen(screen: str, *arguments: str) -> str:
     return done.stdout
 
 
+@pytest.mark.slow
 def test_the_command_in_a_real_window(screen: str, tmp_path: Path) -> None:
     out = tmp_path / "episode.npz"
     text = at_the_screen(screen, "teleop", "--task", "maze", "--speed", "8", "--out", str(out))
@@ -316,6 +317,7 @@ def test_the_command_in_a_real_window(screen: str, tmp_path: Path) -> None:
     assert episode.actions.max() == 1.0 and episode.actions.min() == 0.0
 
 
+@pytest.mark.slow
 def test_live_in_a_real_window(screen: str) -> None:
     arguments = ["run", "--task", "maze", "--boxes", "2", "--policy", "straight", "--live"]
     text = at_the_screen(screen, *arguments)

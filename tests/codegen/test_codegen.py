@@ -159,6 +159,7 @@ PUSHED = {
 
 @needs_gcc
 @pytest.mark.parametrize("name", PUSHED)
+@pytest.mark.slow
 def test_pushing_is_the_same_in_c(name, tmp_path):
     robot, side, config, noise, walls = PUSHED[name]
     worlds, plan, expected, slowed = push(robot, side, config, noise, 120, walls)
@@ -171,6 +172,7 @@ def test_pushing_is_the_same_in_c(name, tmp_path):
 
 @needs_gcc
 @pytest.mark.parametrize("name", ["tracking_mpc", "pushing_mpc"])
+@pytest.mark.slow
 def test_it_needs_nothing_but_libm(name, tmp_path):
     if name == "tracking_mpc":
         write_tracking_mpc(tmp_path, AREA)

@@ -53,6 +53,7 @@ def test_a_second_process_loads_what_the_first_compiled(module: Path, tmp_path: 
     assert _run(module, tmp_path / "cache") == (_LOADED, "")
 
 
+@pytest.mark.slow
 def test_a_kernel_is_compiled_anew_when_one_that_it_calls_changes(
     module: Path, tmp_path: Path
 ) -> None:
@@ -80,6 +81,7 @@ print(ready)
 """
 
 
+@pytest.mark.slow
 def test_a_class_of_arguments_that_has_moved_is_no_error(tmp_path: Path) -> None:
     module, cache = tmp_path / "totals.py", tmp_path / "cache"
     for home, said in (("one", "False"), ("other", "False"), ("other", "True")):
@@ -111,6 +113,7 @@ llvmlite.binding.get_host_cpu_name = lambda: {name!r}
 """
 
 
+@pytest.mark.slow
 def test_kernels_for_a_generic_processor_load_on_every_one(module: Path, tmp_path: Path) -> None:
     cache = tmp_path / "cache"
     generic = {"NUMBA_CPU_NAME": "generic"}
@@ -130,6 +133,7 @@ def test_a_folder_that_cannot_be_made_is_one_warning(module: Path, tmp_path: Pat
     assert "cannot be written to" in errors and str(tmp_path / "file") in errors
 
 
+@pytest.mark.slow
 def test_processes_that_start_at_once_compile_each_kernel_once(
     module: Path, tmp_path: Path
 ) -> None:
@@ -162,6 +166,7 @@ def test_an_exception_of_a_called_kernel_reaches_python_from_the_cache(tmp_path:
         assert _run(module, tmp_path / "cache") == ("('negative', 3)", "")
 
 
+@pytest.mark.slow
 def test_without_a_chosen_folder_kernels_lie_beside_their_source(
     module: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

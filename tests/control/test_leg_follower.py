@@ -50,6 +50,7 @@ def run(
 
 @settings(max_examples=40, deadline=None)
 @given(points=st.lists(places, min_size=1, max_size=3), heading=st.floats(-3.0, 3.0), rate=rates)
+@pytest.mark.slow
 def test_it_arrives_by_every_point_at_any_rate(points, heading, rate):
     period, turn_rate = rate
     follower, poses = run(

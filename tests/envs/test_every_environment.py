@@ -223,6 +223,7 @@ def digests(order):
     return dict(line.split() for line in done.stdout.splitlines())
 
 
+@pytest.mark.slow
 def test_same_bytes_in_another_process_and_another_order():
     assert digests("forwards") == digests("backwards")
     assert len(set(digests("forwards").values())) == len(WORLDS)
@@ -240,6 +241,7 @@ def least_growth(marks):
 
 
 @pytest.mark.parametrize("name", WORLDS)
+@pytest.mark.slow
 def test_resets_leak_nothing(name):
     """Neither Python objects nor the engine's memory."""
     env = make(name)

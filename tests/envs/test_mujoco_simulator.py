@@ -111,6 +111,7 @@ def digest():
     return total.hexdigest()
 
 
+@pytest.mark.slow
 def test_another_process_gives_the_same_bytes():
     here = Path(__file__).parent
     program = PROGRAM.format(folder=str(here))

@@ -95,6 +95,7 @@ def test_same_seed_same_bytes_whatever_came_before(observation):
     assert rollout(one, 6) != first
 
 
+@pytest.mark.slow
 def test_same_bytes_in_another_process():
     code = (
         "import hashlib, gymnasium, pushplan.envs, numpy as np\n"
@@ -281,6 +282,7 @@ def test_vector_environments(vector):
     envs.close()
 
 
+@pytest.mark.slow
 def test_many_resets_leak_nothing():
     """Neither Python objects nor memory of the engine, which the peak size of the process shows."""
     env = make(Scenario("maze", variations={"boxes": 3}), observation="state")

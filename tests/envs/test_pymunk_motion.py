@@ -141,6 +141,7 @@ def test_plain_boxes_stop_at_once_whatever_comes_next():
 
 @pytest.mark.parametrize("seed", range(4))
 @pytest.mark.parametrize("water", [None, WATER])
+@pytest.mark.slow
 def test_leaving_out_what_is_far_changes_nothing(seed, water):
     """The same drive with every object simulated all the time ends at the same places."""
     rng = np.random.default_rng(seed)

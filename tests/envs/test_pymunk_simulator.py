@@ -105,6 +105,7 @@ def test_wheeled_box_rolls_on_for_speed_times_time_constant():
 
 
 @pytest.mark.parametrize("seed", range(3))
+@pytest.mark.slow
 def test_nothing_is_ever_pressed_into_a_wall(seed):
     world = cluttered(seed, wheeled=(0, 3, 6))
     simulator = built(world)

@@ -70,6 +70,7 @@ def test_a_run_directory_holds_rows_and_traces(tmp_path: Path) -> None:
     assert rows[1].path_length_m == pytest.approx(0.5 * len(episode.actions))
 
 
+@pytest.mark.slow
 def test_whatever_a_policy_does_becomes_a_row(tmp_path: Path) -> None:
     names = (
         "Ahead Raises Exits Nan WrongShape Text Unmakeable Sleeps Swallows HoldsGil Killed "
@@ -117,6 +118,7 @@ def test_an_environment_that_raises_is_told_from_a_policy_that_does(tmp_path: Pa
     assert (row.status, row.reason) == ("env_error", "RuntimeError: the engine is broken")
 
 
+@pytest.mark.slow
 def test_a_foreign_process_pool_that_breaks_costs_the_culprits_only(tmp_path: Path) -> None:
     context = get_context("forkserver")
     jobs = jobs_of("Ahead HoldsGil Killed Logs", range(1)) + jobs_of("Ahead", range(1, 6))
@@ -127,6 +129,7 @@ def test_a_foreign_process_pool_that_breaks_costs_the_culprits_only(tmp_path: Pa
     assert found == {"Ahead": "done", "HoldsGil": "timeout", "Killed": "crashed", "Logs": "done"}
 
 
+@pytest.mark.slow
 def test_any_executor_gives_the_same_results(tmp_path: Path) -> None:
     jobs = jobs_of("Ahead Raises", range(3))
     with ThreadPoolExecutor(2) as threads:
@@ -229,6 +232,7 @@ class Mine(Ahead):
 
 
 @pytest.mark.parametrize("guarded", [True, False])
+@pytest.mark.slow
 def test_a_policy_of_the_main_script_runs_and_a_missing_guard_is_explained(
     tmp_path: Path, guarded: bool
 ) -> None:
@@ -317,6 +321,7 @@ def test_workers_end_with_their_owner_and_ctrl_c_is_clean(tmp_path: Path) -> Non
     assert len(without_timings(tmp_path)) == 1 + 18
 
 
+@pytest.mark.slow
 def test_two_runs_do_not_write_into_one_directory(tmp_path: Path) -> None:
     process = start(tmp_path)
     try:

@@ -31,6 +31,7 @@ def run(
     return {row.policy: row for row in rows}
 
 
+@pytest.mark.slow
 def test_texts_that_cannot_be_written_down_become_rows(tmp_path: Path) -> None:
     names = "Surrogate Unspeakable BadLog Ahead"
     for workers in (0, 1):
@@ -46,6 +47,7 @@ def test_limits_that_a_policy_sets_hold_nobody_else_up(tmp_path: Path) -> None:
     assert len(list((tmp_path / "episodes").iterdir())) == 3
 
 
+@pytest.mark.slow
 def test_memory_that_is_gone_for_good_is_a_row(tmp_path: Path) -> None:
     # filling so much takes about a second, and far longer where others compute
     rows = run(tmp_path, "OutOfMemoryForGood Ahead", memory_limit_mb=1500.0, timeout_s=60.0)
@@ -53,6 +55,7 @@ def test_memory_that_is_gone_for_good_is_a_row(tmp_path: Path) -> None:
     assert rows["Ahead"].status == "done"
 
 
+@pytest.mark.slow
 def test_shared_memory_counts(tmp_path: Path) -> None:
     rows = run(tmp_path, "SharesMuch Ahead", memory_limit_mb=600.0)
     assert rows["SharesMuch"].status == "out_of_memory" and "600 MB" in rows["SharesMuch"].reason
@@ -60,6 +63,7 @@ def test_shared_memory_counts(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("name", ["Chatters", "ClaimsMuch", "SendsCode"])
+@pytest.mark.slow
 def test_what_no_worker_says_is_a_failed_row(
     tmp_path: Path, name: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -70,6 +74,7 @@ def test_what_no_worker_says_is_a_failed_row(
     assert not (tmp_path / "ran").exists()
 
 
+@pytest.mark.slow
 def test_one_policy_does_not_change_the_next_ones_results(tmp_path: Path) -> None:
     alone = run(tmp_path / "alone", "Ahead")["Ahead"]
     after = run(tmp_path / "after", "Patches Ahead")["Ahead"]
@@ -95,6 +100,7 @@ def _gone(pid: int) -> bool:
 
 
 @pytest.mark.parametrize("name", ["HasChildren", "DiesWithChildren"])
+@pytest.mark.slow
 def test_children_of_a_policy_end_with_its_worker(
     tmp_path: Path, name: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -120,6 +126,7 @@ def test_logs_and_notes_are_bounded(tmp_path: Path) -> None:
     assert "raise ValueError" in note.read_text()
 
 
+@pytest.mark.slow
 def test_a_worker_that_was_killed_from_outside_gets_another_try(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -158,6 +158,7 @@ def test_a_suite_may_name_its_policies() -> None:
         Experiment.from_dict(data)
 
 
+@pytest.mark.slow
 def test_the_papers_comparison_is_an_experiment_file() -> None:
     shipped = Experiment.load(Path(__file__).parents[2] / "examples" / "paper.yaml")
     assert [one.name for one in shipped.suites] == [table.suite for table in published_tables()]

@@ -154,6 +154,7 @@ class TestStepLate:
         assert done[2] and done[4]["reason"] == "wall"
         assert env.world.time < 120.0
 
+    @pytest.mark.slow
     def test_waiting_counts_for_the_time_limit(self):
         env = PushEnv(task="area_clearing", action="velocity", observation="state")
         env.reset(seed=0)

@@ -148,6 +148,7 @@ def test_nothing_is_cut_off(browser: Any, folder: Path, width: int, scheme: str)
     assert one.state("isDark()") == (scheme == "dark")
 
 
+@pytest.mark.slow
 def test_replays_beside_the_page(browser: Any, folder: Path, tmp_path: Path) -> None:
     shutil.copytree(folder, tmp_path / "run")
     assert main(["report", str(tmp_path / "run"), "--replays", "beside", "--replay-most", "6"]) == 0

@@ -7,6 +7,7 @@ import pytest
 
 from pushplan.envs import PushEnv
 from pushplan.evaluation import InvalidActionError, Job, JobSettings, parse_policy, run_episode
+from pushplan.evaluation.episode import Recording
 from pushplan.learned import learned_names
 from pushplan.planners import PlanFollower, make_policy, policy_names
 from pushplan.scenarios import suite
@@ -72,10 +73,12 @@ def test_a_policy_that_gives_a_twist_gets_the_first_action_mode_that_takes_one()
     episodes = []
     for policy in (Straight(), type("Stated", (Straight,), {"actions": ("velocity",)})()):
         env = settings.environment(ROOM, policy)
-        episodes.append(run_episode(env, policy, ROOM))
+        recording = Recording(policy, ROOM, "the same")
+        recording.run(env, limit=60)
+        episodes.append(recording.episode())
         assert env.action_space.shape == (2,)
     assert episodes[0] == episodes[1]
-    assert len(episodes[0].actions) > 1
+    assert len(episodes[0].actions) == 60
 
 
 def test_without_a_mode_that_fits_the_error_names_the_remedy():
@@ -85,6 +88,7 @@ def test_without_a_mode_that_fits_the_error_names_the_remedy():
             run_episode(env, policy, ROOM)
 
 
+@pytest.mark.slow
 def test_a_job_of_such_a_policy_has_a_row():
     from pushplan.evaluation.execute import execute
 

@@ -189,6 +189,7 @@ def test_no_results_is_an_error(tmp_path: Path) -> None:
         Results.load(tmp_path)
 
 
+@pytest.mark.slow
 def test_page_csv_and_database_of_a_folder_say_the_same(tmp_path: Path) -> None:
     many = bench("smoke", ["straight", "random"], episodes=4, workers=0, out=tmp_path)
     many.report()

@@ -127,6 +127,7 @@ class TestReproduce:
             assert again.same and not again.changed
             assert again.again.E_nav == row.E_nav
 
+    @pytest.mark.slow
     def test_what_differs_is_named(
         self, stored: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
     ) -> None:

@@ -119,6 +119,7 @@ def free_starts(static: StaticMap, clearance: float, rng: np.random.Generator) -
 
 @pytest.mark.parametrize("seed", range(10))
 @pytest.mark.parametrize("kind", ["disc", "line", "polygon"])
+@pytest.mark.slow
 def test_lengths_equal_the_plain_visibility_graph(seed: int, kind: str) -> None:
     rng = np.random.default_rng(seed)
     static = random_map(rng)
@@ -152,6 +153,7 @@ def test_lengths_equal_the_plain_visibility_graph(seed: int, kind: str) -> None:
 
 
 @pytest.mark.parametrize("seed", range(10))
+@pytest.mark.slow
 def test_field_equals_the_plain_visibility_graph(seed: int) -> None:
     rng = np.random.default_rng(100 + seed)
     static = random_map(rng)

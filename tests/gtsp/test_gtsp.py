@@ -300,6 +300,7 @@ def test_node_choice_on_unstructured_costs() -> None:
     assert tour.cost <= 2.2 * exact.cost
 
 
+@pytest.mark.slow
 def test_same_seed_same_tour_in_another_process() -> None:
     code = (
         "import numpy as np\n"

@@ -53,6 +53,7 @@ def world() -> World:
 
 @pytest.mark.parametrize("name", ["kinodynamic-rrt", "push-aware"])
 @pytest.mark.parametrize("model", [OnlySweep(), IceInteraction()], ids=["sweep", "ice"])
+@pytest.mark.slow
 def test_a_model_that_has_only_sweep(name, model, world):
     planner = make_planner(name, interaction=model)
     result = planner.plan(world, stop=MaxIterations(1200), rng=np.random.default_rng(0))
@@ -63,6 +64,7 @@ def test_a_model_that_has_only_sweep(name, model, world):
 
 
 @pytest.mark.parametrize("name", ["kinodynamic-rrt", "push-aware"])
+@pytest.mark.slow
 def test_only_sweep_gives_about_the_plans_of_the_compiled_form(name, world):
     world = replace(world, movables=world.movables.select([0]))
     plans = [

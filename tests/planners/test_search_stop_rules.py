@@ -138,6 +138,7 @@ def test_no_piece_is_begun_after_a_stop():
     assert [k for first, last in pieces for k in range(first, last)] == list(range(10))
 
 
+@pytest.mark.slow
 def test_another_process_gives_the_same_bytes(request):
     code = (
         "import sys; sys.path[:0] = sys.argv[1:]; import test_search_stop_rules as t\n"

@@ -45,6 +45,7 @@ def least_gap(field):
 
 
 @pytest.mark.parametrize("concentration", [0.1, 0.2, 0.3, 0.4, 0.5, 0.7, 0.9])
+@pytest.mark.slow
 def test_concentration_is_exact_and_nothing_overlaps(concentration):
     for seed in range(3):
         field = ice(concentration, seed)

@@ -21,6 +21,7 @@ def few(tmp_path_factory):
 
 
 class TestPassages:
+    @pytest.mark.slow
     def test_same_seed_same_bytes(self):
         config = PassageConfig(passages=4, greatest_concentration=0.15)
         (a, truth_a), (b, truth_b) = (voyage_passages(7, "train", config) for _ in range(2))
@@ -103,6 +104,7 @@ def test_the_table_compares_predictors():
 
 
 @pytest.mark.learn
+@pytest.mark.slow
 def test_a_network_learns_and_is_exported(few, tmp_path):
     import torch
 

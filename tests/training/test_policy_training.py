@@ -124,6 +124,7 @@ def behaviour(path: Path) -> np.ndarray:
 @pytest.mark.learn
 class TestTraining:
     @pytest.mark.parametrize("algorithm", ["ppo", "sac", "sam", "bc"])
+    @pytest.mark.slow
     def test_left_off_and_taken_up_it_ends_the_same(self, algorithm, tmp_path, data):
         config = tiny(algorithm)
         whole = trained(config, tmp_path / "whole", data)
@@ -143,6 +144,7 @@ class TestTraining:
         again = trained(config, tmp_path / "parts", data, resume=True)  # nothing is left to do
         assert np.array_equal(behaviour(whole), behaviour(again))
 
+    @pytest.mark.slow
     def test_what_comes_out_runs_without_a_learning_library(self, tmp_path, data):
         path = trained(tiny("bc"), tmp_path / "run", data)
         code = f"""
@@ -183,6 +185,7 @@ print(episode.actions.ravel().tolist())
         assert model.specification.action == exported.specification.action
         assert model.decide(seen) == pytest.approx(exported.decide(seen), abs=1e-4)
 
+    @pytest.mark.slow
     def test_a_process_for_each_environment_learns_the_same(self, tmp_path):
         config = tiny("ppo", steps=32, validation=0)
         one = train_policy(config, tmp_path / "one", device="cpu")
@@ -442,6 +445,7 @@ class TestSamLearner:
         with pytest.raises(InvalidInputError, match="divisible by 8"):
             SamLearner(tiny("sam", options={"shrink": 2}), (4, 16, 20), "cpu")
 
+    @pytest.mark.slow
     def test_it_starts_with_the_weights_of_an_exported_network(self, tmp_path, data):
         import torch
 
@@ -478,6 +482,7 @@ class TestSamLearner:
             (__file__, "cannot be read"),
         ],
     )
+    @pytest.mark.slow
     def test_weights_of_another_network_are_refused(self, start, said, tmp_path, data):
         options = {**TINY["sam"], "start": start}
         if start == "area-clearing-sam":  # the same but for the number of blocks

@@ -217,6 +217,7 @@ def test_the_bound_holds_in_a_corridor_of_the_robots_own_width(drive):
     assert lower_bound(world) > 11.0
 
 
+@pytest.mark.slow
 def test_thin_posts_are_not_missed_where_the_robot_starts_at_a_wall():
     diamond = np.array([[0.5, 0.0], [0.0, 0.5], [-0.5, 0.0], [0.0, -0.5]])
     robot = RobotModel.from_outline(

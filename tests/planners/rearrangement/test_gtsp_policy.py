@@ -167,6 +167,7 @@ def commands():
     return digest.hexdigest()
 
 
+@pytest.mark.slow
 def test_two_processes_drive_the_same():
     code = "import test_gtsp_policy as t; print(t.commands())"
     path = f"import sys; sys.path[:0] = {[p for p in sys.path if 'tests' in p]!r}; "

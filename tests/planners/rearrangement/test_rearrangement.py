@@ -226,6 +226,7 @@ GAP = [
 @pytest.mark.parametrize(
     ("pose", "extra"), [((-4.5, -4.5, 0.3), ()), ((0.1, 0.05, 0.2), GAP), ((0.0, -4.7, 0.0), ())]
 )
+@pytest.mark.slow
 def test_a_box_in_a_tight_place_is_brought_out_of_it(pose, extra, drive_back):
     here = small_box(pose, extra)
     if not drive_back:

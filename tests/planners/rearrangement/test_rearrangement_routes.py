@@ -68,6 +68,7 @@ def touched(scene, poses):
     return float(shapely.area(shapely.intersection(STATIC, bodies)).max())
 
 
+@pytest.mark.slow
 def test_ways_among_columns_touch_nothing():
     rng = np.random.default_rng(3)
     found = asked = 0

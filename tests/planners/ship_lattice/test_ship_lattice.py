@@ -108,6 +108,7 @@ def test_random_worlds(seed: int) -> None:
 
 
 @pytest.mark.parametrize("name", ["quick", "published"])
+@pytest.mark.slow
 def test_hundreds_of_random_worlds(name: str) -> None:
     planner = ShipLattice(getattr(ShipLatticeConfig, name)())
     for seed in range(120):
