@@ -12,6 +12,7 @@ TASKS: dict[str, str] = {
     "box_delivery": "pushplan.envs.tasks.box_delivery:BoxDeliveryTask",
     "area_clearing": "pushplan.envs.tasks.area_clearing:AreaClearingTask",
     "ship_ice": "pushplan.envs.tasks.ship_ice:ShipIceTask",
+    "room": "pushplan.envs.tasks.room:RoomTask",
 }
 SIMULATORS: Mapping[str, str] = {
     "mujoco": "pushplan.envs.simulators.mujoco_simulator:MujocoSimulator",

@@ -96,10 +96,13 @@ def bench(
 
 
 def suites_of(given: Any, episodes: int | None, seed: int) -> tuple[Suite, ...]:
-    """Suites by name, with commas between them, a suite, or a list of scenarios."""
-    from pushplan.scenarios import Suite, suite
+    """Suites and folders of worlds, with commas between them, a suite, or a list of scenarios."""
+    from pushplan.scenarios import Suite, suite, world_suite
 
     if isinstance(given, str):
         names = [name.strip() for name in given.split(",")]
-        return tuple(suite(name, episodes=episodes, first_seed=seed) for name in names)
+        return tuple(
+            (world_suite if "/" in name else suite)(name, episodes=episodes, first_seed=seed)
+            for name in names
+        )
     return (given if isinstance(given, Suite) else Suite("scenarios", 1, tuple(given)),)

@@ -31,7 +31,8 @@ _KEYS = ("schema", "name", "suites", "policies", "episodes", "seed", "metrics", 
 _MORE = ("observation", "latency_factor", "memory_limit_mb", "traces", "misfits")
 _MISFITS = ("refuse", "skip")
 _POLICY = ("policy", "label", "parameters", "sweep", "deadline_s")
-_SUITE = ("suite", "scenarios", "episodes", "seed", "variations", "policies")
+_SUITE = ("suite", "scenarios", "worlds", "episodes", "seed", "variations", "policies")
+_WORLDS = ("simulator", "preset")
 
 
 def fields_of(data: object, folder: Path) -> dict[str, Any]:
@@ -96,22 +97,30 @@ def _path(file: str, folder: Path) -> Path:
 
 def _suite(given: object, episodes: int, seed: int, folder: Path) -> Suite:
     """Read an entry of ``suites``: a name, or a mapping."""
-    from pushplan.scenarios import Suite, load_scenarios, suite
+    from pushplan.scenarios import Suite, load_scenarios, suite, world_suite
 
     entry = {"suite": given} if isinstance(given, str) else given
-    known_keys("suite", entry, _SUITE, ())
+    here = isinstance(entry, Mapping) and "worlds" in entry
+    known_keys("suite", entry, (*_SUITE, *_WORLDS) if here else _SUITE, ())
     assert isinstance(entry, Mapping)
-    if ("suite" in entry) == ("scenarios" in entry):
+    if sum(kind in entry for kind in ("suite", "scenarios", "worlds")) != 1:
         raise SchemaError(
-            "an entry of suites has either 'suite', a name, or 'scenarios', a file: "
-            f"got {short(dict(entry))}"
+            "an entry of suites has either 'suite', a name, 'scenarios', a file, or 'worlds', a "
+            f"folder: got {short(dict(entry))}"
         )
+    first = integer("seed", entry.get("seed", seed), low=0)
     if "scenarios" in entry:
         path = _path(expect("scenarios", entry["scenarios"], str), folder)
         found = Suite(path.stem, 1, tuple(load_scenarios(path)))
+    elif "worlds" in entry:
+        found = world_suite(
+            _path(expect("worlds", entry["worlds"], str), folder),
+            episodes=entry.get("episodes"),
+            first_seed=first,
+            **{key: expect(key, entry[key], str) for key in _WORLDS if key in entry},
+        )
     else:
         episodes = integer("episodes", entry.get("episodes", episodes), low=1)
-        first = integer("seed", entry.get("seed", seed), low=0)
         found = suite(entry["suite"], episodes=episodes, first_seed=first)
     changes = entry.get("variations", {})
     if not isinstance(changes, Mapping):

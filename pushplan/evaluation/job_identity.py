@@ -15,7 +15,7 @@ from typing import Any
 
 import pushplan
 from pushplan.evaluation.jobs import Job, JobSettings
-from pushplan.evaluation.policies import PolicySpec
+from pushplan.evaluation.policies import PolicySpec, file_digest
 from pushplan.world import InvalidInputError
 
 _ENGINES = {"pymunk": "pymunk", "mujoco": "mujoco"}
@@ -50,7 +50,8 @@ def job_spec(job: Job, settings: JobSettings) -> dict[str, Any]:
 
     Returns:
         ``policy`` (``label``, ``identity``, and ``source`` and ``options`` if it can be made from
-        them again), ``scenario``, ``settings`` and ``versions``.
+        them again), ``scenario``, ``settings``, ``versions``, and a hash of the content for each
+        of the ``files`` that the scenario names, if it names any.
     """
     spec = job.policy
     policy: dict[str, Any] = {"label": spec.label, "identity": spec.identity}
@@ -63,7 +64,14 @@ def job_spec(job: Job, settings: JobSettings) -> dict[str, Any]:
         "key": [job.scenario.key, job.scenario.seed],
         "settings": settings_dict(settings),
         "versions": versions(str(job.scenario.simulator), spec.network is not None),
+        **({"files": files} if (files := _files(job.scenario)) else {}),
     }
+
+
+def _files(scenario: Any) -> dict[str, str]:
+    """Hash of the content of each file that a variation names."""
+    named = getattr(scenario, "variations", {}).items()
+    return {name: file_digest(Path(path)).strip() for name, path in named if name.endswith("_file")}
 
 
 def settings_dict(settings: JobSettings) -> dict[str, Any]:
@@ -95,7 +103,7 @@ def same_but_versions(spec: Mapping[str, Any]) -> str:
 def differences(before: Mapping[str, Any], now: Mapping[str, Any]) -> str:
     """What differs between two specifications, in words."""
     parts = []
-    for section in ("policy", "scenario", "settings", "versions"):
+    for section in ("policy", "scenario", "files", "settings", "versions"):
         old, new = before.get(section, {}), now.get(section, {})
         names = [name for name in sorted({*old, *new}) if old.get(name) != new.get(name)]
         if section == "policy":  # its source may have moved, its options are in its identity

@@ -52,7 +52,7 @@ class PolicySpec:
         options = "".join(f" {key}={value!r}" for key, value in sorted(self.options.items()))
         if isinstance(self.source, str):
             if (file := _network_file(self.source)) is not None:
-                return f"{file.name}{_digest(file)}{options}"
+                return f"{file.name}{file_digest(file)}{options}"
             where, _, name = self.source.rpartition(":")
             shown = Path(where).name if where.endswith(".py") else where
             return f"{shown}{':' if where else ''}{name}{source_digest(where)}{options}"
@@ -141,10 +141,10 @@ def policy_names() -> tuple[str, ...]:
 
 def source_digest(where: str) -> str:
     """A hash of what a ``file.py`` or a module holds, in words; nothing for modules of ours."""
-    return _digest(Path(where) if where.endswith(".py") else _file_of(where))
+    return file_digest(Path(where) if where.endswith(".py") else _file_of(where))
 
 
-def _digest(file: Path | None) -> str:
+def file_digest(file: Path | None) -> str:
     """A hash of a file's content, in words; nothing for none."""
     if file is None or not file.is_file():
         return ""
@@ -154,7 +154,7 @@ def _digest(file: Path | None) -> str:
 
 @functools.lru_cache(maxsize=256)
 def _content_hash(file: Path, *_version: int) -> str:
-    """`_digest` of a file as it is; jobs by the thousand ask for the same one."""
+    """`file_digest` of a file as it is; jobs by the thousand ask for the same one."""
     return f" sha256:{hashlib.sha256(file.read_bytes()).hexdigest()[:12]}"
 
 

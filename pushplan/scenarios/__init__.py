@@ -8,7 +8,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from pushplan.scenarios.scenario import Scenario, load_scenarios, save_scenarios
-from pushplan.scenarios.suite import Suite, suite, suite_names
+from pushplan.scenarios.suite import Suite, suite, suite_names, world_suite
 from pushplan.world.lazy_names import lazy_names
 
 if TYPE_CHECKING:
@@ -26,6 +26,7 @@ __all__ = [
     "save_scenarios",
     "suite",
     "suite_names",
+    "world_suite",
 ]
 
 __getattr__, __dir__ = lazy_names(

@@ -30,6 +30,7 @@ LAYOUTS = {
     "area_clearing": [
         {"layout": name} for name in ("clear_small", "walled", "walled_with_columns")
     ],
+    "room": [{"spread": 0.2}, {"max_speed": 0.1, "control_step": 0.05}],
 }
 
 
@@ -96,9 +97,10 @@ def comparable(info):
     return {key: getattr(value, "tolist", lambda v=value: v)() for key, value in info.items()}
 
 
-def test_all_four_tasks_run_on_both_simulators():
-    assert {task for task, _ in PAIRS} == {"maze", "ship_ice", "box_delivery", "area_clearing"}
-    assert len(PAIRS) == 8
+def test_every_task_runs_on_both_simulators():
+    tasks = {"maze", "ship_ice", "box_delivery", "area_clearing", "room"}
+    assert {task for task, _ in PAIRS} == tasks
+    assert len(PAIRS) == 2 * len(tasks)
 
 
 @pytest.mark.parametrize(

@@ -64,6 +64,7 @@ def test_suites_and_tasks_are_chosen_by_name() -> None:
         chosen_tables(",")
 
 
+@pytest.mark.slow
 def test_ours_beside_theirs(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out, page = tmp_path / "run", tmp_path / "comparison.md"
     command = ["bench", "paper", "--only", "maze-2d-3,maze-3d-3", "--episodes", "2"]

@@ -46,6 +46,7 @@ def test_single_floes_move_as_in_the_other_model(friction):
         assert ours.work == pytest.approx(other.work, rel=0.12)
 
 
+@pytest.mark.slow
 def test_work_agrees_with_the_simulator_in_a_crowd():
     from pushplan.training.ice_passages import PassageConfig, voyage_passages
 

@@ -172,6 +172,7 @@ print(episode.actions.ravel().tolist())
             assert float(decided[0]) == action
             seen, *_ = env.step(decided)
 
+    @pytest.mark.slow
     def test_images_and_the_file_of_the_library(self, tmp_path, monkeypatch):
         from pushplan.learned import load_policy
 
@@ -563,6 +564,7 @@ class TestCard:
 
 class TestCommands:
     @pytest.mark.learn
+    @pytest.mark.slow
     def test_from_nothing_to_a_card(self, tmp_path, capsys):
         config = tiny("bc", validation=0, steps=32)
         path = tmp_path / "tiny.yaml"

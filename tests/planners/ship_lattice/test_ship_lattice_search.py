@@ -152,6 +152,7 @@ def test_the_estimate_saves_most_nodes_and_costs_little_more() -> None:
 
 @settings(max_examples=60, deadline=None)
 @given(seed=st.integers(0, 10**6), half=st.integers(0, 3), reach=st.integers(0, 4))
+@pytest.mark.slow
 def test_the_bound_holds_for_random_walks_over_random_prices(
     seed: int, half: int, reach: int
 ) -> None:

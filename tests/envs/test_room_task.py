@@ -1,0 +1,172 @@
+"""World files as environments, one by one and as suites."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import shapely
+
+from pushplan.envs import PushEnv
+from pushplan.envs.tasks.room import small_room
+from pushplan.evaluation import Experiment, bench
+from pushplan.scenarios import world_suite
+from pushplan.world import GoalDisc, GoalLine, ScenarioError, SchemaError, World, save_world
+
+ROOM = Path(__file__).parents[2] / "examples" / "room.yaml"
+
+
+def room(path: Path | None = None, **variations: object) -> PushEnv:
+    named = {} if path is None else {"world_file": str(path)}
+    return PushEnv(task="room", variations={**named, **variations}, observation="state")
+
+
+def start(env: PushEnv, seed: int = 0) -> World:
+    env.reset(seed=seed)
+    return env.world
+
+
+def test_the_file_says_what_there_is(tmp_path: Path) -> None:
+    given = replace(small_room(), time=7.0, margin=0.03)
+    save_world(given, tmp_path / "a.yaml")
+    world = start(room(tmp_path / "a.yaml"), 5)
+    assert world == replace(given, time=0.0)
+    assert start(room(tmp_path / "a.yaml", max_speed=0.1)).robot.max_speed == 0.1
+
+
+@pytest.mark.parametrize("simulator", ["pymunk", "mujoco"])
+def test_a_policy_gets_there(simulator: str) -> None:
+    results = bench(
+        [one for one in world_suite(ROOM.parent, simulator=simulator, preset="testbed").scenarios],
+        ["straight"],
+        workers=0,
+    )
+    assert [row.reason for row in results.rows] == ["goal"]
+
+
+def bodies(world: World) -> list[shapely.Geometry]:
+    objects = [world.movables.outline_world(k) for k in range(len(world.movables))]
+    return [shapely.Polygon(one) for one in (*world.robot_outline_world(), *objects)]
+
+
+def test_a_spread_moves_bodies_a_little_and_never_onto_each_other() -> None:
+    spread, plain = 0.3, small_room()
+    env = room(spread=spread)
+    starts = [start(env, seed) for seed in range(20)]
+    assert start(env, 3) == starts[3] and starts[3] != starts[4]
+    column = shapely.Polygon(plain.static.polygons[0])
+    for world in starts:
+        shapes = bodies(world)
+        for i, shape in enumerate(shapes):
+            assert not shape.intersects(column)
+            assert not any(shape.intersects(other) for other in shapes[:i])
+        moved = world.movables.poses - plain.movables.poses
+        assert (np.hypot(moved[:, 0], moved[:, 1]) <= spread).all()
+        assert (np.abs(moved[:, 2]) * world.movables.radii <= spread + 1e-12).all()
+
+
+def test_the_reward_is_progress_less_work() -> None:
+    env = room()
+    world = start(env)
+    total = 0.0
+    for _ in range(20):
+        _, reward, *_, info = env.step(np.array([1.0, 0.0], np.float32))
+        total += reward
+    assert info["work"] == 0.0 and env.world.robot_pose[0] > world.robot_pose[0] + 0.3
+    assert 10.0 < total < 50.0
+
+
+def test_time_runs_out() -> None:
+    env = room(time_limit=0.5)
+    start(env)
+    ends = [env.step(np.zeros(2, np.float32))[3] for _ in range(5)]
+    assert ends == [False, False, False, False, True]
+
+
+@pytest.mark.parametrize(
+    ("goal", "action", "words"),
+    [
+        (GoalDisc(np.array([0.6, 0.6]), 0.2), "velocity", "starts in the goal"),
+        (GoalDisc(np.array([1.5, 1.5]), 0.1), "velocity", "no way leads to the goal"),
+        (GoalLine(np.array([1.5, 2.5]), np.array([0.0, 1.0])), "wheels", None),
+    ],
+)
+def test_what_makes_no_sense_is_said(
+    tmp_path: Path, goal: GoalDisc, action: str, words: str | None
+) -> None:
+    save_world(replace(small_room(), goal=goal), tmp_path / "a.yaml")
+    options = {"task": "room", "variations": {"world_file": str(tmp_path / "a.yaml")}}
+    if words is None:
+        env = PushEnv(**options, action=action)
+        env.reset(seed=0)
+        env.step(np.full(2, 0.5, np.float32))
+    else:
+        with pytest.raises(ScenarioError, match=words):
+            PushEnv(**options, action=action)
+
+
+def test_a_file_that_is_not_there() -> None:
+    with pytest.raises(ScenarioError, match="cannot read world file"):
+        room(Path("nothere.yaml"))
+
+
+class TestSuites:
+    @pytest.fixture
+    def folder(self, tmp_path: Path) -> Path:
+        folder = tmp_path / "rooms"
+        folder.mkdir()
+        save_world(small_room(), folder / "b.yaml")
+        save_world(replace(small_room(), margin=0.05), folder / "a.json")
+        (folder / "map.yaml").write_text("image: map.pgm\n")
+        (folder / "notes.txt").write_text("no world")
+        return folder
+
+    def test_a_folder_is_a_suite(self, folder: Path) -> None:
+        found = world_suite(folder, episodes=3, first_seed=7)
+        assert found.name == "rooms"
+        files = [Path(str(one.variations["world_file"])).name for one in found.scenarios]
+        assert files == ["a.json", "b.yaml", "a.json"]
+        assert [one.seed for one in found.scenarios] == [7, 7, 8]
+        assert len(world_suite(folder)) == 2
+
+    def test_folders_without_worlds(self, folder: Path) -> None:
+        (folder / "a.json").unlink()
+        (folder / "b.yaml").unlink()
+        with pytest.raises(SchemaError, match="in it says schema: pushplan-world"):
+            world_suite(folder)
+        with pytest.raises(SchemaError, match="no such folder"):
+            world_suite(folder / "none")
+
+    def test_in_an_experiment_a_changed_file_is_run_again(
+        self, folder: Path, tmp_path: Path
+    ) -> None:
+        data = {
+            "schema": "pushplan-experiment/1",
+            "suites": [{"worlds": "rooms", "variations": {"time_limit": 0.4}}],
+            "policies": ["straight"],
+        }
+        ran = []
+
+        def run() -> int:
+            experiment = Experiment.from_dict(data, tmp_path)
+            experiment.run(
+                tmp_path / "out", workers=0, progress=lambda done, total, row: ran.append(row)
+            )
+            return sum(row is not None for row in ran)
+
+        assert run() == 2
+        assert run() == 2
+        save_world(replace(small_room(), margin=0.06), folder / "b.yaml")
+        assert run() == 3
+
+    def test_unknown_keys_are_named(self, folder: Path) -> None:
+        data = {"schema": "pushplan-experiment/1", "policies": ["straight"]}
+        for entry, words in (
+            ({"worlds": "rooms", "suite": "maze-2d-3"}, "either 'suite'"),
+            ({"suite": "maze-2d-3", "simulator": "mujoco"}, "simulator"),
+            ({"worlds": "nothere"}, "no such folder"),
+        ):
+            with pytest.raises(SchemaError, match=words):
+                Experiment.from_dict({**data, "suites": [entry]}, folder.parent)
