@@ -88,7 +88,8 @@ class Runner:
         observer_gain: how much of the difference between what is predicted and what is seen is
             believed; less than 1 smooths noisy poses. By default 1, and 0.3 where there is noise.
             A policy that `ExpectsNoise` is told what is left.
-        margin: distance that plans keep from what is static [m]; that of the worlds if None.
+        margin: distance that plans keep from what is static [m]; if None that of the worlds, and
+            twice what noise leaves at the robot's farthest point, whichever is more.
         keep_unseen: for how long an object is taken to be there that is missing in the worlds [s].
         log: keeps worlds, plans and commands.
         executor: runs planning calls; a thread by default, another one for simulation.
@@ -147,9 +148,9 @@ class Runner:
         gain = number("observer_gain", observer_gain, low=0.0, high=1.0, open_low=True)
         self.policy = _policy_of(policy, self.max_age)
         left = math.sqrt(gain / (2.0 - gain))  # of white noise, after a filter of that gain
-        self._goal_inset = 3.0 * left * noise[0]
+        self._left = left * noise[0], left * noise[1]
         if any(noise) and isinstance(self.policy, ExpectsNoise):
-            self.policy.expect_noise(left * noise[0], left * noise[1])
+            self.policy.expect_noise(*self._left)
         self._believed = max(self.max_age, _BLIND if self.on_stale == "continue" else 0.0)
         self._estimator = StateEstimator(delay, gain, self._believed)
         self._delay, self._clock, self._log = delay, clock, log
@@ -217,12 +218,16 @@ class Runner:
         """The world as the policy plans in it: with the margin, and sure to be in the goal."""
         world = expect("world", world, World)
         goal = world.goal
-        inset = self._goal_inset + world.robot.max_speed * self.period  # the last command acts
+        place, heading = self._left
+        inset = 3.0 * place + world.robot.max_speed * self.period  # the last command acts
         if isinstance(goal, GoalDisc):
             world = replace(
                 world, goal=GoalDisc(goal.center, max(goal.radius - inset, 0.5 * goal.radius))
             )
-        return world if self.margin is None else replace(world, margin=self.margin)
+        margin = self.margin
+        if margin is None:
+            margin = max(world.margin, 2.0 * (place + heading * world.robot.circumscribed_radius))
+        return world if margin == world.margin else replace(world, margin=margin)
 
     def update(self, world: World) -> bool:
         """Take a snapshot, from any thread.
