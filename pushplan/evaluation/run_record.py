@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from pushplan.evaluation.rows import ResultRow
-from pushplan.evaluation.summary import policies_of, settings_of
+from pushplan.evaluation.summary import natural, policies_of, settings_of
 from pushplan.world import Episode
 
 
@@ -16,12 +16,18 @@ from pushplan.world import Episode
 class RunRecord:
     """Rows of a run and what was noted about it."""
 
-    rows: tuple[ResultRow, ...]  # sorted
+    rows: tuple[ResultRow, ...]  # by the titles of their settings, otherwise as given
     # configuration, policies and titles of the settings
     about: Mapping[str, Any] = field(default_factory=dict)
     path: Path | None = None  # the run directory; None for rows that come from elsewhere
     # job -> value by name of metrics that are no columns
     measured: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        known = self.about.get("settings", {})
+        place = {one: natural(known.get(one, one)) for one in settings_of(self.rows)}
+        rows = sorted(self.rows, key=lambda row: place[row.setting])
+        object.__setattr__(self, "rows", tuple(rows))
 
     @property
     def policies(self) -> list[str]:

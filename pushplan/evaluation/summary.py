@@ -199,10 +199,11 @@ def _by_scenario(rows: Sequence[ResultRow], metric: str) -> dict[tuple[str, int]
 
 
 def settings_of(rows: Sequence[ResultRow]) -> list[str]:
-    """The settings that occur, with numbers in their order."""
-    return sorted({row.setting for row in rows}, key=_natural)
+    """The settings that occur, in the order of the rows."""
+    return list(dict.fromkeys(row.setting for row in rows))
 
 
-def _natural(setting: str) -> list[tuple[int, int, str]]:
-    parts = re.split(r"(\d+)", setting)
+def natural(title: str) -> list[tuple[int, int, str]]:
+    """Key that sorts texts with the numbers in them in their order."""
+    parts = re.split(r"(\d+)", title)
     return [(0, int(p), "") if p.isdecimal() else (1, 0, p) for p in parts]
