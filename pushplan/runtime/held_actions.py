@@ -36,17 +36,7 @@ class HeldActions:
     """
 
     def __init__(self, policy: Policy, hold: float) -> None:
-        name = type(policy).__name__
-        if isinstance(policy, ChoosesActions) and not set(policy.actions) & set(_MODES):
-            raise InvalidInputError(
-                f"a Runner drives policies with one of the actions {', '.join(_MODES)}; "
-                f"{name} gives {', '.join(policy.actions)}"
-            )
-        if isinstance(policy, ChoosesObservation) and policy.observation is not None:
-            raise InvalidInputError(
-                f"a Runner drives policies that look at the World alone; {name} needs the "
-                f"observation {policy.observation!r}"
-            )
+        check_world_policy(policy)
         self._policy, self._hold = policy, hold
         given = policy.actions if isinstance(policy, ChoosesActions) else ()
         self.actions = tuple(mode for mode in given if mode in _TWISTS) or _TWISTS
@@ -81,11 +71,34 @@ class HeldActions:
     def _receive(self, world: World) -> None:
         if self._pending is not None and self._pending.ready(world.time):
             pending, self._pending = self._pending, None
-            self._twist, self._since = _twist(world, pending.result()), world.time
+            self._twist, self._since = twist_of(world, pending.result()), world.time
 
 
-def _twist(world: World, action: object) -> Twist:
-    """An action as a velocity."""
+def check_world_policy(policy: Policy) -> None:
+    """Refuse a policy that gives no velocities, or needs more than the world.
+
+    Raises:
+        InvalidInputError: naming what it gives or needs, and what can be driven.
+    """
+    name = type(policy).__name__
+    if isinstance(policy, ChoosesActions) and not set(policy.actions) & set(_MODES):
+        raise InvalidInputError(
+            f"a Runner drives policies with one of the actions {', '.join(_MODES)}; "
+            f"{name} gives {', '.join(policy.actions)}"
+        )
+    if isinstance(policy, ChoosesObservation) and policy.observation is not None:
+        raise InvalidInputError(
+            f"a Runner drives policies that look at the World alone; {name} needs the "
+            f"observation {policy.observation!r}"
+        )
+
+
+def twist_of(world: World, action: object) -> Twist:
+    """An action as a velocity.
+
+    Raises:
+        InvalidInputError: if it is neither a `Twist` nor wheel speeds of a robot with wheels.
+    """
     if isinstance(action, Twist):
         return action
     if isinstance(action, WheelSpeeds) and world.robot.wheel_separation > 0.0:

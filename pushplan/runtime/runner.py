@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import gc
 import math
-import sys
 import threading
 import time
 import warnings
@@ -20,6 +18,7 @@ from pushplan.planners import make_policy, policy_for
 from pushplan.planners.kernel_warmup import warm_up_policy
 from pushplan.runtime.command import Command, CommandStatus
 from pushplan.runtime.held_actions import HeldActions
+from pushplan.runtime.interpreter_turns import take_short_turns, take_usual_turns
 from pushplan.runtime.object_memory import ObjectMemory
 from pushplan.runtime.state_estimator import StateEstimator
 from pushplan.runtime.thread_executor import ThreadExecutor
@@ -48,7 +47,6 @@ PLAN_STOP = OwnBudget() | Deadline(1.0)
 _SMOOTHING = 0.3  # gain of the filter of noisy poses
 _RETRY = 0.25  # time after a failure in which the policy is not asked [s]
 _BLIND = 60.0  # for how long a robot that is to continue does so without a world [s]
-_SWITCH = 5e-4  # how long the planning thread may keep the interpreter to itself [s]
 
 
 class RunLog(Protocol):
@@ -156,7 +154,7 @@ class Runner:
         self._delay, self._clock, self._log = delay, clock, log
         self._executor = executor or ThreadExecutor(self.plan_stop, clock)
         self._lock = threading.Lock()
-        self._switch_interval: float | None = None
+        self._prompt = False
         self._forget()
 
     def _forget(self) -> None:
@@ -200,11 +198,9 @@ class Runner:
         self._memory = ObjectMemory(self.keep_unseen)
         self._memory.complete(world, world)
         self._begin(world)
-        if self._switch_interval is None:
-            self._switch_interval = sys.getswitchinterval()
-            sys.setswitchinterval(min(_SWITCH, self._switch_interval))
-            gc.collect()
-            gc.freeze()  # else a collection amid driving goes through all modules and kernels
+        if not self._prompt:
+            take_short_turns()
+            self._prompt = True
         self._newest = self._observed = world
         self.worlds = 1
         self._note("world", world)
@@ -264,10 +260,9 @@ class Runner:
             Whether no planning thread is left.
         """
         self.cancel("closed")
-        if self._switch_interval is not None:
-            sys.setswitchinterval(self._switch_interval)
-            self._switch_interval = None
-            gc.unfreeze()
+        if self._prompt:
+            take_usual_turns()
+            self._prompt = False
         return self._executor.close(timeout) if isinstance(self._executor, ThreadExecutor) else True
 
     def command(self, now: float) -> Command:
@@ -344,7 +339,7 @@ class Runner:
             self._failure, self._retry_at = describe(error), now + _RETRY
             self._begin(world)
             return None, CommandStatus.FAILED, self._failure
-        if _is_done(world):
+        if is_done(world):
             return wanted, CommandStatus.DONE, ""
         if self._running_s and wanted.linear == 0.0 == wanted.angular:
             return wanted, CommandStatus.WAITING, "a plan is on its way"
@@ -381,7 +376,8 @@ def _policy_of(policy: object, hold: float) -> Any:
     return policy if isinstance(policy, PlansBesideDriving) else HeldActions(policy, hold)
 
 
-def _is_done(world: World) -> bool:
+def is_done(world: World) -> bool:
+    """Whether the robot, or every object, is where the goal wants it."""
     goal = world.goal
     if isinstance(goal, GoalDisc | GoalLine):
         return goal.distance(float(world.robot_pose[0]), float(world.robot_pose[1])) == 0.0

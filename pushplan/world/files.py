@@ -116,13 +116,13 @@ def world_from_dict(data: object, folder: str | Path = ".") -> World:
     assert isinstance(data, Mapping)
     if data["schema"] != SCHEMA:
         raise SchemaError(f"this pushplan reads schema {SCHEMA!r}, got {short(data['schema'])}")
-    robot, pose, twist = _robot(data["robot"])
+    robot, pose, twist = robot_from_dict(data["robot"])
     return World(
         robot=robot,
         robot_pose=pose,
         robot_twist=twist,
         static=_static(data.get("static", {}), Path(folder)),
-        movables=_movables(data.get("movables", [])),
+        movables=movables_from_list(data.get("movables", [])),
         goal=_goal(data["goal"]),
         time=number("time", data.get("time", 0.0)),
         margin=data.get("margin", 0.0),
@@ -167,7 +167,12 @@ def write_atomic(path: Path, data: bytes) -> None:
     os.replace(temporary, path)
 
 
-def _robot(data: object) -> tuple[RobotModel, Any, Any]:
+def robot_from_dict(data: object) -> tuple[RobotModel, Any, Any]:
+    """The robot, its pose and its twist, as the key ``robot`` of a world has them.
+
+    Raises:
+        SchemaError, InvalidInputError: as `world_from_dict`.
+    """
     needed = ("parts", "mass", "drive", "max_speed", "max_turn_rate", "pose")
     known_keys("robot", data, (*needed, *_ROBOT_LIMITS, "name", "twist"), needed)
     assert isinstance(data, Mapping)
@@ -206,7 +211,12 @@ def _static(data: object, folder: Path) -> StaticMap:
     )
 
 
-def _movables(data: object) -> Movables:
+def movables_from_list(data: object) -> Movables:
+    """The objects, as the key ``movables`` of a world has them.
+
+    Raises:
+        SchemaError, InvalidInputError: as `world_from_dict`.
+    """
     outlines, poses, twists, masses, wheeled, ids = [], [], [], [], [], []
     for i, item in enumerate(_list("movables", data)):
         name = f"movables[{i}]"

@@ -35,11 +35,13 @@ MAX_DEPTH = 64
 LONGEST_NUMBER = 400
 """Most characters of a number in JSON and YAML: floats written out have 310."""
 _MEMBERS = 1000
-_TEXT = re.compile(rb'"[^"\\]*(?:\\.[^"\\]*)*"')
-_LONG_NUMBER = re.compile(rb"\d{%d}" % LONGEST_NUMBER)
+_TEXT = re.compile(rb'"[^"\\]*(?:\\.[^"\\]*)*(?:"|\\?\Z)', re.DOTALL)
+"""A text in JSON; one that does not end reaches to the end of all, else searching is quadratic."""
 _STEPS = np.zeros(256, dtype=np.int8)
 _STEPS[[ord("["), ord("{")]] = 1
 _STEPS[[ord("]"), ord("}")]] = -1
+_DIGITS = np.zeros(256, dtype=np.bool_)
+_DIGITS[ord("0") : ord("9") + 1] = True
 
 
 def read_bytes(path: str | Path, what: str = "file", limit: int = MAX_BYTES) -> bytes:
@@ -210,18 +212,21 @@ def _array(file: IO[bytes], limit: int) -> NDArray[Any]:
 
 def _check_json(data: bytes) -> None:
     """Refuse what would take much memory or a deep stack, before it is parsed."""
-    for text in (data, _TEXT.sub(b'""', data)):  # what stands in texts counts only if it must
+    for strip in (False, True):  # what stands in texts counts only if it must
+        text = _TEXT.sub(b'""', data) if strip else data
         count = text.count(b",") + text.count(b"[") + text.count(b"{")
-        depth = 0
+        depth, digits = 0, 0
         if count <= MAX_VALUES:
-            steps = _STEPS[np.frombuffer(text, dtype=np.uint8)]
+            codes = np.frombuffer(text, dtype=np.uint8)
+            steps = _STEPS[codes]
             depth = int(np.cumsum(steps[steps != 0], dtype=np.int64).max(initial=0))
-        long = _LONG_NUMBER.search(text)
-        if count <= MAX_VALUES and depth <= MAX_DEPTH and long is None:
+            others = np.flatnonzero(~_DIGITS[codes])
+            digits = int(np.diff(others, prepend=-1, append=len(codes)).max()) - 1
+        if count <= MAX_VALUES and depth <= MAX_DEPTH and digits < LONGEST_NUMBER:
             return
     if count > MAX_VALUES:
         raise ValueError(f"{MAX_VALUES:,} values are the most, got {count:,}")
-    if long is not None:
+    if digits >= LONGEST_NUMBER:
         raise ValueError(f"a number may have {LONGEST_NUMBER} digits at most")
     raise ValueError(f"lists and mappings may be nested {MAX_DEPTH} deep, got {depth:,}")
 

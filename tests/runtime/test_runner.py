@@ -466,3 +466,14 @@ def test_a_map_that_changes_is_seen():
         world, commands = drive(runner, replace(world, static=empty), 40)
     assert runner.failures == 0
     assert commands[-1].status is CommandStatus.DRIVING
+
+
+def test_runners_of_one_process_share_the_settings_of_the_interpreter() -> None:
+    before, world = (sys.getswitchinterval(), gc.get_freeze_count()), maze()
+    first, second = Runner(Straight(), period=PERIOD), Runner(Straight(), period=PERIOD)
+    first.start(world)
+    second.start(world)
+    first.close()
+    assert sys.getswitchinterval() < before[0] and gc.get_freeze_count() > before[1]
+    second.close()
+    assert (sys.getswitchinterval(), gc.get_freeze_count()) == before
