@@ -46,7 +46,7 @@ def scenario_of(options: argparse.Namespace) -> Scenario:
 
     shown = {"boxes": options.boxes, "shape": options.shape}
     given: dict[str, Any] = {key: value for key, value in shown.items() if value is not None}
-    for name, value in map(_variation, options.variations):
+    for name, value in map(variation, options.variations):
         if name in given:
             raise InvalidInputError(f"variation {name!r} is given twice")
         given[name] = value
@@ -62,7 +62,12 @@ def scenario_of(options: argparse.Namespace) -> Scenario:
     return suite(options.suite, episodes=1, first_seed=options.seed).scenarios[0]
 
 
-def _variation(text: str) -> tuple[str, Any]:
+def variation(text: str) -> tuple[str, Any]:
+    """Name and value of a text of the form ``NAME=VALUE``.
+
+    Raises:
+        InvalidInputError: if it has another form, or the value is no YAML.
+    """
     from pushplan.world import InvalidInputError
     from pushplan.world.safe_files import parse_yaml
 

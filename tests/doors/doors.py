@@ -185,9 +185,9 @@ def _read_name(path: Path) -> Any:
 
 
 def _read_variation(path: Path) -> Any:
-    from pushplan.cli.scenario_options import _variation
+    from pushplan.cli.scenario_options import variation
 
-    return _variation("boxes=" + path.read_bytes().decode("utf-8", "surrogateescape"))
+    return variation("boxes=" + path.read_bytes().decode("utf-8", "surrogateescape"))
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,159 @@
+"""What the policy server adds to a policy, beside calling it in this process.
+
+``python benchmarks/serving.py`` prints the time of an ``act`` in process and through the server, for
+poses alone and for whole worlds, and what messages cost to write and to read.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "examples"))
+
+from serve_client import PolicyClient
+
+from pushplan.planners import make_policy, warm_up
+from pushplan.serving import PolicyServer
+from pushplan.world import (
+    GoalDisc,
+    Movables,
+    RobotModel,
+    StaticMap,
+    World,
+    stream,
+    world_from_dict,
+    world_to_dict,
+)
+from pushplan.world.safe_files import parse_json
+
+SQUARE = np.array([[-0.2, -0.2], [0.2, -0.2], [0.2, 0.2], [-0.2, 0.2]])
+
+
+def world_of(objects: int) -> World:
+    """A room of 50 m with a wall and some square boxes, away from the robot's way."""
+    rng = np.random.default_rng(0)
+    poses = np.column_stack([rng.uniform(2, 48, (objects, 2)), rng.uniform(-3, 3, objects)])
+    poses[:, 1] = np.where(abs(poses[:, 1] - 25.0) < 2.0, 40.0, poses[:, 1])
+    return World(
+        robot=RobotModel.from_outline(
+            SQUARE, mass=1.0, drive="differential", max_speed=1.0, max_turn_rate=2.0
+        ),
+        robot_pose=[2.0, 25.0, 0.0],
+        static=StaticMap.build(bounds=[0, 0, 50, 50], segments=[[10, 0, 10, 20]], radii=0.1),
+        movables=Movables.from_outlines([SQUARE] * objects, poses),
+        goal=GoalDisc([48.0, 25.0], 0.5),
+    )
+
+
+def quantiles(seconds: list[float]) -> str:
+    """Median, 99 % and worst [ms]."""
+    ms = 1e3 * np.array(seconds)
+    return f"{np.median(ms):9.3f} {np.quantile(ms, 0.99):9.3f} {ms.max():9.3f}"
+
+
+def driven(steps: int) -> list[tuple[float, list[float]]]:
+    """Times and robot poses of a drive along the straight way."""
+    return [(0.01 * k, [2.0 + 0.01 * k, 25.0, 0.0]) for k in range(steps)]
+
+
+def in_process(policy: str, world: World, steps: int) -> list[float]:
+    """What each `act` takes [s], the world made by `World.moved`."""
+    made = make_policy(policy)
+    made.reset(world, stream(0, "policy"))
+    took = []
+    for now, pose in driven(steps):
+        began = time.perf_counter()
+        made.act(world.moved(robot_pose=pose, robot_twist=[1, 0, 0], time=now), None)
+        took.append(time.perf_counter() - began)
+    return took
+
+
+def served(address: str, world: World, steps: int, whole: bool) -> list[float]:
+    """What each `act` takes through the server [s], from the client's values to its reply."""
+    data: dict[str, Any] = world_to_dict(world)
+    poses, took = world.movables.poses.tolist(), []
+    with PolicyClient(address) as client:
+        client.reset(data)
+        for now, pose in driven(steps):
+            data["time"], data["robot"]["pose"], data["robot"]["twist"] = now, pose, [1, 0, 0]
+            began = time.perf_counter()
+            if whole:
+                client.act(world=data)
+            else:
+                client.act(time=now, robot_pose=pose, robot_twist=[1, 0, 0], poses=poses)
+            took.append(time.perf_counter() - began)
+    return took
+
+
+def message_costs(objects: int) -> None:
+    """What JSON costs, and MessagePack where it is installed."""
+    world = world_of(objects)
+    whole = world_to_dict(world)
+    poses = {"time": 1.0, "robot_pose": [1.0, 2.0, 3.0], "poses": world.movables.poses.tolist()}
+    print(f"\n{f'message of {objects} objects':34} {'bytes':>8} {'write':>9} {'read':>9} ms")
+    for name, data in (("whole world", whole), ("poses", poses)):
+        text = json.dumps(data)
+        wrote, read = median(lambda d=data: json.dumps(d)), median(lambda t=text: parse_json(t))
+        print(f"{f'{name}, JSON':34} {len(text):8,} {wrote:9.3f} {read:9.3f}")
+        try:
+            import msgpack
+        except ImportError:
+            continue
+        packed = msgpack.packb(data)
+        wrote = median(lambda d=data: msgpack.packb(d))
+        read = median(lambda p=packed: msgpack.unpackb(p))
+        print(f"{f'{name}, MessagePack':34} {len(packed):8,} {wrote:9.3f} {read:9.3f}")
+    print(f"{'World from a whole world read':54} {median(lambda: world_from_dict(whole)):9.3f}")
+
+
+def median(call: Callable[[], object], times: int = 200) -> float:
+    """Median time of a call [ms]."""
+    took = []
+    for _ in range(times):
+        began = time.perf_counter()
+        call()
+        took.append(time.perf_counter() - began)
+    return 1e3 * float(np.median(took))
+
+
+def main() -> None:
+    """Measure and print."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--policy", default="straight")
+    parser.add_argument("--steps", type=int, default=2000)
+    parser.add_argument("--server", help="address of a server in another process")
+    options = parser.parse_args()
+    warm_up(options.policy)
+    print(f"{'act of ' + options.policy:34} {'median':>9} {'99 %':>9} {'worst':>9} ms")
+    with tempfile.TemporaryDirectory() as folder:
+        path = f"unix:{os.path.join(folder, 's')}"
+        own = None if options.server else PolicyServer(options.policy, path)
+        if own is not None:
+            own.start()
+        try:
+            for objects in (0, 10, 100):
+                world = world_of(objects)
+                took = in_process(options.policy, world, options.steps)
+                print(f"{f'{objects} objects, in process':34} {quantiles(took)}")
+                for whole in (False, True):
+                    took = served(options.server or path, world, options.steps, whole)
+                    name = f"{objects} objects, {'whole worlds' if whole else 'poses'} served"
+                    print(f"{name:34} {quantiles(took)}")
+        finally:
+            if own is not None:
+                own.close()
+    message_costs(100)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,195 @@
+"""The two kinds of episodes: in step with a simulator, and beside a robot's own loop."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+from pushplan.control import ImmediateExecutor
+from pushplan.runtime import PLAN_STOP, Command, Runner
+from pushplan.runtime.held_actions import twist_of
+from pushplan.runtime.runner import is_done
+from pushplan.serving.messages import plan_fields, twist_fields
+from pushplan.world import (
+    Cancellation,
+    Deadline,
+    OwnBudget,
+    Plan,
+    PlansBesideDriving,
+    Policy,
+    ShowsPlan,
+    Stop,
+    WheelSpeeds,
+    World,
+    stream,
+)
+from pushplan.world.checks import expect, known_keys, number
+
+SETTINGS = (
+    "planning_limit",
+    "max_age",
+    "on_stale",
+    "delay",
+    "position_noise",
+    "heading_noise",
+    "observer_gain",
+    "margin",
+    "keep_unseen",
+)
+"""What a client may set, as arguments of `Runner`; ``planning_limit`` holds for both kinds."""
+
+
+class PlanCount:
+    """Numbers the plans that a policy shows, and says how old the present one is."""
+
+    def __init__(self) -> None:
+        self._plan: Plan | None = None
+        self._number, self._since = 0, 0.0
+
+    def fields(self, plan: Plan | None, time: float, with_plan: bool) -> dict[str, Any]:
+        """What a reply says of the plan that is followed at a time [s]."""
+        if plan is not self._plan:
+            self._plan, self._since = plan, time
+            self._number += plan is not None
+        known = {
+            "plan_number": 0 if plan is None else self._number,
+            "plan_age": 0.0 if plan is None else time - self._since,
+        }
+        return {**known, "plan": plan_fields(plan)} if with_plan else known
+
+
+class StepEpisode:
+    """A policy in step with a simulator, which waits for each action.
+
+    Args:
+        policy: acts by the world alone.
+        planning_limit: wall-clock limit of a planning call [s]; infinite for none.
+    """
+
+    def __init__(self, policy: Policy, planning_limit: float) -> None:
+        self._policy = policy
+        self._token = Cancellation()
+        self._executor = _Interruptible(self._token, planning_limit)
+
+    def reset(self, world: World, seed: int) -> None:
+        """Begin an episode, with the stream of random numbers that batches give this seed."""
+        self._plans = PlanCount()
+        self._policy.reset(world, stream(seed, "policy"))
+        if isinstance(self._policy, PlansBesideDriving):
+            self._policy.plan_with(self._executor)
+
+    def act(self, world: World, with_plan: bool) -> dict[str, Any]:
+        """The reply to a world."""
+        action = self._policy.act(world, None)
+        fields: dict[str, Any] = {"type": "action", "time": world.time, "twist": None}
+        if isinstance(action, WheelSpeeds):
+            fields["wheels"] = {"left": action.left, "right": action.right}
+        if "wheels" not in fields or world.robot.wheel_separation > 0.0:
+            fields["twist"] = twist_fields(twist_of(world, action))
+        plan = self._policy.current_plan if isinstance(self._policy, ShowsPlan) else None
+        plans = self._plans.fields(plan, world.time, with_plan)
+        return {**fields, "done": is_done(world), **plans}
+
+    def abandon(self) -> None:
+        """End the planning call that runs, from any thread."""
+        self._token.cancel()
+
+    def close(self) -> None:
+        """Nothing is left to end."""
+
+
+class LoopEpisode:
+    """A policy in a `Runner`, beside a robot's own loop: planning has a thread of its own.
+
+    Args:
+        policy: a fresh one.
+        period: of the robot's loop [s].
+        settings: of `SETTINGS`, as a client gave them.
+    """
+
+    def __init__(self, policy: Policy, period: float, settings: Mapping[str, Any]) -> None:
+        options = {key: value for key, value in settings.items() if key != "planning_limit"}
+        stop = PLAN_STOP
+        if "planning_limit" in settings:
+            stop = OwnBudget() | Deadline(limit_of(settings))
+        self._runner = Runner(policy, period=period, plan_stop=stop, **options)
+
+    def start(self, world: World, with_plan: bool) -> dict[str, Any]:
+        """Begin an episode; the reply is the first command."""
+        self._plans = PlanCount()
+        return self._fields(self._runner.start(world), with_plan)
+
+    def update(self, world: World) -> dict[str, Any]:
+        """Take a snapshot."""
+        return {"type": "updated", "taken": self._runner.update(world)}
+
+    def command(self, now: float, with_plan: bool) -> dict[str, Any]:
+        """What to drive now."""
+        return self._fields(self._runner.command(now), with_plan)
+
+    def cancel(self, reason: str) -> dict[str, Any]:
+        """Stop the robot."""
+        self._runner.cancel(reason)
+        return {"type": "cancelled"}
+
+    def _fields(self, command: Command, with_plan: bool) -> dict[str, Any]:
+        return {
+            "type": "command",
+            "time": command.time,
+            "twist": twist_fields(command.twist),
+            "status": command.status.value,
+            "reason": command.reason,
+            "world_age": command.world_age,
+            "late": command.late,
+            **self._plans.fields(command.plan, command.time, with_plan),
+        }
+
+    def abandon(self) -> None:
+        """End the planning call that runs, from any thread."""
+        self._runner.cancel("the client has left")
+
+    def close(self) -> None:
+        """End planning; returns when the call that runs has returned."""
+        while not self._runner.close(1.0):
+            pass
+
+
+def limit_of(settings: Mapping[str, Any]) -> float:
+    """The setting ``planning_limit`` [s], infinite where it is not given.
+
+    Raises:
+        InvalidInputError: if it is not a positive number.
+    """
+    if "planning_limit" not in settings:
+        return math.inf
+    return number("settings.planning_limit", settings["planning_limit"], low=0.0, open_low=True)
+
+
+def check_settings(policy: Policy, settings: object) -> dict[str, Any]:
+    """The settings of a client, after a `Runner` has taken them.
+
+    Raises:
+        SchemaError: if a key is unknown.
+        InvalidInputError: if a value is refused.
+    """
+    known_keys("settings", settings, SETTINGS, ())
+    chosen = dict(expect("settings", settings, dict))
+    LoopEpisode(policy, 1.0, chosen).close()
+    return chosen
+
+
+class _Interruptible(ImmediateExecutor):
+    """Runs planning calls at once, under a token that ends them and a limit.
+
+    Args:
+        token: ends them.
+        limit: of each call [s].
+    """
+
+    def __init__(self, token: Cancellation, limit: float) -> None:
+        self._rule: Stop = token if math.isinf(limit) else token | Deadline(limit)
+
+    def submit(self, call: Any, time: float, stop: Stop | None = None) -> Any:
+        """See `pushplan.world.PlanningExecutor`."""
+        return super().submit(call, time, (OwnBudget() if stop is None else stop) | self._rule)

@@ -1,0 +1,176 @@
+"""`Session`: the requests of one client, answered one after another."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from pushplan import __version__
+from pushplan.runtime.held_actions import check_world_policy
+from pushplan.serving import messages
+from pushplan.serving.episodes import LoopEpisode, StepEpisode, check_settings, limit_of
+from pushplan.serving.limits import ServerLimits
+from pushplan.serving.world_feed import WorldFeed
+from pushplan.world import ChoosesActions, InvalidInputError, Policy, PushplanError
+from pushplan.world.checks import boolean, integer, number, word
+from pushplan.world.errors import describe, one_line, short
+from pushplan.world.files import SCHEMA
+from pushplan.world.safe_files import MAX_DEPTH, MAX_VALUES
+
+LOG = logging.getLogger("pushplan.serving")
+_GOALS = {"robot": ("disc", "line"), "objects": ("receptacle", "clearance_area")}
+Fields = dict[str, Any]
+
+
+@dataclass(frozen=True)
+class Answer:
+    """A reply as it is sent, and whether it is the last one."""
+
+    data: bytes
+    last: bool = False
+
+
+class Session:
+    """A client's policy and episode. All but `abandon` is called by one thread.
+
+    Args:
+        make_policy: makes the client's own policy.
+        label: what clients are told that the policy is called.
+        limits: that clients are told.
+    """
+
+    def __init__(self, make_policy: Callable[[], Policy], label: str, limits: ServerLimits) -> None:
+        self._make_policy, self._label, self._limits = make_policy, label, limits
+        self._feed: WorldFeed | None = None
+        self._period: float | None = None
+        self._settings: Fields = {}
+        self._episode: StepEpisode | LoopEpisode | None = None
+        self._abandoned = False
+
+    def answer(self, body: bytes) -> Answer:
+        """The reply to the body of a message: an error where the message is wrong.
+
+        Whatever a policy raises becomes an error for its client.
+        """
+        kind: str | None = None
+        try:
+            request = messages.decode(body)
+            kind = request["type"]
+            if self._feed is None and kind not in ("hello", "close"):
+                raise InvalidInputError(f"the first message must be 'hello', got {kind!r}")
+            reply = getattr(self, f"_{kind}")(request)
+            return Answer(messages.encode(reply), kind == "close")
+        except PushplanError as error:
+            return Answer(messages.error(f"{kind}: {error}" if kind else str(error), kind))
+        except BaseException as error:  # of a policy, of any kind: its thread goes on
+            LOG.warning("%s of %s: %s", kind, self._label, describe(error), exc_info=True)
+            return Answer(messages.error(f"{kind}: {self._label} failed: {describe(error)}", kind))
+
+    def abandon(self) -> None:
+        """End the planning call that runs, because the client has left; from any thread."""
+        self._abandoned = True
+        if self._episode is not None:
+            self._episode.abandon()
+
+    def close(self) -> None:
+        """End the episode."""
+        if self._episode is not None:
+            self._episode.close()
+            self._episode = None
+
+    def _hello(self, request: Fields) -> Fields:
+        if self._feed is not None:
+            raise InvalidInputError("hello was said already; connect once more to begin anew")
+        if request["protocol"] != messages.PROTOCOL:
+            raise InvalidInputError(
+                f"this server speaks {messages.PROTOCOL!r}, got {short(request['protocol'])}"
+            )
+        period = request.get("period")
+        if period is not None:
+            period = number("period", period, low=0.0, open_low=True)
+        feed = WorldFeed(request.get("robot"))
+        policy = self._make_policy()
+        check_world_policy(policy)
+        self._settings = check_settings(policy, request.get("settings", {}))
+        self._feed, self._period = feed, period
+        goals = _GOALS.get(getattr(policy, "goal_kind", ""), sum(_GOALS.values(), ()))
+        return {
+            "type": "hello",
+            "protocol": messages.PROTOCOL,
+            "version": __version__,
+            "policy": self._label,
+            "actions": list(policy.actions) if isinstance(policy, ChoosesActions) else [],
+            "goals": list(goals),
+            "world_schema": SCHEMA,
+            "period": period,
+            "settings": self._settings,
+            "limits": {
+                "message_bytes": self._limits.message_bytes,
+                "values": MAX_VALUES,
+                "depth": MAX_DEPTH,
+                "message_s": self._limits.message_s,
+                "idle_s": self._limits.idle_s,
+            },
+        }
+
+    def _reset(self, request: Fields) -> Fields:
+        seed = integer("seed", request.get("seed", 0), low=0)
+        world = self._worlds.whole(request["world"])
+        if not isinstance(self._episode, StepEpisode):
+            self._begin(StepEpisode(self._make_policy(), limit_of(self._settings)))
+        self._steps.reset(world, seed)
+        return {"type": "reset", "time": world.time}
+
+    def _act(self, request: Fields) -> Fields:
+        episode, with_plan = self._steps, _with_plan(request)
+        return episode.act(self._worlds.next(request), with_plan)
+
+    def _start(self, request: Fields) -> Fields:
+        if self._period is None:
+            raise InvalidInputError("give the 'period' of the robot's loop [s] in hello")
+        with_plan, world = _with_plan(request), self._worlds.whole(request["world"])
+        if not isinstance(self._episode, LoopEpisode):
+            self._begin(LoopEpisode(self._make_policy(), self._period, self._settings))
+        return self._loop.start(world, with_plan)
+
+    def _update(self, request: Fields) -> Fields:
+        episode = self._loop
+        return episode.update(self._worlds.next(request))
+
+    def _command(self, request: Fields) -> Fields:
+        return self._loop.command(number("now", request["now"]), _with_plan(request))
+
+    def _cancel(self, request: Fields) -> Fields:
+        return self._loop.cancel(one_line(word("reason", request.get("reason", "cancelled"))))
+
+    def _close(self, request: Fields) -> Fields:
+        return {"type": "closed"}
+
+    @property
+    def _worlds(self) -> WorldFeed:
+        assert self._feed is not None
+        return self._feed
+
+    @property
+    def _steps(self) -> StepEpisode:
+        if not isinstance(self._episode, StepEpisode):
+            raise InvalidInputError("send 'reset' first; after 'start' only 'command' is answered")
+        return self._episode
+
+    @property
+    def _loop(self) -> LoopEpisode:
+        if not isinstance(self._episode, LoopEpisode):
+            raise InvalidInputError("send 'start' first; after 'reset' only 'act' is answered")
+        return self._episode
+
+    def _begin(self, episode: StepEpisode | LoopEpisode) -> None:
+        self.close()
+        self._episode = episode
+        if self._abandoned:  # meanwhile
+            episode.abandon()
+
+
+def _with_plan(request: Fields) -> bool:
+    return boolean("with_plan", request.get("with_plan", False))

@@ -1,0 +1,155 @@
+"""`WorldFeed`: whole worlds, and worlds of which a message says only what has changed."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from pushplan.world import InvalidInputError, Movables, SchemaError, World, world_from_dict
+from pushplan.world.checks import FloatArray, array, number
+from pushplan.world.errors import short
+from pushplan.world.files import movables_from_list, robot_from_dict
+
+MAX_OBJECTS = 20_000
+"""Most objects that one client may make known."""
+_CHANGES = ("time", "robot_pose", "robot_twist", "ids", "poses", "twists", "added")
+_AT_REST = (0.0, 0.0, 0.0)
+
+
+class WorldFeed:
+    """Keeps what does not change between the worlds of one client: map, goal, outlines, masses.
+
+    Args:
+        robot: mapping of the robot, for worlds that have only its pose and twist.
+    """
+
+    def __init__(self, robot: Mapping[str, Any] | None = None) -> None:
+        if robot is not None:
+            robot_from_dict({**_mapping("robot", robot), "pose": _AT_REST})
+        self._robot = dict(robot or {})
+        self._world: World | None = None
+        self._known = Movables.empty()
+        self._index: dict[int, int] = {}
+
+    def whole(self, data: object) -> World:
+        """A world by the schema of world files, from which later messages go on.
+
+        Raises:
+            SchemaError, InvalidInputError: as `world_from_dict`; if it names a file.
+        """
+        if isinstance(data, Mapping):
+            static, robot = data.get("static"), data.get("robot")
+            if isinstance(static, Mapping) and ("map" in static or "unknown" in static):
+                raise SchemaError(
+                    "static.map names a file, which a message must not: give obstacles as "
+                    "static.polygons and static.segments"
+                )
+            if self._robot and isinstance(robot, Mapping):
+                data = {**data, "robot": {**self._robot, **robot}}
+        world = world_from_dict(data)
+        self._keep(world, world.movables)
+        return world
+
+    def next(self, message: Mapping[str, Any]) -> World:
+        """The world of a message: ``world``, or ``time``, ``robot_pose`` and what else changed.
+
+        Raises:
+            SchemaError, InvalidInputError: if it is neither, names an object that no world had, or
+                nothing was there before.
+        """
+        changes = [key for key in _CHANGES if key in message]
+        if "world" in message:
+            if changes:
+                raise SchemaError(f"give either 'world' or {changes[0]!r}, not both")
+            return self.whole(message["world"])
+        for key in ("time", "robot_pose"):
+            if key not in message:
+                raise SchemaError(f"give either 'world', or 'time' and 'robot_pose'; {key!r} lacks")
+        if self._world is None:
+            raise InvalidInputError("send a whole 'world' first: start or reset")
+        return self._changed(self._world, message)
+
+    def _changed(self, world: World, message: Mapping[str, Any]) -> World:
+        seen = self._seen(message)
+        added = movables_from_list(message["added"]) if "added" in message else Movables.empty()
+        if len(added):
+            seen = self._with(seen, added)
+        world = replace(
+            world,
+            time=number("time", message["time"]),
+            robot_pose=array("robot_pose", message["robot_pose"], (3,)),
+            robot_twist=array("robot_twist", message.get("robot_twist", _AT_REST), (3,)),
+            movables=seen,
+        )
+        if len(added):
+            self._keep(world, self._with(self._known, added))
+        self._world = world
+        return world
+
+    def _seen(self, message: Mapping[str, Any]) -> Movables:
+        """The known objects that a message gives poses of; all where they were if it gives none."""
+        assert self._world is not None
+        last = self._world.movables
+        if "poses" not in message:
+            if "ids" in message or "twists" in message:
+                raise SchemaError("'ids' and 'twists' need 'poses', one [x, y, theta] for each")
+            return last
+        objects = self._chosen(message["ids"]) if "ids" in message else self._known
+        count = len(objects)
+        poses = self._rows("poses", message["poses"], count)
+        twists = None
+        if "twists" in message:
+            twists = self._rows("twists", message["twists"], count)
+        return objects.moved_to(poses, twists)
+
+    def _rows(self, name: str, value: Any, count: int) -> FloatArray:
+        rows: FloatArray = array(name, value, (None, 3))
+        if len(rows) != count:
+            raise InvalidInputError(
+                f"{name} must have one row for each of {count} objects, got {len(rows)}: those of "
+                "'ids', or without 'ids' all that are known, in the order of the worlds"
+            )
+        return rows
+
+    def _chosen(self, value: Any) -> Movables:
+        ids = array("ids", value, (None,), dtype=np.int64).tolist()
+        for place, one in enumerate(ids):
+            if one not in self._index:
+                raise InvalidInputError(
+                    f"ids[{place}] is {one}, which no world had: give its outline in 'added' "
+                    f"(known: {short(sorted(self._index))})"
+                )
+        if len(set(ids)) < len(ids):
+            ((most, _),) = Counter(ids).most_common(1)
+            raise InvalidInputError(f"ids must be distinct, got {most} more than once")
+        if ids == list(self._index):
+            return self._known
+        return self._known.select(np.array([self._index[one] for one in ids], dtype=np.int64))
+
+    def _with(self, objects: Movables, added: Movables) -> Movables:
+        for one in added.ids.tolist():
+            if one in self._index:
+                raise InvalidInputError(
+                    f"added has the id {one}, which is known already: give its pose in 'poses', or "
+                    "a whole 'world' if its outline has changed"
+                )
+        return objects.updated(added)
+
+    def _keep(self, world: World, known: Movables) -> None:
+        if len(known) > MAX_OBJECTS:
+            raise InvalidInputError(
+                f"a client may make {MAX_OBJECTS:,} objects known, got {len(known):,}: send a "
+                "whole 'world' to begin anew"
+            )
+        self._world, self._known = world, known
+        self._index = {one: place for place, one in enumerate(known.ids.tolist())}
+
+
+def _mapping(name: str, value: object) -> Mapping[str, Any]:
+    if not isinstance(value, Mapping):
+        raise SchemaError(f"{name} must be a mapping, got {short(value)}")
+    return value
