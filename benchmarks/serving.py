@@ -1,7 +1,7 @@
 """What the policy server adds to a policy, beside calling it in this process.
 
-``python benchmarks/serving.py`` prints the time of an ``act`` in process and through the server, for
-poses alone and for whole worlds, and what messages cost to write and to read.
+``python benchmarks/serving.py`` prints the time of an ``act`` in process and through the server,
+for poses alone and for whole worlds, and what messages cost to write and to read.
 """
 
 from __future__ import annotations
@@ -55,44 +55,39 @@ def world_of(objects: int) -> World:
     )
 
 
+Times = tuple[list[float], list[float]]
+
+
 def quantiles(seconds: list[float]) -> str:
     """Median, 99 % and worst [ms]."""
     ms = 1e3 * np.array(seconds)
     return f"{np.median(ms):9.3f} {np.quantile(ms, 0.99):9.3f} {ms.max():9.3f}"
 
 
-def driven(steps: int) -> list[tuple[float, list[float]]]:
-    """Times and robot poses of a drive along the straight way."""
-    return [(0.01 * k, [2.0 + 0.01 * k, 25.0, 0.0]) for k in range(steps)]
+def compared(address: str, policy: str, world: World, steps: int, whole: bool) -> Times:
+    """What each `act` takes in this process and through the server [s], one beside the other.
 
-
-def in_process(policy: str, world: World, steps: int) -> list[float]:
-    """What each `act` takes [s], the world made by `World.moved`."""
+    In process the world is made by `World.moved`; through the server it is sent.
+    """
     made = make_policy(policy)
     made.reset(world, stream(0, "policy"))
-    took = []
-    for now, pose in driven(steps):
-        began = time.perf_counter()
-        made.act(world.moved(robot_pose=pose, robot_twist=[1, 0, 0], time=now), None)
-        took.append(time.perf_counter() - began)
-    return took
-
-
-def served(address: str, world: World, steps: int, whole: bool) -> list[float]:
-    """What each `act` takes through the server [s], from the client's values to its reply."""
     data: dict[str, Any] = world_to_dict(world)
-    poses, took = world.movables.poses.tolist(), []
+    poses, own, served = world.movables.poses.tolist(), [], []
     with PolicyClient(address) as client:
         client.reset(data)
-        for now, pose in driven(steps):
-            data["time"], data["robot"]["pose"], data["robot"]["twist"] = now, pose, [1, 0, 0]
+        for step in range(steps):
+            now, pose, twist = 0.01 * step, [2.0 + 0.01 * step, 25.0, 0.0], [1.0, 0.0, 0.0]
             began = time.perf_counter()
+            made.act(world.moved(robot_pose=pose, robot_twist=twist, time=now), None)
+            middle = time.perf_counter()
             if whole:
-                client.act(world=data)
+                robot = {**data["robot"], "pose": pose, "twist": twist}
+                client.act(world={**data, "time": now, "robot": robot})
             else:
-                client.act(time=now, robot_pose=pose, robot_twist=[1, 0, 0], poses=poses)
-            took.append(time.perf_counter() - began)
-    return took
+                client.act(time=now, robot_pose=pose, robot_twist=twist, poses=poses)
+            own.append(middle - began)
+            served.append(time.perf_counter() - middle)
+    return own, served
 
 
 def message_costs(objects: int) -> None:
@@ -142,13 +137,15 @@ def main() -> None:
             own.start()
         try:
             for objects in (0, 10, 100):
-                world = world_of(objects)
-                took = in_process(options.policy, world, options.steps)
-                print(f"{f'{objects} objects, in process':34} {quantiles(took)}")
                 for whole in (False, True):
-                    took = served(options.server or path, world, options.steps, whole)
-                    name = f"{objects} objects, {'whole worlds' if whole else 'poses'} served"
-                    print(f"{name:34} {quantiles(took)}")
+                    name = f"{objects} objects, {'whole worlds' if whole else 'poses'}"
+                    where = options.server or path
+                    here, there = compared(
+                        where, options.policy, world_of(objects), options.steps, whole
+                    )
+                    print(f"{f'{name}, in process':34} {quantiles(here)}")
+                    over = [b - a for a, b in zip(here, there, strict=True)]
+                    print(f"{f'{name}, overhead':34} {quantiles(over)}")
         finally:
             if own is not None:
                 own.close()

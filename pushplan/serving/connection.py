@@ -2,122 +2,123 @@
 
 from __future__ import annotations
 
-import asyncio
+import select
+import socket
+import time
 from contextlib import suppress
-from typing import Any
 
 from pushplan.serving import messages
 from pushplan.serving.limits import ServerLimits
-from pushplan.serving.session import Answer
-from pushplan.serving.worker import SessionWorker
 from pushplan.world import PushplanError
 
+_PIECE = 65536  # most bytes that are read at once
 _LINGER_S = 0.5  # for how long a client that is sent away may still send, and read why [s]
+_GONE = getattr(select, "POLLRDHUP", 0) | select.POLLHUP | select.POLLERR
 
 
 class LeftError(Exception):
-    """The client has closed the connection."""
+    """The client has closed the connection, or does not read what it is sent."""
 
 
 class RefusedError(PushplanError):
-    """The client broke a rule after which its bytes make no sense any more."""
+    """The client broke a limit, after which its bytes make no sense any more."""
 
 
 class Connection:
-    """Reads requests, one ahead of the one that is being answered, and writes replies.
+    """Reads messages and writes replies; one thread does both.
 
     Args:
-        reader, writer: the client's streams.
+        client: the connected socket.
         limits: of sizes and times.
     """
 
-    def __init__(
-        self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter, limits: ServerLimits
-    ) -> None:
-        self._reader, self._writer, self._limits = reader, writer, limits
+    def __init__(self, client: socket.socket, limits: ServerLimits) -> None:
+        self._socket, self._limits = client, limits
+        self._buffer = bytearray()
+        if client.family != socket.AF_UNIX:
+            client.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
 
-    async def converse(self, worker: SessionWorker) -> None:
-        """Answer requests until the client says close.
+    def read(self, patience: float) -> bytes:
+        """The body of the next message.
+
+        Args:
+            patience: how long its first byte may take [s]; the rest has a limit of its own.
 
         Raises:
-            LeftError: if it leaves before; at once, also while a request is being answered.
-            RefusedError: if it breaks a limit, or is silent for too long.
+            LeftError: if the client has left.
+            RefusedError: if the message is too long or too slow, or none comes.
         """
-        reading = asyncio.ensure_future(self._read())
-        try:
-            patience = self._limits.message_s  # until hello
-            while True:
-                await asyncio.wait({reading}, timeout=patience)
-                if not reading.done():
-                    raise RefusedError(f"no message came for {patience:g} s, which is the limit")
-                body = reading.result()
-                reading = asyncio.ensure_future(self._read())
-                answer = await self._answer(worker, body, reading)
-                await self._write(answer.data)
-                if answer.last:
-                    return
-                patience = self._limits.idle_s
-        finally:
-            reading.cancel()
-            await asyncio.wait({reading})
-            if not reading.cancelled():
-                reading.exception()  # nobody else asks for it
-
-    async def _answer(
-        self, worker: SessionWorker, body: bytes, reading: asyncio.Future[bytes]
-    ) -> Answer:
-        answering = worker.answer(body)
-        both: set[asyncio.Future[Any]] = {answering, reading}
-        await asyncio.wait(both, return_when=asyncio.FIRST_COMPLETED)
-        if not answering.done() and isinstance(reading.exception(), LeftError):
-            reading.result()
-        return await answering
-
-    async def _read(self) -> bytes:
-        """The body of the next message; the time for it counts from its first byte on."""
-        limits = self._limits
-        try:
-            head = await self._reader.readexactly(1)
-            async with asyncio.timeout(limits.message_s):
-                head += await self._reader.readexactly(messages.LENGTH.size - 1)
-                (length,) = messages.LENGTH.unpack(head)
-                if length > limits.message_bytes:
-                    raise RefusedError(
-                        f"a message may have {limits.message_bytes:,} bytes, the length before "
-                        f"this one says {length:,}"
-                    )
-                return await self._reader.readexactly(length)
-        except TimeoutError:
+        if not self._buffer and not self._receive(patience):
+            raise RefusedError(f"no message came for {patience:g} s, which is the limit")
+        end = time.monotonic() + self._limits.message_s
+        self._fill(messages.LENGTH.size, end)
+        (length,) = messages.LENGTH.unpack_from(self._buffer)
+        most = self._limits.message_bytes
+        if length > most:
             raise RefusedError(
-                f"a message must be whole {limits.message_s:g} s after its first byte"
-            ) from None
-        except (asyncio.IncompleteReadError, OSError):
-            raise LeftError from None
+                f"a message may have {most:,} bytes, the length before this one says {length:,}"
+            )
+        whole = messages.LENGTH.size + length
+        self._fill(whole, end)
+        body = bytes(self._buffer[messages.LENGTH.size : whole])
+        del self._buffer[:whole]
+        return body
 
-    async def _write(self, data: bytes) -> None:
+    def _fill(self, count: int, end: float) -> None:
+        """Read until so many bytes are there; until a time of the monotonic clock [s]."""
+        while len(self._buffer) < count:
+            if not self._receive(end - time.monotonic()):
+                limit = self._limits.message_s
+                raise RefusedError(f"a message must be whole {limit:g} s after its first byte")
+
+    def _receive(self, seconds: float) -> bool:
+        """Read what comes within a time; whether anything did."""
+        if seconds <= 0.0:
+            return False
         try:
-            async with asyncio.timeout(self._limits.message_s):
-                self._writer.write(data)
-                await self._writer.drain()
+            self._socket.settimeout(seconds)
+            piece = self._socket.recv(_PIECE)
         except TimeoutError:
-            raise LeftError from None  # it does not read, so there is nothing to tell it
+            return False
+        except OSError:
+            raise LeftError from None
+        if not piece:
+            raise LeftError
+        self._buffer += piece
+        return True
+
+    def write(self, data: bytes) -> None:
+        """Send a reply.
+
+        Raises:
+            LeftError: if the client has left, or has not read it within the time for a message.
+        """
+        try:
+            self._socket.settimeout(self._limits.message_s)
+            self._socket.sendall(data)
         except OSError:
             raise LeftError from None
 
-    async def refuse(self, message: str) -> None:
-        """Send a last error, and give the client the time to read it."""
-        with suppress(Exception):
-            async with asyncio.timeout(_LINGER_S):
-                self._writer.write(messages.error(message, closing=True))
-                await self._writer.drain()
-                if self._writer.can_write_eof():
-                    self._writer.write_eof()
-                while await self._reader.read(65536):  # else what was sent is lost with a reset
-                    pass
+    def refuse(self, message: str) -> None:
+        """Send a last error, and give the client a moment to read it."""
+        end = time.monotonic() + _LINGER_S
+        with suppress(OSError, LeftError):
+            self._socket.settimeout(_LINGER_S)
+            self._socket.sendall(messages.error(message, closing=True))
+            self._socket.shutdown(socket.SHUT_WR)
+            while self._receive(end - time.monotonic()):  # else a reset takes the error along
+                self._buffer.clear()
 
-    def close(self) -> None:
-        """Close at once; what has not been sent by now is dropped if the client does not read."""
-        if self._writer.transport.get_write_buffer_size():
-            self._writer.transport.abort()
-        else:
-            self._writer.close()
+    def has_left(self) -> bool:
+        """Whether the client has closed its side; from any thread, at once."""
+        poll = select.poll()
+        try:
+            poll.register(self._socket, _GONE)
+            return bool(poll.poll(0))
+        except (OSError, ValueError):  # closed by ourselves
+            return True
+
+    def cut(self) -> None:
+        """End it, from any thread: what reads or writes gives up."""
+        with suppress(OSError):
+            self._socket.shutdown(socket.SHUT_RDWR)

@@ -71,6 +71,7 @@ class StepEpisode:
         self._policy = policy
         self._token = Cancellation()
         self._executor = _Interruptible(self._token, planning_limit)
+        self._shows = policy if isinstance(policy, ShowsPlan) else None  # asking is not quick
 
     def reset(self, world: World, seed: int) -> None:
         """Begin an episode, with the stream of random numbers that batches give this seed."""
@@ -87,7 +88,7 @@ class StepEpisode:
             fields["wheels"] = {"left": action.left, "right": action.right}
         if "wheels" not in fields or world.robot.wheel_separation > 0.0:
             fields["twist"] = twist_fields(twist_of(world, action))
-        plan = self._policy.current_plan if isinstance(self._policy, ShowsPlan) else None
+        plan = None if self._shows is None else self._shows.current_plan
         plans = self._plans.fields(plan, world.time, with_plan)
         return {**fields, "done": is_done(world), **plans}
 

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import asyncio
 import itertools
 import os
 import signal
 import socket
 import threading
+import time
 from collections.abc import Callable
 from contextlib import suppress
 
@@ -17,13 +17,15 @@ from pushplan.runtime.held_actions import check_world_policy
 from pushplan.serving.address import Address
 from pushplan.serving.connection import Connection, LeftError, RefusedError
 from pushplan.serving.limits import ServerLimits
+from pushplan.serving.listener import Listener
 from pushplan.serving.session import LOG, Session
-from pushplan.serving.worker import SessionWorker
-from pushplan.world import InvalidInputError, Policy, PushplanError
+from pushplan.world import InvalidInputError, Policy
 from pushplan.world.checks import expect
-from pushplan.world.errors import describe, short
+from pushplan.world.errors import short
 
 _GRACE_S = 5.0  # for how long planning calls may go on after the end of the server [s]
+_LOOK_S = 0.1  # how often it looks whether clients have left that wait for an answer [s]
+_SIGNALS = (signal.SIGINT, signal.SIGTERM)
 _MOST_REFUSED = 32  # clients that are told at the same time that there are too many
 
 
@@ -74,14 +76,13 @@ class PolicyServer:
         self._limits = expect("limits", limits or ServerLimits(), ServerLimits)
         check_world_policy(self._policy())
         self._numbers = itertools.count(1)
-        self._present: dict[int, SessionWorker] = {}
-        self._tasks: set[asyncio.Task[None]] = set()
+        self._lock = threading.Lock()
+        self._present: dict[int, _Client] = {}
         self._refused = 0
-        self._warm = False
+        self._warm = self._over = False
+        self._listener: Listener | None = None
         self._thread: threading.Thread | None = None
-        self._loop: asyncio.AbstractEventLoop | None = None
-        self._over: asyncio.Event | None = None
-        self._socket: socket.socket | None = None
+        self._inode = 0
 
     def _policy(self) -> Policy:
         policy = self._make_policy()
@@ -111,38 +112,60 @@ class PolicyServer:
             self._warm = True
 
     def start(self) -> None:
-        """Load all kernels, and serve in a thread until `close`.
+        """Load all kernels, and serve in threads until `close`.
 
         Raises:
             InvalidInputError: if it serves already, or cannot listen at the address.
         """
-        self._open()
-        listening = threading.Event()
+        if self._listener is not None:
+            raise InvalidInputError(f"the server at {self.address} serves already")
+        self.warm_up()
+        listening = self._address.listen()
+        if self._address.path:
+            self._inode = os.stat(self._address.path).st_ino
+        else:
+            port = int(listening.getsockname()[1])
+            self._address = Address(host=self._address.host, port=port)
+        self._over = False
+        self._listener = Listener(listening, self._attend, self._look)
         self._thread = threading.Thread(
-            target=lambda: asyncio.run(self._serve(listening.set)),
+            target=self._listener.serve_forever,
+            args=(_LOOK_S,),
             name="pushplan server",
             daemon=True,
         )
         self._thread.start()
-        listening.wait()
 
     def close(self) -> bool:
-        """Send all clients away and end; a planning call has five seconds to return.
+        """Cut all clients off and end; planning calls have five seconds to return.
 
         Returns:
             Whether no thread is left.
         """
-        if self._thread is None:
+        if self._listener is None:
             return True
-        if self._loop is not None and self._over is not None:
-            with suppress(RuntimeError):  # it has ended already
-                self._loop.call_soon_threadsafe(self._over.set)
+        assert self._thread is not None
+        self._over = True
+        self._listener.shutdown()
         self._thread.join()
-        self._thread = None
+        self._listener.server_close()
+        self._listener = None
+        if self._address.path:
+            self._remove_socket()
+        with self._lock:
+            present = list(self._present.values())
+        for client in present:
+            client.session.abandon()
+            client.connection.cut()
+        end = time.monotonic() + _GRACE_S
+        for client in present:
+            client.thread.join(max(0.0, end - time.monotonic()))
+            if client.thread.is_alive():
+                LOG.warning("%s has not returned from its planning call", client.thread.name)
         return not self._present
 
     def serve_forever(self, ready: Callable[[], object] = lambda: None) -> bool:
-        """Load all kernels, and serve in this thread, the main one, until SIGINT or SIGTERM.
+        """Load all kernels, and serve until SIGINT or SIGTERM; called by the main thread.
 
         Args:
             ready: called when clients can connect.
@@ -153,96 +176,88 @@ class PolicyServer:
         Raises:
             InvalidInputError: as `start`.
         """
-        self._open()
-        asyncio.run(self._serve(ready, signals=(signal.SIGINT, signal.SIGTERM)))
-        return not self._present
-
-    def _open(self) -> None:
-        if self._socket is not None:
-            raise InvalidInputError(f"the server at {self.address} serves already")
+        over = threading.Event()
         self.warm_up()
-        self._socket = self._address.listen()
-        if not self._address.path:
-            self._address = Address(
-                host=self._address.host, port=int(self._socket.getsockname()[1])
-            )
-
-    async def _serve(
-        self, ready: Callable[[], object], signals: tuple[signal.Signals, ...] = ()
-    ) -> None:
-        assert self._socket is not None
-        self._loop, self._over = asyncio.get_running_loop(), asyncio.Event()
-        for one in signals:
-            self._loop.add_signal_handler(one, self._over.set)
-        inode = os.stat(self._address.path).st_ino if self._address.path else 0
-        make = asyncio.start_unix_server if self._address.path else asyncio.start_server
-        server = await make(self._welcome, sock=self._socket)
+        before = {one: signal.signal(one, lambda *_: over.set()) for one in _SIGNALS}
         try:
+            self.start()
             ready()
-            await self._over.wait()
+            over.wait()
         finally:
-            server.close()
-            if self._address.path:
-                self._remove(inode)
-            for task in self._tasks:
-                task.cancel()
-            if self._tasks:
-                await asyncio.wait(self._tasks, timeout=_GRACE_S)
-            for worker in self._present.values():
-                LOG.warning("%s has not returned from its planning call", worker.thread.name)
-            self._socket = None
+            ended = self.close()
+            for one, handler in before.items():
+                signal.signal(one, handler)
+        return ended
 
-    def _remove(self, inode: int) -> None:
+    def _remove_socket(self) -> None:
         """Remove the socket, unless another server has put its own there."""
         with suppress(OSError):
-            if os.lstat(self._address.path).st_ino == inode:
+            if os.lstat(self._address.path).st_ino == self._inode:
                 os.unlink(self._address.path)
 
-    async def _welcome(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-        task = asyncio.current_task()
-        assert task is not None
-        self._tasks.add(task)
-        connection = Connection(reader, writer, self._limits)
-        try:
-            if len(self._present) < self._limits.clients:
-                await self._attend(connection, next(self._numbers))
-            elif self._refused < _MOST_REFUSED:
-                await self._send_away(connection)
-        except asyncio.CancelledError:
-            pass  # the server ends
-        finally:
-            connection.close()
-            self._tasks.discard(task)
+    def _look(self) -> None:
+        """End planning calls whose clients have left."""
+        with self._lock:
+            busy = [client for client in self._present.values() if client.busy]
+        for client in busy:
+            if client.connection.has_left():
+                client.session.abandon()
 
-    async def _send_away(self, connection: Connection) -> None:
-        most = self._limits.clients
-        self._refused += 1
-        try:
-            await connection.refuse(f"the server has {most} clients, which is its limit")
-        finally:
-            self._refused -= 1
-
-    async def _attend(self, connection: Connection, number: int) -> None:
-        """Answer a client; its place is free when its thread has ended."""
-        session = Session(self._policy, self._label, self._limits)
-        worker = self._present[number] = SessionWorker(session, number)
+    def _attend(self, connected: socket.socket) -> None:
+        """Answer a client until it leaves; its place is free when its planning has ended."""
+        connection = Connection(connected, self._limits)
+        client = _Client(connection, Session(self._policy, self._label, self._limits))
+        with self._lock:
+            number = next(self._numbers)
+            free = len(self._present) < self._limits.clients and not self._over
+            if free:
+                self._present[number] = client
+        if not free:
+            self._send_away(connection)
+            return
+        client.thread.name = f"pushplan client {number}"
         LOG.info("client %d has come", number)
         why = "closed"
         try:
-            await connection.converse(worker)
+            client.converse(self._limits)
         except LeftError:
             why = "left"
         except RefusedError as error:
             why = str(error)
-            await connection.refuse(why)
-        except asyncio.CancelledError:
-            why = "the server ends"
-            await connection.refuse(why)
-            raise
-        except PushplanError as error:
-            why = describe(error)
+            connection.refuse(why)
         finally:
-            connection.close()
             LOG.info("client %d has gone: %s", number, why)
-            await worker.end()
-            del self._present[number]
+            connected.close()
+            client.session.close()
+            with self._lock:
+                del self._present[number]
+
+    def _send_away(self, connection: Connection) -> None:
+        with self._lock:
+            if self._refused >= _MOST_REFUSED:
+                return
+            self._refused += 1
+        connection.refuse(f"the server has {self._limits.clients} clients, which is its limit")
+        with self._lock:
+            self._refused -= 1
+
+
+class _Client:
+    """A client that is there, and the thread that answers it, which makes this."""
+
+    def __init__(self, connection: Connection, session: Session) -> None:
+        self.connection, self.session = connection, session
+        self.thread = threading.current_thread()
+        self.busy = False
+
+    def converse(self, limits: ServerLimits) -> None:
+        """Answer message after message until the client says close."""
+        patience = limits.message_s  # until hello
+        last = False
+        while not last:
+            body = self.connection.read(patience)
+            self.busy = True
+            answer = self.session.answer(body)
+            self.busy = False
+            self.connection.write(answer.data)
+            patience, last = limits.idle_s, answer.last

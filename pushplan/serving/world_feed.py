@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from pushplan.world import InvalidInputError, Movables, SchemaError, World, world_from_dict
-from pushplan.world.checks import FloatArray, array, number
+from pushplan.world.checks import FloatArray, array
 from pushplan.world.errors import short
 from pushplan.world.files import movables_from_list, robot_from_dict
 
@@ -74,19 +74,20 @@ class WorldFeed:
         return self._changed(self._world, message)
 
     def _changed(self, world: World, message: Mapping[str, Any]) -> World:
-        seen = self._seen(message)
-        added = movables_from_list(message["added"]) if "added" in message else Movables.empty()
-        if len(added):
-            seen = self._with(seen, added)
+        seen, added = self._seen(message), None
+        if "added" in message:
+            added = movables_from_list(message["added"])
+            self._refuse_known(added)
+            seen = seen.updated(added)
         world = replace(
             world,
-            time=number("time", message["time"]),
-            robot_pose=array("robot_pose", message["robot_pose"], (3,)),
-            robot_twist=array("robot_twist", message.get("robot_twist", _AT_REST), (3,)),
+            time=message["time"],
+            robot_pose=message["robot_pose"],
+            robot_twist=message.get("robot_twist", _AT_REST),
             movables=seen,
         )
-        if len(added):
-            self._keep(world, self._with(self._known, added))
+        if added is not None:
+            self._keep(world, self._known.updated(added))
         self._world = world
         return world
 
@@ -130,14 +131,13 @@ class WorldFeed:
             return self._known
         return self._known.select(np.array([self._index[one] for one in ids], dtype=np.int64))
 
-    def _with(self, objects: Movables, added: Movables) -> Movables:
+    def _refuse_known(self, added: Movables) -> None:
         for one in added.ids.tolist():
             if one in self._index:
                 raise InvalidInputError(
                     f"added has the id {one}, which is known already: give its pose in 'poses', or "
                     "a whole 'world' if its outline has changed"
                 )
-        return objects.updated(added)
 
     def _keep(self, world: World, known: Movables) -> None:
         if len(known) > MAX_OBJECTS:

@@ -41,8 +41,8 @@ _TEXT = re.compile(rb'"[^"\\]*(?:\\.[^"\\]*)*(?:"|\\?\Z)', re.DOTALL)
 _STEPS = np.zeros(256, dtype=np.int8)
 _STEPS[[ord("["), ord("{")]] = 1
 _STEPS[[ord("]"), ord("}")]] = -1
-_DIGITS = np.zeros(256, dtype=np.bool_)
-_DIGITS[ord("0") : ord("9") + 1] = True
+_NO_DIGITS = np.ones(256, dtype=np.bool_)
+_NO_DIGITS[ord("0") : ord("9") + 1] = False
 
 
 def read_bytes(path: str | Path, what: str = "file", limit: int = MAX_BYTES) -> bytes:
@@ -218,11 +218,11 @@ def _check_json(data: bytes) -> None:
         count = text.count(b",") + text.count(b"[") + text.count(b"{")
         depth, digits = 0, 0
         if count <= MAX_VALUES:
-            codes = np.frombuffer(text, dtype=np.uint8)
+            codes = np.frombuffer(b" %b " % text, dtype=np.uint8)
             steps = _STEPS[codes]
             depth = int(np.cumsum(steps[steps != 0], dtype=np.int64).max(initial=0))
-            others = np.flatnonzero(~_DIGITS[codes])
-            digits = int(np.diff(others, prepend=-1, append=len(codes)).max()) - 1
+            others = np.flatnonzero(_NO_DIGITS[codes])
+            digits = int((others[1:] - others[:-1]).max()) - 1
         if count <= MAX_VALUES and depth <= MAX_DEPTH and digits < LONGEST_NUMBER:
             return
     if count > MAX_VALUES:
