@@ -1,0 +1,116 @@
+"""``pushplan serve`` from end to end, and the client that is copied into other environments."""
+
+from __future__ import annotations
+
+import ast
+import os
+import re
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import pytest
+from served import EXAMPLES, PolicyClient, ServeError, maze_dict
+
+from pushplan.cli import main
+from pushplan.serving import PROTOCOL, ServerLimits
+
+CLIENT = EXAMPLES / "serve_client.py"
+
+
+@contextmanager
+def command(*arguments: str) -> Iterator[tuple[subprocess.Popen[str], str]]:
+    """A server in a process of its own, and what it says first."""
+    process = subprocess.Popen(
+        [sys.executable, "-m", "pushplan", "serve", *arguments],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    try:
+        assert process.stdout is not None
+        yield process, process.stdout.readline()
+    finally:
+        process.kill()
+        process.communicate()
+
+
+def test_the_command_serves_the_client_that_is_shipped_until_a_signal(tmp_path):
+    path = tmp_path / "s"
+    address = f"unix:{path}"
+    with command("straight", "--socket", address) as (process, said):
+        assert said == f"straight is served at {address} ({PROTOCOL})\n"
+        done = subprocess.run(
+            [sys.executable, "-I", str(CLIENT), address], capture_output=True, text=True
+        )
+        assert re.search(r"straight: \d\d steps", done.stdout), done
+        process.kill()
+        process.wait()
+    assert path.exists()  # it had no time to remove it
+    for one, arguments in (
+        (signal.SIGTERM, ("--set", "spacing=0.3", "--verbose")),
+        (signal.SIGINT, ()),
+    ):
+        with command("straight", "--socket", address, *arguments) as (process, said):
+            client = PolicyClient(address)
+            client.reset(maze_dict())
+            process.send_signal(one)
+            _, errors = process.communicate(timeout=20)
+            assert process.returncode == 0, errors
+            assert ("client 1 has come" in errors) == bool(arguments) and "Trace" not in errors
+            with pytest.raises((ConnectionError, ServeError)):
+                client.act(time=1.0, robot_pose=[1, 1, 0])
+        assert not path.exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["straight", "--socket", "tcp:0.0.0.0:7400"], "can be reached from other machines"),
+        (["straight", "--socket", "here"], "a socket is unix:PATH or tcp:127.0.0.1:PORT"),
+        (["strait", "--socket", "unix:s"], "did you mean 'straight'?"),
+        (["nowhere.py:Policy", "--socket", "unix:s"], "there is no file nowhere.py"),
+        (["straight", "--socket", "unix:s", "--set", "speed=2"], "unknown option"),
+        (["straight", "--socket", "unix:s", "--set", "speed"], "--set takes NAME=VALUE"),
+        (["straight", "--socket", "unix:s", "--message-bytes", "10"], "limit message_bytes must"),
+        (["straight"], "--socket"),
+    ],
+)
+def test_what_cannot_be_served_is_one_line(arguments, said, capsys):
+    assert main(["serve", *arguments]) == 2
+    errors = capsys.readouterr().err
+    assert said in errors and "Traceback" not in errors
+
+
+def test_the_help_says_the_limits(capsys):
+    assert main(["serve", "--help"]) == 0
+    text = " ".join(capsys.readouterr().out.split())
+    for value in vars(ServerLimits()).values():
+        assert f"(default {value:,})" in text
+
+
+def test_the_client_needs_python_3_8_and_its_standard_library_alone():
+    tree = ast.parse(CLIENT.read_text("utf-8"), feature_version=(3, 8))
+    names: set[str] = set()
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            names.update(alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            names.add(str(node.module))
+    assert {name.partition(".")[0] for name in names} <= sys.stdlib_module_names
+
+
+def test_the_example_runs_as_it_is_shipped(tmp_path):
+    done: Any = subprocess.run(
+        [sys.executable, str(CLIENT)],
+        capture_output=True,
+        text=True,
+        cwd=tmp_path,
+        env={**os.environ, "TMPDIR": str(tmp_path)},
+    )
+    assert done.returncode == 0 and "straight: 64 steps" in done.stdout, done
+    assert list(Path(tmp_path).iterdir()) == []
