@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from pushplan.serving.scale import check_motion, check_scale, check_shapes
 from pushplan.world import InvalidInputError, Movables, SchemaError, World, world_from_dict
 from pushplan.world.checks import FloatArray, array
 from pushplan.world.errors import short
@@ -39,7 +40,7 @@ class WorldFeed:
         """A world by the schema of world files, from which later messages go on.
 
         Raises:
-            SchemaError, InvalidInputError: as `world_from_dict`; if it names a file.
+            SchemaError, InvalidInputError: as `world_from_dict` and `check_scale`; if it names a file.
         """
         if isinstance(data, Mapping):
             static, robot = data.get("static"), data.get("robot")
@@ -51,6 +52,7 @@ class WorldFeed:
             if self._robot and isinstance(robot, Mapping):
                 data = {**data, "robot": {**self._robot, **robot}}
         world = world_from_dict(data)
+        check_scale(world)
         self._keep(world, world.movables)
         return world
 
@@ -78,6 +80,7 @@ class WorldFeed:
         if "added" in message:
             added = movables_from_list(message["added"])
             self._refuse_known(added)
+            check_shapes(added)
             seen = seen.updated(added)
         world = replace(
             world,
@@ -86,6 +89,7 @@ class WorldFeed:
             robot_twist=message.get("robot_twist", _AT_REST),
             movables=seen,
         )
+        check_motion(world)
         if added is not None:
             self._keep(world, self._known.updated(added))
         self._world = world

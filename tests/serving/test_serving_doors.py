@@ -101,6 +101,9 @@ def test_a_wrong_hello(changes, said):
         ({"world": maze_dict(goal={"kind": "circle"})}, "unknown goal kind 'circle'"),
         ({"world": maze_dict(movables=[{**BOX, "id": 2**70}])}, "movables[0].id must"),
         ({"world": maze_dict(movables=[BOX, BOX])}, "movables.ids must be distinct"),
+        ({"world": maze_dict(static={"bounds": [0, 0, 1e300, 1]})}, "static.bounds must be"),
+        ({"world": maze_dict(static={"bounds": [0, 0, 9e5, 1]})}, "100,000 times as far apart"),
+        ({"world": maze_dict(goal={"kind": "disc", "center": [0, 1e9], "radius": 1})}, "goal must"),
     ],
 )  # fmt: skip
 def test_a_wrong_start(changes, said):
@@ -116,6 +119,9 @@ def test_a_wrong_start(changes, said):
         ({"robot_pose": [1, 2, "east"]}, "robot_pose must be an array of float64"),
         ({"robot_pose": [1, 2, 10**320]}, "robot_pose must be"),
         ({"robot_pose": None}, "robot_pose must"),
+        ({"robot_pose": [1e308, 0, 0]}, "robot_pose must be at most 1e+06 [m, rad], got 1e+308"),
+        ({"robot_pose": [-9e5, 0, 0]}, "100,000 times as far apart"),
+        ({"poses": [[1, 2, 3], [1, -1e9, 3]]}, "poses of objects must be at most 1e+06"),
         ({"robot_twist": [[1, 2, 3]]}, "robot_twist must have shape (3,), got (1, 3)"),
         ({"time": "now"}, "time must be a number, got 'now'"),
         ({"time": None}, "time must be a number, got None"),
