@@ -22,6 +22,8 @@ HEAVY = ("pymunk", "mujoco", "gymnasium", "torch", "matplotlib")
         "planners",
         "planners.rrt",
         "planners.push_aware.policies",
+        "runtime",
+        "serving",
     ],
 )
 def test_no_simulator_and_no_learning_library(module):

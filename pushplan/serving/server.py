@@ -209,10 +209,12 @@ class PolicyServer:
         client = _Client(connection, Session(self._policy, self._label, self._limits))
         with self._lock:
             number = next(self._numbers)
-            free = len(self._present) < self._limits.clients and not self._over
-            if free:
+            full, over = len(self._present) >= self._limits.clients, self._over
+            if not (full or over):
                 self._present[number] = client
-        if not free:
+        if over:
+            return
+        if full:
             self._send_away(connection)
             return
         client.thread.name = f"pushplan client {number}"

@@ -40,7 +40,8 @@ class WorldFeed:
         """A world by the schema of world files, from which later messages go on.
 
         Raises:
-            SchemaError, InvalidInputError: as `world_from_dict` and `check_scale`; if it names a file.
+            SchemaError, InvalidInputError: as `world_from_dict` and `check_scale`, or if it names a
+                file.
         """
         if isinstance(data, Mapping):
             static, robot = data.get("static"), data.get("robot")

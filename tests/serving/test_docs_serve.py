@@ -1,0 +1,69 @@
+"""What docs/serve.md shows is what happens."""
+
+from __future__ import annotations
+
+import json
+import re
+import shutil
+import subprocess
+from pathlib import Path
+from typing import Any
+
+import pytest
+from served import HELLO, Raw, served
+
+from pushplan.serving import ServerLimits, scale, world_feed
+from pushplan.serving.episodes import SETTINGS
+from pushplan.serving.messages import REQUESTS
+
+PAGE = (Path(__file__).parents[2] / "docs" / "serve.md").read_text("utf-8")
+(EXCHANGE,) = re.findall(r"```\n(> .*?)```", PAGE, re.DOTALL)
+LINES = [(line[0], line[2:]) for line in EXCHANGE.splitlines()]
+REQUESTED = [text for who, text in LINES if who == ">"]
+REPLIED = [json.loads(text) for who, text in LINES if who == "<"]
+
+
+def same(got: Any, shown: Any) -> bool:
+    if isinstance(shown, dict):
+        return got.keys() == shown.keys() and all(
+            same(got[key], shown[key]) for key in shown if key != "version"
+        )
+    return got == (pytest.approx(shown) if type(shown) is float else shown)
+
+
+def test_the_exchange_happens_as_it_is_shown(tmp_path):
+    with served("straight", tmp_path) as server, Raw(server) as raw:
+        for request, shown in zip(REQUESTED, REPLIED, strict=True):
+            got = raw.ask(request.encode())
+            assert same(got, shown), (got, shown)
+
+
+@pytest.mark.skipif(shutil.which("g++") is None, reason="needs g++")
+def test_the_client_in_another_language_compiles_and_talks(tmp_path):
+    (code,) = re.findall(r"```cpp\n(.*?)```", PAGE, re.DOTALL)
+    (tmp_path / "client.cpp").write_text(code)
+    build = ["g++", "-std=c++17", "-Wall", "-Werror", "client.cpp", "-o", "client"]
+    subprocess.run(build, cwd=tmp_path, check=True)
+    with served("straight", tmp_path) as server:
+        done = subprocess.run(
+            [tmp_path / "client", server.address.removeprefix("unix:")],
+            input="\n".join(REQUESTED),
+            capture_output=True,
+            text=True,
+            check=True,
+        )
+    replies = [json.loads(line) for line in done.stdout.splitlines()]
+    assert all(same(*pair) for pair in zip(replies, REPLIED, strict=True))
+
+
+def test_the_page_names_every_request_key_setting_and_limit():
+    for kind, (required, optional) in REQUESTS.items():
+        assert f"| `{kind}` |" in PAGE
+        assert all(f"`{key}`" in PAGE for key in (*required, *optional))
+    assert all(f"`{key}`" in PAGE for key in SETTINGS)
+    limits = ServerLimits()
+    assert (limits.clients, limits.message_bytes, limits.message_s, limits.idle_s) == (
+        *(8, 4_000_000, 10.0, 600.0),
+    )
+    assert f"{world_feed.MAX_OBJECTS:,}" in PAGE and f"{scale.WIDEST:,.0f} radii" in PAGE
+    assert scale.FARTHEST == 1e6 and HELLO["protocol"] in PAGE
