@@ -11,7 +11,9 @@ import numpy as np
 import pytest
 from served import HELLO, PolicyClient, Raw, ServeError, Still, maze, maze_dict, served
 
+from pushplan.evaluation import JobSettings, run_episode
 from pushplan.planners import make_policy
+from pushplan.scenarios import suite
 from pushplan.serving import PROTOCOL, PolicyServer
 from pushplan.world import Twist, WheelSpeeds, World, stream, world_to_dict
 
@@ -235,3 +237,37 @@ def test_a_server_can_start_again_after_its_end(tmp_path):
         server.start()
         assert through(server.address, maze(), 0, 2)
         assert server.close() and server.close()
+
+
+@pytest.mark.parametrize(
+    ("suite_name", "policy"),
+    [
+        ("maze-2d-3", "straight"),
+        pytest.param("area-clearing-2d-10", "gtsp-mpc", marks=pytest.mark.slow),
+        pytest.param("maze-3d-3", "push-aware", marks=pytest.mark.slow),
+    ],
+)
+def test_an_episode_through_the_server_is_that_of_a_batch_to_the_bit(suite_name, policy, tmp_path):
+    scenario = suite(suite_name, episodes=1, first_seed=5).scenarios[0]
+    env = JobSettings().environment(scenario, make_policy(policy))
+    wanted = run_episode(env, make_policy(policy), scenario)
+    with served(policy, tmp_path) as server, PolicyClient(server.address) as client:
+        env.reset(seed=scenario.seed)
+        client.reset(world_to_dict(env.world), scenario.seed)
+        actions, over = [], False
+        while not over:
+            world = env.world
+            reply = client.act(
+                time=world.time,
+                robot_pose=world.robot_pose.tolist(),
+                robot_twist=world.robot_twist.tolist(),
+                ids=world.movables.ids.tolist(),
+                poses=world.movables.poses.tolist(),
+                twists=world.movables.twists.tolist(),
+            )
+            actions.append(env.encode(Twist(**reply["twist"])))
+            *_, terminated, truncated, _ = env.step(actions[-1])
+            over = terminated or truncated
+    assert np.array_equal(np.array(actions), wanted.actions)
+    assert env.world.time == wanted.times[-1]
+    env.close()
