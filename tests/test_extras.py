@@ -35,8 +35,10 @@ import numpy as np
 import pushplan.control, pushplan.learned, pushplan.metrics, pushplan.perception
 from pushplan.cli import main
 from pushplan.control import TwistLimiter
+from pushplan.evaluation.policies import parse_policy
 from pushplan.planners import make_policy, policy_names
 from pushplan.runtime import Runner
+from pushplan.serving import PolicyServer
 from pushplan.world import RobotModel, Twist, load_world
 
 for name in policy_names():
@@ -44,6 +46,7 @@ for name in policy_names():
 world = load_world("examples/room.yaml")
 with Runner("straight", period=0.05) as runner:
     assert runner.start(world).status in ("waiting", "driving")
+PolicyServer(parse_policy("straight").make, "unix:never-made")
 robot = RobotModel.from_outline(
     [[0, 0], [1, 0], [0, 1]], mass=1, drive="differential", max_speed=1, max_turn_rate=1,
     max_acceleration=0.5,

@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 from collections.abc import Callable
 from dataclasses import dataclass
+from traceback import format_tb
 from typing import Any
 
 from pushplan import __version__
@@ -65,8 +66,9 @@ class Session:
         except PushplanError as error:
             return Answer(messages.error(f"{kind}: {error}" if kind else str(error), kind))
         except BaseException as error:  # of a policy, of any kind: its thread goes on
-            LOG.warning("%s of %s: %s", kind, self._label, describe(error), exc_info=True)
-            return Answer(messages.error(f"{kind}: {self._label} failed: {describe(error)}", kind))
+            said = f"{self._label} failed: {describe(error)}"
+            LOG.warning("%s: %s\n%s", kind, said, "".join(format_tb(error.__traceback__)))
+            return Answer(messages.error(f"{kind}: {said}", kind))
 
     def abandon(self) -> None:
         """End the planning call that runs, because the client has left; from any thread."""

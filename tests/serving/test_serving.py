@@ -72,9 +72,8 @@ def through(
     [
         ("straight", 30),
         ("random", 30),
-        pytest.param("push-aware", 8, marks=pytest.mark.warm("push-aware")),
         pytest.param("kinodynamic-rrt", 60, marks=pytest.mark.slow),
-        pytest.param("push-aware", 120, marks=pytest.mark.slow, id="push-aware-long"),
+        pytest.param("push-aware", 120, marks=pytest.mark.slow),
     ],
 )
 def test_the_same_seed_and_worlds_give_the_same_commands_to_the_bit(name, steps, tmp_path):

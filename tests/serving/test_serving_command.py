@@ -51,20 +51,28 @@ def test_the_command_serves_the_client_that_is_shipped_until_a_signal(tmp_path):
         process.kill()
         process.wait()
     assert path.exists()  # it had no time to remove it
-    for one, arguments in (
-        (signal.SIGTERM, ("--set", "spacing=0.3", "--verbose")),
-        (signal.SIGINT, ()),
+    with command("straight", "--socket", address, "--set", "spacing=0.3", "--verbose") as (
+        process,
+        said,
     ):
-        with command("straight", "--socket", address, *arguments) as (process, said):
-            client = PolicyClient(address)
+        client = PolicyClient(address)
+        client.reset(maze_dict())
+        process.send_signal(signal.SIGTERM)
+        _, errors = process.communicate(timeout=20)
+        assert process.returncode == 0 and "client 1 has come" in errors, errors
+        with pytest.raises((ConnectionError, ServeError)):
+            client.act(time=1.0, robot_pose=[1, 1, 0])
+    assert not path.exists()
+
+
+@pytest.mark.slow
+def test_the_keyboard_ends_it_as_well(tmp_path):
+    with command("random", "--socket", "tcp:127.0.0.1:0") as (process, said):
+        client = PolicyClient(said.split()[4])
+        process.send_signal(signal.SIGINT)
+        assert process.communicate(timeout=20) == ("", "") and process.returncode == 0
+        with pytest.raises(ConnectionError):
             client.reset(maze_dict())
-            process.send_signal(one)
-            _, errors = process.communicate(timeout=20)
-            assert process.returncode == 0, errors
-            assert ("client 1 has come" in errors) == bool(arguments) and "Trace" not in errors
-            with pytest.raises((ConnectionError, ServeError)):
-                client.act(time=1.0, robot_pose=[1, 1, 0])
-        assert not path.exists()
 
 
 @pytest.mark.parametrize(
