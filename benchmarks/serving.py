@@ -95,11 +95,11 @@ def message_costs(objects: int) -> None:
     world = world_of(objects)
     whole = world_to_dict(world)
     poses = {"time": 1.0, "robot_pose": [1.0, 2.0, 3.0], "poses": world.movables.poses.tolist()}
-    print(f"\n{f'message of {objects} objects':34} {'bytes':>8} {'write':>9} {'read':>9} ms")
+    print(f"\n{f'message of {objects} objects':40} {'bytes':>8} {'write':>9} {'read':>9} ms")
     for name, data in (("whole world", whole), ("poses", poses)):
         text = json.dumps(data)
         wrote, read = median(lambda d=data: json.dumps(d)), median(lambda t=text: parse_json(t))
-        print(f"{f'{name}, JSON':34} {len(text):8,} {wrote:9.3f} {read:9.3f}")
+        print(f"{f'{name}, JSON':40} {len(text):8,} {wrote:9.3f} {read:9.3f}")
         try:
             import msgpack
         except ImportError:
@@ -107,8 +107,8 @@ def message_costs(objects: int) -> None:
         packed = msgpack.packb(data)
         wrote = median(lambda d=data: msgpack.packb(d))
         read = median(lambda p=packed: msgpack.unpackb(p))
-        print(f"{f'{name}, MessagePack':34} {len(packed):8,} {wrote:9.3f} {read:9.3f}")
-    print(f"{'World from a whole world read':54} {median(lambda: world_from_dict(whole)):9.3f}")
+        print(f"{f'{name}, MessagePack':40} {len(packed):8,} {wrote:9.3f} {read:9.3f}")
+    print(f"{'World from a whole world read':60} {median(lambda: world_from_dict(whole)):9.3f}")
 
 
 def median(call: Callable[[], object], times: int = 200) -> float:
@@ -129,7 +129,7 @@ def main() -> None:
     parser.add_argument("--server", help="address of a server in another process")
     options = parser.parse_args()
     warm_up(options.policy)
-    print(f"{'act of ' + options.policy:34} {'median':>9} {'99 %':>9} {'worst':>9} ms")
+    print(f"{'act of ' + options.policy:40} {'median':>9} {'99 %':>9} {'worst':>9} ms")
     with tempfile.TemporaryDirectory() as folder:
         path = f"unix:{os.path.join(folder, 's')}"
         own = None if options.server else PolicyServer(options.policy, path)
@@ -143,9 +143,9 @@ def main() -> None:
                     here, there = compared(
                         where, options.policy, world_of(objects), options.steps, whole
                     )
-                    print(f"{f'{name}, in process':34} {quantiles(here)}")
+                    print(f"{f'{name}, in process':40} {quantiles(here)}")
                     over = [b - a for a, b in zip(here, there, strict=True)]
-                    print(f"{f'{name}, overhead':34} {quantiles(over)}")
+                    print(f"{f'{name}, overhead':40} {quantiles(over)}")
         finally:
             if own is not None:
                 own.close()
