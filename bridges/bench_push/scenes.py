@@ -1,0 +1,413 @@
+"""The environments of ``benchnpin``, as worlds of pushplan and with velocities as actions.
+
+Runs in the virtual environment of ``benchnpin``; knows pushplan by its world files only.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import math
+import random
+import sys
+import types
+
+import numpy as np
+import pymunk
+from shapely.geometry import MultiPoint, Polygon
+
+
+class Scene:
+    """One environment of theirs; `reset` and `step` as theirs, `world` and `state` for ours.
+
+    Attributes:
+        period: time between two actions [s].
+        own_limit: what ends an episode of theirs besides success, in words.
+    """
+
+    name = ""
+    metric = ""
+    own_limit = ""
+    turns = math.pi / 30.0  # greatest turn rate of their actions [rad/s]
+    drive = "constant_speed"
+
+    def __init__(self, variation: str) -> None:
+        supply_shortest_paths()
+        import benchnpin.environments  # noqa: F401  registers them
+        import gymnasium
+
+        with contextlib.redirect_stdout(io.StringIO()):
+            self.env = gymnasium.make(
+                self.name, cfg=self.config(variation), disable_env_checker=True
+            )
+        self.inner = self.env.unwrapped
+        without_images(self.inner)
+
+    def config(self, variation: str) -> dict:
+        """What of their configuration differs from their default."""
+        raise NotImplementedError
+
+    def reset(self, seed: int) -> dict:
+        """Begin an episode; their starts come from Python's and NumPy's global generators."""
+        random.seed(seed)
+        np.random.seed(seed)
+        self.inner.episode_idx = seed - 1  # where they take a numbered start
+        self.inner.random_state = np.random.RandomState(seed)
+        with contextlib.redirect_stdout(io.StringIO()):
+            _, info = self.env.reset()
+        self.time = 0.0
+        self.objects = list(self._shapes())
+        return info
+
+    def step(self, linear: float, angular: float) -> tuple[float, bool, bool, dict]:
+        """Drive for a period with these velocities [m/s, rad/s], within their limits."""
+        with contextlib.redirect_stdout(io.StringIO()):
+            _, reward, terminated, truncated, info = self.env.step(self.action(linear, angular))
+        self.time += self.period
+        return float(np.asarray(reward).reshape(-1)[0]), bool(terminated), bool(truncated), info
+
+    @property
+    def period(self) -> float:
+        """Time between two actions [s]."""
+        return float(self.inner.dt)
+
+    def action(self, linear: float, angular: float) -> np.ndarray:
+        """Their action for these velocities."""
+        return np.clip([angular / self.turns], -1.0, 1.0)
+
+    @property
+    def body(self) -> pymunk.Body:
+        """The robot."""
+        raise NotImplementedError
+
+    def _shapes(self) -> list:
+        """The movable objects."""
+        raise NotImplementedError
+
+    def parts(self) -> list:
+        """The robot's outlines that count, body frame."""
+        raise NotImplementedError
+
+    def robot_mass(self) -> float:
+        """As their metrics count it [kg]."""
+        raise NotImplementedError
+
+    def bounds(self) -> list:
+        """x_min, y_min, x_max, y_max of the floor [m]."""
+        raise NotImplementedError
+
+    def goal(self, static: list) -> dict:
+        """The goal, as in a world file."""
+        raise NotImplementedError
+
+    def speeds(self) -> tuple[float, float]:
+        """Least and greatest forward speed [m/s]."""
+        speed = float(self.inner.target_speed)
+        return speed, speed
+
+    def state(self) -> dict:
+        """What changes, as a message of the policy server has it."""
+        return {
+            "time": self.time,
+            "robot_pose": pose_of(self.body),
+            "ids": [k for k, shape in enumerate(self.objects) if self.is_there(shape)],
+            "poses": [pose_of(shape.body) for shape in self.objects if self.is_there(shape)],
+        }
+
+    def is_there(self, shape: pymunk.Shape) -> bool:
+        """Whether an object of the start is still on the floor."""
+        return shape.space is not None
+
+    def world(self) -> dict:
+        """The scene as a world file has it; call it after `reset`."""
+        low, high = self.speeds()
+        polygons, segments = statics(self.inner.space)
+        robot = {
+            "name": self.name,
+            "drive": self.drive,
+            "mass": self.robot_mass(),
+            "max_speed": high,
+            "max_turn_rate": self.turns,
+            "parts": self.parts(),
+            "pose": pose_of(self.body),
+        }
+        if self.drive != "constant_speed":
+            robot["min_speed"] = low
+        return {
+            "schema": "pushplan-world/1",
+            "robot": robot,
+            "static": {"bounds": self.bounds(), "polygons": polygons, "segments": segments},
+            "movables": [
+                {
+                    "id": k,
+                    "outline": centered(touching(shape)),
+                    "pose": pose_of(shape.body),
+                    "mass": float(shape.area),  # as their metrics count it
+                }
+                for k, shape in enumerate(self.objects)
+            ],
+            "goal": self.goal(polygons),
+        }
+
+
+class MazeScene(Scene):
+    """``maze-NAMO-v0``; variations ``3``, ``5``, ``10``: boxes."""
+
+    name, metric = "maze-NAMO-v0", "maze_namo_metric:MazeNamoMetric"
+    own_limit = "a wall, 400 steps"
+
+    def config(self, variation: str) -> dict:
+        return {"num_obstacles": int(variation), "randomize_obstacles": True}
+
+    @property
+    def body(self) -> pymunk.Body:
+        return self.inner.robot_body
+
+    def _shapes(self) -> list:
+        return self.inner.polygons
+
+    def parts(self) -> list:
+        wheels = [corner for shape in self.inner.wheels for corner in touching(shape)]
+        return [hull([*touching(self.inner.robot_shape), *wheels])]
+
+    def robot_mass(self) -> float:
+        return float(self.inner.cfg.robot.mass)
+
+    def bounds(self) -> list:
+        return [0.0, 0.0, float(self.inner.cfg.env.width), float(self.inner.cfg.env.length)]
+
+    def goal(self, static: list) -> dict:
+        cfg = self.inner.cfg
+        center = [float(value) for value in self.inner.goal]
+        return {
+            "kind": "disc",
+            "center": center,
+            "radius": float(cfg.goal_radius + cfg.robot.min_r),
+        }
+
+
+class ShipScene(Scene):
+    """``ship-ice-v0``; variations ``10`` to ``50``: concentration [%]."""
+
+    name, metric = "ship-ice-v0", "ship_ice_metric:ShipIceMetric"
+    own_limit = "the sides of the channel, 300 steps"
+    turns = math.pi / 14.0
+
+    def config(self, variation: str) -> dict:
+        return {"concentration": int(variation) / 100.0}
+
+    @property
+    def body(self) -> pymunk.Body:
+        return self.inner.ship_body
+
+    def _shapes(self) -> list:
+        return self.inner.polygons
+
+    def parts(self) -> list:
+        return [touching(self.inner.ship_shape)]
+
+    def robot_mass(self) -> float:
+        return float(self.inner.cfg.ship.mass)
+
+    def bounds(self) -> list:
+        occ = self.inner.cfg.occ
+        return [0.0, 0.0, float(occ.map_width), float(occ.map_height)]
+
+    def goal(self, static: list) -> dict:
+        middle = 0.5 * float(self.inner.cfg.occ.map_width)
+        return {"kind": "line", "point": [middle, float(self.inner.goal[1])], "normal": [0.0, 1.0]}
+
+
+class AreaScene(Scene):
+    """``area-clearing-v0`` with velocities; variations are the names of its environments."""
+
+    name, metric = "area-clearing-v0", "task_driven_metric:TaskDrivenMetric"
+    own_limit = "200 of their steps of 1.5 m since the last box was cleared"
+    turns = math.pi / 60.0  # half of what its attribute says, as its velocity action has it
+    drive = "differential"
+
+    def config(self, variation: str) -> dict:
+        return {
+            "env": variation,
+            "agent": {"action_type": "velocity"},
+            "render": {"show": False, "log_obs": False},
+            "sim": {"t_max": idle_steps(1.5, 0.2, 0.2)},
+        }
+
+    def action(self, linear: float, angular: float) -> np.ndarray:
+        speed = linear / float(self.inner.target_speed)
+        return np.clip([speed, angular / self.turns], -1.0, 1.0)
+
+    def speeds(self) -> tuple[float, float]:
+        speed = float(self.inner.target_speed)
+        return -speed, speed
+
+    @property
+    def body(self) -> pymunk.Body:
+        return self.inner.agent.body
+
+    def _shapes(self) -> list:
+        return self.inner.box_shapes
+
+    def parts(self) -> list:
+        shapes = [one for one in self.body.shapes if one.label != "wheel"]
+        return [touching(one) for one in sorted(shapes, key=lambda one: one.label)]
+
+    def robot_mass(self) -> float:
+        return float(self.inner.cfg.agent.mass)
+
+    def bounds(self) -> list:
+        x, y = np.array(self.inner.outer_boundary_vertices).T
+        return [float(x.min()), float(y.min()), float(x.max()), float(y.max())]
+
+    def goal(self, static: list) -> dict:
+        polygon = convex(self.inner.boundary_vertices)
+        size = 2.0 * float(self.inner.cfg.obstacle_size)
+        walls = [Polygon(one) for one in static]
+        closing = zip(polygon, polygon[1:] + polygon[:1], strict=True)
+        edges = [can_leave(np.array(a), np.array(b), size, walls) for a, b in closing]
+        return {"kind": "clearance_area", "polygon": polygon, "open_edges": edges}
+
+
+class DeliveryScene(Scene):
+    """``box-delivery-v0`` with velocities; variations are the names of its layouts."""
+
+    name, metric = "box-delivery-v0", "task_driven_metric:TaskDrivenMetric"
+    own_limit = "200 of their steps of 1.25 m since the last box was delivered"
+    turns = 1.0
+    drive = "differential"
+
+    def config(self, variation: str) -> dict:
+        return {
+            "env": {"obstacle_config": variation},
+            "agent": {"action_type": "velocity"},
+            "render": {"show": False, "show_obs": False},
+            "misc": {"inactivity_cutoff": idle_steps(1.25, 0.3, 0.2)},
+        }
+
+    def action(self, linear: float, angular: float) -> np.ndarray:
+        return np.clip([linear, angular], -1.0, 1.0)
+
+    def speeds(self) -> tuple[float, float]:
+        speed = float(self.inner.target_speed)
+        return -speed, speed
+
+    @property
+    def body(self) -> pymunk.Body:
+        return self.inner.robot.body
+
+    def _shapes(self) -> list:
+        return self.inner.boxes
+
+    def parts(self) -> list:
+        return [touching(self.inner.robot)]
+
+    def robot_mass(self) -> float:
+        return float(self.inner.cfg.agent.mass)
+
+    def bounds(self) -> list:
+        x, y = 0.5 * self.inner.room_length, 0.5 * self.inner.room_width
+        return [-float(x), -float(y), float(x), float(y)]
+
+    def goal(self, static: list) -> dict:
+        (x, y), size = self.inner.receptacle_position, self.inner.receptacle_size
+        half = 0.5 * float(size)
+        corners = [[x - half, y - half], [x + half, y - half], [x + half, y + half]]
+        return {"kind": "receptacle", "polygon": convex([*corners, [x - half, y + half]])}
+
+
+SCENES = {
+    "maze": (MazeScene, ("3", "5", "10")),
+    "ship_ice": (ShipScene, ("10", "20", "30", "40", "50")),
+    "area_clearing": (AreaScene, ("clear_env", "walled_env", "walled_env_with_columns")),
+    "box_delivery": (DeliveryScene, ("small_empty", "small_columns")),
+}
+
+
+def idle_steps(step: float, speed: float, period: float) -> int:
+    """Their idle limit, 200 heading actions of ``step`` [m] each, in velocity actions."""
+    return 200 * math.ceil(step / (speed * period) - 1e-9)
+
+
+def pose_of(body: pymunk.Body) -> list:
+    """[x, y, theta] of a body."""
+    x, y = body.position
+    return [float(x), float(y), float(body.angle)]
+
+
+def convex(points: object) -> list:
+    """Corners as lists, counter-clockwise."""
+    corners = np.array([(float(x), float(y)) for x, y in points])
+    x, y = corners.T
+    area = float(x @ np.roll(y, -1) - y @ np.roll(x, -1))
+    return (corners if area > 0.0 else corners[::-1]).tolist()
+
+
+def touching(shape: pymunk.Poly) -> list:
+    """Where a polygon touches others: its corners, moved out by its radius; body frame."""
+    return hull(Polygon(shape.get_vertices()).buffer(shape.radius, join_style=2).exterior.coords)
+
+
+def centered(outline: list) -> list:
+    """An outline about its own centroid, which its corners' moving out shifts by less than 1 mm."""
+    middle = Polygon(outline).centroid
+    return [[x - middle.x, y - middle.y] for x, y in outline]
+
+
+def hull(points: object) -> list:
+    """The convex hull, counter-clockwise."""
+    return convex(list(MultiPoint(list(points)).convex_hull.exterior.coords)[:-1])
+
+
+def statics(space: pymunk.Space) -> tuple[list, list]:
+    """Polygons and thick segments of everything that stands still, with its contact radius."""
+    polygons, segments = [], []
+    for shape in space.shapes:
+        label = getattr(shape, "label", "")
+        if shape.body.body_type != pymunk.Body.STATIC or label == "receptacle":
+            continue
+        to_world = shape.body.local_to_world
+        if isinstance(shape, pymunk.Segment):
+            a, b = to_world(shape.a), to_world(shape.b)
+            ends = {"from": [float(a.x), float(a.y)], "to": [float(b.x), float(b.y)]}
+            segments.append({**ends, "radius": float(shape.radius)})
+        else:
+            polygons.append(convex([to_world(corner) for corner in touching(shape)]))
+    return polygons, segments
+
+
+def can_leave(a: np.ndarray, b: np.ndarray, size: float, walls: list) -> bool:
+    """Whether a square of this size [m] finds room somewhere outside the edge from a to b."""
+    along = (b - a) / np.linalg.norm(b - a)
+    out = np.array([along[1], -along[0]])
+    for share in np.linspace(0.0, 1.0, 41):
+        corner = a + share * (np.linalg.norm(b - a) - size) * along
+        corners = [
+            corner,
+            corner + size * along,
+            corner + size * (along + out),
+            corner + size * out,
+        ]
+        if not any(wall.intersects(Polygon(corners)) for wall in walls):
+            return True
+    return False
+
+
+def supply_shortest_paths() -> None:
+    """A module ``spfa`` where theirs, which no registry has, is not installed.
+
+    It draws the images that learned policies see, and is never called here: see `without_images`.
+    """
+    try:
+        import spfa  # noqa: F401
+    except ImportError:
+        sys.modules["spfa"] = types.ModuleType("spfa")
+
+
+def without_images(inner: object) -> None:
+    """Leave out what only images and rewards need: it takes seconds a step and moves nothing."""
+    nothing = np.zeros(inner.observation_space.shape, inner.observation_space.dtype)
+    inner.generate_observation = lambda *args, **kwargs: nothing
+    for name in ("create_global_shortest_path_to_goal_points", "shortest_path_distance"):
+        if hasattr(inner, name):
+            setattr(inner, name, lambda *args, **kwargs: 0.0)
