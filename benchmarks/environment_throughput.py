@@ -11,8 +11,7 @@ velocities, random headings for headings. A new episode starts where one ends, a
 where the robot has been held for 5 steps; resets are timed apart. Shares are measured by wrapping
 the simulator and the observation builder of the environment in timers. The first episode, in which
 kernels are loaded and distance fields are computed, is not counted; what it costs stands in the
-last columns. Reference and target are rates of Bench-Push on another 2-core machine, so the ratio
-holds that of the two machines too.
+last columns. ``bridges/bench_push/throughput.py`` sets the original beside it, in turns.
 """
 
 from __future__ import annotations
@@ -29,13 +28,12 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Row:
-    """One environment, with the reference's and the wanted steps/s."""
+    """One environment, with the wanted steps/s."""
 
     task: str
     simulator: str
     action: str
     variations: Mapping[str, Any] = field(default_factory=dict)
-    reference: float = float("nan")
     target: float = float("nan")
     simulated: bool = False  # rates are simulated seconds a second
 
@@ -47,22 +45,22 @@ class Row:
 
 
 ROWS = (
-    Row("maze", "pymunk", "turn_rate", {"boxes": 5}, 12.2, 1000),
-    Row("maze", "pymunk", "turn_rate", {"boxes": 10}, 11.8, 900),
+    Row("maze", "pymunk", "turn_rate", {"boxes": 5}, 1000),
+    Row("maze", "pymunk", "turn_rate", {"boxes": 10}, 900),
     Row("maze", "pymunk", "turn_rate", {"boxes": 10, "wheeled": 0.5}),
-    Row("ship_ice", "pymunk", "turn_rate", {"concentration": 0.1}, 6.4, 450),
+    Row("ship_ice", "pymunk", "turn_rate", {"concentration": 0.1}, 450),
     Row("ship_ice", "pymunk", "turn_rate", {"concentration": 0.3}),
-    Row("ship_ice", "pymunk", "turn_rate", {"concentration": 0.5}, 2.4, 60),
-    Row("box_delivery", "pymunk", "heading", {}, 2.5, 150),
+    Row("ship_ice", "pymunk", "turn_rate", {"concentration": 0.5}, 60),
+    Row("box_delivery", "pymunk", "heading", {}, 150),
     Row("box_delivery", "pymunk", "heading", {"layout": "large_columns"}),
     Row("box_delivery", "pymunk", "velocity", {}),
-    Row("area_clearing", "pymunk", "heading", {}, 17.2, 500),
-    Row("area_clearing", "pymunk", "velocity", {}, 43, 1500),
-    Row("maze", "mujoco", "turn_rate", {"boxes": 3}, 11.7, 500),
-    Row("box_delivery", "mujoco", "heading", {}, 4.5, 120),
-    Row("area_clearing", "mujoco", "heading", {}, 19.5, 200),
-    Row("ship_ice", "mujoco", "turn_rate", {"concentration": 0.1}, 7.1, 40, simulated=True),
-    Row("ship_ice", "mujoco", "turn_rate", {"concentration": 0.5}, 1.3, 10, simulated=True),
+    Row("area_clearing", "pymunk", "heading", {}, 500),
+    Row("area_clearing", "pymunk", "velocity", {}, 1500),
+    Row("maze", "mujoco", "turn_rate", {"boxes": 3}, 500),
+    Row("box_delivery", "mujoco", "heading", {}, 120),
+    Row("area_clearing", "mujoco", "heading", {}, 200),
+    Row("ship_ice", "mujoco", "turn_rate", {"concentration": 0.1}, 40, simulated=True),
+    Row("ship_ice", "mujoco", "turn_rate", {"concentration": 0.5}, 10, simulated=True),
 )
 VECTOR = (ROWS[1], ROWS[5], ROWS[9], ROWS[11])
 
@@ -167,7 +165,7 @@ def measure(row: Row, seconds: float) -> dict[str, float]:
 def throughput(seconds: float, only: str) -> None:
     """The table of rates."""
     print(
-        f"{'environment':58} {'steps/s':>8} {'sim s/s':>8} {'ratio':>6} {'target':>7} "
+        f"{'environment':58} {'steps/s':>8} {'sim s/s':>8} {'target':>7} "
         f"{'physics':>8} {'observ.':>8} {'rest':>6} {'held':>6} {'reset':>9} "
         f"{'1st reset':>9} {'make':>9}"
     )
@@ -176,10 +174,9 @@ def throughput(seconds: float, only: str) -> None:
             continue
         found = measure(row, seconds)
         rest = 1.0 - found["physics"] - found["observation"]
-        ours = found["simulated"] if row.simulated else found["rate"]
         print(
             f"{row.name:58} {found['rate']:8.0f} {found['simulated']:8.0f} "
-            f"{ours / row.reference:6.0f} {row.target:7.0f} "
+            f"{row.target:7.0f} "
             f"{found['physics']:8.0%} {found['observation']:8.0%} "
             f"{rest:6.0%} {found['held']:6.0%} {found['reset'] * 1e3:6.1f} ms "
             f"{found['first_reset'] * 1e3:6.0f} ms {found['make'] * 1e3:6.1f} ms",

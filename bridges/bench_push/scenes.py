@@ -31,7 +31,7 @@ class Scene:
     turns = math.pi / 30.0  # greatest turn rate of their actions [rad/s]
     drive = "constant_speed"
 
-    def __init__(self, variation: str) -> None:
+    def __init__(self, variation: str, images: bool = False) -> None:
         supply_shortest_paths()
         import benchnpin.environments  # noqa: F401  registers them
         import gymnasium
@@ -41,7 +41,8 @@ class Scene:
                 self.name, cfg=self.config(variation), disable_env_checker=True
             )
         self.inner = self.env.unwrapped
-        without_images(self.inner)
+        if not images:
+            without_images(self.inner)
 
     def config(self, variation: str) -> dict:
         """What of their configuration differs from their default."""
