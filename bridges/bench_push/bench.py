@@ -84,7 +84,9 @@ def main() -> int:
             raise ValueError
     except ValueError as error:
         parser.error(str(error) or "--seeds are FIRST-LAST, such as 0-29")
-    there = subprocess.run([options.python, "-c", "import benchnpin"], capture_output=True)
+    there = subprocess.run(
+        [options.python, "-c", "import benchnpin"], capture_output=True, env=without_python()
+    )
     if there.returncode:
         parser.error(_REMEDY.format(python=options.python))
     options.out.mkdir(parents=True, exist_ok=True)
@@ -141,17 +143,21 @@ def drive(
     partial = out.with_suffix(".part")
     arguments = ["--scene", scene, "--variation", variation, "--out", str(partial)]
     arguments += ["--seeds", f"{seeds[0]}-{seeds[1]}", "--most-steps", str(options.most_steps)]
-    clean = {key: value for key, value in os.environ.items() if not key.startswith("PYTHON")}
     with served(policy) as address:
         done = subprocess.run(
             [python, "-W", "ignore", str(HERE / "drive.py"), address, *arguments],
-            env=clean,
+            env=without_python(),
             capture_output=True,
             text=True,
         )
     if done.returncode:
         raise SystemExit(f"{scene} {variation}, {policy}: drive.py failed\n{done.stderr[-2000:]}")
     partial.replace(out)
+
+
+def without_python() -> dict[str, str]:
+    """The variables of this process for another interpreter, which has packages of its own."""
+    return {key: value for key, value in os.environ.items() if not key.startswith("PYTHON")}
 
 
 @contextmanager

@@ -9,13 +9,13 @@ resets left out. The original's other scenes draw images with a package that no 
 from __future__ import annotations
 
 import argparse
-import os
 import subprocess
 import sys
 import time
 from pathlib import Path
 
 import numpy as np
+from bench import without_python
 
 from pushplan.envs import PushEnv
 
@@ -52,9 +52,8 @@ def main() -> None:
 
 def original(python: str, task: str, variation: str, seconds: float) -> float:
     """Steps a second of theirs."""
-    clean = {key: value for key, value in os.environ.items() if not key.startswith("PYTHON")}
     command = [python, "-W", "ignore", str(HERE / "rate.py"), task, variation, str(seconds)]
-    done = subprocess.run(command, env=clean, capture_output=True, text=True, check=True)
+    done = subprocess.run(command, env=without_python(), capture_output=True, text=True, check=True)
     steps, spent = done.stdout.split()[-2:]
     return int(steps) / float(spent)
 

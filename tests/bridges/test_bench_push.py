@@ -27,10 +27,11 @@ def python(tmp_path_factory: pytest.TempPathFactory) -> str:
         return given
     folder = tmp_path_factory.mktemp("benchnpin")
     venv.create(folder, with_pip=True)
+    own = {key: value for key, value in os.environ.items() if not key.startswith("PYTHON")}
     found = str(folder / "bin" / "python")
     for what in (["-r", str(BRIDGE / "requirements.txt")], ["--no-deps", "benchnpin==0.1.1"]):
         command = [found, "-m", "pip", "install", "--quiet", *what]
-        done = subprocess.run(command, capture_output=True, text=True)
+        done = subprocess.run(command, capture_output=True, text=True, env=own)
         if done.returncode:
             pytest.skip(f"benchnpin cannot be installed: {done.stderr.strip()[-300:]}")
     return found
