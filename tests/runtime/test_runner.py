@@ -386,7 +386,7 @@ def test_prediction_costs_what_has_passed_and_goes_along_what_was_commanded():
             began = time.thread_time()
             runner.command(world.time + 0.01 * n)
             took.append(time.thread_time() - began)
-    assert np.median(took[-200:]) < 3.0 * np.median(took[20:220]) + 1e-4
+    assert min(took[-200:]) < 3.0 * min(took[20:220]) + 1e-4  # the least: others load the machine
 
 
 LOOP = """
