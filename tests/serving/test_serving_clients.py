@@ -61,8 +61,8 @@ def test_the_end_of_the_server_ends_planning_and_tells_clients(tmp_path):
             raw.send(message)
         assert planner.inside.wait(10.0)
         assert server.close() and planner.stopped
-        assert [raw.receive()["type"] for _ in range(2)] == ["hello", "reset"]
-        assert raw.receive() is None
+        replies = list(iter(raw.receive, None))  # to the action it may still reply
+        assert [one["type"] for one in replies][:2] == ["hello", "reset"] and len(replies) <= 3
 
 
 def test_one_client_too_many_is_told_so(tmp_path):
