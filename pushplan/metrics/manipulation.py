@@ -6,11 +6,13 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.spatial.distance import cdist
 
 from pushplan.geometry import VisibilityGraph, goal_distances
 from pushplan.metrics.lengths import interaction_work, object_path_lengths, robot_path_length
-from pushplan.world import Episode, StaticMap, World
+from pushplan.world import ClearanceArea, Episode, Receptacle, StaticMap, World
 from pushplan.world.checks import BoolArray, FloatArray
+from pushplan.world.outline import centroid
 
 
 @dataclass(frozen=True)
@@ -37,7 +39,7 @@ class ManipulationScores:
     tree_length_m: float
 
 
-def manipulation_scores(episode: Episode, *, straight: bool = False) -> ManipulationScores:
+def manipulation_scores(episode: Episode, *, reference: bool = False) -> ManipulationScores:
     """Score one episode that has a goal for the objects.
 
     ``episode.completed`` says which sub-tasks were done. Lengths are those of a point: neither
@@ -52,8 +54,10 @@ def manipulation_scores(episode: Episode, *, straight: bool = False) -> Manipula
 
     Args:
         episode: the recorded run.
-        straight: measure straight lines instead of shortest paths around static things, as the
-            reference implementation does.
+        reference: measure as the original's code does: straight lines instead of shortest paths
+            around static things, to the centre of a receptacle instead of its rim, and to the
+            nearest of ten places along every edge of a clearance area, open or not; effort can
+            then pass 1.
 
     Raises:
         InvalidInputError: if the goal is one for the robot.
@@ -61,13 +65,15 @@ def manipulation_scores(episode: Episode, *, straight: bool = False) -> Manipula
     done = _completed(episode)
     fraction = s_manip(episode)
     needed = done & ~episode.world.completed
-    shortest = shortest_lengths(episode.world, needed, straight=straight)
-    tree = tree_length(episode.world, needed, straight=straight)
+    shortest = shortest_lengths(episode.world, needed, reference=reference)
+    tree = tree_length(episode.world, needed, reference=reference)
     driven, work = robot_path_length(episode), interaction_work(episode)
     return ManipulationScores(
         success=fraction,
         efficiency=efficiency(tree, driven, everything=fraction == 1.0),
-        effort=effort(episode.world, shortest, object_path_lengths(episode), driven),
+        effort=effort(
+            episode.world, shortest, object_path_lengths(episode), driven, bounded=not reference
+        ),
         completed=int(done.sum()),
         path_length_m=driven,
         interaction_work_kg_m=work,
@@ -75,22 +81,26 @@ def manipulation_scores(episode: Episode, *, straight: bool = False) -> Manipula
     )
 
 
-def shortest_lengths(start: World, chosen: BoolArray, *, straight: bool = False) -> FloatArray:
+def shortest_lengths(start: World, chosen: BoolArray, *, reference: bool = False) -> FloatArray:
     """(K,) l_i* [m] of the chosen objects, 0 for the others; inf where no way leads to the goal.
 
     Args:
         start: the scene at the start.
         chosen: (K,) flags.
-        straight: as in `manipulation_scores`.
+        reference: as in `manipulation_scores`.
     """
-    distances = goal_distances(_floor(start, straight), start.manipulation_goal)
-    lengths = np.zeros(len(chosen))
+    lengths, places = np.zeros(len(chosen)), start.movables.poses[:, :2]
+    if reference:
+        ends = _reference_ends(start.manipulation_goal)
+        lengths[chosen] = cdist(places[chosen], ends).min(axis=1)
+        return lengths
+    distances = goal_distances(start.static, start.manipulation_goal)
     for k in np.flatnonzero(chosen):
-        lengths[k] = distances.path_from(start.movables.poses[k, :2]).length
+        lengths[k] = distances.path_from(places[k]).length
     return lengths
 
 
-def tree_length(start: World, chosen: BoolArray, *, straight: bool = False) -> float:
+def tree_length(start: World, chosen: BoolArray, *, reference: bool = False) -> float:
     """L*(O') [m] of the chosen objects, 0 if there are none; inf where no way leads.
 
     The nearest goal points hang on their own objects alone, so their edges are in every spanning
@@ -99,20 +109,21 @@ def tree_length(start: World, chosen: BoolArray, *, straight: bool = False) -> f
     if not chosen.any():
         return 0.0
     points = [start.robot_pose[:2], *start.movables.poses[chosen, :2]]
-    tree = spanning_tree_length(_floor(start, straight), points)
-    return tree + float(shortest_lengths(start, chosen, straight=straight).sum())
+    tree = spanning_tree_length(None if reference else start.static, points)
+    return tree + float(shortest_lengths(start, chosen, reference=reference).sum())
 
 
-def spanning_tree_length(static: StaticMap, points: list[FloatArray]) -> float:
+def spanning_tree_length(static: StaticMap | None, points: list[FloatArray]) -> float:
     """Length [m] of the minimum spanning tree over points (2,) [m], inf if one is cut off.
 
-    Edges are shortest paths of a point around what is static.
+    Edges are shortest paths of a point around what is static, straight lines without a map.
     """
-    paths, is_free = VisibilityGraph(static), not len(static.polygons) and not len(static.segments)
+    walled = static is not None and (len(static.polygons) or len(static.segments))
+    paths = VisibilityGraph(static) if static is not None and walled else None
     lengths = np.zeros((len(points), len(points)))
     for k, a in enumerate(points):
         for j, b in enumerate(points[:k]):
-            length = math.dist(a, b) if is_free else paths.shortest_path(a, b).length
+            length = math.dist(a, b) if paths is None else paths.shortest_path(a, b).length
             lengths[j, k] = lengths[k, j] = length
     to_tree, outside, total = lengths[0], list(range(1, len(points))), 0.0
     while outside:  # Prim: the nearest point joins the tree
@@ -140,7 +151,14 @@ def efficiency(tree_m: float, driven_m: float, *, everything: bool) -> float:
     return 1.0 if everything and tree_m == 0.0 else 0.0
 
 
-def effort(world: World, shortest: FloatArray, lengths: FloatArray, driven_m: float) -> float:
+def effort(
+    world: World,
+    shortest: FloatArray,
+    lengths: FloatArray,
+    driven_m: float,
+    *,
+    bounded: bool = True,
+) -> float:
     """I_manip, equation 5.
 
     An object that got to its goal on a path shorter than l_i* counts with that path. That happens
@@ -152,13 +170,16 @@ def effort(world: World, shortest: FloatArray, lengths: FloatArray, driven_m: fl
         shortest: (K,) l_i* of the completed objects [m], 0 for the others.
         lengths: (K,) l_i [m].
         driven_m: l_0 [m].
+        bounded: whether to do so; the original's code does not.
     """
     masses = world.movables.masses
     work = float(masses @ lengths)
     if work == 0.0:
         return 1.0
     own = world.robot.mass * driven_m
-    return min(1.0, (own + float(masses @ np.minimum(shortest, lengths))) / (own + work))
+    needed = float(masses @ (np.minimum(shortest, lengths) if bounded else shortest))
+    share = (own + needed) / (own + work)
+    return min(1.0, share) if bounded else share
 
 
 def _completed(episode: Episode) -> BoolArray:
@@ -166,14 +187,13 @@ def _completed(episode: Episode) -> BoolArray:
     return episode.completed
 
 
-def _floor(start: World, straight: bool) -> StaticMap:
-    """The map, or one without obstacles that holds everything."""
-    if not straight:
-        return start.static
-    box, corners = start.static.bounds.reshape(2, 2), start.manipulation_goal.polygon
-    everything = [box, corners, start.robot_pose[None, :2], start.movables.poses[:, :2]]
-    points = np.concatenate(everything)
-    return StaticMap.build(bounds=[*(points.min(axis=0) - 1.0), *(points.max(axis=0) + 1.0)])
+def _reference_ends(goal: Receptacle | ClearanceArea) -> FloatArray:
+    """(N, 2) places [m] that the original's code takes for the goal."""
+    if isinstance(goal, Receptacle):
+        return centroid(goal.polygon)[None]
+    shares = (np.arange(10) + 0.5)[:, None, None] / 10.0
+    ends: FloatArray = goal.polygon + shares * (np.roll(goal.polygon, -1, axis=0) - goal.polygon)
+    return ends.reshape(-1, 2)
 
 
 def s_manip(episode: Episode) -> float:
@@ -187,9 +207,14 @@ def e_manip(episode: Episode) -> float:
     return manipulation_scores(episode).efficiency
 
 
-def e_manip_straight(episode: Episode) -> float:
-    """E_manip with straight lines, to be set beside the reference implementation's."""
-    return manipulation_scores(episode, straight=True).efficiency
+def e_manip_reference(episode: Episode) -> float:
+    """E_manip as the original's code measures it."""
+    return manipulation_scores(episode, reference=True).efficiency
+
+
+def i_manip_reference(episode: Episode) -> float:
+    """I_manip as the original's code measures it."""
+    return manipulation_scores(episode, reference=True).effort
 
 
 def i_manip(episode: Episode) -> float:

@@ -75,8 +75,11 @@ METRICS: dict[str, Metric] = {
     "E_nav_to_goal_point": Metric(
         f"{_NAVIGATION}:e_nav_to_goal_point", Role.ON_REQUEST, goal="robot"
     ),
-    "E_manip_straight": Metric(
-        f"{_MANIPULATION}:e_manip_straight", Role.ON_REQUEST, goal="objects"
+    "E_manip_reference": Metric(
+        f"{_MANIPULATION}:e_manip_reference", Role.ON_REQUEST, goal="objects"
+    ),
+    "I_manip_reference": Metric(
+        f"{_MANIPULATION}:i_manip_reference", Role.ON_REQUEST, goal="objects"
     ),
     "path_length_m": Metric(
         f"{_FACTS}:robot_path_length", Role.DETAIL, "path [m]", higher_is_better=False
