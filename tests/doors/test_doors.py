@@ -91,7 +91,8 @@ YAMLS = {
         "60,000 values",
     ),
     "twice": ("movables: [1]\nmovables: []", "'movables' stands in one mapping twice"),
-    "deep": ("[" * 100_000, "64 deep"),
+    "deep": ("[" * 500, "64 deep"),
+    "deeper": ("[" * 100_000, "nest"),  # libyaml has a limit of its own since PyYAML 6.0.4
     "dashes": ("- " * 100_000, "64 deep"),
     "long": ("time: " + "9" * 5000, "400 digits"),
     "hexadecimal": ("time: 0x" + "f" * 5000, "400 digits"),
