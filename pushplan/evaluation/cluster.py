@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 import threading
 from collections.abc import Callable, Iterator
-from concurrent.futures import Executor, Future
+from concurrent.futures import CancelledError, Executor, Future
 from contextlib import contextmanager
 from typing import Any
 
@@ -58,19 +58,29 @@ class DaskExecutor(Executor):
 
 
 def _hand_over(task: Any, found: Future[Any]) -> None:
-    if task.status == "finished":
-        try:
-            found.set_result(task.result())
-        except Exception as error:
-            found.set_exception(ClusterError(f"a result was lost: {describe(error)}"))
-    elif task.status == "error":
+    try:
+        found.set_result(_fetched(task))
+    except Exception as error:
+        found.set_exception(error)
+
+
+def _fetched(task: Any) -> Any:
+    if task.status == "error":
         failure = task.exception()
-        if type(failure).__name__ != "KilledWorker":  # a job's own errors are in its result
-            failure = ClusterError(f"the cluster's workers cannot run jobs: {describe(failure)}")
-        found.set_exception(failure)
-    else:
-        text = "the scheduler of the cluster was lost; what was stored is kept, and the same"
-        found.set_exception(ClusterError(f"{text} command goes on"))
+        if type(failure).__name__ == "KilledWorker":  # a job's own errors are in its result
+            raise failure
+        raise ClusterError(f"the cluster's workers cannot run jobs: {describe(failure)}")
+    try:
+        if task.status == "finished":
+            return task.result()
+    except (OSError, CancelledError):  # the scheduler went before the result was fetched
+        pass
+    except Exception as error:
+        raise ClusterError(f"a result was lost: {describe(error)}") from error
+    raise ClusterError(
+        "the scheduler of the cluster was lost; what was stored is kept, and the same command "
+        "goes on"
+    )
 
 
 @contextmanager
