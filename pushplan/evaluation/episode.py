@@ -21,6 +21,7 @@ from pushplan.world import (
     PlansBesideDriving,
     Policy,
     PushplanError,
+    ShowsPlan,
     Twist,
     WheelSpeeds,
     World,
@@ -28,6 +29,8 @@ from pushplan.world import (
 )
 from pushplan.world.checks import FloatArray, number
 from pushplan.world.errors import describe
+from pushplan.world.plan import Plan
+from pushplan.world.recorded_plans import PlanRecorder
 
 Clock = Callable[[], float]
 """Returns seconds, like `time.perf_counter`."""
@@ -118,6 +121,7 @@ class Recording:
         self._actions: list[FloatArray] = []
         self._rewards: list[float] = []
         self._act_times: list[float] = []
+        self._plans: PlanRecorder | None = None
 
     def run(self, env: Any, observer: Observer | None = None, *, limit: int | None = None) -> None:
         """Reset and step until the episode ends, or for ``limit`` steps.
@@ -139,6 +143,7 @@ class Recording:
             begin = self._clock()
             action = self._ask(self.policy.act, world, observation)
             elapsed = self._clock() - begin
+            self._note_plan(world)
             if not self._actions and self._changes_mode(env, action):
                 self.run(env, observer, limit=limit)
                 return
@@ -178,6 +183,7 @@ class Recording:
             actions=actions,
             rewards=np.array(self._rewards),
             act_times_s=np.array(self._act_times),
+            plans=None if self._plans is None else self._plans.recorded(),
             plan_times_s=np.array(plan_times(self.policy) or []),
             about={
                 "policy": self.label,
@@ -214,6 +220,8 @@ class Recording:
     def _begin(self, world: World) -> None:
         self.started = True
         self._world = copy.deepcopy(world)  # the one that a policy is shown is the policy's
+        shows = isinstance(self.policy, ShowsPlan)
+        self._plans = PlanRecorder(self._world.movables.ids) if shows else None
         self._times = [np.array([world.time])]
         self._robot = [np.array(world.robot_pose)[None]]
         self._objects = [np.array(world.movables.poses)[None]]
@@ -225,6 +233,12 @@ class Recording:
         self._actions.append(np.array(command, dtype=np.float64).reshape(-1))
         self._rewards.append(reward)
         self._act_times.append(elapsed_s)
+
+    def _note_plan(self, world: World) -> None:
+        if self._plans is not None:
+            plan = self._ask(lambda: self.policy.current_plan)  # type: ignore[attr-defined]
+            if plan is None or isinstance(plan, Plan):
+                self._plans.note(world.time, world.movables.ids, plan)
 
     def _ask(self, method: Callable[..., Any], *arguments: Any) -> Any:
         try:

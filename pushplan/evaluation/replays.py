@@ -19,6 +19,8 @@ from pushplan.world.files import write_atomic
 
 FRAMES = 400
 """At most so many instants of an episode are kept."""
+PATH = 24
+"""Of the path of a plan, at most so many points are kept."""
 _LENGTH, _ANGLE = 1e-3, 1e-3  # steps in which poses are kept [m], [rad]
 _MOST = 2**15 - 1
 
@@ -57,7 +59,8 @@ def packed(run: RunRecord, row: ResultRow) -> str | None:
         return None
     if episode is None:
         return None
-    return json.dumps({"job": row.job, **_scene(episode), **_motion(episode)})
+    scene, motion = _scene(episode), _motion(episode)
+    return json.dumps({"job": row.job, **scene, **motion, "plans": _plans(episode)})
 
 
 def write_beside(run: RunRecord, rows: Sequence[ResultRow], folder: Path) -> set[str]:
@@ -114,6 +117,24 @@ def _motion(episode: Episode) -> dict[str, Any]:
         "scales": scales.tolist(),
         "packed": base64.b64encode(zlib.compress(data, 9)).decode(),
     }
+
+
+def _plans(episode: Episode) -> list[dict[str, Any]]:
+    """When each plan was taken up, its path, and where it expects which objects at its end."""
+    plans, found = episode.plans, []
+    for index in range(0 if plans is None else len(plans)):
+        assert plans is not None
+        path, (moved, poses) = plans.path(index), plans.expected(index)
+        kept = np.unique(np.linspace(0, len(path) - 1, min(len(path), PATH)).round().astype(int))
+        found.append(
+            {
+                "time": round(float(plans.times[index] - episode.times[0]), 3),
+                "path": _flat(path[kept, :2]),
+                "moved": moved.tolist(),
+                "ends": _flat(poses),
+            }
+        )
+    return found
 
 
 def _flat(points: FloatArray) -> list[float]:

@@ -91,4 +91,6 @@ def _differing_arrays(first: Episode | None, second: Episode | None) -> list[str
     for name in _TIMES:
         if len(getattr(first, name)) != len(getattr(second, name)):
             found.append(name)
+    if first.plans != second.plans:
+        found.append("plans")
     return found + [n for n in ("about",) if dict(first.about) != dict(second.about)]

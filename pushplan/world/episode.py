@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -15,6 +15,7 @@ from pushplan.world.checked_fields import CheckedFields, Shape
 from pushplan.world.checks import ArrayRecord, BoolArray, FloatArray, array, known_keys
 from pushplan.world.errors import InvalidInputError, SchemaError
 from pushplan.world.files import world_from_dict, world_to_dict
+from pushplan.world.recorded_plans import RecordedPlans
 from pushplan.world.safe_files import parse_json, read_npz
 from pushplan.world.scene import World
 
@@ -29,7 +30,7 @@ _ARRAYS = (
     "act_times_s",
     "plan_times_s",
 )
-
+_PLANS = {f"plans_{field.name}": field.name for field in fields(RecordedPlans)}
 
 Numbers = Annotated[FloatArray, Shape(None)]
 
@@ -52,6 +53,7 @@ class Episode(ArrayRecord, CheckedFields):
         act_times_s: (S,) wall-clock time of each call of the policy [s].
         plan_times_s: (P,) wall-clock time of each planning call [s].
         about: who ran what: policy, scenario, seed, versions; JSON values only.
+        plans: what the policy meant to do; None if it does not show its plans.
 
     Raises:
         InvalidInputError: if shapes disagree or a value is not finite.
@@ -73,6 +75,7 @@ class Episode(ArrayRecord, CheckedFields):
     act_times_s: Numbers = field(default_factory=lambda: np.zeros(0), compare=False)
     plan_times_s: Numbers = field(default_factory=lambda: np.zeros(0), compare=False)
     about: Mapping[str, Any] = field(default_factory=dict, compare=False)
+    plans: RecordedPlans | None = field(default=None, compare=False)
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -86,6 +89,8 @@ class Episode(ArrayRecord, CheckedFields):
         put(self, "object_poses", array("episode.object_poses", poses, (length, count, 3)))
         done = np.zeros(count, dtype=bool) if self.completed is None else self.completed
         put(self, "completed", array("episode.completed", done, (count,), dtype=np.bool_))
+        if self.plans is not None and (self.plans.moved >= count).any():
+            raise InvalidInputError(f"plans.moved must hold indices of {count} objects")
 
     def world_at(self, index: int) -> World:
         """The scene at recorded instant ``index``."""
@@ -110,6 +115,8 @@ class Episode(ArrayRecord, CheckedFields):
             "about": dict(self.about),
         }
         arrays: dict[str, Any] = {key: getattr(self, key) for key in _ARRAYS}
+        if self.plans is not None:
+            arrays |= {key: getattr(self.plans, name) for key, name in _PLANS.items()}
         file = io.BytesIO()
         np.savez_compressed(file, header=np.array(json.dumps(header)), **arrays)
         return file.getvalue()
@@ -122,7 +129,7 @@ class Episode(ArrayRecord, CheckedFields):
             SchemaError: if the file is missing, truncated, over a limit, or not an episode of this
                 version.
         """
-        arrays = read_npz(path, "episode file", ("header", *_ARRAYS))
+        arrays = read_npz(path, "episode file", ("header", *_ARRAYS), tuple(_PLANS))
         try:
             text = str(arrays.pop("header"))
         except ValueError as error:
@@ -132,10 +139,16 @@ class Episode(ArrayRecord, CheckedFields):
             raise SchemaError(f"{path}: this pushplan reads schema {SCHEMA!r}")
         keys = ("schema", "world", "success", "reason", "about")
         known_keys(f"the header of {path}", header, keys, keys)
+        plans = {name: arrays.pop(key) for key, name in _PLANS.items() if key in arrays}
+        if plans:
+            known_keys(
+                f"the plans of {path}", plans, tuple(_PLANS.values()), tuple(_PLANS.values())
+            )
         return cls(
             world=world_from_dict(header["world"]),
             success=header["success"],
             reason=header["reason"],
             about=header["about"],
+            plans=RecordedPlans(**plans) if plans else None,
             **arrays,
         )

@@ -112,11 +112,25 @@ def test_an_episode_is_played_beside_another_in_step(opened: Opened, folder: Pat
     whole = [np.interp(view[3], instants, episode.robot_poses[:, axis]) for axis in (0, 1)]
     assert np.abs(np.array(view[:2]) - whole).max() < 2e-3
     before = opened.state("player.views.map((view) => view.canvas.toDataURL())")
+    planned = opened.state("player.views.findIndex((view) => view.replay.plans.length > 0)")
     page.evaluate("$('time').value = 500; $('time').dispatchEvent(new Event('input'))")
     assert opened.state("player.time") == pytest.approx(opened.state("player.end") / 2)
     after = opened.state("player.views.map((view) => view.canvas.toDataURL())")
     assert before[0] != after[0] and before[1] != after[1]
+    job, starts = opened.state(
+        "(({job, plans}) => [job, plans.map((plan) => plan.time)])"
+        f"(player.views[{planned}].replay)"
+    )
+    planner = Results.load(folder).episode(
+        next(row for row in Results.load(folder).rows if row.job == job)
+    )
+    assert planner is not None and planner.plans is not None
+    assert starts == pytest.approx(planner.plans.times - planner.times[0], abs=1e-3)
     page.locator("h1").click()
+    page.keyboard.press("p")
+    assert opened.state(f"player.views[{planned}].canvas.toDataURL()") != after[planned]
+    page.keyboard.press("p")
+    assert opened.state("player.views.map((view) => view.canvas.toDataURL())") == after
     page.keyboard.press("Space")
     page.wait_for_function(f"player.time > {opened.state('player.end') / 2}")
     page.keyboard.press("Space")

@@ -187,7 +187,7 @@ document.addEventListener("keydown", (event) => {
   if (typing || event.ctrlKey || event.metaKey || event.altKey) return;
   const inMatrix = event.target === matrix;
   const keys = {
-    "/": () => $("find").focus(), d: switchTheme, ",": () => stepBy(-1), ".": () => stepBy(1),
+    "/": () => $("find").focus(), d: switchTheme, p: togglePlans, ",": () => stepBy(-1), ".": () => stepBy(1),
     " ": event.target.matches("button, a") ? null : togglePlay,
     ArrowUp: inMatrix && (() => move(-1, 0)), ArrowDown: inMatrix && (() => move(1, 0)),
     ArrowLeft: inMatrix && (() => move(0, -1)), ArrowRight: inMatrix && (() => move(0, 1)),

@@ -100,11 +100,13 @@ function stepBy(frames) {
   const { times } = player.views[0].replay;
   seek(times[Math.min(Math.max(frameAt(times, player.time) + frames, 0), times.length - 1)]);
 }
+const togglePlans = () => { $("plans").checked = !$("plans").checked; seek(player.time); };
+$("plans").onchange = () => seek(player.time);
 $("play").onclick = togglePlay;
 $("time").oninput = () => seek(Number($("time").value) / 1000 * player.end);
 addEventListener("resize", () => seek(player.time));
 
-const COLOURS = { wall: "#555", goal: "#009e73", robot: "#0072b2", object: "#e69f00", ghost: "#e69f0055", trail: "#0072b2" };
+const COLOURS = { wall: "#555", goal: "#009e73", robot: "#0072b2", object: "#e69f00", ghost: "#e69f0055", trail: "#0072b2", plan: "#d55e00" };
 function drawView({ canvas, box, replay }) {
   const [x0, y0, x1, y1] = replay.bounds;
   const width = box.clientWidth || 400;
@@ -152,6 +154,15 @@ function drawView({ canvas, box, replay }) {
   pen.beginPath();
   for (let frame = 0; frame <= k; frame++) pen.lineTo(...pose(0, frame).slice(0, 2));
   pen.strokeStyle = COLOURS.trail; pen.stroke();
+  const plan = $("plans").checked && replay.plans.findLast((one) => one.time <= player.time);
+  if (plan) {
+    pen.setLineDash([5 / scale, 4 / scale]);
+    pen.beginPath();
+    for (let i = 0; i < plan.path.length; i += 2) pen.lineTo(plan.path[i], plan.path[i + 1]);
+    pen.strokeStyle = COLOURS.plan; pen.stroke();
+    plan.moved.forEach((body, i) => placed([replay.objects[body]], plan.ends.slice(3 * i, 3 * i + 3), null, COLOURS.plan));
+    pen.setLineDash([]);
+  }
   const [x, y, angle] = pose(0, k);
   placed(replay.robot, [x, y, angle], `${COLOURS.robot}cc`, "#003a5d");
   const size = Math.max(...replay.robot.flat().map(Math.abs));

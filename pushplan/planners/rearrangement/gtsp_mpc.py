@@ -18,10 +18,11 @@ from pushplan.planners.rearrangement.push_choice import (
 from pushplan.planners.rearrangement.push_execution import ExecutionEnd, PushExecution
 from pushplan.planners.rearrangement.push_graph import PushGraph
 from pushplan.planners.rearrangement.push_history import PushHistory
+from pushplan.planners.rearrangement.push_plan import push_plan
 from pushplan.planners.rearrangement.push_scene import PushScene, check_world
 from pushplan.planners.rearrangement.rearrangement_config import RearrangementConfig
 from pushplan.planners.rearrangement.rollout_cache import RolloutCache
-from pushplan.world import InvalidInputError, PlanningExecutor, Stop, Twist, World
+from pushplan.world import InvalidInputError, Plan, PlanningExecutor, Stop, Twist, World
 from pushplan.world.checks import FloatArray, expect
 
 
@@ -42,6 +43,7 @@ class GtspMpc:
     Attributes:
         given_up: why nothing more is tried with an object, by id.
         plan: the pushes planned last, in order.
+        current_plan: the push in hand, with the way to it; None while there is none.
         graph: the graph that they come from.
     """
 
@@ -67,6 +69,7 @@ class GtspMpc:
         self._executor: PlanningExecutor = ImmediateExecutor()
         self._choosing: PendingChoice | None = None
         self._execution: PushExecution | None = None
+        self._shown: Push | None = None
         self._away: Retreat | PoseFollower | None = None
         self._cache = RolloutCache()
         self._history = PushHistory(self.config)
@@ -76,6 +79,7 @@ class GtspMpc:
         self._clock = EpisodeClock(self.config.response)
         self.given_up: dict[int, str] = {}
         self.plan: tuple[Push, ...] = ()
+        self.current_plan: Plan | None = None
         self.graph: PushGraph | None = None
 
     def reset(self, world: World, rng: np.random.Generator) -> None:
@@ -113,7 +117,7 @@ class GtspMpc:
             self._left, self._rounds, self._stopped_at = left, 0, None
             self._history.count_progress()
         if not left:
-            self._execution, self.given_up, self.plan = None, {}, ()
+            self._execution, self.given_up, self.plan, self.current_plan = None, {}, (), None
             self._forget_choice()
             return Twist(0.0, 0.0)
         if self._stopped_at is not None and _alike(scene, self._stopped_at):
@@ -136,10 +140,19 @@ class GtspMpc:
             if self._execution is not None:
                 command = self._execution.command(scene, held)
                 if isinstance(command, Twist):
+                    self._show(scene.world, self._execution)
                     self._choose_ahead(scene, self._execution)
                     return command
                 self._close(scene, self._execution, command)
         return Twist(0.0, 0.0)
+
+    def _show(self, world: World, execution: PushExecution) -> None:
+        """Make `current_plan` that of the push in hand, once for the way and once for the push."""
+        push = execution.push
+        if push is not self._shown and len(push.object_poses) == len(world.movables):
+            self._shown = push
+            route = None if execution.pushing else execution.route
+            self.current_plan = push_plan(world, route, push)
 
     def _choose_ahead(self, scene: PushScene, execution: PushExecution) -> None:
         """Ask for the next push while one is driven, where that takes time."""
@@ -205,7 +218,7 @@ class GtspMpc:
 
     def _close(self, scene: PushScene, execution: PushExecution, end: ExecutionEnd) -> None:
         """Draw the conclusions from how an execution ended."""
-        self._execution, push = None, execution.push
+        self._execution, self.current_plan, push = None, None, execution.push
         if end is ExecutionEnd.DONE and not push.relocates:
             self._stuck = 0
             return

@@ -1,0 +1,125 @@
+"""What a policy meant to do, beside what happened: the plans of an episode, thinned out."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Annotated
+
+import numpy as np
+
+from pushplan.world.checked_fields import CheckedFields, Shape
+from pushplan.world.checks import ArrayRecord, FloatArray, IntArray
+from pushplan.world.errors import InvalidInputError
+from pushplan.world.plan import Plan
+
+_POSES = 48  # of a path, at most
+_MOVED = 1e-3  # objects that a plan expects to move by less are left out [m], [rad]
+
+
+@dataclass(frozen=True, eq=False)
+class RecordedPlans(ArrayRecord, CheckedFields):
+    """Paths that were planned, and where the objects were expected at their ends.
+
+    Args:
+        times: (P,) when each plan was taken up [s], not decreasing.
+        offsets: (P + 1,) where the path of each plan starts in ``paths``.
+        paths: (N, 3) x, y [m], theta [rad] of the robot, every path thinned out.
+        moved_offsets: (P + 1,) where each plan starts in ``moved``.
+        moved: (M,) indices of the objects that are expected to move, in the order of the episode.
+        moved_poses: (M, 3) where they are expected at the end of the plan.
+
+    Raises:
+        InvalidInputError: if shapes, offsets or indices disagree, or a value is not finite.
+    """
+
+    field_prefix = "plans."
+
+    times: Annotated[FloatArray, Shape(None)]
+    offsets: Annotated[IntArray, Shape(None)]
+    paths: Annotated[FloatArray, Shape("N", 3)]
+    moved_offsets: Annotated[IntArray, Shape(None)]
+    moved: Annotated[IntArray, Shape("M")]
+    moved_poses: Annotated[FloatArray, Shape("M", 3)]
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if (np.diff(self.times) < 0.0).any():
+            raise InvalidInputError("plans.times must not decrease")
+        for name, total in (("offsets", len(self.paths)), ("moved_offsets", len(self.moved))):
+            offsets, count = getattr(self, name), len(self) + 1
+            rises = len(offsets) == count and not (np.diff(offsets, prepend=0) < 0).any()
+            if not rises or (offsets[0], offsets[-1]) != (0, total):
+                raise InvalidInputError(
+                    f"plans.{name} must be {count} numbers that rise from 0 to {total}"
+                )
+        if (self.moved < 0).any():
+            raise InvalidInputError("plans.moved must hold indices of objects, got a negative one")
+
+    def __len__(self) -> int:
+        return len(self.times)
+
+    def path(self, index: int) -> FloatArray:
+        """(N, 3) poses of one plan."""
+        return self.paths[self.offsets[index] : self.offsets[index + 1]]
+
+    def expected(self, index: int) -> tuple[IntArray, FloatArray]:
+        """Indices (M,) of the objects that one plan moves, and where it leaves them (M, 3)."""
+        part = slice(self.moved_offsets[index], self.moved_offsets[index + 1])
+        return self.moved[part], self.moved_poses[part]
+
+
+class PlanRecorder:
+    """Keeps plans as they are taken up, of each no more than `RecordedPlans` needs.
+
+    Args:
+        ids: (K,) of the episode's objects, in its order.
+    """
+
+    def __init__(self, ids: IntArray) -> None:
+        self._places = {int(one): k for k, one in enumerate(ids)}
+        self._last: Plan | None = None
+        self._times: list[float] = []
+        self._paths: list[FloatArray] = []
+        self._moved: list[IntArray] = []
+        self._moved_poses: list[FloatArray] = []
+
+    def note(self, time: float, ids: IntArray, plan: Plan | None) -> None:
+        """Note the plan that is driven now; the same one as before, or none, adds nothing.
+
+        Args:
+            time: now [s].
+            ids: of the objects that are there, in the order of the plan's prediction.
+            plan: it.
+        """
+        if plan is self._last:
+            return
+        self._last = plan
+        if plan is None:
+            return
+        last = len(plan.poses) - 1
+        kept = np.unique(np.linspace(0, last, min(last + 1, _POSES)).round().astype(int))
+        moved, poses = self._prediction(ids, plan)
+        self._times.append(time)
+        self._paths.append(plan.poses[kept])
+        self._moved.append(moved)
+        self._moved_poses.append(poses)
+
+    def _prediction(self, ids: IntArray, plan: Plan) -> tuple[IntArray, FloatArray]:
+        predicted = plan.object_poses
+        if predicted is None or predicted.shape[1] != len(ids):
+            return np.zeros(0, dtype=np.int64), np.zeros((0, 3))
+        far = np.abs(predicted[-1] - predicted[0]).max(axis=1, initial=0.0) > _MOVED
+        chosen = [k for k in np.flatnonzero(far).tolist() if int(ids[k]) in self._places]
+        places = np.array([self._places[int(ids[k])] for k in chosen], dtype=np.int64)
+        return places, predicted[-1][chosen]
+
+    def recorded(self) -> RecordedPlans:
+        """What was noted so far."""
+        return RecordedPlans(
+            times=np.array(self._times),
+            offsets=np.cumsum([0, *map(len, self._paths)]),
+            paths=np.concatenate([np.zeros((0, 3)), *self._paths]),
+            moved_offsets=np.cumsum([0, *map(len, self._moved)]),
+            moved=np.concatenate([np.zeros(0, dtype=np.int64), *self._moved]),
+            moved_poses=np.concatenate([np.zeros((0, 3)), *self._moved_poses]),
+        )

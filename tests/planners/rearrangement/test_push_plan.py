@@ -1,0 +1,38 @@
+"""The push in hand as a plan, for pictures and logs."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from pushplan.envs import make
+from pushplan.planners import make_policy
+from pushplan.scenarios import suite
+from pushplan.world import ShowsPlan
+
+
+@pytest.mark.warm("gtsp-mpc")
+def test_gtsp_mpc_shows_the_push_in_hand() -> None:
+    (scenario,) = suite("area-clearing-2d-10", episodes=1, first_seed=3).scenarios
+    env = make(scenario, action="velocity")
+    env.reset(seed=scenario.seed)
+    policy = make_policy("gtsp-mpc")
+    assert isinstance(policy, ShowsPlan)
+    policy.reset(env.world, np.random.default_rng(0))
+    assert policy.current_plan is None
+    seen = []
+    for _ in range(400):
+        command = policy.act(env.world, None)
+        plan = policy.current_plan
+        if plan is not None and (not seen or plan is not seen[-1][1]):
+            seen.append((env.world, plan))
+        env.step(env.encode(command))
+    assert len(seen) >= 2  # the way to the push, then the push as it is predicted from there
+    for world, plan in seen:
+        (push,) = plan.subtasks
+        assert np.allclose(plan.poses[0], world.robot_pose, atol=0.2)
+        assert np.allclose(plan.object_poses[0], world.movables.poses)
+        moved = np.hypot(*(plan.object_poses[-1] - plan.object_poses[0])[:, :2].T) > 0.1
+        assert set(push.object_ids) <= set(world.movables.ids[moved].tolist())
+        assert np.allclose(plan.object_poses[push.first], world.movables.poses)
+        assert plan.interaction_cost > 0.0
