@@ -50,9 +50,16 @@ class ExpectedTime:
 
 
 class ImmediateExecutor:
-    """Runs calls at once, and takes it that they take no time: the world stands still meanwhile."""
+    """Runs calls at once, and takes it that they take no time: the world stands still meanwhile.
+
+    Args:
+        stop: a rule that ends each call, whatever its own; None for its own.
+    """
 
     takes_time = False
+
+    def __init__(self, stop: Stop | None = None) -> None:
+        self._stop = stop
 
     def expected(self, stop: Stop | None) -> float:
         """Nothing."""
@@ -62,7 +69,7 @@ class ImmediateExecutor:
         self, call: Callable[[Stop | None], T], time: float, stop: Stop | None = None
     ) -> _Done[T]:
         """See `pushplan.world.PlanningExecutor`."""
-        return _Done(call(stop), -math.inf)
+        return _Done(call(self._stop or stop), -math.inf)
 
 
 class SimulatedExecutor:

@@ -6,11 +6,19 @@ import contextlib
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
-from pushplan.evaluation.episode import PolicyError, Recording
+from pushplan.control import ImmediateExecutor
 from pushplan.evaluation.jobs import Job, JobSettings
 from pushplan.evaluation.limits import EpisodeTimeout, soft_limit
 from pushplan.evaluation.policies import PolicySpec, parse_policies
-from pushplan.world import ChecksScenario, InvalidInputError, Policy, PushplanError
+from pushplan.world import (
+    ChecksScenario,
+    InvalidInputError,
+    MaxIterations,
+    PlansBesideDriving,
+    Policy,
+    PushplanError,
+    stream,
+)
 from pushplan.world.errors import describe
 
 if TYPE_CHECKING:
@@ -110,9 +118,15 @@ def incompatibility(spec: PolicySpec, scenario: Any, settings: JobSettings) -> s
 
 
 def _first_step(policy: Policy, scenario: Any, env: Any) -> str | None:
+    """Why the policy refuses the start of a scenario; planning calls end after an iteration."""
     try:
-        Recording(policy, scenario).run(env, limit=1)
-    except PolicyError as error:
-        if isinstance(error.__cause__, InvalidInputError):  # its way to refuse a world
-            return str(error.__cause__)
-    return None  # whatever else goes wrong is for the episodes to tell
+        observation, _ = env.reset(seed=scenario.seed)
+        policy.reset(env.world, stream(scenario.seed, "policy"))
+        if isinstance(policy, PlansBesideDriving):
+            policy.plan_with(ImmediateExecutor(MaxIterations(1)))
+        policy.act(env.world, observation)
+    except InvalidInputError as error:  # its way to refuse a world
+        return str(error)
+    except Exception:
+        return None  # whatever else goes wrong is for the episodes to tell
+    return None
