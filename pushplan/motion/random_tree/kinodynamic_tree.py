@@ -33,6 +33,7 @@ class TreeLimits(NamedTuple):
     edge_length: float  # longest edge [m]
     spacing: float  # distance between collision checks [m]
     turn_weight: float  # what a radian of heading error is worth in metres
+    reverses: bool  # whether edges may lead back
 
 
 _OMPL_TURN_WEIGHT = 0.5  # what a radian is worth in the distance of its SE(2)
@@ -50,14 +51,18 @@ def steer(
     scratch: FloatArray,  # memory for the footprint's corners
     out: FloatArray,  # (3,) receives the end of the arc
 ) -> tuple[float, float]:
-    """Curvature and length of the free arc nearest to a target, of seven; length 0: blocked."""
-    bound, longest, spacing, turn_weight = limits
+    """Curvature and length of the free arc nearest to a target, of seven; length 0: blocked.
+
+    Where edges may lead back there are seven more, whose lengths are negative.
+    """
+    bound, longest, spacing, turn_weight, reverses = limits
     dx, dy = target[0] - start[0], target[1] - start[1]
     side = -np.sin(start[2]) * dx + np.cos(start[2]) * dy
     aimed = 2.0 * side / max(dx * dx + dy * dy, 1e-12)  # the circle through both, tangent here
     best, best_curvature, best_length = np.inf, 0.0, 0.0
     pose = np.empty(3)
-    for i in range(7):
+    for arc in range(14 if reverses else 7):
+        i, signed = arc % 7, longest if arc < 7 else -longest
         if i == 0:
             curvature = sampled
         elif i == 1:
@@ -66,7 +71,7 @@ def steer(
             curvature = bound * (0.5 * (i - 2) - 1.0)
         steps = int(np.ceil(longest / step_along(curvature, spacing)))
         for step in range(1, steps + 1):
-            length = longest * step / steps
+            length = signed * step / steps
             along_arc(start, length, curvature, pose)
             if not is_free(pose, shape, among, scratch):
                 break
@@ -182,7 +187,7 @@ class TreeGrowth:
             self.scratch,
             self.end,
         )
-        self.moved = length > 0.0
+        self.moved = length != 0.0
         if not self.moved:
             return
         self.end[2] = _wrap(self.end[2])

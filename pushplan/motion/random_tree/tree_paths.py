@@ -6,7 +6,6 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from pushplan.compiled import owned
 from pushplan.geometry import VisibilityGraph
 from pushplan.motion.coarse_path import coarse_path, reachable
 from pushplan.motion.collision import is_free, obstacles
@@ -15,6 +14,8 @@ from pushplan.motion.path_improver import Candidate, PathImprover
 from pushplan.motion.polyline import polyline_plan
 from pushplan.motion.random_tree.kinodynamic_tree import TreeGrowth, TreeLimits
 from pushplan.motion.random_tree.targets import Targets
+from pushplan.motion.start_turn import start_turn
+from pushplan.world import Drive
 from pushplan.world.checks import FloatArray
 from pushplan.world.outline import unflatten
 from pushplan.world.polyline import path_length
@@ -40,6 +41,17 @@ class TreePaths:
         """Look farther from the coarse path, as the way out may be the other way."""
         self._fraction *= 0.5
         self._improver.relax()
+
+    def change_start(self) -> None:
+        """Begin in another way: after a turn on the spot and without it, in turns.
+
+        A car that can reverse may do so in all of its trees from now on.
+        """
+        improver = self._improver
+        turned = len(improver.lead.pieces) > 0
+        improver.begin_with(None if turned else start_turn(improver))
+        robot = improver.world.robot
+        improver.reverses = robot.drive is Drive.CAR and robot.min_speed < 0.0
 
     def grow_two(self, push_weight: float) -> Iterator[Candidate]:
         """Paths of two trees, around the objects and among them, until the stop rule fires."""
@@ -68,7 +80,7 @@ class TreePaths:
         if np.isinf(push_weight):
             boxes = unflatten(world.movables.vertices_world, world.movables.offsets)
             among = obstacles(keep_out(world), boxes)
-            if not is_free(owned(world.robot_pose), shape, among, np.empty_like(shape.vertices)):
+            if not is_free(improver.lead.pose, shape, among, np.empty_like(shape.vertices)):
                 return None  # the robot touches an object already: only pushing helps
         coarse = coarse_path(world, push_weight)
         if improver.stopped():
@@ -92,10 +104,11 @@ class TreePaths:
             edge_length=config.edge * size,
             spacing=problem.spacing,
             turn_weight=0.5 * size,
+            reverses=improver.reverses,
         )
         spread = config.coarse_path_spread * size
         targets = Targets(coarse, self._fraction, spread, world.static.bounds, improver.rng)
-        growth = TreeGrowth(world.robot_pose, improver.goal, targets, limits, shape, among)
+        growth = TreeGrowth(improver.lead.pose, improver.goal, targets, limits, shape, among)
         arcs = growth.grow(int(improver.rng.integers(1, 2**31)), done, improver.stopped)
         if arcs is None:
             return None

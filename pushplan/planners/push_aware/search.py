@@ -93,6 +93,11 @@ class PushAwareSearch:
                 return None
             if trees.sealed:
                 return PlanStatus.GOAL_UNREACHABLE
+            trees.change_start()
+            if len(improver.lead.pieces):
+                warm_start(improver)
+                if improver.solved:
+                    return None
             trees.relax()
             trees.relax()  # where a first tree fails, the start is most often a tight one
             warm_start(improver)
@@ -207,7 +212,7 @@ class PushAwareSearch:
 
     def _plant(self, tree: PushTree) -> None:
         """Begin a search where the robot and the objects are."""
-        plant(tree, owned(self.world.robot_pose), owned(self.world.movables.poses), 0.0)
+        plant(tree, self.improver.lead.pose, self.improver.lead.objects, 0.0)
 
     def _few(self) -> int:
         """Arcs to drive between two looks at the stop rule."""

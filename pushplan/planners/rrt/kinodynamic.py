@@ -80,6 +80,9 @@ def _search(improver: PathImprover, trees: TreePaths) -> PlanStatus | None:
             return PlanStatus.GOAL_UNREACHABLE
         if not improver.solved:
             trees.relax()
+            trees.change_start()
+            if len(improver.lead.pieces):
+                warm_start(improver)
     return PlanStatus.SOLVED if improver.solved else None
 
 
