@@ -41,8 +41,8 @@ class PlanStatus(enum.Enum):
     CANCELLED = ("cancelled", "The call was cancelled before there was a plan: call again.")
     START_BLOCKED = (
         "start_blocked",
-        "The robot starts in collision with something static: check the pose and the footprint, "
-        "or drive clear first.",
+        "The robot starts in collision with something static, or cannot reverse and has no room "
+        "ahead: check the pose and the footprint, or drive clear first.",
     )
     GOAL_UNREACHABLE = (
         "goal_unreachable",

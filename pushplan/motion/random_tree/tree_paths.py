@@ -8,12 +8,13 @@ import numpy as np
 
 from pushplan.geometry import VisibilityGraph
 from pushplan.motion.coarse_path import coarse_path, reachable
-from pushplan.motion.collision import is_free, obstacles
+from pushplan.motion.collision import footprint, is_free, obstacles
 from pushplan.motion.keep_out import keep_out
 from pushplan.motion.path_improver import Candidate, PathImprover
 from pushplan.motion.polyline import polyline_plan
 from pushplan.motion.random_tree.kinodynamic_tree import TreeGrowth, TreeLimits
 from pushplan.motion.random_tree.targets import Targets
+from pushplan.motion.room_ahead import gets_away
 from pushplan.motion.start_turn import start_turn
 from pushplan.world import Drive
 from pushplan.world.checks import FloatArray
@@ -36,6 +37,8 @@ class TreePaths:
         self.trees = 0
         self.sealed = False
         """Whether certainly no path leads to the goal."""
+        self.boxed_in = False
+        """Whether the robot cannot even get away from where it stands."""
 
     def relax(self) -> None:
         """Look farther from the coarse path, as the way out may be the other way."""
@@ -43,15 +46,21 @@ class TreePaths:
         self._improver.relax()
 
     def change_start(self) -> None:
-        """Begin in another way: after a turn on the spot and without it, in turns.
+        """Begin in another way, after what was tried has failed.
 
-        A car that can reverse may do so in all of its trees from now on.
+        A differential drive begins with a turn on the spot and without it, in turns. A car that can
+        reverse may do so in all of its trees from now on; of one that cannot it is found out
+        whether it is `boxed_in`.
         """
-        improver = self._improver
+        improver, robot = self._improver, self._improver.world.robot
         turned = len(improver.lead.pieces) > 0
         improver.begin_with(None if turned else start_turn(improver))
-        robot = improver.world.robot
-        improver.reverses = robot.drive is Drive.CAR and robot.min_speed < 0.0
+        if robot.drive is Drive.CAR:
+            improver.reverses = robot.min_speed < 0.0
+            if not improver.reverses and not improver.relaxed:
+                bare = improver.problem._replace(footprint=footprint(robot))
+                start = improver.lead.pose
+                self.boxed_in = not gets_away(bare, start, improver.size)
 
     def grow_two(self, push_weight: float) -> Iterator[Candidate]:
         """Paths of two trees, around the objects and among them, until the stop rule fires."""

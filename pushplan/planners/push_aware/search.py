@@ -80,7 +80,7 @@ class PushAwareSearch:
 
         Returns:
             A status where the call ends here: the start is blocked, the robot is there already,
-            or no way leads to the goal.
+            or no way leads to the goal or on at all.
         """
         improver, trees = self.improver, self.trees
         status = improver.begin()
@@ -94,6 +94,8 @@ class PushAwareSearch:
             if trees.sealed:
                 return PlanStatus.GOAL_UNREACHABLE
             trees.change_start()
+            if trees.boxed_in:
+                return PlanStatus.START_BLOCKED
             if len(improver.lead.pieces):
                 warm_start(improver)
                 if improver.solved:

@@ -79,8 +79,10 @@ def _search(improver: PathImprover, trees: TreePaths) -> PlanStatus | None:
         if trees.sealed:
             return PlanStatus.GOAL_UNREACHABLE
         if not improver.solved:
-            trees.relax()
             trees.change_start()
+            if trees.boxed_in:
+                return PlanStatus.START_BLOCKED
+            trees.relax()
             if len(improver.lead.pieces):
                 warm_start(improver)
     return PlanStatus.SOLVED if improver.solved else None
