@@ -9,7 +9,7 @@ from pushplan.motion.collision import footprint, is_free, obstacles
 from pushplan.motion.keep_out import keep_out
 from pushplan.motion.path_problem import SweptPath
 from pushplan.world import Drive, InvalidInputError, Plan, RobotModel, World
-from pushplan.world.checks import BoolArray, FloatArray
+from pushplan.world.polyline import goes_back
 
 TIGHTEST = 0.1
 """Least turning radius that plans ever use, in circumscribed radii: nearly on the spot."""
@@ -78,7 +78,7 @@ def timed_plan(world: World, path: SweptPath, turn_fraction: float) -> Plan:
     speeds = np.minimum(robot.max_speed, fastest)
     if robot.drive is Drive.CONSTANT_SPEED:
         speeds = np.full(count, robot.max_speed)
-    back = _goes_back(path.poses)
+    back = goes_back(path.poses)
     speeds[back] = np.maximum(robot.min_speed, -fastest[back])
     turn_rates = np.where(on_spot, signs * turn_rate, speeds * ahead)
     # the length of an arc, where `path.lengths` has its chord
@@ -99,10 +99,3 @@ def timed_plan(world: World, path: SweptPath, turn_fraction: float) -> Plan:
         interaction_cost=float(path.works[-1]),
         object_poses=path.objects,
     )
-
-
-def _goes_back(poses: FloatArray) -> BoolArray:
-    """(N,) whether the step from each pose (N, 3) leads back; the last as the one before."""
-    moves, headings = np.diff(poses[:, :2], axis=0), poses[:-1, 2]
-    back = moves[:, 0] * np.cos(headings) + moves[:, 1] * np.sin(headings) < 0.0
-    return np.append(back, back[-1:] if len(back) else [False])
