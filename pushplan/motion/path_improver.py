@@ -68,7 +68,9 @@ class PathImprover:
         )
         self.size = world.robot.circumscribed_radius
         self.iterations = self.nodes = self.relaxed = 0
-        self.tight = self.reverses = False
+        self.tight = False
+        self.backward = 0.0
+        """How far paths of trees may lead back [m]."""
         self.lead = self._no_lead = Lead(
             np.empty((0, 2)), owned(world.robot_pose), owned(world.movables.poses)
         )

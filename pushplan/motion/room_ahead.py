@@ -14,13 +14,13 @@ from pushplan.world.checks import FloatArray
 _STEP = 0.08  # length of a step [circumscribed radii]
 _CELL = 0.6  # sides of the boxes of poses of which one is looked at each [steps]
 _LEAST_TURN = 0.02  # the same of headings at least [rad]
-_REACH = 2.0  # distance at which the robot has got away [circumscribed radii]
-_MOST = 50_000  # poses that are looked at; then it counts as getting away
+_REACH = 3.0  # distance at which the robot has got away [circumscribed radii]
+_MOST = 5_000  # poses that are looked at; then it counts as getting away
 
 
 @kernel(allocates=True)
 def gets_away(problem: PathProblem, start: FloatArray, size: float) -> bool:
-    """Tell whether forward arcs lead from a pose (3,) to the goal or two robot sizes away.
+    """Tell whether forward arcs lead from a pose (3,) to the goal or three robot sizes away.
 
     Steps straight ahead and of the least turning radius are tried depth first; objects do not
     count, as they may be pushed.

@@ -11,6 +11,7 @@ from pushplan.motion.coarse_path import coarse_path, reachable
 from pushplan.motion.collision import footprint, is_free, obstacles
 from pushplan.motion.keep_out import keep_out
 from pushplan.motion.path_improver import Candidate, PathImprover
+from pushplan.motion.path_problem import PathProblem
 from pushplan.motion.polyline import polyline_plan
 from pushplan.motion.random_tree.kinodynamic_tree import TreeGrowth, TreeLimits
 from pushplan.motion.random_tree.targets import Targets
@@ -21,6 +22,7 @@ from pushplan.world.checks import FloatArray
 from pushplan.world.outline import unflatten
 from pushplan.world.polyline import path_length
 
+_BACKWARD = 2.0  # how far a car may go back at first [turning radii]
 _EDGES = 30
 """Edges along a coarse path up to which a tree gets its budget; in proportion more beyond."""
 
@@ -45,22 +47,31 @@ class TreePaths:
         self._fraction *= 0.5
         self._improver.relax()
 
+    def look_ahead(self) -> None:
+        """Change the start at once where no forward arc leads away from it."""
+        improver = self._improver
+        if improver.world.robot.can_stop and not self._gets_away(improver.problem):
+            self.change_start()
+
+    def _gets_away(self, problem: PathProblem) -> bool:
+        return bool(gets_away(problem, self._improver.lead.pose, self._improver.size))
+
     def change_start(self) -> None:
         """Begin in another way, after what was tried has failed.
 
         A differential drive begins with a turn on the spot and without it, in turns. A car that can
-        reverse may do so in all of its trees from now on; of one that cannot it is found out
-        whether it is `boxed_in`.
+        reverse may do so, by two turning radii and twice as far each time; of one that cannot it is
+        found out whether it is `boxed_in`.
         """
         improver, robot = self._improver, self._improver.world.robot
         turned = len(improver.lead.pieces) > 0
         improver.begin_with(None if turned else start_turn(improver))
         if robot.drive is Drive.CAR:
-            improver.reverses = robot.min_speed < 0.0
-            if not improver.reverses and not improver.relaxed:
+            if robot.min_speed < 0.0:
+                improver.backward = max(2.0 * improver.backward, _BACKWARD * robot.turning_radius)
+            elif not improver.relaxed:
                 bare = improver.problem._replace(footprint=footprint(robot))
-                start = improver.lead.pose
-                self.boxed_in = not gets_away(bare, start, improver.size)
+                self.boxed_in = not self._gets_away(bare)
 
     def grow_two(self, push_weight: float) -> Iterator[Candidate]:
         """Paths of two trees, around the objects and among them, until the stop rule fires."""
@@ -113,7 +124,7 @@ class TreePaths:
             edge_length=config.edge * size,
             spacing=problem.spacing,
             turn_weight=0.5 * size,
-            reverses=improver.reverses,
+            backward=improver.backward,
         )
         spread = config.coarse_path_spread * size
         targets = Targets(coarse, self._fraction, spread, world.static.bounds, improver.rng)

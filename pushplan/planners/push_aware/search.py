@@ -86,16 +86,17 @@ class PushAwareSearch:
         status = improver.begin()
         if status is not None:
             return status
+        trees.look_ahead()
         warm_start(improver)
         while not improver.stopped():
+            if trees.boxed_in:
+                return PlanStatus.START_BLOCKED
             self._one_round()
             if improver.solved:
                 return None
             if trees.sealed:
                 return PlanStatus.GOAL_UNREACHABLE
             trees.change_start()
-            if trees.boxed_in:
-                return PlanStatus.START_BLOCKED
             if len(improver.lead.pieces):
                 warm_start(improver)
                 if improver.solved:
