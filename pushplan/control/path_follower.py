@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from pushplan.control.episode_clock import EpisodeClock
 from pushplan.control.limits import TwistLimiter, clamp_twist, driven_twist
+from pushplan.control.stage_follower import StageFollower
 from pushplan.control.tracking import Progress
 from pushplan.world import Drive, Plan, Twist, World
 from pushplan.world.checks import number
@@ -35,10 +36,15 @@ class PathFollower:
         number("distance", self.distance, low=0.0, open_low=True)
         self._clock = EpisodeClock(self.period)
         self._limiter: TwistLimiter | None = None
+        self._stages = StageFollower(self._follow, self._begin, self._clock)
 
     def reset(self, world: World) -> None:
         """See `pushplan.world.Controller`."""
         self._clock.reset()
+        self._stages.reset()
+        self._begin()
+
+    def _begin(self) -> None:
         self._limiter = None
 
     def command(self, world: World, plan: Plan) -> Twist:
@@ -47,14 +53,14 @@ class PathFollower:
         Past the end of the plan the robot stops; a constant-speed robot drives on along the last
         heading.
         """
-        return self._clock.command_for(world, lambda _: self._follow(world, plan))
+        return self._clock.command_for(world, lambda _: self._stages.command(world, plan))
 
     def _follow(self, world: World, plan: Plan) -> Twist:
         robot = world.robot
         size = robot.circumscribed_radius
         progress = self._prepare(world)
         x, y, theta = (float(value) for value in world.robot_pose)
-        along = progress.update(plan, x, y)
+        along = progress.update(plan, world.robot_pose)
         path_x, path_y, path_theta = (float(value) for value in progress.pose(along))
         index = progress.index(along)
         speed = float(plan.speeds[index])

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from pushplan.control.episode_clock import EpisodeClock
 from pushplan.control.limits import clamp_twist
+from pushplan.control.stage_follower import StageFollower
 from pushplan.control.tracking import Progress
 from pushplan.world import Drive, Plan, Twist, World
 from pushplan.world.checks import number
@@ -29,10 +30,15 @@ class PurePursuit:
         number("lookahead", self.lookahead, low=0.0, open_low=True)
         self._clock = EpisodeClock(1.0)
         self._progress: Progress | None = None
+        self._stages = StageFollower(self._follow, self._begin, self._clock)
 
     def reset(self, world: World) -> None:
         """See `pushplan.world.Controller`."""
         self._clock.reset()
+        self._stages.reset()
+        self._begin()
+
+    def _begin(self) -> None:
         self._progress = None
 
     def command(self, world: World, plan: Plan) -> Twist:
@@ -41,14 +47,14 @@ class PurePursuit:
         Past the end of the plan the robot stops; a constant-speed robot drives on along the last
         heading.
         """
-        return self._clock.command_for(world, lambda _: self._follow(world, plan))
+        return self._clock.command_for(world, lambda _: self._stages.command(world, plan))
 
     def _follow(self, world: World, plan: Plan) -> Twist:
         robot = world.robot
         reach = self.lookahead * robot.circumscribed_radius
         progress = self._progress = self._progress or Progress(window=2.0 * reach)
         x, y, theta = (float(value) for value in world.robot_pose)
-        along = progress.update(plan, x, y)
+        along = progress.update(plan, world.robot_pose)
         if robot.can_stop and along >= progress.total - 1e-9:
             return clamp_twist(robot, 0.0, 0.0)
         aim = progress.pose(min(along + reach, progress.total))

@@ -2,14 +2,25 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
-from pushplan.world import Plan
+from pushplan.world import Plan, Stage
 from pushplan.world.checks import FloatArray
+
+_NEAR = 0.005  # what may be left of a stage that another one follows [windows]
+_AWAY = 0.25  # a robot that is farther from where it turns has turned [windows]
+ALIGNED = math.radians(2.0)
+"""What may be left of a turn on the spot [rad]."""
 
 
 class Progress:
     """How far along a plan the robot is; never jumps to another branch of the same path.
+
+    It goes from stage to stage (`pushplan.world.Plan.stages`): a robot that turns on the spot gets
+    on in its heading, and where it goes back along the same path it does not get back before it
+    has arrived.
 
     Args:
         window: how far ahead along the path the nearest point is looked for [m].
@@ -19,20 +30,61 @@ class Progress:
         self.window = window
         self._plan: Plan | None = None
         self._lengths: FloatArray = np.zeros(1)
+        self._stages: tuple[Stage, ...] = (Stage(0, 0, 1),)
+        self._at = 0
         self.along = 0.0
         """Path length from the beginning of the plan to the nearest point [m]."""
+        self.turned = 0.0
+        """Angle of the present turn on the spot that is made [rad]."""
+        self.left_to_turn = 0.0
+        """Angle of it that is left, the way that the plan turns [rad]."""
 
-    def update(self, plan: Plan, x: float, y: float) -> float:
-        """Move on to the point of ``plan`` nearest to (x, y) [m]; returns `along`."""
+    def update(self, plan: Plan, pose: FloatArray) -> float:
+        """Move on to the place on ``plan`` nearest to a pose (3,); returns `along`."""
         if plan is not self._plan:
             self._plan = plan
-            self._lengths = plan.arc_lengths
-            self.along = 0.0
+            self._lengths, self._stages = plan.arc_lengths, plan.stages
+            self._at = 0
+            self.along = self.turned = 0.0
+        while not self._get_on(plan, self.stage, pose) and not self.is_last:
+            self._at += 1
+            self.turned = 0.0
+        return self.along
+
+    @property
+    def stage(self) -> Stage:
+        """The present part of the plan."""
+        return self._stages[self._at]
+
+    @property
+    def is_last(self) -> bool:
+        """Whether no other stage follows the present one."""
+        return self._at == len(self._stages) - 1
+
+    def _get_on(self, plan: Plan, stage: Stage, pose: FloatArray) -> bool:
+        """Take up a pose on a stage; returns whether something of it is left."""
+        x, y = float(pose[0]), float(pose[1])
+        if stage.direction:
+            self._go_on(plan, stage, x, y)
+            return bool(self.along < self._lengths[stage.last] - _NEAR * self.window)
+        headings = self._headings()
+        whole = float(headings[-1] - headings[0])
+        side = math.copysign(1.0, whole)
+        ahead = side * math.remainder(float(pose[2] - headings[0]) - side * self.turned, math.tau)
+        self.turned = min(max(self.turned, self.turned + ahead), abs(whole))
+        self.left_to_turn = abs(whole) - self.turned - min(ahead, 0.0)
+        away = math.dist((x, y), plan.poses[stage.last, :2].tolist())
+        return self.left_to_turn > ALIGNED and away < _AWAY * self.window
+
+    def _go_on(self, plan: Plan, stage: Stage, x: float, y: float) -> None:
+        """Move on to the point of a stage that is driven nearest to (x, y) [m]."""
         lengths, points = self._lengths, plan.poses[:, :2]
-        first = max(0, int(np.searchsorted(lengths, self.along, side="right")) - 1)
-        last = min(int(np.searchsorted(lengths, self.along + self.window)) + 1, len(points) - 1)
+        first = int(np.searchsorted(lengths, self.along, side="right")) - 1
+        first = max(stage.first, first)
+        last = int(np.searchsorted(lengths, self.along + self.window)) + 1
+        last = min(last, stage.last)
         if last <= first:
-            return self.along
+            return
         a, b = points[first:last], points[first + 1 : last + 1]
         edge = b - a
         square = np.maximum((edge * edge).sum(axis=1), 1e-18)
@@ -44,24 +96,52 @@ class Progress:
             lengths[first + best + 1] - lengths[first + best]
         )
         self.along = max(self.along, float(here))
-        return self.along
 
     @property
     def total(self) -> float:
         """Length of the plan [m]."""
         return float(self._lengths[-1])
 
+    @property
+    def left_of_stage(self) -> float:
+        """Path length that is left of the present stage [m]."""
+        return float(self._lengths[self.stage.last]) - self.along
+
+    @property
+    def time(self) -> float:
+        """Time of the plan at the present place [s]."""
+        assert self._plan is not None
+        first, last, direction = self.stage
+        part = slice(first, last + 1)
+        times = self._plan.times[part]
+        if direction:
+            return float(np.interp(self.along, self._lengths[part], times))
+        return float(np.interp(self.turned, np.abs(self._headings() - self._headings()[0]), times))
+
+    def _headings(self) -> FloatArray:
+        """Headings of the poses of the present stage [rad], without jumps."""
+        assert self._plan is not None
+        first, last, _ = self.stage
+        return np.unwrap(self._plan.poses[first : last + 1, 2])
+
     def index(self, along: float) -> int:
-        """Index of the last pose at or before path length ``along`` [m]."""
+        """Index of the last pose of the present stage at or before path length ``along`` [m]."""
+        first, last, direction = self.stage
+        if direction == 0:
+            turned = np.abs(self._headings() - self._headings()[0])
+            return first + int(np.searchsorted(turned, self.turned + 1e-9, side="right")) - 1
         at = int(np.searchsorted(self._lengths, along + 1e-12, side="right")) - 1
-        return min(max(at, 0), len(self._lengths) - 1)
+        return min(max(at, first), last)
 
     def pose(self, along: float) -> FloatArray:
-        """(3,) pose of the plan at path length ``along`` [m], headings taken the short way."""
+        """(3,) pose of the plan at path length ``along`` [m], headings taken the short way.
+
+        Of a turn on the spot it is that where the robot is.
+        """
         assert self._plan is not None
         i = self.index(along)
         poses = self._plan.poses
-        if i == len(poses) - 1:
+        if i == self.stage.last or not self.stage.direction:
             last: FloatArray = poses[i]
             return last
         length = self._lengths[i + 1] - self._lengths[i]

@@ -1,4 +1,7 @@
-"""Shortest forward paths of bounded curvature (Dubins 1957), compiled.
+"""Arcs, and the shortest forward paths of bounded curvature (Dubins 1957), compiled.
+
+An arc is a length [m], negative for back, and a curvature [1/m]. A turn on the spot is one of
+infinite curvature, whose length is its angle [rad].
 
 The six words are solved as in Shkel and Lumelsky, "Classification of the Dubins set" (2001),
 with start at the origin and lengths in units of the turning radius.
@@ -90,6 +93,9 @@ def dubins(
 @kernel
 def along_arc(pose: FloatArray, length: float, curvature: float, out: FloatArray) -> None:
     """Drive ``length`` [m] along an arc of constant curvature [1/m] from ``pose`` (3,)."""
+    if np.isinf(curvature):
+        out[0], out[1], out[2] = pose[0], pose[1], pose[2] + length * np.sign(curvature)
+        return
     turn = length * curvature
     half = 0.5 * turn
     # chord of the arc; sinc keeps the straight limit exact
@@ -103,6 +109,8 @@ def along_arc(pose: FloatArray, length: float, curvature: float, out: FloatArray
 @kernel
 def step_along(curvature: float, spacing: float) -> float:
     """Distance between poses on an arc [m]: ``spacing``, less where that would turn too far."""
+    if np.isinf(curvature):
+        return MAX_TURN
     return min(spacing, MAX_TURN / max(abs(curvature), 1e-12))
 
 
@@ -119,9 +127,9 @@ def sample_pieces(
     here = start
     for i in range(pieces.shape[0]):
         length, curvature = pieces[i, 0], pieces[i, 1]
-        if length < 1e-8 * spacing:
+        if abs(length) < 1e-8 * spacing:
             continue
-        steps = int(np.ceil(length / step_along(curvature, spacing)))
+        steps = int(np.ceil(abs(length) / step_along(curvature, spacing)))
         if count + steps > out.shape[0]:
             return -1
         for step in range(1, steps + 1):

@@ -40,9 +40,8 @@ def warm_start(improver: PathImprover) -> None:
     for clearance in (max(1.25 * size, 1.02 * radius), 1.1 * size):
         if improver.stopped():
             return  # the contours alone take their time on a large map
-        arcs = warm_start_arcs(
-            improver.world, improver.goal, clearance, radius, depth, improver.stopped
-        )
+        world = improver.world.moved(robot_pose=improver.lead.pose)
+        arcs = warm_start_arcs(world, improver.goal, clearance, radius, depth, improver.stopped)
         if arcs is None:
             continue
         if improver.candidate(arcs, improver.jam_cost, free=False) is not None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 
@@ -40,6 +41,14 @@ class Candidate:
     cost: float
 
 
+class Lead(NamedTuple):
+    """What every path of a search begins with, before the search itself."""
+
+    pieces: FloatArray  # (E, 2) arcs from the robot's pose on, as in `pushplan.motion.dubins`
+    pose: FloatArray  # (3,) where the search begins
+    objects: FloatArray  # (K, 3) poses of the objects by then
+
+
 class PathImprover:
     """What the searches of one planning call share: the problem, its clock, and the best path."""
 
@@ -60,6 +69,11 @@ class PathImprover:
         self.size = world.robot.circumscribed_radius
         self.iterations = self.nodes = self.relaxed = 0
         self.tight = False
+        self.backward = 0.0
+        """How far paths of trees may lead back [m]."""
+        self.lead = self._no_lead = Lead(
+            np.empty((0, 2)), owned(world.robot_pose), owned(world.movables.poses)
+        )
         self.best_cost, self.first_solution_s = np.inf, float("nan")
         self.problem = PathProblem(
             robot_mass=world.robot.mass,
@@ -92,6 +106,10 @@ class PathImprover:
             self._keep(here, 1, 0.0)
             return PlanStatus.SOLVED
         return None
+
+    def begin_with(self, lead: Lead | None) -> None:
+        """Begin all paths with some arcs, from the next search on; None begins at the robot."""
+        self.lead = self._no_lead if lead is None else lead
 
     def relax(self) -> None:
         """Allow tighter turns and less margin, from the second time on.
@@ -149,14 +167,15 @@ class PathImprover:
 
     def candidate(
         self,
-        arcs: FloatArray,  # (E, 2) length [m] and curvature [1/m]
+        arcs: FloatArray,  # (E, 2) length [m] and curvature [1/m], from the end of the lead on
         limit: float = np.inf,  # cost that it must stay below [kg m]
         *,
         free: bool = True,  # whether it is known to touch no wall and to reach the goal
     ) -> Candidate | None:
         """The path along some arcs with its cost; None if it is not one that could be a plan."""
         problem, count = self.problem, len(self.world.movables)
-        steps = [length / step_along(turn, problem.spacing) for length, turn in arcs.tolist()]
+        arcs = np.concatenate([self.lead.pieces, arcs])
+        steps = [abs(arc) / step_along(turn, problem.spacing) for arc, turn in arcs.tolist()]
         capacity = 3 * int(sum(steps) + len(arcs)) + 200
         path = make_swept_path(capacity, count)
         used = lay_out(owned(self.world.robot_pose), arcs, path, problem)

@@ -9,6 +9,7 @@ from pushplan.motion.collision import footprint, is_free, obstacles
 from pushplan.motion.keep_out import keep_out
 from pushplan.motion.path_problem import SweptPath
 from pushplan.world import Drive, InvalidInputError, Plan, RobotModel, World
+from pushplan.world.polyline import goes_back
 
 TIGHTEST = 0.1
 """Least turning radius that plans ever use, in circumscribed radii: nearly on the spot."""
@@ -59,6 +60,8 @@ def start_margin(world: World, margin: float) -> float | None:
 def timed_plan(world: World, path: SweptPath, turn_fraction: float) -> Plan:
     """Give a path speeds and times: full speed, slower where the curvature asks for it.
 
+    Steps against the heading are driven back; those of infinite curvature turn on the spot.
+
     Args:
         world: the snapshot that the path starts from.
         path: poses, curvatures, predicted objects, lengths and works.
@@ -67,21 +70,31 @@ def timed_plan(world: World, path: SweptPath, turn_fraction: float) -> Plan:
     robot = world.robot
     count = len(path.poses)
     ahead = np.append(path.curvatures[1:], 0.0)  # curvature from each pose on
+    on_spot, signs = np.isinf(ahead), np.sign(ahead)
+    ahead[on_spot] = 0.0
     curvature = np.maximum(np.abs(ahead), 1e-12)
-    fastest = turn_fraction * robot.max_turn_rate / curvature
+    turn_rate = turn_fraction * robot.max_turn_rate
+    fastest = turn_rate / curvature
     speeds = np.minimum(robot.max_speed, fastest)
     if robot.drive is Drive.CONSTANT_SPEED:
         speeds = np.full(count, robot.max_speed)
+    back = goes_back(path.poses)
+    speeds[back] = np.maximum(robot.min_speed, -fastest[back])
+    turn_rates = np.where(on_spot, signs * turn_rate, speeds * ahead)
     # the length of an arc, where `path.lengths` has its chord
     chords = np.diff(path.lengths)
     half = np.clip(0.5 * np.abs(ahead[:-1]) * chords, 1e-9, 1.0)
     arcs = chords * np.arcsin(half) / half
-    times = np.concatenate([[0.0], np.cumsum(arcs / speeds[:-1])])
+    spot = on_spot[:-1]
+    lasts = np.divide(arcs, np.abs(speeds[:-1]), where=~spot, out=np.zeros(count - 1))
+    lasts[spot] = np.abs(np.diff(path.poses[:, 2])[spot]) / turn_rate
+    speeds[on_spot] = 0.0
+    times = np.concatenate([[0.0], np.cumsum(lasts)])
     return Plan(
         times=times,
         poses=path.poses,
         speeds=speeds,
-        turn_rates=speeds * ahead,
+        turn_rates=turn_rates,
         travel_cost=robot.mass * float(path.lengths[-1]),
         interaction_cost=float(path.works[-1]),
         object_poses=path.objects,

@@ -11,6 +11,7 @@ import numpy as np
 
 from pushplan.control import waiting_twist
 from pushplan.control.recovery import warm_up_recovery
+from pushplan.motion.path_search_config import PathSearchConfig
 from pushplan.planners.following.plan_follower import PlanFollower
 from pushplan.planners.following.renewing_follower import RenewingFollower
 from pushplan.planners.registry import make_policy, policy_names
@@ -29,6 +30,9 @@ from pushplan.world.policy_abilities import WarmsUp
 
 _ITERATIONS = 600
 """Iterations of a planner that does not say how many it needs to use all of its kernels."""
+
+_BLOCKED_ITERATIONS = 2500
+"""Iterations after which planners have given up to drive straight on."""
 
 _POSES = ((2.0, 5.0, 0.0), (2.05, 5.0, 0.1), (5.0, 5.35, 0.2))
 """At the start, between the headings of a lattice, and a little too close to a wall."""
@@ -76,6 +80,11 @@ def warm_up_policy(policy: Policy) -> None:
         policy.stop = stop
         with contextlib.suppress(Exception):
             policy.planner.plan(_doorway(), stop=MaxIterations(_ITERATIONS))
+        if not isinstance(getattr(policy.planner, "config", None), PathSearchConfig):
+            return
+        for drive in (Drive.DIFFERENTIAL, Drive.CAR):
+            with contextlib.suppress(Exception):
+                policy.planner.plan(_before_a_wall(drive), stop=MaxIterations(_BLOCKED_ITERATIONS))
 
 
 def _plan_and_follow(policy: PlanFollower, world: World) -> None:
@@ -115,6 +124,24 @@ def _doorway() -> World:
         polygons=[wall, wall * [1.0, -1.0] + [0.0, 10.0]], bounds=[0.0, 0.0, 10.0, 10.0]
     )
     return replace(_room(), static=static, movables=Movables.empty())
+
+
+def _before_a_wall(drive: Drive) -> World:
+    """A robot that has no room ahead; it may turn on the spot, or is a car that cannot."""
+    square = 0.5 * np.array([[1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0], [1.0, -1.0]])
+    angles = np.linspace(0.0, 2.0 * np.pi, 8, endpoint=False)
+    robot = RobotModel.from_outline(
+        0.5 * np.column_stack([np.cos(angles), np.sin(angles)]),
+        mass=1.0,
+        drive=drive,
+        max_speed=1.0,
+        max_turn_rate=1.0,
+        min_turning_radius=1.0 if drive is Drive.CAR else 0.0,
+    )
+    static = StaticMap.build(
+        polygons=[square + np.array([3.01, 5.0])], bounds=[0.0, 0.0, 10.0, 10.0]
+    )
+    return replace(_room(), robot=robot, static=static)
 
 
 def _water() -> World:

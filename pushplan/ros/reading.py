@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from pushplan.world import InvalidInputError, Plan, RobotModel, StaticMap, Twist
 from pushplan.world.checks import FloatArray, array
-from pushplan.world.polyline import arc_lengths, path_length
+from pushplan.world.polyline import arc_lengths, goes_back, path_length
 
 _TILT = math.cos(math.radians(15.0))  # steepest floor that still counts as a plane
 _LATERAL = 1e-6  # speed that counts as none [m/s, rad/s]
@@ -90,6 +90,8 @@ def plan_from(message: Any, robot: RobotModel, frame: str | None = None) -> Plan
     steps = np.diff(times)
     if len(steps) == 0 or (steps < 0.0).any() or not steps.any():
         steps = np.maximum(lengths / robot.max_speed, np.abs(turns) / robot.max_turn_rate)
+    elif robot.min_speed < 0.0:  # a path with times says where it goes back
+        lengths *= np.where(goes_back(poses)[:-1], -1.0, 1.0)
     moving = steps > 0.0
     rates = np.zeros((2, len(poses)))
     rates[:, :-1][:, moving] = np.stack([lengths, turns])[:, moving] / steps[moving]

@@ -22,7 +22,7 @@ from pushplan.world.goals import (
 )
 from pushplan.world.movables import Movables
 from pushplan.world.nav2_map import load_nav2_map
-from pushplan.world.plan import Plan, PlanResult, PlanStats, PlanStatus, SubTask
+from pushplan.world.plan import Plan, PlanResult, PlanStats, PlanStatus, Stage, SubTask
 from pushplan.world.planning_executor import PendingResult, PlanningExecutor
 from pushplan.world.policy_abilities import (
     ChecksEnvironment,
@@ -103,6 +103,7 @@ __all__ = [
     "ScenarioError",
     "SchemaError",
     "ShowsPlan",
+    "Stage",
     "StaticMap",
     "Stop",
     "StopCheck",

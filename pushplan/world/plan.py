@@ -5,7 +5,8 @@ from __future__ import annotations
 import enum
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING, Annotated
+from itertools import pairwise
+from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 import numpy as np
 
@@ -40,8 +41,8 @@ class PlanStatus(enum.Enum):
     CANCELLED = ("cancelled", "The call was cancelled before there was a plan: call again.")
     START_BLOCKED = (
         "start_blocked",
-        "The robot starts in collision with something static: check the pose and the footprint, "
-        "or drive clear first.",
+        "The robot starts in collision with something static, or cannot reverse and has no room "
+        "ahead: check the pose and the footprint, or drive clear first.",
     )
     GOAL_UNREACHABLE = (
         "goal_unreachable",
@@ -74,6 +75,14 @@ class SubTask(ArrayRecord):
     last: int
 
 
+class Stage(NamedTuple):
+    """A part of a plan that is driven in one direction; the next one begins where it ends."""
+
+    first: int  # index of its first pose
+    last: int  # index of its last pose
+    direction: int  # 1 ahead, -1 back, 0 for a turn on the spot
+
+
 @dataclass(frozen=True, eq=False)
 class Plan(ArrayRecord, CheckedFields):
     """A time-stamped path of the robot with its expected price.
@@ -81,7 +90,8 @@ class Plan(ArrayRecord, CheckedFields):
     Args:
         times: (N,) seconds since the snapshot that was planned from, not decreasing, from 0.
         poses: (N, 3) x, y [m], theta [rad], world frame.
-        speeds: (N,) forward speed from each pose on [m/s].
+        speeds: (N,) forward speed from each pose on [m/s], negative for back; 0 with a turn rate
+            for a turn on the spot.
         turn_rates: (N,) turn rate from each pose on [rad/s].
         travel_cost: robot mass times path length [kg m].
         interaction_cost: expected sum of object mass times path length [kg m].
@@ -127,6 +137,16 @@ class Plan(ArrayRecord, CheckedFields):
     def arc_lengths(self) -> FloatArray:
         """(N,) path length of the robot up to each pose [m]."""
         return frozen(arc_lengths(self.poses))
+
+    @cached_property
+    def stages(self) -> tuple[Stage, ...]:
+        """Its parts that are driven ahead, back, or on the spot, in order; at least one."""
+        on_spot = (self.speeds == 0.0) & (self.turn_rates != 0.0)
+        kinds = np.where(self.speeds < 0.0, -1.0, 1.0)
+        kinds[on_spot] = 2.0 * np.sign(self.turn_rates[on_spot])
+        cuts = (np.flatnonzero(np.diff(kinds[:-1])) + 1).tolist()
+        ends = pairwise([0, *cuts, len(self.times) - 1])
+        return tuple(Stage(a, b, int(kinds[a]) if abs(kinds[a]) == 1.0 else 0) for a, b in ends)
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pushplan.world.checks import FloatArray
+from pushplan.world.checks import BoolArray, FloatArray
 
 
 def step_lengths(points: FloatArray) -> FloatArray:
@@ -35,3 +35,10 @@ def path_lengths(points: FloatArray) -> FloatArray:
     """(K,) length [m] of each of the paths (N, K, 2 or 3)."""
     lengths: FloatArray = step_lengths(points).sum(axis=0)
     return lengths
+
+
+def goes_back(poses: FloatArray) -> BoolArray:
+    """(N,) whether the step from each pose (N, 3) leads back; the last as the one before."""
+    moves, headings = np.diff(poses[:, :2], axis=0), poses[:-1, 2]
+    back = moves[:, 0] * np.cos(headings) + moves[:, 1] * np.sin(headings) < 0.0
+    return np.append(back, back[-1:] if len(back) else [False])

@@ -161,7 +161,7 @@ def test_progress_does_not_jump_across_a_loop():
     world = make_u_maze(static=FLOOR, robot_pose=[0, 0, 0])
     loop = arc_plan(world, [(4.0, 0.0), (2 * math.pi, 1.0), (4.0, 0.0)])
     progress = Progress(window=1.0)
-    seen = [progress.update(loop, *pose[:2]) for pose in loop.poses]
+    seen = [progress.update(loop, pose) for pose in loop.poses]
     assert np.all(np.diff(seen) >= 0.0)
     assert np.abs(np.array(seen) - np.arange(len(seen)) * 0.1).max() < 0.15
 

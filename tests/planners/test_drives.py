@@ -3,18 +3,23 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from conftest import OCTAGON, make_robot, make_u_maze
+from plan_checks import check_plan
 
-from pushplan.control import MpcTracker, PathFollower, PurePursuit
+from pushplan.control import MpcTracker, PathFollower, Progress, PurePursuit
 from pushplan.geometry.transforms import arc_step
 from pushplan.planners import PlanFollower, make_planner, make_policy
+from pushplan.runtime.disturbances import Disturbances
+from pushplan.runtime.disturbed_policy import DisturbedPolicy
 from pushplan.world import (
     Drive,
     InvalidInputError,
     MaxIterations,
+    Plan,
     PlanStatus,
     Receptacle,
     RobotModel,
@@ -104,17 +109,89 @@ def test_plans_for_every_kind_of_robot_keep_its_turning_radius(kind, name):
 
 
 @pytest.mark.warm("push-aware")
-def test_a_car_that_reverses_backs_off_from_a_wall_that_it_faces():
-    """No forward path begins there."""
+def test_a_car_that_reverses_backs_off_from_a_wall_that_it_overlaps():
+    """No plan begins there."""
     world = make_u_maze([], robot=ROBOTS["car that reverses"])
     x = world.static.bounds[2] - 0.75
     world = world.moved(robot_pose=[x, 3.0, 0.0])
     plan = make_planner("push-aware").plan(world, stop=MaxIterations(2000))
-    assert plan.plan is None
+    assert plan.status is PlanStatus.START_BLOCKED
     policy = PlanFollower(make_planner("push-aware"), stop=MaxIterations(2000))
     world, twists = drive(world, policy, 120.0)
     assert min(twist.linear for twist in twists) < 0.0
     assert world.goal.distance(*world.robot_pose[:2]) == 0.0
+
+
+FACING_A_WALL = [13.785, 3.0, 0.0]
+"""Nose a centimetre and a half before a wall of the maze, the goal beyond the wall behind it."""
+NEAR_A_WALL = [13.895, 3.0, 0.0]
+"""The same of the disc."""
+
+
+def test_a_plan_is_driven_in_stages_ahead_back_and_on_the_spot():
+    plan = Plan(
+        times=np.arange(7.0),
+        poses=np.array(
+            [[0.0, 0, 0], [0, 0, 1], [0, 0, 2], [1, 0, 2], [2, 0, 2], [1, 0, 2], [0, 0, 2]]
+        ),
+        speeds=np.array([0.0, 0.0, 1.0, 1.0, -1.0, -1.0, -1.0]),
+        turn_rates=np.array([1.0, 1.0, 0, 0, 0, 0, 0]),
+        travel_cost=4.0,
+    )
+    assert plan.stages == ((0, 2, 0), (2, 4, 1), (4, 6, -1))
+    progress = Progress(window=2.0)
+    places = [(0, 0, 0.5), (0, 0, 2), (1, 0.1, 2), (2, 0, 2), (1.5, 0, 2), (0, 0, 2)]
+    along = [progress.update(plan, np.array(pose)) for pose in places[:1]]
+    assert (progress.time, progress.index(0.0)) == (pytest.approx(0.5), 0)
+    along += [progress.update(plan, np.array(pose)) for pose in places[1:]]
+    assert along == pytest.approx([0.0, 0.0, 1.0, 2.0, 2.5, 4.0])
+    assert progress.index(along[-1]) == 6
+
+
+@pytest.mark.warm(*PLANNERS)
+@pytest.mark.parametrize("name", PLANNERS)
+def test_a_robot_that_faces_a_wall_plans_to_turn_on_the_spot_first(name):
+    """No arc leads on from there; the turn pushes the box beside it."""
+    world = make_u_maze([[13.3, 4.05, 0.0]], robot=ROBOTS["disc"], robot_pose=NEAR_A_WALL)
+    result = make_planner(name).plan(world, stop=MaxIterations(6000))
+    assert result.status is PlanStatus.SOLVED
+    check_plan(world, result.plan, result.status)
+    assert [stage.direction for stage in result.plan.stages] == [0, 1]
+    assert result.plan.poses[result.plan.stages[0].last, 2] > 1.0
+
+
+@pytest.mark.warm(*PLANNERS)
+@pytest.mark.parametrize("name", PLANNERS)
+def test_a_car_that_faces_a_wall_plans_to_reverse_where_it_can(name):
+    car = ROBOTS["car that reverses"]
+    world = make_u_maze(BOXES, robot=car, robot_pose=FACING_A_WALL)
+    result = make_planner(name).plan(world, stop=MaxIterations(6000))
+    assert result.status is PlanStatus.SOLVED
+    plan = result.plan
+    check_plan(world, plan, result.status)
+    assert {stage.direction for stage in plan.stages} == {1, -1}
+    assert plan.speeds.min() == pytest.approx(car.min_speed)
+    assert np.abs(plan.turn_rates / plan.speeds).max() <= 1.0 / RADIUS + 1e-6
+    blocked = make_planner(name).plan(replace(world, robot=CAR), stop=MaxIterations(6000))
+    assert blocked.status is PlanStatus.START_BLOCKED
+    assert "no room ahead" in blocked.status.remedy
+
+
+@pytest.mark.warm("kinodynamic-rrt")
+@pytest.mark.parametrize("controller", [PathFollower, PurePursuit, MpcTracker])
+@pytest.mark.parametrize(
+    ("kind", "pose"), [("disc", NEAR_A_WALL), ("car that reverses", FACING_A_WALL)]
+)
+def test_turns_on_the_spot_and_reverse_arcs_are_driven_to_the_goal(kind, pose, controller):
+    robot = replace(ROBOTS[kind], max_acceleration=1.0, max_turn_acceleration=4.0)
+    world = make_u_maze([], robot=robot, robot_pose=pose)
+    policy = PlanFollower(make_planner("kinodynamic-rrt"), controller(), stop=MaxIterations(4000))
+    end, twists = drive(world, policy, 120.0)
+    assert world.goal.distance(*end.robot_pose[:2]) == 0.0
+    (result,) = policy.plan_log
+    assert end.time < 1.2 * result.plan.duration
+    first = twists[2]
+    assert first.linear < 0.0 if robot.drive is Drive.CAR else first == Twist(0.0, first.angular)
 
 
 @pytest.mark.warm("push-aware")
@@ -130,6 +207,21 @@ def test_controllers_bring_every_kind_of_robot_to_its_goal(kind, controller):
         assert robot.min_speed - 1e-9 <= twist.linear <= robot.max_speed + 1e-9
         if robot.drive is Drive.CAR:
             assert abs(twist.angular) * RADIUS <= abs(twist.linear) + 1e-9
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("kind", "pose"), [("disc", NEAR_A_WALL), ("car that reverses", FACING_A_WALL)]
+)
+@pytest.mark.parametrize("name", PLANNERS)
+def test_a_runner_turns_and_reverses_out_through_noise_and_delay(name, kind, pose):
+    robot = replace(ROBOTS[kind], max_acceleration=1.0, max_turn_acceleration=4.0)
+    noise = Disturbances(position_noise=0.01, heading_noise=math.radians(2.0), delay=0.1)
+    world = make_u_maze(BOXES, robot=robot, robot_pose=pose)
+    world, twists = drive(world, DisturbedPolicy(name, noise, period=0.1), 100.0)
+    assert world.goal.distance(*world.robot_pose[:2]) == 0.0
+    first = [twist for twist in twists if twist != Twist(0.0, 0.0)][3]
+    assert first.linear < 0.0 or (first.linear == 0.0 and robot.drive is Drive.DIFFERENTIAL)
 
 
 @pytest.mark.parametrize("controller", [PathFollower, PurePursuit, MpcTracker])

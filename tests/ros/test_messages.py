@@ -85,6 +85,15 @@ def test_a_plan_comes_back_as_a_path():
     assert again.turn_rates[2] == pytest.approx((6.2 - 2 * math.pi) / 0.75)  # the short way round
 
 
+def test_a_path_with_times_turns_on_the_spot_and_goes_back_as_the_plan_does():
+    robot = make_robot(drive="differential", min_speed=-0.5)
+    poses = np.array([[0.0, 0, 0], [0, 0, 1.5], [0, 1, 1.5], [0, 0.2, 1.6]])
+    times, rates = np.array([0.0, 1, 2, 3]), np.array([[0.0, 1.5], [1, 0], [-0.8, 0.1], [0, 0]])
+    plan = Plan(times, poses, rates[:, 0], rates[:, 1], travel_cost=1.8)
+    assert plan_from(sent(MESSAGES.path(plan, 0.0)), robot).stages == plan.stages
+    assert [stage.direction for stage in plan.stages] == [0, 1, -1]
+
+
 def test_a_path_without_times_is_driven_at_the_robots_speed():
     robot = make_robot(max_speed=0.5, max_turn_rate=1.0)
     poses = np.array([[0.0, 0, 0], [1, 0, 0], [1, 0, 1.5]])

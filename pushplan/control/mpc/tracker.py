@@ -13,6 +13,7 @@ from pushplan.control.mpc.horizon import FAILED, make_horizon, track_of
 from pushplan.control.mpc.kernels import Tuning, assembly_memory
 from pushplan.control.mpc.mpc_config import MpcConfig
 from pushplan.control.mpc.tracker_kernels import TrackerMemory, begin_track, track_step
+from pushplan.control.stage_follower import StageFollower
 from pushplan.world import Drive, Plan, RobotModel, Twist, World
 from pushplan.world.checks import expect
 
@@ -44,6 +45,7 @@ class MpcTracker:
         self._clock = EpisodeClock(self.config.period)
         self._out = np.zeros(2)
         self._memory: TrackerMemory | None = None
+        self._stages = StageFollower(self._follow, self._begin, self._clock)
 
     @property
     def fallbacks(self) -> int:
@@ -53,6 +55,10 @@ class MpcTracker:
     def reset(self, world: World) -> None:
         """See `pushplan.world.Controller`."""
         self._clock.reset()
+        self._stages.reset()
+        self._begin()
+
+    def _begin(self) -> None:
         self._robot = None
 
     def command(self, world: World, plan: Plan) -> Twist:
@@ -61,7 +67,7 @@ class MpcTracker:
         Past the end of the plan the robot stops; a constant-speed robot drives on
         along the last heading.
         """
-        return self._clock.command_for(world, lambda _: self._follow(world, plan))
+        return self._clock.command_for(world, lambda _: self._stages.command(world, plan))
 
     def _follow(self, world: World, plan: Plan) -> Twist:
         """Start afresh in a new episode, on a new plan, or where the robot is another one."""

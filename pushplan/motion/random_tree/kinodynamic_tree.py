@@ -33,6 +33,7 @@ class TreeLimits(NamedTuple):
     edge_length: float  # longest edge [m]
     spacing: float  # distance between collision checks [m]
     turn_weight: float  # what a radian of heading error is worth in metres
+    backward: float  # how far a path may lead back in all [m]
 
 
 _OMPL_TURN_WEIGHT = 0.5  # what a radian is worth in the distance of its SE(2)
@@ -50,23 +51,28 @@ def steer(
     scratch: FloatArray,  # memory for the footprint's corners
     out: FloatArray,  # (3,) receives the end of the arc
 ) -> tuple[float, float]:
-    """Curvature and length of the free arc nearest to a target, of seven; length 0: blocked."""
-    bound, longest, spacing, turn_weight = limits
+    """Curvature and length of the free arc nearest to a target, of seven; length 0: blocked.
+
+    Where it may lead back there are seven more, whose lengths are negative.
+    """
+    bound, longest, spacing, turn_weight, backward = limits
     dx, dy = target[0] - start[0], target[1] - start[1]
     side = -np.sin(start[2]) * dx + np.cos(start[2]) * dy
     aimed = 2.0 * side / max(dx * dx + dy * dy, 1e-12)  # the circle through both, tangent here
     best, best_curvature, best_length = np.inf, 0.0, 0.0
     pose = np.empty(3)
-    for i in range(7):
+    for arc in range(14 if backward > 0.0 else 7):
+        i = arc % 7
+        signed = longest if arc < 7 else -min(longest, backward)
         if i == 0:
             curvature = sampled
         elif i == 1:
             curvature = min(max(aimed, -bound), bound)
         else:
             curvature = bound * (0.5 * (i - 2) - 1.0)
-        steps = int(np.ceil(longest / step_along(curvature, spacing)))
+        steps = int(np.ceil(abs(signed) / step_along(curvature, spacing)))
         for step in range(1, steps + 1):
-            length = longest * step / steps
+            length = signed * step / steps
             along_arc(start, length, curvature, pose)
             if not is_free(pose, shape, among, scratch):
                 break
@@ -95,6 +101,7 @@ class TreeGrowth:
         self.unit = self.limits.turn_weight / _OMPL_TURN_WEIGHT
         self.root = self.state_of(self.start)
         self.poses = {self.root: self.start}
+        self.backed = {self.root: 0.0}  # how far the way to each state leads back [m]
         self.scratch = np.empty_like(self.shape.vertices)
         self.end, self.target = np.empty(3), np.empty(3)
         self.moved = True  # OMPL asks whether the start is valid before anything moves
@@ -171,18 +178,20 @@ class TreeGrowth:
     def _propagate(
         self, state: base.State, action: control.Control, duration: float, result: base.State
     ) -> None:
-        origin = _read(state)
+        origin, limits = _read(state), self.limits
+        if limits.backward > 0.0:
+            limits = limits._replace(backward=limits.backward - self.backed[origin])
         curvature, length = steer(
             self.poses[origin],
             self.target,
             action[0],
-            self.limits,
+            limits,
             self.shape,
             self.among,
             self.scratch,
             self.end,
         )
-        self.moved = length > 0.0
+        self.moved = length != 0.0
         if not self.moved:
             return
         self.end[2] = _wrap(self.end[2])
@@ -191,6 +200,7 @@ class TreeGrowth:
         if end not in self.poses:
             self.poses[end] = self.end.copy()
             self.edges[end] = (origin, length, curvature)
+            self.backed[end] = self.backed[origin] - min(length, 0.0)
 
     def _is_valid(self, state: base.State) -> bool:
         return self.moved

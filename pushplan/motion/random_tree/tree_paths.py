@@ -6,19 +6,23 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from pushplan.compiled import owned
 from pushplan.geometry import VisibilityGraph
 from pushplan.motion.coarse_path import coarse_path, reachable
-from pushplan.motion.collision import is_free, obstacles
+from pushplan.motion.collision import footprint, is_free, obstacles
 from pushplan.motion.keep_out import keep_out
 from pushplan.motion.path_improver import Candidate, PathImprover
+from pushplan.motion.path_problem import PathProblem
 from pushplan.motion.polyline import polyline_plan
 from pushplan.motion.random_tree.kinodynamic_tree import TreeGrowth, TreeLimits
 from pushplan.motion.random_tree.targets import Targets
+from pushplan.motion.room_ahead import gets_away
+from pushplan.motion.start_turn import start_turn
+from pushplan.world import Drive
 from pushplan.world.checks import FloatArray
 from pushplan.world.outline import unflatten
 from pushplan.world.polyline import path_length
 
+_BACKWARD = 2.0  # how far a car may go back at first [turning radii]
 _EDGES = 30
 """Edges along a coarse path up to which a tree gets its budget; in proportion more beyond."""
 
@@ -35,11 +39,39 @@ class TreePaths:
         self.trees = 0
         self.sealed = False
         """Whether certainly no path leads to the goal."""
+        self.boxed_in = False
+        """Whether the robot cannot even get away from where it stands."""
 
     def relax(self) -> None:
         """Look farther from the coarse path, as the way out may be the other way."""
         self._fraction *= 0.5
         self._improver.relax()
+
+    def look_ahead(self) -> None:
+        """Change the start at once where no forward arc leads away from it."""
+        improver = self._improver
+        if improver.world.robot.can_stop and not self._gets_away(improver.problem):
+            self.change_start()
+
+    def _gets_away(self, problem: PathProblem) -> bool:
+        return bool(gets_away(problem, self._improver.lead.pose, self._improver.size))
+
+    def change_start(self) -> None:
+        """Begin in another way, after what was tried has failed.
+
+        A differential drive begins with a turn on the spot and without it, in turns. A car that can
+        reverse may do so, by two turning radii and twice as far each time; of one that cannot it is
+        found out whether it is `boxed_in`.
+        """
+        improver, robot = self._improver, self._improver.world.robot
+        turned = len(improver.lead.pieces) > 0
+        improver.begin_with(None if turned else start_turn(improver))
+        if robot.drive is Drive.CAR:
+            if robot.min_speed < 0.0:
+                improver.backward = max(2.0 * improver.backward, _BACKWARD * robot.turning_radius)
+            elif not improver.relaxed:
+                bare = improver.problem._replace(footprint=footprint(robot))
+                self.boxed_in = not self._gets_away(bare)
 
     def grow_two(self, push_weight: float) -> Iterator[Candidate]:
         """Paths of two trees, around the objects and among them, until the stop rule fires."""
@@ -68,7 +100,7 @@ class TreePaths:
         if np.isinf(push_weight):
             boxes = unflatten(world.movables.vertices_world, world.movables.offsets)
             among = obstacles(keep_out(world), boxes)
-            if not is_free(owned(world.robot_pose), shape, among, np.empty_like(shape.vertices)):
+            if not is_free(improver.lead.pose, shape, among, np.empty_like(shape.vertices)):
                 return None  # the robot touches an object already: only pushing helps
         coarse = coarse_path(world, push_weight)
         if improver.stopped():
@@ -92,10 +124,11 @@ class TreePaths:
             edge_length=config.edge * size,
             spacing=problem.spacing,
             turn_weight=0.5 * size,
+            backward=improver.backward,
         )
         spread = config.coarse_path_spread * size
         targets = Targets(coarse, self._fraction, spread, world.static.bounds, improver.rng)
-        growth = TreeGrowth(world.robot_pose, improver.goal, targets, limits, shape, among)
+        growth = TreeGrowth(improver.lead.pose, improver.goal, targets, limits, shape, among)
         arcs = growth.grow(int(improver.rng.integers(1, 2**31)), done, improver.stopped)
         if arcs is None:
             return None

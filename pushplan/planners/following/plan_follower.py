@@ -151,8 +151,7 @@ class PlanFollower:
         if world.robot.can_stop or self._pending is None:
             return False
         assert self._progress is not None
-        x, y = (float(value) for value in world.robot_pose[:2])
-        return self._progress.update(plan, x, y) >= self._progress.total - 1e-9
+        return self._progress.update(plan, world.robot_pose) >= self._progress.total - 1e-9
 
     def _update_plan(self, world: World) -> None:
         """Ask for a plan where one is wanted, and take up the one that is there."""
@@ -188,9 +187,11 @@ class PlanFollower:
         latency = self.replanning.latency
         if latency is None:
             latency = self._executor.expected(self.stop)
-        start, stretch = world_ahead(
-            world, self.current_plan, self._progress.along, latency, self.interaction
-        )
+        plan, now = self.current_plan, 0.0
+        if plan is not None and latency > 0.0:
+            self._progress.update(plan, world.robot_pose)
+            now = self._progress.time
+        start, stretch = world_ahead(world, plan, now, latency, self.interaction)
         planner, rng = self.planner, self._rng
         self._planned_at, self._planned_from = world.time, world.robot_pose[:2]
         self._planned_ids = world.movables.ids
@@ -236,7 +237,7 @@ class PlanFollower:
             return False
         # what is expected of it from now on
         self.current_plan = rest_of(old, index, swept.object_poses)
-        self._progress.update(self.current_plan, *(float(v) for v in world.robot_pose[:2]))
+        self._progress.update(self.current_plan, world.robot_pose)
         return True
 
     def _needs_plan(self, world: World) -> Reason | None:
@@ -254,7 +255,7 @@ class PlanFollower:
             return Reason.OBJECTS  # something was delivered, lost or found
         assert self._progress is not None
         x, y = (float(value) for value in world.robot_pose[:2])
-        along = self._progress.update(plan, x, y)
+        along = self._progress.update(plan, world.robot_pose)
         index = self._progress.index(along)
         here = self._progress.pose(along)
         if rested and np.hypot(x - here[0], y - here[1]) > rule.offset * size:

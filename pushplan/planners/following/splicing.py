@@ -20,7 +20,7 @@ _SPACING = 0.15  # distance between the poses of a stretch without a plan [R]
 def world_ahead(
     world: World,
     plan: Plan | None,
-    along: float,
+    now: float,
     latency: float,
     interaction: InteractionModel,
 ) -> tuple[World, Plan | None]:
@@ -31,7 +31,7 @@ def world_ahead(
     Args:
         world: the world now.
         plan: what is driven; None for nothing.
-        along: how far along it the robot is [m].
+        now: how far on it the robot is, by its times [s].
         latency: how far to look ahead [s].
         interaction: predicts the objects.
 
@@ -41,7 +41,7 @@ def world_ahead(
     """
     if latency <= 0.0:
         return world, None
-    times, poses, twists = _stretch(world, plan, along, latency)
+    times, poses, twists = _stretch(world, plan, now, latency)
     swept = interaction.sweep(world, np.concatenate([world.robot_pose[None], poses[1:]]))
     if swept.jammed_at >= 0:
         return world, None
@@ -96,19 +96,18 @@ def passed(world: World, plan: Plan, seconds: float) -> int:
     """
     robot = world.robot
     progress = Progress(window=robot.circumscribed_radius + 1.2 * seconds * robot.max_speed)
-    x, y = (float(value) for value in world.robot_pose[:2])
-    return progress.index(progress.update(plan, x, y))
+    return progress.index(progress.update(plan, world.robot_pose))
 
 
 def _stretch(
-    world: World, plan: Plan | None, along: float, latency: float
+    world: World, plan: Plan | None, now: float, latency: float
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Times from now (N,), poses (N, 3) and twists (N, 2) over the next ``latency`` seconds."""
     if plan is None:
         times, poses = np.zeros(1), np.array(world.robot_pose)[None]
         twists = np.array([[world.robot.min_speed, 0.0]])
     else:
-        times, poses, twists = _on_plan(plan, along, latency)
+        times, poses, twists = _on_plan(plan, now, latency)
     left = latency - float(times[-1])
     if left <= 1e-9:
         return times, poses, twists
@@ -124,9 +123,8 @@ def _stretch(
     return np.append(times, times[-1] + left * share[1:]), np.concatenate([poses, arc[1:]]), twists
 
 
-def _on_plan(plan: Plan, along: float, latency: float) -> tuple[FloatArray, FloatArray, FloatArray]:
+def _on_plan(plan: Plan, now: float, latency: float) -> tuple[FloatArray, FloatArray, FloatArray]:
     """The part of a plan that is driven in the next ``latency`` seconds."""
-    now = float(np.interp(along, plan.arc_lengths, plan.times))
     end = min(now + latency, float(plan.times[-1]))
     inner = (plan.times > now + 1e-9) & (plan.times < end - 1e-9)
     times = np.concatenate([[now], plan.times[inner], [end] if end > now else []])

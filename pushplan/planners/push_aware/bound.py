@@ -35,12 +35,13 @@ def lower_bound(world: World, stopped: Callable[[], bool] = lambda: False) -> fl
         path = VisibilityGraph(keep_out(world), clearance).to_goal(start, goal, stopped)
         length = float(path.length)
         around = length / (1.0 + _TOO_LONG) if np.isfinite(length) else 0.0
-    radius = world.robot.turning_radius
-    if world.robot.drive is Drive.DIFFERENTIAL:
-        radius = 0.0
-    radius = max(radius, TIGHTEST * world.robot.circumscribed_radius)
-    turning = turning_length(world.robot_pose, goal, radius)
-    return world.robot.mass * max(around, turning)
+    robot = world.robot
+    if robot.drive is Drive.CONSTANT_SPEED or (robot.drive is Drive.CAR and not robot.min_speed):
+        radius = max(robot.turning_radius, TIGHTEST * robot.circumscribed_radius)
+        turning = turning_length(world.robot_pose, goal, radius)
+    else:  # it may turn on the spot, or go back, at first
+        turning = goal.distance(*world.robot_pose[:2])
+    return robot.mass * max(around, turning)
 
 
 def _is_clear(static: StaticMap, point: FloatArray, clearance: float) -> bool:

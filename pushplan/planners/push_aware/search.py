@@ -80,19 +80,27 @@ class PushAwareSearch:
 
         Returns:
             A status where the call ends here: the start is blocked, the robot is there already,
-            or no way leads to the goal.
+            or no way leads to the goal or on at all.
         """
         improver, trees = self.improver, self.trees
         status = improver.begin()
         if status is not None:
             return status
+        trees.look_ahead()
         warm_start(improver)
         while not improver.stopped():
+            if trees.boxed_in:
+                return PlanStatus.START_BLOCKED
             self._one_round()
             if improver.solved:
                 return None
             if trees.sealed:
                 return PlanStatus.GOAL_UNREACHABLE
+            trees.change_start()
+            if len(improver.lead.pieces):
+                warm_start(improver)
+                if improver.solved:
+                    return None
             trees.relax()
             trees.relax()  # where a first tree fails, the start is most often a tight one
             warm_start(improver)
@@ -207,7 +215,7 @@ class PushAwareSearch:
 
     def _plant(self, tree: PushTree) -> None:
         """Begin a search where the robot and the objects are."""
-        plant(tree, owned(self.world.robot_pose), owned(self.world.movables.poses), 0.0)
+        plant(tree, self.improver.lead.pose, self.improver.lead.objects, 0.0)
 
     def _few(self) -> int:
         """Arcs to drive between two looks at the stop rule."""

@@ -66,7 +66,8 @@ class KinodynamicRRT:
         trees = TreePaths(improver)
         status = improver.begin()
         if status is None:
-            if is_far(improver):
+            trees.look_ahead()
+            if is_far(improver) or len(improver.lead.pieces):
                 warm_start(improver)
             status = _search(improver, trees) or call.stopped_status
         return improver.result(status, trees=float(trees.trees))
@@ -75,11 +76,16 @@ class KinodynamicRRT:
 def _search(improver: PathImprover, trees: TreePaths) -> PlanStatus | None:
     """Grow and shortcut until the stop rule fires; None where there is no plan by then."""
     while not improver.stopped():
+        if trees.boxed_in:
+            return PlanStatus.START_BLOCKED
         _one_round(improver, trees)
         if trees.sealed:
             return PlanStatus.GOAL_UNREACHABLE
         if not improver.solved:
+            trees.change_start()
             trees.relax()
+            if len(improver.lead.pieces):
+                warm_start(improver)
     return PlanStatus.SOLVED if improver.solved else None
 
 

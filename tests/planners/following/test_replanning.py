@@ -371,8 +371,8 @@ def test_bad_rules(changes):
 def test_a_progress_has_no_memory_of_another_plan():
     world = floor()
     progress = Progress(window=2.0)
-    progress.update(line_plan(world), 3.0, 0.0)
-    assert progress.update(line_plan(world, 5.0), 0.5, 0.0) == pytest.approx(0.5)
+    progress.update(line_plan(world), np.array([3.0, 0.0, 0.0]))
+    assert progress.update(line_plan(world, 5.0), np.array([0.5, 0.0, 0.0])) == pytest.approx(0.5)
 
 
 def test_boxes_that_leave_do_not_stop_the_comparison():

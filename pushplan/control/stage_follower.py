@@ -1,0 +1,138 @@
+"""`StageFollower`: plans that turn on the spot or go back, for controllers that drive ahead."""
+
+from __future__ import annotations
+
+import functools
+import math
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from pushplan.control.episode_clock import EpisodeClock
+from pushplan.control.limits import ramp_twist
+from pushplan.control.tracking import Progress
+from pushplan.world import Plan, RobotModel, Stage, Twist, World
+
+_BRAKES = 0.5  # fraction of the greatest deceleration that an end is approached with
+_WINDOW = 2.0  # of its progress [circumscribed radii]
+
+
+class StageFollower:
+    """Drives a plan stage by stage: turns by itself, the rest by a controller.
+
+    Of a stage that goes back the controller sees the mirror image: a robot whose front is its
+    rear, on a path that it drives ahead. Before a stage that another one follows is over, the
+    robot slows down so that it comes to a stand there. A plan of one stage that is driven ahead
+    goes to the controller as it is.
+
+    Args:
+        follow: the command of the controller for a world and a plan that is driven ahead.
+        begin: forgets what the controller knows, before another stage.
+        clock: knows for how long commands are held, and the last one.
+    """
+
+    def __init__(
+        self,
+        follow: Callable[[World, Plan], Twist],
+        begin: Callable[[], None],
+        clock: EpisodeClock,
+    ) -> None:
+        self._follow, self._begin, self._clock = follow, begin, clock
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget the episode."""
+        self._progress: Progress | None = None
+        self._plan: Plan | None = None
+        self._part: Plan | None = None
+        self._stage: Stage | None = None
+        self._direction: int | None = None
+
+    def command(self, world: World, plan: Plan) -> Twist:
+        """See `pushplan.world.Controller`; within the accelerations of the robot.
+
+        Args:
+            world: the scene now.
+            plan: the whole plan.
+        """
+        if len(plan.stages) == 1 and plan.stages[0].direction == 1:
+            self._take_up(1)
+            return self._follow(world, plan)
+        robot, size = world.robot, world.robot.circumscribed_radius
+        if self._progress is None or self._progress.window != _WINDOW * size:
+            self._progress = Progress(_WINDOW * size)
+        self._progress.update(plan, world.robot_pose)
+        stage = self._progress.stage
+        if plan is not self._plan or stage != self._stage:
+            self._take_up(stage.direction)
+            self._plan, self._stage, self._part = plan, stage, None
+        wanted = self._on_stage(world, plan, stage, self._progress)
+        last = self._clock.command
+        return ramp_twist(robot, last, wanted.linear, wanted.angular, self._clock.held)
+
+    def _take_up(self, direction: int) -> None:
+        """Let the controller begin anew where another direction begins."""
+        if self._direction is not None and direction != self._direction:
+            self._begin()
+        self._direction = direction
+
+    def _on_stage(self, world: World, plan: Plan, stage: Stage, progress: Progress) -> Twist:
+        robot, held = world.robot, self._clock.held
+        if stage.direction == 0:
+            side = math.copysign(1.0, float(plan.turn_rates[stage.first]))
+            left = progress.left_to_turn
+            return Twist(0.0, side * _approach(left, robot.max_turn_acceleration, held))
+        if self._part is None:
+            self._part = _part(plan, stage)
+        if stage.direction < 0:
+            twist = self._follow(_mirrored(world), self._part)
+            wanted = Twist(-twist.linear, twist.angular)
+        else:
+            wanted = self._follow(world, self._part)
+        if progress.is_last:
+            return wanted
+        fastest = _approach(progress.left_of_stage, robot.max_acceleration, held)
+        if abs(wanted.linear) <= fastest:
+            return wanted
+        slower = fastest / abs(wanted.linear)
+        return Twist(slower * wanted.linear, slower * wanted.angular)
+
+
+def _approach(left: float, deceleration: float, held: float) -> float:
+    """The speed with which what is left is driven so as to stand at the end."""
+    return min(left / held, math.sqrt(2.0 * _BRAKES * deceleration * max(left, 0.0)))
+
+
+def _part(plan: Plan, stage: Stage) -> Plan:
+    """A stage that is driven, as a plan of its own that leads ahead."""
+    part = slice(stage.first, stage.last + 1)
+    poses = plan.poses[part]
+    if stage.direction < 0:
+        poses = poses + np.array([0.0, 0.0, np.pi])
+    speeds, turn_rates = np.abs(plan.speeds[part]), plan.turn_rates[part].copy()
+    if len(speeds) > 1:  # what the last pose says belongs to the next stage
+        speeds[-1], turn_rates[-1] = speeds[-2], 0.0
+    return Plan(
+        times=plan.times[part] - plan.times[stage.first],
+        poses=poses,
+        speeds=speeds,
+        turn_rates=turn_rates,
+        travel_cost=0.0,
+    )
+
+
+def _mirrored(world: World) -> World:
+    """The same scene with a robot whose front is its rear."""
+    pose = world.robot_pose + np.array([0.0, 0.0, np.pi])
+    return replace(world, robot=_turned_round(world.robot), robot_pose=pose)
+
+
+@functools.lru_cache(maxsize=8)
+def _turned_round(robot: RobotModel) -> RobotModel:
+    return replace(
+        robot,
+        parts=tuple(-part for part in robot.parts),
+        max_speed=-robot.min_speed,
+        min_speed=-robot.max_speed,
+    )

@@ -1,0 +1,109 @@
+"""A turn on the spot towards the shortest path, for a robot from whose heading no arc leads on."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from pushplan.compiled import copy_into, kernel, owned
+from pushplan.geometry import VisibilityGraph
+from pushplan.interaction.advance import advance_objects
+from pushplan.motion.collision import is_free
+from pushplan.motion.dubins import MAX_TURN
+from pushplan.motion.keep_out import keep_out
+from pushplan.motion.path_improver import Lead, PathImprover
+from pushplan.motion.path_problem import PathProblem
+from pushplan.world import Drive
+from pushplan.world.checks import FloatArray
+from pushplan.world.polyline import arc_lengths
+
+_LEAST = 0.1
+"""A turn that brings the heading nearer by less is not worth while [rad]."""
+
+
+class _Turn(NamedTuple):
+    """A turn on the spot that is free."""
+
+    angle: float  # [rad]
+    error: float  # |heading error| that is left [rad]
+    objects: FloatArray  # (K, 3) where the objects are after it
+
+
+def start_turn(improver: PathImprover) -> Lead | None:
+    """The turn of a differential drive towards the first leg of the shortest path around the walls.
+
+    It goes the shorter way or, where something static blocks that, the longer one; where both are
+    blocked, as far as it gets. Objects that the footprint sweeps are pushed.
+
+    Args:
+        improver: of this planning call.
+
+    Returns:
+        The turn; None for other drives, and where a turn brings nothing.
+    """
+    world = improver.world
+    if world.robot.drive is not Drive.DIFFERENTIAL:
+        return None
+    heading = _first_heading(improver)
+    if heading is None:
+        return None
+    left = math.remainder(heading - float(world.robot_pose[2]), math.tau)
+    if abs(left) < _LEAST:
+        return None
+    start, objects = owned(world.robot_pose), owned(world.movables.poses)
+    best: _Turn | None = None
+    for angle in (left, left - math.copysign(math.tau, left)):
+        turn = _Turn(*_turn_freely(improver.problem, start, objects, angle))
+        if best is None or turn.error < best.error - _LEAST:
+            best = turn
+    assert best is not None
+    if best.error > abs(left) - _LEAST:
+        return None
+    pose = start + np.array([0.0, 0.0, best.angle])
+    pieces = np.array([[abs(best.angle), math.copysign(math.inf, best.angle)]])
+    return Lead(pieces, pose, best.objects)
+
+
+def _first_heading(improver: PathImprover) -> float | None:
+    """The bearing [rad] of the shortest path around the walls where it is R away; None without."""
+    static, start = keep_out(improver.world), improver.world.robot_pose[:2]
+    for clearance in (1.1 * improver.size, improver.world.robot.inscribed_radius):
+        graph = VisibilityGraph(static, clearance)
+        corners = graph.to_goal(start, improver.goal, improver.stopped).points
+        if len(corners):
+            along = arc_lengths(corners)
+            ahead = min(improver.size, float(along[-1]))
+            dx, dy = (float(np.interp(ahead, along, c - c[0])) for c in corners.T)
+            return math.atan2(dy, dx)
+    return None
+
+
+@kernel(allocates=True)
+def _turn_freely(
+    problem: PathProblem,
+    start: FloatArray,  # (3,) pose
+    objects: FloatArray,  # (K, 3) poses of the objects there
+    angle: float,  # to turn by [rad]
+) -> tuple[float, float, FloatArray]:
+    """Turn until something blocks it; what of the turn comes nearest to the wanted heading."""
+    steps = int(np.ceil(abs(angle) / MAX_TURN))
+    here, last = start.copy(), start.copy()
+    poses, moved = objects.copy(), np.zeros(objects.shape[0])
+    best_poses = poses.copy()
+    corners = np.empty_like(problem.footprint.vertices)
+    best, turned = np.abs((angle + np.pi) % (2.0 * np.pi) - np.pi), 0.0
+    for step in range(1, steps + 1):
+        here[2] = start[2] + angle * step / steps
+        if not is_free(here, problem.footprint, problem.walls, corners):
+            break
+        if not advance_objects(problem.contacts, last, here, poses, moved):
+            break
+        copy_into(last, here)
+        left = angle - angle * step / steps
+        error = np.abs((left + np.pi) % (2.0 * np.pi) - np.pi)
+        if error < best:
+            best, turned = error, angle * step / steps
+            copy_into(best_poses, poses)
+    return turned, best, best_poses
