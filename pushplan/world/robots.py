@@ -20,7 +20,9 @@ BUMPERS = ("none", "collector", "pusher", "navigation")
 """Inward-curved (keeps boxes in), straight edge, outward-curved (sheds boxes to the sides)."""
 _SEGMENTS = 6
 _LIMITS = tuple(
-    field.name for field in fields(RobotModel) if field.name not in ("parts", "drive", "name")
+    field.name
+    for field in fields(RobotModel)
+    if field.name not in ("parts", "drive", "name", "wheel_parts")
 )
 
 

@@ -149,9 +149,10 @@ class BoxDeliveryTask(ManipulationTask):
         if not len(ids):
             return ids
         if len(ids) == len(start):
-            vertices, offsets = start.vertices, start.offsets
+            vertices, offsets = start.drawn_vertices, start.drawn_offsets
         else:  # boxes are alike
-            vertices, offsets = start.vertices[: 4 * len(ids)], start.offsets[: len(ids) + 1]
+            offsets = start.drawn_offsets[: len(ids) + 1]
+            vertices = start.drawn_vertices[: 4 * len(ids)]
         corners = transform_outlines(poses, vertices, offsets)
         gone: IntArray = ids[self._mouth.contains_each(corners, offsets)]
         return gone

@@ -194,7 +194,7 @@ def square_boxes(
 
 def footprint_at(robot: RobotModel, pose: FloatArray) -> list[Any]:
     """Shapely polygons of the robot's parts at a pose (3,)."""
-    return [shapely.Polygon(transform(pose, part)) for part in robot.parts]
+    return [shapely.Polygon(transform(pose, part)) for part in robot.contact_parts]
 
 
 def rectangle(x0: float, y0: float, x1: float, y1: float) -> FloatArray:

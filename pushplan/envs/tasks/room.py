@@ -133,7 +133,8 @@ class RoomTask(Task):
         world, spread = self._world, self.variations.spread
         free = FreeSpace(world.static)
         movables = world.movables
-        outlines = [list(world.robot.parts), *([movables.outline(k)] for k in range(len(movables)))]
+        outlines = [list(world.robot.contact_parts)]
+        outlines += [[movables.outline(k)] for k in range(len(movables))]
         poses = np.vstack([world.robot_pose, movables.poses])
         radii = [world.robot.circumscribed_radius, *movables.radii]
         shapes = [_shape(pose, parts) for pose, parts in zip(poses, outlines, strict=True)]
