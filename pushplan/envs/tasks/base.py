@@ -124,7 +124,9 @@ class Task(ABC):
     @property
     def _max_steps(self) -> int:
         """Control steps that last as long as those of the preset, or longer for a slower robot."""
+        limit = self.variations.time_limit
         seconds: float = self.preset.max_steps * self.preset.control_step * self.slowness
+        seconds = seconds if limit is None else limit
         return math.ceil(seconds / self.control_step - 1e-9)
 
     @abstractmethod
