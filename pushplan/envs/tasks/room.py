@@ -121,9 +121,9 @@ class RoomTask(Task):
         self.goal_kind = self._goal.kind
         self.objects_leave = isinstance(world.goal, Receptacle)
         way = self._goal.way
-        if not 0.0 < way < math.inf:
+        if self._goal.is_done or way == math.inf:
             who = "every object starts" if of_objects else "the robot starts"
-            where = "no way leads to the goal" if way else f"{who} in the goal"
+            where = f"{who} in the goal" if self._goal.is_done else "no way leads to the goal"
             raise ScenarioError(f"room: {where} in {path}")
         limit = self.variations.time_limit
         if limit is None:

@@ -38,6 +38,7 @@ class RobotGoal:
         self._mass, self._bounds = world.robot.mass, world.static.bounds
         x, y, _ = world.robot_pose.tolist()
         self.way = field.exact(x, y)
+        self.is_done = self.way == 0.0
 
     def score(self, before: World, after: World, work: float, touched_static: bool) -> StepOutcome:
         """A wall is a failure even where the goal is reached at once."""
@@ -70,7 +71,9 @@ class ObjectsGoal:
     def __init__(self, world: World, field: GeodesicField) -> None:
         self._field, self._world = field, world
         self._far = float(field.values[np.isfinite(field.values)].max())
-        self.way = float(self._distances(world.movables.poses).sum())
+        # 1 m where all centres are there already, but not all corners
+        self.way = float(self._distances(world.movables.poses).sum()) or 1.0
+        self.is_done = bool(world.completed.all())
         self._mouth: Receptacle | None = None
         if isinstance(world.goal, Receptacle):
             lean = _LEAN * float(world.movables.radii.min(initial=math.inf))
