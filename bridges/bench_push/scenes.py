@@ -310,6 +310,11 @@ class DeliveryScene(Scene):
             "misc": {"inactivity_cutoff": idle_steps(1.25, 0.3)},
         }
 
+    @property
+    def period(self) -> float:
+        # after each action it steps twice more, to see whether anything still moves
+        return float(self.inner.dt * (self.inner.steps + 2) / self.inner.steps)
+
     def action(self, linear: float, angular: float) -> np.ndarray:
         return np.clip([linear, angular], -1.0, 1.0)
 

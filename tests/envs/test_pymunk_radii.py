@@ -7,7 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from pushplan.envs import PushEnv
 from pushplan.envs.simulators.base import Materials
+from pushplan.envs.simulators.pymunk_drive import PymunkOptions
 from pushplan.envs.simulators.pymunk_simulator import PymunkSimulator
 from pushplan.world import Drive, GoalDisc, Movables, RobotModel, StaticMap, Twist, World
 
@@ -76,3 +78,16 @@ def test_wheels_push_and_do_not_count_at_walls() -> None:
     free = replace(world, static=StaticMap.build(bounds=(-5.0, -5.0, 5.0, 5.0)))
     simulator.build(free.moved(movable_poses=aside), Materials())
     assert (simulator.step(Twist(0.5, 0.0), 1.5).object_poses[-1, 0] != aside[0]).any()
+
+
+def test_a_direction_may_be_held_while_the_robot_turns() -> None:
+    for ahead in (3.0, 1.2):  # nothing in reach, and a box that is pushed
+        simulator = PymunkSimulator(PymunkOptions(holds_direction=True))
+        simulator.build(scene(ahead), Materials())
+        trace = simulator.step(Twist(0.5, 0.5), 0.8)
+        np.testing.assert_allclose(trace.robot_poses[-1], (0.4, 0.0, 0.4), atol=1e-9)
+    env = PushEnv(task="maze", simulator=PymunkSimulator(PymunkOptions(holds_direction=True)))
+    env.reset(seed=0)
+    before = env.world.robot_pose
+    env.step(np.ones(1, np.float32))
+    np.testing.assert_allclose(env.world.robot_pose[:2] - before[:2], (0.0, 0.12), atol=1e-9)

@@ -260,13 +260,14 @@ class PymunkBodies:
         self._step(h)
 
     def march(
-        self, chord: float, heading: float, w: float, h: float, count: int
+        self, chord: float, heading: float, held: float | None, w: float, h: float, count: int
     ) -> tuple[int, float]:
         """Substeps on an arc; the last one is the first in which something static is touched.
 
         Args:
             chord: speed along the chord of a substep [m/s].
             heading: of the robot [rad].
+            held: direction that it keeps while it turns [rad]; None on an arc.
             w: turn rate [rad/s].
             h: length of a substep [s].
             count: how many at most.
@@ -276,7 +277,7 @@ class PymunkBodies:
         """
         contacts, half = self._contacts, 0.5 * w * h
         for i in range(1, count + 1):
-            middle = heading + half
+            middle = heading + half if held is None else held
             self.drive(chord * math.cos(middle), chord * math.sin(middle), w)
             self.advance(h)
             heading += w * h
