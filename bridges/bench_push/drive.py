@@ -71,6 +71,7 @@ def drive(scene: Scene, client: PolicyClient, seed: int, most_steps: int) -> dic
     return {
         "seed": seed,
         "world": world,
+        "idle_limit": scene.idle_limit,
         "times": times,
         "robot_poses": robot,
         "object_poses": objects,

@@ -16,6 +16,19 @@ import numpy as np
 import pymunk
 from shapely.geometry import MultiPoint, Polygon
 
+PERIOD = 0.2
+"""Time between two velocity actions where boxes have goals [s]."""
+
+
+def idle_steps(step: float, speed: float) -> int:
+    """Their idle limit, 200 heading actions of ``step`` [m] each, in velocity actions."""
+    return 200 * math.ceil(step / (speed * PERIOD) - 1e-9)
+
+
+def idle_time(step: float, speed: float) -> float:
+    """The same in seconds."""
+    return idle_steps(step, speed) * PERIOD
+
 
 class Scene:
     """One environment of theirs; `reset` and `step` as theirs, `world` and `state` for ours.
@@ -23,11 +36,13 @@ class Scene:
     Attributes:
         period: time between two actions [s].
         own_limit: what ends an episode of theirs besides success, in words.
+        idle_limit: time without progress after which they end an episode [s]; None if never.
     """
 
     name = ""
     metric = ""
     own_limit = ""
+    idle_limit = None
     turns = math.pi / 30.0  # greatest turn rate of their actions [rad/s]
     drive = "constant_speed"
 
@@ -86,8 +101,10 @@ class Scene:
         raise NotImplementedError
 
     def parts(self) -> list:
-        """The robot's outlines that count, body frame."""
+        """The robot's shapes that count, wheels last."""
         raise NotImplementedError
+
+    wheels = 0  # how many of the parts do not count at walls
 
     def robot_mass(self) -> float:
         """As their metrics count it [kg]."""
@@ -123,13 +140,17 @@ class Scene:
         """The scene as a world file has it; call it after `reset`."""
         low, high = self.speeds()
         polygons, segments = statics(self.inner.space)
+        parts = self.parts()
+        radius = max(float(part.radius) for part in parts)
         robot = {
             "name": self.name,
             "drive": self.drive,
             "mass": self.robot_mass(),
             "max_speed": high,
             "max_turn_rate": self.turns,
-            "parts": self.parts(),
+            "parts": [outline_of(part, part.radius - radius) for part in parts],
+            "contact_radius": radius,
+            "wheel_parts": self.wheels,
             "pose": pose_of(self.body),
         }
         if self.drive != "constant_speed":
@@ -141,9 +162,10 @@ class Scene:
             "movables": [
                 {
                     "id": k,
-                    "outline": centered(touching(shape)),
+                    "outline": outline_of(shape),
+                    "contact_radius": float(shape.radius),
                     "pose": pose_of(shape.body),
-                    "mass": float(shape.area),  # as their metrics count it
+                    "mass": drawn_area(shape),  # as their metrics count it: not `Shape.area`
                 }
                 for k, shape in enumerate(self.objects)
             ],
@@ -156,6 +178,7 @@ class MazeScene(Scene):
 
     name, metric = "maze-NAMO-v0", "maze_namo_metric:MazeNamoMetric"
     own_limit = "a wall, 400 steps"
+    wheels = 4
 
     def config(self, variation: str) -> dict:
         return {"num_obstacles": int(variation), "randomize_obstacles": True}
@@ -168,8 +191,7 @@ class MazeScene(Scene):
         return self.inner.polygons
 
     def parts(self) -> list:
-        wheels = [corner for shape in self.inner.wheels for corner in touching(shape)]
-        return [hull([*touching(self.inner.robot_shape), *wheels])]
+        return [self.inner.robot_shape, *self.inner.wheels]
 
     def robot_mass(self) -> float:
         return float(self.inner.cfg.robot.mass)
@@ -205,7 +227,7 @@ class ShipScene(Scene):
         return self.inner.polygons
 
     def parts(self) -> list:
-        return [touching(self.inner.ship_shape)]
+        return [self.inner.ship_shape]
 
     def robot_mass(self) -> float:
         return float(self.inner.cfg.ship.mass)
@@ -224,6 +246,7 @@ class AreaScene(Scene):
 
     name, metric = "area-clearing-v0", "task_driven_metric:TaskDrivenMetric"
     own_limit = "200 of their steps of 1.5 m since the last box was cleared"
+    idle_limit = idle_time(1.5, 0.2)
     turns = math.pi / 60.0  # half of what its attribute says, as its velocity action has it
     drive = "differential"
 
@@ -232,7 +255,7 @@ class AreaScene(Scene):
             "env": variation,
             "agent": {"action_type": "velocity"},
             "render": {"show": False, "log_obs": False},
-            "sim": {"t_max": idle_steps(1.5, 0.2, 0.2)},
+            "sim": {"t_max": idle_steps(1.5, 0.2)},
         }
 
     def action(self, linear: float, angular: float) -> np.ndarray:
@@ -252,7 +275,7 @@ class AreaScene(Scene):
 
     def parts(self) -> list:
         shapes = [one for one in self.body.shapes if one.label != "wheel"]
-        return [touching(one) for one in sorted(shapes, key=lambda one: one.label)]
+        return sorted(shapes, key=lambda one: one.label)
 
     def robot_mass(self) -> float:
         return float(self.inner.cfg.agent.mass)
@@ -275,6 +298,7 @@ class DeliveryScene(Scene):
 
     name, metric = "box-delivery-v0", "task_driven_metric:TaskDrivenMetric"
     own_limit = "200 of their steps of 1.25 m since the last box was delivered"
+    idle_limit = idle_time(1.25, 0.3)
     turns = 1.0
     drive = "differential"
 
@@ -283,8 +307,13 @@ class DeliveryScene(Scene):
             "env": {"obstacle_config": variation},
             "agent": {"action_type": "velocity"},
             "render": {"show": False, "show_obs": False},
-            "misc": {"inactivity_cutoff": idle_steps(1.25, 0.3, 0.2)},
+            "misc": {"inactivity_cutoff": idle_steps(1.25, 0.3)},
         }
+
+    @property
+    def period(self) -> float:
+        # after each action it steps twice more, to see whether anything still moves
+        return float(self.inner.dt * (self.inner.steps + 2) / self.inner.steps)
 
     def action(self, linear: float, angular: float) -> np.ndarray:
         return np.clip([linear, angular], -1.0, 1.0)
@@ -301,7 +330,7 @@ class DeliveryScene(Scene):
         return self.inner.boxes
 
     def parts(self) -> list:
-        return [touching(self.inner.robot)]
+        return [self.inner.robot]
 
     def robot_mass(self) -> float:
         return float(self.inner.cfg.agent.mass)
@@ -325,11 +354,6 @@ SCENES = {
 }
 
 
-def idle_steps(step: float, speed: float, period: float) -> int:
-    """Their idle limit, 200 heading actions of ``step`` [m] each, in velocity actions."""
-    return 200 * math.ceil(step / (speed * period) - 1e-9)
-
-
 def pose_of(body: pymunk.Body) -> list:
     """[x, y, theta] of a body."""
     x, y = body.position
@@ -344,15 +368,16 @@ def convex(points: object) -> list:
     return (corners if area > 0.0 else corners[::-1]).tolist()
 
 
-def touching(shape: pymunk.Poly) -> list:
-    """Where a polygon touches others: its corners, moved out by its radius; body frame."""
-    return hull(Polygon(shape.get_vertices()).buffer(shape.radius, join_style=2).exterior.coords)
+def outline_of(shape: pymunk.Poly, grown: float = 0.0) -> list:
+    """The corners of a polygon, moved out by ``grown`` [m]; body frame."""
+    if not grown:
+        return convex(shape.get_vertices())
+    return hull(Polygon(shape.get_vertices()).buffer(grown, join_style=2).exterior.coords)
 
 
-def centered(outline: list) -> list:
-    """An outline about its own centroid, which its corners' moving out shifts by less than 1 mm."""
-    middle = Polygon(outline).centroid
-    return [[x - middle.x, y - middle.y] for x, y in outline]
+def drawn_area(shape: pymunk.Poly) -> float:
+    """Area of a polygon without its radius [m²]."""
+    return float(Polygon(shape.get_vertices()).area)
 
 
 def hull(points: object) -> list:
@@ -361,7 +386,7 @@ def hull(points: object) -> list:
 
 
 def statics(space: pymunk.Space) -> tuple[list, list]:
-    """Polygons and thick segments of everything that stands still, with its contact radius."""
+    """Polygons and thick segments of everything that stands still, grown by their radius."""
     polygons, segments = [], []
     for shape in space.shapes:
         label = getattr(shape, "label", "")
@@ -373,7 +398,9 @@ def statics(space: pymunk.Space) -> tuple[list, list]:
             ends = {"from": [float(a.x), float(a.y)], "to": [float(b.x), float(b.y)]}
             segments.append({**ends, "radius": float(shape.radius)})
         else:
-            polygons.append(convex([to_world(corner) for corner in touching(shape)]))
+            polygons.append(
+                convex([to_world(corner) for corner in outline_of(shape, shape.radius)])
+            )
     return polygons, segments
 
 

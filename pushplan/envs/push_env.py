@@ -47,7 +47,7 @@ class PushEnv(gymnasium.Env[NDArray[Any], NDArray[Any]]):
 
     Args:
         task: name of the task.
-        simulator: name of the simulator.
+        simulator: name of the simulator, or one with numerical settings of its own.
         preset: set of dimensions of the task; the first that suits the simulator if None.
         variations: what departs from the preset, by name.
         observation: name of one of the task's observations, or a builder of one's own; the
@@ -77,7 +77,7 @@ class PushEnv(gymnasium.Env[NDArray[Any], NDArray[Any]]):
         self,
         *,
         task: str,
-        simulator: str = "pymunk",
+        simulator: str | Simulator = "pymunk",
         preset: str | None = None,
         variations: Mapping[str, object] | None = None,
         observation: str | ObservationBuilder | None = None,
@@ -86,19 +86,21 @@ class PushEnv(gymnasium.Env[NDArray[Any], NDArray[Any]]):
         seed: int | None = None,
     ) -> None:
         task_class: type[Task] = look_up("task", TASKS, task)
-        engine: type[Simulator] = look_up("simulator", SIMULATORS, simulator)
+        if isinstance(simulator, Simulator):
+            self._simulator, simulator = simulator, simulator.name
+        else:
+            self._simulator = look_up("simulator", SIMULATORS, simulator)()
         self._may_adapt = action is None
         action = chosen_action(task_class, action)
         preset = default_preset(task, simulator) if preset is None else preset
         if preset not in task_class.presets:
             raise UnknownNameError(f"preset of {task}", preset, task_class.presets)
-        self._simulator = engine()
         self._renderer = Renderer(render_mode, self._simulator)
         self.metadata, self.render_mode = self._renderer.metadata, render_mode
         variations = {} if variations is None else variations
         self._make_task = partial(task_class, preset=preset, variations=variations)
         self._use_action(action)
-        if engine.needs_solids and self.task.materials.solids is None:
+        if self._simulator.needs_solids and self.task.materials.solids is None:
             raise ScenarioError(
                 f"{task}: simulator {simulator!r} needs a third dimension, which preset "
                 f"{preset!r} has not (valid: {', '.join(task_class.solid_presets)})"

@@ -31,9 +31,11 @@ GYM_IDS: Mapping[str, str] = {
 """Gymnasium id -> task."""
 
 
-def goal_kind(task: str) -> str | None:
+def goal_kind(task: str, variations: Mapping[str, object] | None = None) -> str | None:
     """Who has the goal in a task, ``"robot"`` or ``"objects"``; None for an unknown task."""
-    kind: str | None = look_up("task", TASKS, task).goal_kind if task in TASKS else None
+    if task not in TASKS:
+        return None
+    kind: str = look_up("task", TASKS, task).goal_kind_of(variations or {})
     return kind
 
 

@@ -95,7 +95,7 @@ def _scene(episode: Episode) -> dict[str, Any]:
         "walls": [_flat(polygon) for polygon in world.static.polygons],
         "segments": [_flat(segment) for segment in segments],
         "goal": shown,
-        "robot": [_flat(part) for part in world.robot.parts],
+        "robot": [_flat(part) for part in world.robot.contact_parts],
         "objects": [_flat(world.movables.outline(k)) for k in range(len(world.movables))],
     }
 

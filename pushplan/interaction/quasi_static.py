@@ -138,6 +138,7 @@ class _Shapes:
         self.key = (
             movables.vertices.tobytes(),
             movables.offsets.tobytes(),
+            movables.contact_radii.tobytes(),
             movables.masses.tobytes(),
         )
 
@@ -152,7 +153,7 @@ class _Shapes:
 def _thinnest(robot: RobotModel, shapes: _Shapes) -> float:
     """Half diagonal of the square that is as wide as the thinnest body [m]."""
     movables = shapes.movables
-    outlines = [*robot.parts, *unflatten(movables.vertices, movables.offsets)]
+    outlines = [*robot.contact_parts, *unflatten(movables.vertices, movables.offsets)]
     floor = robot.circumscribed_radius / 30.0
     sizes = {len(outline) for outline in outlines}  # those with as many corners at once
     widths = [_width(np.stack([o for o in outlines if len(o) == size])) for size in sizes]
@@ -171,7 +172,7 @@ def _width(outlines: FloatArray) -> float:
 @functools.lru_cache(maxsize=32)
 def _bodies(robot: RobotModel, shapes: _Shapes, static: StaticMap, gyration: float) -> Bodies:
     movables = shapes.movables
-    squares = [polygon_inertia(movables.outline(k)) for k in range(len(movables))]
+    squares = [polygon_inertia(movables.drawn_outline(k)) for k in range(len(movables))]
     parts = static.convex_parts
     vertices, offsets = flatten(parts)
     boxes = [np.concatenate([part.min(axis=0), part.max(axis=0)]) for part in parts]

@@ -44,7 +44,7 @@ def footprint(robot: RobotModel, margin: float = 0.0) -> Footprint:
     if margin == 0.0:
         return Footprint(owned(robot.vertices), owned(robot.offsets), robot.circumscribed_radius)
     parts = []
-    for part in robot.parts:
+    for part in robot.contact_parts:
         grown = Polygon(part).buffer(margin, join_style="mitre")
         parts.append(convex_outline("footprint", np.asarray(grown.exterior.coords)[:-1]))
     vertices, offsets = flatten(parts)

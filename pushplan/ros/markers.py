@@ -33,7 +33,7 @@ def scene_markers(messages: Messages, world: World) -> Any:
     return _array(
         messages,
         [
-            _marker(messages, "robot", 0, base, time, world.robot.parts),
+            _marker(messages, "robot", 0, base, time, world.robot.contact_parts),
             _marker(messages, "static", 0, frame, time, world.static.convex_parts),
             _marker(messages, "goal", 0, frame, time, area),
         ],

@@ -24,7 +24,7 @@ ENDINGS = (".json", ".npz", ".npy")
 _OVERLAP = 1e-6  # floes may overlap by this fraction of the smaller one: rounding, where they touch
 
 
-def load_ice(path: str | Path, *, hull: bool = False) -> IceField:
+def load_ice(path: str | Path, *, hull: bool = False, overlaps: bool = False) -> IceField:
     """Read an ice field.
 
     - ``.json``: a list of polygons, each a list of [x, y] corners [m]; or a mapping with
@@ -39,6 +39,8 @@ def load_ice(path: str | Path, *, hull: bool = False) -> IceField:
     Args:
         path: the file.
         hull: take the convex hull of a floe that is not convex, instead of refusing it.
+        overlaps: take floes that overlap, as those of the 2D benchmark do, instead of refusing
+            them.
 
     Raises:
         SchemaError: if the file cannot be read or has another form.
@@ -61,7 +63,8 @@ def load_ice(path: str | Path, *, hull: bool = False) -> IceField:
         floes = _clean(polygons, hull)
         field = IceField(floes, _bounds(floes, bounds))
         _check_inside(field)
-        _check_apart(field)
+        if not overlaps:
+            _check_apart(field)
     except InvalidInputError as error:
         raise InvalidInputError(f"{path}: {error}") from error
     return field

@@ -32,7 +32,11 @@ _ROBOT_LIMITS = (
     "max_turn_acceleration",
     "min_turning_radius",
     "wheel_separation",
+    "contact_radius",
+    "wheel_parts",
 )
+_IF_THERE = ("contact_radius", "wheel_parts")
+"""Written only where they are not 0."""
 _GOALS: dict[str, tuple[type[Any], tuple[str, ...]]] = {
     "disc": (GoalDisc, ("center", "radius")),
     "line": (GoalLine, ("point", "normal")),
@@ -53,7 +57,7 @@ def world_to_dict(world: World) -> dict[str, Any]:
     }
     for key in _ROBOT_LIMITS:
         value = getattr(world.robot, key)
-        if math.isfinite(value):
+        if math.isfinite(value) and (value or key not in _IF_THERE):
             robot[key] = value
     assert world.robot_twist is not None
     robot["pose"] = world.robot_pose.tolist()
@@ -64,7 +68,8 @@ def world_to_dict(world: World) -> dict[str, Any]:
             "id": int(objects.ids[k]),
             "pose": objects.poses[k].tolist(),
             "twist": objects.twists[k].tolist(),
-            "outline": objects.outline(k).tolist(),
+            "outline": objects.drawn_outline(k).tolist(),
+            **({"contact_radius": float(radius)} if (radius := objects.contact_radii[k]) else {}),
             "mass": float(objects.masses[k]),
             "wheeled": bool(objects.wheeled[k]),
         }
@@ -217,10 +222,10 @@ def movables_from_list(data: object) -> Movables:
     Raises:
         SchemaError, InvalidInputError: as `world_from_dict`.
     """
-    outlines, poses, twists, masses, wheeled, ids = [], [], [], [], [], []
+    outlines, poses, twists, masses, wheeled, ids, radii = [], [], [], [], [], [], []
     for i, item in enumerate(_list("movables", data)):
         name = f"movables[{i}]"
-        valid = ("id", "pose", "twist", "outline", "polygon", "mass", "wheeled")
+        valid = ("id", "pose", "twist", "outline", "polygon", "mass", "wheeled", "contact_radius")
         known_keys(name, item, valid, ())
         if ("polygon" in item) == ("outline" in item) or ("outline" in item) != ("pose" in item):
             raise SchemaError(
@@ -240,6 +245,7 @@ def movables_from_list(data: object) -> Movables:
             mass = abs(signed_area(convex_outline(f"{name}.outline", outline)))
         masses.append(number(f"{name}.mass", mass, low=0.0, open_low=True))
         wheeled.append(item.get("wheeled", False))
+        radii.append(number(f"{name}.contact_radius", item.get("contact_radius", 0.0), low=0.0))
         ids.append(integer(f"{name}.id", item.get("id", i), high=2**63 - 1))
     return Movables.from_outlines(
         outlines,
@@ -248,6 +254,7 @@ def movables_from_list(data: object) -> Movables:
         wheeled=wheeled,
         twists=np.asarray(twists) if twists else np.zeros((0, 3)),
         ids=ids,
+        contact_radii=radii or 0.0,
     )
 
 

@@ -27,12 +27,13 @@ from pushplan.world.outline import (
     convex_outline,
     convex_outlines,
     flatten,
+    grown_outlines,
     transform,
     transform_outlines,
     well_formed,
 )
 
-_ONE_EACH = ("poses", "twists", "masses", "wheeled")
+_ONE_EACH = ("poses", "twists", "masses", "wheeled", "contact_radii")
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,8 +49,12 @@ class Movables(ArrayRecord, CheckedFields):
         twists: (K, 3) velocities in the world frame [m/s, m/s, rad/s].
         masses: (K,) masses as the metrics count them [kg], positive.
         wheeled: (K,) whether the object stands on casters and rolls.
-        vertices: (V, 2) convex outlines in body frames, flattened, counter-clockwise [m].
-        offsets: (K + 1,) where each outline starts in ``vertices``.
+        drawn_vertices: (V, 2) convex outlines as drawn, in body frames, flattened,
+            counter-clockwise [m].
+        drawn_offsets: (K + 1,) where each outline starts in ``drawn_vertices``.
+        contact_radii: (K,) distances from the drawn outlines at which objects touch others [m]:
+            they are rounded by them. `vertices` are grown by them, and everything but masses,
+            goals and files reads those.
 
     Raises:
         InvalidInputError: if shapes disagree, an outline is not convex or off its centroid.
@@ -62,28 +67,33 @@ class Movables(ArrayRecord, CheckedFields):
     twists: Annotated[FloatArray, Shape("K", 3)]
     masses: Annotated[FloatArray, Shape("K")]
     wheeled: Annotated[BoolArray, Shape("K")]
-    vertices: Annotated[FloatArray, Shape(None, 2)]
-    offsets: Annotated[IntArray, Shape(None)]
+    drawn_vertices: Annotated[FloatArray, Shape(None, 2)]
+    drawn_offsets: Annotated[IntArray, Shape(None)]
+    contact_radii: Annotated[FloatArray, Shape("K")]
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        array("movables.offsets", self.offsets, (len(self.ids) + 1,), dtype=np.int64)
+        array("movables.drawn_offsets", self.drawn_offsets, (len(self.ids) + 1,), dtype=np.int64)
         if len(np.unique(self.ids)) != len(self.ids):
             raise InvalidInputError(f"movables.ids must be distinct, got {self.ids.tolist()}")
         if (self.masses <= 0.0).any():
             raise InvalidInputError(f"movables.masses must be positive, got {self.masses.min()}")
-        if self.offsets[0] != 0 or self.offsets[-1] != len(self.vertices):
-            raise InvalidInputError("movables.offsets must run from 0 to the number of vertices")
+        if (self.contact_radii < 0.0).any():
+            least = self.contact_radii.min()
+            raise InvalidInputError(f"movables.contact_radii must not be negative, got {least}")
+        if self.drawn_offsets[0] != 0 or self.drawn_offsets[-1] != len(self.drawn_vertices):
+            raise InvalidInputError("movables.drawn_offsets must run from 0 to len(drawn_vertices)")
         self._check_outlines()
 
     def _check_outlines(self) -> None:
-        good = well_formed(self.vertices, self.offsets)
+        vertices, offsets = self.drawn_vertices, self.drawn_offsets
+        good = well_formed(vertices, offsets)
         if not good.all():
             k = int(np.argmin(good))
             name = f"outline of movable {self.ids[k]}"
-            convex_outline(name, self.vertices[self.offsets[k] : self.offsets[k + 1]])
+            convex_outline(name, vertices[offsets[k] : offsets[k + 1]])
             raise InvalidInputError(f"{name} must be counter-clockwise")
-        _, centres = areas_and_centroids(self.vertices, self.offsets)
+        _, centres = areas_and_centroids(vertices, offsets)
         for k in np.flatnonzero(np.abs(centres).max(axis=1) > 1e-6 * self.radii).tolist():
             raise InvalidInputError(
                 f"outline of movable {self.ids[k]} must have its centroid at the body origin, it "
@@ -109,17 +119,19 @@ class Movables(ArrayRecord, CheckedFields):
         wheeled: ArrayLike | None = None,
         twists: ArrayLike | None = None,
         ids: ArrayLike | None = None,
+        contact_radii: ArrayLike = 0.0,
     ) -> Movables:
         """Objects from body-frame outlines whose centroid is the body origin.
 
         Args:
-            outlines: K convex outlines, each (N, 2) [m].
+            outlines: K convex outlines as drawn, each (N, 2) [m].
             poses: (K, 3) x, y [m], theta [rad].
             masses: (K,) [kg]; by default area times ``density``.
             density: [kg/m²].
             wheeled: (K,) flags, by default all false.
             twists: (K, 3), by default zero.
             ids: (K,), by default 0 to K - 1.
+            contact_radii: (K,), or one for all [m].
         """
         clean = convex_outlines("outline", outlines)
         vertices, offsets = flatten(clean)
@@ -133,8 +145,9 @@ class Movables(ArrayRecord, CheckedFields):
             twists=np.asarray(np.zeros((count, 3)) if twists is None else twists),
             masses=np.asarray(masses),
             wheeled=np.asarray(np.zeros(count, dtype=bool) if wheeled is None else wheeled),
-            vertices=vertices,
-            offsets=offsets,
+            drawn_vertices=vertices,
+            drawn_offsets=offsets,
+            contact_radii=np.broadcast_to(np.asarray(contact_radii), (count,)),
         )
 
     @classmethod
@@ -146,6 +159,7 @@ class Movables(ArrayRecord, CheckedFields):
         density: float = 1.0,
         wheeled: ArrayLike | None = None,
         ids: ArrayLike | None = None,
+        contact_radii: ArrayLike = 0.0,
     ) -> Movables:
         """Objects from convex polygons in the world frame, as perception reports them.
 
@@ -156,11 +170,38 @@ class Movables(ArrayRecord, CheckedFields):
         poses = np.column_stack([centres, np.zeros(len(clean))])
         outlines = [c - centre for c, centre in zip(clean, centres, strict=True)]
         return cls.from_outlines(
-            outlines, poses, masses=masses, density=density, wheeled=wheeled, ids=ids
+            outlines,
+            poses,
+            masses=masses,
+            density=density,
+            wheeled=wheeled,
+            ids=ids,
+            contact_radii=contact_radii,
         )
 
+    @cached_property
+    def _contact_outlines(self) -> tuple[FloatArray, IntArray]:
+        if not self.contact_radii.any():
+            return self.drawn_vertices, self.drawn_offsets
+        grown = grown_outlines(self.drawn_vertices, self.drawn_offsets, self.contact_radii)
+        return frozen(grown[0]), frozen(grown[1])
+
+    @property
+    def vertices(self) -> FloatArray:
+        """(V, 2) outlines as others touch them: grown by the contact radii, not rounded [m]."""
+        return self._contact_outlines[0]
+
+    @property
+    def offsets(self) -> IntArray:
+        """(K + 1,) where each outline starts in `vertices`."""
+        return self._contact_outlines[1]
+
+    def drawn_outline(self, k: int) -> FloatArray:
+        """(N, 2) corners of object ``k`` as drawn, in its body frame [m]."""
+        return self.drawn_vertices[self.drawn_offsets[k] : self.drawn_offsets[k + 1]]
+
     def outline(self, k: int) -> FloatArray:
-        """(N, 2) corners of object ``k`` in its body frame [m]."""
+        """(N, 2) corners of object ``k`` as others touch it, in its body frame [m]."""
         return self.vertices[self.offsets[k] : self.offsets[k + 1]]
 
     def outline_world(self, k: int) -> FloatArray:
@@ -223,11 +264,10 @@ class Movables(ArrayRecord, CheckedFields):
             return clone
         values = {
             name: np.concatenate([getattr(self, name), getattr(changes, name)])
-            for name in (*_ONE_EACH, "ids", "vertices")
+            for name in (*_ONE_EACH, "ids", "drawn_vertices")
         }
-        values["offsets"] = np.concatenate(
-            [self.offsets, self.offsets[-1] + changes.offsets[1:]], dtype=np.int64
-        )
+        more = self.drawn_offsets[-1] + changes.drawn_offsets[1:]
+        values["drawn_offsets"] = np.concatenate([self.drawn_offsets, more], dtype=np.int64)
         index = np.arange(len(self))
         index[at[known]] = len(self) + known
         kept = np.ones(len(self), dtype=np.bool_)
@@ -244,11 +284,13 @@ class Movables(ArrayRecord, CheckedFields):
     def _gathered(self, index: IntArray) -> Movables:
         """The objects (N,) at an index each, which are distinct."""
         values = {name: frozen(getattr(self, name)[index]) for name in (*_ONE_EACH, "ids")}
-        counts = np.diff(self.offsets)[index]
+        counts = np.diff(self.drawn_offsets)[index]
         offsets = np.zeros(len(index) + 1, dtype=np.int64)
         np.cumsum(counts, out=offsets[1:])
-        corners = np.arange(offsets[-1]) + np.repeat(self.offsets[index] - offsets[:-1], counts)
-        values["vertices"], values["offsets"] = frozen(self.vertices[corners]), frozen(offsets)
+        starts = self.drawn_offsets[index]
+        corners = np.arange(offsets[-1]) + np.repeat(starts - offsets[:-1], counts)
+        values["drawn_vertices"] = frozen(self.drawn_vertices[corners])
+        values["drawn_offsets"] = frozen(offsets)
         return self._unchecked(values)
 
     def _index_of(self, ids: IntArray) -> IntArray:
@@ -264,8 +306,9 @@ class Movables(ArrayRecord, CheckedFields):
         return np.argsort(self.ids)
 
     def _has_outlines_of(self, others: Movables, at: IntArray) -> bool:
-        return all(
-            np.array_equal(self.outline(k), others.outline(j)) for j, k in enumerate(at.tolist())
+        return np.array_equal(self.contact_radii[at], others.contact_radii) and all(
+            np.array_equal(self.drawn_outline(k), others.drawn_outline(j))
+            for j, k in enumerate(at.tolist())
         )
 
     @cached_property

@@ -67,9 +67,19 @@ def grown_outline(corners: FloatArray, margin: float) -> FloatArray:
     It holds all points within the margin, with a corner for each corner and two for sharp ones
     (that turn by more than 100 degrees); at corners it reaches at most 1.56 margins away.
     """
-    edges = np.roll(corners, -1, axis=0) - corners
-    after = edges / np.hypot(edges[:, 0], edges[:, 1])[:, None]  # (N, 2) directions
-    before = np.roll(after, 1, axis=0)
+    return grown_outlines(corners, np.array([0, len(corners)]), np.array([margin]))[0]
+
+
+def grown_outlines(
+    vertices: FloatArray, offsets: IntArray, margins: FloatArray
+) -> tuple[FloatArray, IntArray]:
+    """`grown_outline` of each of K flattened outlines by its own margin (K,) [m]."""
+    corners, following = vertices, next_corner(offsets)
+    margin = np.repeat(margins, np.diff(offsets))[:, None]
+    edges = corners[following] - corners
+    after = edges / np.hypot(edges[:, 0], edges[:, 1])[:, None]  # (V, 2) directions
+    before = np.empty_like(after)
+    before[following] = after
     turns = np.arctan2(
         before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0], (before * after).sum(axis=1)
     )
@@ -78,9 +88,9 @@ def grown_outline(corners: FloatArray, margin: float) -> FloatArray:
     outward = np.array([[0.0, -1.0], [1.0, 0.0]])  # a direction times this points outwards
     first = corners + margin * (before @ outward + reach * before)
     second = corners + margin * (after @ outward - reach * after)
-    keep = np.column_stack([np.ones(len(corners), dtype=np.bool_), sharp])
-    corners_of_both: FloatArray = np.stack([first, second], axis=1)[keep]
-    return corners_of_both
+    keep = np.column_stack([np.ones(len(corners), dtype=np.bool_), sharp & (margin[:, 0] > 0.0)])
+    grown_offsets: IntArray = np.concatenate([[0], np.cumsum(keep.sum(axis=1))])[offsets]
+    return np.stack([first, second], axis=1)[keep], grown_offsets
 
 
 def convex_outlines(name: str, outlines: Sequence[ArrayLike]) -> list[FloatArray]:

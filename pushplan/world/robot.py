@@ -12,8 +12,14 @@ from typing import Annotated
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pushplan.world.checked_fields import CheckedFields, Limits, NonNegativeFloat, PositiveFloat
-from pushplan.world.checks import ArrayRecord, FloatArray, IntArray, choice, number
+from pushplan.world.checked_fields import (
+    CheckedFields,
+    Limits,
+    NonNegativeFloat,
+    NonNegativeInt,
+    PositiveFloat,
+)
+from pushplan.world.checks import ArrayRecord, FloatArray, IntArray, choice, frozen, number
 from pushplan.world.errors import InvalidInputError
 from pushplan.world.outline import convex_outline, flatten, grown_outline
 
@@ -37,7 +43,7 @@ class RobotModel(ArrayRecord, CheckedFields):
     """Footprint, mass and motion limits of a robot. Body frame: x forward, y left.
 
     Args:
-        parts: convex parts of the footprint, each (N, 2) corners in the body frame [m].
+        parts: convex parts of the footprint as drawn, each (N, 2) corners in the body frame [m].
         mass: mass as the metrics count it [kg].
         drive: how it may move.
         max_speed: greatest forward speed [m/s]; the speed itself for a constant-speed drive.
@@ -48,6 +54,11 @@ class RobotModel(ArrayRecord, CheckedFields):
         max_turn_acceleration: limit of |dω/dt| [rad/s²].
         min_turning_radius: of a car, to the body origin, at any speed [m]; 0 for other drives.
         wheel_separation: distance between the driven wheels [m], 0 if there are none.
+        contact_radius: distance [m] from the drawn parts at which they touch others: they are
+            rounded by it. `contact_parts` are grown by it, and everything but pictures and files
+            reads those.
+        wheel_parts: how many of the last parts are wheels, which push objects but do not count at
+            what is static; planar simulators heed it, planners keep all parts clear.
         name: for logs and pictures.
 
     Raises:
@@ -66,6 +77,8 @@ class RobotModel(ArrayRecord, CheckedFields):
     max_turn_acceleration: Acceleration = math.inf
     min_turning_radius: NonNegativeFloat = 0.0
     wheel_separation: NonNegativeFloat = 0.0
+    contact_radius: NonNegativeFloat = 0.0
+    wheel_parts: NonNegativeInt = 0
     name: str = "robot"
 
     def __post_init__(self) -> None:
@@ -80,6 +93,11 @@ class RobotModel(ArrayRecord, CheckedFields):
             put(self, "min_speed", self.max_speed)
         else:  # it has to be able to stop
             number("robot.min_speed", self.min_speed, high=0.0)
+        if self.wheel_parts >= len(self.parts):
+            raise InvalidInputError(
+                f"robot.wheel_parts must be less than the number of parts, {len(self.parts)}, "
+                f"got {self.wheel_parts}"
+            )
         if (self.drive is Drive.CAR) != (self.min_turning_radius > 0.0):
             raise InvalidInputError(
                 "robot.min_turning_radius must be positive for a car and 0 for other drives, "
@@ -106,12 +124,19 @@ class RobotModel(ArrayRecord, CheckedFields):
         return replace(self, parts=tuple(grown_outline(part, margin) for part in self.parts))
 
     @cached_property
+    def contact_parts(self) -> tuple[FloatArray, ...]:
+        """Parts of the footprint as others touch them: grown by the contact radius, not rounded."""
+        if self.contact_radius == 0.0:
+            return self.parts
+        return tuple(frozen(grown_outline(part, self.contact_radius)) for part in self.parts)
+
+    @cached_property
     def _flat(self) -> tuple[FloatArray, IntArray]:
-        return flatten(self.parts)
+        return flatten(self.contact_parts)
 
     @property
     def vertices(self) -> FloatArray:
-        """(V, 2) corners of all parts in the body frame [m], one part after the other."""
+        """(V, 2) corners of all contact parts in the body frame [m], one after the other."""
         return self._flat[0]
 
     @property
@@ -128,7 +153,7 @@ class RobotModel(ArrayRecord, CheckedFields):
     def inscribed_radius(self) -> float:
         """Radius [m] of the largest disc about the body origin inside one part, 0 if none."""
         best = 0.0
-        for part in self.parts:
+        for part in self.contact_parts:
             edges = np.roll(part, -1, axis=0) - part
             # distance of the origin to each edge line, positive inside a counter-clockwise part
             inside = (edges[:, 1] * part[:, 0] - edges[:, 0] * part[:, 1]) / np.hypot(

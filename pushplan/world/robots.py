@@ -20,7 +20,9 @@ BUMPERS = ("none", "collector", "pusher", "navigation")
 """Inward-curved (keeps boxes in), straight edge, outward-curved (sheds boxes to the sides)."""
 _SEGMENTS = 6
 _LIMITS = tuple(
-    field.name for field in fields(RobotModel) if field.name not in ("parts", "drive", "name")
+    field.name
+    for field in fields(RobotModel)
+    if field.name not in ("parts", "drive", "name", "wheel_parts")
 )
 
 
@@ -36,7 +38,7 @@ def turtlebot3_burger(
     body = _box(-0.069, 0.069, 0.0915)
     parts = [body, *_bumper(bumper, 0.069, 0.0915, 0.1, 0.03, 0.02)]
     own = {"mass": 1.07, "max_speed": 0.22, "max_turn_rate": 2.84, "wheel_separation": 0.16}
-    return _robot("turtlebot3", parts, drive, own, limits)
+    return make_robot("turtlebot3", parts, drive, own, limits)
 
 
 def jackal(
@@ -58,7 +60,7 @@ def jackal(
         "max_turn_acceleration": 25.0,
         "wheel_separation": 0.3756,
     }
-    return _robot("jackal", parts, drive, own, limits)
+    return make_robot("jackal", parts, drive, own, limits)
 
 
 def maze_robot(drive: Drive | str = Drive.CONSTANT_SPEED, **limits: float) -> RobotModel:
@@ -68,7 +70,7 @@ def maze_robot(drive: Drive | str = Drive.CONSTANT_SPEED, **limits: float) -> Ro
         *((-0.7, 0.5), (-0.7, -0.5), (-0.6, -0.6), (0.6, -0.6)),
     ]
     own = {"mass": 1.0, "max_speed": 0.15, "max_turn_rate": 0.105, "wheel_separation": 1.0}
-    return _robot("maze robot", [np.array(octagon)], drive, own, limits)
+    return make_robot("maze robot", [np.array(octagon)], drive, own, limits)
 
 
 def box_delivery_robot(drive: Drive | str = Drive.DIFFERENTIAL, **limits: float) -> RobotModel:
@@ -76,9 +78,9 @@ def box_delivery_robot(drive: Drive | str = Drive.DIFFERENTIAL, **limits: float)
 
     The benchmark turns by at most (pi / 2) / 15 in a control step of 0.2 s.
     """
-    parts = [_box(-0.31, 0.26, 0.35), _trapezium(0.20, 0.39, 0.31, 0.53)]
+    parts = [_box(-0.31, 0.26, 0.35), trapezium(0.20, 0.39, 0.31, 0.53)]
     own = {"mass": 1.0, "max_speed": 0.3, "max_turn_rate": np.pi / 6.0, "wheel_separation": 0.5}
-    return _robot("box-delivery robot", parts, drive, own, limits)
+    return make_robot("box-delivery robot", parts, drive, own, limits)
 
 
 def area_clearing_robot(drive: Drive | str = Drive.DIFFERENTIAL, **limits: float) -> RobotModel:
@@ -86,18 +88,23 @@ def area_clearing_robot(drive: Drive | str = Drive.DIFFERENTIAL, **limits: float
 
     The benchmark turns by at most (pi / 2) / 15 in a control step of 0.2 s.
     """
-    parts = [_box(-0.7, 0.6, 0.8), _trapezium(0.45, 0.9, 0.7, 1.2)]
+    parts = [_box(-0.7, 0.6, 0.8), trapezium(0.45, 0.9, 0.7, 1.2)]
     own = {"mass": 1.0, "max_speed": 0.2, "max_turn_rate": np.pi / 6.0, "wheel_separation": 1.2}
-    return _robot("area-clearing robot", parts, drive, own, limits)
+    return make_robot("area-clearing robot", parts, drive, own, limits)
 
 
-def _robot(
+def make_robot(
     name: str,
     parts: list[FloatArray],
     drive: Drive | str,
     own: dict[str, float],
     limits: dict[str, float],
 ) -> RobotModel:
+    """A robot with its own limits where no others are asked for.
+
+    Raises:
+        UnknownNameError: if there is no such limit.
+    """
     for key in limits:
         if key not in _LIMITS:
             raise UnknownNameError("limit of a robot", key, _LIMITS)
@@ -113,7 +120,8 @@ def _box(back: float, front: float, half: float) -> FloatArray:
     return np.array([(back, -half), (front, -half), (front, half), (back, half)])
 
 
-def _trapezium(back: float, back_half: float, front: float, front_half: float) -> FloatArray:
+def trapezium(back: float, back_half: float, front: float, front_half: float) -> FloatArray:
+    """(4, 2) corners [m] of a shape that is symmetric about x."""
     return np.array(
         [(back, -back_half), (front, -front_half), (front, front_half), (back, back_half)]
     )
@@ -134,7 +142,7 @@ def _bumper(
     if kind == "none":
         return []
     if kind == "pusher":
-        return [_trapezium(back, body_half, back + depth, half)]
+        return [trapezium(back, body_half, back + depth, half)]
     fraction = np.linspace(-1.0, 1.0, _SEGMENTS + 1)  # parabolic edges: 3 mm off a circle at most
     if kind == "navigation":
         nose = back + 0.5 * depth + 1.5 * curve * (1.0 - fraction**2)

@@ -21,7 +21,7 @@ from pushplan.world.goals import (
     Receptacle,
 )
 from pushplan.world.movables import Movables
-from pushplan.world.outline import transform
+from pushplan.world.outline import transform, transform_outlines
 from pushplan.world.robot import RobotModel
 from pushplan.world.static_map import StaticMap
 
@@ -100,17 +100,18 @@ class World(ArrayRecord, CheckedFields):
 
     @property
     def completed(self) -> BoolArray:
-        """(K,) whether each object is where the goal wants it: delivered, or off the area.
+        """(K,) whether each object, as drawn, is where the goal wants it: delivered, or off.
 
         Raises:
             InvalidInputError: if the goal is one for the robot.
         """
-        movables = self.movables
-        return self.manipulation_goal.contains_each(movables.vertices_world, movables.offsets)
+        objects = self.movables
+        corners = transform_outlines(objects.poses, objects.drawn_vertices, objects.drawn_offsets)
+        return self.manipulation_goal.contains_each(corners, objects.drawn_offsets)
 
     def robot_outline_world(self) -> tuple[FloatArray, ...]:
         """Footprint parts, each (N, 2) corners in the world frame [m]."""
-        return tuple(transform(self.robot_pose, part) for part in self.robot.parts)
+        return tuple(transform(self.robot_pose, part) for part in self.robot.contact_parts)
 
     def moved(
         self,

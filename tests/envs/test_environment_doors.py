@@ -26,7 +26,7 @@ from pushplan.world import (
     ("wrong", "text"),
     [
         ({"preset": []}, "unknown preset of box_delivery"),
-        ({"preset": 3}, "valid: benchmark, testbed"),
+        ({"preset": 3}, "valid: benchmark, original, testbed"),
         ({"action": 3}, "unknown action"),
         ({"observation": 3}, "valid: image, spatial, state"),
         ({"variations": 5}, "variations must be a mapping, got 5"),

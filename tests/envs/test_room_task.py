@@ -10,10 +10,24 @@ import pytest
 import shapely
 
 from pushplan.envs import PushEnv
+from pushplan.envs.registry import goal_kind
 from pushplan.envs.tasks.room import small_room
 from pushplan.evaluation import Experiment, bench
-from pushplan.scenarios import world_suite
-from pushplan.world import GoalDisc, GoalLine, ScenarioError, SchemaError, World, save_world
+from pushplan.scenarios import Scenario, world_suite
+from pushplan.world import (
+    ClearanceArea,
+    Drive,
+    GoalDisc,
+    GoalLine,
+    Receptacle,
+    RobotModel,
+    ScenarioError,
+    SchemaError,
+    StaticMap,
+    World,
+    save_world,
+)
+from pushplan.world.goals import Goal
 
 ROOM = Path(__file__).parents[2] / "examples" / "room.yaml"
 
@@ -110,6 +124,82 @@ def test_what_makes_no_sense_is_said(
 def test_a_file_that_is_not_there() -> None:
     with pytest.raises(ScenarioError, match="cannot read world file"):
         room(Path("nothere.yaml"))
+
+
+SQUARE = np.array([(1.0, 0.0), (3.0, 0.0), (3.0, 1.2), (1.0, 1.2)])
+
+
+def boxes_ahead(goal: Goal, path: Path) -> PushEnv:
+    """The small room without its column and one box ahead of the robot."""
+    plain = small_room()
+    static = replace(plain.static, polygons=())
+    world = replace(plain, static=static, movables=plain.movables.select([0]), goal=goal)
+    save_world(world, path)
+    return room(path, idle_limit=30.0)
+
+
+@pytest.mark.parametrize(
+    ("goal", "leaves"),
+    [
+        (ClearanceArea(np.array([(1, 0.2), (2, 0.2), (2, 1), (1, 1)]), [True] * 4), False),
+        (Receptacle(np.array([(2.2, 0), (3, 0), (3, 1.2), (2.2, 1.2)])), True),
+    ],
+)
+def test_objects_have_goals_too(tmp_path: Path, goal: Goal, leaves: bool) -> None:
+    env = boxes_ahead(goal, tmp_path / "a.json")
+    assert env.task.goal_kind == "objects"
+    world = start(env)
+    scores, total, over = [], 0.0, False
+    while not over and len(scores) < 300:
+        _, reward, over, late, info = env.step(np.array([1.0, 0.0], np.float32))
+        total += reward
+        scores.append(info["completed"].tolist())
+        assert not late
+    assert info["success"] and info["reason"] == "done" and scores[-1] == [True]
+    assert len(env.world.movables) == (0 if leaves else 1) and len(world.movables) == 1
+    assert total == pytest.approx(150.0 + 10.0 + 200.0, abs=8.0)
+
+
+def test_without_progress_it_ends(tmp_path: Path) -> None:
+    env = boxes_ahead(Receptacle(SQUARE + np.array((1.2, 1.5))), tmp_path / "a.json")
+    start(env)
+    while not env.step(np.zeros(2, np.float32))[3]:
+        pass
+    assert env.world.time == pytest.approx(30.0)
+
+
+def test_rows_of_rooms_have_the_metrics_of_their_goal(tmp_path: Path) -> None:
+    boxes_ahead(Receptacle(SQUARE + np.array((0.0, 1.5))), tmp_path / "a.json")
+    variations = {"world_file": str(tmp_path / "a.json"), "time_limit": 1.0}
+    results = bench([Scenario("room", variations=variations)], ["greedy"], workers=0)
+    good = [row for row in results.rows if row.policy == "greedy"]
+    assert "E_manip" in good[0].metrics and "E_nav" not in good[0].metrics
+    assert goal_kind("room", variations) == "objects" and goal_kind("room") == "robot"
+
+
+def test_open_water_ends_at_its_sides(tmp_path: Path) -> None:
+    ship = RobotModel.from_outline(
+        0.1 * np.array([(1, 0), (-1, 1), (-1, -1)]),
+        mass=1.0,
+        drive=Drive.CONSTANT_SPEED,
+        max_speed=0.5,
+        max_turn_rate=1.0,
+    )
+    world = replace(
+        small_room(),
+        robot=ship,
+        static=StaticMap.build(bounds=(0.0, 0.0, 1.0, 9.0)),
+        goal=GoalLine(np.array([0.5, 3.0]), np.array([0.0, 1.0])),
+    )
+    for theta, reason in ((np.pi / 2, "goal"), (0.0, "left_map")):
+        save_world(world.moved(robot_pose=[0.6, 0.6, theta]), tmp_path / "a.json")
+        env = room(tmp_path / "a.json")
+        start(env)
+        over = False
+        while not over:
+            *_, over, late, info = env.step(np.zeros(2, np.float32))
+            assert not late
+        assert info["reason"] == reason and info["success"] == (reason == "goal")
 
 
 class TestSuites:

@@ -60,7 +60,8 @@ class Momentum:
         """For the robot and all objects of a world."""
         movables = world.movables
         moments = [
-            mass * polygon_inertia(movables.outline(k)) for k, mass in enumerate(movables.masses)
+            mass * polygon_inertia(movables.drawn_outline(k))
+            for k, mass in enumerate(movables.masses)
         ]
         inertia = np.ones((1 + len(movables), 2))
         inertia[1:, 0], inertia[1:, 1] = movables.masses, moments

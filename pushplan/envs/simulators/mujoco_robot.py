@@ -38,7 +38,7 @@ def caster_position(robot: RobotModel) -> float:
 
     At the rear, unless most of the chassis is ahead of the axle.
     """
-    x = robot.parts[0][:, 0]
+    x = robot.contact_parts[0][:, 0]
     rear, front = float(-x.min()), float(x.max())
     return -0.85 * rear if rear >= 0.5 * front else 0.85 * front
 
@@ -57,8 +57,9 @@ def add_wheeled_robot(
     caster = caster_position(robot)
     height = solids.robot_height
     wheel_mass = _WHEEL_MASS * mass
-    middle = [_BALANCE * caster, centroid(robot.parts[0])[1], _MASS_HEIGHT * height - radius]
-    set_mass(body, robot.parts[0], height, mass - 2.0 * wheel_mass, middle)
+    hull = robot.contact_parts[0]
+    middle = [_BALANCE * caster, centroid(hull)[1], _MASS_HEIGHT * height - radius]
+    set_mass(body, hull, height, mass - 2.0 * wheel_mass, middle)
     low = _CLEARANCE * radius
     add_hull(spec, body, robot, materials, solids, low=low, ground=radius)
     ball = _CASTER * radius
@@ -144,7 +145,7 @@ def add_hull(
     """
     palette = FLOOR_PALETTE if materials.water is None else WATER_PALETTE
     meets = FLOOR_BIT | STATIC_BIT | OBJECT_BIT
-    for i, part in enumerate(robot.parts):
+    for i, part in enumerate(robot.contact_parts):
         top = solids.bumper_height if i else solids.robot_height
         color = color_of(palette.bumper if i else palette.robot)
         surface = Surface(ROBOT_BIT, meets, materials.robot_object, 2, color)
@@ -157,7 +158,7 @@ def add_ship(
 ) -> None:
     """A floating body with thrusters that hold its speed ahead, sideways and its turn rate."""
     body = add_floating(spec, "robot")
-    hull = robot.parts[0]
+    hull = robot.contact_parts[0]
     set_mass(body, hull, solids.robot_height, robot.mass, [*centroid(hull), 0.0])
     half = 0.5 * solids.object_height
     add_hull(spec, body, robot, materials, solids, low=-half, ground=0.0)

@@ -17,6 +17,7 @@ from pushplan.world import World
 from pushplan.world.checks import FloatArray, IntArray
 
 ROBOT, OBJECT, STATIC = 1, 2, 3
+_GROUND = 1 << 31  # category of what is static, which wheels do not meet
 CORRECTION = 0.2
 """Fraction of an overlap beyond the slop that is taken back in one substep."""
 _POSE_AND_TWIST = (
@@ -131,14 +132,18 @@ class PymunkBodies:
             shapes.append(pymunk.Segment(ground, tuple(line[:2]), tuple(line[2:]), radius))
         for shape in shapes:
             shape.friction, shape.collision_type = friction, STATIC
+            shape.filter = pymunk.ShapeFilter(categories=_GROUND)
         self.space.add(*shapes)
 
     def _make_robot(self, world: World, friction: float) -> list[pymunk.Shape]:
         shapes: list[pymunk.Shape] = []
-        for part in world.robot.parts:
-            shape = pymunk.Poly(self.robot, part.tolist())
+        robot = world.robot
+        for part in robot.parts:
+            shape = pymunk.Poly(self.robot, part.tolist(), radius=robot.contact_radius)
             shape.friction, shape.collision_type = friction, ROBOT
             shapes.append(shape)
+        for wheel in shapes[len(shapes) - robot.wheel_parts :]:
+            wheel.filter = pymunk.ShapeFilter(mask=pymunk.ShapeFilter.ALL_MASKS() ^ _GROUND)
         return shapes
 
     def _make_objects(
@@ -147,10 +152,10 @@ class PymunkBodies:
         movables = world.movables
         made: list[tuple[pymunk.Body, pymunk.Shape]] = []
         for k in range(len(movables)):
-            outline = movables.outline(k).tolist()
+            outline, radius = movables.drawn_outline(k).tolist(), float(movables.contact_radii[k])
             mass = float(movables.masses[k])
             body = pymunk.Body(mass, pymunk.moment_for_poly(mass, outline))
-            shape = pymunk.Poly(body, outline)
+            shape = pymunk.Poly(body, outline, radius=radius)
             shape.friction, shape.collision_type = friction, OBJECT
             made.append((body, shape))
         return made
@@ -255,13 +260,14 @@ class PymunkBodies:
         self._step(h)
 
     def march(
-        self, chord: float, heading: float, w: float, h: float, count: int
+        self, chord: float, heading: float, held: float | None, w: float, h: float, count: int
     ) -> tuple[int, float]:
         """Substeps on an arc; the last one is the first in which something static is touched.
 
         Args:
             chord: speed along the chord of a substep [m/s].
             heading: of the robot [rad].
+            held: direction that it keeps while it turns [rad]; None on an arc.
             w: turn rate [rad/s].
             h: length of a substep [s].
             count: how many at most.
@@ -271,7 +277,7 @@ class PymunkBodies:
         """
         contacts, half = self._contacts, 0.5 * w * h
         for i in range(1, count + 1):
-            middle = heading + half
+            middle = heading + half if held is None else held
             self.drive(chord * math.cos(middle), chord * math.sin(middle), w)
             self.advance(h)
             heading += w * h

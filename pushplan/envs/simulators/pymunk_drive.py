@@ -35,6 +35,9 @@ class PymunkOptions(CheckedFields):
         decay: fraction of its speed that a rolling or floating object may lose in one substep.
         iterations: sweeps of the contact solver in each substep.
         samples: poses recorded in each call of `PymunkSimulator.step`, at even intervals.
+        holds_direction: whether the robot keeps the direction in the world that it had when a
+            command began, and turns beside that, as in the code of the 2D benchmark; else its
+            velocity turns with it, on an arc.
     """
 
     field_prefix = "pymunk "
@@ -45,6 +48,7 @@ class PymunkOptions(CheckedFields):
     decay: _Small = 0.04
     iterations: PositiveInt = 10
     samples: PositiveInt = 8
+    holds_direction: bool = False
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -87,6 +91,7 @@ class PymunkDriver:
         self._bodies = bodies
         self._radius = robot.circumscribed_radius
         self._limit = options.tolerance * size
+        self._holds_direction = options.holds_direction
         self._deepest = 0.0
         self._measured = False
         self._yielding = 0.0
@@ -142,7 +147,8 @@ class PymunkDriver:
         h = duration / (samples * each)
         half = 0.5 * w * h
         # the chord of an arc is shorter than the arc by sin(x) / x
-        chord = command.linear * (math.sin(half) / half if half else 1.0)
+        held = float(start[0, 2]) if self._holds_direction else None
+        chord = command.linear * (math.sin(half) / half if half and held is None else 1.0)
         bodies.load(active, start)
         self.held = False
         rows = np.empty((samples, *start.shape))
@@ -154,12 +160,12 @@ class PymunkDriver:
                 first = i == 0 and j == 0
                 # a jam needs something static, so most substeps do without a way back
                 if not (first or careful or bodies.static_contacts):
-                    done, heading = bodies.march(advancing, heading, w, h, each - j)
+                    done, heading = bodies.march(advancing, heading, held, w, h, each - j)
                     j += done
                     if not self._sound(self._limit):
                         return None
                     continue
-                middle = heading + half
+                middle = heading + half if held is None else held
                 vx, vy = advancing * math.cos(middle), advancing * math.sin(middle)
                 outcome = self._substep(vx, vy, w, h, first=first)
                 if outcome is _Moved.NOTHING:  # nor will it in the rest of the step

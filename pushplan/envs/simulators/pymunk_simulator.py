@@ -119,10 +119,14 @@ class PymunkSimulator(Simulator):
         x, y, theta = self._rows[0, :3].tolist()
         turn = command.angular * duration / samples
         half = 0.5 * turn
-        chord = command.linear * duration / samples * (math.sin(half) / half if half else 1.0)
+        chord = command.linear * duration / samples
+        held = theta if self.options.holds_direction else None
+        if held is None and half:
+            chord *= math.sin(half) / half
         for i in range(samples):
-            x += chord * math.cos(theta + half)
-            y += chord * math.sin(theta + half)
+            middle = theta + half if held is None else held
+            x += chord * math.cos(middle)
+            y += chord * math.sin(middle)
             theta += turn
             poses[i] = x, y, theta
         v = command.linear

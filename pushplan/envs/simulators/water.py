@@ -127,7 +127,7 @@ def coasting(
 def _hull_inertia(world: World) -> float:
     """Polar second moment of the robot's footprint about its origin, per unit mass [m²]."""
     total = moment = 0.0
-    for part in world.robot.parts:
+    for part in world.robot.contact_parts:
         area = polygon_area(owned(part))
         x, y = polygon_centroid(part)
         total += area

@@ -9,6 +9,7 @@ from functools import partial
 from pushplan.envs.tasks.manipulation import ManipulationPreset
 from pushplan.envs.tasks.materials import BENCHMARK_MATERIALS, TESTBED_MATERIALS
 from pushplan.world import area_clearing_robot, turtlebot3_burger
+from pushplan.world.original_robots import CONTACT_RADIUS, original_area_clearing_robot
 
 
 @dataclass(frozen=True)
@@ -73,6 +74,23 @@ BENCHMARK = AreaClearingPreset(
     start_margin=1.0,
 )
 
+_WALL_RADIUS = 0.1
+
+ORIGINAL = replace(
+    BENCHMARK,
+    robots={"original": original_area_clearing_robot},
+    layouts={
+        name: replace(one, outer=(one.outer[0] - _WALL_RADIUS, one.outer[1] - _WALL_RADIUS))
+        for name, one in _LAYOUTS.items()
+    },
+    materials=replace(BENCHMARK_MATERIALS, object_static=0.99),
+    column=2.0 + 2.0 * _WALL_RADIUS,
+    inner_wall=0.2 + 2.0 * _WALL_RADIUS,
+    contact_radius=CONTACT_RADIUS,
+    touching=True,
+)
+"""As the 2D benchmark's own code has it; all that is static is larger by its contact radius."""
+
 SCALE = 0.08
 """Length in the testbed of a metre in the benchmark, whose 1 m boxes become 8 cm cubes."""
 
@@ -96,4 +114,8 @@ TESTBED = replace(
     start_margin=SCALE,
 )
 
-PRESETS: Mapping[str, AreaClearingPreset] = {"benchmark": BENCHMARK, "testbed": TESTBED}
+PRESETS: Mapping[str, AreaClearingPreset] = {
+    "benchmark": BENCHMARK,
+    "testbed": TESTBED,
+    "original": ORIGINAL,
+}

@@ -54,7 +54,7 @@ class Task(ABC):
     """
 
     name: ClassVar[str]
-    goal_kind: ClassVar[Literal["robot", "objects"]] = "robot"
+    goal_kind: Literal["robot", "objects"] = "robot"
     """Who has a goal: decides which metrics apply."""
     preset_table: ClassVar[Mapping[str, Any]]
     """Dimensions by the name of the preset."""
@@ -104,6 +104,11 @@ class Task(ABC):
         self.variations = self.variation_class.read({} if variations is None else variations)
         self._prepare()
 
+    @classmethod
+    def goal_kind_of(cls, variations: Mapping[str, object]) -> Literal["robot", "objects"]:
+        """`goal_kind` with these variations."""
+        return cls.goal_kind
+
     def _prepare(self) -> None:
         """Set what is the same in every start: the robot, the materials, the times, the goal."""
         raise NotImplementedError(f"task {self.name!r} has neither __init__ nor _prepare")
@@ -119,7 +124,9 @@ class Task(ABC):
     @property
     def _max_steps(self) -> int:
         """Control steps that last as long as those of the preset, or longer for a slower robot."""
+        limit = self.variations.time_limit
         seconds: float = self.preset.max_steps * self.preset.control_step * self.slowness
+        seconds = seconds if limit is None else limit
         return math.ceil(seconds / self.control_step - 1e-9)
 
     @abstractmethod
@@ -130,7 +137,7 @@ class Task(ABC):
             ScenarioError: if the request cannot be met, such as too many boxes.
         """
 
-    objects_leave: ClassVar[bool] = False
+    objects_leave: bool = False
     """Whether objects can leave the floor, so that `leaving` has to be asked."""
 
     def leaving(self, ids: IntArray, poses: FloatArray) -> IntArray:

@@ -73,12 +73,12 @@ class BoxDeliveryTask(ManipulationTask):
         self._empty = StaticMap.build(polygons=self._walls, bounds=self.bounds)
 
     def _corners(self) -> list[FloatArray]:
-        """Triangles that keep boxes from getting stuck in the corners without receptacle."""
+        """What keeps boxes from getting stuck in the corners without receptacle."""
         x, y = self.bounds[2:]
-        leg = self.preset.corner
         return [
-            _triangle(np.array([sx * x, sy * y]), np.array([-sx * leg, 0.0]), -sy * leg)
+            (np.array([x, y]) - piece) * (sx, sy)
             for sx, sy in ((-1.0, -1.0), (1.0, -1.0), (-1.0, 1.0))
+            for piece in self.preset.corner
         ]
 
     def _layout(self, rng: np.random.Generator) -> tuple[StaticMap, bool]:
@@ -114,13 +114,13 @@ class BoxDeliveryTask(ManipulationTask):
         """A wall from +x that leaves a gap at -x, with triangles where it meets the wall."""
         fraction, thickness = self.preset.divider
         x0, y0, x1, y1 = self.bounds
-        margin, half, leg = self.preset.divider_margin, 0.5 * thickness, self.preset.corner
+        margin, half = self.preset.divider_margin, 0.5 * thickness
         y = float(rng.uniform(y0 + margin, y1 - margin))
-        along = np.array([-leg, 0.0])
+        wall = rectangle(x1 - fraction * (x1 - x0), y - half, x1, y + half)
+        corners = ((np.array([x1, y + side * half]), side) for side in (1.0, -1.0))
         return [
-            rectangle(x1 - fraction * (x1 - x0), y - half, x1, y + half),
-            _triangle(np.array([x1, y + half]), along, leg),
-            _triangle(np.array([x1, y - half]), along, -leg),
+            wall,
+            *(at - piece * (1.0, -side) for at, side in corners for piece in self.preset.corner),
         ]
 
     def _robot_poses(self, rng: np.random.Generator, static: StaticMap) -> FloatArray:
@@ -149,9 +149,10 @@ class BoxDeliveryTask(ManipulationTask):
         if not len(ids):
             return ids
         if len(ids) == len(start):
-            vertices, offsets = start.vertices, start.offsets
+            vertices, offsets = start.drawn_vertices, start.drawn_offsets
         else:  # boxes are alike
-            vertices, offsets = start.vertices[: 4 * len(ids)], start.offsets[: len(ids) + 1]
+            offsets = start.drawn_offsets[: len(ids) + 1]
+            vertices = start.drawn_vertices[: 4 * len(ids)]
         corners = transform_outlines(poses, vertices, offsets)
         gone: IntArray = ids[self._mouth.contains_each(corners, offsets)]
         return gone
@@ -190,8 +191,3 @@ class BoxDeliveryTask(ManipulationTask):
         dx, dy, turn = (after.robot_pose - before.robot_pose).tolist()
         turned = abs(np.remainder(turn + np.pi, 2.0 * np.pi) - np.pi)
         return bool(np.hypot(dx, dy) < self.preset.still and turned < _STILL_TURN)
-
-
-def _triangle(corner: FloatArray, along: FloatArray, up: float) -> FloatArray:
-    """A right-angled corner piece: its corner, one leg (2,) and the other, along y [m]."""
-    return np.array([corner, corner + along, corner + np.array([0.0, up])])

@@ -3,12 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
+from itertools import pairwise
+
+import numpy as np
 
 from pushplan.envs.tasks.manipulation import ManipulationPreset
 from pushplan.envs.tasks.materials import BENCHMARK_MATERIALS, TESTBED_MATERIALS
 from pushplan.world import box_delivery_robot, jackal, turtlebot3_burger
+from pushplan.world.checks import FloatArray
+from pushplan.world.original_robots import CONTACT_RADIUS, original_box_delivery_robot
+from pushplan.world.outline import grown_outline
 
 LAYOUTS = ("small_empty", "small_columns", "large_columns", "large_divider")
 
@@ -20,7 +26,9 @@ class BoxDeliveryPreset(ManipulationPreset):
     # length along x and width along y of the room by layout [m]
     rooms: Mapping[str, tuple[float, float]]
     receptacle: float  # side of the square receptacle in the corner at +x, +y [m]
-    corner: float  # legs of the triangles that fill the other corners [m]
+    # pieces that fill the other corners: (3, 2) corners each about the room's corner, with the room
+    # at +x and +y [m]
+    corner: tuple[FloatArray, ...]
     columns: Mapping[str, int]  # greatest number of columns by layout
     column: float  # side of the square columns [m]
     column_spacing: float  # least distance between the centres of two columns [m]
@@ -30,6 +38,18 @@ class BoxDeliveryPreset(ManipulationPreset):
     divider_margin: float  # least distance of its centre line from the walls along it [m]
     start_margin: float  # distance of a fixed start from the wall at -x [m]
     still: float  # a robot that moves less than this in an action has not moved [m]
+
+
+def _triangle(leg: float) -> tuple[FloatArray, ...]:
+    return (np.array([(0.0, 0.0), (leg, 0.0), (0.0, leg)]),)
+
+
+def _fillet(leg: float, grown: float) -> tuple[FloatArray, ...]:
+    """Three triangles under a chain of chords, each larger by a contact radius [m]."""
+    s, c = 0.5 * leg * np.sin(np.pi / 8.0), 0.5 * leg * np.cos(np.pi / 8.0)
+    rim = [(0.0, leg), (s, leg - c), (leg - c, s), (leg, 0.0)]
+    fan = [np.array([(0.0, 0.0), after, before]) for before, after in pairwise(rim)]
+    return tuple(grown_outline(piece, grown) for piece in fan)
 
 
 BENCHMARK = BoxDeliveryPreset(
@@ -53,7 +73,7 @@ BENCHMARK = BoxDeliveryPreset(
         "large_divider": (10.0, 10.0),
     },
     receptacle=1.5,
-    corner=0.6,
+    corner=_triangle(0.6),
     columns={"small_columns": 3, "large_columns": 8},
     column=1.0,
     column_spacing=2.0,
@@ -88,7 +108,7 @@ TESTBED = BoxDeliveryPreset(
         "large_divider": (2.845, 2.845),
     },
     receptacle=0.3,
-    corner=0.11,
+    corner=_triangle(0.11),
     columns={"small_columns": 3, "large_columns": 8},
     column=0.2845,
     column_spacing=0.569,
@@ -99,4 +119,19 @@ TESTBED = BoxDeliveryPreset(
     still=0.01,
 )
 
-PRESETS: Mapping[str, BoxDeliveryPreset] = {"benchmark": BENCHMARK, "testbed": TESTBED}
+ORIGINAL = replace(
+    BENCHMARK,
+    robots={"original": original_box_delivery_robot},
+    materials=replace(BENCHMARK_MATERIALS, robot_object=1.0, object_static=1.0),
+    heading_step=1.25,
+    corner=_fillet(1.0, CONTACT_RADIUS),
+    contact_radius=CONTACT_RADIUS,
+    touching=True,
+)
+"""As the 2D benchmark's own code has it."""
+
+PRESETS: Mapping[str, BoxDeliveryPreset] = {
+    "benchmark": BENCHMARK,
+    "testbed": TESTBED,
+    "original": ORIGINAL,
+}

@@ -19,6 +19,9 @@ from pushplan.world.outline import transform
 _BATCH = 64
 _LATTICE_SHIFTS = 16
 _LATTICE_CELLS = 20_000
+_TOUCH_TRIES = 20
+_TOUCH = 1e-6
+"""How near boxes are that touch the robot, as a fraction of their size."""
 _CORNERS = np.array([(-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5)])
 
 
@@ -109,6 +112,49 @@ class FreeSpace:
             f"{count} boxes of {size:g} m do not fit: {room}; ask for fewer or smaller boxes"
         )
 
+    def place_beside(
+        self,
+        rng: np.random.Generator,
+        count: int,
+        size: float,
+        robot: Sequence[Any],
+        *,
+        touching: bool,
+        keep_off: Sequence[tuple[Any, float]] = (),
+        within: ArrayLike | None = None,
+        allowed: Callable[[FloatArray], BoolArray] | None = None,
+        spacing: float = 0.0,
+        **options: Any,
+    ) -> FloatArray:
+        """`place_squares` off a robot, or in touch with it.
+
+        Args:
+            rng: the only source of randomness.
+            count: number of squares.
+            size: side [m].
+            robot: Shapely geometries.
+            touching: whether squares may touch the robot: they are placed as if it were not there,
+                and those that overlap it are moved straight away from its middle until they touch.
+            keep_off, within, allowed, spacing, options: as `place_squares` takes them.
+
+        Raises:
+            ScenarioError: if there is no room for them.
+        """
+        rules: Any = {"within": within, "allowed": allowed, "spacing": spacing, **options}
+        body = shapely.union_all(list(robot))
+        box = np.asarray(self.static.bounds if within is None else within)
+        for _ in range(_TOUCH_TRIES if touching else 0):
+            poses = self.place_squares(rng, count, size, keep_off=keep_off, **rules)
+            moved = _moved_off(poses, size, body)
+            pushed = moved[(moved != poses).any(axis=1)]
+            inside = (pushed[:, :2] >= box[:2]).all() and (pushed[:, :2] <= box[2:]).all()
+            fits = self._fits(pushed, size, keep_off, 0.0).all()
+            reached = allowed is None or not len(pushed) or allowed(pushed[:, :2]).all()
+            if inside and fits and reached and _apart(moved, size, spacing):
+                return moved
+        off = [*keep_off, *((shape, 0.0) for shape in robot)]
+        return self.place_squares(rng, count, size, keep_off=off, **rules)
+
     def _fits(
         self, poses: FloatArray, size: float, keep_off: Sequence[tuple[Any, float]], gap: float
     ) -> BoolArray:
@@ -117,6 +163,35 @@ class FreeSpace:
         for shape, reach in keep_off:
             fits &= shapely.distance(shapes, shape) > reach + gap
         return fits
+
+
+def _moved_off(poses: FloatArray, size: float, body: Any) -> FloatArray:
+    """Poses (N, 3) of squares; those that overlap a body moved away from its middle, to touch."""
+    moved = poses.copy()
+    middle = np.array([body.centroid.x, body.centroid.y])
+    reach = size + math.dist(body.bounds[:2], body.bounds[2:])
+    for k in np.flatnonzero(shapely.intersects(shapely.polygons(squares(poses, size)), body)):
+        away = poses[k, :2] - middle
+        length = float(np.hypot(*away))
+        away = away / length if length > 0.0 else np.array([1.0, 0.0])
+        near, far = 0.0, reach
+        while far - near > _TOUCH * size:
+            half = 0.5 * (near + far)
+            moved[k, :2] = poses[k, :2] + half * away
+            hit = shapely.Polygon(squares(moved[k : k + 1], size)[0]).intersects(body)
+            near, far = (half, far) if hit else (near, half)
+        moved[k, :2] = poses[k, :2] + far * away
+    return moved
+
+
+def _apart(poses: FloatArray, size: float, spacing: float) -> bool:
+    """Whether squares at poses (N, 3) overlap none of the others and keep their spacing."""
+    for k, pose in enumerate(poses):
+        others = poses[k + 1 :]
+        near = np.hypot(*(others[:, :2] - pose[:2]).T) < spacing
+        if near.any() or squares_overlap(pose, others, size).any():
+            return False
+    return True
 
 
 def _throw(
@@ -173,7 +248,13 @@ def _lattice(
 
 
 def square_boxes(
-    rng: np.random.Generator, poses: FloatArray, size: float, *, mass: float | None, wheeled: float
+    rng: np.random.Generator,
+    poses: FloatArray,
+    size: float,
+    *,
+    mass: float | None,
+    wheeled: float,
+    contact_radius: float = 0.0,
 ) -> Movables:
     """Square boxes at poses (N, 3), of which some stand on casters.
 
@@ -183,18 +264,21 @@ def square_boxes(
         size: side [m].
         mass: [kg]; 1 kg/m² of their area if None.
         wheeled: fraction on casters, 0 to 1.
+        contact_radius: distance from the squares at which they touch others [m].
     """
     count = len(poses)
     on_casters = np.zeros(count, dtype=bool)
     on_casters[rng.permutation(count)[: round(wheeled * count)]] = True
     masses = None if mass is None else np.full(count, mass)
     outlines = [_CORNERS * size] * count
-    return Movables.from_outlines(outlines, poses, masses=masses, wheeled=on_casters)
+    return Movables.from_outlines(
+        outlines, poses, masses=masses, wheeled=on_casters, contact_radii=contact_radius
+    )
 
 
 def footprint_at(robot: RobotModel, pose: FloatArray) -> list[Any]:
     """Shapely polygons of the robot's parts at a pose (3,)."""
-    return [shapely.Polygon(transform(pose, part)) for part in robot.parts]
+    return [shapely.Polygon(transform(pose, part)) for part in robot.contact_parts]
 
 
 def rectangle(x0: float, y0: float, x1: float, y1: float) -> FloatArray:

@@ -85,6 +85,8 @@ class ManipulationPreset:
     windows: Mapping[str, float]  # side of the observed square by layout [m]
     field_resolution: float  # side of a cell of the distance field [m]
     progress_reward: float  # for each metre by which the way of an object to its goal changes [1/m]
+    contact_radius: float = 0.0  # of the boxes [m]
+    touching: bool = False  # whether boxes may start in touch with the robot
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -102,6 +104,9 @@ class ManipulationVariations(TaskVariations):
     bumper: Annotated[str, OneOf(BUMPERS)] | None = None
     bumper_friction: NonNegativeFloat | None = None  # friction coefficient between robot and boxes
     random_start: bool  # whether the robot's start is random
+    touching: bool | None = None  # whether boxes may start in touch with the robot
+    # time without progress after which the episode is cut off [s], whatever the action mode
+    idle_limit: PositiveFloat | None = None
 
     layouts: ClassVar[tuple[str, ...]]
 
@@ -212,7 +217,7 @@ class ManipulationTask(Task):
 
     def _furnish(self, rng: np.random.Generator, static: StaticMap) -> World:
         """Robot and boxes among static obstacles; every box within the robot's reach."""
-        size, wanted = self.box_size, self.variations
+        size, wanted, preset = self.box_size, self.variations, self.preset
         free_space = FreeSpace(static)
         radius = self.robot.circumscribed_radius
         resolution = self.preset.field_resolution
@@ -224,23 +229,32 @@ class ManipulationTask(Task):
             candidates = candidates[:0]
         pose = self._free_pose(candidates, free_space, reach)
         region, keep_off = self._box_region()
-        preset = self.preset
-        poses = free_space.place_squares(
+        poses = free_space.place_beside(
             rng,
             self.box_count,
-            size,
-            keep_off=[(shape, 0.0) for shape in (*footprint_at(self.robot, pose), *keep_off)],
+            size + 2.0 * preset.contact_radius,
+            footprint_at(self.robot, pose),
+            touching=preset.touching if wanted.touching is None else wanted.touching,
+            keep_off=[(shape, 0.0) for shape in keep_off],
             gap=GAP * size,
             random_yaw=wanted.box_yaw == "random",
             spacing=preset.box_spacing / preset.box_size * size,
             within=region,
             allowed=lambda centres: reach.within(centres, radius + 0.5 * size),
         )
+        boxes = square_boxes(
+            rng,
+            poses,
+            size,
+            mass=preset.box_mass,
+            wheeled=wanted.wheeled,
+            contact_radius=preset.contact_radius,
+        )
         return World(
             robot=self.robot,
             robot_pose=pose,
             static=static,
-            movables=square_boxes(rng, poses, size, mass=preset.box_mass, wheeled=wanted.wheeled),
+            movables=boxes,
             goal=self.goal,
         )
 
@@ -268,9 +282,11 @@ class ManipulationTask(Task):
         self._idle_actions += 1
         if progress:
             self._idle_actions, self._idle_since = 0, world.time
-        if self.action in self.idle_limits:
+        limit = self.variations.idle_limit
+        if limit is None and self.action in self.idle_limits:
             return self._idle_actions >= self.idle_limits[self.action]
-        return world.time - self._idle_since >= self.idle_time * (1.0 - 1e-9)
+        limit = self.idle_time if limit is None else limit
+        return bool(world.time - self._idle_since >= limit * (1.0 - 1e-9))
 
     def _image(self, name: str) -> ImageObservation:
         """``"image"``, or ``"spatial"``, the same at fewer pixels."""

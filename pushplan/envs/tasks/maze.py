@@ -54,9 +54,11 @@ class MazeVariations(TaskVariations):
     wheeled: Fraction = 0.0  # fraction of the boxes that stand on casters, 0 to 1
     # whether the robot starts anywhere instead of at the preset's start
     random_start: bool | None = None
+    touching: bool | None = None  # whether boxes may start in touch with the robot
     # what the testbed's robot carries in front, one of `pushplan.world.BUMPERS`
     bumper: str | None = None
     bumper_friction: NonNegativeFloat | None = None  # friction coefficient between robot and boxes
+    time_limit: PositiveFloat | None = None  # when the episode is cut off [s]
 
 
 class MazeTask(Task):
@@ -129,19 +131,21 @@ class MazeTask(Task):
         )
 
     def _boxes(self, rng: np.random.Generator, robot_pose: FloatArray) -> Movables:
-        wanted, size = self.variations, self.box_size
-        poses = self._free_space.place_squares(
+        wanted, size, radius = self.variations, self.box_size, self.preset.contact_radius
+        poses = self._free_space.place_beside(
             rng,
             wanted.boxes,
-            size,
-            keep_off=[
-                (shapely.Point(self.goal.center), self.goal.radius),
-                *((part, 0.0) for part in footprint_at(self.robot, robot_pose)),
-            ],
+            size + 2.0 * radius,
+            footprint_at(self.robot, robot_pose),
+            touching=self.preset.touching if wanted.touching is None else wanted.touching,
+            keep_off=[(shapely.Point(self.goal.center), self.goal.radius)],
             gap=GAP * size,
             random_yaw=wanted.box_yaw == "random",
         )
-        return square_boxes(rng, poses, size, mass=self.preset.box_mass, wheeled=wanted.wheeled)
+        mass = self.preset.box_mass
+        return square_boxes(
+            rng, poses, size, mass=mass, wheeled=wanted.wheeled, contact_radius=radius
+        )
 
     def _start_pose(self, rng: np.random.Generator) -> FloatArray:
         """The preset's start, or a random one from which the robot can get away.

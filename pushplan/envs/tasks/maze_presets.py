@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -20,6 +20,7 @@ from pushplan.world import (
     turtlebot3_burger,
 )
 from pushplan.world.checks import choice
+from pushplan.world.original_robots import CONTACT_RADIUS, original_maze_robot
 
 
 @dataclass(frozen=True)
@@ -47,6 +48,10 @@ class MazePreset:
     work_reward: float  # per kg m of work on the boxes
     window: float  # side of the image observation [m]
     field_resolution: float  # cells of the goal distance field [m]
+    # makes the robot, which has no bumpers; None for the TurtleBot3 with one of them
+    body: Callable[..., RobotModel] | None = None
+    contact_radius: float = 0.0  # of the boxes [m]
+    touching: bool = False  # whether boxes may start in touch with the robot
 
     def robot(self, drive: Drive, bumper: str | None = None) -> RobotModel:
         """The robot; a differential drive may also reverse at full speed.
@@ -59,13 +64,13 @@ class MazePreset:
             InvalidInputError: if there is no such bumper, or the robot cannot carry one.
         """
         limits = {"max_speed": self.max_speed, "max_turn_rate": self.max_turn_rate}
-        if not self.thick_lines:
+        if self.body is None:
             return turtlebot3_burger("none" if bumper is None else bumper, drive, **limits)
         if choice("bumper", "none" if bumper is None else bumper, BUMPERS) != "none":
             raise InvalidInputError(
                 f"bumper {bumper!r} does not fit the robot of this preset (valid: none)"
             )
-        return maze_robot(drive, **limits)
+        return self.body(drive, **limits)
 
     def static(self, shape: str) -> StaticMap:
         """The walls of the room and inside it."""
@@ -120,7 +125,20 @@ BENCHMARK = MazePreset(
     work_reward=1.5,
     window=12.0,
     field_resolution=0.1,
+    body=maze_robot,
 )
+
+ORIGINAL = replace(
+    BENCHMARK,
+    goal_radius=1.0,
+    robot_radius=0.6,
+    max_turn_rate=np.pi / 30.0,
+    max_steps=20_000,  # it has no limit
+    body=original_maze_robot,
+    contact_radius=CONTACT_RADIUS,
+    touching=True,
+)
+"""As the 2D benchmark's own code has it."""
 
 TESTBED = MazePreset(
     rooms={"u": (1.575, 2.845), "z": (2.5, 2.845)},
@@ -144,4 +162,8 @@ TESTBED = MazePreset(
     field_resolution=0.02,
 )
 
-PRESETS: Mapping[str, MazePreset] = {"benchmark": BENCHMARK, "testbed": TESTBED}
+PRESETS: Mapping[str, MazePreset] = {
+    "benchmark": BENCHMARK,
+    "testbed": TESTBED,
+    "original": ORIGINAL,
+}

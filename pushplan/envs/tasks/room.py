@@ -1,11 +1,11 @@
-"""Room: the world of a file as an environment, with a goal for the robot."""
+"""Room: the world of a file as an environment."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import ClassVar
+from typing import ClassVar, Literal
 
 import numpy as np
 import shapely
@@ -14,13 +14,16 @@ from pushplan.envs.simulators.base import Materials
 from pushplan.envs.tasks.base import StepOutcome, Task
 from pushplan.envs.tasks.layout import FreeSpace
 from pushplan.envs.tasks.materials import BENCHMARK_MATERIALS, TESTBED_MATERIALS
+from pushplan.envs.tasks.room_goals import ObjectsGoal, RobotGoal
 from pushplan.envs.tasks.variations import TaskVariations
 from pushplan.geometry.distance_field import geodesic_field
 from pushplan.observation import ImageObservation
 from pushplan.world import (
+    ClearanceArea,
     GoalDisc,
     InvalidInputError,
     Movables,
+    Receptacle,
     ScenarioError,
     StaticMap,
     World,
@@ -28,12 +31,9 @@ from pushplan.world import (
     turtlebot3_burger,
 )
 from pushplan.world.checked_fields import NonNegativeFloat, PositiveFloat
-from pushplan.world.checks import FloatArray
+from pushplan.world.checks import FloatArray, IntArray
 from pushplan.world.outline import transform
 
-WALL_REWARD = -50.0
-SUCCESS_REWARD = 200.0
-PROGRESS_REWARD = 150.0
 _IMAGE_CHANNELS = ("footprint", "movable", "static", "goal_distance")
 _CELLS = 200
 """Of the goal distance field, along the longer side of the room."""
@@ -69,16 +69,22 @@ class RoomVariations(TaskVariations):
     # how far the robot and each object may start from where the file has them, as drawn by the
     # seed [m]; they are turned by as much at their rims
     spread: NonNegativeFloat = 0.0
-    # when the episode is cut off [s]; if None after ten times the shortest way at full speed
+    # when the episode is cut off [s]; if None after ten times the shortest way at full speed, for
+    # goals of objects after ten times the sum of their ways
     time_limit: PositiveFloat | None = None
+    # when it is cut off after the last object that was done [s]; never if None
+    idle_limit: PositiveFloat | None = None
+    # friction coefficients between robot and objects, two objects, objects and walls
+    bumper_friction: NonNegativeFloat | None = None
+    object_friction: NonNegativeFloat | None = None
+    wall_friction: NonNegativeFloat | None = None
 
 
 class RoomTask(Task):
-    """The world of a file, with its robot: drive to the goal, moving little.
+    """The world of a file, with its robot and its goal, of any kind.
 
-    Reward of a step: 150 times the decrease of the goal distance, minus 150 times the work on the
-    objects over the robot's mass, both as fractions of the way from the file's start; -50 at a
-    wall, +200 at the goal. The goal distance is the shortest way of a point around what is static.
+    `RobotGoal` and `ObjectsGoal` say what the reward is and when an episode ends; goal distances
+    are shortest ways of a point around what is static.
     """
 
     name = "room"
@@ -96,36 +102,46 @@ class RoomTask(Task):
         path = self.variations.world_file
         try:
             world = small_room() if path is None else load_world(path)
-            world.navigation_goal  # noqa: B018  objects' goals have tasks of their own
             robot = self.variations.limit(world.robot)
             if self.action == "wheels" and robot.wheel_separation == 0.0:
                 raise InvalidInputError(f"robot {robot.name!r} has no wheels (valid: velocity)")
         except InvalidInputError as error:
             raise ScenarioError(f"room: {error}") from error
-        self.robot, self.materials = robot, self.preset.materials
+        self.robot, self.materials = robot, self._make_materials()
         self.control_step = self.variations.control_step or self.preset.control_step
         at_rest = world.movables.moved_to(world.movables.poses)
         self._world = replace(world, robot=robot, movables=at_rest, robot_twist=None, time=0.0)
         room = world.static.bounds[2:] - world.static.bounds[:2]
         self.reach = 2.0 * float(np.hypot(*room))
         self.state_objects = max(self.state_objects, len(world.movables))
-        self._field = geodesic_field(
-            world.static, world.navigation_goal, resolution=float(room.max()) / _CELLS
-        )
-        x, y, _ = world.robot_pose.tolist()
-        self._way = self._field.exact(x, y)
-        if not 0.0 < self._way < math.inf:
-            where = "no way leads to the goal" if self._way else "the robot starts in the goal"
+        field = geodesic_field(world.static, world.goal, resolution=float(room.max()) / _CELLS)
+        of_objects = isinstance(world.goal, Receptacle | ClearanceArea)
+        goal_of = ObjectsGoal if of_objects else RobotGoal
+        self._goal: RobotGoal | ObjectsGoal = goal_of(self._world, field)
+        self.goal_kind = self._goal.kind
+        self.objects_leave = isinstance(world.goal, Receptacle)
+        way = self._goal.way
+        if self._goal.is_done or way == math.inf:
+            who = "every object starts" if of_objects else "the robot starts"
+            where = f"{who} in the goal" if self._goal.is_done else "no way leads to the goal"
             raise ScenarioError(f"room: {where} in {path}")
         limit = self.variations.time_limit
         if limit is None:
-            limit = max(_SHORTEST_WAYS * self._way / robot.max_speed, _LEAST_TIME)
+            limit = max(_SHORTEST_WAYS * way / robot.max_speed, _LEAST_TIME)
         self._most = math.ceil(limit / self.control_step - 1e-9)
-        self._steps = 0
+        self._steps, self._idle_since, self._done = 0, 0, 0
+
+    def _make_materials(self) -> Materials:
+        """The preset's, with the friction that is asked for."""
+        wanted, given = self.variations, self.preset.materials
+        asked = (wanted.bumper_friction, wanted.object_friction, wanted.wall_friction)
+        own = (given.robot_object, given.object_object, given.object_static)
+        bumper, objects, walls = (b if a is None else a for a, b in zip(asked, own, strict=True))
+        return replace(given, robot_object=bumper, object_object=objects, object_static=walls)
 
     def start(self, rng: np.random.Generator) -> World:
         """The world of the file, with the robot and the objects moved a little if asked for."""
-        self._steps = 0
+        self._steps, self._idle_since, self._done = 0, 0, 0
         return self._spread(rng) if self.variations.spread else self._world
 
     def _spread(self, rng: np.random.Generator) -> World:
@@ -133,7 +149,8 @@ class RoomTask(Task):
         world, spread = self._world, self.variations.spread
         free = FreeSpace(world.static)
         movables = world.movables
-        outlines = [list(world.robot.parts), *([movables.outline(k)] for k in range(len(movables)))]
+        outlines = [list(world.robot.contact_parts)]
+        outlines += [[movables.outline(k)] for k in range(len(movables))]
         poses = np.vstack([world.robot_pose, movables.poses])
         radii = [world.robot.circumscribed_radius, *movables.radii]
         shapes = [_shape(pose, parts) for pose, parts in zip(poses, outlines, strict=True)]
@@ -144,7 +161,7 @@ class RoomTask(Task):
                 shift = spread * math.sqrt(away) * np.array([np.cos(angle), np.sin(angle)])
                 pose = poses[k] + np.array([*shift, turn * spread / radii[k]])
                 shape = _shape(pose, parts)
-                outside = k == 0 and self._is_there(pose)
+                outside = k == 0 and self._is_goal(pose)
                 if free.is_free(np.array([shape]), 0.0)[0] and not (
                     outside or shape.intersects(others)
                 ):
@@ -155,20 +172,39 @@ class RoomTask(Task):
     def score(
         self, before: World, after: World, *, work: float, touched_static: bool
     ) -> StepOutcome:
-        """The reward above; a wall is a failure even where the goal is reached at once."""
+        """What the goal says, and the limits of time."""
         self._steps += 1
-        near, far = (self._field.sample(*world.robot_pose[:2]) for world in (after, before))
-        costs = far - near - work / self.robot.mass
-        reward = PROGRESS_REWARD * costs / self._way
-        if touched_static:
-            return StepOutcome(reward + WALL_REWARD, False, "wall", True, False)
-        if self._is_there(after.robot_pose):
-            return StepOutcome(reward + SUCCESS_REWARD, True, "goal", True, False)
-        late = self._steps >= self._most
-        return StepOutcome(reward, False, "time_limit" if late else "", False, late)
+        outcome = self._goal.score(before, after, work, touched_static)
+        done = 0 if outcome.completed is None else int(outcome.completed.sum())
+        if done > self._done:
+            self._idle_since = self._steps
+        self._done = done
+        if outcome.terminated:
+            return outcome
+        if self._steps >= self._most:
+            return replace(outcome, reason="time_limit", truncated=True)
+        idle, limit = self._steps - self._idle_since, self.variations.idle_limit
+        if limit is not None and idle * self.control_step >= limit * (1.0 - 1e-9):
+            return replace(outcome, reason="no_progress", truncated=True)
+        return outcome
 
-    def _is_there(self, pose: FloatArray) -> bool:
-        return self._world.navigation_goal.distance(float(pose[0]), float(pose[1])) == 0.0
+    def leaving(self, ids: IntArray, poses: FloatArray) -> IntArray:
+        """Objects in the receptacle, where the goal is one."""
+        assert isinstance(self._goal, ObjectsGoal)
+        return self._goal.leaving(ids, poses)
+
+    def _is_goal(self, pose: FloatArray) -> bool:
+        return isinstance(self._goal, RobotGoal) and self._goal.is_there(pose)
+
+    @classmethod
+    def goal_kind_of(cls, variations: Mapping[str, object]) -> Literal["robot", "objects"]:
+        """As the file has it; the robot's where it cannot be read."""
+        path = variations.get("world_file")
+        try:
+            goal = None if path is None else load_world(str(path)).goal
+        except InvalidInputError:
+            return cls.goal_kind
+        return "objects" if isinstance(goal, Receptacle | ClearanceArea) else "robot"
 
     def _image(self, name: str) -> ImageObservation:
         window = _WINDOW * 2.0 * self.robot.circumscribed_radius

@@ -52,6 +52,7 @@ class ShipIceVariations(TaskVariations):
     start_heading: float = _UP  # [rad], straight ahead by default
     # ice from a file, as `pushplan.scenarios.load_ice` reads it, instead of random ice
     ice_file: str | None = None
+    time_limit: PositiveFloat | None = None  # when the episode is cut off [s]
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -115,7 +116,7 @@ class ShipIceTask(Task):
         if path is None:
             return None
         try:
-            field = load_ice(path)
+            field = load_ice(path, overlaps=self.preset.overlaps)
         except InvalidInputError as error:
             raise ScenarioError(f"ship_ice: {error}") from error
         low, high = self.preset.bounds[:2], self.preset.bounds[2:]
@@ -140,7 +141,11 @@ class ShipIceTask(Task):
             robot=self.robot,
             robot_pose=pose,
             static=self.static,
-            movables=Movables.from_polygons(field.polygons, density=self.preset.floe_density),
+            movables=Movables.from_polygons(
+                field.polygons,
+                density=self.preset.floe_density,
+                contact_radii=self.preset.contact_radius,
+            ),
             goal=self.goal,
         )
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -13,6 +13,7 @@ from pushplan.envs.simulators.water import Water
 from pushplan.scenarios.ice import FloeSizes
 from pushplan.world import Drive, RobotModel
 from pushplan.world.checks import FloatArray
+from pushplan.world.original_robots import CONTACT_RADIUS
 from pushplan.world.outline import centroid
 
 ICE_DENSITY = 900.0
@@ -43,6 +44,8 @@ class ShipPreset:
     work_reward: float  # per kg m of work on the floes
     window: float  # side of the image observation [m]
     shift: float  # how far its middle lies ahead of the ship's origin [m]
+    contact_radius: float = 0.0  # of the ship and the floes [m]
+    overlaps: bool = False  # whether floes from a file may overlap
 
     def robot(self) -> RobotModel:
         """The ship."""
@@ -52,6 +55,7 @@ class ShipPreset:
             drive=Drive.CONSTANT_SPEED,
             max_speed=self.max_speed,
             max_turn_rate=self.max_turn_rate,
+            contact_radius=self.contact_radius,
             name="ship",
         )
 
@@ -92,6 +96,18 @@ BENCHMARK = ShipPreset(
     window=6.0,
     shift=2.0,
 )
+
+
+ORIGINAL = replace(
+    BENCHMARK,
+    ice=(2.0, 40.0),
+    max_turn_rate=math.pi / 14.0,
+    clearance=-CONTACT_RADIUS,  # its floes may touch the ship
+    max_steps=20_000,  # it has no limit
+    contact_radius=CONTACT_RADIUS,
+    overlaps=True,
+)
+"""As the 2D benchmark's own code has it; its own fields are for ``ice_file``."""
 
 
 def _supply_vessel(length: float, beam: float) -> FloatArray:
@@ -141,4 +157,8 @@ FULL_SCALE = ShipPreset(
     shift=2.0 * _SCALE,
 )
 
-PRESETS: Mapping[str, ShipPreset] = {"benchmark": BENCHMARK, "full_scale": FULL_SCALE}
+PRESETS: Mapping[str, ShipPreset] = {
+    "benchmark": BENCHMARK,
+    "full_scale": FULL_SCALE,
+    "original": ORIGINAL,
+}

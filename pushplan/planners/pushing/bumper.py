@@ -140,7 +140,7 @@ def _bumper(robot: RobotModel) -> Bumper:
     wide = float(np.abs(robot.vertices[:, 1]).max())
     ys = np.linspace(-wide, wide, _SAMPLES) * (1.0 - 1e-9)
     front = np.full(_SAMPLES, -np.inf)
-    for part in robot.parts:
+    for part in robot.contact_parts:
         front = np.maximum(front, _foremost(part, ys))
     middle = _SAMPLES // 2
     if not math.isfinite(front[middle]) or front[middle] <= 0.0:

@@ -312,7 +312,7 @@ class PushScene:
         away = np.hypot(*(self.poses[:, :2] - pose[:2]).T)
         for k in np.flatnonzero(away < self.size + movables.radii).tolist():
             outline = np.ascontiguousarray(movables.outline_world(k))
-            for part in robot.parts:
+            for part in robot.contact_parts:
                 body = np.ascontiguousarray(part @ np.array([[c, s], [-s, c]]) + pose[:2])
                 if convex_penetration(body, outline)[0] > 0.0:
                     return False
