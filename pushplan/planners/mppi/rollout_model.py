@@ -40,7 +40,7 @@ def default_model(world: World) -> InteractionModel:
     """
     if isinstance(world.goal, GoalLine) and not world.static.convex_parts:
         return IceInteraction()
-    return QuasiStatic(friction=0.1, static_friction=0.5)
+    return QuasiStatic(friction=0.1, static_friction=0.5, step=0.3, iterations=6)
 
 
 def step_length(world: World, config: MppiConfig) -> float:
