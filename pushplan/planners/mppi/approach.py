@@ -49,18 +49,28 @@ def standoff(world: World, k: int) -> float:
     return float(world.robot.vertices[:, 0].max() + inside.min())
 
 
-def place_behind(world: World, k: int, heading: float) -> FloatArray:
-    """(3,) pose from which the robot pushes object ``k`` along a heading [rad], or nearly so."""
+def place_behind(world: World, k: int, heading: float, skipped: int = 0) -> FloatArray:
+    """(3,) pose from which the robot pushes an object along a heading, or nearly so.
+
+    Args:
+        world: the snapshot.
+        k: index of the object.
+        heading: of the push [rad].
+        skipped: places that have failed already; after the last one the first comes again.
+    """
     grid, clearances = _grid(world)
     away, x, y = standoff(world, k), world.movables.poses[k, 0], world.movables.poses[k, 1]
     needed = world.robot.inscribed_radius
+    rows, cols = grid.shape
+    places = []
     for turn in _TURNS:
         theta = heading + turn
         place = np.array([x - away * np.cos(theta), y - away * np.sin(theta), theta])
         row, col = grid.cell(place[0], place[1])
-        rows, cols = grid.shape
         if 0 <= row < rows and 0 <= col < cols and clearances[row, col] >= needed:
-            return place
+            places.append(place)
+    if places:
+        return places[skipped % len(places)]
     return np.array([x - away * np.cos(heading), y - away * np.sin(heading), heading])
 
 

@@ -36,11 +36,12 @@ _FEW = 40  # objects that are few enough to keep them all
 def default_model(world: World) -> InteractionModel:
     """Ice contacts where a robot goes through open water, else quasi-static ones.
 
-    Walls hold what is squeezed against them, as a robot of constant speed cannot back out.
+    For a robot that cannot back out, walls hold what is squeezed against them.
     """
     if isinstance(world.goal, GoalLine) and not world.static.convex_parts:
         return IceInteraction()
-    return QuasiStatic(friction=0.1, static_friction=0.5, step=0.3, iterations=6)
+    held = 0.0 if world.robot.can_stop else 0.5
+    return QuasiStatic(friction=0.1, static_friction=held, step=0.3, iterations=6)
 
 
 def step_length(world: World, config: MppiConfig) -> float:

@@ -57,14 +57,15 @@ class TargetChoice:
 
     def _behind(self, world: World, k: int) -> FloatArray | None:
         """(3,) pose behind an object on its way to the goal; None if there is no way."""
-        robot = world.robot
+        movables, robot = world.movables, world.robot
         points = _way_of_object(world, k).points
         steps = np.hypot(*(points - points[:1]).T) if len(points) else np.zeros(0)
         ahead = np.flatnonzero(steps > 0.02 * robot.circumscribed_radius)
         if not len(ahead):
             return None
         dx, dy = points[ahead[0]] - points[0]
-        return place_behind(world, k, math.atan2(dy, dx))
+        failed = self._failures.get(int(movables.ids[k]), 0)
+        return place_behind(world, k, math.atan2(dy, dx), failed)
 
     def _gets_on(self, world: World, k: int, place: FloatArray) -> bool:
         """Whether the way to the object and the way of it have got shorter lately."""
