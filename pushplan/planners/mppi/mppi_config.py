@@ -65,7 +65,7 @@ class MppiConfig(CheckedFields):
     turn_noise: PositiveFloat = 0.5
     speed_noise: PositiveFloat = 0.5
     exploring: Fraction = 0.2
-    temperature: PositiveFloat = 0.1
+    temperature: PositiveFloat = 0.05
     elite: PositiveFraction = 0.1
     push_weight: NonNegativeFloat = 1.0
     goal_weight: PositiveFloat = 2.0
