@@ -114,7 +114,7 @@ def _plan(world: World, model: RolloutModel, rollouts: Rollouts, s: int) -> Plan
     twists = np.concatenate([twists, twists[-1:]])[: end + 1]
     length = float(np.hypot(*np.diff(poses[:, :2], axis=0).T).sum())
     return Plan(
-        times=model.period / parts * np.arange(end + 1),
+        times=model.period / parts * np.arange(end + 1, dtype=np.float64),
         poses=poses,
         speeds=twists[:, 0],
         turn_rates=twists[:, 1],

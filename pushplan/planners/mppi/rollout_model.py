@@ -8,7 +8,7 @@ import numpy as np
 
 from pushplan.compiled import owned
 from pushplan.control.limits import driven_twist
-from pushplan.interaction import InteractionModel, QuasiStatic
+from pushplan.interaction import InteractionModel, QuasiStatic, SweepsMany
 from pushplan.interaction.advance import CompiledInteraction
 from pushplan.interaction.ice import IceInteraction
 from pushplan.motion.collision import footprint, is_free, obstacles, static_depth
@@ -103,13 +103,20 @@ class RolloutModel:
         return rollouts
 
     def _ask(self, rollouts: Rollouts) -> None:
-        """Carry the objects along each path by the model's own ``sweep``."""
-        for s in range(len(rollouts.paths)):
-            path = rollouts.paths[s, : rollouts.ends[s] + 1]
-            swept = self.interaction.sweep(self.world, path)
-            rollouts.objects[s], rollouts.works[s] = swept.object_poses[-1], swept.work
-            if swept.jammed_at >= 0:
-                rollouts.ends[s], rollouts.outcomes[s] = max(swept.jammed_at - 1, 0), BLOCKED
+        """Have the model itself carry the objects along each path."""
+        paths = [
+            path[: end + 1]
+            for path, end in zip(rollouts.paths, rollouts.ends.tolist(), strict=True)
+        ]
+        model = self.interaction
+        if isinstance(model, SweepsMany):
+            swept = model.sweep_many(self.world, paths)
+        else:
+            swept = [model.sweep(self.world, path) for path in paths]
+        for s, one in enumerate(swept):
+            rollouts.objects[s], rollouts.works[s] = one.object_poses[-1], one.work
+            if one.jammed_at >= 0:
+                rollouts.ends[s], rollouts.outcomes[s] = max(one.jammed_at - 1, 0), BLOCKED
 
 
 def _nearby(world: World, horizon: float) -> World:
