@@ -4,8 +4,8 @@
 
 Each figure is of a process of its own that imports pushplan and calls `warm_up(NAME)`; `everything`
 is `pushplan compile`. With ``--write`` nothing is measured: the names of the kernels that
-`pushplan compile NAME` makes ready go into the package, for all names, so that its progress knows
-how many are to come.
+`pushplan compile NAME` makes ready go into the package, for the names given or else for all, so
+that its progress knows how many are to come.
 """
 
 from __future__ import annotations
@@ -58,11 +58,21 @@ def measure(name: str, cache: str) -> tuple[float, float, int]:
     return busy, took, kernels
 
 
-def write_kernel_names() -> None:
-    """Write down which kernels each name of `pushplan compile` makes ready."""
+def write_kernel_names(only: list[str]) -> None:
+    """Write down which kernels each name of `pushplan compile` makes ready.
+
+    Args:
+        only: the names that are looked at; what is written of the others stays. All if empty.
+    """
     from pushplan.evaluation.warmup import names
 
-    _write({name: _last_line(_KERNELS, name, {}) for name in names()})
+    kernels: dict[str, list[str]] = {name: [] for name in names()}
+    for users, shared in json.loads(_MANIFEST.read_text()).items():
+        for name in set(users.split()) & set(kernels) - set(only or kernels):
+            kernels[name] += shared
+    for name in only or list(kernels):
+        kernels[name] = _last_line(_KERNELS, name, {})
+    _write(kernels)
 
 
 def _write(kernels: dict[str, list[str]]) -> None:
@@ -88,15 +98,15 @@ def _last_line(script: str, name: str, settings: dict[str, str]) -> Any:
 def main() -> None:
     """Print the table, or write the names."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("names", nargs="*", default=(*_NAMES, _EVERYTHING))
+    parser.add_argument("names", nargs="*")
     parser.add_argument("--write", action="store_true", help="write the names of the kernels")
     options = parser.parse_args()
     if options.write:
-        write_kernel_names()
+        write_kernel_names(options.names)
         return
     print("| policy | kernels | cold [s of CPU] | warm [s of CPU] | warm [s] |")
     print("|---|---|---|---|---|")
-    for name in options.names:
+    for name in options.names or (*_NAMES, _EVERYTHING):
         with tempfile.TemporaryDirectory() as cache:
             cold, _, kernels = measure(name, cache)
             busy, took, _ = measure(name, cache)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from numpy.typing import ArrayLike
 
 from pushplan.envs.registry import SIMULATORS
@@ -33,3 +35,13 @@ class RolloutInteraction:
         """
         self._simulator.build(world, self._materials)
         return self._simulator.follow(path)
+
+    def sweep_many(self, world: World, paths: Sequence[ArrayLike]) -> list[Interaction]:
+        """Do as `sweep` for each of several paths; the scene is built once for all of them."""
+        simulator = self._simulator
+        simulator.build(world, self._materials)
+        start, found = simulator.save(), []
+        for path in paths:
+            simulator.restore(start)
+            found.append(simulator.follow(path))
+        return found

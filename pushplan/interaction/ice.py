@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 from pushplan.compiled import owned
 from pushplan.interaction.ice_bodies import IceBodies, IceProblem, IceSettings, ice_problem
 from pushplan.interaction.ice_contacts import sweep_ice
+from pushplan.interaction.ice_step import IceContacts
 from pushplan.interaction.model import Interaction, checked_path
 from pushplan.interaction.quasi_static import QuasiStatic
 from pushplan.world import World
@@ -87,6 +88,21 @@ class IceInteraction(CheckedFields):
         """
         problem: IceProblem = ice_problem(self.bodies(world), self.settings(world))
         return problem
+
+    def compiled(self, world: World) -> IceContacts:
+        """The model as `pushplan.interaction.advance.advance_objects` takes it.
+
+        Raises:
+            InvalidInputError: if there is something static in the world.
+        """
+        problem, count = self.problem(world), len(world.movables)
+        return IceContacts(
+            1.0 / world.movables.masses,
+            problem.bodies.radii,
+            np.zeros(1, np.int64),
+            problem,
+            np.full((count, 3), np.nan),
+        )
 
     def sweep(self, world: World, path: ArrayLike) -> Interaction:
         """Predict the motion of every object; see `InteractionModel.sweep`."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Annotated, Protocol, runtime_checkable
 
@@ -72,3 +73,11 @@ class InteractionModel(Protocol):
         Raises:
             InvalidInputError: if the path is not (N, 3), empty, or not finite.
         """
+
+
+@runtime_checkable
+class SweepsMany(InteractionModel, Protocol):
+    """A model that predicts several paths from one snapshot faster than one after the other."""
+
+    def sweep_many(self, world: World, paths: Sequence[ArrayLike]) -> list[Interaction]:
+        """Do as `sweep` for each of several paths, all from ``world``."""

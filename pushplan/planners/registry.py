@@ -40,6 +40,8 @@ POLICIES: dict[str, str] = {
     "ship-predictive": "pushplan.planners.ship_predictive.policies:ship_predictive",
     "ship-predictive-network": "pushplan.planners.ship_predictive.policies:network",
     "ship-predictive-published": "pushplan.planners.ship_predictive.policies:published",
+    "mppi": "pushplan.planners.mppi.policies:mppi",
+    "cem": "pushplan.planners.mppi.policies:cem",
     "random": "pushplan.planners.random_twist:RandomTwist",
     "greedy": "pushplan.planners.rearrangement.greedy:GreedyPusher",
     "gtsp": "pushplan.planners.rearrangement:Gtsp",

@@ -6,10 +6,10 @@ import functools
 import math
 
 import numpy as np
-import shapely
 
 from pushplan.geometry import GoalDistances, goal_distances
-from pushplan.world import ClearanceArea, Goal, InvalidInputError, Receptacle, StaticMap
+from pushplan.motion.done_places import done_places
+from pushplan.world import ClearanceArea, Goal, Receptacle, StaticMap
 from pushplan.world.checks import FloatArray
 
 _INSET = 1.05  # distance of an object from the edges of a receptacle when it is done [radii]
@@ -83,34 +83,6 @@ class ObjectPaths:
             middle = self._goal.polygon.mean(axis=0)
             goals = [np.stack([middle, middle])]
         return None if goals is None else goal_distances(self._static, goals, clearance=clearance)
-
-
-def done_places(goal: Goal, radius: float, inset: float) -> list[FloatArray] | None:
-    """The places of an object's middle when it is done: convex polygons and segments.
-
-    Args:
-        goal: of the objects.
-        radius: of the object [m].
-        inset: distance that it keeps from the edges of a receptacle [radii].
-
-    Returns:
-        None where a receptacle has no such place.
-
-    Raises:
-        InvalidInputError: if the goal is one for the robot.
-    """
-    if isinstance(goal, Receptacle):
-        inner = shapely.Polygon(goal.polygon).buffer(-inset * radius, join_style="mitre")
-        if inner.is_empty or inner.area <= 0.0:
-            return None
-        return [np.asarray(inner.exterior.coords)[:-1]]
-    if isinstance(goal, ClearanceArea):
-        ends = np.stack([goal.polygon, np.roll(goal.polygon, -1, axis=0)], axis=1)
-        along = ends[:, 1] - ends[:, 0]
-        outward = np.stack([along[:, 1], -along[:, 0]], axis=1)
-        outward *= 1.1 * radius / np.hypot(along[:, 0], along[:, 1])[:, None]
-        return list((ends + outward[:, None])[goal.open_edges])
-    raise InvalidInputError(f"this needs a goal for the objects, got {type(goal).__name__}")
 
 
 @functools.lru_cache(maxsize=8)

@@ -12,7 +12,7 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 
 from pushplan.motion.collision import footprint, obstacles
-from pushplan.planners.rearrangement.object_paths import done_places
+from pushplan.motion.done_places import done_places
 from pushplan.planners.rearrangement.pose_grid_kernels import LENGTHS, MOVES
 from pushplan.planners.rearrangement.primitives import SHIFTS
 from pushplan.planners.rearrangement.push_pose_kernels import pushable_moves

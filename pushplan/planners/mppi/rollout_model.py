@@ -1,0 +1,168 @@
+"""`RolloutModel`: everything that rollouts from one snapshot need."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from pushplan.compiled import owned
+from pushplan.control.limits import driven_twist
+from pushplan.interaction import InteractionModel, QuasiStatic, SweepsMany
+from pushplan.interaction.advance import CompiledInteraction
+from pushplan.interaction.ice import IceInteraction
+from pushplan.motion.collision import footprint, is_free, obstacles, static_depth
+from pushplan.motion.goal_region import goal_numbers
+from pushplan.motion.keep_out import keep_out
+from pushplan.planners.mppi.control_sequence import interpolation
+from pushplan.planners.mppi.mppi_config import MppiConfig
+from pushplan.planners.mppi.rollout_kernels import (
+    BLOCKED,
+    DriveLimits,
+    RolloutProblem,
+    Rollouts,
+    make_rollouts,
+    roll_objects,
+    roll_robots,
+)
+from pushplan.world import GoalDisc, GoalLine, World
+from pushplan.world.checks import FloatArray
+
+_TURN = 0.35  # greatest turn from pose to pose [rad]
+_NEAR = 1.5  # objects so much farther away than the robot gets are left out [R]
+_FEW = 40  # objects that are few enough to keep them all
+
+
+def default_model(world: World) -> InteractionModel:
+    """Ice contacts where a robot goes through open water, else quasi-static ones.
+
+    For a robot that cannot back out, walls hold what is squeezed against them.
+    """
+    if isinstance(world.goal, GoalLine) and not world.static.convex_parts:
+        return IceInteraction()
+    held = 0.0 if world.robot.can_stop else 0.5
+    return QuasiStatic(friction=0.1, static_friction=held, step=0.3, iterations=6)
+
+
+def step_length(world: World, config: MppiConfig) -> float:
+    """Time between two steps of a rollout [s]."""
+    if config.step is not None:
+        return config.step
+    return config.stride * world.robot.circumscribed_radius / world.robot.max_speed
+
+
+class RolloutModel:
+    """Rolls out control sequences from one snapshot.
+
+    Args:
+        world: the snapshot.
+        config: settings.
+        interaction: predicts the objects; `default_model` if None. One in compiled form rolls
+            all samples in one kernel; any other one is asked for each sample's path.
+    """
+
+    def __init__(
+        self, world: World, config: MppiConfig, interaction: InteractionModel | None = None
+    ) -> None:
+        self.config, self.period = config, step_length(world, config)
+        self.world = _nearby(world, config.steps * self.period)
+        self.interaction = default_model(world) if interaction is None else interaction
+        self.compiled = (
+            self.interaction.compiled(self.world)
+            if isinstance(self.interaction, CompiledInteraction) and len(self.world.movables)
+            else None
+        )
+        self._matrix = interpolation(config.steps, config.knots)
+        self._objects = owned(self.world.movables.poses)
+        driven = driven_twist(world)
+        self._twist = np.array([driven.linear, driven.angular])
+        self.problem = _problem(world, config, self.period)
+
+    @property
+    def horizon(self) -> float:
+        """Time from the beginning to the end of a rollout [s]."""
+        return self.config.steps * self.period
+
+    def roll(self, knots: FloatArray) -> Rollouts:
+        """Roll out S sequences.
+
+        Args:
+            knots: (S, M, 2) controls at the knots, as fractions of the greatest ones.
+        """
+        controls = np.ascontiguousarray(np.einsum("hm,smc->shc", self._matrix, knots))
+        config = self.config
+        rollouts = make_rollouts(
+            len(knots), config.steps, self.problem.substeps, len(self._objects)
+        )
+        start = owned(self.world.robot_pose)
+        roll_robots(controls, start, self._twist, self.problem, rollouts)
+        if self.compiled is not None:
+            roll_objects(self.compiled, self._objects, rollouts)
+        elif len(self._objects):
+            self._ask(rollouts)
+        return rollouts
+
+    def _ask(self, rollouts: Rollouts) -> None:
+        """Have the model itself carry the objects along each path."""
+        paths = [
+            path[: end + 1]
+            for path, end in zip(rollouts.paths, rollouts.ends.tolist(), strict=True)
+        ]
+        model = self.interaction
+        if isinstance(model, SweepsMany):
+            swept = model.sweep_many(self.world, paths)
+        else:
+            swept = [model.sweep(self.world, path) for path in paths]
+        for s, one in enumerate(swept):
+            rollouts.objects[s], rollouts.works[s] = one.object_poses[-1], one.work
+            if one.jammed_at >= 0:
+                rollouts.ends[s], rollouts.outcomes[s] = max(one.jammed_at - 1, 0), BLOCKED
+
+
+def _nearby(world: World, horizon: float) -> World:
+    """The world with those objects only that the robot may move within the horizon."""
+    movables, robot = world.movables, world.robot
+    if len(movables) <= _FEW:
+        return world
+    reach = horizon * robot.max_speed + (1.0 + _NEAR) * robot.circumscribed_radius
+    away = np.hypot(*(movables.poses[:, :2] - world.robot_pose[:2]).T)
+    near = away < reach + movables.radii
+    return World(
+        robot,
+        world.robot_pose,
+        world.static,
+        movables.select(near),
+        world.goal,
+        world.robot_twist,
+        world.time,
+        world.margin,
+    )
+
+
+def _problem(world: World, config: MppiConfig, period: float) -> RolloutProblem:
+    robot = world.robot
+    limits = DriveLimits(
+        robot.min_speed,
+        robot.max_speed,
+        robot.max_turn_rate,
+        robot.max_acceleration * period,
+        robot.max_turn_acceleration * period,
+        robot.min_turning_radius,
+    )
+    walls, start = obstacles(keep_out(world)), owned(world.robot_pose)
+    for margin in (config.margin * robot.circumscribed_radius, 0.0):
+        shape = footprint(robot, margin)
+        corners = np.empty_like(shape.vertices)
+        if is_free(start, shape, walls, corners):
+            break
+    goal = world.goal
+    return RolloutProblem(
+        float(period),
+        max(1, math.ceil(robot.max_turn_rate * period / _TURN)),
+        limits,
+        shape,
+        walls,
+        goal_numbers(goal, 0.0) if isinstance(goal, GoalDisc | GoalLine) else np.zeros(5),
+        isinstance(goal, GoalDisc | GoalLine),
+        float(static_depth(start, shape, walls, corners)),
+    )
