@@ -40,13 +40,11 @@ class ConvexObstacles(NamedTuple):
 
 @functools.lru_cache(maxsize=64)
 def footprint(robot: RobotModel, margin: float = 0.0) -> Footprint:
-    """The robot's footprint, every part grown by ``margin`` [m] with sharp corners."""
-    if margin == 0.0:
-        return Footprint(owned(robot.vertices), owned(robot.offsets), robot.circumscribed_radius)
-    parts = []
-    for part in robot.contact_parts:
-        grown = Polygon(part).buffer(margin, join_style="mitre")
-        parts.append(convex_outline("footprint", np.asarray(grown.exterior.coords)[:-1]))
+    """What of a robot counts at walls, every part grown by ``margin`` [m] with sharp corners."""
+    parts = list(robot.wall_parts)
+    if margin != 0.0:
+        grown = [Polygon(part).buffer(margin, join_style="mitre").exterior for part in parts]
+        parts = [convex_outline("footprint", np.asarray(ring.coords)[:-1]) for ring in grown]
     vertices, offsets = flatten(parts)
     radius = float(np.hypot(vertices[:, 0], vertices[:, 1]).max())
     return Footprint(owned(vertices), owned(offsets), radius)

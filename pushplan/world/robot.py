@@ -58,7 +58,7 @@ class RobotModel(ArrayRecord, CheckedFields):
             rounded by it. `contact_parts` are grown by it, and everything but pictures and files
             reads those.
         wheel_parts: how many of the last parts are wheels, which push objects but do not count at
-            what is static; planar simulators heed it, planners keep all parts clear.
+            what is static; planners and planar simulators heed it.
         name: for logs and pictures.
 
     Raises:
@@ -129,6 +129,11 @@ class RobotModel(ArrayRecord, CheckedFields):
         if self.contact_radius == 0.0:
             return self.parts
         return tuple(frozen(grown_outline(part, self.contact_radius)) for part in self.parts)
+
+    @property
+    def wall_parts(self) -> tuple[FloatArray, ...]:
+        """The contact parts that count at what is static: all but the wheels."""
+        return self.contact_parts[: len(self.parts) - self.wheel_parts]
 
     @cached_property
     def _flat(self) -> tuple[FloatArray, IntArray]:

@@ -26,3 +26,20 @@ def test_free_poses_are_those_that_shapely_finds(count: int) -> None:
         inside = bool(np.all((pose[:2] >= 0.0) & (pose[:2] <= 30.0)))
         hull = shapely.Polygon(transform(pose, plank))
         assert is_free(pose, shape, among, scratch) == (inside and not hull.intersects(walls))
+
+
+def test_wheels_push_but_do_not_count_at_walls() -> None:
+    body = np.array([(-0.5, -0.3), (0.5, -0.3), (0.5, 0.3), (-0.5, 0.3)])
+    wheel = np.array([(-0.2, 0.3), (0.2, 0.3), (0.2, 0.5), (-0.2, 0.5)])
+    limits = {"mass": 1.0, "drive": "differential", "max_speed": 1.0, "max_turn_rate": 1.0}
+    robot = RobotModel(parts=(body, wheel), wheel_parts=1, **limits)  # type: ignore[arg-type]
+    whole = RobotModel(parts=(body, wheel), **limits)  # type: ignore[arg-type]
+    wall = StaticMap.build(
+        polygons=[[(-1, 0.4), (1, 0.4), (1, 0.6), (-1, 0.6)]], bounds=(-2, -2, 2, 2)
+    )
+    for one, free in ((robot, True), (whole, False)):
+        for margin in (0.0, 0.05):
+            shape = footprint(one, margin)
+            scratch = np.empty_like(shape.vertices)
+            assert is_free(np.zeros(3), shape, obstacles(wall), scratch) == free
+    assert len(robot.vertices) == 8 and robot.circumscribed_radius == whole.circumscribed_radius
