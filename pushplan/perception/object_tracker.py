@@ -11,23 +11,13 @@ import shapely
 from numpy.typing import ArrayLike
 
 from pushplan.perception.assignment import assign
-from pushplan.perception.contour_alignment import Contour
+from pushplan.perception.sighting import Sighting, sightings_of
 from pushplan.perception.track import Track, see_all
 from pushplan.world import InvalidInputError, Movables
 from pushplan.world.checks import FloatArray, array, boolean, frozen, integer, number
-from pushplan.world.outline import areas_and_centroids, flatten, next_corner, signed_area
+from pushplan.world.outline import areas_and_centroids, flatten, signed_area
 
-_FLAT = 1e-6  # least area of an outline [squared sides of the box around it]
 _SAME_SIZE = 0.2  # relative difference of sizes up to which a jump may be of the same object
-
-
-class Sighting(NamedTuple):
-    """An outline in one snapshot: contour (N,), centre x + iy [m] and area [m²] of its hull."""
-
-    contour: Contour
-    centre: complex
-    area: float
-    label: int | None
 
 
 class Candidate(NamedTuple):
@@ -153,7 +143,8 @@ class ObjectTracker:
         if self._time is not None and stamp <= self._time:
             self.ignored += 1
             return self._movables
-        sightings = self._sightings(points, labels)
+        sightings = sightings_of(points, labels)
+        self.flat += len(points) - len(sightings)
         first, self._time = self._time is None, stamp
         for track in self._tracks:
             track.predict(stamp)
@@ -166,24 +157,6 @@ class ObjectTracker:
         self._tracks = [one for one in self._tracks if stamp - one.seen_at <= self.keep]
         self._movables = self._collected()
         return self._movables
-
-    def _sightings(self, points: Sequence[FloatArray], labels: FloatArray | None) -> list[Sighting]:
-        closed = [i for i, corners in enumerate(points) if len(corners) >= 3]
-        if not closed:
-            self.flat += len(points)
-            return []
-        areas, centres, signs, sizes = _measured([points[i] for i in closed])
-        solid = np.flatnonzero(areas > _FLAT * sizes**2).tolist()
-        self.flat += len(points) - len(solid)
-        return [
-            Sighting(
-                _contour(points[closed[i]], signs[i]),
-                complex(*centres[i]),
-                float(areas[i]),
-                None if labels is None else int(labels[i]),
-            )
-            for i in solid
-        ]
 
     def _match(self, sightings: list[Sighting]) -> list[Sighting]:
         """Give the sightings within the gates to their tracks; return the others."""
@@ -307,41 +280,8 @@ def _plane(points: Sequence[complex]) -> FloatArray:
     return np.column_stack([values.real, values.imag])
 
 
-def _measured(points: Sequence[FloatArray]) -> tuple[FloatArray, ...]:
-    """Of M outlines with three corners or more: what tells a hull from a line, and where it lies.
-
-    Returns:
-        (M,) areas [m²] and (M, 2) centroids [m] of the hulls, (M,) positive where the corners run
-        counter-clockwise, and (M,) longer sides of the boxes around them [m].
-    """
-    vertices, offsets = flatten(points)
-    counts = np.diff(offsets)
-    clouds = np.full(len(points), shapely.MultiPoint())
-    owners = np.repeat(np.arange(len(points)), counts)
-    shapely.multipoints(shapely.points(vertices), indices=owners, out=clouds)
-    hulls = shapely.convex_hull(clouds)
-    starts = offsets[:-1]
-    shifted = vertices - np.repeat(vertices[starts], counts, axis=0)
-    after = shifted[next_corner(offsets)]
-    cross = shifted[:, 0] * after[:, 1] - shifted[:, 1] * after[:, 0]
-    return (
-        shapely.area(hulls),
-        shapely.get_coordinates(shapely.centroid(hulls)),
-        np.add.reduceat(cross, starts),
-        (np.maximum.reduceat(vertices, starts) - np.minimum.reduceat(vertices, starts)).max(axis=1),
-    )
-
-
 def _hull(corners: FloatArray) -> FloatArray:
     """(H, 2) corners of the convex hull, counter-clockwise."""
     ring = shapely.MultiPoint(corners).convex_hull.exterior.coords[:-1]
     hull = np.array(ring)
     return hull if signed_area(hull) > 0.0 else np.ascontiguousarray(hull[::-1])
-
-
-def _contour(corners: FloatArray, sign: float) -> Contour:
-    """Corners as a contour, counter-clockwise, without the first one repeated at the end."""
-    if (corners[0] == corners[-1]).all():
-        corners = corners[:-1]
-    points = corners[:, 0] + 1j * corners[:, 1]
-    return points if sign >= 0.0 else points[::-1]

@@ -1,7 +1,8 @@
 """From worlds to motor commands, in a robot's own loop."""
 
 from pushplan.runtime.command import Command, CommandStatus
-from pushplan.runtime.runner import PLAN_STOP, RunLog, Runner
+from pushplan.runtime.run_log import RunLog
+from pushplan.runtime.runner import PLAN_STOP, Runner
 from pushplan.runtime.state_estimator import StateEstimator
 from pushplan.runtime.thread_executor import PlanningError, ThreadExecutor
 

@@ -7,13 +7,16 @@ from typing import Any
 import numpy as np
 
 from pushplan.control import ImmediateExecutor
+from pushplan.planners import make_policy, policy_for
 from pushplan.planners.kernel_warmup import warm_up_policy
 from pushplan.world import (
     ChoosesActions,
     ChoosesObservation,
     InvalidInputError,
     PendingResult,
+    Planner,
     PlanningExecutor,
+    PlansBesideDriving,
     Policy,
     Twist,
     WheelSpeeds,
@@ -108,3 +111,26 @@ def twist_of(world: World, action: object) -> Twist:
         f"a Runner needs a Twist, or WheelSpeeds of a robot with a wheel_separation, "
         f"got {type(action).__name__}"
     )
+
+
+def drivable(policy: object, hold: float) -> Any:
+    """What a runner drives: a policy that plans beside driving.
+
+    Args:
+        policy: a policy, a planner, or the name of one.
+        hold: for how long an action of a policy that plans in one go is held [s].
+
+    Raises:
+        InvalidInputError: if it is none of these.
+        UnknownNameError: if there is no policy of that name.
+    """
+    if isinstance(policy, str):
+        policy = make_policy(policy)
+    if isinstance(policy, Planner) and not isinstance(policy, Policy):
+        policy = policy_for(policy)
+    if not isinstance(policy, Policy):
+        raise InvalidInputError(
+            "policy must be a policy (reset and act), a planner (plan) or a name, "
+            f"got {type(policy).__name__}"
+        )
+    return policy if isinstance(policy, PlansBesideDriving) else HeldActions(policy, hold)

@@ -5,21 +5,19 @@ from __future__ import annotations
 import math
 import threading
 import time
-import warnings
 from collections.abc import Callable
-from dataclasses import replace
-from typing import Any, Protocol
 
 import numpy as np
 
 from pushplan.control import waiting_twist
 from pushplan.control.limits import driven_twist, ramp_twist
-from pushplan.planners import make_policy, policy_for
 from pushplan.planners.kernel_warmup import warm_up_policy
 from pushplan.runtime.command import Command, CommandStatus
-from pushplan.runtime.held_actions import HeldActions
+from pushplan.runtime.held_actions import drivable
 from pushplan.runtime.interpreter_turns import take_short_turns, take_usual_turns
+from pushplan.runtime.noise_allowance import NoiseAllowance
 from pushplan.runtime.object_memory import ObjectMemory
+from pushplan.runtime.run_log import QuietLog, RunLog
 from pushplan.runtime.state_estimator import StateEstimator
 from pushplan.runtime.thread_executor import ThreadExecutor
 from pushplan.world import (
@@ -32,7 +30,6 @@ from pushplan.world import (
     Plan,
     Planner,
     PlanningExecutor,
-    PlansBesideDriving,
     Policy,
     ShowsPlan,
     Stop,
@@ -47,19 +44,6 @@ PLAN_STOP = OwnBudget() | Deadline(1.0)
 _SMOOTHING = 0.3  # gain of the filter of noisy poses
 _RETRY = 0.25  # time after a failure in which the policy is not asked [s]
 _BLIND = 60.0  # for how long a robot that is to continue does so without a world [s]
-
-
-class RunLog(Protocol):
-    """Keeps what a `Runner` sees and does; a log that raises is not called again."""
-
-    def world(self, world: World) -> None:
-        """A snapshot has come in."""
-
-    def plan(self, plan: Plan, time: float) -> None:
-        """A plan was taken up, at a time [s]."""
-
-    def command(self, command: Command) -> None:
-        """A command was given."""
 
 
 class Runner:
@@ -144,14 +128,14 @@ class Runner:
         if observer_gain is None:
             observer_gain = _SMOOTHING if any(noise) else 1.0
         gain = number("observer_gain", observer_gain, low=0.0, high=1.0, open_low=True)
-        self.policy = _policy_of(policy, self.max_age)
+        self.policy = drivable(policy, self.max_age)
         left = math.sqrt(gain / (2.0 - gain))  # of white noise, after a filter of that gain
-        self._left = left * noise[0], left * noise[1]
+        self._allowance = NoiseAllowance(left * noise[0], left * noise[1], self.period, self.margin)
         if any(noise) and isinstance(self.policy, ExpectsNoise):
-            self.policy.expect_noise(*self._left)
+            self.policy.expect_noise(left * noise[0], left * noise[1])
         self._believed = max(self.max_age, _BLIND if self.on_stale == "continue" else 0.0)
         self._estimator = StateEstimator(delay, gain, self._believed)
-        self._delay, self._clock, self._log = delay, clock, log
+        self._delay, self._clock, self._log = delay, clock, QuietLog(log)
         self._executor = executor or ThreadExecutor(self.plan_stop, clock)
         self._lock = threading.Lock()
         self._prompt = False
@@ -188,7 +172,7 @@ class Runner:
         Raises:
             InvalidInputError: if the policy cannot be used in such a world.
         """
-        world = self._with_margin(world)
+        world = self._allowance.planning_world(world)
         if not self.worlds:  # the first time
             warm_up_policy(self.policy)
         self._estimator.warm_up(world)
@@ -203,27 +187,12 @@ class Runner:
             self._prompt = True
         self._newest = self._observed = world
         self.worlds = 1
-        self._note("world", world)
+        self._log.note("world", world)
         return self.command(world.time)
 
     def _begin(self, world: World) -> None:
         self.policy.reset(world, np.random.default_rng(0))
         self.policy.plan_with(self._executor)
-
-    def _with_margin(self, world: World) -> World:
-        """The world as the policy plans in it: with the margin, and sure to be in the goal."""
-        world = expect("world", world, World)
-        goal = world.goal
-        place, heading = self._left
-        inset = 3.0 * place + world.robot.max_speed * self.period  # the last command acts
-        if isinstance(goal, GoalDisc):
-            world = replace(
-                world, goal=GoalDisc(goal.center, max(goal.radius - inset, 0.5 * goal.radius))
-            )
-        margin = self.margin
-        if margin is None:
-            margin = max(world.margin, 2.0 * (place + heading * world.robot.circumscribed_radius))
-        return world if margin == world.margin else replace(world, margin=margin)
 
     def update(self, world: World) -> bool:
         """Take a snapshot, from any thread.
@@ -234,14 +203,14 @@ class Runner:
         Returns:
             Whether it is news. One that is not later than the newest is counted and ignored.
         """
-        world = self._with_margin(world)
+        world = self._allowance.planning_world(world)
         with self._lock:
             if self._newest is not None and world.time <= self._newest.time:
                 self.ignored += 1
                 return False
             self._newest = world
             self.worlds += 1
-        self._note("world", world)
+        self._log.note("world", world)
         return True
 
     def cancel(self, reason: str = "cancelled") -> None:
@@ -302,7 +271,7 @@ class Runner:
         if plan is not self._plan:
             self._plan, self._planned_at = plan, now
             if plan is not None:
-                self._note("plan", plan, now)
+                self._log.note("plan", plan, now)
         command = Command(
             now,
             twist,
@@ -314,7 +283,7 @@ class Runner:
             last is not None and held > 1.5 * self.period,
         )
         self._last, self.status = command, status
-        self._note("command", command)
+        self._log.note("command", command)
         return command
 
     def _choose(
@@ -350,30 +319,6 @@ class Runner:
         """For how long a planning call has been running [s]; 0 if none is."""
         executor = self._executor
         return executor.running_s if isinstance(executor, ThreadExecutor) else 0.0
-
-    def _note(self, what: str, *values: Any) -> None:
-        """Tell the log; one that fails is not called again."""
-        if self._log is None:
-            return
-        try:
-            getattr(self._log, what)(*values)
-        except Exception as error:
-            self._log = None
-            warnings.warn(f"logging has ended: {describe(error)}", RuntimeWarning, stacklevel=3)
-
-
-def _policy_of(policy: object, hold: float) -> Any:
-    """What a runner drives: a policy that plans beside driving."""
-    if isinstance(policy, str):
-        policy = make_policy(policy)
-    if isinstance(policy, Planner) and not isinstance(policy, Policy):
-        policy = policy_for(policy)
-    if not isinstance(policy, Policy):
-        raise InvalidInputError(
-            "policy must be a policy (reset and act), a planner (plan) or a name, "
-            f"got {type(policy).__name__}"
-        )
-    return policy if isinstance(policy, PlansBesideDriving) else HeldActions(policy, hold)
 
 
 def is_done(world: World) -> bool:

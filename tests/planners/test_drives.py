@@ -151,13 +151,20 @@ def test_a_plan_is_driven_in_stages_ahead_back_and_on_the_spot():
 @pytest.mark.warm(*PLANNERS)
 @pytest.mark.parametrize("name", PLANNERS)
 def test_a_robot_that_faces_a_wall_plans_to_turn_on_the_spot_first(name):
-    """No arc leads on from there; the turn pushes the box beside it."""
-    world = make_u_maze([[13.3, 4.05, 0.0]], robot=ROBOTS["disc"], robot_pose=NEAR_A_WALL)
+    """No arc leads on from there; the corners of the robot push the box beside it."""
+    robot = make_robot(drive=Drive.DIFFERENTIAL)
+    world = make_u_maze([[13.5, 4.13, 0.0]], robot=robot, robot_pose=[13.55, 3.0, 0.0])
     result = make_planner(name).plan(world, stop=MaxIterations(6000))
     assert result.status is PlanStatus.SOLVED
-    check_plan(world, result.plan, result.status)
-    assert [stage.direction for stage in result.plan.stages] == [0, 1]
-    assert result.plan.poses[result.plan.stages[0].last, 2] > 1.0
+    plan = result.plan
+    check_plan(world, plan, result.status)
+    assert [stage.direction for stage in plan.stages] == [0, 1]
+    end = plan.stages[0].last
+    assert abs(plan.poses[end, 2]) > 1.0
+    assert plan.times[end] >= abs(plan.poses[end, 2]) / robot.max_turn_rate
+    assert np.abs(plan.object_poses[end] - world.movables.poses).max() > 1e-3
+    swept = make_planner(name).interaction.sweep(world, plan.poses)
+    assert swept.work == pytest.approx(plan.interaction_cost, rel=1e-3)
 
 
 @pytest.mark.warm(*PLANNERS)

@@ -93,7 +93,7 @@ def channel_view(world: World, config: PredictiveConfig, model: IceInteraction) 
     near = np.flatnonzero((floes[:, 1] > -reach) & (floes[:, 1] < goal + reach))
     off = math.remainder(float(world.robot_pose[2]) - turn - 0.5 * math.pi, 2.0 * math.pi)
     radius = robot.turning_radius / config.turn_fraction
-    margin = config.margin * 0.5 * float(np.ptp(robot.vertices[:, 1]))
+    margin = config.margin * 0.5 * float(np.ptp(robot.vertices[:, 1])) + world.margin
     low, high = _box(world, turn, margin, (1.0 + 1e-6) * radius * (1.0 - math.cos(off)), off)
     aside = 0.5 * max(goal, 0.0) + 5.0 * length  # no path leads farther from the straight one
     low[0], high[0] = max(low[0], min(-aside, high[0])), min(high[0], max(aside, low[0]))

@@ -25,10 +25,11 @@ class PredictiveShip:
     what the metrics measure. A table of costs to go over the ice as it lies guides a beam of
     arcs (see `BeamSearch`). Use it where the positions of the floes are known.
 
-    Plans keep the ship's origin half a beam inside the sides of the channel, nearer only as far as
-    a turn from where it starts needs the space. A goal line that is very far away is approached
-    (`PredictiveConfig.farthest`). Without a stop rule the effort is fixed; with one the beam is
-    widened until the rule fires. An iteration is one predicted piece of path.
+    Plans keep the ship's origin half a beam, and the margin of the world, inside the sides of the
+    channel, nearer only as far as a turn from where it starts needs the space. A goal line that is
+    very far away is approached (`PredictiveConfig.farthest`). Without a stop rule the effort is
+    fixed; with one the beam is widened until the rule fires. An iteration is one predicted piece of
+    path.
 
     Args:
         config: parameters.

@@ -147,7 +147,11 @@ def timed_path(world: World, poses: FloatArray, curvatures: FloatArray) -> Plan:
 
 
 def _clearance(world: World) -> float:
-    """Distance from the bounds [m] that the ship's origin keeps: half a beam, if it has that."""
+    """Distance from the bounds [m] that the ship's origin keeps: half a beam and the margin.
+
+    It is less where the ship is nearer.
+    """
     x, y = world.robot_pose[:2]
     x0, y0, x1, y1 = world.static.bounds
-    return float(max(min(world.robot.inscribed_radius, x - x0, x1 - x, y - y0, y1 - y), 0.0))
+    wanted = world.robot.inscribed_radius + world.margin
+    return float(max(min(wanted, x - x0, x1 - x, y - y0, y1 - y), 0.0))

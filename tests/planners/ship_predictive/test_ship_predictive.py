@@ -1,6 +1,7 @@
 """The predictive ship planners at their doors."""
 
 import time
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -217,6 +218,18 @@ def test_the_frame_does_not_matter():
     turned = PredictiveShip().plan(flat).plan
     assert turned.poses[:, 0] == pytest.approx(plan.poses[:, 1], abs=1e-6)
     assert turned.poses[:, 1] == pytest.approx(-plan.poses[:, 0], abs=1e-6)
+
+
+@pytest.mark.parametrize("name", ["ship-predictive", "ship-predictive-published"])
+def test_the_margin_of_a_world_is_kept_from_the_sides_of_the_channel(name):
+    """The ice leaves a gap at a side, 6 m from the middle; half a beam is 0.25 m."""
+    ice_row = [(2.0 * SQUARE, [x, 6.0, 0.0]) for x in (-5.0, -2.8, -0.6, 1.6, 3.6)]
+    world = channel(ice_row, pose=[4.5, 1.0, np.pi / 2])
+    sides = [
+        float(make_planner(name).plan(replace(world, margin=margin)).plan.poses[:, 0].max())
+        for margin in (0.0, 1.0)
+    ]
+    assert sides[0] > 6.0 - 0.25 - 1.0 >= sides[1] - 1e-9
 
 
 @pytest.mark.parametrize(
