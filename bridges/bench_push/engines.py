@@ -24,6 +24,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+sys.path.insert(0, str(Path(__file__).parent))
+
 import numpy as np
 from bench import POLICIES, VARIATIONS, chosen, complete, drive, ours, say, scored
 
