@@ -64,16 +64,16 @@ def test_a_short_episode_is_scored_by_both(python: str, scene: str, tmp_path: Pa
 @pytest.mark.parametrize("scene", ["maze-5", "area_clearing-clear_env"])
 def test_the_same_start_in_both_engines(python: str, scene: str, tmp_path: Path) -> None:
     policy = "straight" if scene.startswith("maze") else "greedy"
-    arguments = ["--python", python, "--scenes", scene, "--policies", policy, "--seeds", "3-3"]
+    arguments = ["--python", python, "--scenes", scene, "--policies", policy, "--seeds", "0-0"]
     command = [sys.executable, str(BRIDGE / "engines.py"), *arguments, "--most-steps", "100"]
     done = subprocess.run(
         [*command, "--out", str(tmp_path)], capture_output=True, text=True, cwd=ROOT
     )
     assert done.returncode == 0, done.stderr
     rows = [line.split("|") for line in done.stdout.splitlines() if line.startswith("| ")][1:]
-    assert [row[3].strip() for row in rows] == ["original", "ours", "ours, held"]
-    theirs, _, held = (float(row[7].split()[0]) for row in rows)
-    assert held == pytest.approx(theirs, rel=0.1, abs=1e-3)
+    assert [row[3].strip() for row in rows] == ["original", "ours", "ours, its settings"]
+    theirs, _, alike = (float(row[7].split()[0]) for row in rows)
+    assert alike == pytest.approx(theirs, rel=0.1, abs=1e-3)
 
 
 @pytest.mark.slow
