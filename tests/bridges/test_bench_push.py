@@ -10,6 +10,9 @@ from pathlib import Path
 
 import pytest
 
+from pushplan.envs import make
+from pushplan.scenarios import load_scenarios
+
 ROOT = Path(__file__).parents[2]
 BRIDGE = ROOT / "bridges" / "bench_push"
 SCENES = ("maze-5", "ship_ice-20", "area_clearing-clear_env", "box_delivery-small_empty")
@@ -55,6 +58,35 @@ def test_a_short_episode_is_scored_by_both(python: str, scene: str, tmp_path: Pa
     first, second = (next(out.iterdir()).read_text(encoding="utf-8") for out in outs)
     poses = [text.partition('"robot_poses"')[2].partition('"act_s"')[0] for text in (first, second)]
     assert poses[0] and poses[0] == poses[1]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("scene", ["maze-5", "area_clearing-clear_env"])
+def test_the_same_start_in_both_engines(python: str, scene: str, tmp_path: Path) -> None:
+    policy = "straight" if scene.startswith("maze") else "greedy"
+    arguments = ["--python", python, "--scenes", scene, "--policies", policy, "--seeds", "0-0"]
+    command = [sys.executable, str(BRIDGE / "engines.py"), *arguments, "--most-steps", "100"]
+    done = subprocess.run(
+        [*command, "--out", str(tmp_path)], capture_output=True, text=True, cwd=ROOT
+    )
+    assert done.returncode == 0, done.stderr
+    rows = [line.split("|") for line in done.stdout.splitlines() if line.startswith("| ")][1:]
+    assert [row[3].strip() for row in rows] == ["original", "ours", "ours, its settings"]
+    theirs, _, alike = (float(row[7].split()[0]) for row in rows)
+    assert alike == pytest.approx(theirs, rel=0.1, abs=1e-3)
+
+
+@pytest.mark.slow
+def test_its_ice_fields_become_scenarios(python: str, tmp_path: Path) -> None:
+    own = {key: value for key, value in os.environ.items() if not key.startswith("PYTHON")}
+    arguments = ["--concentration", "20", "--fields", "4-5", "--out", str(tmp_path)]
+    subprocess.run([python, str(BRIDGE / "ice.py"), *arguments], check=True, env=own)
+    scenarios = load_scenarios(tmp_path / "20.yaml")
+    assert [one.seed for one in scenarios] == [4, 5]
+    env = make(scenarios[0], observation="state")
+    env.reset(seed=4)
+    masses = env.world.movables.masses
+    assert 0.18 < masses.sum() / (12.0 * 38.0) < 0.22 and 240 < len(masses) < 280
 
 
 @pytest.mark.slow

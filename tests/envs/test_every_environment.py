@@ -22,13 +22,18 @@ from pushplan.world import ClearanceArea, Drive, Receptacle
 from pushplan.world.lazy_names import look_up
 
 LAYOUTS = {
-    "maze": [{"shape": "z", "wheeled": 0.4}, {"boxes": 0}, {"bumper_friction": 0.3}],
-    "ship_ice": [{"concentration": 0.0}, {"concentration": 0.5}],
+    "maze": [
+        {"shape": "z", "wheeled": 0.4},
+        {"boxes": 0},
+        {"bumper_friction": 0.3, "touching": True},
+    ],
+    "ship_ice": [{"concentration": 0.0}, {"concentration": 0.5, "time_limit": 8.0}],
     "box_delivery": [
         {"layout": name} for name in ("small_columns", "large_columns", "large_divider")
     ],
     "area_clearing": [
-        {"layout": name} for name in ("clear_small", "walled", "walled_with_columns")
+        {"layout": name, "touching": True, "idle_limit": 30.0}
+        for name in ("clear_small", "walled", "walled_with_columns")
     ],
     "room": [{"spread": 0.2}, {"max_speed": 0.1, "control_step": 0.05}],
 }
