@@ -62,7 +62,10 @@ print(json.dumps({
 }))
 """
 
-TWICE = {"pushplan.search.astar.search": "lattices of a ship's poses and of pushed objects"}
+TWICE = {
+    "pushplan.search.astar.search": "lattices of a ship's poses and of pushed objects",
+    "pushplan.planners.mppi.rollout_kernels.roll_objects": "objects in a room, floes in water",
+}
 """Kernels that Python calls with more than one type of arguments, and why."""
 
 
