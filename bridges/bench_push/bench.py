@@ -38,7 +38,6 @@ POLICIES = {
     "area_clearing": ("greedy", "gtsp-mpc"),
     "box_delivery": ("greedy", "gtsp-mpc"),
 }
-"""The first is what the others are compared with."""
 THEIRS = {"maze": ("theirs:rrt",), "ship_ice": ("theirs:lattice",)}
 """Needs a checkout of the original's repository."""
 GTSP = {"area_clearing": ("theirs:gtsp",)}

@@ -20,6 +20,7 @@ TITLES = {
     "area_clearing": "Area-Clearing",
     "box_delivery": "Box-Delivery",
 }
+OWN = ("theirs:rrt", "theirs:lattice", "theirs:gtsp")
 SCORES = {"theirs": ("S", "E", "I"), "ours": ("S", "E", "I", "work")}
 HEADINGS = {
     "theirs": "By the original's code",
@@ -33,8 +34,8 @@ def report(runs: Sequence[Run]) -> str:
     lines = [
         f"Measured until {today} ({os.cpu_count()}-core {platform.machine()}), every policy on the "
         "same starts; `seeds` are those that ran. Means with 95 % bootstrap intervals. Δ is the "
-        "mean paired difference to the first row of the variation, on the seeds that both have. "
-        "Rows `theirs:` are planners of the original, in its process, with its actions clipped to "
+        "mean paired difference, on the seeds that both have, to the original's own planner where "
+        "it ran, else to the first row of the variation. Rows `theirs:` are planners of the original, in its process, with its actions clipped to "
         "their limits.",
     ]
     for scene in dict.fromkeys(run.scene for run in runs):
@@ -53,11 +54,12 @@ def table(runs: Sequence[Run], by: str) -> list[str]:
     lines = ["| " + " | ".join(heads) + " |", "|" + "---|" * len(heads)]
     for variation in dict.fromkeys(run.variation for run in runs):
         group = [run for run in runs if run.variation == variation]
-        lines += [row(run, group[0], by) for run in group]
+        own = [run for run in group if run.policy in OWN and run.episodes]
+        lines += [row(run, (own or group)[0], by) for run in group]
     return lines
 
 
-def row(run: Run, first: Run, by: str) -> str:
+def row(run: Run, base: Run, by: str) -> str:
     """One line of a table."""
     cells = [run.variation.replace("_", " "), f"`{run.policy}`", _seeds(run)]
     names = SCORES[by]
@@ -67,9 +69,9 @@ def row(run: Run, first: Run, by: str) -> str:
         cells.append(shown(estimate(list(run.values(by, name).values())), name))
     for name in names:
         if name != "S":
-            mine, other = run.values(by, name), first.values(by, name)
+            mine, other = run.values(by, name), base.values(by, name)
             gaps = [mine[seed] - other[seed] for seed in sorted(mine.keys() & other.keys())]
-            cells.append("" if run is first or not gaps else shown(estimate(gaps), name, "+"))
+            cells.append("" if run is base or not gaps else shown(estimate(gaps), name, "+"))
     if by == "theirs":
         waits = [1e3 * wait for one in run.episodes.values() for wait in one["act_s"]]
         cells.append(f"{np.median(waits):.2g}, {max(waits):.0f}")
