@@ -35,8 +35,8 @@ def report(runs: Sequence[Run]) -> str:
         f"Measured until {today} ({os.cpu_count()}-core {platform.machine()}), every policy on the "
         "same starts; `seeds` are those that ran. Means with 95 % bootstrap intervals. Δ is the "
         "mean paired difference, on the seeds that both have, to the original's own planner where "
-        "it ran, else to the first row of the variation. Rows `theirs:` are planners of the original, in its process, with its actions clipped to "
-        "their limits.",
+        "it ran, else to the first row of the variation. Rows `theirs:` are planners of the "
+        "original, in its process, with its actions clipped to their limits.",
     ]
     for scene in dict.fromkeys(run.scene for run in runs):
         lines += ["", f"### {TITLES[scene]}"]
