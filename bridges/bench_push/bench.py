@@ -4,37 +4,32 @@
         [--policies straight,push-aware] [--seeds 0-29] [--out runs/bench_push] [--page PAGE.md]
 
 ``--python`` is the interpreter of a virtual environment that has ``benchnpin`` (see the README
-beside this file). Each policy runs in a process of `pushplan serve`, each scene in a process of
-that interpreter. Episodes that are there already are not run again.
+beside this file). Each policy of ours runs in a process of `pushplan serve`, each scene in a
+process of that interpreter; so do policies of theirs, ``theirs:NAME`` or ``theirs:FILE.py:CLASS``.
+Episodes that are there already are not run again.
 """
 
 from __future__ import annotations
 
 import argparse
-import datetime
-import json
 import os
-import platform
 import subprocess
 import sys
 import tempfile
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
-import numpy as np
+sys.path.insert(0, str(Path(__file__).parent))
 
-from pushplan.evaluation.statistics import Estimate, estimate
-from pushplan.metrics import compute
-from pushplan.world import Episode, world_from_dict
+from episodes import Run, file_of, mend, read, whole
+from tables import report, write
 
 HERE = Path(__file__).parent
 VARIATIONS = {
     "maze": ("3", "5", "10"),
     "ship_ice": ("10", "20", "30", "40", "50"),
-    "area_clearing": ("clear_env", "walled_env", "walled_env_with_columns"),
+    "area_clearing": ("clear_env", "clear_env_turning", "walled_env", "walled_env_with_columns"),
     "box_delivery": ("small_empty", "small_columns"),
 }
 POLICIES = {
@@ -43,7 +38,10 @@ POLICIES = {
     "area_clearing": ("greedy", "gtsp-mpc"),
     "box_delivery": ("greedy", "gtsp-mpc"),
 }
-"""The first is what the others are compared with."""
+THEIRS = {"maze": ("theirs:rrt",), "ship_ice": ("theirs:lattice",)}
+"""Needs a checkout of the original's repository."""
+GTSP = {"area_clearing": ("theirs:gtsp",)}
+"""Needs a solver, too."""
 _REMEDY = f"""{{python}} cannot import benchnpin. With Python 3.10 or 3.11, make a virtual
 environment for it:
   python -m venv benchnpin
@@ -52,30 +50,9 @@ environment for it:
 and give --python benchnpin/bin/python"""
 
 
-@dataclass(frozen=True)
-class Run:
-    """What one policy did in one scene, by seed."""
-
-    scene: str
-    variation: str
-    policy: str
-    episodes: dict[int, dict[str, Any]]
-
-    def values(self, by: str, name: str) -> dict[int, float]:
-        """A score of every seed, by ``"theirs"`` or by ``"ours"``."""
-        return {seed: one[by][name] for seed, one in self.episodes.items()}
-
-
 def main() -> int:
-    """Run what is missing and print the tables."""
-    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("--python", required=True, help="interpreter that has benchnpin")
-    parser.add_argument("--scenes", default=",".join(VARIATIONS), metavar="A,B")
-    parser.add_argument("--policies", metavar="A,B", help="default: those that suit the scene")
-    parser.add_argument("--seeds", default="0-29", metavar="FIRST-LAST")
-    parser.add_argument("--most-steps", type=int, default=20_000, help="of an episode")
-    parser.add_argument("--out", type=Path, default=Path("runs/bench_push"))
-    parser.add_argument("--page", type=Path, help="also write the tables there, as Markdown")
+    """Run what is missing and print the tables; 1 if episodes are missing then."""
+    parser = parser_of()
     options = parser.parse_args()
     try:
         scenes = chosen(options.scenes)
@@ -90,20 +67,44 @@ def main() -> int:
     if there.returncode:
         parser.error(_REMEDY.format(python=options.python))
     options.out.mkdir(parents=True, exist_ok=True)
-    runs = []
-    for scene, variation in scenes:
-        policies = options.policies.split(",") if options.policies else POLICIES[scene]
-        for policy in policies:
-            out = options.out / f"{scene}-{variation}-{policy}-{first}-{last}.jsonl"
-            if not complete(out, last - first + 1):
-                say(f"{scene} {variation}: {policy}")
-                drive(options.python, scene, variation, policy, (first, last), out, options)
-            runs.append(read(scene, variation, policy, out))
-    text = report(runs, (first, last))
+    runs = [
+        finished(Run(scene, variation, policy, range(first, last + 1)), options)
+        for scene, variation in scenes
+        for policy in policies_for(scene, options)
+    ]
+    text = report(runs)
     say(text)
     if options.page:
-        options.page.write_text(text, encoding="utf-8")
-    return 0
+        write(options.page, text)
+    lacking = [run for run in runs if run.missing]
+    for run in lacking:
+        say(f"{run.name}: {len(run.episodes)} of {len(run.seeds)} episodes; again to go on")
+    return 1 if lacking else 0
+
+
+def parser_of() -> argparse.ArgumentParser:
+    """The options."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("--python", required=True, help="interpreter that has benchnpin")
+    parser.add_argument("--scenes", default=",".join(VARIATIONS), metavar="A,B")
+    parser.add_argument("--policies", metavar="A,B", help="default: those that suit the scene")
+    parser.add_argument("--seeds", default="0-29", metavar="FIRST-LAST")
+    parser.add_argument("--most-steps", type=int, default=20_000, help="of an episode")
+    parser.add_argument("--out", type=Path, default=Path("runs/bench_push"))
+    parser.add_argument("--page", type=Path, help="also put the tables there, as Markdown")
+    parser.add_argument(
+        "--original",
+        type=Path,
+        metavar="FOLDER",
+        help="checkout of the original's repository, for its planners theirs:rrt, theirs:lattice",
+    )
+    parser.add_argument(
+        "--glns",
+        metavar="COMMAND",
+        help="the solver that theirs:gtsp calls; 'ours' has it call that of pushplan instead",
+    )
+    parser.add_argument("--only-report", action="store_true", help="tables of what is there")
+    return parser
 
 
 def say(text: str) -> None:
@@ -125,34 +126,50 @@ def chosen(text: str) -> list[tuple[str, str]]:
     return found
 
 
-def complete(out: Path, count: int) -> bool:
-    """Whether a file has that many episodes."""
-    return out.is_file() and len(out.read_text(encoding="utf-8").splitlines()) >= count
+def policies_for(scene: str, options: argparse.Namespace) -> Sequence[str]:
+    """Those that were asked for, or that suit the scene and can run."""
+    if options.policies:
+        return options.policies.split(",")
+    theirs = THEIRS.get(scene, ()) if options.original else ()
+    gtsp = GTSP.get(scene, ()) if options.original and options.glns else ()
+    return (*POLICIES[scene], *theirs, *gtsp)
 
 
-def drive(
-    python: str,
-    scene: str,
-    variation: str,
-    policy: str,
-    seeds: tuple[int, int],
-    out: Path,
-    options: argparse.Namespace,
-) -> None:
-    """Drive all seeds of one scene with one policy; the file is there when all are done."""
-    partial = out.with_suffix(".part")
-    arguments = ["--scene", scene, "--variation", variation, "--out", str(partial)]
-    arguments += ["--seeds", f"{seeds[0]}-{seeds[1]}", "--most-steps", str(options.most_steps)]
-    with served(policy) as address:
+def finished(run: Run, options: argparse.Namespace) -> Run:
+    """A run with all of its episodes, as far as they can be had."""
+    out = file_of(options.out, run.scene, run.variation, run.policy)
+    lines = whole(out, options.most_steps)
+    missing = [seed for seed in run.seeds if seed not in lines]
+    if missing and not options.only_report:
+        say(f"{run.name}: {len(missing)} episodes")
+        mend(out, lines)
+        drive(run, missing, out, options)
+    return read(run, out, options.most_steps)
+
+
+def drive(run: Run, seeds: Sequence[int], out: Path, options: argparse.Namespace) -> None:
+    """Drive these seeds, and say what failed; each episode is in the file once it is over."""
+    arguments = ["--scene", run.scene, "--variation", run.variation, "--out", str(out.resolve())]
+    arguments += ["--seeds", ",".join(map(str, seeds)), "--most-steps", str(options.most_steps)]
+    if options.original:
+        arguments += ["--original", str(options.original.resolve())]
+    if options.glns:
+        ours = f"{sys.executable} {HERE.resolve() / 'glns.py'}"
+        arguments += ["--glns", ours if options.glns == "ours" else options.glns]
+    with served(run.policy) as policy, tempfile.TemporaryDirectory() as scratch:
         done = subprocess.run(
-            [python, "-W", "ignore", str(HERE / "drive.py"), address, *arguments],
+            [options.python, "-W", "ignore", str(HERE.resolve() / "drive.py"), policy, *arguments],
             env=without_python(),
-            capture_output=True,
+            cwd=scratch,  # their planners leave files behind
+            stderr=subprocess.PIPE,
             text=True,
         )
     if done.returncode:
-        raise SystemExit(f"{scene} {variation}, {policy}: drive.py failed\n{done.stderr[-2000:]}")
-    partial.replace(out)
+        said = done.stderr.strip().splitlines() or [f"ended with {done.returncode}"]
+        traceback = [line for line in said if not line.startswith(("seed ", "theirs:"))]
+        complaints = [line for line in said if line.startswith(("seed ", "theirs:"))]
+        for line in complaints or traceback[-1:]:
+            say(f"{run.name}: {line}")
 
 
 def without_python() -> dict[str, str]:
@@ -162,7 +179,14 @@ def without_python() -> dict[str, str]:
 
 @contextmanager
 def served(policy: str) -> Iterator[str]:
-    """The address of a server of that policy, which ends with the block."""
+    """What `drive.py` takes for a policy: the address of a server of it, which ends with the block.
+
+    Policies of theirs need no server.
+    """
+    if policy.startswith("theirs:"):
+        name, colon, kind = policy.removeprefix("theirs:").rpartition(":")
+        yield f"theirs:{Path(name).resolve()}:{kind}" if colon else policy
+        return
     with tempfile.TemporaryDirectory() as folder:
         address = f"unix:{folder}/policy.sock"
         command = [sys.executable, "-m", "pushplan", "serve", policy, "--socket", address]
@@ -175,82 +199,6 @@ def served(policy: str) -> Iterator[str]:
         finally:
             server.terminate()
             server.wait()
-
-
-def read(scene: str, variation: str, policy: str, path: Path) -> Run:
-    """The episodes of a file, with our scores beside theirs."""
-    episodes = {}
-    for line in path.read_text(encoding="utf-8").splitlines():
-        one = json.loads(line)
-        one["ours"] = ours(scored(one))
-        episodes[int(one["seed"])] = one
-    return Run(scene, variation, policy, episodes)
-
-
-def scored(one: dict[str, Any]) -> Episode:
-    """An episode of ours from what `drive.py` wrote."""
-    count = len(one["times"])
-    return Episode(
-        world=world_from_dict(one["world"]),
-        times=np.array(one["times"]),
-        robot_poses=np.array(one["robot_poses"]),
-        object_poses=np.array(one["object_poses"]).reshape(count, -1, 3),
-        success=one["success"],
-        reason=one["reason"],
-        completed=np.array(one["completed"]) if one["completed"] else None,
-    )
-
-
-def ours(episode: Episode) -> dict[str, float]:
-    """Success, E and I as `pushplan bench` has them, and the work [kg m]."""
-    found = compute(episode)
-    kind = "manip" if "E_manip" in found else "nav"
-    return {
-        "S": found.get("S_manip", float(episode.success)),
-        "E": found[f"E_{kind}"],
-        "I": found[f"I_{kind}"],
-        "work": found["interaction_work_kg_m"],
-    }
-
-
-def report(runs: Sequence[Run], seeds: tuple[int, int]) -> str:
-    """All tables as Markdown."""
-    today = datetime.datetime.now(tz=datetime.UTC).date().isoformat()
-    lines = [
-        f"Seeds {seeds[0]} to {seeds[1]}, {today}, {platform.machine()}, {os.cpu_count()} cores. "
-        "Means with 95 % bootstrap intervals; S, E and I by the original's code, in brackets by "
-        "ours on the same trajectory; differences to the first policy on the same starts.",
-    ]
-    for scene, variation in dict.fromkeys((run.scene, run.variation) for run in runs):
-        group = [run for run in runs if (run.scene, run.variation) == (scene, variation)]
-        lines += ["", f"### {scene}, {variation}", ""]
-        lines += ["| policy | S | E | I | work [kg m] | ΔE | ΔI | decision median, max [ms] |"]
-        lines += ["|---|---|---|---|--:|---|---|--:|"]
-        lines += [row(run, group[0]) for run in group]
-    return "\n".join(lines) + "\n"
-
-
-def row(run: Run, first: Run) -> str:
-    """One line of a table."""
-    cells = [f"`{run.policy}`"]
-    for name in ("S", "E", "I"):
-        values, own = run.values("theirs", name), run.values("ours", name)
-        cells.append(
-            f"{shown(estimate(list(values.values())))} ({np.mean(list(own.values())):.3f})"
-        )
-    cells.append(f"{np.mean(list(run.values('ours', 'work').values())):.3g}")
-    for name in ("E", "I"):
-        mine, other = run.values("theirs", name), first.values("theirs", name)
-        gaps = [mine[seed] - other[seed] for seed in mine.keys() & other.keys()]
-        cells.append("" if run is first else shown(estimate(gaps), "+"))
-    waits = [1e3 * wait for one in run.episodes.values() for wait in one["act_s"]]
-    cells.append(f"{np.median(waits):.2g}, {max(waits):.0f}")
-    return "| " + " | ".join(cells) + " |"
-
-
-def shown(value: Estimate, sign: str = "") -> str:
-    """A mean with its interval."""
-    return f"{value.mean:{sign}.3f} [{value.low:{sign}.3f}, {value.high:{sign}.3f}]"
 
 
 if __name__ == "__main__":

@@ -1,8 +1,9 @@
-"""Drives an environment of ``benchnpin`` with a policy server, and writes what happened.
+"""Drives an environment of ``benchnpin`` and writes what happened.
 
 Runs in the virtual environment of ``benchnpin``; ``bench.py`` calls it::
 
-    python drive.py ADDRESS --scene maze --variation 5 --seeds 0-29 --out episodes.jsonl
+    python drive.py ADDRESS --scene maze --variation 5 --seeds 0,3-29 --out episodes.jsonl
+    python drive.py theirs:FILE.py:CLASS --scene maze --variation 5 --seeds 0-29 --out ...
 """
 
 from __future__ import annotations
@@ -17,47 +18,82 @@ from pathlib import Path
 
 os.environ.setdefault("MPLBACKEND", "Agg")
 os.environ.setdefault("SDL_VIDEODRIVER", "dummy")
-sys.path.insert(0, str(Path(__file__).parents[2] / "examples"))
 
 import numpy as np
+from checkout import take_from
+from drivers import PolicyFailure, Served, Theirs, policy_of
 from scenes import SCENES, Scene, pose_of
-from serve_client import PolicyClient
 
 
-def main() -> None:
-    """Drive every seed and write a line of JSON for each."""
+def main() -> int:
+    """Drive every seed and add a line of JSON for each. An episode that fails is left out."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("address", help="of 'pushplan serve': unix:PATH or tcp:HOST:PORT")
+    parser.add_argument("policy", help="address of 'pushplan serve', or theirs:NAME")
     parser.add_argument("--scene", choices=SCENES, required=True)
     parser.add_argument("--variation", required=True)
-    parser.add_argument("--seeds", required=True, metavar="FIRST-LAST")
+    parser.add_argument("--seeds", required=True, metavar="0,3-29")
     parser.add_argument("--out", type=Path, required=True)
     parser.add_argument("--most-steps", type=int, default=20_000)
+    parser.add_argument("--original", type=Path, help="checkout of the original's repository")
+    parser.add_argument("--glns", metavar="COMMAND", help="the solver that theirs:gtsp calls")
     options = parser.parse_args()
-    first, last = (int(seed) for seed in options.seeds.split("-"))
-    scene = SCENES[options.scene][0](options.variation)
-    with PolicyClient(options.address) as client, options.out.open("w") as file:
-        for seed in range(first, last + 1):
-            episode = drive(scene, client, seed, options.most_steps)
+    if options.original:
+        take_from(options.original)
+    scene, driver = made(options)
+    failed = 0
+    for seed in seeds_of(options.seeds):
+        try:
+            episode = drive(scene, driver, seed, options.most_steps)
+        except PolicyFailure as error:
+            failed += 1
+            complain(f"seed {seed}: the policy failed: {error}")
+            continue
+        except OSError as error:
+            complain(f"seed {seed}: the policy server has gone: {error}")
+            return 1
+        with options.out.open("a") as file:
             file.write(json.dumps(episode) + "\n")
-            file.flush()
+    return 1 if failed else 0
 
 
-def drive(scene: Scene, client: PolicyClient, seed: int, most_steps: int) -> dict:
+def made(options: argparse.Namespace) -> tuple[Scene, Served | Theirs]:
+    """The environment and what drives it."""
+    kind = SCENES[options.scene][0]
+    if options.policy.startswith("theirs:"):
+        policy = policy_of(options.policy.removeprefix("theirs:"), options.glns)
+        scene = kind(options.variation, images=getattr(policy, "images", True))
+        return scene, Theirs(scene, policy)
+    scene = kind(options.variation)
+    return scene, Served(scene, options.policy)
+
+
+def seeds_of(text: str) -> list[int]:
+    """The numbers of ``"0,3-29"``."""
+    ends = [word.partition("-") for word in text.split(",")]
+    return [k for low, _, high in ends for k in range(int(low), int(high or low) + 1)]
+
+
+def complain(text: str) -> None:
+    """Say a line to `bench.py`, which shows it."""
+    sys.stderr.write(text + "\n")
+    sys.stderr.flush()
+
+
+def drive(scene: Scene, driver: Served | Theirs, seed: int, most_steps: int) -> dict:
     """One episode: the start, everything's poses, and the scores of their code."""
-    info = scene.reset(seed)
+    seen, info = scene.reset(seed)
     metric = metric_of(scene)
     metric.reset(info)
     world = scene.world()
-    client.reset(world, seed)
+    driver.begin(world, seed)
     times, robot = [0.0], [pose_of(scene.body)]
     objects = [[pose_of(one.body) for one in scene.objects]]
     waits, reason, done = [], "", False
     while not done:
         began = time.perf_counter()
-        twist = client.act(**scene.state())["twist"]
+        action = driver.action(seen, info)
         waits.append(time.perf_counter() - began)
-        reward, terminated, truncated, info = scene.step(twist["linear"], twist["angular"])
+        seen, reward, terminated, truncated, info = scene.step(action)
         times.append(scene.time)
         robot.append(pose_of(scene.body))
         objects.append([pose_of(one.body) for one in scene.objects])
@@ -70,6 +106,7 @@ def drive(scene: Scene, client: PolicyClient, seed: int, most_steps: int) -> dic
     success = all(statuses) if statuses else bool(info.get("trial_success"))
     return {
         "seed": seed,
+        "most_steps": most_steps,
         "world": world,
         "idle_limit": scene.idle_limit,
         "times": times,
@@ -101,4 +138,4 @@ def complete(info: dict) -> None:
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())

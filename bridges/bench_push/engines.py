@@ -27,7 +27,9 @@ from typing import Any
 sys.path.insert(0, str(Path(__file__).parent))
 
 import numpy as np
-from bench import POLICIES, VARIATIONS, chosen, complete, drive, ours, say, scored
+from bench import POLICIES, chosen, finished, parser_of, say
+from episodes import Run, file_of, mend, ours, whole
+from tables import ranges, write
 
 from pushplan.envs import PushEnv
 from pushplan.envs.simulators.pymunk_drive import PymunkOptions
@@ -56,22 +58,16 @@ SLOP = 0.1
 class Pairs:
     """One policy in one scene, by engine: scores by name and start."""
 
-    scene: str
-    policy: str
+    run: Run
     theirs: dict[str, list[float]]
     ours: dict[str, dict[str, list[float]]]
 
 
 def main() -> int:
     """Run what is missing and print the table."""
-    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("--python", required=True, help="interpreter that has benchnpin")
-    parser.add_argument("--scenes", default=",".join(VARIATIONS), metavar="A,B")
-    parser.add_argument("--policies", metavar="A,B", help="default: those that suit the scene")
-    parser.add_argument("--seeds", default="0-19", metavar="FIRST-LAST")
-    parser.add_argument("--most-steps", type=int, default=20_000, help="of an episode")
-    parser.add_argument("--out", type=Path, default=Path("runs/bench_push"))
-    parser.add_argument("--page", type=Path, help="also write the table there, as Markdown")
+    parser = parser_of()
+    parser.description = (__doc__ or "").splitlines()[0]
+    parser.set_defaults(seeds="0-19")
     options = parser.parse_args()
     try:
         scenes = chosen(options.scenes)
@@ -83,38 +79,40 @@ def main() -> int:
     for scene, variation in scenes:
         names = options.policies.split(",") if options.policies else POLICIES[scene]
         for policy in names:
-            stem = f"{scene}-{variation}-{policy}-{first}-{last}"
-            path = options.out / f"{stem}.jsonl"
-            if not complete(path, last - first + 1):
-                say(f"{scene} {variation}: {policy}, original engine")
-                drive(options.python, scene, variation, policy, (first, last), path, options)
-            own = {}
-            for engine, alike in ENGINES.items():
-                name = f"{stem}-own-engine{'-its-settings' if alike else ''}.jsonl"
-                own[engine] = options.out / name
-                if not complete(own[engine], last - first + 1):
-                    say(f"{scene} {variation}: {policy}, {engine}")
-                    repeat(scene, policy, path, own[engine], options.most_steps, alike)
-            found.append(pairs(f"{scene} {variation}", policy, path, own))
-    text = report(found, (first, last))
+            run = finished(Run(scene, variation, policy, range(first, last + 1)), options)
+            found.append(pairs(run, options))
+    text = report(found)
     say(text)
     if options.page:
-        options.page.write_text(text, encoding="utf-8")
+        write(options.page, text, "engines.py")
     return 0
 
 
-def repeat(scene: str, policy: str, path: Path, out: Path, most_steps: int, alike: bool) -> None:
-    """Run each start of a file of episodes in our engine; the other file is there when done."""
-    lines = path.read_text(encoding="utf-8").splitlines()
-    partial = out.with_suffix(".part")
-    with partial.open("w", encoding="utf-8") as file:
-        for line in lines:
-            start = json.loads(line)
-            episode = in_own_engine(start, scene, policy, most_steps, alike)
-            scores = {"seed": start["seed"], "reason": episode.reason, **ours(episode)}
-            file.write(json.dumps(scores) + "\n")
-            file.flush()
-    partial.replace(out)
+def pairs(run: Run, options: argparse.Namespace) -> Pairs:
+    """The scores of the engines, start by start; starts that ours has not run yet are run."""
+    starts = whole(file_of(options.out, run.scene, run.variation, run.policy), options.most_steps)
+    ours = {}
+    for engine, alike in ENGINES.items():
+        name = f"{run.policy}-own-engine{'-its-settings' if alike else ''}"
+        path = file_of(options.out, run.scene, run.variation, name)
+        done = whole(path, options.most_steps)
+        missing = [seed for seed in run.episodes if seed not in done]
+        if missing and not options.only_report:
+            say(f"{run.name}, {engine}: {len(missing)} episodes")
+            mend(path, done)
+            for seed in missing:
+                repeat(run, json.loads(starts[seed]), path, options.most_steps, alike)
+            done = whole(path, options.most_steps)
+        ours[engine] = columns([json.loads(done[seed]) for seed in run.episodes if seed in done])
+    return Pairs(run, columns([one["ours"] for one in run.episodes.values()]), ours)
+
+
+def repeat(run: Run, start: dict[str, Any], path: Path, most_steps: int, alike: bool) -> None:
+    """Run one start in our engine and add its scores to a file."""
+    episode = in_own_engine(start, run.scene, run.policy, most_steps, alike)
+    line = {"seed": start["seed"], "most_steps": most_steps, "reason": episode.reason}
+    with path.open("a", encoding="utf-8") as file:
+        file.write(json.dumps({**line, **ours(episode)}) + "\n")
 
 
 def in_own_engine(
@@ -171,40 +169,30 @@ def every(episode: Episode, period: float) -> Episode:
     )
 
 
-def pairs(scene: str, policy: str, path: Path, own: dict[str, Path]) -> Pairs:
-    """The scores of the engines, start by start."""
-    theirs = [ours(scored(json.loads(line))) for line in path.read_text().splitlines()]
-    mine = {
-        engine: [json.loads(line) for line in file.read_text().splitlines()]
-        for engine, file in own.items()
-    }
-    return Pairs(
-        scene, policy, columns(theirs), {engine: columns(them) for engine, them in mine.items()}
-    )
-
-
 def columns(episodes: Sequence[dict[str, Any]]) -> dict[str, list[float]]:
     """Scores by name."""
     return {name: [float(one[name]) for one in episodes] for name in SCORES}
 
 
-def report(found: Sequence[Pairs], seeds: tuple[int, int]) -> str:
+def report(found: Sequence[Pairs]) -> str:
     """The table as Markdown."""
     today = datetime.datetime.now(tz=datetime.UTC).date().isoformat()
     lines = [
-        f"Seeds {seeds[0]} to {seeds[1]}, {today}, {platform.machine()}, {os.cpu_count()} cores. "
-        "Means by our metrics; in brackets how much the mean is off the original engine's, and "
-        "for E and I the 95 % bootstrap interval of the paired difference.",
+        f"{today}, {platform.machine()}, {os.cpu_count()} cores. Means by our metrics; in brackets "
+        "how much the mean is off the original engine's, and for E and I the 95 % bootstrap "
+        "interval of the paired difference.",
         "",
-        "| scene | policy | engine | S | E | I | work [kg m] |",
-        "|---|---|---|---|---|---|---|",
+        "| scene | policy | seeds | engine | S | E | I | work [kg m] |",
+        "|---|---|---|---|---|---|---|---|",
     ]
     for one in found:
-        cells = [one.scene, f"`{one.policy}`", "original"]
+        run = one.run
+        cells = [f"{run.scene} {run.variation}".replace("_", " "), f"`{run.policy}`"]
+        cells += [ranges(run.episodes), "original"]
         cells += [shown(name, one.theirs[name]) for name in SCORES]
         lines.append("| " + " | ".join(cells) + " |")
         for engine, scores in one.ours.items():
-            cells = ["", "", engine]
+            cells = ["", "", "", engine]
             cells += [shown(name, scores[name], one.theirs[name]) for name in SCORES]
             lines.append("| " + " | ".join(cells) + " |")
     return "\n".join(lines) + "\n"

@@ -30,7 +30,7 @@ def main() -> None:
             scene.reset(steps)
         turn = rng.uniform(-0.5, 0.5) * scene.turns
         began = time.perf_counter()
-        _, terminated, truncated, _ = scene.step(scene.speeds()[1], turn)
+        _, _, terminated, truncated, _ = scene.step(scene.action(scene.speeds()[1], turn))
         spent += time.perf_counter() - began
         steps += 1
         over = terminated or truncated

@@ -10,10 +10,10 @@ import io
 import math
 import random
 import sys
-import types
 
 import numpy as np
 import pymunk
+from checkout import supply
 from shapely.geometry import MultiPoint, Polygon
 
 PERIOD = 0.2
@@ -45,9 +45,10 @@ class Scene:
     idle_limit = None
     turns = math.pi / 30.0  # greatest turn rate of their actions [rad/s]
     drive = "constant_speed"
+    needs_spfa = False  # for images
 
     def __init__(self, variation: str, images: bool = False) -> None:
-        supply_shortest_paths()
+        supply("spfa")  # no registry has it; it draws images, see `without_images`
         import benchnpin.environments  # noqa: F401  registers them
         import gymnasium
 
@@ -58,29 +59,33 @@ class Scene:
         self.inner = self.env.unwrapped
         if not images:
             without_images(self.inner)
+        elif self.needs_spfa and not hasattr(sys.modules["spfa"], "spfa"):
+            raise SystemExit(f"images of {self.name} need the package spfa, which no registry has")
 
     def config(self, variation: str) -> dict:
         """What of their configuration differs from their default."""
         raise NotImplementedError
 
-    def reset(self, seed: int) -> dict:
+    def reset(self, seed: int) -> tuple[object, dict]:
         """Begin an episode; their starts come from Python's and NumPy's global generators."""
         random.seed(seed)
         np.random.seed(seed)
         self.inner.episode_idx = seed - 1  # where they take a numbered start
         self.inner.random_state = np.random.RandomState(seed)
         with contextlib.redirect_stdout(io.StringIO()):
-            _, info = self.env.reset()
+            seen, info = self.env.reset()
         self.time = 0.0
         self.objects = list(self._shapes())
-        return info
+        return seen, info
 
-    def step(self, linear: float, angular: float) -> tuple[float, bool, bool, dict]:
-        """Drive for a period with these velocities [m/s, rad/s], within their limits."""
+    def step(self, action: np.ndarray) -> tuple[object, float, bool, bool, dict]:
+        """Take an action for a period. It is clipped here, as their code clips none."""
+        legal = np.clip(action, -1.0, 1.0)
         with contextlib.redirect_stdout(io.StringIO()):
-            _, reward, terminated, truncated, info = self.env.step(self.action(linear, angular))
+            seen, reward, terminated, truncated, info = self.env.step(legal)
         self.time += self.period
-        return float(np.asarray(reward).reshape(-1)[0]), bool(terminated), bool(truncated), info
+        reward = float(np.asarray(reward).reshape(-1)[0])
+        return seen, reward, bool(terminated), bool(truncated), info
 
     @property
     def period(self) -> float:
@@ -88,8 +93,12 @@ class Scene:
         return float(self.inner.dt)
 
     def action(self, linear: float, angular: float) -> np.ndarray:
-        """Their action for these velocities."""
-        return np.clip([angular / self.turns], -1.0, 1.0)
+        """Their action for these velocities [m/s, rad/s]."""
+        return np.array([angular / self.turns])
+
+    def facts(self, info: dict) -> dict:
+        """What their planners are told besides the image, by the names in their episode loops."""
+        return {}
 
     @property
     def body(self) -> pymunk.Body:
@@ -193,6 +202,16 @@ class MazeScene(Scene):
     def parts(self) -> list:
         return [self.inner.robot_shape, *self.inner.wheels]
 
+    def facts(self, info: dict) -> dict:
+        return {
+            "robot_pos": info["state"],
+            "robot_radius": float(self.inner.cfg.robot.min_r),
+            "goal": self.inner.goal,
+            "maze_vertices": self.inner.maze_walls,
+            "obstacles": info["obs"],
+            "action_scale": float(self.inner.max_yaw_rate_step),
+        }
+
     def robot_mass(self) -> float:
         return float(self.inner.cfg.robot.mass)
 
@@ -229,6 +248,15 @@ class ShipScene(Scene):
     def parts(self) -> list:
         return [self.inner.ship_shape]
 
+    def facts(self, info: dict) -> dict:
+        return {
+            "ship_pos": info["state"],
+            "obstacles": info["obs"],
+            "goal": self.inner.goal,
+            "conc": self.inner.cfg.concentration,
+            "action_scale": float(self.inner.max_yaw_rate_step),
+        }
+
     def robot_mass(self) -> float:
         return float(self.inner.cfg.ship.mass)
 
@@ -242,13 +270,25 @@ class ShipScene(Scene):
 
 
 class AreaScene(Scene):
-    """``area-clearing-v0`` with velocities; variations are the names of its environments."""
+    """``area-clearing-v0`` with velocities; variations are the names of its environments.
+
+    ``clear_env_turning`` is ``clear_env`` with ten times the turn rate: its heading actions, which
+    its learned policies have, turn the robot at any rate.
+    """
 
     name, metric = "area-clearing-v0", "task_driven_metric:TaskDrivenMetric"
     own_limit = "200 of their steps of 1.5 m since the last box was cleared"
     idle_limit = idle_time(1.5, 0.2)
     turns = math.pi / 60.0  # half of what its attribute says, as its velocity action has it
     drive = "differential"
+    needs_spfa = True
+
+    def __init__(self, variation: str, images: bool = False) -> None:
+        name = variation.removesuffix("_turning")
+        super().__init__(name, images)
+        if name != variation:
+            self.turns = 10.0 * self.turns
+            self.inner.max_yaw_rate_step *= 10.0
 
     def config(self, variation: str) -> dict:
         return {
@@ -259,8 +299,18 @@ class AreaScene(Scene):
         }
 
     def action(self, linear: float, angular: float) -> np.ndarray:
-        speed = linear / float(self.inner.target_speed)
-        return np.clip([speed, angular / self.turns], -1.0, 1.0)
+        return np.array([linear / float(self.inner.target_speed), angular / self.turns])
+
+    def facts(self, info: dict) -> dict:
+        return {
+            "agent_pos": info["state"],
+            "obstacles": info["obs"],
+            "boundary": self.inner.boundary_vertices,
+            "walls": self.inner.walls,
+            "static_obstacles": self.inner.static_obstacles,
+            "target_speed": float(self.inner.target_speed),
+            "action_scale": float(self.inner.max_yaw_rate_step),
+        }
 
     def speeds(self) -> tuple[float, float]:
         speed = float(self.inner.target_speed)
@@ -301,6 +351,7 @@ class DeliveryScene(Scene):
     idle_limit = idle_time(1.25, 0.3)
     turns = 1.0
     drive = "differential"
+    needs_spfa = True
 
     def config(self, variation: str) -> dict:
         return {
@@ -316,7 +367,7 @@ class DeliveryScene(Scene):
         return float(self.inner.dt * (self.inner.steps + 2) / self.inner.steps)
 
     def action(self, linear: float, angular: float) -> np.ndarray:
-        return np.clip([linear, angular], -1.0, 1.0)
+        return np.array([linear, angular])
 
     def speeds(self) -> tuple[float, float]:
         speed = float(self.inner.target_speed)
@@ -349,7 +400,10 @@ class DeliveryScene(Scene):
 SCENES = {
     "maze": (MazeScene, ("3", "5", "10")),
     "ship_ice": (ShipScene, ("10", "20", "30", "40", "50")),
-    "area_clearing": (AreaScene, ("clear_env", "walled_env", "walled_env_with_columns")),
+    "area_clearing": (
+        AreaScene,
+        ("clear_env", "clear_env_turning", "walled_env", "walled_env_with_columns"),
+    ),
     "box_delivery": (DeliveryScene, ("small_empty", "small_columns")),
 }
 
@@ -419,17 +473,6 @@ def can_leave(a: np.ndarray, b: np.ndarray, size: float, walls: list) -> bool:
         if not any(wall.intersects(Polygon(corners)) for wall in walls):
             return True
     return False
-
-
-def supply_shortest_paths() -> None:
-    """A module ``spfa`` where theirs, which no registry has, is not installed.
-
-    It draws the images that learned policies see, and is never called here: see `without_images`.
-    """
-    try:
-        import spfa  # noqa: F401
-    except ImportError:
-        sys.modules["spfa"] = types.ModuleType("spfa")
 
 
 def without_images(inner: object) -> None:

@@ -1,14 +1,20 @@
-"""One short episode of each original environment, driven through the policy server."""
+"""The original environments: short episodes of ours and of policies for their interface."""
 
 from __future__ import annotations
 
+import importlib
+import importlib.util
+import json
 import os
 import subprocess
 import sys
 import venv
 from pathlib import Path
 
+import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from pushplan.envs import make
 from pushplan.scenarios import load_scenarios
@@ -51,13 +57,136 @@ def test_a_short_episode_is_scored_by_both(python: str, scene: str, tmp_path: Pa
             *arguments, "--policies", policy, "--out", str(out), "--page", str(out) + ".md"
         )
         assert done.returncode == 0, done.stderr
-        (line,) = [line for line in done.stdout.splitlines() if line.startswith(f"| `{policy}`")]
-        success, efficiency = (cell.split() for cell in line.split("|")[2:4])
+        lines = [line for line in done.stdout.splitlines() if f"| `{policy}` | 3 |" in line]
+        assert len(lines) == 2  # by their code, and by ours
+        success, efficiency = (cell.split() for cell in lines[0].split("|")[4:6])
         assert 0.0 <= float(success[0]) <= 1.0 and 0.0 <= float(efficiency[0]) <= 1.2
-        assert line in Path(f"{out}.md").read_text(encoding="utf-8")
+        assert "\n".join(lines[:1]) in Path(f"{out}.md").read_text(encoding="utf-8")
     first, second = (next(out.iterdir()).read_text(encoding="utf-8") for out in outs)
     poses = [text.partition('"robot_poses"')[2].partition('"act_s"')[0] for text in (first, second)]
     assert poses[0] and poses[0] == poses[1]
+
+
+THEIRS = """
+class Spinner:
+    images = False
+
+    def reset(self):
+        self.calls = 0
+
+    def act(self, observation, **facts):
+        self.calls += 1
+        assert len(facts["robot_pos"]) == 3 and len(facts["obstacles"]) == 5
+        return 12.0 if self.calls > 2 else 0.0  # its limit is 1
+"""
+
+
+@pytest.mark.slow
+def test_a_policy_for_their_interface_keeps_within_limits(python: str, tmp_path: Path) -> None:
+    (tmp_path / "spinner.py").write_text(THEIRS, encoding="utf-8")
+    policy = f"theirs:{tmp_path / 'spinner.py'}:Spinner"
+    arguments = ["--scenes", "maze-5", "--seeds", "3-3", "--most-steps", "10"]
+    done = bench("--python", python, *arguments, "--policies", policy, "--out", str(tmp_path / "a"))
+    assert done.returncode == 0, done.stdout + done.stderr
+    (file,) = (tmp_path / "a").iterdir()
+    episode = json.loads(file.read_text(encoding="utf-8"))
+    rates = np.diff(np.array(episode["robot_poses"])[:, 2]) / np.diff(episode["times"])
+    assert rates[1] == 0.0 and rates[-1] == pytest.approx(np.pi / 30.0)
+
+
+BRITTLE = """
+import os, pathlib
+from pushplan.world import Twist
+
+class Brittle:
+    def reset(self, world, rng):
+        count = pathlib.Path({marker!r})
+        resets = len(count.read_text()) if count.exists() else 0
+        count.write_text("x" * (resets + 1))
+        if resets == 1:
+            raise ValueError("out of ideas")
+        if resets == 2:
+            os._exit(1)
+
+    def act(self, world, observation):
+        return Twist(world.robot.max_speed, 0.0)
+"""
+
+
+@pytest.mark.slow
+def test_a_failure_loses_no_finished_episode(python: str, tmp_path: Path) -> None:
+    source = BRITTLE.format(marker=str(tmp_path / "resets"))
+    (tmp_path / "brittle.py").write_text(source, encoding="utf-8")
+    arguments = ["--scenes", "maze-5", "--seeds", "3-5", "--most-steps", "5"]
+    arguments += ["--policies", f"{tmp_path / 'brittle.py'}:Brittle", "--out", str(tmp_path / "a")]
+    done = bench("--python", python, *arguments)
+    assert done.returncode == 1
+    assert "seed 4: the policy failed: reset: " in done.stdout and "out of ideas" in done.stdout
+    assert "seed 5: the policy server has gone" in done.stdout
+    assert "1 of 3 episodes" in done.stdout
+    (file,) = (tmp_path / "a").iterdir()
+    first = file.read_text(encoding="utf-8")
+    file.write_text(first + first[:50], encoding="utf-8")  # as after a kill
+    done = bench("--python", python, *arguments)
+    assert done.returncode == 0, done.stdout + done.stderr
+    lines = file.read_text(encoding="utf-8").splitlines()
+    assert lines[0] == first.strip()
+    assert [json.loads(line)["seed"] for line in lines] == [3, 4, 5]
+
+
+def test_tables_replace_what_stands_between_the_marks(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.syspath_prepend(str(BRIDGE))
+    tables = importlib.import_module("tables")
+    page = tmp_path / "page.md"
+    begin = "<!-- tables of bench.py -->"
+    page.write_text(f"# Page\n\n{begin}\nold\n{tables.END}\n\nMore.\n", encoding="utf-8")
+    for text in ("new\n", "newer\n"):
+        tables.write(page, text)
+        expected = f"# Page\n\n{begin}\n{text}{tables.END}\n\nMore.\n"
+        assert page.read_text(encoding="utf-8") == expected
+    tables.write(tmp_path / "other.md", "new\n")
+    assert "new" in (tmp_path / "other.md").read_text(encoding="utf-8")
+
+
+def test_modules_of_a_checkout_are_read_under_the_name_that_is_installed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.syspath_prepend(str(BRIDGE))
+    monkeypatch.syspath_prepend(str(tmp_path / "installed"))
+    monkeypatch.setattr(sys, "meta_path", list(sys.meta_path))
+    installed = tmp_path / "installed" / "benchnpin"
+    planners = tmp_path / "checkout" / "benchpush" / "planners"
+    for folder in (installed, planners):
+        folder.mkdir(parents=True)
+    (installed / "__init__.py").write_text("", encoding="utf-8")
+    (installed / "tools.py").write_text("ANSWER = 42\n", encoding="utf-8")
+    (planners / "tree.py").write_text("from benchpush.tools import ANSWER\n", encoding="utf-8")
+    checkout = importlib.import_module("checkout")
+    with pytest.raises(SystemExit, match="not the original's"):
+        checkout.take_from(tmp_path)
+    checkout.take_from(tmp_path / "checkout")
+    assert importlib.import_module("benchnpin.planners.tree").ANSWER == 42
+
+
+@given(
+    *(st.tuples(*[st.floats(-3.0, 3.0)] * 3) for _ in range(2)),
+    st.floats(0.2, 2.0),
+)
+def test_dubins_paths_are_the_shortest(
+    start: tuple[float, ...], end: tuple[float, ...], radius: float
+) -> None:
+    spec = importlib.util.spec_from_file_location("dubins_paths", BRIDGE / "dubins_paths.py")
+    assert spec is not None and spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    path = module.shortest_path(start, end, radius)
+    last = path.sample(path.path_length())
+    assert np.allclose(last[:2], end[:2], atol=1e-6)
+    assert np.cos(last[2] - end[2]) == pytest.approx(1.0, abs=1e-6)
+    poses, distances = path.sample_many(0.1)
+    assert len(poses) == len(distances) and path.path_length() - 0.1 <= max(distances, default=0.0)
 
 
 @pytest.mark.slow
@@ -71,8 +200,8 @@ def test_the_same_start_in_both_engines(python: str, scene: str, tmp_path: Path)
     )
     assert done.returncode == 0, done.stderr
     rows = [line.split("|") for line in done.stdout.splitlines() if line.startswith("| ")][1:]
-    assert [row[3].strip() for row in rows] == ["original", "ours", "ours, its settings"]
-    theirs, _, alike = (float(row[7].split()[0]) for row in rows)
+    assert [row[4].strip() for row in rows] == ["original", "ours", "ours, its settings"]
+    theirs, _, alike = (float(row[8].split()[0]) for row in rows)
     assert alike == pytest.approx(theirs, rel=0.1, abs=1e-3)
 
 
@@ -102,6 +231,7 @@ def test_what_is_missing_is_said() -> None:
     [
         (("--scenes", "mase-5"), "no scene 'mase-5' (valid: maze"),
         (("--scenes", "maze-4"), "no scene 'maze-4'"),
+        (("--scenes", "area_clearing-turning"), "clear_env_turning"),
         (("--seeds", "5-3"), "FIRST-LAST"),
         (("--seeds", "x"), "FIRST-LAST"),
     ],
