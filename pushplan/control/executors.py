@@ -8,7 +8,7 @@ from collections import deque
 from collections.abc import Callable
 from typing import Generic, TypeVar
 
-from pushplan.world import Stop
+from pushplan.world import OwnBudget, Stop
 from pushplan.world.checks import number
 
 T = TypeVar("T")
@@ -53,13 +53,13 @@ class ImmediateExecutor:
     """Runs calls at once, and takes it that they take no time: the world stands still meanwhile.
 
     Args:
-        stop: a rule that ends each call, whatever its own; None for its own.
+        rule: ends each call, beside its own rule.
     """
 
     takes_time = False
 
-    def __init__(self, stop: Stop | None = None) -> None:
-        self._stop = stop
+    def __init__(self, rule: Stop | None = None) -> None:
+        self._rule = rule
 
     def expected(self, stop: Stop | None) -> float:
         """Nothing."""
@@ -69,7 +69,9 @@ class ImmediateExecutor:
         self, call: Callable[[Stop | None], T], time: float, stop: Stop | None = None
     ) -> _Done[T]:
         """See `pushplan.world.PlanningExecutor`."""
-        return _Done(call(self._stop or stop), -math.inf)
+        if self._rule is not None:
+            stop = (OwnBudget() if stop is None else stop) | self._rule
+        return _Done(call(stop), -math.inf)
 
 
 class SimulatedExecutor:

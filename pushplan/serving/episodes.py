@@ -19,7 +19,6 @@ from pushplan.world import (
     PlansBesideDriving,
     Policy,
     ShowsPlan,
-    Stop,
     WheelSpeeds,
     World,
     stream,
@@ -70,7 +69,10 @@ class StepEpisode:
     def __init__(self, policy: Policy, planning_limit: float) -> None:
         self._policy = policy
         self._token = Cancellation()
-        self._executor = _Interruptible(self._token, planning_limit)
+        limited = math.isfinite(planning_limit)
+        self._executor = ImmediateExecutor(
+            self._token | Deadline(planning_limit) if limited else self._token
+        )
         self._shows = policy if isinstance(policy, ShowsPlan) else None  # asking is not quick
 
     def reset(self, world: World, seed: int) -> None:
@@ -178,19 +180,3 @@ def check_settings(policy: Policy, settings: object) -> dict[str, Any]:
     chosen = dict(expect("settings", settings, dict))
     LoopEpisode(policy, 1.0, chosen).close()
     return chosen
-
-
-class _Interruptible(ImmediateExecutor):
-    """Runs planning calls at once, under a token that ends them and a limit.
-
-    Args:
-        token: ends them.
-        limit: of each call [s].
-    """
-
-    def __init__(self, token: Cancellation, limit: float) -> None:
-        self._rule: Stop = token if math.isinf(limit) else token | Deadline(limit)
-
-    def submit(self, call: Any, time: float, stop: Stop | None = None) -> Any:
-        """See `pushplan.world.PlanningExecutor`."""
-        return super().submit(call, time, (OwnBudget() if stop is None else stop) | self._rule)
