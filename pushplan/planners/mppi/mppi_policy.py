@@ -13,7 +13,11 @@ from pushplan.planners.arguments import check_pusher
 from pushplan.planners.mppi.control_sequence import SPEED, TURN, ControlSequence
 from pushplan.planners.mppi.mppi import Decision, Mppi
 from pushplan.planners.mppi.mppi_config import MppiConfig
-from pushplan.planners.mppi.objectives import manipulation_objective, navigation_objective
+from pushplan.planners.mppi.objectives import (
+    Objective,
+    manipulation_objective,
+    navigation_objective,
+)
 from pushplan.planners.mppi.rollout_model import step_length
 from pushplan.planners.mppi.target_choice import TargetChoice
 from pushplan.world import (
@@ -117,18 +121,14 @@ class MppiPolicy:
 
     def _ask(self, world: World) -> None:
         """Have a decision made."""
-        planner, rng, nominal = self.planner, self._rng, self._controls
-        if isinstance(world.goal, GoalDisc | GoalLine):
-            objective = navigation_objective(world, self.config)
-        else:
-            approach = self._targets.approach(world)
-            objective = manipulation_objective(world, self.config, approach)
+        planner, rng, nominal, targets = self.planner, self._rng, self._controls, self._targets
+
+        def decide(stop: Stop | None) -> Decision:
+            objective = _objective(world, planner.config, targets)
+            return planner.decide(world, objective, nominal, stop=stop, rng=rng)
+
         self._decided_at = world.time
-        self._pending = self._executor.submit(
-            lambda stop: planner.decide(world, objective, nominal, stop=stop, rng=rng),
-            world.time,
-            self.stop,
-        )
+        self._pending = self._executor.submit(decide, world.time, self.stop)
 
     def _receive(self, world: World) -> None:
         """Take up a decision that is there."""
@@ -138,6 +138,13 @@ class MppiPolicy:
         self._controls = decision.controls
         self.plan_log.append(decision.result)
         self.current_plan = decision.result.plan
+
+
+def _objective(world: World, config: MppiConfig, targets: TargetChoice) -> Objective:
+    """What a decision minimises."""
+    if isinstance(world.goal, GoalDisc | GoalLine):
+        return navigation_objective(world, config)
+    return manipulation_objective(world, config, targets.approach(world))
 
 
 def _is_done(world: World) -> bool:

@@ -120,9 +120,12 @@ class RolloutModel:
 
 
 def _nearby(world: World, horizon: float) -> World:
-    """The world with those objects only that the robot may move within the horizon."""
+    """The world with those objects only that the robot may move within the horizon.
+
+    Where objects have a goal all of them stay: the costs are of all.
+    """
     movables, robot = world.movables, world.robot
-    if len(movables) <= _FEW:
+    if len(movables) <= _FEW or not isinstance(world.goal, GoalDisc | GoalLine):
         return world
     reach = horizon * robot.max_speed + (1.0 + _NEAR) * robot.circumscribed_radius
     away = np.hypot(*(movables.poses[:, :2] - world.robot_pose[:2]).T)

@@ -227,3 +227,14 @@ def test_a_robot_in_a_wall_or_cut_off_from_its_goal_still_gets_commands():
     assert make_policy("mppi", samples=8).act(walled).linear == 1.0
     line = room(walls=False, goal=GoalLine(np.array([8.0, 0.0]), np.array([1.0, 0.0])))
     assert make_policy("mppi", samples=8).act(replace(line, movables=Movables.empty())).linear == 1
+
+
+def test_a_crowd_of_objects_with_a_goal_is_kept_whole():
+    area = ClearanceArea(4.0 * SQUARE + 5.0, np.ones(4, np.bool_))
+    world = room(Drive.DIFFERENTIAL, walls=False, goal=area)
+    places = [(0.2 + 0.2 * (k % 48), 0.3 + 0.3 * (k // 48), 0.0) for k in range(60)]
+    crowd = Movables.from_outlines([0.1 * SQUARE] * 60, places)
+    assert len(RolloutModel(replace(world, movables=crowd), SMALL).world.movables) == 60
+    line = room(walls=False, goal=GoalLine(np.array([8.0, 0.0]), np.array([1.0, 0.0])))
+    far = replace(line, movables=crowd, robot_pose=np.array([9.5, 9.5, 0.0]))
+    assert len(RolloutModel(far, replace(SMALL, steps=2)).world.movables) == 0
