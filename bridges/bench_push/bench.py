@@ -72,7 +72,7 @@ def main() -> int:
         for scene, variation in scenes
         for policy in policies_for(scene, options)
     ]
-    text = report(runs)
+    text = report([run for run in runs if run.episodes])
     say(text)
     if options.page:
         write(options.page, text)

@@ -54,7 +54,7 @@ def table(runs: Sequence[Run], by: str) -> list[str]:
     lines = ["| " + " | ".join(heads) + " |", "|" + "---|" * len(heads)]
     for variation in dict.fromkeys(run.variation for run in runs):
         group = [run for run in runs if run.variation == variation]
-        own = [run for run in group if run.policy in OWN and run.episodes]
+        own = [run for run in group if run.policy in OWN]
         lines += [row(run, (own or group)[0], by) for run in group]
     return lines
 
@@ -63,8 +63,6 @@ def row(run: Run, base: Run, by: str) -> str:
     """One line of a table."""
     cells = [run.variation.replace("_", " "), f"`{run.policy}`", ranges(run.episodes)]
     names = SCORES[by]
-    if not run.episodes:
-        return "| " + " | ".join([*cells, *[""] * (2 * len(names))]) + " |"
     for name in names:
         cells.append(shown(estimate(list(run.values(by, name).values())), name))
     for name in names:
