@@ -240,7 +240,7 @@ def _number(name: str, value: object) -> float:
 
 def blank_row(policy: str, scenario: Any, status: Status, reason: str) -> ResultRow:
     """The row of a job of which nothing was recorded."""
-    kind = goal_kind(str(scenario.task), scenario.variations)
+    kind = goal_kind(str(scenario.task), scenario.to_dict().get("variations"))
     zeroed = {
         name: metric.if_failed
         for name, metric in METRICS.items()
