@@ -59,6 +59,7 @@ class Pairs:
     """One policy in one scene, by engine: scores by name and start."""
 
     run: Run
+    seeds: list[int]  # that all engines have
     theirs: dict[str, list[float]]
     ours: dict[str, dict[str, list[float]]]
 
@@ -103,8 +104,11 @@ def pairs(run: Run, options: argparse.Namespace) -> Pairs:
             for seed in missing:
                 repeat(run, json.loads(starts[seed]), path, options.most_steps, alike)
             done = whole(path, options.most_steps)
-        ours[engine] = columns([json.loads(done[seed]) for seed in run.episodes if seed in done])
-    return Pairs(run, columns([one["ours"] for one in run.episodes.values()]), ours)
+        ours[engine] = {seed: json.loads(line) for seed, line in done.items()}
+    both = [seed for seed in run.episodes if all(seed in done for done in ours.values())]
+    theirs = columns([run.episodes[seed]["ours"] for seed in both])
+    scores = {engine: columns([done[seed] for seed in both]) for engine, done in ours.items()}
+    return Pairs(run, both, theirs, scores)
 
 
 def repeat(run: Run, start: dict[str, Any], path: Path, most_steps: int, alike: bool) -> None:
@@ -188,7 +192,7 @@ def report(found: Sequence[Pairs]) -> str:
     for one in found:
         run = one.run
         cells = [f"{run.scene} {run.variation}".replace("_", " "), f"`{run.policy}`"]
-        cells += [ranges(run.episodes), "original"]
+        cells += [ranges(one.seeds), "original"]
         cells += [shown(name, one.theirs[name]) for name in SCORES]
         lines.append("| " + " | ".join(cells) + " |")
         for engine, scores in one.ours.items():

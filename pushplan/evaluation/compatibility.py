@@ -121,6 +121,9 @@ def _first_step(policy: Policy, scenario: Any, env: Any) -> str | None:
     """Why the policy refuses the start of a scenario; planning calls end after an iteration."""
     try:
         observation, _ = env.reset(seed=scenario.seed)
+    except Exception:
+        return None  # that is not the policy's fault
+    try:
         policy.reset(env.world, stream(scenario.seed, "policy"))
         if isinstance(policy, PlansBesideDriving):
             policy.plan_with(ImmediateExecutor(MaxIterations(1)))

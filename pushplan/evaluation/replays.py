@@ -122,7 +122,9 @@ def _motion(episode: Episode) -> dict[str, Any]:
 def _plans(episode: Episode) -> list[dict[str, Any]]:
     """When each plan was taken up, its path, and where it expects which objects at its end."""
     plans, found = episode.plans, []
-    for index in range(0 if plans is None else len(plans)):
+    count = 0 if plans is None else len(plans)
+    shown = np.unique(np.linspace(0, count - 1, min(count, FRAMES)).round().astype(int))
+    for index in shown.tolist():
         assert plans is not None
         path, (moved, poses) = plans.path(index), plans.expected(index)
         kept = np.unique(np.linspace(0, len(path) - 1, min(len(path), PATH)).round().astype(int))

@@ -8,7 +8,7 @@ import numpy as np
 
 from pushplan.world import StaticMap, World
 from pushplan.world.checks import FloatArray
-from pushplan.world.outline import grown_outline
+from pushplan.world.outline import grown_outline, transform
 
 _LEVELS = 4  # fractions of the margin that an obstacle near the robot may keep
 
@@ -24,7 +24,7 @@ def keep_out(world: World) -> StaticMap:
     static, margin = world.static, world.margin
     if margin == 0.0:
         return static
-    outlines = world.robot_outline_world()
+    outlines = [transform(world.robot_pose, part) for part in world.robot.wall_parts]
     reach = world.robot.circumscribed_radius + 2.0 * margin
     low, high = _boxes(static)
     at = world.robot_pose[:2]

@@ -78,7 +78,8 @@ def timed_plan(world: World, path: SweptPath, turn_fraction: float) -> Plan:
     speeds = np.minimum(robot.max_speed, fastest)
     if robot.drive is Drive.CONSTANT_SPEED:
         speeds = np.full(count, robot.max_speed)
-    back = goes_back(path.poses)
+    back = goes_back(path.poses, robot.circumscribed_radius)
+    back &= robot.min_speed < 0.0
     speeds[back] = np.maximum(robot.min_speed, -fastest[back])
     turn_rates = np.where(on_spot, signs * turn_rate, speeds * ahead)
     # the length of an arc, where `path.lengths` has its chord

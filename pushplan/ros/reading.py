@@ -91,7 +91,8 @@ def plan_from(message: Any, robot: RobotModel, frame: str | None = None) -> Plan
     if len(steps) == 0 or (steps < 0.0).any() or not steps.any():
         steps = np.maximum(lengths / robot.max_speed, np.abs(turns) / robot.max_turn_rate)
     elif robot.min_speed < 0.0:  # a path with times says where it goes back
-        lengths *= np.where(goes_back(poses)[:-1], -1.0, 1.0)
+        back = goes_back(poses, robot.circumscribed_radius)[:-1]
+        lengths *= np.where(back, -1.0, 1.0)
     moving = steps > 0.0
     rates = np.zeros((2, len(poses)))
     rates[:, :-1][:, moving] = np.stack([lengths, turns])[:, moving] / steps[moving]

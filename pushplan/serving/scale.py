@@ -23,7 +23,7 @@ def check_scale(world: World) -> None:
     """
     static, goal, robot = world.static, world.goal, world.robot
     _within("static.bounds", static.bounds, FARTHEST, "m")
-    for name, lines in (("static.polygons", static.polygons), ("robot.parts", robot.parts)):
+    for name, lines in (("static.polygons", static.polygons), ("robot.parts", robot.contact_parts)):
         for line in lines:
             _within(name, line, FARTHEST, "m")
     _within("static.segments", static.segments, FARTHEST, "m")

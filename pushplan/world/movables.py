@@ -227,7 +227,8 @@ class Movables(ArrayRecord, CheckedFields):
 
     def select(self, keep: ArrayLike) -> Movables:
         """The objects whose index or flag is in ``keep``."""
-        index = np.arange(len(self))[np.asarray(keep)]
+        chosen = np.asarray(keep)  # an empty list would be one of floats
+        index = np.arange(len(self))[chosen if chosen.size else chosen.astype(np.int64)]
         if len(np.unique(index)) != len(index):
             raise InvalidInputError(f"keep must name an object once, got {index.tolist()}")
         return self._gathered(index)

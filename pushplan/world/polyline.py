@@ -37,8 +37,13 @@ def path_lengths(points: FloatArray) -> FloatArray:
     return lengths
 
 
-def goes_back(poses: FloatArray) -> BoolArray:
-    """(N,) whether the step from each pose (N, 3) leads back; the last as the one before."""
+def goes_back(poses: FloatArray, size: float) -> BoolArray:
+    """(N,) whether the step from each pose (N, 3) leads back; the last as the one before.
+
+    Args:
+        poses: x, y [m] and heading [rad].
+        size: of the robot [m]; what leads back by less than a thousandth of it is rounding.
+    """
     moves, headings = np.diff(poses[:, :2], axis=0), poses[:-1, 2]
-    back = moves[:, 0] * np.cos(headings) + moves[:, 1] * np.sin(headings) < 0.0
+    back = moves[:, 0] * np.cos(headings) + moves[:, 1] * np.sin(headings) < -1e-3 * size
     return np.append(back, back[-1:] if len(back) else [False])

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 
@@ -13,6 +13,7 @@ from pushplan.world.errors import InvalidInputError
 from pushplan.world.plan import Plan
 
 _POSES = 48  # of a path, at most
+_PLANS = 2000  # of an episode, at most; beyond them every second one is kept, then every fourth
 _MOVED = 1e-3  # objects that a plan expects to move by less are left out [m], [rad]
 
 
@@ -78,6 +79,7 @@ class PlanRecorder:
     def __init__(self, ids: IntArray) -> None:
         self._places = {int(one): k for k, one in enumerate(ids)}
         self._last: Plan | None = None
+        self._seen, self._stride = 0, 1
         self._times: list[float] = []
         self._paths: list[FloatArray] = []
         self._moved: list[IntArray] = []
@@ -96,6 +98,9 @@ class PlanRecorder:
         self._last = plan
         if plan is None:
             return
+        self._seen += 1
+        if (self._seen - 1) % self._stride:
+            return
         last = len(plan.poses) - 1
         kept = np.unique(np.linspace(0, last, min(last + 1, _POSES)).round().astype(int))
         moved, poses = self._prediction(ids, plan)
@@ -103,6 +108,12 @@ class PlanRecorder:
         self._paths.append(plan.poses[kept])
         self._moved.append(moved)
         self._moved_poses.append(poses)
+        if len(self._times) > _PLANS:
+            self._stride *= 2
+            columns: tuple[list[Any], ...]
+            columns = self._times, self._paths, self._moved, self._moved_poses
+            for column in columns:
+                del column[1::2]
 
     def _prediction(self, ids: IntArray, plan: Plan) -> tuple[IntArray, FloatArray]:
         predicted = plan.object_poses

@@ -55,8 +55,7 @@ class RobotModel(ArrayRecord, CheckedFields):
         min_turning_radius: of a car, to the body origin, at any speed [m]; 0 for other drives.
         wheel_separation: distance between the driven wheels [m], 0 if there are none.
         contact_radius: distance [m] from the drawn parts at which they touch others: they are
-            rounded by it. `contact_parts` are grown by it, and everything but pictures and files
-            reads those.
+            rounded by it. `contact_parts` are grown by it, and everything but files reads those.
         wheel_parts: how many of the last parts are wheels, which push objects but do not count at
             what is static; planners and planar simulators heed it.
         name: for logs and pictures.

@@ -260,3 +260,34 @@ class TestSuites:
         ):
             with pytest.raises(SchemaError, match=words):
                 Experiment.from_dict({**data, "suites": [entry]}, folder.parent)
+
+
+def test_bodies_are_spread_on_their_side_of_the_walls(tmp_path: Path) -> None:
+    world = small_room()
+    save_world(world, tmp_path / "a.yaml")
+    env = room(tmp_path / "a.yaml", spread=1.0)
+    low, high = world.static.bounds[:2], world.static.bounds[2:]
+    moved = 0
+    for seed in range(30):
+        after = start(env, seed)
+        places = np.vstack([after.robot_pose, after.movables.poses])[:, :2]
+        assert (places > low).all() and (places < high).all()
+        moved += int(np.abs(after.robot_pose - world.robot_pose).max() > 0.01)
+    assert moved > 10
+
+
+def test_goals_for_objects_that_nothing_can_reach_are_refused(tmp_path: Path) -> None:
+    world = small_room()
+    corner = np.array([(0.0, 0.0), (0.5, 0.0), (0.5, 0.5), (0.0, 0.5)]) + world.static.bounds[:2]
+    empty = replace(world, goal=Receptacle(corner), movables=world.movables.select([]))
+    save_world(empty, tmp_path / "empty.yaml")
+    with pytest.raises(ScenarioError, match="needs an object"):
+        room(tmp_path / "empty.yaml")
+    polygons = [
+        *world.static.polygons,
+        corner + np.array([(-0.1, -0.1), (0.1, -0.1), (0.1, 0.1), (-0.1, 0.1)]),
+    ]
+    shut = replace(world.static, polygons=tuple(polygons))
+    save_world(replace(world, goal=Receptacle(corner), static=shut), tmp_path / "shut.yaml")
+    with pytest.raises(ScenarioError, match="no way leads to the goal"):
+        room(tmp_path / "shut.yaml")

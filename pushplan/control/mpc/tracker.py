@@ -45,17 +45,20 @@ class MpcTracker:
         self._clock = EpisodeClock(self.config.period)
         self._out = np.zeros(2)
         self._memory: TrackerMemory | None = None
+        self._earlier = 0  # failures of memories before
         self._stages = StageFollower(self._follow, self._begin, self._clock)
 
     @property
     def fallbacks(self) -> int:
         """Calls since the start of the episode in which the solver gave no solution."""
-        return 0 if self._memory is None else int(self._memory.horizon.counts[FAILED])
+        now = 0 if self._memory is None else int(self._memory.horizon.counts[FAILED])
+        return self._earlier + now
 
     def reset(self, world: World) -> None:
         """See `pushplan.world.Controller`."""
         self._clock.reset()
         self._stages.reset()
+        self._memory, self._earlier = None, 0
         self._begin()
 
     def _begin(self) -> None:
@@ -73,6 +76,7 @@ class MpcTracker:
         """Start afresh in a new episode, on a new plan, or where the robot is another one."""
         if self._robot is not world.robot and self._robot != world.robot:
             self._robot, self._plan = world.robot, None
+            self._earlier = self.fallbacks
             self._memory = tracker_memory(world.robot, self.config)
             driven = driven_twist(world)
             self._memory.horizon.last[:] = driven.linear, driven.angular

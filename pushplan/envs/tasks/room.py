@@ -145,9 +145,12 @@ class RoomTask(Task):
         return self._spread(rng) if self.variations.spread else self._world
 
     def _spread(self, rng: np.random.Generator) -> World:
-        """Bodies moved one after the other, off all others; where nothing is free one stays."""
+        """Bodies moved one after the other, off all others, on the same side of the walls.
+
+        Where nothing is free one stays.
+        """
         world, spread = self._world, self.variations.spread
-        free = FreeSpace(world.static)
+        free, floor = FreeSpace(world.static), shapely.box(*world.static.bounds)
         movables = world.movables
         outlines = [list(world.robot.contact_parts)]
         outlines += [[movables.outline(k)] for k in range(len(movables))]
@@ -161,9 +164,13 @@ class RoomTask(Task):
                 shift = spread * math.sqrt(away) * np.array([np.cos(angle), np.sin(angle)])
                 pose = poses[k] + np.array([*shift, turn * spread / radii[k]])
                 shape = _shape(pose, parts)
-                outside = k == 0 and self._is_goal(pose)
-                if free.is_free(np.array([shape]), 0.0)[0] and not (
-                    outside or shape.intersects(others)
+                if k == 0 and self._is_goal(pose):
+                    continue
+                way = shapely.LineString([poses[k][:2], pose[:2]])  # it is not across a wall
+                if (
+                    floor.covers(shape)
+                    and free.is_free(np.array([shape, way]), 0.0).all()
+                    and not shape.intersects(others)
                 ):
                     poses[k], shapes[k] = pose, shape
                     break

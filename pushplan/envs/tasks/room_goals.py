@@ -9,7 +9,7 @@ import numpy as np
 
 from pushplan.envs.tasks.base import StepOutcome
 from pushplan.geometry.distance_field import GeodesicField
-from pushplan.world import Receptacle, World
+from pushplan.world import Receptacle, ScenarioError, World
 from pushplan.world.checks import BoolArray, FloatArray, IntArray
 from pushplan.world.outline import grown_outline, transform_outlines
 
@@ -69,14 +69,19 @@ class ObjectsGoal:
     kind: Literal["objects"] = "objects"
 
     def __init__(self, world: World, field: GeodesicField) -> None:
+        if not len(world.movables):
+            raise ScenarioError("room: a goal for objects needs an object, the world has none")
         self._field, self._world = field, world
-        self._far = float(field.values[np.isfinite(field.values)].max())
+        self._far = float(field.values[np.isfinite(field.values)].max(initial=0.0))
         # 1 m where all centres are there already, but not all corners
         self.way = float(self._distances(world.movables.poses).sum()) or 1.0
+        starts = world.movables.poses[:, :2].tolist()
+        if not any(np.isfinite(field.exact(x, y)) for x, y in starts):
+            self.way = math.inf
         self.is_done = bool(world.completed.all())
         self._mouth: Receptacle | None = None
         if isinstance(world.goal, Receptacle):
-            lean = _LEAN * float(world.movables.radii.min(initial=math.inf))
+            lean = _LEAN * float(world.movables.radii.min())
             self._mouth = Receptacle(grown_outline(world.goal.polygon, lean))
 
     def _distances(self, poses: FloatArray) -> FloatArray:

@@ -16,6 +16,7 @@ from pushplan.motion.polyline import polyline_plan
 from pushplan.motion.random_tree.kinodynamic_tree import TreeGrowth, TreeLimits
 from pushplan.motion.random_tree.targets import Targets
 from pushplan.motion.room_ahead import gets_away
+from pushplan.motion.speed_profile import TIGHTEST
 from pushplan.motion.start_turn import start_turn
 from pushplan.world import Drive
 from pushplan.world.checks import FloatArray
@@ -70,7 +71,10 @@ class TreePaths:
             if robot.min_speed < 0.0:
                 improver.backward = max(2.0 * improver.backward, _BACKWARD * robot.turning_radius)
             elif not improver.relaxed:
-                bare = improver.problem._replace(footprint=footprint(robot))
+                tightest = max(robot.turning_radius, TIGHTEST * improver.size)
+                bare = improver.problem._replace(
+                    footprint=footprint(robot), turning_radius=tightest
+                )
                 self.boxed_in = not self._gets_away(bare)
 
     def grow_two(self, push_weight: float) -> Iterator[Candidate]:

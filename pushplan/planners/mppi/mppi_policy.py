@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import deque
 from typing import Any
 
 import numpy as np
@@ -33,6 +34,7 @@ from pushplan.world import (
 )
 
 _PERIOD = 0.1  # for which the first command is taken to be held [s]
+_LOGGED = 10_000  # decisions that are kept
 
 
 class MppiPolicy:
@@ -54,8 +56,8 @@ class MppiPolicy:
         self._forget(np.random.default_rng(0))
 
     def _forget(self, rng: np.random.Generator) -> None:
-        self.plan_log: list[PlanResult] = []
-        """Every decision since the last reset."""
+        self.plan_log: deque[PlanResult] = deque(maxlen=_LOGGED)
+        """The newest decisions since the last reset."""
         self.current_plan: Plan | None = None
         self.plan_with(ImmediateExecutor())
         self._rng = rng
@@ -134,7 +136,8 @@ class MppiPolicy:
         """Take up a decision that is there."""
         if self._pending is None or not self._pending.ready(world.time):
             return
-        decision, self._pending = self._pending.result(), None
+        pending, self._pending = self._pending, None
+        decision = pending.result()
         self._controls = decision.controls
         self.plan_log.append(decision.result)
         self.current_plan = decision.result.plan

@@ -7,7 +7,6 @@ from collections.abc import Callable
 import numpy as np
 
 from pushplan.compiled import owned
-from pushplan.motion.keep_out import keep_out
 from pushplan.planners.mppi.cost_kernels import (
     Approach,
     CostWeights,
@@ -45,7 +44,7 @@ def navigation_objective(world: World, config: MppiConfig) -> Objective:
     """Driving and pushing up to the horizon, and the way that is left to the goal."""
     robot, weights = world.robot, _weights(world, config)
     cell = _cell(world, robot.circumscribed_radius)
-    field = robot_field(keep_out(world), world.navigation_goal, robot.inscribed_radius, cell)
+    field = robot_field(world.static, world.navigation_goal, robot.inscribed_radius, cell)
 
     def costs(rollouts: Rollouts) -> FloatArray:
         out = np.empty(len(rollouts.paths))

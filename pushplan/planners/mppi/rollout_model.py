@@ -29,6 +29,7 @@ from pushplan.world import GoalDisc, GoalLine, World
 from pushplan.world.checks import FloatArray
 
 _TURN = 0.35  # greatest turn from pose to pose [rad]
+_LENGTH = 0.3  # greatest length from pose to pose [circumscribed radii]
 _NEAR = 1.5  # objects so much farther away than the robot gets are left out [R]
 _FEW = 40  # objects that are few enough to keep them all
 
@@ -153,6 +154,8 @@ def _problem(world: World, config: MppiConfig, period: float) -> RolloutProblem:
         robot.min_turning_radius,
     )
     walls, start = obstacles(keep_out(world)), owned(world.robot_pose)
+    turn = robot.max_turn_rate * period
+    length = max(robot.max_speed, -robot.min_speed) * period / robot.circumscribed_radius
     for margin in (config.margin * robot.circumscribed_radius, 0.0):
         shape = footprint(robot, margin)
         corners = np.empty_like(shape.vertices)
@@ -161,7 +164,7 @@ def _problem(world: World, config: MppiConfig, period: float) -> RolloutProblem:
     goal = world.goal
     return RolloutProblem(
         float(period),
-        max(1, math.ceil(robot.max_turn_rate * period / _TURN)),
+        max(1, math.ceil(max(turn / _TURN, length / _LENGTH) - 1e-9)),
         limits,
         shape,
         walls,

@@ -49,7 +49,7 @@ def clearance_problem(
         least: see `ClearanceProblem`.
         slack: the same.
     """
-    vertices, offsets = flatten([*robot.contact_parts, outline])
+    vertices, offsets = flatten([*robot.wall_parts, outline])
     reach = np.hypot(vertices[:, 0], vertices[:, 1])
     return ClearanceProblem(
         owned(vertices),

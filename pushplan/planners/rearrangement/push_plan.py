@@ -9,11 +9,13 @@ from pushplan.geometry.angles import wrap_angle
 from pushplan.planners.rearrangement.push import Push
 from pushplan.world import Plan, SubTask, World
 from pushplan.world.checks import FloatArray
-from pushplan.world.polyline import arc_lengths
+from pushplan.world.polyline import arc_lengths, goes_back, step_lengths
+
+_STILL = 1e-6  # a step that is shorter turns on the spot [circumscribed radii]
 
 
 def push_plan(world: World, route: Legs | None, push: Push) -> Plan:
-    """The way to a push and the push itself, at full speed.
+    """The way to a push and the push itself, at full speed and turn rate.
 
     A push is predicted at its end only: in between, ``object_poses`` follow the straight line from
     where the objects are, as far as the robot has pushed.
@@ -23,20 +25,28 @@ def push_plan(world: World, route: Legs | None, push: Push) -> Plan:
         route: to the start of the push; None if the robot is there.
         push: the push.
     """
-    way = _way(world, route)
+    robot, way = world.robot, _way(world, route)
     poses = np.concatenate([way, push.poses])
     along, first = arc_lengths(poses), len(way)
-    speed = world.robot.max_speed
+    lengths, turns = step_lengths(poses), wrap_angle(np.diff(poses[:, 2]))
+    fastest = np.where(goes_back(poses, robot.circumscribed_radius), -1.0, 1.0) * robot.max_speed
+    on_spot = lengths < _STILL * robot.circumscribed_radius
+    steps = np.maximum(lengths / robot.max_speed, np.abs(turns) / robot.max_turn_rate)
+    moving = steps > 0.0
+    speeds, turn_rates = fastest, np.zeros(len(poses))
+    speeds[:-1][moving] = np.sign(fastest[:-1][moving]) * lengths[moving] / steps[moving]
+    speeds[:-1][on_spot] = 0.0
+    turn_rates[:-1][moving] = turns[moving] / steps[moving]
     done = np.maximum(along - along[first], 0.0) / max(float(along[-1] - along[first]), 1e-12)
     start = world.movables.poses
     moves = push.object_poses - start
     moves[:, 2] = wrap_angle(moves[:, 2])
     return Plan(
-        times=along / speed,
+        times=np.concatenate([[0.0], np.cumsum(steps)]),
         poses=poses,
-        speeds=np.full(len(poses), speed),
-        turn_rates=np.zeros(len(poses)),
-        travel_cost=world.robot.mass * float(along[-1]),
+        speeds=speeds,
+        turn_rates=turn_rates,
+        travel_cost=robot.mass * float(along[-1]),
         interaction_cost=push.work,
         object_poses=start + done[:, None, None] * moves,
         subtasks=(SubTask(push.serves, first, len(poses) - 1),),
@@ -44,12 +54,11 @@ def push_plan(world: World, route: Legs | None, push: Push) -> Plan:
 
 
 def _way(world: World, route: Legs | None) -> FloatArray:
-    """(N, 3) poses at the corners of a route, headed as the robot drives the leg before each."""
-    here: FloatArray = world.robot_pose[None]
-    if route is None or not len(route.points):
-        return here
-    corners = np.concatenate([here[:, :2], route.points])
-    moves = np.diff(corners, axis=0)
-    headings = np.arctan2(moves[:, 1], moves[:, 0])
-    headings = headings + np.where(np.asarray(route.signs) < 0.0, np.pi, 0.0)
-    return np.concatenate([here, np.column_stack([route.points, headings])])
+    """(N, 3) poses before and after each turn on the spot of a route, from where the robot is."""
+    poses = [np.array(world.robot_pose)]
+    if route is not None:
+        for point, sign in zip(route.points, route.signs, strict=True):
+            move = point - poses[-1][:2]
+            heading = np.arctan2(move[1], move[0]) + (np.pi if sign < 0.0 else 0.0)
+            poses += [np.array([*poses[-1][:2], heading]), np.array([*point, heading])]
+    return np.array(poses)

@@ -36,3 +36,10 @@ def test_gtsp_mpc_shows_the_push_in_hand() -> None:
         assert set(push.object_ids) <= set(world.movables.ids[moved].tolist())
         assert np.allclose(plan.object_poses[push.first], world.movables.poses)
         assert plan.interaction_cost > 0.0
+        for stage in plan.stages:  # it says where the robot turns on the spot and where it backs
+            part = plan.poses[stage.first : stage.last + 1]
+            ahead = np.diff(part[:, :2], axis=0) * np.column_stack(
+                [np.cos(part[:-1, 2]), np.sin(part[:-1, 2])]
+            )
+            assert stage.direction == 0 or (stage.direction * ahead.sum(axis=1) > -1e-3).all()
+    assert any(stage.direction == 0 for _, plan in seen for stage in plan.stages)
