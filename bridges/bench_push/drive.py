@@ -22,7 +22,8 @@ os.environ.setdefault("SDL_VIDEODRIVER", "dummy")
 import numpy as np
 from checkout import take_from
 from drivers import PolicyFailure, Served, Theirs, policy_of
-from scenes import SCENES, Scene, pose_of
+from outlines import pose_of
+from scenes import SCENES, Scene
 
 
 def main() -> int:

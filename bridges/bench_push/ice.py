@@ -17,7 +17,7 @@ from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
-from scenes import hull
+from outlines import hull
 
 CHANNEL = (12.0, 40.0)
 """Width and length [m]."""
