@@ -16,6 +16,7 @@ from pushplan.evaluation.run_record import RunRecord
 from pushplan.world import Episode, GoalDisc, GoalLine, SchemaError
 from pushplan.world.checks import FloatArray
 from pushplan.world.files import write_atomic
+from pushplan.world.recorded_plans import thinned
 
 FRAMES = 400
 """At most so many instants of an episode are kept."""
@@ -102,7 +103,7 @@ def _scene(episode: Episode) -> dict[str, Any]:
 
 def _motion(episode: Episode) -> dict[str, Any]:
     count = len(episode.times)
-    kept = np.unique(np.linspace(0, count - 1, min(count, FRAMES)).round().astype(int))
+    kept = thinned(count, FRAMES)
     poses = np.concatenate([episode.robot_poses[:, None], episode.object_poses], axis=1)[kept]
     poses[..., 2] = np.unwrap(poses[..., 2], axis=0)
     leaps = np.abs(np.diff(poses, axis=0)).max(axis=(0, 1), initial=0.0)
@@ -123,11 +124,10 @@ def _plans(episode: Episode) -> list[dict[str, Any]]:
     """When each plan was taken up, its path, and where it expects which objects at its end."""
     plans, found = episode.plans, []
     count = 0 if plans is None else len(plans)
-    shown = np.unique(np.linspace(0, count - 1, min(count, FRAMES)).round().astype(int))
-    for index in shown.tolist():
+    for index in thinned(count, FRAMES).tolist():
         assert plans is not None
         path, (moved, poses) = plans.path(index), plans.expected(index)
-        kept = np.unique(np.linspace(0, len(path) - 1, min(len(path), PATH)).round().astype(int))
+        kept = thinned(len(path), PATH)
         found.append(
             {
                 "time": round(float(plans.times[index] - episode.times[0]), 3),

@@ -17,6 +17,11 @@ _PLANS = 2000  # of an episode, at most; beyond them every second one is kept, t
 _MOVED = 1e-3  # objects that a plan expects to move by less are left out [m], [rad]
 
 
+def thinned(count: int, most: int) -> IntArray:
+    """Indices of at most ``most`` of so many things, evenly spaced, first and last among them."""
+    return np.unique(np.linspace(0, count - 1, min(count, most)).round().astype(np.int64))
+
+
 @dataclass(frozen=True, eq=False)
 class RecordedPlans(ArrayRecord, CheckedFields):
     """Paths that were planned, and where the objects were expected at their ends.
@@ -101,8 +106,7 @@ class PlanRecorder:
         self._seen += 1
         if (self._seen - 1) % self._stride:
             return
-        last = len(plan.poses) - 1
-        kept = np.unique(np.linspace(0, last, min(last + 1, _POSES)).round().astype(int))
+        kept = thinned(len(plan.poses), _POSES)
         moved, poses = self._prediction(ids, plan)
         self._times.append(time)
         self._paths.append(plan.poses[kept])
