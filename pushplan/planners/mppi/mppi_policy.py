@@ -48,7 +48,7 @@ class MppiPolicy:
         stop: stop rule of each decision; `MppiConfig.iterations` alone if None.
     """
 
-    actions = ("turn_rate", "velocity")
+    actions = ("velocity", "turn_rate")
 
     def __init__(self, planner: Mppi | None = None, stop: Stop | None = None) -> None:
         self.planner = planner or Mppi()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 
@@ -28,21 +29,37 @@ _CELL = 0.3  # side of a cell of distance fields [R]
 _MOST_CELLS = 20_000
 
 
+class _Defaults(NamedTuple):
+    """Settings that depend on who has the goal; see `MppiConfig`."""
+
+    goal_weight: float
+    collision_cost: float
+
+
+_NAVIGATION = _Defaults(3.0, 200.0)
+_MANIPULATION = _Defaults(2.0, 20.0)
+
+
 def _cell(world: World, size: float) -> float:
     """Side of the cells of a distance field [m]."""
     sides = world.static.bounds[2:] - world.static.bounds[:2]
     return max(_CELL * size, float(np.sqrt(sides[0] * sides[1] / _MOST_CELLS)))
 
 
-def _weights(world: World, config: MppiConfig) -> CostWeights:
+def _weights(world: World, config: MppiConfig, defaults: _Defaults) -> CostWeights:
     robot = world.robot
-    collision = config.collision_cost * robot.mass * robot.circumscribed_radius
-    return CostWeights(robot.mass, config.push_weight, config.goal_weight, collision)
+    goal_weight, collision = config.goal_weight, config.collision_cost
+    if goal_weight is None:
+        goal_weight = defaults.goal_weight
+    if collision is None:
+        collision = defaults.collision_cost
+    collision *= robot.mass * robot.circumscribed_radius
+    return CostWeights(robot.mass, config.push_weight, goal_weight, collision)
 
 
 def navigation_objective(world: World, config: MppiConfig) -> Objective:
     """Driving and pushing up to the horizon, and the way that is left to the goal."""
-    robot, weights = world.robot, _weights(world, config)
+    robot, weights = world.robot, _weights(world, config, _NAVIGATION)
     cell = _cell(world, robot.circumscribed_radius)
     field = robot_field(world.static, world.navigation_goal, robot.inscribed_radius, cell)
 
@@ -85,7 +102,8 @@ def manipulation_objective(world: World, config: MppiConfig, approach: Approach)
         config: settings.
         approach: to the object that is to be pushed.
     """
-    weights, costs_left = _weights(world, config), object_costs(world, config)
+    weights = _weights(world, config, _MANIPULATION)
+    costs_left = object_costs(world, config)
     start = owned(world.movables.poses)
 
     def costs(rollouts: Rollouts) -> FloatArray:

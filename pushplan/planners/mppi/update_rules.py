@@ -13,8 +13,9 @@ from pushplan.world.checks import FloatArray
 def exponential_weights(costs: FloatArray, temperature: float) -> FloatArray:
     """Weights proportional to exp(-(J - min J) / λ), as path integral control has them.
 
-    λ is ``temperature`` times (median J - min J): Williams et al. (ICRA 2017, eq. 17) take it in
-    units of the cost, which would have to be chosen for every task anew.
+    λ is ``temperature`` times (lower quartile of J - min J): Williams et al. (ICRA 2017, eq. 17)
+    take it in units of the cost, which would have to be chosen for every task anew. The quartile,
+    not the median, as up to half of the samples may run into walls, and cost far more.
 
     Args:
         costs: (S,) J of each sample.
@@ -24,8 +25,8 @@ def exponential_weights(costs: FloatArray, temperature: float) -> FloatArray:
         (S,) weights, with sum 1.
     """
     above = costs - costs.min()
-    scale = temperature * float(np.median(above))
-    if scale <= 0.0:  # half of the samples are as good as the best
+    scale = temperature * float(np.quantile(above, 0.25))
+    if scale <= 0.0:  # a quarter of the samples are as good as the best
         weights = (above == 0.0).astype(np.float64)
     else:
         weights = np.exp(-above / scale)
