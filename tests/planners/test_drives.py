@@ -167,6 +167,19 @@ def test_a_robot_that_faces_a_wall_plans_to_turn_on_the_spot_first(name):
     assert swept.work == pytest.approx(plan.interaction_cost, rel=1e-3)
 
 
+@pytest.mark.warm("push-aware")
+def test_a_robot_that_faces_away_turns_on_the_spot_rather_than_driving_round():
+    robot = make_robot(drive=Drive.DIFFERENTIAL)
+    world = make_u_maze([], robot=robot, robot_pose=[11.25, 3.75, -np.pi / 2])
+    ahead = world.moved(robot_pose=[11.25, 3.75, np.pi / 2])
+    costs = []
+    for start in (world, ahead):
+        result = make_planner("push-aware").plan(start, stop=MaxIterations(6000))
+        check_plan(start, result.plan, result.status)
+        costs.append(result.stats.detail["cost"])
+    assert max(costs) < 1.02 * min(costs)
+
+
 @pytest.mark.warm(*PLANNERS)
 @pytest.mark.parametrize("name", PLANNERS)
 def test_a_car_that_faces_a_wall_plans_to_reverse_where_it_can(name):

@@ -11,6 +11,7 @@ from pushplan.motion.dubins_warm_start import warm_start
 from pushplan.motion.keep_out import keep_out
 from pushplan.motion.path_improver import Candidate, PathImprover
 from pushplan.motion.random_tree.tree_paths import TreePaths
+from pushplan.motion.start_turn import start_turn
 from pushplan.planners.push_aware.best_first import Branching, make_search
 from pushplan.planners.push_aware.bound import lower_bound
 from pushplan.planners.push_aware.cost_to_go import CostToGo, length_to_go
@@ -25,6 +26,7 @@ from pushplan.world.checks import FloatArray
 _RANDOM_NODES = 20_000  # nodes of a random tree at most; then another is begun
 _SIGNATURES = 4  # ways to have pushed the objects that some searches tell apart in each cell
 _LONGEST_ARC = 2.0  # longest arc of the random tree [R]
+_LARGE_TURN = 0.5  # turn on the spot from which on arcs without it are a detour [rad]
 
 
 @dataclass(frozen=True)
@@ -66,6 +68,7 @@ class PushAwareSearch:
         table = self._table()
         if table is not None:
             self._search(table, self._first_variant(table))
+        self._turn_first(table)
         while not improver.stopped():
             begun = improver.iterations
             if table is not None:
@@ -108,6 +111,21 @@ class PushAwareSearch:
             if table is not None:
                 self._search(table, replace(self._first_variant(table), inflation=1.3))
         return None
+
+    def _turn_first(self, table: CostToGo | None) -> None:
+        """Try paths that begin with a turn on the spot, and go on with them if they cost less."""
+        improver = self.improver
+        lead = None if len(improver.lead.pieces) else start_turn(improver)
+        if lead is None or lead.pieces[0, 0] < _LARGE_TURN or improver.stopped():
+            return
+        before = improver.best_cost
+        improver.begin_with(lead)
+        warm_start(improver)
+        self._one_round()
+        if table is not None:
+            self._search(table, self._first_variant(table))
+        if not improver.best_cost < before:
+            improver.begin_with(None)
 
     def _table(self) -> CostToGo | None:
         """Lengths to the goal without objects; the same for every call on this map."""
