@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from pushplan import __version__
 from pushplan.cli import (
     bench,
+    bounds,
     codegen,
     compare,
     compiling,
@@ -40,6 +41,7 @@ COMMANDS = (
     score,
     report,
     compare,
+    bounds,
     stored,
     ice,
     gtsp,

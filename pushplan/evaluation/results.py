@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from pushplan.evaluation.database import DATABASE
+from pushplan.evaluation.gaps import gaps
 from pushplan.evaluation.rescoring import metric_label, rescore
 from pushplan.evaluation.rows import rows_csv
 from pushplan.evaluation.run_record import RunRecord
@@ -25,9 +26,11 @@ from pushplan.evaluation.tables import (
     Table,
     aggregate_table,
     difference_tables,
+    gap_tables,
     measured_tables,
     score_tables,
 )
+from pushplan.scenarios.known_bounds import known_bounds
 from pushplan.world import InvalidInputError, UnknownNameError
 from pushplan.world.checks import choice, integer
 from pushplan.world.files import write_atomic
@@ -99,13 +102,14 @@ class Results(RunRecord):
         return measured_tables(estimates, self.policies, metrics, self.titles) if values else []
 
     def tables(self, *, wide: bool = False) -> list[Table]:
-        """Scores of the policies, then their paired differences."""
+        """Scores of the policies, their gaps to what is known, then their paired differences."""
         titles = self.titles
         together = aggregate_table(self.rows, self.policies) if wide else None
         return [
             *([together] if together else []),
             *score_tables(self.summary(), titles, wide=wide),
             *self._measured_tables(self.about.get("metrics", []), self.measured),
+            *gap_tables(gaps(self.rows, self.policies, known_bounds()), titles),
             *difference_tables(self.compare(), titles, wide=wide),
         ]
 

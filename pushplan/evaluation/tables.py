@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pushplan.evaluation.gaps import Gap
 from pushplan.evaluation.rows import ResultRow
 from pushplan.evaluation.statistics import Estimate
 from pushplan.evaluation.statistics_aggregate import (
@@ -64,6 +65,11 @@ PAIR_NOTE = (
     "how many further scenarios would separate the pair, were the differences to go on like this "
     "(power 0.8)"
 )
+GAP_NOTE = (
+    "work of robot and objects, m₀ l₀ + Σ mᵢ lᵢ, of the successful episodes: mean of how much it "
+    "is above the best known solution of the scenario, and above a proven bound ('pushplan "
+    "bounds'); of how many scenarios that is known"
+)
 AGGREGATE_NOTE = (
     "interquartile mean over all episodes of all settings with its 95 % stratified bootstrap "
     "interval; P is the probability that an episode of the policy has a better value than one of "
@@ -98,6 +104,26 @@ def score_tables(
         cells = tuple(_policy_cells(summary, metrics, wide) for summary in mine)
         note = SCORE_NOTE + ("; med is the median" if wide else "")
         tables.append(Table(titles.get(setting, setting), headings, cells, note))
+    return tables
+
+
+def gap_tables(found: Sequence[Gap], titles: Mapping[str, str]) -> list[Table]:
+    """One table a setting of how far its policies are from what is known to be possible."""
+    tables = []
+    for setting in dict.fromkeys(gap.setting for gap in found):
+        cells = tuple(
+            (
+                gap.policy,
+                f"{gap.to_best:+.1%}" if gap.with_best else "",
+                str(gap.with_best),
+                f"{gap.to_bound:+.1%}",
+                str(gap.count),
+            )
+            for gap in found
+            if gap.setting == setting
+        )
+        headings = ("policy", "above best known", "of", "above bound", "of")
+        tables.append(Table(titles.get(setting, setting), headings, cells, GAP_NOTE))
     return tables
 
 

@@ -33,6 +33,18 @@ def centroid(corners: FloatArray) -> FloatArray:
     return centre
 
 
+def inscribed_radius(corners: FloatArray) -> float:
+    """Radius [m] of the largest disc about the origin inside a convex outline, 0 if none.
+
+    Args:
+        corners: (V, 2) counter-clockwise [m].
+    """
+    edges = np.roll(corners, -1, axis=0) - corners
+    # distance of the origin to each edge line, positive inside a counter-clockwise outline
+    inside = edges[:, 1] * corners[:, 0] - edges[:, 0] * corners[:, 1]
+    return max(0.0, float((inside / np.hypot(edges[:, 0], edges[:, 1])).min()))
+
+
 def convex_outline(name: str, corners: ArrayLike) -> FloatArray:
     """Check one convex outline and return it counter-clockwise, as (N, 2) [m].
 

@@ -21,7 +21,7 @@ from pushplan.world.checked_fields import (
 )
 from pushplan.world.checks import ArrayRecord, FloatArray, IntArray, choice, frozen, number
 from pushplan.world.errors import InvalidInputError
-from pushplan.world.outline import convex_outline, flatten, grown_outline
+from pushplan.world.outline import convex_outline, flatten, grown_outline, inscribed_radius
 
 
 class Drive(enum.StrEnum):
@@ -156,15 +156,7 @@ class RobotModel(ArrayRecord, CheckedFields):
     @cached_property
     def inscribed_radius(self) -> float:
         """Radius [m] of the largest disc about the body origin inside one part, 0 if none."""
-        best = 0.0
-        for part in self.contact_parts:
-            edges = np.roll(part, -1, axis=0) - part
-            # distance of the origin to each edge line, positive inside a counter-clockwise part
-            inside = (edges[:, 1] * part[:, 0] - edges[:, 0] * part[:, 1]) / np.hypot(
-                edges[:, 0], edges[:, 1]
-            )
-            best = max(best, float(inside.min()))
-        return best
+        return max(map(inscribed_radius, self.contact_parts))
 
     @property
     def turning_radius(self) -> float:

@@ -9,11 +9,11 @@ import numpy as np
 from pushplan.compiled import owned
 from pushplan.motion.dubins_warm_start import warm_start
 from pushplan.motion.keep_out import keep_out
+from pushplan.motion.length_bound import length_bound
 from pushplan.motion.path_improver import Candidate, PathImprover
 from pushplan.motion.random_tree.tree_paths import TreePaths
 from pushplan.motion.start_turn import start_turn
 from pushplan.planners.push_aware.best_first import Branching, make_search
-from pushplan.planners.push_aware.bound import lower_bound
 from pushplan.planners.push_aware.cost_to_go import CostToGo, length_to_go
 from pushplan.planners.push_aware.cost_to_go_maker import cost_to_go_maker
 from pushplan.planners.push_aware.push_aware_config import PushAwareConfig
@@ -62,7 +62,7 @@ class PushAwareSearch:
         """Search until the stop rule fires; None where there is no plan by then."""
         improver = self.improver
         status = self._first_plan()
-        self.bound = lower_bound(self.world, improver.stopped)
+        self.bound = length_bound(self.world, improver.stopped)
         if status is not None:
             return status
         table = self._table()

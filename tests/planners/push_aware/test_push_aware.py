@@ -18,10 +18,10 @@ from pushplan.interaction import QuasiStatic
 from pushplan.motion.collision import footprint, obstacles
 from pushplan.motion.dubins import along_arc, dubins
 from pushplan.motion.goal_region import goal_numbers
+from pushplan.motion.length_bound import length_bound, turning_length
 from pushplan.motion.path_problem import PathProblem
 from pushplan.planners import make_planner, make_policy, policy_names
 from pushplan.planners.push_aware import PushAware, PushAwareConfig
-from pushplan.planners.push_aware.bound import lower_bound, turning_length
 from pushplan.planners.push_aware.cost_to_go import length_to_go
 from pushplan.planners.push_aware.cost_to_go_maker import CostToGoMaker
 from pushplan.planners.push_aware.push_tree import make_push_tree, plant, trace
@@ -155,7 +155,7 @@ def test_the_bound_holds_for_every_plan_of_a_long_run(drive):
         world = make_u_maze(scattered_boxes(2, seed), robot=robot, robot_pose=pose)
         result = planner.plan(world, stop=MaxIterations(4000), rng=generator(seed))
         detail = result.stats.detail
-        assert 0.0 < detail["bound"] == lower_bound(world) <= detail["cost"]
+        assert 0.0 < detail["bound"] == length_bound(world) <= detail["cost"]
         if seed == 0 and drive == "differential":  # and not far, where nothing is in the way
             alone = make_u_maze(robot=robot, robot_pose=pose)
             assert planner.plan(alone, stop=MaxIterations(6000)).stats.detail["gap"] < 0.03
@@ -214,7 +214,7 @@ def test_the_bound_holds_in_a_corridor_of_the_robots_own_width(drive):
     result = PushAware().plan(world, stop=MaxIterations(2500))
     assert result.status is PlanStatus.SOLVED
     assert result.stats.detail["gap"] >= 0.0
-    assert lower_bound(world) > 11.0
+    assert length_bound(world) > 11.0
 
 
 @pytest.mark.slow

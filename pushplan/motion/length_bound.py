@@ -13,14 +13,14 @@ from pushplan.motion.speed_profile import TIGHTEST
 from pushplan.world import Drive, GoalDisc, NavigationGoal, StaticMap, World
 from pushplan.world.checks import FloatArray
 
-_TOO_LONG = 7e-4
+TOO_LONG = 7e-4
 """Fraction by which a `VisibilityGraph` may exceed the shortest path around arcs."""
-_SLIM = 1e-3
+SLIM = 1e-3
 """Fraction by which the disc is less than the inscribed one: gaps as wide as the robot count."""
 _DIRECTIONS = 360
 
 
-def lower_bound(world: World, stopped: Callable[[], bool] = lambda: False) -> float:
+def length_bound(world: World, stopped: Callable[[], bool] = lambda: False) -> float:
     """A cost that no plan can undercut [kg m].
 
     Every path is at least as long as the shortest one of the robot's inscribed disc around the
@@ -29,12 +29,12 @@ def lower_bound(world: World, stopped: Callable[[], bool] = lambda: False) -> fl
     """
     goal = world.navigation_goal
     around = 0.0
-    clearance = (1.0 - _SLIM) * world.robot.inscribed_radius
+    clearance = (1.0 - SLIM) * world.robot.inscribed_radius
     start = world.robot_pose[:2]
     if not stopped() and _is_clear(keep_out(world), start, clearance):
         path = VisibilityGraph(keep_out(world), clearance).to_goal(start, goal, stopped)
         length = float(path.length)
-        around = length / (1.0 + _TOO_LONG) if np.isfinite(length) else 0.0
+        around = length / (1.0 + TOO_LONG) if np.isfinite(length) else 0.0
     robot = world.robot
     if robot.drive is Drive.CONSTANT_SPEED or (robot.drive is Drive.CAR and not robot.min_speed):
         radius = max(robot.turning_radius, TIGHTEST * robot.circumscribed_radius)

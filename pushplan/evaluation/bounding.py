@@ -1,0 +1,58 @@
+"""Bounds of scenarios, and the best solutions that stored runs hold."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+
+from pushplan.envs.making import make
+from pushplan.evaluation.gaps import total_work
+from pushplan.evaluation.results import Results
+from pushplan.motion.transport_bound import transport_bound
+from pushplan.motion.work_bound import work_bound
+from pushplan.scenarios import Scenario
+from pushplan.scenarios.known_bounds import KnownBounds
+from pushplan.world import GoalDisc, GoalLine, World
+
+
+def scenario_bound(scenario: Scenario, *, most_nodes: int = 400) -> KnownBounds:
+    """The proven bound of one scenario, from its start.
+
+    Args:
+        scenario: its environment is made and reset.
+        most_nodes: of the proof, see `pushplan.motion.work_bound`.
+    """
+    env = make(scenario, observation="state")
+    try:
+        env.reset(seed=scenario.seed)
+        world = env.world
+    finally:
+        env.close()
+    return KnownBounds(world.robot.mass, _bound(world, most_nodes))
+
+
+def _bound(world: World, most_nodes: int) -> float:
+    if isinstance(world.goal, GoalDisc | GoalLine):
+        return work_bound(world, most_nodes=most_nodes).work
+    return transport_bound(world)
+
+
+def with_solutions(
+    bounds: Mapping[str, KnownBounds], runs: Iterable[str]
+) -> dict[str, KnownBounds]:
+    """The bounds, with the best solutions of some runs.
+
+    Args:
+        bounds: by `Scenario.key`; other scenarios of the runs are left out.
+        runs: run directories.
+
+    Raises:
+        InvalidInputError: if a directory holds no results.
+    """
+    found = dict(bounds)
+    for path in runs:
+        for row in Results.load(path).rows:
+            if (known := found.get(row.scenario)) is None:
+                continue
+            if (work := total_work(row, known)) is not None:
+                found[row.scenario] = known.better(work, row.policy)
+    return found

@@ -1,0 +1,36 @@
+"""What robot and objects together must be worth of work where objects have a goal."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pushplan.geometry import goal_distances
+from pushplan.motion.length_bound import TOO_LONG
+from pushplan.world import World
+from pushplan.world.outline import inscribed_radius
+
+
+def transport_bound(world: World) -> float:
+    """A lower bound on m₀ l₀ + Σ mᵢ lᵢ of a robot that brings all objects to their goal [kg m].
+
+    The middle of each object that is not done travels at least the shortest path of a point around
+    what is static, and its inscribed radius more, as all of the object has to be in the goal, or
+    out of the area over an open edge. The robot drives at least up to the nearest of them; how far
+    beyond that has no such bound, as it may push several objects at once.
+
+    Raises:
+        InvalidInputError: if the goal is not one for the objects.
+    """
+    goal, movables, robot = world.manipulation_goal, world.movables, world.robot
+    left = np.flatnonzero(~world.completed)
+    if len(left) == 0:
+        return 0.0
+    distances = goal_distances(world.static, goal)
+    lengths = np.zeros(len(left))
+    for i, k in enumerate(left):
+        way = distances.path_from(movables.poses[k, :2]).length / (1.0 + TOO_LONG)
+        if 0.0 < way < np.inf:
+            lengths[i] = way + inscribed_radius(movables.outline(int(k)))
+    away = np.hypot(*(movables.poses[left, :2] - world.robot_pose[:2]).T)
+    approach = max(0.0, float((away - movables.radii[left]).min()) - robot.circumscribed_radius)
+    return robot.mass * approach + float(movables.masses[left] @ lengths)

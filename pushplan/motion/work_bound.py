@@ -1,0 +1,156 @@
+"""What robot and objects together must be worth of work at least: a proof by branch and bound.
+
+A robot whose middle passes an object's middle nearer than both inscribed discs allow has moved it
+by what is missing. So each object costs a robot's path a *depth*, and the cheapest such path is
+found over intervals of the depths: an interval [lo, hi] costs mᵢ lo, and keeps the robot's middle
+out of the disc that is hi smaller. Shortest paths among discs are exact, so each box of intervals
+has a bound of its own (branch and bound: Land and Doig 1960).
+"""
+
+from __future__ import annotations
+
+import heapq
+import itertools
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from pushplan.geometry import VisibilityGraph
+from pushplan.motion.keep_out import keep_out
+from pushplan.motion.length_bound import SLIM, TOO_LONG, length_bound
+from pushplan.world import StaticMap, World
+from pushplan.world.checks import FloatArray
+from pushplan.world.outline import inscribed_radius
+
+
+@dataclass(frozen=True)
+class WorkBound:
+    """A proven lower bound, and how good it is.
+
+    Args:
+        work: that no way to the goal undercuts [kg m].
+        relaxed: what the cheapest path of the relaxed problem costs [kg m]: the bound cannot pass
+            it, however long it is refined.
+        nodes: shortest paths that it took.
+    """
+
+    work: float
+    relaxed: float
+    nodes: int
+
+
+@dataclass(frozen=True)
+class _Node:
+    """Intervals of depths (K,) [m], and the shortest path under them."""
+
+    low: FloatArray
+    high: FloatArray
+    bound: float  # [kg m]
+    depths: FloatArray  # (K,) of the path
+
+
+def work_bound(
+    world: World,
+    *,
+    tolerance: float = 2e-3,
+    most_nodes: int = 400,
+    stopped: Callable[[], bool] = lambda: False,
+) -> WorkBound:
+    """A lower bound on m₀ l₀ + Σ mᵢ lᵢ of a robot that gets to its goal [kg m].
+
+    It counts what objects must make way for the robot, and that it may drive around them; not that
+    they touch each other, and not that the robot turns. Overlaps that a simulator leaves are not
+    counted either.
+
+    Args:
+        world: the start.
+        tolerance: difference to the relaxed optimum that is good enough, as a fraction.
+        most_nodes: shortest paths at most; the bound holds whenever it ends.
+        stopped: ends it early.
+
+    Raises:
+        InvalidInputError: if the goal is not one for the robot.
+    """
+    search = _Relaxation(world)
+    least = length_bound(world, stopped)
+    root = search.root()
+    if root is None:
+        return WorkBound(least, least, 1)
+    order = itertools.count()
+    heap = [(root.bound, next(order), root)]
+    relaxed, nodes = search.cost(root), 1
+    while not stopped() and nodes < most_nodes:
+        bound, _, node = heap[0]
+        if bound >= (1.0 - tolerance) * relaxed:
+            break
+        heapq.heappop(heap)
+        for child in search.split(node):
+            nodes += 1
+            if child is not None:
+                relaxed = min(relaxed, search.cost(child))
+                heapq.heappush(heap, (max(bound, child.bound), next(order), child))
+    return WorkBound(max(least, heap[0][0]), max(least, relaxed), nodes)
+
+
+class _Relaxation:
+    """Paths of the inscribed disc of the robot, among objects that are discs."""
+
+    def __init__(self, world: World) -> None:
+        self.world, self.static, self.goal = world, keep_out(world), world.navigation_goal
+        self.mass, self.masses = world.robot.mass, world.movables.masses
+        self.clearance = (1.0 - SLIM) * world.robot.inscribed_radius
+        self.start = world.robot_pose[:2]
+        self.centers = world.movables.poses[:, :2]
+        count = len(world.movables)
+        inner = [inscribed_radius(world.movables.outline(k)) for k in range(count)]
+        self.inner = (1.0 - SLIM) * np.array(inner, dtype=np.float64).reshape(count)
+
+    def root(self) -> _Node | None:
+        """All depths are possible; None where there is no path at all."""
+        reach = self.clearance + self.inner
+        away = np.hypot(*(self.centers - self.start).T)
+        return self._node(np.maximum(0.0, reach - away), reach)
+
+    def cost(self, node: _Node) -> float:
+        """What the path of a node costs in the relaxed problem [kg m]."""
+        return node.bound + float(self.masses @ np.maximum(0.0, node.depths - node.low))
+
+    def split(self, node: _Node) -> list[_Node | None]:
+        """Halve the interval of the object that the path owes most."""
+        depths = np.minimum(node.depths, node.high)  # deeper than r_i no disc keeps the path out
+        owed = self.masses * (depths - node.low)
+        k = int(np.argmax(owed))
+        middle = 0.5 * (node.low[k] + depths[k])
+        less, more = node.high.copy(), node.low.copy()
+        less[k] = more[k] = middle
+        return [self._node(node.low, less), self._node(more, node.high)]
+
+    def _node(self, low: FloatArray, high: FloatArray) -> _Node | None:
+        solid = np.flatnonzero(self.inner > high)
+        discs = np.concatenate([self.centers[solid], self.centers[solid]], axis=1)
+        static = StaticMap(
+            self.static.polygons,
+            np.concatenate([self.static.segments, discs]),
+            np.concatenate([self.static.radii, (self.inner - high)[solid]]),
+            self.static.bounds,
+        )
+        path = VisibilityGraph(static, self.clearance).to_goal(self.start, self.goal)
+        if not np.isfinite(path.length):
+            return None
+        length = float(path.length) / (1.0 + TOO_LONG)
+        near = _distances(self.centers, path.points)
+        depths = np.maximum(0.0, self.clearance + self.inner - near)
+        return _Node(low, high, self.mass * length + float(self.masses @ low), depths)
+
+
+def _distances(points: FloatArray, line: FloatArray) -> FloatArray:
+    """(K,) distances of points (K, 2) from a polyline (N, 2)."""
+    if len(line) < 2:
+        return np.hypot(*(points - line[:1]).T)
+    a, along = line[:-1], np.diff(line, axis=0)
+    square = np.maximum((along**2).sum(axis=1), 1e-300)
+    offset = points[:, None] - a  # (K, N - 1, 2)
+    part = np.clip((offset * along).sum(axis=2) / square, 0.0, 1.0)
+    found: FloatArray = np.hypot(*(offset - part[..., None] * along).transpose(2, 0, 1))
+    return found.min(axis=1)

@@ -1,0 +1,96 @@
+"""How good a solution of a scenario can be, and how good the best known one is: shipped data."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cache
+from importlib import resources
+from pathlib import Path
+from types import MappingProxyType
+
+from pushplan.world import SchemaError
+from pushplan.world.checks import number
+from pushplan.world.files import write_atomic
+
+BOUNDS_FILE = "data/bounds.csv"
+"""Where the package keeps them."""
+_COLUMNS = ("scenario", "robot_mass_kg", "bound_kg_m", "best_kg_m", "best_policy")
+
+
+@dataclass(frozen=True)
+class KnownBounds:
+    """What is known of m₀ l₀ + Σ mᵢ lᵢ of a successful episode of one scenario.
+
+    Args:
+        robot_mass: m₀ [kg].
+        bound: that no episode undercuts, proven [kg m].
+        best: the least of any episode so far [kg m]; None where none succeeded.
+        best_policy: label of the policy that drove it; empty where there is none.
+    """
+
+    robot_mass: float
+    bound: float
+    best: float | None = None
+    best_policy: str = ""
+
+    def __post_init__(self) -> None:
+        number("robot_mass", self.robot_mass, low=0.0)
+        number("bound", self.bound, low=0.0)
+        if self.best is not None:
+            number("best", self.best, low=0.0)
+
+    def better(self, work: float, policy: str) -> KnownBounds:
+        """The same, with one more solution known."""
+        if self.best is not None and self.best <= work:
+            return self
+        return KnownBounds(self.robot_mass, self.bound, work, policy)
+
+
+@cache
+def known_bounds() -> Mapping[str, KnownBounds]:
+    """What ships with pushplan, by `Scenario.key`."""
+    source = resources.files("pushplan.scenarios") / BOUNDS_FILE
+    with resources.as_file(source) as path:
+        return MappingProxyType(load_bounds(path))
+
+
+def load_bounds(path: str | Path) -> dict[str, KnownBounds]:
+    """Read what `save_bounds` wrote.
+
+    Raises:
+        SchemaError: if there is no such file, or a line of it cannot be read.
+    """
+    try:
+        lines = Path(path).read_text(encoding="utf-8").splitlines()
+    except (OSError, UnicodeDecodeError) as error:
+        raise SchemaError(f"bounds {path}: cannot be read: {error}") from error
+    reader = csv.DictReader(lines)
+    if tuple(reader.fieldnames or ()) != _COLUMNS:
+        raise SchemaError(f"bounds {path}: the columns must be {', '.join(_COLUMNS)}")
+    found: dict[str, KnownBounds] = {}
+    for row in reader:
+        try:
+            found[row["scenario"]] = KnownBounds(
+                float(row["robot_mass_kg"]),
+                float(row["bound_kg_m"]),
+                float(row["best_kg_m"]) if row["best_kg_m"] else None,
+                row["best_policy"],
+            )
+        except (ValueError, TypeError) as error:
+            raise SchemaError(f"bounds {path}, line {reader.line_num}: {error}") from error
+    return found
+
+
+def save_bounds(path: str | Path, bounds: Mapping[str, KnownBounds]) -> None:
+    """Write them as CSV, by the names of the scenarios.
+
+    Raises:
+        OSError: if the file cannot be written.
+    """
+    lines = [",".join(_COLUMNS)]
+    for key, one in sorted(bounds.items()):
+        best = "" if one.best is None else f"{one.best:.6g}"
+        lines.append(f"{key},{one.robot_mass:.6g},{one.bound:.6g},{best},{one.best_policy}")
+    write_atomic(Path(path), ("\n".join(lines) + "\n").encode())

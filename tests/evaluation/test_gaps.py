@@ -1,0 +1,80 @@
+"""Gaps to bounds and best known solutions, and the file that keeps them."""
+
+import math
+
+import pytest
+
+from pushplan.evaluation import ResultRow
+from pushplan.evaluation.gaps import gaps, total_work
+from pushplan.scenarios import suite
+from pushplan.scenarios.known_bounds import KnownBounds, known_bounds, load_bounds, save_bounds
+from pushplan.world import InvalidInputError, SchemaError
+
+
+def test_gaps_are_means_over_successes():
+    known = {"maze-a-0": KnownBounds(2.0, 20.0, 25.0, "x"), "maze-a-1": KnownBounds(2.0, 40.0)}
+    rows = [
+        row("maze-a-0", 0, length=10.0, work=10.0),
+        row("maze-a-1", 1, length=20.0, work=20.0),
+        row("maze-a-1", 1, length=1.0, work=0.0, success=False),
+        row("maze-a-2", 2, length=1.0, work=0.0),
+    ]
+    (gap,) = gaps(rows, ["p"], known)
+    assert (gap.policy, gap.count, gap.with_best) == ("p", 2, 1)
+    assert gap.to_bound == pytest.approx(0.5)
+    assert gap.to_best == pytest.approx(30.0 / 25.0 - 1.0)
+    assert total_work(rows[2], known["maze-a-1"]) is None
+    (alone,) = gaps(rows[1:2], ["p"], known)
+    assert math.isnan(alone.to_best)
+
+
+def row(scenario, seed, *, length, work, success=True):
+    metrics = {"path_length_m": length, "interaction_work_kg_m": work}
+    names = {"policy": "p", "task": "maze", "simulator": "pymunk", "scenario": scenario}
+    return ResultRow(
+        **names, seed=seed, status="done", reason="goal", success=success, metrics=metrics
+    )
+
+
+def test_a_better_solution_takes_the_place():
+    one = KnownBounds(1.0, 2.0)
+    two = one.better(5.0, "a").better(6.0, "b").better(4.0, "c")
+    assert (two.best, two.best_policy) == (4.0, "c")
+
+
+def test_files_keep_them(tmp_path):
+    bounds = {"b-1": KnownBounds(1.5, 2.25, 3.5, "p"), "a-0": KnownBounds(1.0, 2.0)}
+    save_bounds(tmp_path / "b.csv", bounds)
+    assert load_bounds(tmp_path / "b.csv") == bounds
+    assert (tmp_path / "b.csv").read_text().splitlines()[1].startswith("a-0,")
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("a,b\n1,2\n", "columns must be"),
+        ("HEAD\nx,1,nan,,\n", "line 2"),
+        ("HEAD\nx,1,-2,,\n", "line 2"),
+        ("HEAD\nx,one,2,,\n", "line 2"),
+        ("HEAD\nx\n", "line 2"),
+    ],
+)
+def test_damaged_files_say_where(tmp_path, text, words):
+    head = "scenario,robot_mass_kg,bound_kg_m,best_kg_m,best_policy"
+    (tmp_path / "b.csv").write_text(text.replace("HEAD", head))
+    with pytest.raises(SchemaError, match=words):
+        load_bounds(tmp_path / "b.csv")
+
+
+def test_a_missing_file_is_named(tmp_path):
+    with pytest.raises(SchemaError, match="cannot be read"):
+        load_bounds(tmp_path / "none.csv")
+    with pytest.raises(InvalidInputError):
+        KnownBounds(1.0, float("nan"))
+
+
+def test_what_ships_belongs_to_scenarios_and_no_solution_undercuts_its_bound():
+    shipped = known_bounds()
+    assert suite("maze-2d-10").scenarios[0].key in shipped
+    for key, one in shipped.items():
+        assert one.best is None or one.best >= one.bound, key
