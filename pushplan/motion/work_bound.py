@@ -147,10 +147,11 @@ class _Relaxation:
 def _distances(points: FloatArray, line: FloatArray) -> FloatArray:
     """(K,) distances of points (K, 2) from a polyline (N, 2)."""
     if len(line) < 2:
-        return np.hypot(*(points - line[:1]).T)
+        line = np.concatenate([line[:1], line[:1]])
     a, along = line[:-1], np.diff(line, axis=0)
     square = np.maximum((along**2).sum(axis=1), 1e-300)
     offset = points[:, None] - a  # (K, N - 1, 2)
     part = np.clip((offset * along).sum(axis=2) / square, 0.0, 1.0)
-    found: FloatArray = np.hypot(*(offset - part[..., None] * along).transpose(2, 0, 1))
-    return found.min(axis=1)
+    missed = offset - part[..., None] * along
+    found: FloatArray = np.hypot(missed[..., 0], missed[..., 1]).min(axis=1)
+    return found
