@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import argparse
+import json
+import math
 import os
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -140,30 +142,17 @@ def positive(text: str) -> float:
     return value
 
 
-def check_folder(path: str | None) -> None:
-    """Refuse a file in a folder that is not there: better now than after a long run.
-
-    Raises:
-        InvalidInputError: if its folder does not exist.
-    """
-    from pathlib import Path
-
-    from pushplan.world import InvalidInputError
-
-    if path is not None and not Path(path).absolute().parent.is_dir():
-        raise InvalidInputError(f"there is no folder {Path(path).parent} for {path!r}")
-
-
 def check_episode_file(path: str | None) -> None:
     """Refuse a file for an episode that cannot be written.
 
     Raises:
-        InvalidInputError: if its folder does not exist.
+        InvalidInputError: as `check_file`.
         MissingDependencyError: if it is to be MCAP and a library for that is missing.
     """
+    from pushplan.cli.outputs import check_file
     from pushplan.world.libraries import need
 
-    check_folder(path)
+    check_file(path)
     if path is not None and is_mcap(path):
         need("mcap")
         need("rosbags")
@@ -194,9 +183,22 @@ def is_mcap(path: str) -> bool:
     return path.lower().endswith(".mcap")
 
 
-def say(text: str) -> None:
+def say(text: str, end: str = "\n") -> None:
     """Write a line to standard output."""
-    sys.stdout.write(text + "\n")
+    sys.stdout.write(text + end)
+
+
+def say_json(value: Any) -> None:
+    """Write a value to standard output as JSON; what is not finite becomes null."""
+    say(json.dumps(_finite(value), indent=1))
+
+
+def _finite(value: Any) -> Any:
+    if isinstance(value, Mapping):
+        return {key: _finite(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_finite(item) for item in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def say_scores(episode: Episode, names: Sequence[str] | None = None, who: str = "") -> None:

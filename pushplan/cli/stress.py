@@ -6,8 +6,9 @@ import argparse
 import os
 from typing import Any
 
-from pushplan.cli.bench import progress_of
 from pushplan.cli.common import add_command, add_trust, positive, say, whole
+from pushplan.cli.outputs import check_directory
+from pushplan.cli.progress import progress_of
 
 _EXAMPLES = """\
   pushplan stress push-aware maze-3d-3
@@ -73,6 +74,7 @@ def run(options: argparse.Namespace) -> int:
     from pushplan.evaluation import stress
     from pushplan.evaluation.table_formats import markdown, text
 
+    check_directory(options.out)
     with progress_of(options.policy) as progress:
         sheet = stress(
             options.policy,
