@@ -48,6 +48,7 @@ intersphinx_mapping = inventories.reachable(
     }
 )
 
+pygments_dark_style = "github-dark"
 html_theme = "furo"
 html_title = f"pushplan {version}"
 html_static_path = ["site/static"]

@@ -6,13 +6,15 @@ import argparse
 import inspect
 import re
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import parameters
 import public_names
-from docutils.nodes import Element
 
 from pushplan.cli import build_parser
+
+if TYPE_CHECKING:
+    from docutils.nodes import Element
 
 _ANCHOR = re.compile(r'^<a id="(\w+)"></a>$', re.MULTILINE)
 _LINK_UP = re.compile(r"\[([^\]]*)\]\((\.\./[^)#]+)(?:#[^)]*)?\)")
@@ -65,6 +67,12 @@ def api_page(package: str) -> str:
 def parameter_page() -> str:
     """One table of every parameter of every planner."""
     lines = [
+        "---",
+        "hide-toc: true",
+        "---",
+        "",
+        "<style>.content { width: auto; max-width: 72em; flex: 1; padding: 0 2em; }</style>",
+        "",
         "# Parameters",
         "",
         "Every parameter of every planner, policy and controller, from the dataclasses that hold "
@@ -73,7 +81,7 @@ def parameter_page() -> str:
         "of the range are refused. Where no unit is given, a number has none, or the class says "
         "in what all its lengths are.",
         "",
-        "| class | used by | what it is |",
+        "| class | what it is | used by |",
         "|---|---|---|",
     ]
     kinds = parameters.classes()
@@ -81,18 +89,18 @@ def parameter_page() -> str:
         about = inspect.cleandoc(kind.__doc__ or "").partition("\n\n")[0]
         users = ", ".join(f"`{name}`" for name in parameters.users(kind))
         link = f'<a href="#{_anchor(kind)}">{kind.__name__}</a>'
-        lines.append(f"| {link} | {users} | {_cell(about)} |")
+        lines.append(f"| {link} | {_cell(about)} | {users} |")
     lines += ["", "## Names that change defaults", "", "| name | values |", "|---|---|"]
     for name, given in parameters.changes().items():
         values = ", ".join(f"`{key}={value}`" for key, value in given.items())
         lines.append(f"| `{name}` | {values} |")
-    lines += ["", "## All of them", "", "| class | parameter | unit | default | valid | what |"]
+    lines += ["", "## All of them", "", "| class | parameter | default | unit | what | valid |"]
     lines.append("|---|---|---|---|---|---|")
     for kind in kinds:
         for index, one in enumerate(parameters.parameters(kind)):
             owner = f"`{kind.__name__}`"
             target = "" if index else f'<span id="{_anchor(kind)}"></span>'
-            cells = (one.unit, f"`{_cell(one.default)}`", one.valid, one.text)
+            cells = (f"`{_cell(one.default)}`", one.unit, one.text, one.valid)
             lines.append(
                 f"| {target}{owner} | `{one.name}` | " + " | ".join(map(_cell, cells)) + " |"
             )

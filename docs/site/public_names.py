@@ -10,8 +10,6 @@ from functools import cache
 from types import ModuleType
 from typing import Any
 
-from sphinx.pycode import ModuleAnalyzer
-
 import pushplan
 
 FIRST = ("world", "planners", "envs", "evaluation", "metrics", "scenarios")
@@ -59,6 +57,8 @@ def directive_of(value: Any) -> str:
 
 def comment_on(package: str, name: str) -> str:
     """The text below a constant or a type alias in the module that it stands in."""
+    from sphinx.pycode import ModuleAnalyzer
+
     root = importlib.import_module(f"pushplan.{package}")
     for module in (root.__name__, *_modules(root)):
         said = ModuleAnalyzer.for_module(module).find_attr_docs().get(("", name))

@@ -14,6 +14,7 @@ from pushplan.cli.common import (
     add_run_options,
     add_trust,
     batch_options,
+    complete,
     positive,
     whole,
 )
@@ -39,14 +40,18 @@ A run that was interrupted or killed continues when the same command is given ag
 def add(commands: Any) -> None:
     """Add the command."""
     parser = add_command(commands, "bench", "compare policies on a suite", _EXAMPLES, run)
-    parser.add_argument("suite", metavar="SUITE,...", help="see 'pushplan list suites'; or 'paper'")
-    parser.add_argument(
+    suite = parser.add_argument(
+        "suite", metavar="SUITE,...", help="see 'pushplan list suites'; or 'paper'"
+    )
+    complete(suite, "suites")
+    policies = parser.add_argument(
         "--policies",
         metavar="A,B",
         help="names ('pushplan list policies'), 'onnx:FILE', 'sb3:FILE', 'file.py:Class' or "
         "'module:Class' of a policy or a planner, each with 'label=' in front if wanted "
         "(paper: all that come with pushplan by default)",
     )
+    complete(policies, "policies")
     parser.add_argument(
         "--episodes", type=whole(1), metavar="N", help="default: the suite's own; paper: 100 each"
     )

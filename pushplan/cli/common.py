@@ -29,6 +29,17 @@ def add_command(
     return parser
 
 
+def complete(action: argparse.Action, kind: str) -> None:
+    """Let the shell complete an argument with the names of a kind of `pushplan list`."""
+
+    def names(**_: Any) -> list[str]:
+        from pushplan.cli.listing import names_of
+
+        return names_of(kind)
+
+    action.completer = names  # type: ignore[attr-defined]
+
+
 def batch_options(options: argparse.Namespace) -> dict[str, Any]:
     """What ``bench`` and ``bench paper`` hand to the batch runner under the same names."""
     return {
@@ -46,7 +57,7 @@ def add_run_options(parser: argparse.ArgumentParser) -> None:
         type=whole(0),
         default=os.cpu_count() or 1,
         metavar="W",
-        help="processes (default: all %(default)s cores; 0: this process)",
+        help="processes (default: one a core; 0: this process)",
     )
     parser.add_argument(
         "--retry-failed", action="store_true", help="run jobs again that raised, hung or crashed"

@@ -7,7 +7,7 @@ import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from pushplan.cli.common import add_command, milliseconds, positive, say, say_json, whole
+from pushplan.cli.common import add_command, complete, milliseconds, positive, say, say_json, whole
 from pushplan.cli.outputs import check_file, check_picture
 
 if TYPE_CHECKING:
@@ -27,7 +27,10 @@ def add(commands: Any) -> None:
         commands, "plan", "plan in a world from a file, without a simulator", _EXAMPLES, run
     )
     parser.add_argument("world", metavar="WORLD.yaml", help="world file (.yaml, .yml or .json)")
-    parser.add_argument("--planner", required=True, metavar="NAME", help="see 'pushplan list'")
+    planner = parser.add_argument(
+        "--planner", required=True, metavar="NAME", help="see 'pushplan list planners'"
+    )
+    complete(planner, "planners")
     budget = parser.add_mutually_exclusive_group()
     budget.add_argument("--deadline", type=positive, metavar="S", help="wall-clock limit [s]")
     budget.add_argument(

@@ -56,7 +56,7 @@ def add(commands: Any) -> None:
         type=whole(0),
         default=os.cpu_count() or 1,
         metavar="W",
-        help="processes (default: all %(default)s cores; 0: this process)",
+        help="processes (default: one a core; 0: this process)",
     )
     parser.add_argument("--out", metavar="DIR", help="run directory, to be continued and kept")
     parser.add_argument(
