@@ -87,11 +87,12 @@ def test_the_start_page_runs(monkeypatch: pytest.MonkeyPatch) -> None:
         assert main(command.split()[1:]) == 0
 
 
-def test_a_site_that_cannot_be_reached_is_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_site_that_cannot_be_reached_is_left_out(tmp_path: Path) -> None:
     spec = importlib.util.spec_from_file_location("inventories", DOCS / "site" / "inventories.py")
     assert spec is not None and spec.loader is not None
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     assert module.reachable({"nobody": "http://127.0.0.1:9/", "other": "file:///none/"}) == {}
-    there = DOCS.as_uri() + "/"
-    assert module.reachable({"no-inventory": there}) == {}
+    there = f"{tmp_path.as_uri()}/"
+    (tmp_path / "objects.inv").write_bytes(b"# Sphinx inventory version 2\n")
+    assert module.reachable({"one": there, "other": "file:///none/"}) == {"one": (there, None)}

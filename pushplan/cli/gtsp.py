@@ -6,6 +6,7 @@ import argparse
 from typing import Any
 
 from pushplan.cli.common import add_command, milliseconds, positive, say, whole
+from pushplan.cli.kernel_progress import kernel_progress
 from pushplan.cli.outputs import check_file
 
 _EXAMPLES = """\
@@ -50,7 +51,8 @@ def run(options: argparse.Namespace) -> int:
 
     check_file(options.out)
     instance = read_gtsp(options.file)
-    warm_up_solver()
+    with kernel_progress():
+        warm_up_solver()
     stop = MaxIterations(options.iterations) if options.iterations else Deadline(options.seconds)
     tour = solve_gtsp(
         instance.costs,

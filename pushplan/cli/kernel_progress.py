@@ -39,7 +39,8 @@ class KernelProgress:
                 sys.stderr.write(f"\r\033[K{self}")
                 sys.stderr.flush()
             elif self.compiled == 1:
-                sys.stderr.write(f"{self}; later runs find them in the cache\n")
+                words, _, _ = str(self).partition(":")
+                sys.stderr.write(f"{words}; later runs find them in the cache\n")
         self.ready.add(kernel)
 
     def clear(self) -> None:
@@ -50,15 +51,10 @@ class KernelProgress:
 
     def __str__(self) -> str:
         """Say how far it is, without a total that is not known."""
-        if self.expected >= self.ready:
-            return f"{in_words(len(self.expected - self.ready))}: {self._count} of at most " + str(
-                len(self.expected)
-            )
-        return f"compiling kernels, once: {self._count}"
-
-    @property
-    def _count(self) -> int:
-        return len(self.ready)
+        if self.expected and self.expected >= self.ready:
+            words = in_words(len(self.expected - self.ready))
+            return f"{words}: {len(self.ready)} of at most {len(self.expected)}"
+        return f"compiling kernels, once: {len(self.ready)}"
 
 
 class PendingKernels:

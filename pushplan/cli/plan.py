@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from pushplan.cli.common import add_command, complete, milliseconds, positive, say, say_json, whole
+from pushplan.cli.kernel_progress import kernel_progress
 from pushplan.cli.outputs import check_file, check_picture
 
 if TYPE_CHECKING:
@@ -51,7 +52,8 @@ def run(options: argparse.Namespace) -> int:
     check_picture(options.render)
     world = load_world(options.world)
     planner = make_planner(options.planner)
-    warm_up(options.planner)  # a deadline is for planning, not for loading kernels
+    with kernel_progress(options.planner):
+        warm_up(options.planner)  # a deadline is for planning, not for loading kernels
     result = planner.plan(world, stop=_stop(options), rng=stream(options.seed, "policy"))
     data = _as_dict(options, result)
     if options.json:

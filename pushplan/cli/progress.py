@@ -64,7 +64,6 @@ def _bar(running: ExitStack, policies: tuple[str, ...]) -> Progress:
                 yield from super().get_renderables()
 
     bar = Bar(*columns, console=Console(stderr=True), transient=True, refresh_per_second=4)
-    task = bar.add_task("", total=None)
     failed = 0
 
     def update(done: int, total: int, row: ResultRow | None) -> None:
@@ -73,11 +72,12 @@ def _bar(running: ExitStack, policies: tuple[str, ...]) -> Progress:
             pending.finish()
         elif done < total:
             pending = PendingKernels(*policies)
-        if not bar.live.is_started:
-            running.enter_context(bar)
         failed += row is not None and row.failed
         text = f"[red]{failed} failed" if failed else ""
+        task = bar.task_ids[0] if bar.task_ids else bar.add_task("", total=total)
         bar.update(task, completed=done, total=total, description=text)
+        if not bar.live.is_started:
+            running.enter_context(bar)
 
     return update
 
