@@ -35,6 +35,14 @@ myst_heading_anchors = 4
 default_role = "py:obj"
 autodoc_member_order = "bysource"
 autodoc_typehints = "signature"
+autodoc_type_aliases = {  # by these names, not by what they stand for
+    name: name
+    for name in (
+        *("FloatArray", "IntArray", "BoolArray", "ArrayLike", "Image"),
+        *("PositiveFloat", "NonNegativeFloat", "Fraction", "PositiveFraction"),
+        *("PositiveInt", "NonNegativeInt"),
+    )
+}
 autodoc_default_options = {"members": True, "show-inheritance": True}
 napoleon_google_docstring = True
 napoleon_numpy_docstring = False

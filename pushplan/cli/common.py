@@ -194,6 +194,11 @@ def is_mcap(path: str) -> bool:
     return path.lower().endswith(".mcap")
 
 
+def has_screen() -> bool:
+    """Whether windows can be shown: on Linux a display server says so in the environment."""
+    return sys.platform != "linux" or bool({"DISPLAY", "WAYLAND_DISPLAY"} & os.environ.keys())
+
+
 def say(text: str, end: str = "\n") -> None:
     """Write a line to standard output."""
     sys.stdout.write(text + end)

@@ -5,10 +5,9 @@ from __future__ import annotations
 import argparse
 import os
 import sys
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from pushplan.cli.common import add_command, say
+from pushplan.cli.common import add_command, has_screen, say
 from pushplan.cli.outputs import check_directory
 from pushplan.cli.progress import progress_of
 
@@ -43,6 +42,8 @@ def add(commands: Any) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Run the episodes, say how they ended, write the page and open it."""
+    import webbrowser
+
     from pushplan.cli.report import exit_code
     from pushplan.evaluation import Results, run_batch
     from pushplan.world.libraries import need
@@ -61,8 +62,8 @@ def run(options: argparse.Namespace) -> int:
         say(f"  {row.policy} in {row.task}: {how}, work {row.interaction_work_kg_m:.3g} kg m")
     page = results.report()
     say(f"page: {page}")
-    if not options.no_open and sys.stdout.isatty():
-        _open(page)
+    if not options.no_open and sys.stdout.isatty() and has_screen():  # no browser in the terminal
+        webbrowser.open(page.absolute().as_uri())
     return exit_code(results)
 
 
@@ -75,12 +76,3 @@ def _jobs() -> list[Job]:
         for name, policy in EPISODES.items()
         for scenario in suite(name, episodes=1).scenarios
     ]
-
-
-def _open(page: Path) -> None:
-    """Open a page where there is a screen: a browser in the terminal would be in the way."""
-    import webbrowser
-
-    if sys.platform == "linux" and not ({"DISPLAY", "WAYLAND_DISPLAY"} & os.environ.keys()):
-        return
-    webbrowser.open(page.absolute().as_uri())

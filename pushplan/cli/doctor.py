@@ -6,12 +6,11 @@ import argparse
 import ctypes.util
 import os
 import platform
-import sys
 from importlib.metadata import PackageNotFoundError, packages_distributions, version
 from importlib.util import find_spec
 from typing import Any
 
-from pushplan.cli.common import add_command, say, say_json
+from pushplan.cli.common import add_command, has_screen, say, say_json
 
 _EXAMPLES = """\
   pushplan doctor
@@ -68,8 +67,7 @@ def examine() -> dict[str, Any]:
         "kernels": _kernels() if libraries["numba"] is not None else None,
         "drawing": {
             **{name: ctypes.util.find_library(lib) is not None for name, lib in _DISPLAYS.items()},
-            "screen": sys.platform != "linux"
-            or bool({"DISPLAY", "WAYLAND_DISPLAY"} & os.environ.keys()),
+            "screen": has_screen(),
             "MUJOCO_GL": os.environ.get("MUJOCO_GL"),
         },
     }
@@ -80,8 +78,8 @@ def _version(module: str, owners: Any) -> str | None:
     if find_spec(module) is None:
         return None
     try:
-        return version(owners[module][0])
-    except (KeyError, PackageNotFoundError):
+        return version(owners.get(module, [module])[0])
+    except PackageNotFoundError:
         return "unknown"
 
 
