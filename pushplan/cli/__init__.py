@@ -6,6 +6,7 @@ import argparse
 import os
 import sys
 from collections.abc import Sequence
+from typing import Any
 
 from pushplan import __version__
 from pushplan.cli import (
@@ -14,6 +15,8 @@ from pushplan.cli import (
     codegen,
     compare,
     compiling,
+    demo,
+    doctor,
     experiment,
     gtsp,
     ice,
@@ -30,6 +33,8 @@ from pushplan.cli import (
 )
 
 COMMANDS = (
+    demo,
+    doctor,
     run,
     teleop,
     plan,
@@ -54,12 +59,19 @@ _USER_OS_ERRORS = (FileNotFoundError, FileExistsError, PermissionError, IsADirec
 _DESCRIPTION = "Plan, push, score and compare: baselines for robots that push things."
 _EXAMPLES = """\
 examples:
+  pushplan demo
   pushplan bench maze-2d-5 --policies straight,kinodynamic-rrt --episodes 20 --out runs/first
   pushplan run maze-2d-5 --policy kinodynamic-rrt --seed 3 --render episode.gif
   pushplan plan room.yaml --planner kinodynamic-rrt --deadline 1.0 --render plan.png
   pushplan list policies
 
 'pushplan COMMAND --help' explains a command.
+
+exit codes:
+  0    done
+  1    something that was run failed, or a gate says no: a job, a plan, an episode, 'compare'
+  2    the command cannot be carried out as it was given: an option, a name, a file, an extra
+  130  interrupted by Ctrl-C
 """
 
 
@@ -70,9 +82,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         arguments: what follows the program's name; from the command line if None.
 
     Returns:
-        0 on success, 1 for a failure, 2 for what the user can put right, 130 after Ctrl-C.
+        0, 1, 2 or 130: the exit codes that ``pushplan --help`` lists.
     """
-    parser = _parser()
+    parser = build_parser()
     if "_ARGCOMPLETE" in os.environ:  # the shell asks how a line may go on
         from pushplan.world.libraries import need
 
@@ -106,15 +118,30 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return _fail(str(error), 2 if isinstance(error, users) else 1)
 
 
-def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
+class _Parser(argparse.ArgumentParser):
+    """Names the nearest choices, as every other message of an unknown name does."""
+
+    def _check_value(self, action: argparse.Action, value: Any) -> None:
+        if action.choices is not None and value not in action.choices:
+            from pushplan.world.errors import unknown_name_message
+
+            kind = "command" if action.metavar == "COMMAND" else "choice"
+            text = unknown_name_message(kind, value, map(str, action.choices))
+            raise argparse.ArgumentError(None if kind == "command" else action, text)
+
+
+def build_parser() -> argparse.ArgumentParser:
+    """The parser of the whole command line."""
+    parser = _Parser(
         prog="pushplan",
         description=_DESCRIPTION,
         epilog=_EXAMPLES,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("--version", action="version", version=f"pushplan {__version__}")
-    commands = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
+    commands = parser.add_subparsers(
+        title="commands", metavar="COMMAND", required=True, parser_class=_Parser
+    )
     for command in COMMANDS:
         command.add(commands)
     return parser

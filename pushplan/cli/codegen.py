@@ -7,6 +7,7 @@ from dataclasses import fields, replace
 from typing import TYPE_CHECKING, Any
 
 from pushplan.cli.common import add_command, say
+from pushplan.cli.outputs import check_directory
 
 if TYPE_CHECKING:
     from pushplan.world import World
@@ -48,6 +49,7 @@ def run(options: argparse.Namespace) -> int:
     from pushplan.planners.pushing import PushingConfig
     from pushplan.world import UnknownNameError, load_world, turtlebot3_burger
 
+    check_directory(options.out)
     if options.controller not in CONTROLLERS:
         raise UnknownNameError("controller", options.controller, CONTROLLERS)
     world = load_world(options.world) if options.world else None

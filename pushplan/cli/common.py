@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import argparse
+import json
+import math
 import os
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -27,6 +29,17 @@ def add_command(
     return parser
 
 
+def complete(action: argparse.Action, kind: str) -> None:
+    """Let the shell complete an argument with the names of a kind of `pushplan list`."""
+
+    def names(**_: Any) -> list[str]:
+        from pushplan.cli.listing import names_of
+
+        return names_of(kind)
+
+    action.completer = names  # type: ignore[attr-defined]
+
+
 def batch_options(options: argparse.Namespace) -> dict[str, Any]:
     """What ``bench`` and ``bench paper`` hand to the batch runner under the same names."""
     return {
@@ -44,7 +57,7 @@ def add_run_options(parser: argparse.ArgumentParser) -> None:
         type=whole(0),
         default=os.cpu_count() or 1,
         metavar="W",
-        help="processes (default: all %(default)s cores; 0: this process)",
+        help="processes (default: one a core; 0: this process)",
     )
     parser.add_argument(
         "--retry-failed", action="store_true", help="run jobs again that raised, hung or crashed"
@@ -140,30 +153,17 @@ def positive(text: str) -> float:
     return value
 
 
-def check_folder(path: str | None) -> None:
-    """Refuse a file in a folder that is not there: better now than after a long run.
-
-    Raises:
-        InvalidInputError: if its folder does not exist.
-    """
-    from pathlib import Path
-
-    from pushplan.world import InvalidInputError
-
-    if path is not None and not Path(path).absolute().parent.is_dir():
-        raise InvalidInputError(f"there is no folder {Path(path).parent} for {path!r}")
-
-
 def check_episode_file(path: str | None) -> None:
     """Refuse a file for an episode that cannot be written.
 
     Raises:
-        InvalidInputError: if its folder does not exist.
+        InvalidInputError: as `check_file`.
         MissingDependencyError: if it is to be MCAP and a library for that is missing.
     """
+    from pushplan.cli.outputs import check_file
     from pushplan.world.libraries import need
 
-    check_folder(path)
+    check_file(path)
     if path is not None and is_mcap(path):
         need("mcap")
         need("rosbags")
@@ -194,9 +194,27 @@ def is_mcap(path: str) -> bool:
     return path.lower().endswith(".mcap")
 
 
-def say(text: str) -> None:
+def has_screen() -> bool:
+    """Whether windows can be shown: on Linux a display server says so in the environment."""
+    return sys.platform != "linux" or bool({"DISPLAY", "WAYLAND_DISPLAY"} & os.environ.keys())
+
+
+def say(text: str, end: str = "\n") -> None:
     """Write a line to standard output."""
-    sys.stdout.write(text + "\n")
+    sys.stdout.write(text + end)
+
+
+def say_json(value: Any) -> None:
+    """Write a value to standard output as JSON; what is not finite becomes null."""
+    say(json.dumps(_finite(value), indent=1))
+
+
+def _finite(value: Any) -> Any:
+    if isinstance(value, Mapping):
+        return {key: _finite(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_finite(item) for item in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def say_scores(episode: Episode, names: Sequence[str] | None = None, who: str = "") -> None:

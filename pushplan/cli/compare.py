@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import argparse
-import json
-import math
 from dataclasses import asdict
 from typing import Any
 
-from pushplan.cli.common import add_command, say
+from pushplan.cli.common import add_command, say, say_json
 
 _EXAMPLES = """\
   pushplan compare runs/main runs/branch
@@ -39,8 +37,7 @@ def run(options: argparse.Namespace) -> int:
 
     verdicts = compare_runs(options.old, options.new, options.fail_on or _DEFAULT)
     if options.json:
-        lines = [{**asdict(one), "rule": str(one.rule)} for one in verdicts]
-        say(json.dumps(_finite(lines), indent=1))
+        say_json([{**asdict(one), "rule": str(one.rule)} for one in verdicts])
     else:
         for setting in dict.fromkeys(one.setting for one in verdicts):
             say(setting)
@@ -49,12 +46,3 @@ def run(options: argparse.Namespace) -> int:
         return 0
     bad = [v for v in verdicts if v.failed or (options.strict and v.verdict == "unclear")]
     return 1 if bad else 0
-
-
-def _finite(value: Any) -> Any:
-    """JSON has neither NaN nor infinity."""
-    if isinstance(value, dict):
-        return {key: _finite(item) for key, item in value.items()}
-    if isinstance(value, list):
-        return [_finite(item) for item in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value

@@ -8,8 +8,9 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from pushplan.cli.bench import progress_of
 from pushplan.cli.common import add_command, add_run_options, add_trust, run_options, say
+from pushplan.cli.outputs import check_directory
+from pushplan.cli.progress import progress_of
 
 _EXAMPLES = """\
   pushplan experiment study.yaml
@@ -33,7 +34,7 @@ def add(commands: Any) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Check the file, run its jobs, print the tables, write plots and page."""
-    from pushplan.cli.report import show
+    from pushplan.cli.report import exit_code, show
     from pushplan.evaluation import Experiment
 
     experiment = Experiment.load(options.file)
@@ -48,11 +49,12 @@ def run(options: argparse.Namespace) -> int:
         say(f"{len(jobs)} jobs")
         return 0
     out = options.out or os.path.join("runs", Path(options.file).stem)
-    with progress_of("") as progress:
+    check_directory(out)
+    with progress_of(*(one.label for one in experiment.policies)) as progress:
         try:
             results = experiment.run(out, progress=progress, **run_options(options))
         except KeyboardInterrupt:
             sys.stderr.write(f"stopped; the same command continues the run in {out}\n")
             raise
     show(results)
-    return 0
+    return exit_code(results)

@@ -8,11 +8,11 @@ from pathlib import Path
 
 import numpy as np
 
-from pushplan.cli.common import check_folder
+from pushplan.cli.outputs import check_picture
 from pushplan.cli.scoreboard import Scoreboard, closing_lines
 from pushplan.drawing import draw_world, save_animation, save_image
 from pushplan.drawing.files import Frame
-from pushplan.world import Episode, InvalidInputError, Plan, Policy, ShowsPlan, World
+from pushplan.world import Episode, Plan, Policy, ShowsPlan, World
 
 ENDINGS = (".png", ".gif", ".mp4")
 FRAMES = 240
@@ -24,14 +24,12 @@ class Camera:
     """Watches an episode and draws it when it is over.
 
     Raises:
-        InvalidInputError: if the ending is unknown or the folder is missing.
+        InvalidInputError: if the file cannot be written, or the ending is unknown.
     """
 
     def __init__(self, path: str) -> None:
         self.path = Path(path)
-        if self.path.suffix.lower() not in ENDINGS:
-            raise InvalidInputError(f"a picture ends in {', '.join(ENDINGS)}, got {path!r}")
-        check_folder(path)
+        check_picture(path, ENDINGS)
         self._steps: list[tuple[World, Plan | None]] = []
 
     def __call__(self, step: int, world: World, policy: Policy) -> None:

@@ -5,7 +5,9 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
-from pushplan.cli.common import add_command, check_folder, milliseconds, positive, say, whole
+from pushplan.cli.common import add_command, milliseconds, positive, say, whole
+from pushplan.cli.kernel_progress import kernel_progress
+from pushplan.cli.outputs import check_file
 
 _EXAMPLES = """\
   pushplan gtsp boxes.gtsp --seconds 1
@@ -47,9 +49,10 @@ def run(options: argparse.Namespace) -> int:
     from pushplan.gtsp import GtspConfig, read_gtsp, solve_gtsp, warm_up_solver, write_tour
     from pushplan.world import Deadline, MaxIterations, stream
 
-    check_folder(options.out)
+    check_file(options.out)
     instance = read_gtsp(options.file)
-    warm_up_solver()
+    with kernel_progress():
+        warm_up_solver()
     stop = MaxIterations(options.iterations) if options.iterations else Deadline(options.seconds)
     tour = solve_gtsp(
         instance.costs,

@@ -6,7 +6,8 @@ import argparse
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
-from pushplan.cli.common import add_command, check_folder, positive, say, whole
+from pushplan.cli.common import add_command, positive, say, whole
+from pushplan.cli.outputs import check_file, check_picture
 
 if TYPE_CHECKING:
     from pushplan.scenarios import IceField
@@ -64,8 +65,8 @@ def add(commands: Any) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Make or read a field, say what it is like, write files."""
-    check_folder(options.out)
-    check_folder(options.picture)
+    check_file(options.out, (".json", ".npz"))
+    check_picture(options.picture)
     field = _field(options)
     say(f"{len(field)} floes, concentration {100.0 * field.concentration:.2f} %")
     if len(field):

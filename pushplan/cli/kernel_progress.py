@@ -1,18 +1,27 @@
-"""A line that counts the kernels while they are compiled."""
+"""A line that says how far the kernels are while they are compiled."""
 
 from __future__ import annotations
 
 import json
 import sys
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from importlib.resources import files
+from typing import Any
+
+from pushplan.cli.common import duration
+
+SECONDS_A_KERNEL = 1.2
+"""What one takes to compile [s of CPU]: the mean of the table in docs/compilation.md."""
+
+_LINGER_S = 3.0  # between two kernels a process imports and loads
 
 
 @dataclass
 class KernelProgress:
-    """What has become ready so far."""
+    """What has become ready so far in this process."""
 
     # names of the kernels that are to come; empty if that is not known
     expected: frozenset[str] = frozenset()
@@ -23,16 +32,16 @@ class KernelProgress:
 
     def __call__(self, kernel: str, loaded: bool) -> None:
         """Count a kernel, and say so if it was compiled."""
-        self.ready.add(kernel)
         self.loaded += loaded
         self.compiled += not loaded
-        if loaded:
-            return
-        if self.terminal:
-            sys.stderr.write(f"\r\033[K{self}")
-            sys.stderr.flush()
-        elif self.compiled == 1:
-            sys.stderr.write("compiling kernels; later runs find them in the cache\n")
+        if not loaded:
+            if self.terminal:
+                sys.stderr.write(f"\r\033[K{self}")
+                sys.stderr.flush()
+            elif self.compiled == 1:
+                words, _, _ = str(self).partition(":")
+                sys.stderr.write(f"{words}; later runs find them in the cache\n")
+        self.ready.add(kernel)
 
     def clear(self) -> None:
         """Empty the line for something else."""
@@ -42,9 +51,45 @@ class KernelProgress:
 
     def __str__(self) -> str:
         """Say how far it is, without a total that is not known."""
-        if self.expected >= self.ready:
-            return f"compiling kernels: {len(self.ready)} of {len(self.expected)}"
-        return f"compiling kernels: {len(self.ready)}"
+        if self.expected and self.expected >= self.ready:
+            words = in_words(len(self.expected - self.ready))
+            return f"{words}: {len(self.ready)} of at most {len(self.expected)}"
+        return f"compiling kernels, once: {len(self.ready)}"
+
+
+class PendingKernels:
+    """Kernels that worker processes may have to compile: what the cache on disk lacks of them.
+
+    Args:
+        names: policies; of those that `pushplan compile` does not name nothing is known.
+    """
+
+    def __init__(self, *names: str) -> None:
+        known = [name for name in names if expected_kernels(name)]
+        self._missing = expected_kernels(*known) if known else frozenset()
+        self._seen = -_LINGER_S
+
+    def finish(self) -> None:
+        """Say no more of them: a job is done, and what it needed is there."""
+        self._missing = frozenset()
+
+    def __str__(self) -> str:
+        """How long it may take, while some process compiles one of them; else empty."""
+        from pushplan.compiled import cached_kernels, compiling_kernels
+
+        now = time.monotonic()
+        if self._missing and compiling_kernels(self._missing):
+            self._seen = now
+        if not self._missing or now - self._seen >= _LINGER_S:
+            return ""
+        self._missing -= cached_kernels(self._missing)
+        return in_words(len(self._missing))
+
+
+def in_words(missing: int) -> str:
+    """How long it takes, at most, to compile so many kernels on one core."""
+    about = max(1.0, round(SECONDS_A_KERNEL * missing))
+    return f"compiling kernels, about {duration(about)} at most, once"
 
 
 @contextmanager
@@ -66,8 +111,19 @@ def kernel_progress(*names: str) -> Iterator[KernelProgress]:
 
 def expected_kernels(*names: str) -> frozenset[str]:
     """Look up the kernels that names make ready; none if one of the names is not known."""
-    text = files("pushplan.cli").joinpath("kernel_names.json").read_text(encoding="utf-8")
-    users = {kernel: set(users.split()) for users, of in json.loads(text).items() for kernel in of}
+    users = _users()
     if not set(names) <= set().union(*users.values()):
         return frozenset()
     return frozenset(kernel for kernel, by in users.items() if not by.isdisjoint(names))
+
+
+def every_kernel() -> frozenset[str]:
+    """The kernels that anything of `pushplan compile` makes ready."""
+    return frozenset(_users())
+
+
+def _users() -> dict[str, set[str]]:
+    """Kernel -> the names that make it ready."""
+    text = files("pushplan.cli").joinpath("kernel_names.json").read_text(encoding="utf-8")
+    table: dict[str, Any] = json.loads(text)
+    return {kernel: set(users.split()) for users, of in table.items() for kernel in of}

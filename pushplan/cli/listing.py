@@ -3,41 +3,82 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from itertools import zip_longest
 from typing import Any
 
-from pushplan.cli.common import add_command, say
+from pushplan.cli.common import add_command, say, say_json
 
 _EXAMPLES = """\
   pushplan list
   pushplan list policies
   pushplan list suites --names
+  pushplan list all --json
 """
+_ALL = "all"
 
 
 def add(commands: Any) -> None:
     """Add the command."""
     parser = add_command(commands, "list", "list what there is, by name", _EXAMPLES, run)
     parser.add_argument(
-        "kind", nargs="?", choices=sorted(_KINDS), help="what to list (default: all)"
+        "kind",
+        nargs="?",
+        choices=[*sorted(_KINDS), _ALL],
+        help="what to list (default: the kinds, with how many there are of each)",
     )
     parser.add_argument("--names", action="store_true", help="names alone, one a line")
+    parser.add_argument("--json", action="store_true", help="a list of objects, for scripts")
 
 
 def run(options: argparse.Namespace) -> int:
     """One name a line, with what it is for and its first line of documentation."""
-    for kind in _KINDS if options.kind is None else [options.kind]:
-        if options.kind is None and not options.names:
+    if options.kind is None:
+        _say_kinds(options)
+        return 0
+    kinds = list(_KINDS) if options.kind == _ALL else [options.kind]
+    if options.json:
+        say_json([{"kind": kind, **one} for kind in kinds for one in _described(kind)])
+        return 0
+    for kind in kinds:
+        if len(kinds) > 1 and not options.names:
             say(f"{kind}:")
-        facts = None if options.names else _FACTS.get(kind)
+        facts = None if options.names else _KINDS[kind].facts
         rows = [(name, *_facts(facts, name)) for name in names_of(kind)]
-        columns = zip_longest(*rows, fillvalue="")
-        widths = [max(map(len, column)) for column in columns]
-        for row in rows:
-            line = "  ".join(text.ljust(width) for text, width in zip(row, widths, strict=False))
-            say(line.rstrip() if options.kind or options.names else f"  {line.rstrip()}")
+        _say_rows(rows, indented=len(kinds) > 1 and not options.names)
     return 0
+
+
+def _say_kinds(options: argparse.Namespace) -> None:
+    """What can be listed: one line a kind, with the number of its names."""
+    counts = {kind: len(names_of(kind)) for kind in _KINDS}
+    if options.json:
+        say_json([{"kind": k, "count": n, "what": _KINDS[k].what} for k, n in counts.items()])
+    elif options.names:
+        say("\n".join(counts))
+    else:
+        _say_rows([(kind, f"{n:3d}", _KINDS[kind].what) for kind, n in counts.items()])
+        say("'pushplan list KIND' lists one kind, 'pushplan list all' everything")
+
+
+def _say_rows(rows: Sequence[tuple[str, ...]], indented: bool = False) -> None:
+    columns = zip_longest(*rows, fillvalue="")
+    widths = [max(map(len, column)) for column in columns]
+    for row in rows:
+        line = "  ".join(text.ljust(width) for text, width in zip(row, widths, strict=False))
+        say(("  " if indented else "") + line.rstrip())
+
+
+def _described(kind: str) -> list[dict[str, str]]:
+    """Each name of a kind with the columns beside it, by their headings."""
+    about = _KINDS[kind]
+    described = []
+    for name in names_of(kind):
+        facts = _facts(about.facts, name)
+        headings = about.headings if len(facts) == len(about.headings) else ("missing",)
+        described.append({"name": name, **dict(zip(headings, facts, strict=False))})
+    return described
 
 
 def _facts(facts: Callable[[str], tuple[str, ...]] | None, name: str) -> tuple[str, ...]:
@@ -50,11 +91,11 @@ def _facts(facts: Callable[[str], tuple[str, ...]] | None, name: str) -> tuple[s
         return (str(error),)
 
 
-def names_of(kind: str) -> Iterable[str]:
+def names_of(kind: str) -> list[str]:
     """The names of one kind."""
     from pushplan.world.lazy_names import look_up
 
-    names: Any = look_up("kind", _KINDS, kind)
+    names: Any = look_up("kind", {one: about.home for one, about in _KINDS.items()}, kind)
     return list(names() if callable(names) else names)
 
 
@@ -122,6 +163,40 @@ def _simulator(name: str) -> tuple[str, ...]:
     return (_said(SIMULATORS, name),)
 
 
+def _action(name: str) -> tuple[str, ...]:
+    """Tasks that have it, description."""
+    from pushplan.envs.registry import ACTIONS, TASKS
+    from pushplan.world.lazy_names import look_up
+
+    tasks = [task for task in TASKS if name in look_up("task", TASKS, task).actions]
+    return ",".join(tasks), _said(ACTIONS, name)
+
+
+def _channel(name: str) -> tuple[str, ...]:
+    from pushplan.observation import CHANNELS
+
+    return ((CHANNELS[name].__doc__ or "").partition("\n")[0],)
+
+
+def _condition(name: str) -> tuple[str, ...]:
+    """What it disturbs, and what is asked of a policy."""
+    from dataclasses import fields
+
+    from pushplan.evaluation.stress_testing import CONDITIONS
+
+    one = CONDITIONS[name]
+    disturbed = [
+        f"{item.name}={value:.3g}"
+        for item in fields(one.disturbances)
+        if isinstance(value := getattr(one.disturbances, item.name), float)
+        and value != item.default
+    ]
+    disturbed += [f"rate={one.rate:g}"] if one.rate is not None else []
+    disturbed += [f"{key}={value}" for key, value in one.variations.items()]
+    asked = "no success asked for" if one.success is None else f"success {one.success:g}"
+    return " ".join(disturbed) or "nothing", asked
+
+
 def _said(table: Any, name: str) -> str:
     """The first line of the documentation of what a table names."""
     from pushplan.world.lazy_names import look_up
@@ -129,22 +204,50 @@ def _said(table: Any, name: str) -> str:
     return (look_up("name", table, name).__doc__ or "").partition("\n")[0]
 
 
-_KINDS: dict[str, str] = {
-    "planners": "pushplan.planners:planner_names",
-    "policies": "pushplan.evaluation.policies:policy_names",
-    "tasks": "pushplan.envs.registry:TASKS",
-    "suites": "pushplan.scenarios:suite_names",
-    "conditions": "pushplan.evaluation.stress_testing:CONDITIONS",
-    "metrics": "pushplan.metrics:metric_names",
-    "simulators": "pushplan.envs.registry:SIMULATORS",
+@dataclass(frozen=True)
+class _Kind:
+    """One kind of things that have names."""
+
+    what: str
+    home: str  # "module:name" of the names, or of a function that gives them
+    headings: tuple[str, ...]  # of the columns beside a name
+    facts: Callable[[str], tuple[str, ...]]  # the columns beside a name
+
+
+_ONE = ("description",)
+_KINDS: dict[str, _Kind] = {
+    "planners": _Kind("find a plan for a World", "pushplan.planners:planner_names", _ONE, _planner),
+    "policies": _Kind(
+        "drive a robot: planners that are followed, controllers, trained networks",
+        "pushplan.evaluation.policies:policy_names",
+        ("tasks", "actions", "description"),
+        _policy,
+    ),
+    "tasks": _Kind(
+        "what the robot has to do", "pushplan.envs.registry:TASKS", ("actions", *_ONE), _task
+    ),
+    "suites": _Kind(
+        "lists of starts to run policies on",
+        "pushplan.scenarios:suite_names",
+        ("task", "simulator", "action", "episodes"),
+        _suite,
+    ),
+    "conditions": _Kind(
+        "disturbances of 'pushplan stress'",
+        "pushplan.evaluation.stress_testing:CONDITIONS",
+        ("disturbance", "asked"),
+        _condition,
+    ),
+    "metrics": _Kind("scores of an episode", "pushplan.metrics:metric_names", _ONE, _metric),
+    "simulators": _Kind(
+        "what moves the bodies", "pushplan.envs.registry:SIMULATORS", _ONE, _simulator
+    ),
+    "actions": _Kind(
+        "how a policy commands the robot",
+        "pushplan.envs.registry:ACTIONS",
+        ("tasks", *_ONE),
+        _action,
+    ),
+    "channels": _Kind("of image observations", "pushplan.observation:CHANNELS", _ONE, _channel),
 }
-"""What there is -> the names themselves, or a function that gives them."""
-_FACTS: dict[str, Callable[[str], tuple[str, ...]]] = {
-    "planners": _planner,
-    "policies": _policy,
-    "tasks": _task,
-    "suites": _suite,
-    "metrics": _metric,
-    "simulators": _simulator,
-}
-"""What there is -> the columns beside a name."""
+"""What there is."""

@@ -9,7 +9,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from pushplan.cli.common import batch_options, check_folder, say
+from pushplan.cli.common import batch_options, say
+from pushplan.cli.outputs import check_file
 
 if TYPE_CHECKING:
     from pushplan.evaluation import Comparison
@@ -48,7 +49,7 @@ def compare(options: argparse.Namespace, out: str, progress: Callable[..., None]
     from pushplan.evaluation import bench_paper
     from pushplan.evaluation.paper import EPISODES
 
-    check_folder(options.markdown)
+    check_file(options.markdown)
     given = {"only": options.only, "policies": options.policies, "episodes": options.episodes}
     words = [word for key, value in given.items() if value for word in (f"--{key}", str(value))]
     return bench_paper(

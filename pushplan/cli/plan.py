@@ -7,7 +7,9 @@ import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from pushplan.cli.common import add_command, milliseconds, positive, say, whole
+from pushplan.cli.common import add_command, complete, milliseconds, positive, say, say_json, whole
+from pushplan.cli.kernel_progress import kernel_progress
+from pushplan.cli.outputs import check_file, check_picture
 
 if TYPE_CHECKING:
     from pushplan.world import PlanResult, Stop
@@ -26,7 +28,10 @@ def add(commands: Any) -> None:
         commands, "plan", "plan in a world from a file, without a simulator", _EXAMPLES, run
     )
     parser.add_argument("world", metavar="WORLD.yaml", help="world file (.yaml, .yml or .json)")
-    parser.add_argument("--planner", required=True, metavar="NAME", help="see 'pushplan list'")
+    planner = parser.add_argument(
+        "--planner", required=True, metavar="NAME", help="see 'pushplan list planners'"
+    )
+    complete(planner, "planners")
     budget = parser.add_mutually_exclusive_group()
     budget.add_argument("--deadline", type=positive, metavar="S", help="wall-clock limit [s]")
     budget.add_argument(
@@ -34,6 +39,7 @@ def add(commands: Any) -> None:
     )
     parser.add_argument("--seed", type=whole(0), default=0, help="of the planner (default 0)")
     parser.add_argument("--out", metavar="plan.json", help="write the plan and its statistics")
+    parser.add_argument("--json", action="store_true", help="print what --out writes, alone")
     parser.add_argument("--render", metavar="plan.png", help="write a picture of the plan")
 
 
@@ -42,20 +48,27 @@ def run(options: argparse.Namespace) -> int:
     from pushplan.planners import make_planner, warm_up
     from pushplan.world import load_world, stream
 
+    check_file(options.out)
+    check_picture(options.render)
     world = load_world(options.world)
     planner = make_planner(options.planner)
-    warm_up(options.planner)  # a deadline is for planning, not for loading kernels
+    with kernel_progress(options.planner):
+        warm_up(options.planner)  # a deadline is for planning, not for loading kernels
     result = planner.plan(world, stop=_stop(options), rng=stream(options.seed, "policy"))
-    _print(options.planner, result)
+    data = _as_dict(options, result)
+    if options.json:
+        say_json(data)
+    else:
+        _print(options.planner, result)
     if options.out:
-        text = json.dumps(_as_dict(options, result), indent=1) + "\n"
-        Path(options.out).write_text(text, encoding="utf-8")
-        say(f"wrote {options.out}")
+        Path(options.out).write_text(json.dumps(data, indent=1) + "\n", encoding="utf-8")
     if options.render:
         from pushplan.drawing import draw_world, save_image
 
         save_image(options.render, draw_world(world, plan=result.plan))
-        say(f"wrote {options.render}")
+    for file in (options.out, options.render):
+        if file and not options.json:
+            say(f"wrote {file}")
     return 0 if result.plan is not None else 1
 
 

@@ -5,11 +5,13 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Sequence
+from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
-from pushplan.cli.common import add_command, say, whole
+from pushplan.cli.common import add_command, say, say_json, whole
 
 if TYPE_CHECKING:
+    from pushplan.evaluation import Results
     from pushplan.evaluation.tables import Table
 
 _EXAMPLES = """\
@@ -69,11 +71,29 @@ def run(options: argparse.Namespace) -> int:
     return 0
 
 
-def show(results: Any, **options: Any) -> None:
+def show(results: Results, **options: Any) -> None:
     """Print the tables of a run, write its report, say where it is."""
     _print(results.tables())
     page = results.report(**options)
     say(f"page:    {page}")
+
+
+def show_json(results: Results) -> None:
+    """Write the report of a run, and print what its tables say as JSON."""
+    page = results.report()
+    summaries = [{**asdict(one), "title": results.titles[one.setting]} for one in results.summary()]
+    pairs = [{**asdict(one), "verdict": one.verdict} for one in results.compare()]
+    say_json({"page": str(page), "policies": summaries, "differences": pairs})
+
+
+def exit_code(results: Results) -> int:
+    """1 where jobs of a run failed, with a line that says where to look; else 0."""
+    failed = sum(row.failed for row in results.rows)
+    if not failed:
+        return 0
+    where = "" if results.path is None else f" in {results.path / 'results.csv'}"
+    sys.stderr.write(f"{failed} of {len(results.rows)} jobs failed: see status and reason{where}\n")
+    return 1
 
 
 def _print(tables: Sequence[Table]) -> None:

@@ -10,6 +10,7 @@ from pushplan.cli.common import (
     add_latency,
     add_trust,
     check_episode_file,
+    complete,
     milliseconds,
     save_episode,
     say,
@@ -34,7 +35,10 @@ def add(commands: Any) -> None:
     """Add the command."""
     parser = add_command(commands, "run", "run one policy on one scenario", _EXAMPLES, run)
     add_scenario_options(parser)
-    parser.add_argument("--policy", required=True, metavar="NAME", help="as in 'pushplan bench'")
+    policy = parser.add_argument(
+        "--policy", required=True, metavar="NAME", help="as in 'pushplan bench'"
+    )
+    complete(policy, "policies")
     parser.add_argument(
         "--observation",
         metavar="NAME",

@@ -6,7 +6,7 @@ import argparse
 import re
 from typing import TYPE_CHECKING, Any
 
-from pushplan.cli.common import whole
+from pushplan.cli.common import complete, whole
 
 if TYPE_CHECKING:
     from pushplan.scenarios import Scenario
@@ -17,9 +17,18 @@ _SCIENTIFIC = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)[eE][-+]?\d+")
 
 def add_scenario_options(parser: argparse.ArgumentParser) -> None:
     """Add what `scenario_of` reads."""
-    parser.add_argument("suite", nargs="?", metavar="SUITE", help="take its scenario of --seed")
-    parser.add_argument("--task", metavar="NAME", help="a task instead of a suite, such as maze")
-    parser.add_argument("--simulator", default="pymunk", metavar="NAME", help="default pymunk")
+    suite = parser.add_argument(
+        "suite", nargs="?", metavar="SUITE", help="take its scenario of --seed"
+    )
+    task = parser.add_argument(
+        "--task", metavar="NAME", help="a task instead of a suite, such as maze"
+    )
+    simulator = parser.add_argument(
+        "--simulator", default="pymunk", metavar="NAME", help="default pymunk"
+    )
+    complete(suite, "suites")
+    complete(task, "tasks")
+    complete(simulator, "simulators")
     parser.add_argument("--preset", metavar="NAME", help="default: the first for the simulator")
     parser.add_argument("--boxes", type=whole(0), metavar="N", help="number of boxes")
     parser.add_argument("--shape", metavar="NAME", help="shape of the maze: u or z")

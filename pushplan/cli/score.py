@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import argparse
-from typing import Any
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
 
 from pushplan.cli.common import (
     add_command,
@@ -11,8 +12,12 @@ from pushplan.cli.common import (
     load_episode,
     save_episode,
     say,
+    say_json,
     say_scores,
 )
+
+if TYPE_CHECKING:
+    from pushplan.world import Episode
 
 _EXAMPLES = """\
   pushplan score episode.npz
@@ -37,6 +42,7 @@ def add(commands: Any) -> None:
     parser.add_argument(
         "--out", metavar="FILE", help="write the one episode in another format: .mcap or .npz"
     )
+    parser.add_argument("--json", action="store_true", help="a list of objects, for scripts")
 
 
 def run(options: argparse.Namespace) -> int:
@@ -47,10 +53,24 @@ def run(options: argparse.Namespace) -> int:
         raise InvalidInputError(f"--out writes one episode, got {len(options.episodes)}")
     check_episode_file(options.out)
     names = options.metrics.split(",") if options.metrics else None
+    scored = []
     for path in options.episodes:
         episode = load_episode(path)
-        say_scores(episode, names, f"{path}: ")
+        if options.json:
+            scored.append(_as_dict(path, episode, names))
+        else:
+            say_scores(episode, names, f"{path}: ")
         if options.out:
             save_episode(episode, options.out)
-            say(f"wrote {options.out}")
+            if not options.json:
+                say(f"wrote {options.out}")
+    if options.json:
+        say_json(scored)
     return 0
+
+
+def _as_dict(path: str, episode: Episode, names: Sequence[str] | None) -> dict[str, Any]:
+    from pushplan.metrics import compute
+
+    ended = {"episode": path, "success": episode.success, "reason": episode.reason}
+    return {**ended, "metrics": dict(compute(episode, names))}

@@ -7,6 +7,7 @@ import sys
 from typing import Any
 
 from pushplan.cli.common import add_command, duration, say
+from pushplan.cli.outputs import check_directory, check_file
 
 _RUN = "run directory of 'pushplan bench' or 'pushplan experiment'"
 
@@ -71,6 +72,7 @@ def _status(options: argparse.Namespace) -> int:
 def _merge(options: argparse.Namespace) -> int:
     from pushplan.evaluation import merge
 
+    check_directory(options.out)
     found = merge(options.out, options.directories)
     say(f"{found.added} results taken into {options.out}, {found.known} were there already")
     if found.differing:
@@ -114,6 +116,7 @@ def _reproduce(options: argparse.Namespace) -> int:
 def _salvage(options: argparse.Namespace) -> int:
     from pushplan.evaluation import salvage
 
+    check_directory(options.out)
     found = salvage(options.directory, options.out)
     say(f"{found.rows} results saved in {options.out}, {found.from_csv} of them from results.csv")
     if found.without_episode:
@@ -124,5 +127,6 @@ def _salvage(options: argparse.Namespace) -> int:
 def _export(options: argparse.Namespace) -> int:
     from pushplan.evaluation import Results
 
+    check_file(options.file, (".csv", ".parquet"))
     say(f"{Results.load(options.directory).export(options.file)} rows in {options.file}")
     return 0

@@ -6,8 +6,9 @@ import argparse
 import os
 from typing import Any
 
-from pushplan.cli.bench import progress_of
 from pushplan.cli.common import add_command, add_trust, positive, say, whole
+from pushplan.cli.outputs import check_directory
+from pushplan.cli.progress import progress_of
 
 _EXAMPLES = """\
   pushplan stress push-aware maze-3d-3
@@ -55,7 +56,7 @@ def add(commands: Any) -> None:
         type=whole(0),
         default=os.cpu_count() or 1,
         metavar="W",
-        help="processes (default: all %(default)s cores; 0: this process)",
+        help="processes (default: one a core; 0: this process)",
     )
     parser.add_argument("--out", metavar="DIR", help="run directory, to be continued and kept")
     parser.add_argument(
@@ -73,6 +74,7 @@ def run(options: argparse.Namespace) -> int:
     from pushplan.evaluation import stress
     from pushplan.evaluation.table_formats import markdown, text
 
+    check_directory(options.out)
     with progress_of(options.policy) as progress:
         sheet = stress(
             options.policy,

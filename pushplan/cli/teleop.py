@@ -5,7 +5,8 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING, Any
 
-from pushplan.cli.common import add_command, check_folder, positive, say, say_scores
+from pushplan.cli.common import add_command, positive, say, say_scores
+from pushplan.cli.outputs import check_file
 from pushplan.cli.scenario_options import add_scenario_options, scenario_of
 
 if TYPE_CHECKING:
@@ -49,7 +50,7 @@ def add(commands: Any) -> None:
 def run(options: argparse.Namespace) -> int:
     """Open a window, drive, print the scores, write the episode."""
     scenario = scenario_of(options)
-    check_folder(options.out)
+    check_file(options.out)
     env = _environment(scenario, options.action)
     from pushplan.cli.cockpit import drive
     from pushplan.cli.keyboard import Keyboard

@@ -9,6 +9,7 @@ import sys
 from typing import TYPE_CHECKING, Any
 
 from pushplan.cli.common import add_command, say, whole
+from pushplan.cli.outputs import check_directory
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -74,6 +75,7 @@ def run(options: argparse.Namespace) -> int:
 
     from pushplan.training.policies.training import train_policy
 
+    check_directory(options.out)
     config = _config(options)
     _show_progress(logging.getLogger("pushplan.training"))
     try:
@@ -211,6 +213,7 @@ def _export(options: argparse.Namespace) -> int:
     from pushplan.training.policies.dataset import DatasetRequest, read_metadata, record, to_minari
     from pushplan.world import InvalidInputError
 
+    check_directory(options.out)
     given = options.config
     config = config_named(options.task, "bc") if given is None else read_config(given)
     if config.task != options.task:

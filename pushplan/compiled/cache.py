@@ -94,6 +94,24 @@ class KernelCache(_Cache):
             self._lock.close()
             self._lock = None
 
+    def holds_current(self) -> bool:
+        """Whether something is kept for the code as it is now, for any types of arguments."""
+        pattern = f"{self._stem}.{source_digest(self._kernel)[:12]}.*.nbc"
+        return any(next(folder.glob(pattern), None) for folder in self._folders.read)
+
+    def is_locked(self) -> bool:
+        """Whether a process holds its place, to compile it."""
+        if fcntl is None or self._folders.write is None:
+            return False
+        try:
+            with (self._folders.write / f"{self._stem}.lock").open() as file:
+                fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
+        except FileNotFoundError:
+            return False
+        except OSError:
+            return True
+        return False
+
     @property
     def _folders(self) -> Folders:
         return find_folders(self._kernel.py_func.__code__.co_filename)

@@ -16,6 +16,7 @@ from numba.core.caching import UserWideCacheLocator, _CacheLocator
 
 _LOG = logging.getLogger(__name__)
 _DIGEST = hashlib.sha256().digest_size
+_damaged: set[Path] = set()  # folders that are known to hold damaged files
 
 
 class Folders(NamedTuple):
@@ -44,7 +45,7 @@ def read(path: Path) -> bytes | None:
     except OSError:
         return None
     if hashlib.sha256(content[_DIGEST:]).digest() != content[:_DIGEST]:
-        warn_once(f"the cache of kernels in {path.parent} is damaged, and compiled anew")
+        _warn_damaged(path.parent)
         return None
     return content[_DIGEST:]
 
@@ -72,6 +73,13 @@ def remove(path: Path) -> None:
 def warn_once(message: str) -> None:
     """Log a warning, each one once a process."""
     _LOG.warning(message)
+
+
+def _warn_damaged(folder: Path) -> None:
+    """Log a warning, one a process however many files in however many folders are damaged."""
+    if not _damaged:
+        _LOG.warning("the cache of kernels in %s is damaged, and compiled anew", folder)
+    _damaged.add(folder)
 
 
 @functools.cache

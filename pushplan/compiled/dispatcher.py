@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager, suppress
+from importlib import import_module
 from typing import Any
 
 from numba.core.registry import CPUDispatcher
@@ -28,12 +29,41 @@ def watching(watcher: Watcher) -> Iterator[None]:
         _WATCHERS.remove(watcher)
 
 
+def cached_kernels(names: Iterable[str]) -> frozenset[str]:
+    """Look up which kernels are in the cache, for the code as it is now.
+
+    Args:
+        names: ``"module.function"``, as watchers are told; those that cannot be imported here are
+            left out.
+    """
+    return frozenset(name for name, kernel in _kernels(names) if kernel.cache.holds_current())
+
+
+def compiling_kernels(names: Iterable[str]) -> frozenset[str]:
+    """Look up which kernels some process compiles at the moment; ``names`` as `cached_kernels`."""
+    return frozenset(name for name, kernel in _kernels(names) if kernel.cache.is_locked())
+
+
+def _kernels(names: Iterable[str]) -> Iterator[tuple[str, KernelDispatcher]]:
+    for name in names:
+        module, _, function = name.rpartition(".")
+        with suppress(ImportError):
+            kernel = getattr(import_module(module), function, None)
+            if isinstance(kernel, KernelDispatcher):
+                yield name, kernel
+
+
 class _CachedDispatcher(CPUDispatcher):
     form = ""
 
     def enable_caching(self) -> None:
         """Keep what is compiled on disk."""
-        self._cache = KernelCache(self, self.form)
+        self._cache: KernelCache = KernelCache(self, self.form)
+
+    @property
+    def cache(self) -> KernelCache:
+        """Its files on disk."""
+        return self._cache
 
     def compile(self, sig: Any) -> Any:
         """Take the machine code for a signature from the cache, or make it."""

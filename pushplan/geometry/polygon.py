@@ -42,7 +42,7 @@ def polygon_centroid(v: FloatArray) -> tuple[float, float]:
 
 @kernel
 def polygon_inertia(v: FloatArray) -> float:
-    """Second moment ∫ |r|² dA / A [m²] of corners (N, 2) about the centroid; 0 without area."""
+    """Second moment ∫ r² dA / A [m²] of corners (N, 2) about the centroid; 0 without area."""
     n = v.shape[0]
     cx, cy = polygon_centroid(v)
     twice, moment = 0.0, 0.0

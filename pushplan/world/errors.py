@@ -9,7 +9,8 @@ from collections.abc import Iterable
 LONGEST_MESSAGE = 300
 """Most characters of a message; of a longer one, the middle is left out."""
 MOST_CHOICES = 12
-"""Most choices that a message lists; of more, those next to the name that was given."""
+"""Most choices that a message lists; of more, the `NEAREST` to the name that was given."""
+NEAREST = 3
 
 
 class PushplanError(Exception):
@@ -52,9 +53,9 @@ class MissingDependencyError(PushplanError, ImportError):
 
 
 def unknown_name_message(kind: str, name: object, choices: Iterable[str]) -> str:
-    """One line that names the unknown value, and every choice or, of many, the nearest."""
+    """One line that names the unknown value, and every choice or, of many, the three nearest."""
     valid = sorted(choices)
-    near = difflib.get_close_matches(str(name)[:80], valid, n=5, cutoff=0.5)
+    near = difflib.get_close_matches(str(name)[:80], valid, n=NEAREST, cutoff=0.5)
     hint = f"; did you mean {near[0]!r}?" if near else ""
     if len(valid) <= MOST_CHOICES:
         return f"unknown {kind} {short(name)}{hint} (valid: {', '.join(valid) or 'none'})"

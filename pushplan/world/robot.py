@@ -47,11 +47,11 @@ class RobotModel(ArrayRecord, CheckedFields):
         mass: mass as the metrics count it [kg].
         drive: how it may move.
         max_speed: greatest forward speed [m/s]; the speed itself for a constant-speed drive.
-        max_turn_rate: greatest |turn rate| [rad/s].
+        max_turn_rate: greatest turn rate to either side [rad/s].
         min_speed: least forward speed [m/s], negative if it may reverse, else 0; a constant-speed
             drive has none other than ``max_speed``.
-        max_acceleration: limit of |dv/dt| [m/s²]; infinite where speed can jump.
-        max_turn_acceleration: limit of |dω/dt| [rad/s²].
+        max_acceleration: greatest change of the speed [m/s²]; infinite where speed can jump.
+        max_turn_acceleration: greatest change of the turn rate [rad/s²].
         min_turning_radius: of a car, to the body origin, at any speed [m]; 0 for other drives.
         wheel_separation: distance between the driven wheels [m], 0 if there are none.
         contact_radius: distance [m] from the drawn parts at which they touch others: they are

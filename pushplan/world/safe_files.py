@@ -151,12 +151,16 @@ def read_npz(
     """
     data = read_bytes(path, what, limit)
     try:
+        if data[:2] != b"PK":
+            raise SchemaError("it is no .npz archive")
         if data.count(b"PK\1\2") > _MEMBERS:  # each entry costs memory before it can be counted
             raise SchemaError(f"it has more than {_MEMBERS} members")
         with zipfile.ZipFile(io.BytesIO(data)) as archive:
             members = {info.filename.removesuffix(".npy"): info for info in archive.infolist()}
             if len(members) < len(archive.infolist()):
                 raise SchemaError("an array is there twice")
+            if members and members.keys().isdisjoint(required):
+                raise SchemaError(f"it holds {', '.join(map(short, [*members][:3]))}: no {what}")
             known_keys("it", members, (*required, *optional), required)
             arrays: dict[str, NDArray[Any]] = {}
             for name, info in members.items():

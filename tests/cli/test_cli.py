@@ -91,7 +91,7 @@ def test_list(kind: str, name: str, capsys: pytest.CaptureFixture[str]) -> None:
 
 
 def test_list_says_what_each_policy_and_suite_is_for(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["list"]) == 0
+    assert main(["list", "all"]) == 0
     lines = {line.split()[0]: line for line in capsys.readouterr().out.splitlines()}
     assert "box_delivery,area_clearing  velocity " in lines["gtsp-mpc"]
     assert " ship_ice " in lines["ship-predictive"] and " any " in lines["random"]
@@ -101,7 +101,11 @@ def test_list_says_what_each_policy_and_suite_is_for(capsys: pytest.CaptureFixtu
 
 def test_the_shell_completes_commands_and_kinds() -> None:
     pytest.importorskip("argcomplete")
-    for line, words in (("pushplan li", ["list"]), ("pushplan list su", ["suites"])):
+    for line, words in (
+        ("pushplan li", ["list"]),
+        ("pushplan list su", ["suites"]),
+        ("pushplan run maze-2d-6", ["maze-2d-6", "maze-2d-6-z"]),
+    ):
         asked = {"_ARGCOMPLETE": "1", "_ARGCOMPLETE_IFS": "\n", "COMP_LINE": line}
         done = subprocess.run(
             [sys.executable, "-c", "from pushplan.cli import main; main()"],

@@ -79,7 +79,7 @@ def test_bench_with_a_file_of_ones_own(tmp_path: Path, capsys: pytest.CaptureFix
     names += f",planner={tmp_path}/mine.py:Planless"
     out = tmp_path / "run"
     options = ["--episodes", "2", "--workers", "2", "--out", str(out), "--seed", "5"]
-    assert main(["bench", "maze-2d-3", "--policies", names, *options]) == 0
+    assert main(["bench", "maze-2d-3", "--policies", names, *options]) == 1  # some jobs failed
     text = capsys.readouterr().out
     assert "Spin - straight" in text and str(out / "report.html") in text
     rows = {(row.policy, row.seed): row for row in Results.load(out).rows}

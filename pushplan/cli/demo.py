@@ -1,0 +1,78 @@
+"""``pushplan demo``: one episode of three tasks, and a page that replays them."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from typing import TYPE_CHECKING, Any
+
+from pushplan.cli.common import add_command, has_screen, say
+from pushplan.cli.outputs import check_directory
+from pushplan.cli.progress import progress_of
+
+if TYPE_CHECKING:
+    from pushplan.evaluation import Job
+
+_EXAMPLES = """\
+  pushplan demo
+  pushplan demo --no-open --out runs/first-look
+
+It asks nothing and installs nothing. From the first run on, kernels are in the cache.
+"""
+EPISODES = {
+    "maze-2d-3": "kinodynamic-rrt",
+    "ship-ice-2d-10": "skeleton",
+    "area-clearing-2d-10-clear-small": "greedy",
+}
+"""Suite -> the policy that is shown in its first start: those whose kernels compile fast."""
+_MOST_WORKERS = 3
+
+
+def add(commands: Any) -> None:
+    """Add the command."""
+    parser = add_command(
+        commands, "demo", "show a maze, a ship in ice and a clearing, in a minute", _EXAMPLES, run
+    )
+    parser.add_argument(
+        "--out", default=os.path.join("runs", "demo"), metavar="DIR", help="default %(default)s"
+    )
+    parser.add_argument("--no-open", action="store_true", help="do not open the page in a browser")
+
+
+def run(options: argparse.Namespace) -> int:
+    """Run the episodes, say how they ended, write the page and open it."""
+    import webbrowser
+
+    from pushplan.cli.report import exit_code
+    from pushplan.evaluation import Results, run_batch
+    from pushplan.world.libraries import need
+
+    check_directory(options.out)
+    for library in ("gymnasium", "pymunk", "rich", "jinja2", "matplotlib"):
+        need(library)  # before the work, not after it
+    say(f"{len(EPISODES)} episodes; the first time they take up to a minute:")
+    with progress_of(*EPISODES.values()) as progress:
+        workers = min(os.cpu_count() or 1, _MOST_WORKERS)
+        about = {"suite": "demo"}
+        run_batch(_jobs(), out=options.out, workers=workers, about=about, progress=progress)
+    results = Results.load(options.out)
+    for row in results.rows:
+        how = "success" if row.success else row.reason
+        say(f"  {row.policy} in {row.task}: {how}, work {row.interaction_work_kg_m:.3g} kg m")
+    page = results.report()
+    say(f"page: {page}")
+    if not options.no_open and sys.stdout.isatty() and has_screen():  # no browser in the terminal
+        webbrowser.open(page.absolute().as_uri())
+    return exit_code(results)
+
+
+def _jobs() -> list[Job]:
+    from pushplan.evaluation import Job, parse_policy
+    from pushplan.scenarios import suite
+
+    return [
+        Job(parse_policy(policy), scenario)
+        for name, policy in EPISODES.items()
+        for scenario in suite(name, episodes=1).scenarios
+    ]

@@ -1,0 +1,131 @@
+"""``pushplan doctor``: what is installed, what is missing, what is compiled, what can draw."""
+
+from __future__ import annotations
+
+import argparse
+import ctypes.util
+import os
+import platform
+from importlib.metadata import PackageNotFoundError, packages_distributions, version
+from importlib.util import find_spec
+from typing import Any
+
+from pushplan.cli.common import add_command, has_screen, say, say_json
+
+_EXAMPLES = """\
+  pushplan doctor
+  pushplan doctor --json > machine.json
+"""
+BASE = ("numba", "numpy", "ompl", "yaml", "ruckig", "scipy", "shapely")
+"""Libraries that come with pushplan itself; Ruckig where it has a wheel."""
+_DISPLAYS = {"EGL": "EGL", "OSMesa": "OSMesa"}
+"""What MuJoCo draws with where there is no screen -> the name of its library."""
+
+
+def add(commands: Any) -> None:
+    """Add the command."""
+    parser = add_command(
+        commands, "doctor", "say what is installed, missing and compiled", _EXAMPLES, run
+    )
+    parser.add_argument("--json", action="store_true", help="the same as one object, for scripts")
+
+
+def run(options: argparse.Namespace) -> int:
+    """Look and tell; 1 if a library without which nothing works is missing."""
+    found = examine()
+    if options.json:
+        say_json(found)
+    else:
+        _tell(found)
+    return 1 if any(found["libraries"][name] is None for name in BASE if name != "ruckig") else 0
+
+
+def examine() -> dict[str, Any]:
+    """Facts about this installation, as JSON values."""
+    from pushplan import __version__
+    from pushplan.world.libraries import EXTRAS
+
+    owners = packages_distributions()
+    libraries = {name: _version(name, owners) for name in (*BASE, *EXTRAS)}
+    missing: dict[str, list[str]] = {}
+    for name, extra in EXTRAS.items():
+        if libraries[name] is None:
+            missing.setdefault(extra, []).append(name)
+    return {
+        "pushplan": __version__,
+        "python": platform.python_version(),
+        "system": f"{platform.system()} {platform.machine()}",
+        "cores": os.cpu_count(),
+        "libraries": libraries,
+        "extras": {
+            extra: {
+                "missing": missing.get(extra, []),
+                "install": f"pip install 'pushplan[{extra}]'" if extra in missing else None,
+            }
+            for extra in dict.fromkeys(EXTRAS.values())
+        },
+        "kernels": _kernels() if libraries["numba"] is not None else None,
+        "drawing": {
+            **{name: ctypes.util.find_library(lib) is not None for name, lib in _DISPLAYS.items()},
+            "screen": has_screen(),
+            "MUJOCO_GL": os.environ.get("MUJOCO_GL"),
+        },
+    }
+
+
+def _version(module: str, owners: Any) -> str | None:
+    """The version of a library; None if it is not installed, "unknown" if it does not say."""
+    if find_spec(module) is None:
+        return None
+    try:
+        return version(owners.get(module, [module])[0])
+    except PackageNotFoundError:
+        return "unknown"
+
+
+def _kernels() -> dict[str, Any]:
+    from pushplan.cli.kernel_progress import every_kernel
+    from pushplan.compiled import cached_kernels
+    from pushplan.compiled.cache_files import find_folders
+
+    names = every_kernel()
+    folders = find_folders(__file__)
+    return {
+        "compiled": len(cached_kernels(names)),
+        "known": len(names),
+        "cache": None if folders.write is None else str(folders.write),
+        "NUMBA_CACHE_DIR": os.environ.get("NUMBA_CACHE_DIR"),
+    }
+
+
+def _tell(found: dict[str, Any]) -> None:
+    say(f"pushplan {found['pushplan']}, Python {found['python']}, {found['system']}, ", end="")
+    say(f"{found['cores']} cores")
+    versions = found["libraries"]
+    there = [f"{name} {versions[name]}" for name in BASE if versions[name] is not None]
+    lost = [name for name in BASE if versions[name] is None]
+    say(f"base: {', '.join(there)}" + (f"; missing: {', '.join(lost)}" if lost else ""))
+    for extra, one in found["extras"].items():
+        if one["missing"]:
+            say(f"{extra}: missing {', '.join(one['missing'])}; type: {one['install']}")
+        else:
+            from pushplan.world.libraries import EXTRAS
+
+            own = [f"{name} {versions[name]}" for name in EXTRAS if EXTRAS[name] == extra]
+            say(f"{extra}: {', '.join(own)}")
+    if (kernels := found["kernels"]) is not None:
+        _tell_kernels(kernels)
+    drawing = found["drawing"]
+    said = [f"{name} {'yes' if drawing[name] else 'no'}" for name in (*_DISPLAYS, "screen")]
+    say(f"MuJoCo's camera and windows: {', '.join(said)}")
+    if not any(drawing[name] for name in (*_DISPLAYS, "screen")):
+        say("  render_mode 'camera' needs one of them: on Debian 'apt install libegl1'")
+
+
+def _tell_kernels(kernels: dict[str, Any]) -> None:
+    say(f"kernels: {kernels['compiled']} of {kernels['known']} compiled, ", end="")
+    if kernels["cache"] is None:
+        say("no folder for them can be written to: each process compiles anew")
+        return
+    more = "" if kernels["compiled"] == kernels["known"] else "; all of them: pushplan compile"
+    say(f"kept in {kernels['cache']} and its like{more}")

@@ -1,0 +1,63 @@
+"""Files and folders that commands write: refused before the work begins, not after it."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from pathlib import Path
+
+
+def check_file(path: str | None, endings: Sequence[str] = ()) -> None:
+    """Refuse a file that cannot be written.
+
+    Args:
+        path: the file; None is none to be written.
+        endings: what its name may end in; anything if there is none.
+
+    Raises:
+        InvalidInputError: naming the path and what is wrong with it.
+    """
+    if path is None:
+        return
+    from pushplan.world.errors import InvalidInputError
+
+    file = Path(path)
+    if endings and file.suffix.lower() not in endings:
+        raise InvalidInputError(f"a file to write ends in {' or '.join(endings)}, got {path!r}")
+    if file.is_dir():
+        raise InvalidInputError(f"cannot write {path!r}: it is a folder")
+    if not file.absolute().parent.is_dir():
+        raise InvalidInputError(f"there is no folder {file.parent} for {path!r}")
+    if not os.access(file if file.exists() else file.absolute().parent, os.W_OK):
+        raise InvalidInputError(f"cannot write {path!r}: permission denied")
+
+
+def check_picture(path: str | None, endings: Sequence[str] = (".png",)) -> None:
+    """Refuse a picture that cannot be written; errors as `check_file`.
+
+    Raises:
+        MissingDependencyError: if the library that draws it is not installed.
+    """
+    if path is not None:
+        from pushplan.world.libraries import need
+
+        check_file(path, endings)
+        need("PIL")
+
+
+def check_directory(path: str | None) -> None:
+    """Refuse a folder that can neither be made nor written to; it may be there or not.
+
+    Raises:
+        InvalidInputError: naming the path and what is wrong with it.
+    """
+    if path is None:
+        return
+    from pushplan.world.errors import InvalidInputError
+
+    folder = Path(path).absolute()
+    there = next(one for one in (folder, *folder.parents) if one.exists())
+    if not there.is_dir():
+        raise InvalidInputError(f"cannot use {path!r} as a folder: {there} is a file")
+    if not os.access(there, os.W_OK | os.X_OK):
+        raise InvalidInputError(f"cannot use {path!r} as a folder: {there} cannot be written to")

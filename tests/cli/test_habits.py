@@ -1,0 +1,196 @@
+"""What a script and a newcomer rely on: codes, JSON, paths checked early, near names."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import sys
+from pathlib import Path
+
+import pytest
+
+from pushplan.cli import build_parser, main
+from pushplan.cli.doctor import BASE
+from pushplan.cli.kernel_progress import PendingKernels, expected_kernels
+from pushplan.world.errors import unknown_name_message
+from pushplan.world.libraries import EXTRAS
+
+ROOM = str(Path(__file__).parents[2] / "examples" / "room.yaml")
+USERS_MISTAKES = {
+    "demo": [["--out", "FILE/demo"]],
+    "doctor": [["--yaml"]],
+    "run": [["maze-2d-3", "--policy", "nobody"], ["no-suite", "--policy", "straight"]],
+    "teleop": [["no-suite"], ["maze-2d-3", "--out", "/no/such/folder/episode.npz"]],
+    "plan": [
+        [ROOM, "--planner", "nobody"],
+        [ROOM, "--planner", "straight", "--out", "/no/such/folder/plan.json"],
+        [ROOM, "--planner", "straight", "--out", "FOLDER"],
+        [ROOM, "--planner", "straight", "--render", "/no/such/folder/plan.png"],
+        [ROOM, "--planner", "straight", "--render", "plan.bmp"],
+    ],
+    "bench": [
+        ["maze-2d-3", "--policies", "nobody"],
+        ["maze-2d-3", "--policies", "straight", "--out", "FILE/run"],
+        ["paper", "--markdown", "FOLDER"],
+    ],
+    "experiment": [["none.yaml"]],
+    "stress": [["straight", "maze-2d-3", "--out", "FILE/run"]],
+    "serve": [["nobody", "--socket", "unix:never-made"]],
+    "list": [["things"]],
+    "score": [["none.npz"], [ROOM], ["FOLDER"]],
+    "report": [["FOLDER"]],
+    "compare": [["FOLDER", "FOLDER"]],
+    "status": [["FOLDER"]],
+    "merge": [["FILE/run", "FOLDER"]],
+    "rescore": [["FOLDER"]],
+    "reproduce": [["FOLDER", "--job", "3f"]],
+    "salvage": [["FOLDER", "FILE/new"]],
+    "export": [["FOLDER", "rows.csv"], ["FOLDER", "/no/such/folder/rows.csv"]],
+    "ice": [[], ["--concentration", "0.1", "--out", "/no/such/folder/field.json"]],
+    "gtsp": [["none.gtsp"], ["none.gtsp", "--out", "/no/such/folder/tour"]],
+    "train": [["ppo", "--task", "maze", "--out", "FILE/run"]],
+    "dataset": [
+        ["export", "--policy", "straight", "--task", "maze"],
+        [*"export --policy straight --task maze --episodes 1 --out FILE/run".split()],
+    ],
+    "compile": [["nobody"]],
+    "codegen": [["nobody", "--out", "FOLDER"], ["tracking-mpc", "--out", "FILE/c"]],
+}
+
+
+def commands() -> set[str]:
+    (action,) = (one for one in build_parser()._actions if one.metavar == "COMMAND")
+    return set(action.choices)
+
+
+def test_every_command_is_here() -> None:
+    assert set(USERS_MISTAKES) == commands()
+
+
+@pytest.mark.parametrize("command", sorted(USERS_MISTAKES))
+def test_a_users_mistake_is_code_2_and_no_work_is_done(
+    command: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "FILE").write_text("")
+    (tmp_path / "FOLDER").mkdir()
+    for given in USERS_MISTAKES[command]:
+        arguments = [re.sub("^(FILE|FOLDER)", f"{tmp_path}/\\1", one) for one in given]
+        assert main([command, *arguments]) == 2, given
+        said = capsys.readouterr()
+        assert said.out == ""
+        assert said.err.splitlines()[-1].startswith("pushplan")
+        assert "Traceback" not in said.err
+    assert not list((tmp_path / "FOLDER").iterdir())
+
+
+def test_a_failed_run_is_code_1(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "failing.py").write_text(
+        "class Failing:\n    def reset(self, world, rng):\n        raise ValueError('no')\n"
+        "    def act(self, world, observation):\n        pass\n"
+    )
+    policy = f"{tmp_path}/failing.py:Failing"
+    assert main(["run", "maze-2d-3", "--policy", policy]) == 1
+    capsys.readouterr()
+    options = ["--episodes", "1", "--workers", "0", "--out", str(tmp_path / "run"), "--json"]
+    assert main(["bench", "maze-2d-3", "--policies", f"bad={policy},straight", *options]) == 1
+    said = capsys.readouterr()
+    assert "1 of 2 jobs failed" in said.err
+    bad, straight = json.loads(said.out)["policies"]
+    assert (bad["policy"], bad["failed"], straight["failed"]) == ("bad", 1, 0)
+    assert straight["success"]["fraction"] == 1.0 and straight["metrics"]["E_nav"]["count"] == 1
+    assert main(["plan", ROOM, "--planner", "kinodynamic-rrt", "--iterations", "1"]) in (0, 1)
+
+
+def test_the_codes_are_documented(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["--help"]) == 0
+    text = capsys.readouterr().out
+    for code in ("0", "1", "2", "130"):
+        assert re.search(rf"^  {code} +\w", text.partition("exit codes:")[2], re.MULTILINE)
+
+
+def test_list_alone_says_what_can_be_listed(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["list"]) == 0
+    *lines, hint = capsys.readouterr().out.splitlines()
+    assert "'pushplan list KIND'" in hint
+    for line in lines:
+        kind, count, *what = line.split()
+        assert what
+        assert main(["list", kind, "--names"]) == 0
+        assert len(capsys.readouterr().out.splitlines()) == int(count)
+        assert main(["list", kind, "--json"]) == 0
+        listed = json.loads(capsys.readouterr().out)
+        assert len(listed) == int(count)
+        assert all(len(one) > 2 and all(one.values()) for one in listed)
+
+
+def test_plan_and_score_print_json(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out = tmp_path / "plan.json"
+    assert main(["plan", ROOM, "--planner", "straight", "--json", "--out", str(out)]) == 0
+    assert capsys.readouterr().out == out.read_text()
+    episode = str(tmp_path / "episode.npz")
+    assert main(["run", "maze-2d-3", "--policy", "straight", "--out", episode]) == 0
+    capsys.readouterr()
+    assert main(["score", episode, "--json"]) == 0
+    (scored,) = json.loads(capsys.readouterr().out)
+    assert scored["episode"] == episode and scored["success"] is True
+    assert 0.0 < scored["metrics"]["E_nav"] <= 1.0
+
+
+def test_score_says_what_another_file_is(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    field = str(tmp_path / "field.npz")
+    assert main(["ice", "--concentration", "0.05", "--out", field]) == 0
+    for path, said in ((ROOM, "it is no .npz archive"), (field, "it holds 'vertices', 'offsets'")):
+        capsys.readouterr()
+        assert main(["score", path]) == 2
+        text = capsys.readouterr().err
+        assert text.count("\n") == 1 and said in text
+
+
+def test_doctor(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    assert main(["doctor", "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert set(found["libraries"]) == {*BASE, *EXTRAS}
+    assert found["kernels"]["known"] >= found["kernels"]["compiled"] >= 0
+    monkeypatch.setitem(sys.modules, "pymunk", None)
+    monkeypatch.setattr(
+        "pushplan.cli.doctor.find_spec", lambda name: None if name == "pymunk" else object()
+    )
+    assert main(["doctor"]) == 0
+    assert "sim: missing pymunk; type: pip install 'pushplan[sim]'" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("count", [5, 40])
+def test_at_most_three_near_names(count: int) -> None:
+    text = unknown_name_message("suite", "maze-9", [f"maze-{k}" for k in range(count)])
+    nearest = text.partition("nearest of")[2]
+    assert len(re.findall(r"maze-\d", nearest)) in (0, 3)
+
+
+def test_kernels_that_a_worker_compiles_are_told_of() -> None:
+    fcntl = pytest.importorskip("fcntl")
+    from pushplan.planners.shortest_path import ShortestPath  # noqa: F401
+
+    pending = PendingKernels("straight", "somebody-elses.py:Policy")
+    assert str(pending) == ""
+    name = next(name for name in expected_kernels("straight") if "control.waiting" in name)
+    from pushplan.control import waiting
+
+    cache = getattr(waiting, name.rpartition(".")[2]).cache
+    path = Path(cache.cache_path) / f"{cache._stem}.lock"
+    with path.open("a") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        assert re.fullmatch(r"compiling kernels, about [\d.]+ \w+ at most, once", str(pending))
+    pending.finish()
+    assert str(pending) == ""
+
+
+@pytest.mark.slow
+def test_the_demo_shows_three_episodes(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out = tmp_path / "demo"
+    assert main(["demo", "--out", str(out)]) == 0
+    text = capsys.readouterr().out
+    assert text.count(": success") == 3 and f"page: {out / 'report.html'}" in text
+    assert os.path.getsize(out / "report.html") > 100_000

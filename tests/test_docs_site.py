@@ -1,0 +1,98 @@
+"""The site: every public name and parameter is in the reference, examples run, links lead on."""
+
+from __future__ import annotations
+
+import doctest
+import importlib
+import importlib.util
+import re
+import sys
+from pathlib import Path
+from types import ModuleType
+
+import pytest
+
+from pushplan.cli import main
+
+ROOT = Path(__file__).parents[1]
+DOCS = ROOT / "docs"
+
+
+@pytest.fixture(scope="module")
+def site() -> ModuleType:
+    """What makes the pages; it needs Sphinx only for comments on constants."""
+    sys.path.insert(0, str(DOCS / "site"))
+    try:
+        return importlib.import_module("generate")
+    finally:
+        sys.path.remove(str(DOCS / "site"))
+
+
+def test_every_public_name_is_described_once(
+    site: ModuleType, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    names = site.public_names
+    monkeypatch.setattr(names, "comment_on", lambda package, name: "")
+    pages = {package: site.api_page(package) for package in names.packages()}
+    assert {"world", "planners", "envs", "metrics", "scenarios", "evaluation"} <= set(pages)
+    for package, page in pages.items():
+        for name in names.names_of(package):
+            described = [p for p in pages if re.search(rf"^\.\. \w+:: {name}$", pages[p], re.M)]
+            assert described == [names.homes()[name]], name
+            assert package in described or f"`~pushplan.{described[0]}.{name}`" in page
+
+
+def test_every_parameter_has_a_line_with_a_text(site: ModuleType) -> None:
+    page, read = site.parameter_page(), site.parameters
+    for kind in read.classes():
+        for one in read.parameters(kind):
+            assert one.text, f"{kind.__name__}.{one.name}"
+            assert f"`{kind.__name__}` | `{one.name}` | " in page
+    assert re.search(r"`KinodynamicRRTConfig` \|", page) and "`RearrangementConfig`" in page
+    assert re.search(r"`MppiConfig` \| `stride` \| `0.3` \| R \| .*\| float > 0 \|", page)
+
+
+def test_every_option_of_the_command_line_has_a_line(site: ModuleType) -> None:
+    page = site.command_page()
+    for command in ("demo", "bench", "plan"):
+        assert f"## pushplan {command}\n" in page
+    assert "| `--json` |" in page and "| 130 | interrupted" in page
+
+
+def test_every_page_is_in_the_order_of_the_site() -> None:
+    listed = set(re.findall(r"^([\w-]+)$", (DOCS / "index.md").read_text("utf-8"), re.MULTILINE))
+    assert {path.stem for path in DOCS.glob("*.md")} - {"index"} <= listed
+
+
+@pytest.mark.parametrize("page", sorted(DOCS.glob("*.md")), ids=lambda page: page.stem)
+def test_links_between_pages_lead_somewhere(page: Path) -> None:
+    for link in re.findall(r"\]\(([^)#\s:]+)(?:#[^)]*)?\)", page.read_text("utf-8")):
+        assert link.startswith("generated/") or (DOCS / link).exists(), link
+
+
+@pytest.mark.parametrize(
+    "module", ["world.stop", "perception.object_tracker", "evaluation.benchmark"]
+)
+def test_examples_of_docstrings_run(module: str) -> None:
+    found = doctest.testmod(importlib.import_module(f"pushplan.{module}"))
+    assert found.attempted and not found.failed
+
+
+def test_the_start_page_runs(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(ROOT)
+    text = (DOCS / "start.md").read_text("utf-8")
+    (block,) = re.findall(r"^```python\n(.*?)^```$", text, re.MULTILINE | re.DOTALL)
+    exec(compile(block, "start.md", "exec"), {})
+    for command in re.findall(r"^pushplan (?:list|doctor).*$", text, re.MULTILINE):
+        assert main(command.split()[1:]) == 0
+
+
+def test_a_site_that_cannot_be_reached_is_left_out(tmp_path: Path) -> None:
+    spec = importlib.util.spec_from_file_location("inventories", DOCS / "site" / "inventories.py")
+    assert spec is not None and spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    assert module.reachable({"nobody": "http://127.0.0.1:9/", "other": "file:///none/"}) == {}
+    there = f"{tmp_path.as_uri()}/"
+    (tmp_path / "objects.inv").write_bytes(b"# Sphinx inventory version 2\n")
+    assert module.reachable({"one": there, "other": "file:///none/"}) == {"one": (there, None)}
