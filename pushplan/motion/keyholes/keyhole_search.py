@@ -163,7 +163,7 @@ class KeyholeSearch:
         for k in dict.fromkeys(chosen):
             pose = end.state.poses[k]
             clearance = self._space.radius + self._space.cell
-            for push in line_pushes(self.world, k, pose, clearance, self.config.offset):
+            for push in line_pushes(self.world, k, pose, clearance, self.config.offsets):
                 if end.state.gets_to(push.start):
                     yield from self._push(end, push, rank)
                     if self._stopped(self.pushes):

@@ -49,7 +49,7 @@ def straight(pose: FloatArray, along: FloatArray) -> FloatArray:
 
 
 def line_pushes(
-    world: World, k: int, pose: FloatArray, clearance: float, offset: float
+    world: World, k: int, pose: FloatArray, clearance: float, offsets: tuple[float, ...]
 ) -> Iterator[LinePush]:
     """The pushes of object ``k`` at a pose (3,): at each face, in its middle and beside it.
 
@@ -58,7 +58,7 @@ def line_pushes(
         k: index of the object.
         pose: of the object.
         clearance: of the robot's middle from the face at the start [m].
-        offset: how far beside the middle, as a fraction of half the face.
+        offsets: how far beside the middle, as fractions of half the face.
     """
     size = world.robot.circumscribed_radius
     front = float(world.robot.vertices[:, 0].max())
@@ -71,6 +71,6 @@ def line_pushes(
             continue
         out = np.array([edge[1], -edge[0]]) / length
         heading = float(np.arctan2(-out[1], -out[0]))
-        for beside in (0.0, offset, -offset) if offset else (0.0,):
+        for beside in offsets:
             place = 0.5 * (a + b) + 0.5 * beside * edge + clearance * out
             yield LinePush(k, np.array([*place, heading]), clearance - front)

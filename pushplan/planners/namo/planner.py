@@ -1,0 +1,93 @@
+"""`Namo`: opens closed ways by pushes that are chosen for it, one keyhole after another."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from pushplan.interaction import InteractionModel, QuasiStatic
+from pushplan.motion.keyholes import KeyholeConfig, KeyholeSearch
+from pushplan.motion.keyholes.keyhole_plan import keyhole_plan
+from pushplan.planners.registry import make_planner
+from pushplan.world import Drive, PlanResult, PlanStatus, Planner, Stop, World
+from pushplan.world.checked_fields import PositiveFraction
+from pushplan.world.checks import expect
+from pushplan.world.planning_call import PlanningCall
+from pushplan.world.stop import DefaultBudget
+
+
+@dataclass(frozen=True)
+class NamoConfig(KeyholeConfig):
+    """Parameters of `Namo`: those of its search, described in `KeyholeConfig`, and one more.
+
+    Args:
+        turn_fraction: fraction of the greatest turn rate that plans use; the rest is for tracking.
+    """
+
+    turn_fraction: PositiveFraction = 0.9
+
+
+@dataclass(frozen=True)
+class Namo:
+    """Navigation among movable obstacles, for a robot that turns on the spot and goes back.
+
+    Where the goal lies in the component of free space that the robot is in, or the robot cannot
+    turn on the spot, the plan is that of the navigator. Elsewhere a `KeyholeSearch` looks for
+    pushes that connect the component with that of the goal, at the cost l₀ + w Σ mᵢ lᵢ / m₀ and a
+    penalty for what they cut off. The robot drives as a disc between pushes, and backs off after
+    each.
+
+    Use it where objects hold the doors, and a wrong push may close them for good. Without a stop
+    rule it ends after a fixed number of pushes, so the same seed gives the same plan. One
+    iteration is a push that is simulated.
+
+    Args:
+        config: parameters.
+        interaction: predicts the objects; walls hold what is squeezed against them by default.
+        navigator: plans where the way is open, and where no push is found; the push-aware planner
+            by default.
+    """
+
+    config: NamoConfig = field(default_factory=NamoConfig)
+    interaction: InteractionModel = field(
+        default_factory=lambda: QuasiStatic(friction=0.1, static_friction=0.5)
+    )
+    navigator: Planner = field(default_factory=lambda: make_planner("push-aware"))
+
+    def __post_init__(self) -> None:
+        expect("config", self.config, NamoConfig)
+        expect("interaction", self.interaction, InteractionModel)  # type: ignore[type-abstract]
+        expect("navigator", self.navigator, Planner)  # type: ignore[type-abstract]
+
+    def plan(
+        self, world: World, *, stop: Stop | None = None, rng: np.random.Generator | None = None
+    ) -> PlanResult:
+        """Plan from ``world``; see `pushplan.world.Planner`.
+
+        Raises:
+            InvalidInputError: if the world's goal is not one for the robot.
+        """
+        call = PlanningCall(world, stop, rng, DefaultBudget(self.config.default_pushes))
+        world, robot = call.world, call.world.robot
+        goal = world.navigation_goal
+        there = goal.distance(*world.robot_pose[:2].tolist()) == 0.0
+        if there or robot.drive is not Drive.DIFFERENTIAL or robot.min_speed >= 0.0:
+            return self.navigator.plan(world, stop=stop, rng=call.rng)
+        search = KeyholeSearch(
+            world, self.config, self.interaction, lambda pushes: call.check(pushes, np.inf)
+        )
+        end = search.run()
+        if end is not None and end.before is not None:
+            plan = keyhole_plan(world, end, self.interaction, self.config.turn_fraction)
+            return call.result(
+                PlanStatus.SOLVED,
+                plan,
+                call.elapsed,
+                search.pushes,
+                search.expansions,
+                openings=float(len(end.chain()) - 1),
+            )
+        if end is None and not search.exhausted:
+            return call.result(call.stopped_status, iterations=search.pushes)
+        return self.navigator.plan(world, stop=stop, rng=call.rng)
