@@ -109,6 +109,10 @@ class World(ArrayRecord, CheckedFields):
         corners = transform_outlines(objects.poses, objects.drawn_vertices, objects.drawn_offsets)
         return self.manipulation_goal.contains_each(corners, objects.drawn_offsets)
 
+    def believing(self, fixed: ArrayLike) -> World:
+        """The same scene with the objects flagged in (K,) held not to move, and no others."""
+        return replace(self, movables=self.movables.holding_fixed(fixed))
+
     def with_fixed_as_static(self) -> World:
         """The same scene with the objects that are held not to move among what is static."""
         fixed = self.movables.fixed

@@ -115,4 +115,4 @@ class NamoTask(MazeTask):
         fixed = world.movables.fixed
         wrong = self.variations.movability == "wrong"
         told = np.logical_not(fixed) if wrong else np.zeros(len(fixed), dtype=bool)
-        return replace(world, movables=world.movables.holding_fixed(told))
+        return world.believing(told)

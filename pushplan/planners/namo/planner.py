@@ -10,11 +10,11 @@ from pushplan.interaction import InteractionModel, QuasiStatic
 from pushplan.motion.keyholes import KeyholeConfig, KeyholeSearch
 from pushplan.motion.keyholes.keyhole_plan import keyhole_plan
 from pushplan.planners.registry import make_planner
-from pushplan.world import Drive, PlanResult, PlanStatus, Planner, Stop, World
+from pushplan.world import Drive, Plan, Planner, PlanResult, PlanStatus, Stop, World
 from pushplan.world.checked_fields import PositiveFraction
 from pushplan.world.checks import expect
 from pushplan.world.planning_call import PlanningCall
-from pushplan.world.stop import DefaultBudget
+from pushplan.world.stop import DefaultBudget, StopCheck
 
 
 @dataclass(frozen=True)
@@ -36,7 +36,7 @@ class Namo:
     turn on the spot, the plan is that of the navigator. Elsewhere a `KeyholeSearch` looks for
     pushes that connect the component with that of the goal, at the cost l₀ + w Σ mᵢ lᵢ / m₀ and a
     penalty for what they cut off. The robot drives as a disc between pushes, and backs off after
-    each.
+    each. Where the navigator finds a cheaper plan, by pushing straight through, that is taken.
 
     Use it where objects hold the doors, and a wrong push may close them for good. Without a stop
     rule it ends after a fixed number of pushes, so the same seed gives the same plan. One
@@ -78,16 +78,45 @@ class Namo:
             world, self.config, self.interaction, lambda pushes: call.check(pushes, np.inf)
         )
         end = search.run()
-        if end is not None and end.before is not None:
-            plan = keyhole_plan(world, end, self.interaction, self.config.turn_fraction)
-            return call.result(
-                PlanStatus.SOLVED,
-                plan,
-                call.elapsed,
-                search.pushes,
-                search.expansions,
-                openings=float(len(end.chain()) - 1),
-            )
         if end is None and not search.exhausted:
             return call.result(call.stopped_status, iterations=search.pushes)
-        return self.navigator.plan(world, stop=stop, rng=call.rng)
+        rest = _Rest(call, search.pushes) if call.has_rule else None
+        other = self.navigator.plan(world, stop=rest, rng=call.rng)
+        if end is None and not other.status.has_plan and not call.cancelled:
+            return call.result(PlanStatus.WAY_CLOSED, iterations=search.pushes)
+        if end is None or end.before is None:
+            return other
+        plan = keyhole_plan(world, end, self.interaction, self.config.turn_fraction)
+        weight = self.config.push_weight
+        if other.status is PlanStatus.SOLVED and _cost(other.plan, weight) < _cost(plan, weight):
+            return other
+        return call.result(
+            PlanStatus.SOLVED,
+            plan,
+            call.elapsed,
+            search.pushes,
+            search.expansions,
+            openings=float(len(end.chain()) - 1),
+        )
+
+
+def _cost(plan: Plan | None, weight: float) -> float:
+    """m₀ l₀ + w Σ mᵢ lᵢ of a plan [kg m]."""
+    assert plan is not None
+    return plan.travel_cost + weight * plan.interaction_cost
+
+
+class _Rest(Stop):
+    """What is left of the stop rule of a call after some iterations."""
+
+    def __init__(self, call: PlanningCall, iterations: int) -> None:
+        self._call, self._iterations = call, iterations
+
+    def start(self) -> StopCheck:
+        """Go on with the rule of the call."""
+        return lambda iterations, cost: self._call.check(self._iterations + iterations, cost)
+
+    @property
+    def cancelled(self) -> bool:
+        """Whether the call was cancelled."""
+        return self._call.cancelled
