@@ -120,9 +120,7 @@ class World(ArrayRecord, CheckedFields):
             return self
         static = self.static
         held = [self.movables.outline_world(k) for k in np.flatnonzero(fixed).tolist()]
-        solid = StaticMap(
-            (*static.polygons, *held), static.segments, static.radii, static.bounds
-        )
+        solid = StaticMap((*static.polygons, *held), static.segments, static.radii, static.bounds)
         return replace(self, static=solid, movables=self.movables.select(~fixed))
 
     def robot_outline_world(self) -> tuple[FloatArray, ...]:

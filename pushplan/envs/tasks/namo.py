@@ -53,7 +53,7 @@ class NamoTask(MazeTask):
     presets = tuple(PRESETS)
     actions: ClassVar[tuple[str, ...]] = ("velocity", "wheels")
     preset_table = PRESETS
-    variation_class = NamoVariations
+    variation_class = NamoVariations  # type: ignore[assignment]
     variations: NamoVariations  # type: ignore[assignment]
 
     opening: tuple[Opening, ...] = ()
@@ -78,7 +78,8 @@ class NamoTask(MazeTask):
             )
             if proves(world, opening):
                 self.opening = opening
-                self.static, self.goal = world.static, world.navigation_goal
+                assert isinstance(world.goal, GoalDisc)
+                self.static, self.goal = world.static, world.goal
                 self.__dict__.pop("field", None)
                 self.__dict__.pop("_farthest", None)
                 return world

@@ -55,11 +55,16 @@ class DiscState:
     Args:
         space: the space.
         poses: (K, 3) of the objects.
-        robot: (3,) pose of the robot; its disc is free there.
+
+    Attributes:
+        robot: (3,) pose of the robot, whose disc is free there; set before anything is asked that
+            depends on it.
     """
 
-    def __init__(self, space: DiscSpace, poses: FloatArray, robot: FloatArray) -> None:
-        self.space, self.poses, self.robot = space, poses, robot
+    robot: FloatArray
+
+    def __init__(self, space: DiscSpace, poses: FloatArray) -> None:
+        self.space, self.poses = space, poses
         each = [space.object_clearance(k, pose) for k, pose in enumerate(poses)]
         self.objects: FloatArray = (
             np.stack(each) if each else np.full((1, *space.grid.shape), np.inf)
@@ -71,7 +76,8 @@ class DiscState:
     def reached(self) -> BoolArray:
         """(rows, columns) which cells the robot gets to without touching anything."""
         label = self.free.at(self.robot)
-        return (self.free.labels == label) & (label > 0)
+        reached: BoolArray = (self.free.labels == label) & (label > 0)
+        return reached
 
     @property
     def is_open(self) -> bool:

@@ -24,7 +24,7 @@ class KeyholeConfig(CheckedFields):
         cell: side of the cells of the configuration space [R].
         margin: clearance kept from walls during a push [R].
         offsets: how far beside the middle of a face the robot pushes, as fractions of half the
-            face; at its ends it pushes neighbours along.
+            face; beyond 1 it pushes neighbours too.
         longest: length of a push at most [R].
         step: between two places where a push may end [R].
         gain: area of floor that has to become reachable for a push to count as an opening [R²].
@@ -41,7 +41,7 @@ class KeyholeConfig(CheckedFields):
     clearance: PositiveFloat = 1.06
     cell: PositiveFraction = 0.1
     margin: Fraction = 0.06
-    offsets: tuple[float, ...] = (0.0, 0.5, -0.5, 1.0, -1.0)
+    offsets: tuple[float, ...] = (0.0, 0.5, -0.5, 1.25, -1.25)
     longest: PositiveFloat = 8.0
     step: PositiveFloat = 0.5
     gain: PositiveFloat = 4.0

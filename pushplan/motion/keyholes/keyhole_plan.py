@@ -32,10 +32,9 @@ def keyhole_plan(
     poses, curvatures = _driven(world, end)
     found = interaction.sweep(world, poses)
     objects = found.object_poses
-    moved = step_lengths(objects) @ world.movables.masses if len(world.movables) else []
-    works = np.concatenate([[0.0], np.cumsum(moved)])
-    if len(works) != len(poses):
-        works = np.zeros(len(poses))
+    works = np.zeros(len(poses))
+    if len(world.movables):
+        works[1:] = np.cumsum(step_lengths(objects) @ world.movables.masses)
     return timed_plan(
         world, SweptPath(poses, curvatures, objects, arc_lengths(poses), works), turn_fraction
     )

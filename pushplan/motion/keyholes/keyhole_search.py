@@ -15,10 +15,10 @@ from pushplan.interaction import InteractionModel
 from pushplan.motion.collision import first_blocked, footprint, obstacles
 from pushplan.motion.keyholes.disc_space import DiscSpace, DiscState
 from pushplan.motion.keyholes.keyhole_config import KeyholeConfig
-from pushplan.motion.keyholes.line_push import LinePush, line_pushes, straight
+from pushplan.motion.keyholes.line_push import CONTACT, SPACING, LinePush, line_pushes, straight
 from pushplan.world import World
 from pushplan.world.checks import FloatArray
-from pushplan.world.polyline import path_length
+from pushplan.world.polyline import path_length, path_lengths
 
 _LEAVING = 2.5  # how far the robot drives straight to where its disc is free [circumscribed radii]
 
@@ -33,7 +33,6 @@ class KeyholeEnd:
         before: the scene before the last push; None at the start.
         drive: (N, 2) corners of the drive from there to the start of the push [m].
         path: (N, 3) the push, or how the robot got free at the start; ahead, then back.
-        turning: index of the pose of ``path`` from which it leads back.
         pushed: index of the object that was pushed, -1 at the start.
     """
 
@@ -42,12 +41,12 @@ class KeyholeEnd:
     before: KeyholeEnd | None
     drive: FloatArray
     path: FloatArray
-    turning: int
     pushed: int
 
     def chain(self) -> list[KeyholeEnd]:
         """The scenes that have led to this one, from the start on."""
-        found, at = [], self
+        found: list[KeyholeEnd] = []
+        at: KeyholeEnd | None = self
         while at is not None:
             found.append(at)
             at = at.before
@@ -127,17 +126,18 @@ class KeyholeSearch:
 
     def _start(self) -> KeyholeEnd | None:
         """The scene now, with the robot driven straight to where its disc is free."""
-        robot, poses = self.world.robot_pose, self.world.movables.poses
+        robot = self.world.robot_pose
+        state = DiscState(self._space, self.world.movables.poses)
         steps = np.arange(0.0, _LEAVING, self.config.cell)
-        for length in sorted([*steps, *-steps], key=abs):
-            path = straight(robot, np.linspace(0.0, length * self._size, 1 + int(abs(length) / 0.1)))
-            state = DiscState(self._space, poses, path[-1])
+        for length in sorted([*steps, *-steps[1:]], key=abs):
+            along = np.linspace(0.0, length * self._size, 2 + int(abs(length) / SPACING))
+            path = straight(robot, along)
             if not state.is_free(path[-1]):
                 continue
             if length < 0.0 or self.interaction.sweep(self.world, path).work == 0.0:
-                turning = 0 if length < 0.0 else len(path) - 1
+                state.robot = path[-1]
                 cost = abs(length) * self._size
-                return KeyholeEnd(state, cost, None, robot[None, :2], path, turning, -1)
+                return KeyholeEnd(state, cost, None, robot[None, :2], path, -1)
         return None
 
     def _put(self, end: KeyholeEnd) -> None:
@@ -175,7 +175,7 @@ class KeyholeSearch:
             return False
         here, there = end.state.poses[k, :2], end.state.poses[on_path[0], :2]
         reach = self.world.movables.radii[k] + self.world.movables.radii[on_path[0]]
-        return math.dist(here, there) < reach + 2.0 * self._size
+        return math.dist(here, there) < float(reach) + 2.0 * self._size
 
     def _push(self, end: KeyholeEnd, push: LinePush, rank: int) -> Iterator[KeyholeEnd]:
         """The scenes after a push, each ended where it opens something, or in a later rank."""
@@ -188,16 +188,14 @@ class KeyholeSearch:
         scene = self.world.moved(robot_pose=path[0], movable_poses=end.state.poses)
         swept = self.interaction.sweep(scene, path[: max(free, 1)])
         last = free - 1 if swept.jammed_at < 0 else swept.jammed_at - 1
-        contact = int(push.lead / (push.lead + config.longest * size) * (len(path) - 1))
-        step = max(1, round(config.step * size * (len(path) - 1) / (push.lead + config.longest * size)))
-        ends = list(range(contact + step, last + 1, step))
+        step = max(1, round(config.step / SPACING))
+        ends = list(range(CONTACT + step, last + 1, step))
         left = 2  # the first place that is open, and one beyond
         for n in ends:
             new = self._after(end, push, path[: n + 1], swept.object_poses[: n + 1])
             if new is None:
                 continue
-            opens = new.state.is_open or self._gain(end, new) > config.gain * size**2
-            if opens:
+            if new.state.is_open or self._gain(end, new) > config.gain * size**2:
                 left -= 1
                 yield new
                 if left == 0:
@@ -209,31 +207,27 @@ class KeyholeSearch:
         self, end: KeyholeEnd, push: LinePush, path: FloatArray, poses: FloatArray
     ) -> KeyholeEnd | None:
         """The scene after a push (N, 3) with the objects (N, K, 3), the robot backed off."""
-        moved = poses[-1]
+        config, moved = self.config, poses[-1]
         if np.array_equal(moved[push.object_index], end.state.poses[push.object_index]):
             return None
-        cell, size = self._space.cell, self._size
-        longest = path_length(path)
-        for back in np.arange(cell, longest, cell):
-            robot = straight(path[-1], np.array([-back]))[0]
-            state = DiscState(self._space, moved, robot)
-            if not state.is_free(robot):
+        cell, driven = self._space.cell, path_length(path)
+        state = DiscState(self._space, moved)
+        for back in np.arange(cell, driven, cell):
+            away = straight(path[-1], -np.linspace(0.0, back, int(back / cell) + 2)[1:])
+            if not state.is_free(away[-1]):
                 continue
-            away = straight(path[-1], -np.linspace(0.0, back, int(back / (0.1 * size)) + 2)[1:])
-            masses = self.world.movables.masses
-            work = float(masses @ np.hypot(*np.moveaxis(np.diff(poses, axis=0), 2, 0)[:2]).sum(0))
-            cost = end.state.length_to(push.start) + longest + back
-            cost += self.config.push_weight * work / self.world.robot.mass
-            new = KeyholeEnd(
+            state.robot = away[-1]
+            work = float(self.world.movables.masses @ path_lengths(poses))
+            cost = end.cost + end.state.length_to(push.start) + driven + back
+            cost += config.push_weight * work / self.world.robot.mass
+            return KeyholeEnd(
                 state,
-                end.cost + cost + self._closing_cost(end, state),
+                cost + self._closing_cost(end, state),
                 end,
                 end.state.path_to(push.start[:2]),
                 np.concatenate([path, away]),
-                len(path) - 1,
                 push.object_index,
             )
-            return new
         return None
 
     def _gain(self, end: KeyholeEnd, new: KeyholeEnd) -> float:

@@ -13,6 +13,8 @@ from pushplan.world.checks import FloatArray
 _NARROW = 0.3  # faces narrower than this are not pushed [circumscribed radii]
 SPACING = 0.1
 """Distance between the poses of a push [circumscribed radii]."""
+CONTACT = 5
+"""Index of the pose of a push in which the robot touches the face."""
 
 
 @dataclass(frozen=True)
@@ -30,15 +32,15 @@ class LinePush:
     lead: float
 
     def path(self, length: float, size: float) -> FloatArray:
-        """(N, 3) poses from the start through the contact and on for a length [m].
+        """(N, 3) poses from the start to the contact, which has index `CONTACT`, and on.
 
         Args:
             length: of the push itself [m].
             size: circumscribed radius of the robot [m].
         """
-        whole = self.lead + length
-        along = np.linspace(0.0, whole, int(np.ceil(whole / (SPACING * size))) + 1)
-        return straight(self.start, along)
+        lead = np.linspace(0.0, self.lead, CONTACT + 1)
+        on = self.lead + np.arange(1, round(length / (SPACING * size)) + 1) * SPACING * size
+        return straight(self.start, np.concatenate([lead, on]))
 
 
 def straight(pose: FloatArray, along: FloatArray) -> FloatArray:

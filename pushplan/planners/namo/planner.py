@@ -10,8 +10,8 @@ from pushplan.interaction import InteractionModel, QuasiStatic
 from pushplan.motion.keyholes import KeyholeConfig, KeyholeSearch
 from pushplan.motion.keyholes.keyhole_plan import keyhole_plan
 from pushplan.planners.registry import make_planner
-from pushplan.world import Drive, Plan, Planner, PlanResult, PlanStatus, Stop, World
-from pushplan.world.checked_fields import PositiveFraction
+from pushplan.world import Drive, MaxIterations, Plan, Planner, PlanResult, PlanStatus, Stop, World
+from pushplan.world.checked_fields import PositiveFraction, PositiveInt
 from pushplan.world.checks import expect
 from pushplan.world.planning_call import PlanningCall
 from pushplan.world.stop import DefaultBudget, StopCheck
@@ -23,9 +23,11 @@ class NamoConfig(KeyholeConfig):
 
     Args:
         turn_fraction: fraction of the greatest turn rate that plans use; the rest is for tracking.
+        straight_iterations: of the navigator at most, where the way is closed.
     """
 
     turn_fraction: PositiveFraction = 0.9
+    straight_iterations: PositiveInt = 6000
 
 
 @dataclass(frozen=True)
@@ -80,7 +82,9 @@ class Namo:
         end = search.run()
         if end is None and not search.exhausted:
             return call.result(call.stopped_status, iterations=search.pushes)
-        rest = _Rest(call, search.pushes) if call.has_rule else None
+        rest: Stop = MaxIterations(self.config.straight_iterations)
+        if call.has_rule:
+            rest |= _Rest(call, search.pushes)
         other = self.navigator.plan(world, stop=rest, rng=call.rng)
         if end is None and not other.status.has_plan and not call.cancelled:
             return call.result(PlanStatus.WAY_CLOSED, iterations=search.pushes)
