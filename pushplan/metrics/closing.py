@@ -5,9 +5,10 @@ from __future__ import annotations
 from functools import lru_cache
 
 from pushplan.interaction import QuasiStatic
-from pushplan.motion.keyholes import KeyholeConfig, KeyholeSearch
-from pushplan.world import Drive, Episode, GoalDisc, GoalLine, World
+from pushplan.motion.keyholes import KeyholeConfig, KeyholeSearch, suits_keyholes
+from pushplan.world import Episode, GoalDisc, GoalLine, World
 
+_CONFIG = KeyholeConfig()
 PUSHES = 300
 """Simulated pushes after which a scene counts as unsolvable."""
 
@@ -22,16 +23,13 @@ def made_unsolvable(episode: Episode) -> float | None:
     are fixed in the recorded start are static. An episode with success ends solved.
 
     Returns:
-        None where the goal is one for the objects, the robot does not turn on the spot and drive
-        back, or the start counts as unsolvable.
+        None where the goal is one for the objects, there are no walls or no objects or too many,
+        the robot does not turn on the spot and drive back, or the start counts as unsolvable.
     """
     world = episode.world
-    robot = world.robot
     if not isinstance(world.goal, GoalDisc | GoalLine):
         return None
-    if robot.drive is not Drive.DIFFERENTIAL or robot.min_speed >= 0.0:
-        return None
-    if not _solvable(episode.world_at(0)):
+    if not suits_keyholes(world, _CONFIG) or not _solvable(episode.world_at(0)):
         return None
     return 0.0 if episode.success or _solvable(episode.world_at(-1)) else 1.0
 
@@ -41,7 +39,7 @@ def _solvable(world: World) -> bool:
     """Whether pushes are found that lead to the goal."""
     search = KeyholeSearch(
         world.with_fixed_as_static(),
-        KeyholeConfig(),
+        _CONFIG,
         QuasiStatic(friction=0.1, static_friction=0.5),
         lambda pushes: pushes >= PUSHES,
     )

@@ -16,10 +16,11 @@ from pushplan.motion.collision import first_blocked, footprint, obstacles
 from pushplan.motion.keyholes.disc_space import DiscSpace, DiscState
 from pushplan.motion.keyholes.keyhole_config import KeyholeConfig
 from pushplan.motion.keyholes.line_push import CONTACT, SPACING, LinePush, line_pushes, straight
-from pushplan.world import World
+from pushplan.world import Drive, World
 from pushplan.world.checks import FloatArray
 from pushplan.world.polyline import path_length, path_lengths
 
+_MOST_CELLS = 400_000  # of the configuration space
 _LEAVING = 2.5  # how far the robot drives straight to where its disc is free [circumscribed radii]
 
 
@@ -59,6 +60,24 @@ class _Entry:
     number: int
     rank: int = field(compare=False)
     end: KeyholeEnd = field(compare=False)
+
+
+def suits_keyholes(world: World, config: KeyholeConfig) -> bool:
+    """Whether a `KeyholeSearch` makes sense: walls, few objects, and a robot that turns and backs.
+
+    Args:
+        world: the scene.
+        config: parameters.
+    """
+    robot, static = world.robot, world.static
+    sides = (static.bounds[2:] - static.bounds[:2]) / (config.cell * robot.circumscribed_radius)
+    return (
+        robot.drive is Drive.DIFFERENTIAL
+        and robot.min_speed < 0.0
+        and 0 < len(world.movables) <= config.most_objects
+        and bool(static.convex_parts)
+        and float(np.prod(sides)) <= _MOST_CELLS
+    )
 
 
 class KeyholeSearch:
@@ -192,6 +211,8 @@ class KeyholeSearch:
         ends = list(range(CONTACT + step, last + 1, step))
         left = 2  # the first place that is open, and one beyond
         for n in ends:
+            if self._stopped(self.pushes):
+                return
             new = self._after(end, push, path[: n + 1], swept.object_poses[: n + 1])
             if new is None:
                 continue

@@ -7,10 +7,10 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from pushplan.interaction import InteractionModel, QuasiStatic
-from pushplan.motion.keyholes import KeyholeConfig, KeyholeSearch
+from pushplan.motion.keyholes import KeyholeConfig, KeyholeSearch, suits_keyholes
 from pushplan.motion.keyholes.keyhole_plan import keyhole_plan
 from pushplan.planners.registry import make_planner
-from pushplan.world import Drive, MaxIterations, Plan, Planner, PlanResult, PlanStatus, Stop, World
+from pushplan.world import MaxIterations, Plan, Planner, PlanResult, PlanStatus, Stop, World
 from pushplan.world.checked_fields import PositiveFraction, PositiveInt
 from pushplan.world.checks import expect
 from pushplan.world.planning_call import PlanningCall
@@ -34,8 +34,9 @@ class NamoConfig(KeyholeConfig):
 class Namo:
     """Navigation among movable obstacles, for a robot that turns on the spot and goes back.
 
-    Where the goal lies in the component of free space that the robot is in, or the robot cannot
-    turn on the spot, the plan is that of the navigator. Elsewhere a `KeyholeSearch` looks for
+    Where the goal lies in the component of free space that the robot is in, the robot cannot turn
+    on the spot or drive back, there are no walls or too many objects, the plan is that of the
+    navigator. Elsewhere a `KeyholeSearch` looks for
     pushes that connect the component with that of the goal, at the cost l₀ + w Σ mᵢ lᵢ / m₀ and a
     penalty for what they cut off. The robot drives as a disc between pushes, and backs off after
     each. Where the navigator finds a cheaper plan, by pushing straight through, that is taken.
@@ -71,10 +72,9 @@ class Namo:
             InvalidInputError: if the world's goal is not one for the robot.
         """
         call = PlanningCall(world, stop, rng, DefaultBudget(self.config.default_pushes))
-        world, robot = call.world, call.world.robot
-        goal = world.navigation_goal
+        world, goal = call.world, call.world.navigation_goal
         there = goal.distance(*world.robot_pose[:2].tolist()) == 0.0
-        if there or robot.drive is not Drive.DIFFERENTIAL or robot.min_speed >= 0.0:
+        if there or not suits_keyholes(world, self.config):
             return self.navigator.plan(world, stop=stop, rng=call.rng)
         search = KeyholeSearch(
             world, self.config, self.interaction, lambda pushes: call.check(pushes, np.inf)
