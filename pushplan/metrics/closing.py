@@ -5,7 +5,12 @@ from __future__ import annotations
 from functools import lru_cache
 
 from pushplan.interaction import QuasiStatic
-from pushplan.motion.keyholes import KeyholeConfig, KeyholeSearch, suits_keyholes
+from pushplan.motion.keyholes import (
+    KeyholeConfig,
+    KeyholeSearch,
+    nearest_free_pose,
+    suits_keyholes,
+)
 from pushplan.world import Episode, GoalDisc, GoalLine, World
 
 _CONFIG = KeyholeConfig()
@@ -36,9 +41,10 @@ def made_unsolvable(episode: Episode) -> float | None:
 
 @lru_cache(maxsize=64)
 def _solvable(world: World) -> bool:
-    """Whether pushes are found that lead to the goal."""
+    """Whether pushes are found that lead to the goal, from the free place nearest to the robot."""
+    world = world.with_fixed_as_static()
     search = KeyholeSearch(
-        world.with_fixed_as_static(),
+        world.moved(robot_pose=nearest_free_pose(world, _CONFIG)),
         _CONFIG,
         QuasiStatic(friction=0.1, static_friction=0.5),
         lambda pushes: pushes >= PUSHES,

@@ -88,6 +88,15 @@ class DiscState:
         """Whether the disc fits at a point (2,)."""
         return bool(self.clearance[self.space.cell_of(point)] > self.space.radius)
 
+    def nearest_free(self, pose: FloatArray) -> FloatArray:
+        """(3,) the pose nearest to one (3,) where the disc fits; that one where it fits nowhere."""
+        free = np.flatnonzero(self.clearance.ravel() > self.space.radius)
+        if not len(free) or self.is_free(pose):
+            return pose
+        points = self.space.points(free)
+        nearest = points[int(np.argmin(np.hypot(*(points - pose[:2]).T)))]
+        return np.array([*nearest, pose[2]])
+
     def gets_to(self, point: FloatArray) -> bool:
         """Whether the robot gets to a point (2,) without touching anything."""
         return bool(self.reached[self.space.cell_of(point)])

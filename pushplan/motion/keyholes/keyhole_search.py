@@ -80,6 +80,16 @@ def suits_keyholes(world: World, config: KeyholeConfig) -> bool:
     )
 
 
+def nearest_free_pose(world: World, config: KeyholeConfig) -> FloatArray:
+    """(3,) the pose nearest to the robot's in which the disc of a `KeyholeSearch` is free.
+
+    The robot's own pose where there is none.
+    """
+    size = world.robot.circumscribed_radius
+    space = DiscSpace(world, config.clearance * size, config.cell * size)
+    return DiscState(space, world.movables.poses).nearest_free(world.robot_pose)
+
+
 class KeyholeSearch:
     """Best-first search over pushes that connect components of the robot's free space.
 
