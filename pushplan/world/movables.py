@@ -239,7 +239,7 @@ class Movables(ArrayRecord, CheckedFields):
     def holding_fixed(self, fixed: ArrayLike) -> Movables:
         """The same objects, of which those flagged in (K,) are held not to move."""
         clone = self._unchecked(self.__dict__)
-        clone.__dict__["fixed"] = array("fixed", fixed, (len(self),), dtype=np.bool_)
+        clone.__dict__["fixed"] = array("movables.fixed", fixed, (len(self),), dtype=np.bool_)
         return clone
 
     def select(self, keep: ArrayLike) -> Movables:

@@ -11,7 +11,7 @@ from pushplan.motion.keyholes import KeyholeConfig, KeyholeSearch, suits_keyhole
 from pushplan.motion.keyholes.keyhole_plan import keyhole_plan
 from pushplan.planners.registry import make_planner
 from pushplan.world import MaxIterations, Plan, Planner, PlanResult, PlanStatus, Stop, World
-from pushplan.world.checked_fields import PositiveFraction, PositiveInt
+from pushplan.world.checked_fields import NonNegativeInt, PositiveFraction
 from pushplan.world.checks import expect
 from pushplan.world.planning_call import PlanningCall
 from pushplan.world.stop import DefaultBudget, StopCheck
@@ -23,11 +23,12 @@ class NamoConfig(KeyholeConfig):
 
     Args:
         turn_fraction: fraction of the greatest turn rate that plans use; the rest is for tracking.
-        straight_iterations: of the navigator at most, where the way is closed.
+        straight_iterations: of the navigator at most, where the way is closed; at 0 it is asked
+            only where no push is found.
     """
 
     turn_fraction: PositiveFraction = 0.9
-    straight_iterations: PositiveInt = 6000
+    straight_iterations: NonNegativeInt = 6000
 
 
 @dataclass(frozen=True)
@@ -82,18 +83,19 @@ class Namo:
         end = search.run()
         if end is None and not search.exhausted:
             return call.result(call.stopped_status, iterations=search.pushes)
-        rest: Stop = MaxIterations(self.config.straight_iterations)
-        if call.has_rule:
-            rest |= _Rest(call, search.pushes)
-        other = self.navigator.plan(world, stop=rest, rng=call.rng)
-        if end is None and not other.status.has_plan and not call.cancelled:
+        if end is not None and end.before is None:
+            return self.navigator.plan(world, stop=stop, rng=call.rng)
+        other = self._straight(call, search.pushes, wanted=end is None)
+        if end is None:
+            assert other is not None
+            if other.status is not PlanStatus.TIMED_OUT:
+                return other
             return call.result(PlanStatus.WAY_CLOSED, iterations=search.pushes)
-        if end is None or end.before is None:
-            return other
         plan = keyhole_plan(world, end, self.interaction, self.config.turn_fraction)
         weight = self.config.push_weight
-        if other.status is PlanStatus.SOLVED and _cost(other.plan, weight) < _cost(plan, weight):
-            return other
+        if other is not None and other.status is PlanStatus.SOLVED:
+            if _cost(other.plan, weight) < _cost(plan, weight):
+                return other
         return call.result(
             PlanStatus.SOLVED,
             plan,
@@ -102,6 +104,16 @@ class Namo:
             search.expansions,
             openings=float(len(end.chain()) - 1),
         )
+
+    def _straight(self, call: PlanningCall, pushes: int, *, wanted: bool) -> PlanResult | None:
+        """What the navigator finds after some pushes were simulated; None if it is not asked."""
+        budget = self.config.straight_iterations
+        if not (budget or wanted):
+            return None
+        rest: Stop = MaxIterations(budget or self.config.default_pushes)
+        if call.has_rule:
+            rest |= _Rest(call, pushes)
+        return self.navigator.plan(call.world, stop=rest, rng=call.rng)
 
 
 def _cost(plan: Plan | None, weight: float) -> float:

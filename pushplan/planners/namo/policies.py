@@ -34,6 +34,13 @@ class NamoFollower(PlanFollower):
         self.movability = Movability(world)
         super().reset(world, rng)
 
+    def warm_up(self) -> None:
+        """See `pushplan.world.WarmsUp`."""
+        # here, as the warm-up makes policies
+        from pushplan.planners.namo.kernel_warmup import warm_up_namo
+
+        warm_up_namo()
+
     def act(self, world: World, observation: Any = None) -> Twist:
         """The twist for this step."""
         if self.movability is None:
