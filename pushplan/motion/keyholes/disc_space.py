@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import OrderedDict
 from functools import cached_property
 
 import numpy as np
@@ -11,6 +12,8 @@ from pushplan.geometry.free_components import FreeComponents, object_clearance
 from pushplan.search.grid_dijkstra import grid_dijkstra
 from pushplan.world import World
 from pushplan.world.checks import BoolArray, FloatArray, IntArray
+
+_KEPT = 200  # distances to objects that are kept
 
 
 class DiscSpace:
@@ -28,13 +31,16 @@ class DiscSpace:
         self.static = clearance_field(world.static, self.grid)
         x, y = np.meshgrid(self.grid.x, self.grid.y)
         self.goal: BoolArray = world.navigation_goal.contains(np.stack([x, y], axis=-1))
-        self._objects: dict[tuple[int, bytes], FloatArray] = {}
+        self._objects: OrderedDict[tuple[int, bytes], FloatArray] = OrderedDict()
 
     def object_clearance(self, k: int, pose: FloatArray) -> FloatArray:
         """(rows, columns) distance of each cell to object ``k`` at a pose (3,) [m]."""
         key = k, pose.tobytes()
         if key not in self._objects:
             self._objects[key] = object_clearance(self.world.movables, k, pose, self.grid)
+            if len(self._objects) > _KEPT:
+                self._objects.popitem(last=False)
+        self._objects.move_to_end(key)
         return self._objects[key]
 
     def cell_of(self, point: FloatArray) -> tuple[int, int]:
@@ -65,11 +71,9 @@ class DiscState:
 
     def __init__(self, space: DiscSpace, poses: FloatArray) -> None:
         self.space, self.poses = space, poses
-        each = [space.object_clearance(k, pose) for k, pose in enumerate(poses)]
-        self.objects: FloatArray = (
-            np.stack(each) if each else np.full((1, *space.grid.shape), np.inf)
-        )
-        self.clearance: FloatArray = np.minimum(space.static, self.objects.min(axis=0))
+        self.clearance: FloatArray = space.static.copy()
+        for k, pose in enumerate(poses):
+            np.minimum(self.clearance, space.object_clearance(k, pose), out=self.clearance)
         self.free = FreeComponents.of(space.grid, self.clearance, space.radius)
 
     @cached_property
@@ -151,7 +155,9 @@ class DiscState:
             return np.inf, []
         cells = self._chain(parents, last)
         rows, cols = np.divmod(cells, space.grid.shape[1])
-        near = self.objects[:, rows, cols]
+        near = np.full((len(self.poses) + 1, len(cells)), np.inf)
+        for k, pose in enumerate(self.poses):
+            near[k] = space.object_clearance(k, pose)[rows, cols]
         met = near.argmin(axis=0)[near.min(axis=0) <= space.radius]
         return float(costs[row, col]), list(dict.fromkeys(met.tolist()))
 
