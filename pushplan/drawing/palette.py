@@ -19,6 +19,7 @@ class Palette:
     bumper: Color = (38, 50, 66)  # its other parts
     box: tuple[Color, Color] = ((146, 94, 52), (92, 56, 28))  # objects
     wheeled: tuple[Color, Color] = ((226, 192, 140), (150, 112, 62))  # objects on casters
+    fixed: tuple[Color, Color] = ((126, 122, 120), (72, 70, 70))  # objects held not to move
     box_edge_px: float = 1.5  # width of their edges at 600 px
     ghost: Color = (214, 160, 116)  # where objects were or will be
     goal: tuple[Color, Color] = ((206, 236, 222), (0, 158, 115))  # where something has to go

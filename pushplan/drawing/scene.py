@@ -121,6 +121,8 @@ def _objects(canvas: Canvas, objects: Movables, palette: Palette, unit: float) -
     seen = ((middles + radii > reach[:2]) & (middles - radii < reach[2:])).all(axis=1)
     for k in np.flatnonzero(seen).tolist():
         fill, edge = palette.wheeled if objects.wheeled[k] else palette.box
+        if objects.fixed[k]:
+            fill, edge = palette.fixed
         outline = corners[objects.offsets[k] : objects.offsets[k + 1]]
         canvas.polygon(outline, fill, edge, palette.box_edge_px * unit)
 

@@ -146,7 +146,16 @@ class PushEnv(gymnasium.Env[NDArray[Any], NDArray[Any]]):
 
     @property
     def world(self) -> World:
-        """A snapshot of the scene now.
+        """A snapshot of the scene now, as far as a policy is told (`Task.told`).
+
+        Raises:
+            EpisodeOverError: before the first `reset`.
+        """
+        return self.task.told(self.true_world)
+
+    @property
+    def true_world(self) -> World:
+        """A snapshot of the scene now, as the simulator has it.
 
         Raises:
             EpisodeOverError: before the first `reset`.
@@ -250,11 +259,11 @@ class PushEnv(gymnasium.Env[NDArray[Any], NDArray[Any]]):
     def _started(self, action: ArrayLike) -> Motion:
         if self._over:
             raise EpisodeOverError(f"{self._over}: call reset() before step()")
-        return self._mode.start(self._mode.read(action), self.world)
+        return self._mode.start(self._mode.read(action), self.true_world)
 
     def _carry_out(self, motion: Motion) -> tuple[NDArray[Any], float, bool, bool, dict[str, Any]]:
         """Simulate a motion to its end and score it."""
-        before, simulator, roster = self.world, self._simulator, self._roster
+        before, simulator, roster = self.true_world, self._simulator, self._roster
         traces = []
         touched = held = now_held = False
         several = simulator.is_exact and not self.task.objects_leave
@@ -290,13 +299,13 @@ class PushEnv(gymnasium.Env[NDArray[Any], NDArray[Any]]):
 
     def _observe(self, world: World) -> NDArray[Any]:
         began = time.perf_counter()
-        observation = self._builder.observe(world)
+        observation = self._builder.observe(self.task.told(world))
         self.observation_time_s = time.perf_counter() - began
         return observation
 
     def render(self) -> NDArray[np.uint8] | None:
         """The scene now as (H, W, 3) uint8; None in ``"human"`` mode, which draws by itself."""
-        return None if self.render_mode is None else self._renderer.render(self.world)
+        return None if self.render_mode is None else self._renderer.render(self.true_world)
 
     def close(self) -> None:
         """Close the window, if there is one; may be called again."""

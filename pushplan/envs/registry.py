@@ -9,6 +9,7 @@ from pushplan.world.lazy_names import look_up
 
 TASKS: dict[str, str] = {
     "maze": "pushplan.envs.tasks.maze:MazeTask",
+    "namo": "pushplan.envs.tasks.namo:NamoTask",
     "box_delivery": "pushplan.envs.tasks.box_delivery:BoxDeliveryTask",
     "area_clearing": "pushplan.envs.tasks.area_clearing:AreaClearingTask",
     "ship_ice": "pushplan.envs.tasks.ship_ice:ShipIceTask",

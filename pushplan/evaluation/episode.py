@@ -130,7 +130,7 @@ class Recording:
         """
         observation, _ = env.reset(seed=self.scenario.seed)
         world = env.world
-        self._begin(world)
+        self._begin(getattr(env, "true_world", world))
         rng = stream(self.scenario.seed, "policy")
         self._ask(self.policy.reset, world, rng)
         self._simulate_latency(env)

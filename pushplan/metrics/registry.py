@@ -81,6 +81,14 @@ METRICS: dict[str, Metric] = {
     "I_manip_reference": Metric(
         f"{_MANIPULATION}:i_manip_reference", Role.ON_REQUEST, goal="objects"
     ),
+    "made_unsolvable": Metric(
+        "pushplan.metrics.closing:made_unsolvable",
+        Role.ON_REQUEST,
+        "closed for good",
+        higher_is_better=False,
+        goal="robot",
+        high=1.0,
+    ),
     "path_length_m": Metric(
         f"{_FACTS}:robot_path_length", Role.DETAIL, "path [m]", higher_is_better=False
     ),

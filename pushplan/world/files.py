@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import yaml
 
-from pushplan.world.checks import array, integer, known_keys, number, word
+from pushplan.world.checks import array, boolean, integer, known_keys, number, word
 from pushplan.world.errors import InvalidInputError, SchemaError, short, unknown_name_message
 from pushplan.world.goals import ClearanceArea, Goal, GoalDisc, GoalLine, Receptacle
 from pushplan.world.movables import Movables
@@ -72,6 +72,7 @@ def world_to_dict(world: World) -> dict[str, Any]:
             **({"contact_radius": float(radius)} if (radius := objects.contact_radii[k]) else {}),
             "mass": float(objects.masses[k]),
             "wheeled": bool(objects.wheeled[k]),
+            **({"fixed": True} if objects.fixed[k] else {}),
         }
         for k in range(len(objects))
     ]
@@ -223,10 +224,11 @@ def movables_from_list(data: object) -> Movables:
         SchemaError, InvalidInputError: as `world_from_dict`.
     """
     outlines, poses, twists, masses, wheeled, ids, radii = [], [], [], [], [], [], []
+    fixed: list[bool] = []
+    valid = ("id", "pose", "twist", "outline", "polygon", "mass", "wheeled", "contact_radius")
     for i, item in enumerate(_list("movables", data)):
         name = f"movables[{i}]"
-        valid = ("id", "pose", "twist", "outline", "polygon", "mass", "wheeled", "contact_radius")
-        known_keys(name, item, valid, ())
+        known_keys(name, item, (*valid, "fixed"), ())
         if ("polygon" in item) == ("outline" in item) or ("outline" in item) != ("pose" in item):
             raise SchemaError(
                 f"{name} needs either 'polygon' (world frame) or 'outline' (body frame) and 'pose'"
@@ -245,6 +247,7 @@ def movables_from_list(data: object) -> Movables:
             mass = abs(signed_area(convex_outline(f"{name}.outline", outline)))
         masses.append(number(f"{name}.mass", mass, low=0.0, open_low=True))
         wheeled.append(item.get("wheeled", False))
+        fixed.append(boolean(f"{name}.fixed", item.get("fixed", False)))
         radii.append(number(f"{name}.contact_radius", item.get("contact_radius", 0.0), low=0.0))
         ids.append(integer(f"{name}.id", item.get("id", i), high=2**63 - 1))
     return Movables.from_outlines(
@@ -255,6 +258,7 @@ def movables_from_list(data: object) -> Movables:
         twists=np.asarray(twists) if twists else np.zeros((0, 3)),
         ids=ids,
         contact_radii=radii or 0.0,
+        fixed=fixed,
     )
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Annotated, Any
 
@@ -33,7 +33,7 @@ from pushplan.world.outline import (
     well_formed,
 )
 
-_ONE_EACH = ("poses", "twists", "masses", "wheeled", "contact_radii")
+_ONE_EACH = ("poses", "twists", "masses", "wheeled", "contact_radii", "fixed")
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,6 +55,9 @@ class Movables(ArrayRecord, CheckedFields):
         contact_radii: (K,) distances from the drawn outlines at which objects touch others [m]:
             they are rounded by them. `vertices` are grown by them, and everything but masses,
             goals and files reads those.
+        fixed: (K,) whether the object is held not to move, as far as one knows; all false if
+            None. Planners count it as static (`World.with_fixed_as_static`); in a simulator's own
+            world it is the truth.
 
     Raises:
         InvalidInputError: if shapes disagree, an outline is not convex or off its centroid.
@@ -70,8 +73,13 @@ class Movables(ArrayRecord, CheckedFields):
     drawn_vertices: Annotated[FloatArray, Shape(None, 2)]
     drawn_offsets: Annotated[IntArray, Shape(None)]
     contact_radii: Annotated[FloatArray, Shape("K")]
+    fixed: Annotated[BoolArray, Shape("K")] = field(
+        default_factory=lambda: np.zeros(0, dtype=np.bool_)
+    )
 
     def __post_init__(self) -> None:
+        if self.fixed is None or (len(self.fixed) == 0 and len(self.ids)):
+            object.__setattr__(self, "fixed", np.zeros(len(self.ids), dtype=np.bool_))
         super().__post_init__()
         array("movables.drawn_offsets", self.drawn_offsets, (len(self.ids) + 1,), dtype=np.int64)
         if len(np.unique(self.ids)) != len(self.ids):
@@ -120,6 +128,7 @@ class Movables(ArrayRecord, CheckedFields):
         twists: ArrayLike | None = None,
         ids: ArrayLike | None = None,
         contact_radii: ArrayLike = 0.0,
+        fixed: ArrayLike | None = None,
     ) -> Movables:
         """Objects from body-frame outlines whose centroid is the body origin.
 
@@ -132,6 +141,7 @@ class Movables(ArrayRecord, CheckedFields):
             twists: (K, 3), by default zero.
             ids: (K,), by default 0 to K - 1.
             contact_radii: (K,), or one for all [m].
+            fixed: (K,) flags, by default all false.
         """
         clean = convex_outlines("outline", outlines)
         vertices, offsets = flatten(clean)
@@ -148,6 +158,7 @@ class Movables(ArrayRecord, CheckedFields):
             drawn_vertices=vertices,
             drawn_offsets=offsets,
             contact_radii=np.broadcast_to(np.asarray(contact_radii), (count,)),
+            fixed=np.asarray(np.zeros(count, dtype=bool) if fixed is None else fixed),
         )
 
     @classmethod
@@ -223,6 +234,12 @@ class Movables(ArrayRecord, CheckedFields):
         clone = self._unchecked(self.__dict__)
         clone.__dict__["poses"] = array("poses", poses, (count, 3))
         clone.__dict__["twists"] = still if twists is None else array("twists", twists, (count, 3))
+        return clone
+
+    def holding_fixed(self, fixed: ArrayLike) -> Movables:
+        """The same objects, of which those flagged in (K,) are held not to move."""
+        clone = self._unchecked(self.__dict__)
+        clone.__dict__["fixed"] = array("movables.fixed", fixed, (len(self),), dtype=np.bool_)
         return clone
 
     def select(self, keep: ArrayLike) -> Movables:

@@ -49,6 +49,11 @@ class PlanStatus(enum.Enum):
         "No path leads to the goal around the static obstacles: check the map, the bounds and "
         "the footprint.",
     )
+    WAY_CLOSED = (
+        "way_closed",
+        "Objects close every way to the goal, and no push was found that opens one: check which "
+        "objects are held not to move, or allow more pushes.",
+    )
 
     def __init__(self, label: str, remedy: str) -> None:
         self.label = label

@@ -17,7 +17,8 @@ class PlanningCall:
     """One call of a planner, from the time when this object is made.
 
     Args:
-        world: as in `pushplan.world.Planner.plan`.
+        world: as in `pushplan.world.Planner.plan`; objects that are held not to move are static in
+            the call's own.
         stop: likewise.
         rng: likewise.
         default: the stop rule where none is given; nothing ends the call where this is None too.
@@ -30,7 +31,7 @@ class PlanningCall:
         self, world: object, stop: object, rng: object, default: Stop | None = None
     ) -> None:
         self.began = time.perf_counter()
-        self.world: World = expect("world", world, World)
+        self.world: World = expect("world", world, World).with_fixed_as_static()
         given, generator = check_rules(stop, rng)
         self.rng = np.random.default_rng(0) if generator is None else generator
         own = given is None or any(isinstance(rule, OwnBudget) for rule in rules_of(given))

@@ -109,6 +109,20 @@ class World(ArrayRecord, CheckedFields):
         corners = transform_outlines(objects.poses, objects.drawn_vertices, objects.drawn_offsets)
         return self.manipulation_goal.contains_each(corners, objects.drawn_offsets)
 
+    def believing(self, fixed: ArrayLike) -> World:
+        """The same scene with the objects flagged in (K,) held not to move, and no others."""
+        return replace(self, movables=self.movables.holding_fixed(fixed))
+
+    def with_fixed_as_static(self) -> World:
+        """The same scene with the objects that are held not to move among what is static."""
+        fixed = self.movables.fixed
+        if not fixed.any():
+            return self
+        static = self.static
+        held = [self.movables.outline_world(k) for k in np.flatnonzero(fixed).tolist()]
+        solid = StaticMap((*static.polygons, *held), static.segments, static.radii, static.bounds)
+        return replace(self, static=solid, movables=self.movables.select(~fixed))
+
     def robot_outline_world(self) -> tuple[FloatArray, ...]:
         """Footprint parts, each (N, 2) corners in the world frame [m]."""
         return tuple(transform(self.robot_pose, part) for part in self.robot.contact_parts)

@@ -27,6 +27,7 @@ LAYOUTS = {
         {"boxes": 0},
         {"bumper_friction": 0.3, "touching": True},
     ],
+    "namo": [{"layout": "fixed", "movability": "wrong"}, {"layout": "squeeze", "box_size": 0.15}],
     "ship_ice": [{"concentration": 0.0}, {"concentration": 0.5, "time_limit": 8.0}],
     "box_delivery": [
         {"layout": name} for name in ("small_columns", "large_columns", "large_divider")

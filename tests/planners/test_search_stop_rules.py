@@ -23,7 +23,7 @@ from pushplan.world import (
     World,
 )
 
-MAZE = ("straight", "geometric-rrt", "kinodynamic-rrt", "push-aware")
+MAZE = ("straight", "geometric-rrt", "kinodynamic-rrt", "push-aware", "namo")
 SHIP = tuple(name for name in planner_names() if name not in MAZE)
 ONE_SHOT = ("straight", "skeleton")
 """They look for one path, all at once, and return it."""

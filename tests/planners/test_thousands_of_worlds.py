@@ -26,7 +26,7 @@ from pushplan.world import (
 
 pytestmark = pytest.mark.warm("push-aware", "kinodynamic-rrt")
 
-CHANCE = ("geometric-rrt", "kinodynamic-rrt", "push-aware")
+CHANCE = ("geometric-rrt", "kinodynamic-rrt", "push-aware", "namo")
 """Planners that draw places between the bounds: turned, they draw others."""
 AS_PUBLISHED = "ship-lattice-published"
 """Its cost adds kilograms to metres, so that another unit of length gives another path."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import pickle
 import subprocess
 import sys
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -32,6 +33,7 @@ from pushplan.world import (
     World,
     stream,
 )
+from pushplan.world.files import world_from_dict, world_to_dict
 
 NAN = float("nan")
 
@@ -226,3 +228,19 @@ def test_goals_of_objects_agree_with_shapely():
         np.testing.assert_array_equal(mine.contains_each(*corners), expected)
         assert [mine.contains(boxes.outline_world(k)) for k in range(300)] == expected
         assert mine.contains_each(*(Movables.empty().vertices, Movables.empty().offsets)).size == 0
+
+
+def test_fixed_objects_survive_files_and_become_static():
+    boxes = Movables.from_outlines(
+        [SQUARE] * 3, [[2, 0, 0], [4, 0, 0.3], [6, 0, 0]], fixed=[False, True, False]
+    )
+    world = replace(make_u_maze(), movables=boxes)
+    assert world_from_dict(world_to_dict(world)) == world
+    solid = world.with_fixed_as_static()
+    assert solid.movables.ids.tolist() == [0, 2] and not solid.movables.fixed.any()
+    np.testing.assert_array_equal(solid.static.polygons[-1], boxes.outline_world(1))
+    assert solid.with_fixed_as_static() is solid
+    assert not world.believing([False] * 3).movables.fixed.any()
+    assert boxes.select([1, 2]).fixed.tolist() == [True, False]
+    with pytest.raises(InvalidInputError, match="fixed"):
+        Movables.from_outlines([SQUARE], [[0, 0, 0]], fixed=[1.5])

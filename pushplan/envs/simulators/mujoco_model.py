@@ -30,6 +30,7 @@ from pushplan.world import InvalidInputError, Movables, RobotModel, StaticMap, W
 from pushplan.world.checks import FloatArray
 
 _CASTER_BALL = (0.25, 0.25, 0.27)
+_HOLDING = 1e7  # damping of a fixed object over its mass [1/s]
 _STORED = 8
 _store: OrderedDict[Any, Any] = OrderedDict()
 _store_lock = threading.Lock()
@@ -54,7 +55,7 @@ class SceneKey:
     def of(cls, world: World, materials: Materials, options: MujocoOptions) -> SceneKey:
         """The key of a scene."""
         m = world.movables
-        shapes = (m.vertices + 0.0, m.offsets, m.masses, m.wheeled)
+        shapes = (m.vertices + 0.0, m.offsets, m.masses, m.wheeled, m.fixed)
         packed = b"".join(part.tobytes() for part in shapes)
         return cls(world.robot, world.static, materials, options, packed)
 
@@ -113,6 +114,7 @@ def _compile(key: SceneKey, movables: Movables) -> Any:
         raise InvalidInputError(f"MuJoCo cannot build this scene: {error}") from error
     if not afloat:
         _set_rolling(model, movables, key.materials)
+        _hold_fixed(model, movables)
     return model
 
 
@@ -283,3 +285,10 @@ def _set_rolling(model: Any, movables: Movables, materials: Materials) -> None:
         _, inertia = prism_inertia(movables.outline(int(k)), 0.0, float(movables.masses[k]))
         model.dof_damping[first : first + 2] = movables.masses[k] / materials.rolling_time
         model.dof_damping[first + 5] = inertia[2] / materials.rolling_time
+
+
+def _hold_fixed(model: Any, movables: Movables) -> None:
+    """Objects that are fixed do not move: what pushes them meets a damping that it cannot drive."""
+    for k in np.flatnonzero(movables.fixed):
+        first = int(model.body(f"object {k}").dofadr[0])
+        model.dof_damping[first : first + 6] = _HOLDING * float(movables.masses[k])

@@ -16,7 +16,7 @@ from pushplan.envs.simulators.momentum import Momentum
 from pushplan.world import World
 from pushplan.world.checks import FloatArray, IntArray
 
-ROBOT, OBJECT, STATIC = 1, 2, 3
+ROBOT, OBJECT, STATIC, FIXED = 1, 2, 3, 4
 _GROUND = 1 << 31  # category of what is static, which wheels do not meet
 CORRECTION = 0.2
 """Fraction of an overlap beyond the slop that is taken back in one substep."""
@@ -60,7 +60,7 @@ class _Contacts:
 
 
 class PymunkBodies:
-    """One kinematic robot, K dynamic objects and what is static.
+    """One kinematic robot, K objects, dynamic or fixed, and what is static.
 
     Only the robot and those objects that `load` names are in the space; nothing happens to the
     others. Pose-and-twist rows are (1 + A, 6): x, y, theta, vx, vy, omega of the robot, then of
@@ -154,9 +154,13 @@ class PymunkBodies:
         for k in range(len(movables)):
             outline, radius = movables.drawn_outline(k).tolist(), float(movables.contact_radii[k])
             mass = float(movables.masses[k])
-            body = pymunk.Body(mass, pymunk.moment_for_poly(mass, outline))
+            if movables.fixed[k]:
+                body = pymunk.Body(body_type=pymunk.Body.KINEMATIC)
+            else:
+                body = pymunk.Body(mass, pymunk.moment_for_poly(mass, outline))
             shape = pymunk.Poly(body, outline, radius=radius)
-            shape.friction, shape.collision_type = friction, OBJECT
+            shape.friction = friction
+            shape.collision_type = FIXED if movables.fixed[k] else OBJECT
             made.append((body, shape))
         return made
 
@@ -173,6 +177,9 @@ class PymunkBodies:
             contacts.robot_static += 1
             contacts.robot_touched = True
 
+        def begin_fixed(arbiter: Any, space: Any, data: Any) -> None:
+            contacts.robot_static += 1
+
         def end_robot(arbiter: Any, space: Any, data: Any) -> None:
             contacts.robot_static -= 1
 
@@ -180,9 +187,13 @@ class PymunkBodies:
             for point in arbiter.contact_point_set.points:
                 contacts.robot_depth = max(contacts.robot_depth, -point.distance)
 
-        self.space.on_collision(OBJECT, STATIC, begin=begin_object, separate=end_object)
+        for still in (STATIC, FIXED):
+            self.space.on_collision(OBJECT, still, begin=begin_object, separate=end_object)
         self.space.on_collision(
             ROBOT, STATIC, begin=begin_robot, pre_solve=measure_robot, separate=end_robot
+        )
+        self.space.on_collision(
+            ROBOT, FIXED, begin=begin_fixed, pre_solve=measure_robot, separate=end_robot
         )
 
     @property

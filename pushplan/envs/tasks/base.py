@@ -137,6 +137,14 @@ class Task(ABC):
             ScenarioError: if the request cannot be met, such as too many boxes.
         """
 
+    def told(self, world: World) -> World:
+        """What a policy is told of a scene: all of it, unless the task says otherwise.
+
+        Args:
+            world: the scene as the simulator has it.
+        """
+        return world
+
     objects_leave: bool = False
     """Whether objects can leave the floor, so that `leaving` has to be asked."""
 

@@ -93,6 +93,11 @@ class MazeTask(Task):
             if friction is None
             else replace(self.preset.materials, robot_object=friction)
         )
+        self._steps = 0
+        self._lay_out()
+
+    def _lay_out(self) -> None:
+        """Set the walls and the goal, which are the same in every start."""
         shape = self.variations.shape
         self.static = self.preset.static(shape)
         self.goal = GoalDisc(
@@ -102,7 +107,6 @@ class MazeTask(Task):
         room = self.static.bounds[2:] - self.static.bounds[:2]
         self.reach = 2.0 * float(np.hypot(*room))
         self.state_objects = max(self.state_objects, self.variations.boxes)
-        self._steps = 0
 
     @property
     def box_size(self) -> float:

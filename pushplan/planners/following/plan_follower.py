@@ -94,6 +94,7 @@ class PlanFollower:
 
     def reset(self, world: World, rng: np.random.Generator) -> None:
         """Forget the last episode; calls run at once until `plan_with` says otherwise."""
+        world = world.with_fixed_as_static()
         self._forget(rng)
         self.controller.reset(world)
         self._clock.command = driven_twist(world)
@@ -124,6 +125,7 @@ class PlanFollower:
 
     def act(self, world: World, observation: Any = None) -> Twist:
         """The twist for this step; plans first where that is necessary."""
+        world = world.with_fixed_as_static()
         if self._progress is None:
             self.reset(world, self._rng)
         return self._clock.command_for(world, self._act)

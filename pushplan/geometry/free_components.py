@@ -1,0 +1,56 @@
+"""The connected components of the free space of a disc among convex obstacles."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy import ndimage
+
+from pushplan.geometry.grid import Grid, clearance_field
+from pushplan.world import Movables, NavigationGoal, StaticMap
+from pushplan.world.checks import ArrayRecord, FloatArray, IntArray, frozen
+
+
+@dataclass(frozen=True, eq=False)
+class FreeComponents(ArrayRecord):
+    """Where the centre of a disc may be, cell by cell, and which places are connected.
+
+    Args:
+        grid: where the cells are.
+        clearance: (rows, columns) distance of each cell centre to the nearest obstacle [m].
+        labels: (rows, columns) number of the component of each cell, 0 where the disc does not fit.
+    """
+
+    grid: Grid
+    clearance: FloatArray
+    labels: IntArray
+
+    @classmethod
+    def of(cls, grid: Grid, clearance: FloatArray, radius: float) -> FreeComponents:
+        """The components for a disc of ``radius`` [m]; cells are connected along their sides."""
+        labels = ndimage.label(clearance > radius)[0].astype(np.int64)
+        return cls(grid, clearance, labels)
+
+    def at(self, point: ArrayLike) -> int:
+        """The component of a point (2,) [m]; 0 where the disc does not fit, or out of bounds."""
+        row, col = self.grid.cell(*(float(value) for value in np.asarray(point)[:2]))
+        rows, cols = self.grid.shape
+        return int(self.labels[row, col]) if 0 <= row < rows and 0 <= col < cols else 0
+
+    def of_goal(self, goal: NavigationGoal) -> set[int]:
+        """The components that hold a part of the goal."""
+        x, y = np.meshgrid(self.grid.x, self.grid.y)
+        inside = self.labels[goal.contains(np.stack([x, y], axis=-1))]
+        return {int(label) for label in np.unique(inside) if label}
+
+
+def object_clearance(movables: Movables, k: int, pose: FloatArray, grid: Grid) -> FloatArray:
+    """(rows, columns) distance [m] of each cell centre to object ``k`` at a pose (3,)."""
+    outline = movables.moved_to(
+        np.concatenate([movables.poses[:k], pose[None], movables.poses[k + 1 :]])
+    ).outline_world(k)
+    low = grid.origin
+    high = low + grid.resolution * np.array([grid.shape[1], grid.shape[0]])
+    return frozen(clearance_field(StaticMap.build([outline], bounds=[*low, *high]), grid))

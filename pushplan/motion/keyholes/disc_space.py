@@ -1,0 +1,194 @@
+"""The configuration space of a robot that drives as a disc, among objects that may move."""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from functools import cached_property
+
+import numpy as np
+
+from pushplan.geometry import Grid, clearance_field
+from pushplan.geometry.free_components import FreeComponents, object_clearance
+from pushplan.search.grid_dijkstra import grid_dijkstra
+from pushplan.world import World
+from pushplan.world.checks import BoolArray, FloatArray, IntArray
+
+_KEPT = 200  # distances to objects that are kept
+
+
+class DiscSpace:
+    """A grid over a world, and how far each cell is from each object wherever that lies.
+
+    Args:
+        world: walls, objects and goal; where the objects are does not matter.
+        radius: of the disc [m].
+        cell: side of a cell [m].
+    """
+
+    def __init__(self, world: World, radius: float, cell: float) -> None:
+        self.world, self.radius, self.cell = world, radius, cell
+        self.grid = Grid.cover(world.static.bounds, cell)
+        self.static = clearance_field(world.static, self.grid)
+        x, y = np.meshgrid(self.grid.x, self.grid.y)
+        self.goal: BoolArray = world.navigation_goal.contains(np.stack([x, y], axis=-1))
+        self._objects: OrderedDict[tuple[int, bytes], FloatArray] = OrderedDict()
+
+    def object_clearance(self, k: int, pose: FloatArray) -> FloatArray:
+        """(rows, columns) distance of each cell to object ``k`` at a pose (3,) [m]."""
+        key = k, pose.tobytes()
+        if key not in self._objects:
+            self._objects[key] = object_clearance(self.world.movables, k, pose, self.grid)
+            if len(self._objects) > _KEPT:
+                self._objects.popitem(last=False)
+        self._objects.move_to_end(key)
+        return self._objects[key]
+
+    def cell_of(self, point: FloatArray) -> tuple[int, int]:
+        """Row and column of the cell of a point (2,), or of the nearest one."""
+        row, col = self.grid.cell(float(point[0]), float(point[1]))
+        rows, cols = self.grid.shape
+        return min(max(row, 0), rows - 1), min(max(col, 0), cols - 1)
+
+    def points(self, cells: IntArray) -> FloatArray:
+        """(N, 2) middles of cells (N,), counted row by row [m]."""
+        rows, cols = np.divmod(cells, self.grid.shape[1])
+        return np.column_stack([self.grid.x[cols], self.grid.y[rows]])
+
+
+class DiscState:
+    """Where the disc fits with the objects at some poses, and where the robot gets to.
+
+    Args:
+        space: the space.
+        poses: (K, 3) of the objects.
+
+    Attributes:
+        robot: (3,) pose of the robot, whose disc is free there; set before anything is asked that
+            depends on it.
+    """
+
+    robot: FloatArray
+
+    def __init__(self, space: DiscSpace, poses: FloatArray) -> None:
+        self.space, self.poses = space, poses
+        self.clearance: FloatArray = space.static.copy()
+        for k, pose in enumerate(poses):
+            np.minimum(self.clearance, space.object_clearance(k, pose), out=self.clearance)
+        self.free = FreeComponents.of(space.grid, self.clearance, space.radius)
+
+    @cached_property
+    def reached(self) -> BoolArray:
+        """(rows, columns) which cells the robot gets to without touching anything."""
+        label = self.free.at(self.robot)
+        reached: BoolArray = (self.free.labels == label) & (label > 0)
+        return reached
+
+    @property
+    def is_open(self) -> bool:
+        """Whether the robot gets to the goal without touching anything."""
+        return bool((self.reached & self.space.goal).any())
+
+    def is_free(self, point: FloatArray) -> bool:
+        """Whether the disc fits at a point (2,)."""
+        return bool(self.clearance[self.space.cell_of(point)] > self.space.radius)
+
+    def nearest_free(self, pose: FloatArray) -> FloatArray:
+        """(3,) the pose nearest to one (3,) where the disc fits; that one where it fits nowhere."""
+        free = np.flatnonzero(self.clearance.ravel() > self.space.radius)
+        if not len(free) or self.is_free(pose):
+            return pose
+        points = self.space.points(free)
+        nearest = points[int(np.argmin(np.hypot(*(points - pose[:2]).T)))]
+        return np.array([*nearest, pose[2]])
+
+    def gets_to(self, point: FloatArray) -> bool:
+        """Whether the robot gets to a point (2,) without touching anything."""
+        return bool(self.reached[self.space.cell_of(point)])
+
+    @cached_property
+    def _costs(self) -> tuple[FloatArray, IntArray]:
+        """Lengths of paths from the robot to all cells [m], and the cells before them."""
+        weights = np.where(self.reached, 1.0, np.inf)
+        return self._dijkstra(weights, np.zeros_like(self.reached))[:2]
+
+    def _dijkstra(
+        self, weights: FloatArray, goals: BoolArray
+    ) -> tuple[FloatArray, IntArray, IntArray]:
+        space = self.space
+        row, col = space.cell_of(self.robot)
+        start = np.array([row * space.grid.shape[1] + col])
+        return grid_dijkstra(weights, start, goals, space.cell)
+
+    def length_to(self, point: FloatArray) -> float:
+        """Length of the path to a point (2,) [m], infinite where the robot does not get."""
+        return float(self._costs[0][self.space.cell_of(point)])
+
+    def path_to(self, point: FloatArray) -> FloatArray:
+        """(N, 2) corners of a path from the robot to a point (2,) that it gets to [m]."""
+        row, col = self.space.cell_of(point)
+        at = row * self.space.grid.shape[1] + col
+        return self._corners(self._chain(self._costs[1], at), point)
+
+    def path_to_goal(self) -> FloatArray:
+        """(N, 2) corners of a path from the robot to the nearest part of the goal [m]."""
+        costs = np.where(self.space.goal & self.reached, self._costs[0], np.inf)
+        at = int(np.argmin(costs))
+        cells = self._chain(self._costs[1], at)
+        return self._corners(cells, self.space.points(cells[-1:])[0])
+
+    def relaxed(self, closed_cost: float) -> tuple[float, list[int]]:
+        """The cheapest path to the goal that may lead through objects.
+
+        Args:
+            closed_cost: extra cost per metre of floor that objects close.
+
+        Returns:
+            Its cost [m], infinite where walls are in the way, and the objects on it in order.
+        """
+        space = self.space
+        weights = np.where(self.clearance > space.radius, 1.0, 1.0 + closed_cost)
+        weights[space.static <= space.radius] = np.inf
+        costs, parents, order = self._dijkstra(weights, space.goal)
+        last = int(order[-1])
+        row, col = divmod(last, space.grid.shape[1])
+        if not space.goal[row, col]:
+            return np.inf, []
+        cells = self._chain(parents, last)
+        rows, cols = np.divmod(cells, space.grid.shape[1])
+        near = np.full((len(self.poses) + 1, len(cells)), np.inf)
+        for k, pose in enumerate(self.poses):
+            near[k] = space.object_clearance(k, pose)[rows, cols]
+        met = near.argmin(axis=0)[near.min(axis=0) <= space.radius]
+        return float(costs[row, col]), list(dict.fromkeys(met.tolist()))
+
+    @staticmethod
+    def _chain(parents: IntArray, at: int) -> IntArray:
+        """Cells that lead to one, counted row by row."""
+        chain = []
+        while at >= 0:
+            chain.append(at)
+            at = int(parents[at])
+        return np.array(chain[::-1])
+
+    def _corners(self, cells: IntArray, end: FloatArray) -> FloatArray:
+        """The corners that are left of a path along cells where the disc can go straight."""
+        points = self.space.points(cells)
+        points[0], points[-1] = self.robot[:2], end[:2]
+        kept, at = [0], 0
+        while at < len(points) - 1:
+            ahead = len(points) - 1
+            while ahead > at + 1 and not self._sees(points[at], points[ahead]):
+                ahead -= max(1, (ahead - at) // 8)
+            at = max(ahead, at + 1)
+            kept.append(at)
+        return points[kept]
+
+    def _sees(self, a: FloatArray, b: FloatArray) -> bool:
+        """Whether the disc can go straight from a to b."""
+        count = int(np.hypot(*(b - a)) / (0.5 * self.space.cell)) + 2
+        line = a + (b - a) * np.linspace(0.0, 1.0, count)[:, None]
+        grid = self.space.grid
+        at = ((line - grid.origin) / grid.resolution).astype(np.int64)
+        rows = np.clip(at[:, 1], 0, grid.shape[0] - 1)
+        cols = np.clip(at[:, 0], 0, grid.shape[1] - 1)
+        return bool((self.clearance[rows, cols] > self.space.radius).all())

@@ -1,0 +1,273 @@
+"""`KeyholeSearch`: which object to push, and which way, so that a closed way opens."""
+
+from __future__ import annotations
+
+import heapq
+import itertools
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from pushplan.compiled import owned
+from pushplan.interaction import InteractionModel
+from pushplan.motion.collision import first_blocked, footprint, obstacles
+from pushplan.motion.keyholes.disc_space import DiscSpace, DiscState
+from pushplan.motion.keyholes.keyhole_config import KeyholeConfig
+from pushplan.motion.keyholes.line_push import CONTACT, SPACING, LinePush, line_pushes, straight
+from pushplan.world import Drive, World
+from pushplan.world.checks import FloatArray
+from pushplan.world.polyline import path_length, path_lengths
+
+_MOST_CELLS = 400_000  # of the configuration space
+_LEAVING = 2.5  # how far the robot drives straight to where its disc is free [circumscribed radii]
+
+
+@dataclass(frozen=True, eq=False)
+class KeyholeEnd:
+    """A scene after some pushes, with the robot where it can turn.
+
+    Args:
+        state: where the robot gets to then.
+        cost: of the way there: l₀ + w Σ mᵢ lᵢ / m₀, and what it closes [m].
+        before: the scene before the last push; None at the start.
+        drive: (N, 2) corners of the drive from there to the start of the push [m].
+        path: (N, 3) the push, or how the robot got free at the start; ahead, then back.
+        pushed: index of the object that was pushed, -1 at the start.
+    """
+
+    state: DiscState
+    cost: float
+    before: KeyholeEnd | None
+    drive: FloatArray
+    path: FloatArray
+    pushed: int
+
+    def chain(self) -> list[KeyholeEnd]:
+        """The scenes that have led to this one, from the start on."""
+        found: list[KeyholeEnd] = []
+        at: KeyholeEnd | None = self
+        while at is not None:
+            found.append(at)
+            at = at.before
+        return found[::-1]
+
+
+@dataclass(order=True)
+class _Entry:
+    priority: float
+    number: int
+    rank: int = field(compare=False)
+    end: KeyholeEnd = field(compare=False)
+
+
+def suits_keyholes(world: World, config: KeyholeConfig) -> bool:
+    """Whether a `KeyholeSearch` makes sense: walls, few objects, and a robot that turns and backs.
+
+    Args:
+        world: the scene.
+        config: parameters.
+    """
+    robot, static = world.robot, world.static
+    sides = (static.bounds[2:] - static.bounds[:2]) / (config.cell * robot.circumscribed_radius)
+    return (
+        robot.drive is Drive.DIFFERENTIAL
+        and robot.min_speed < 0.0
+        and 0 < len(world.movables) <= config.most_objects
+        and bool(static.convex_parts)
+        and float(np.prod(sides)) <= _MOST_CELLS
+    )
+
+
+def nearest_free_pose(world: World, config: KeyholeConfig) -> FloatArray:
+    """(3,) the pose nearest to the robot's in which the disc of a `KeyholeSearch` is free.
+
+    The robot's own pose where there is none.
+    """
+    size = world.robot.circumscribed_radius
+    space = DiscSpace(world, config.clearance * size, config.cell * size)
+    return DiscState(space, world.movables.poses).nearest_free(world.robot_pose)
+
+
+class KeyholeSearch:
+    """Best-first search over pushes that connect components of the robot's free space.
+
+    A state is where the objects are and in which component the robot is. It is expanded in ranks:
+    first with the object that the cheapest path through objects meets first, the choice of
+    Stilman and Kuffner ("Navigation among movable obstacles: real-time reasoning in complex
+    environments", IJHR 2005), then with the others on that path and those that were in the way of
+    the pushes, at last with all. Ends of pushes that connect more floor, and in the later ranks
+    those that only move something out of the way, are new states: that is the recursion where an
+    object needs another to go first.
+
+    Args:
+        world: the scene; objects that are fixed are among what is static.
+        config: parameters.
+        interaction: predicts the pushes.
+        stopped: asked after each push with their number.
+    """
+
+    def __init__(
+        self,
+        world: World,
+        config: KeyholeConfig,
+        interaction: InteractionModel,
+        stopped: Callable[[int], bool],
+    ) -> None:
+        self.world, self.config, self.interaction = world, config, interaction
+        self.pushes = self.expansions = 0
+        self.exhausted = False
+        """Whether the search has ended because nothing was left to try."""
+        self._stopped = stopped
+        size = world.robot.circumscribed_radius
+        self._size = size
+        self._space = DiscSpace(world, config.clearance * size, config.cell * size)
+        self._shape = footprint(world.robot, config.margin * size)
+        self._walls = obstacles(world.static)
+        self._numbers = itertools.count()
+        self._open: list[_Entry] = []
+        self._seen: set[bytes] = set()
+
+    def run(self) -> KeyholeEnd | None:
+        """The cheapest scene found from which the goal is reached; None if there is none."""
+        start = self._start()
+        if start is None:
+            self.exhausted = True
+            return None
+        self._put(start)
+        while self._open:
+            entry = heapq.heappop(self._open)
+            if entry.end.state.is_open:
+                return entry.end
+            self.expansions += 1
+            for end in self._expand(entry.end, entry.rank):
+                self._put(end)
+            if self._stopped(self.pushes):
+                return None
+            if entry.rank < 2:
+                later = entry.priority + self.config.rank_cost * self._size
+                heapq.heappush(
+                    self._open, _Entry(later, next(self._numbers), entry.rank + 1, entry.end)
+                )
+        self.exhausted = True
+        return None
+
+    def _start(self) -> KeyholeEnd | None:
+        """The scene now, with the robot driven straight to where its disc is free."""
+        robot = self.world.robot_pose
+        state = DiscState(self._space, self.world.movables.poses)
+        steps = np.arange(0.0, _LEAVING, self.config.cell)
+        for length in sorted([*steps, *-steps[1:]], key=abs):
+            along = np.linspace(0.0, length * self._size, 2 + int(abs(length) / SPACING))
+            path = straight(robot, along)
+            if not state.is_free(path[-1]):
+                continue
+            if length < 0.0 or self.interaction.sweep(self.world, path).work == 0.0:
+                state.robot = path[-1]
+                cost = abs(length) * self._size
+                return KeyholeEnd(state, cost, None, robot[None, :2], path, -1)
+        return None
+
+    def _put(self, end: KeyholeEnd) -> None:
+        state, cell = end.state, 2.0 * self._space.cell
+        label = np.flatnonzero(state.reached.ravel())[:1]
+        key = np.rint(state.poses / (cell, cell, 0.3)).tobytes() + label.tobytes()
+        if key in self._seen:
+            return
+        self._seen.add(key)
+        left, _ = state.relaxed(self.config.closed_cost)
+        if math.isfinite(left):
+            heapq.heappush(self._open, _Entry(end.cost + left, next(self._numbers), 0, end))
+
+    def _expand(self, end: KeyholeEnd, rank: int) -> Iterator[KeyholeEnd]:
+        """The scenes that one push leads to, of the objects of a rank."""
+        _, on_path = end.state.relaxed(self.config.closed_cost)
+        everyone = range(len(self.world.movables))
+        chosen: list[int] = on_path[:1]
+        if rank == 1:
+            chosen = [*on_path[1:], *(k for k in everyone if self._is_near(end, k, on_path))]
+        if rank == 2:
+            chosen = [k for k in everyone if k not in on_path]
+        for k in dict.fromkeys(chosen):
+            pose = end.state.poses[k]
+            clearance = self._space.radius + self._space.cell
+            for push in line_pushes(self.world, k, pose, clearance, self.config.offsets):
+                if end.state.gets_to(push.start):
+                    yield from self._push(end, push, rank)
+                    if self._stopped(self.pushes):
+                        return
+
+    def _is_near(self, end: KeyholeEnd, k: int, on_path: list[int]) -> bool:
+        """Whether object ``k`` is in the way of pushes of the first object on the path."""
+        if not on_path or k in on_path:
+            return False
+        here, there = end.state.poses[k, :2], end.state.poses[on_path[0], :2]
+        reach = self.world.movables.radii[k] + self.world.movables.radii[on_path[0]]
+        return math.dist(here, there) < float(reach) + 2.0 * self._size
+
+    def _push(self, end: KeyholeEnd, push: LinePush, rank: int) -> Iterator[KeyholeEnd]:
+        """The scenes after a push, each ended where it opens something, or in a later rank."""
+        self.pushes += 1
+        config, size = self.config, self._size
+        path = push.path(config.longest * size, size)
+        free = first_blocked(
+            owned(path), len(path), self._shape, self._walls, np.empty_like(self._shape.vertices)
+        )
+        scene = self.world.moved(robot_pose=path[0], movable_poses=end.state.poses)
+        swept = self.interaction.sweep(scene, path[: max(free, 1)])
+        last = free - 1 if swept.jammed_at < 0 else swept.jammed_at - 1
+        step = max(1, round(config.step / SPACING))
+        ends = list(range(CONTACT + step, last + 1, step))
+        left = 2  # the first place that is open, and one beyond
+        for n in ends:
+            if self._stopped(self.pushes):
+                return
+            new = self._after(end, push, path[: n + 1], swept.object_poses[: n + 1])
+            if new is None:
+                continue
+            if new.state.is_open or self._gain(end, new) > config.gain * size**2:
+                left -= 1
+                yield new
+                if left == 0:
+                    return
+            elif rank and (n == ends[-1] or n == ends[len(ends) // 2]):
+                yield new
+
+    def _after(
+        self, end: KeyholeEnd, push: LinePush, path: FloatArray, poses: FloatArray
+    ) -> KeyholeEnd | None:
+        """The scene after a push (N, 3) with the objects (N, K, 3), the robot backed off."""
+        config, moved = self.config, poses[-1]
+        if np.array_equal(moved[push.object_index], end.state.poses[push.object_index]):
+            return None
+        cell, driven = self._space.cell, path_length(path)
+        state = DiscState(self._space, moved)
+        for back in np.arange(cell, driven, cell):
+            away = straight(path[-1], -np.linspace(0.0, back, int(back / cell) + 2)[1:])
+            if not state.is_free(away[-1]):
+                continue
+            state.robot = away[-1]
+            work = float(self.world.movables.masses @ path_lengths(poses))
+            cost = end.cost + end.state.length_to(push.start) + driven + back
+            cost += config.push_weight * work / self.world.robot.mass
+            return KeyholeEnd(
+                state,
+                cost + self._closing_cost(end, state),
+                end,
+                end.state.path_to(push.start[:2]),
+                np.concatenate([path, away]),
+                push.object_index,
+            )
+        return None
+
+    def _gain(self, end: KeyholeEnd, new: KeyholeEnd) -> float:
+        """Floor that the robot gets to and did not before [m²]."""
+        fresh = new.state.reached & ~end.state.reached & (end.state.free.labels > 0)
+        return float(fresh.sum()) * self._space.cell**2
+
+    def _closing_cost(self, end: KeyholeEnd, state: DiscState) -> float:
+        """A penalty where floor is free still, and cut off now [m]."""
+        lost = end.state.reached & ~state.reached & (state.free.labels > 0)
+        closed = float(lost.sum()) * self._space.cell**2 > self.config.closing * self._size**2
+        return self.config.closing_cost * self._size if closed else 0.0

@@ -1,0 +1,138 @@
+"""`Namo`: opens closed ways by pushes that are chosen for it, one keyhole after another."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from pushplan.interaction import InteractionModel, QuasiStatic
+from pushplan.motion.keyholes import KeyholeConfig, KeyholeSearch, suits_keyholes
+from pushplan.motion.keyholes.keyhole_plan import keyhole_plan
+from pushplan.planners.registry import make_planner
+from pushplan.world import MaxIterations, Plan, Planner, PlanResult, PlanStatus, Stop, World
+from pushplan.world.checked_fields import NonNegativeInt, PositiveFraction
+from pushplan.world.checks import expect
+from pushplan.world.planning_call import PlanningCall
+from pushplan.world.stop import DefaultBudget, StopCheck
+
+
+@dataclass(frozen=True)
+class NamoConfig(KeyholeConfig):
+    """Parameters of `Namo`: those of its search, described in `KeyholeConfig`, and one more.
+
+    Args:
+        turn_fraction: fraction of the greatest turn rate that plans use; the rest is for tracking.
+        straight_iterations: of the navigator at most, where the way is closed; at 0 it is asked
+            only where no push is found.
+    """
+
+    turn_fraction: PositiveFraction = 0.9
+    straight_iterations: NonNegativeInt = 6000
+
+
+@dataclass(frozen=True)
+class Namo:
+    """Navigation among movable obstacles, for a robot that turns on the spot and goes back.
+
+    Where the goal lies in the component of free space that the robot is in, the robot cannot turn
+    on the spot or drive back, there are no walls or too many objects, the plan is that of the
+    navigator. Elsewhere a `KeyholeSearch` looks for
+    pushes that connect the component with that of the goal, at the cost l₀ + w Σ mᵢ lᵢ / m₀ and a
+    penalty for what they cut off. The robot drives as a disc between pushes, and backs off after
+    each. Where the navigator finds a cheaper plan, by pushing straight through, that is taken.
+
+    Use it where objects hold the doors, and a wrong push may close them for good. Without a stop
+    rule it ends after a fixed number of pushes, so the same seed gives the same plan. One
+    iteration is a push that is simulated.
+
+    Args:
+        config: parameters.
+        interaction: predicts the objects; walls hold what is squeezed against them by default.
+        navigator: plans where the way is open, and where no push is found; the push-aware planner
+            by default.
+    """
+
+    config: NamoConfig = field(default_factory=NamoConfig)
+    interaction: InteractionModel = field(
+        default_factory=lambda: QuasiStatic(friction=0.1, static_friction=0.5)
+    )
+    navigator: Planner = field(default_factory=lambda: make_planner("push-aware"))
+
+    def __post_init__(self) -> None:
+        expect("config", self.config, NamoConfig)
+        expect("interaction", self.interaction, InteractionModel)  # type: ignore[type-abstract]
+        expect("navigator", self.navigator, Planner)  # type: ignore[type-abstract]
+
+    def plan(
+        self, world: World, *, stop: Stop | None = None, rng: np.random.Generator | None = None
+    ) -> PlanResult:
+        """Plan from ``world``; see `pushplan.world.Planner`.
+
+        Raises:
+            InvalidInputError: if the world's goal is not one for the robot.
+        """
+        call = PlanningCall(world, stop, rng, DefaultBudget(self.config.default_pushes))
+        world, goal = call.world, call.world.navigation_goal
+        there = goal.distance(*world.robot_pose[:2].tolist()) == 0.0
+        if there or not suits_keyholes(world, self.config):
+            return self.navigator.plan(world, stop=stop, rng=call.rng)
+        search = KeyholeSearch(
+            world, self.config, self.interaction, lambda pushes: call.check(pushes, np.inf)
+        )
+        end = search.run()
+        if end is None and not search.exhausted:
+            return call.result(call.stopped_status, iterations=search.pushes)
+        if end is not None and end.before is None:
+            return self.navigator.plan(world, stop=stop, rng=call.rng)
+        other = self._straight(call, search.pushes, wanted=end is None)
+        if end is None:
+            assert other is not None
+            if other.status is not PlanStatus.TIMED_OUT:
+                return other
+            return call.result(PlanStatus.WAY_CLOSED, iterations=search.pushes)
+        plan = keyhole_plan(world, end, self.interaction, self.config.turn_fraction)
+        weight = self.config.push_weight
+        if other is not None and other.status is PlanStatus.SOLVED:
+            if _cost(other.plan, weight) < _cost(plan, weight):
+                return other
+        return call.result(
+            PlanStatus.SOLVED,
+            plan,
+            call.elapsed,
+            search.pushes,
+            search.expansions,
+            openings=float(len(end.chain()) - 1),
+        )
+
+    def _straight(self, call: PlanningCall, pushes: int, *, wanted: bool) -> PlanResult | None:
+        """What the navigator finds after some pushes were simulated; None if it is not asked."""
+        budget = self.config.straight_iterations
+        if not (budget or wanted):
+            return None
+        rest: Stop = MaxIterations(budget or self.config.default_pushes)
+        if call.has_rule:
+            rest |= _Rest(call, pushes)
+        return self.navigator.plan(call.world, stop=rest, rng=call.rng)
+
+
+def _cost(plan: Plan | None, weight: float) -> float:
+    """m₀ l₀ + w Σ mᵢ lᵢ of a plan [kg m]."""
+    assert plan is not None
+    return plan.travel_cost + weight * plan.interaction_cost
+
+
+class _Rest(Stop):
+    """What is left of the stop rule of a call after some iterations."""
+
+    def __init__(self, call: PlanningCall, iterations: int) -> None:
+        self._call, self._iterations = call, iterations
+
+    def start(self) -> StopCheck:
+        """Go on with the rule of the call."""
+        return lambda iterations, cost: self._call.check(self._iterations + iterations, cost)
+
+    @property
+    def cancelled(self) -> bool:
+        """Whether the call was cancelled."""
+        return self._call.cancelled

@@ -1,0 +1,160 @@
+"""The planner and the policy for navigation among movable obstacles."""
+
+from __future__ import annotations
+
+import functools
+
+import numpy as np
+import pytest
+
+from pushplan.envs.tasks.namo import NamoTask
+from pushplan.evaluation import JobSettings, run_episode
+from pushplan.interaction import QuasiStatic
+from pushplan.motion.collision import first_blocked, footprint, obstacles
+from pushplan.planners import make_planner, make_policy
+from pushplan.planners.namo.movability import Movability
+from pushplan.scenarios import suite, suite_names
+from pushplan.world import (
+    Cancellation,
+    GoalDisc,
+    GoalLine,
+    InvalidInputError,
+    MaxIterations,
+    Movables,
+    Plan,
+    PlanResult,
+    PlanStatus,
+    StaticMap,
+    Twist,
+    World,
+    maze_robot,
+    stream,
+)
+
+pytestmark = pytest.mark.warm("namo")
+
+ENOUGH = MaxIterations(700)
+
+
+@functools.cache
+def start(layout: str, seed: int = 1) -> tuple[World, tuple[int, ...]]:
+    """A start, and the boxes that its opening moves."""
+    task = NamoTask(variations={"layout": layout})
+    world = task.start(stream(seed, "layout"))
+    return world, tuple(box for step in task.opening for box in step.boxes)
+
+
+def plan(world: World, stop: object = ENOUGH, **options: object) -> PlanResult:
+    planner = make_planner("namo", **options)
+    return planner.plan(world, stop=stop, rng=np.random.default_rng(3))  # type: ignore[arg-type]
+
+
+def digest(found: Plan) -> bytes:
+    assert found.object_poses is not None
+    return found.poses.tobytes() + found.times.tobytes() + found.object_poses.tobytes()
+
+
+def dead_end() -> World:
+    """A corridor with the goal at its end, and a box as wide as the corridor before it."""
+    square = 0.8 * np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
+    ends = [[[-7, 0], [-6, 0], [-6, 2.2], [-7, 2.2]], [[10, 0], [11, 0], [11, 2.2], [10, 2.2]]]
+    sides = [[[-7, y], [11, y], [11, y + 1], [-7, y + 1]] for y in (-1.0, 2.2)]
+    return World(
+        robot=maze_robot("differential"),
+        robot_pose=[0.0, 1.1, 0.0],
+        static=StaticMap.build([*sides, *ends], bounds=[-6, 0, 10, 2.2]),
+        movables=Movables.from_outlines([square], [[7.0, 1.1, 0.0]]),
+        goal=GoalDisc(np.array([9.0, 1.1]), 0.5),
+    )
+
+
+@pytest.mark.parametrize("layout", ["one_box", "aside", "order"])
+def test_plans_open_the_way_and_touch_no_wall(layout: str) -> None:
+    world, boxes = start(layout)
+    found = plan(world, straight_iterations=0)
+    assert found.status is PlanStatus.SOLVED and found.plan is not None
+    poses = found.plan.poses
+    shape = footprint(world.robot)
+    free = first_blocked(
+        poses, len(poses), shape, obstacles(world.static), np.empty_like(shape.vertices)
+    )
+    assert free == len(poses)
+    np.testing.assert_array_equal(poses[0], world.robot_pose)
+    assert world.navigation_goal.distance(*poses[-1, :2]) == 0.0
+    assert QuasiStatic(friction=0.1, static_friction=0.5).sweep(world, poses).jammed_at == -1
+    assert found.stats.detail["openings"] == len(boxes)
+    assert (found.plan.speeds < 0.0).any()  # backs off
+    assert digest(found.plan) == digest(plan(world, straight_iterations=0).plan)  # type: ignore[arg-type]
+
+
+def test_an_open_way_is_the_navigators() -> None:
+    world, _ = start("one_box")
+    opened = world.moved(movable_poses=world.movables.poses + np.array([2.9, 0.0, 0.0]))
+    rng = np.random.default_rng(3)
+    expected = make_planner("push-aware").plan(opened, stop=ENOUGH, rng=rng)
+    assert digest(plan(opened).plan) == digest(expected.plan)  # type: ignore[arg-type]
+
+
+def test_statuses_without_a_plan() -> None:
+    world, _ = start("one_box")
+    held = plan(world.believing([True]))
+    assert held.status is PlanStatus.GOAL_UNREACHABLE and held.plan is None
+    assert plan(world, MaxIterations(1)).status is PlanStatus.TIMED_OUT
+    token = Cancellation()
+    token.cancel()
+    assert plan(world, token).status is PlanStatus.CANCELLED
+    stuck = dead_end()
+    assert plan(stuck).status is PlanStatus.WAY_CLOSED
+    rest = plan(stuck, ENOUGH, straight_iterations=0)
+    assert rest.status is PlanStatus.WAY_CLOSED and "held not to move" in rest.status.remedy
+
+
+def test_bad_input_is_named() -> None:
+    world, _ = start("one_box")
+    with pytest.raises(InvalidInputError, match="world"):
+        plan("a world")  # type: ignore[arg-type]
+    with pytest.raises(InvalidInputError, match="clearance"):
+        make_planner("namo", clearance=-1.0)
+    with pytest.raises(InvalidInputError, match=r"movables\.fixed"):
+        world.believing([True, False, True])
+    line = GoalLine(np.array([13.0, 4.0]), np.array([1.0, 0.0]))
+    assert plan(World(world.robot, world.robot_pose, world.static, world.movables, line)).plan
+
+
+def test_what_stops_the_robot_is_believed_fixed_until_it_moves() -> None:
+    world, _ = start("one_box")
+    box = world.movables.poses[0]
+    there = world.moved(robot_pose=[box[0] - 0.5 - 0.7, box[1], 0.0])
+    movability = Movability(there)
+    believed = there
+    for step in range(8):
+        believed = movability.update(there.moved(time=float(step)))
+        movability.send(Twist(0.15, 0.0))
+    assert believed.movables.fixed.all() and movability.stopped_by == {0}
+    later = there.moved(movable_poses=[box + np.array([0.2, 0.0, 0.0])], time=9.0)
+    assert not movability.update(later).movables.fixed.any()
+
+
+def test_what_was_told_is_doubted_where_nothing_else_is_left() -> None:
+    world = start("one_box")[0].believing([True])
+    movability = Movability(world)
+    assert movability.update(world).movables.fixed.all()
+    movability.doubt()
+    assert not movability.update(world).movables.fixed.any()
+
+
+def episode_succeeds(name: str, number: int) -> bool:
+    scenario = suite(name, episodes=number + 1, first_seed=1000).scenarios[number]
+    policy = make_policy("namo")
+    return run_episode(JobSettings().environment(scenario, policy), policy, scenario).success
+
+
+@pytest.mark.parametrize(("name", "number"), [("namo-2d-order", 0), ("namo-2d-fixed", 2)])
+def test_an_episode_ends_in_the_goal(name: str, number: int) -> None:
+    assert episode_succeeds(name, number)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", [name for name in suite_names() if name.startswith("namo-")])
+def test_an_episode_of_each_suite_ends_in_the_goal(name: str) -> None:
+    assert all(episode_succeeds(name, number) for number in range(3 if "fixed" in name else 1))
