@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import argparse
+from dataclasses import asdict
 from typing import Any
 
-from pushplan.cli.common import add_command, say, whole
+from pushplan.cli.common import add_command, say, say_json, whole
+from pushplan.cli.outputs import check_file
 
 _EXAMPLES = """\
   pushplan bounds maze-2d-10 --episodes 5
@@ -30,6 +32,7 @@ def add(commands: Any) -> None:
         "--nodes", type=whole(1), default=400, metavar="N", help="of a proof (default %(default)s)"
     )
     parser.add_argument("--out", metavar="FILE.csv", help="write, or go on with, this file")
+    parser.add_argument("--json", action="store_true", help="print them as JSON")
 
 
 def run(options: argparse.Namespace) -> int:
@@ -40,22 +43,29 @@ def run(options: argparse.Namespace) -> int:
     from pushplan.scenarios import suite
     from pushplan.scenarios.known_bounds import known_bounds, load_bounds, save_bounds
 
-    out = None if options.out is None else Path(options.out)
+    check_file(options.out, [".csv"])
+    runs = options.runs.split(",") if options.runs else []
+    with_solutions({}, runs)  # refuses what is no run before the work begins
+    scenarios = [
+        scenario
+        for name in options.suites.split(",")
+        for scenario in suite(name, episodes=options.episodes, first_seed=options.seed).scenarios
+    ]
     found = dict(known_bounds())
-    if out is not None and out.exists():
-        found |= load_bounds(out)
-    keys = []
-    for name in options.suites.split(","):
-        for scenario in suite(name, episodes=options.episodes, first_seed=options.seed).scenarios:
-            keys.append(scenario.key)
-            if scenario.key not in found:
-                found[scenario.key] = scenario_bound(scenario, most_nodes=options.nodes)
-    found = with_solutions(found, options.runs.split(",") if options.runs else ())
-    for key in keys:
-        one = found[key]
-        best = "" if one.best is None else f", best {one.best:.4g} ({one.best_policy})"
-        say(f"{key}: bound {one.bound:.4g}{best} kg m")
-    if out is not None:
-        save_bounds(out, found)
-        say(f"{len(found)} scenarios in {out}")
+    if options.out is not None and Path(options.out).exists():
+        found |= load_bounds(options.out)
+    for scenario in scenarios:
+        if scenario.key not in found:
+            found[scenario.key] = scenario_bound(scenario, most_nodes=options.nodes)
+    found = with_solutions(found, runs)
+    if options.json:
+        say_json([{"scenario": one.key, **asdict(found[one.key])} for one in scenarios])
+    else:
+        for key in (one.key for one in scenarios):
+            best = ""
+            if (work := found[key].best) is not None:
+                best = f", best known {work:.4g} kg m ({found[key].best_policy})"
+            say(f"{key}: bound {found[key].bound:.4g} kg m{best}")
+    if options.out is not None:
+        save_bounds(options.out, found)
     return 0

@@ -29,6 +29,11 @@ USERS_MISTAKES = {
         [ROOM, "--planner", "straight", "--render", "/no/such/folder/plan.png"],
         [ROOM, "--planner", "straight", "--render", "plan.bmp"],
     ],
+    "bounds": [
+        ["no-suite"],
+        ["maze-2d-3", "--runs", "/no/such/folder", "--episodes", "1"],
+        ["maze-2d-3", "--out", "/no/such/folder/bounds.csv"],
+    ],
     "bench": [
         ["maze-2d-3", "--policies", "nobody"],
         ["maze-2d-3", "--policies", "straight", "--out", "FILE/run"],
@@ -194,3 +199,13 @@ def test_the_demo_shows_three_episodes(tmp_path: Path, capsys: pytest.CaptureFix
     text = capsys.readouterr().out
     assert text.count(": success") == 3 and f"page: {out / 'report.html'}" in text
     assert os.path.getsize(out / "report.html") > 100_000
+
+
+def test_bounds_are_printed_and_kept(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out = str(tmp_path / "bounds.csv")
+    assert main(["bounds", "maze-2d-3", "--episodes", "1", "--seed", "77", "--out", out]) == 0
+    assert "bound 15." in capsys.readouterr().out
+    assert main(["bounds", "maze-2d-3", "--episodes", "1", "--seed", "77", "--json"]) == 0
+    (one,) = json.loads(capsys.readouterr().out)
+    kept = (tmp_path / "bounds.csv").read_text()
+    assert f"{one['scenario']},1,{one['bound']:.6g},," in kept
