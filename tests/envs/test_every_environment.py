@@ -18,7 +18,7 @@ from pushplan.envs import make as make_scenario
 from pushplan.envs.registry import ACTIONS, SIMULATORS, TASKS
 from pushplan.envs.tasks.base import drive_of
 from pushplan.scenarios import suite, suite_names
-from pushplan.world import ClearanceArea, Drive, Receptacle
+from pushplan.world import ClearanceArea, Drive, GoalDisc, Receptacle
 from pushplan.world.lazy_names import look_up
 
 LAYOUTS = {
@@ -291,3 +291,25 @@ def test_the_drawing_shows_the_scene(name):
 def test_there_is_an_action_mode_for_every_name_that_a_task_gives():
     for task in TASKS:
         assert set(look_up("task", TASKS, task).actions) <= set(ACTIONS)
+
+
+@pytest.mark.parametrize(("task", "simulator", "preset"), list(worlds()))
+def test_a_seed_is_the_same_start_for_every_action(task, simulator, preset):
+    kind = look_up("task", TASKS, task)
+    for seed in (5, 14028):
+        starts = []
+        for action in kind.actions:
+            env = PushEnv(
+                task=task,
+                simulator=simulator,
+                preset=preset,
+                action=action,
+                observation="state",
+            )
+            env.reset(seed=seed)
+            starts.append(np.concatenate([env.world.robot_pose[None], env.world.movables.poses]))
+            env.close()
+        for start in starts[1:]:
+            np.testing.assert_array_equal(start, starts[0])
+        if isinstance(env.world.goal, GoalDisc):
+            assert env.world.goal.distance(*starts[0][0, :2]) > 0.0

@@ -16,7 +16,6 @@ from pushplan.envs.tasks.variations import TaskVariations, Yaw
 from pushplan.geometry.distance_field import GeodesicField, geodesic_field
 from pushplan.observation import ImageObservation
 from pushplan.world import (
-    Drive,
     GoalDisc,
     InvalidInputError,
     Movables,
@@ -155,8 +154,9 @@ class MazeTask(Task):
         """The preset's start, or a random one from which the robot can get away.
 
         A random start is clear of the walls, outside the goal, joined to the goal by a way for
-        the robot's inscribed disc, and not doomed: a robot that cannot stop can turn by a right
-        angle to one side at least without touching a wall.
+        the robot's inscribed disc, and not doomed: at full speed the robot can turn by a right
+        angle to one side at least without touching a wall. That holds whatever the action is, so
+        that a seed is the same start for all of them.
         """
         random = self.variations.random_start
         if not (self.preset.random_start if random is None else random):
@@ -172,15 +172,13 @@ class MazeTask(Task):
         for _ in range(_START_TRIES):
             pose = rng.uniform(low, high)
             row, col = reachable.grid.cell(pose[0], pose[1])
-            distance = reachable.values[row, col]
-            if np.isfinite(distance) and distance > 0.0 and self._can_leave(pose):
+            outside = self.goal.distance(pose[0], pose[1]) > 0.0
+            if outside and np.isfinite(reachable.values[row, col]) and self._can_leave(pose):
                 return pose
         raise ScenarioError("maze: no free start was found from which the goal can be reached")
 
     def _can_leave(self, pose: FloatArray) -> bool:
         angles = np.linspace(0.0, np.pi / 2.0, 13)
-        if self.robot.drive is not Drive.CONSTANT_SPEED:
-            angles = angles[:1]
         for side in (1.0, -1.0):
             radius = side * self.robot.turning_radius
             center = pose[:2] + radius * np.array([-np.sin(pose[2]), np.cos(pose[2])])
