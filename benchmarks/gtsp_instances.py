@@ -87,7 +87,7 @@ def crane(rng: np.random.Generator, count: int) -> Instance:
     doors = np.array([[0, 0], [30, 0]])
     shelf = rng.integers(0, (31, 9), (2, nodes, 2))
     door = doors[rng.integers(0, 2, (2, nodes))]
-    at_door = rng.random((2, nodes, 1)) < (0.4, 0.4)[0]
+    at_door = rng.random((2, nodes, 1)) < 0.3
     begin, end = np.where(at_door, door, shelf)
     steps = np.abs(end[:, None] - begin[None])  # (from, to, axis)
     costs = np.maximum(steps[..., 0], 3 * steps[..., 1]).astype(float)

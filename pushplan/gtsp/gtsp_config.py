@@ -62,6 +62,8 @@ class GtspConfig(CheckedFields):
     hot: PositiveFloat = 2.0
     cold: PositiveFloat = 0.03
     frozen: Fraction = 0.4
+    reheat: PositiveFloat = 2.0
+    whole: PositiveFloat = 0.8
     restarts: PositiveInt = 12
     run_rounds: PositiveFloat = 8.0
     search_nodes: PositiveInt = 3000

@@ -10,6 +10,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from pushplan.gtsp.dominance_kernels import needed_nodes
 from pushplan.gtsp.node_choice_kernels import SPARE
 from pushplan.world.checks import FloatArray, IntArray
 
@@ -32,6 +33,14 @@ class Problem:
         else:
             gathered = costs[np.ix_(names, names)].astype(np.float64)
         return Problem(gathered, offsets.astype(np.int64), names.astype(np.int64))
+
+    def reduced(self) -> Problem:
+        """The same without nodes that another one of their cluster can always stand for."""
+        needed = needed_nodes(self.costs, self.offsets)
+        if len(needed) == len(self.costs):
+            return self
+        offsets = np.searchsorted(needed, self.offsets)
+        return Problem(self.costs[np.ix_(needed, needed)], offsets, self.names[needed])
 
     @property
     def count(self) -> int:
@@ -81,6 +90,16 @@ class Problem:
         return wide
 
     @cached_property
+    def into(self) -> FloatArray:
+        """(m, N) cheapest arc from each cluster to each node."""
+        return _cheapest(self.finite, self.offsets)
+
+    @cached_property
+    def onto(self) -> FloatArray:
+        """(m, N) cheapest arc from each node to each cluster."""
+        return self.into if self.symmetric else _cheapest(self.reverse, self.offsets)
+
+    @cached_property
     def symmetric(self) -> bool:
         """Whether every arc costs the same both ways."""
         return bool(np.array_equal(self.costs, self.costs.T))
@@ -121,6 +140,11 @@ def tour_cost(costs: NDArray[np.number], nodes: Sequence[int] | IntArray) -> flo
         return 0.0
     arcs = costs[np.asarray(nodes), np.roll(nodes, -1)]
     return math.inf if np.isinf(arcs).any() else math.fsum(arcs.tolist())
+
+
+def _cheapest(wide: FloatArray, offsets: IntArray) -> FloatArray:
+    least: FloatArray = np.minimum.reduceat(wide[:, :-SPARE], offsets[:-1], axis=0)
+    return np.ascontiguousarray(least)
 
 
 def _known(values: FloatArray) -> FloatArray:

@@ -121,7 +121,7 @@ def _cheapest_place(
             skip = below(state, interval)
             continue
         skip -= 1
-        cost = insertion_cost(tour, c, a, tour.after[a])
+        cost = insertion_cost(tour, c, a, tour.after[a], lowest)
         if cost < lowest:
             lowest, place = cost, a
     return place
@@ -143,6 +143,8 @@ class TourProblem(NamedTuple):
 
     costs: FloatArray  # (N, N + SPARE) finite
     reverse: FloatArray  # (N, N + SPARE) of the transpose
+    into: FloatArray  # (m, N) cheapest arc from each cluster to each node
+    onto: FloatArray  # (m, N) cheapest arc from each node to each cluster
     offsets: IntArray  # (m + 1,) with m at least 3
     near: IntArray  # (m, k) clusters by distance
     between: FloatArray  # (m, k) these distances
@@ -168,10 +170,10 @@ def search_tours(
     problem: TourProblem, found: TourState, temperature: float, tolerance: float, rounds: int
 ) -> None:
     """Some rounds of simulated annealing; costs within the tolerance count as equal."""
-    costs, reverse, offsets, near, between, max_removed, blink, reach, symmetric = problem
+    costs, reverse, into, onto, offsets, near, between, max_removed, blink, reach, symmetric = problem
     current, current_nodes, best, best_choice, values, state = found
     count, root = len(offsets) - 1, current[0]
-    tour = make_layers(costs, reverse, offsets, root)
+    tour = make_layers(costs, reverse, into, onto, offsets, root)
     layers = np.empty((count, tour.ahead.shape[1] + SPARE))
     order, nodes = np.empty(count, np.int64), np.empty(count, np.int64)
     removed, gone = np.empty(count, np.int64), np.zeros(count, np.int64)

@@ -95,6 +95,7 @@ class AnytimeSearch:
         )
         self.best_nodes = problem.offsets[self.best]
         self.values = np.full(2, np.inf)
+        self.best_heat = self.config.cold
         self.pace = 3e-5 + 3e-7 * problem.width**2
 
     def run(
@@ -102,17 +103,26 @@ class AnytimeSearch:
         budget: Budget,  # of the call
         begin: float,  # fraction of it that is gone when the tour is hottest
         end: float,  # fraction that is gone when it is coldest, where the run ends at the latest
+        again: bool = False,  # from the best tour, not as hot
     ) -> None:
         """One annealing from a random order, until it is frozen."""
-        self._random_start(budget)
-        config, lowest, frozen, first = self.config, np.inf, 0.0, True
+        config, lowest, frozen, first = self.config, np.inf, 0.0, not again
+        hot, cold = config.hot, config.cold
+        if again:
+            self.order, self.nodes = self.best.copy(), self.best_nodes.copy()
+            hot, cold = config.reheat * self.best_heat, 0.5 * config.frozen * self.best_heat
+        else:
+            self._random_start(budget)
         while not budget.stopped():
             gone = budget.gone()
             if gone >= end and np.isfinite(self.values[1]):
                 break
             progress = min(max((gone - begin) / (end - begin), 0.0), 1.0)
-            heat = config.hot * (config.cold / config.hot) ** progress
+            heat = hot * (cold / hot) ** progress
+            before = self.values[1]
             self._rounds(budget, 0.0 if first else heat * self.scale)
+            if self.values[1] < before and not first:
+                self.best_heat = heat
             first = False
             if self.values[0] < lowest - 1e-9 * abs(self.values[0]):  # not by rounding alone
                 lowest, frozen = self.values[0], config.frozen * heat
@@ -143,6 +153,8 @@ class AnytimeSearch:
         kernel_problem = TourProblem(
             problem.finite,
             problem.reverse,
+            problem.into,
+            problem.onto,
             self.offsets,
             self.near,
             self.between,
@@ -194,6 +206,7 @@ def search(
     while first or (left > 0.0 and not budget.stopped()):
         begin = min(budget.gone(), fraction)
         left = fraction - begin
-        state.run(budget, begin, begin + left / max(1, round(left / length)))
+        again = not first and left < config.whole * length
+        state.run(budget, begin, begin + left / max(1, round(left / length)), again)
         left, first = fraction - budget.gone(), False
     return state.best_nodes

@@ -101,7 +101,7 @@ class _Call:
             limit = min(limit, int(NODES_PER_ROOT_SECOND * math.sqrt(self.budget.seconds)))
         if total > max(limit, len(kept)) and len(kept) > 2 and self.config.method != "exact":
             return self._large(kept, limit)
-        problem = Problem.build(self.costs, kept)
+        problem = Problem.build(self.costs, kept).reduced()
         if self._goes_exact(problem):
             found = self._exact(problem)
             if found is not None:
@@ -169,7 +169,7 @@ class _Call:
         self.method = "search"
         budget = self.budget
         few = promising(self.costs, kept, limit, lambda: budget.gone() > 0.3 or budget.stopped())
-        problem = Problem.build(self.costs, few)
+        problem = Problem.build(self.costs, few).reduced()
         self.detail["nodes"] = float(len(problem.names))
         nodes = search(problem, self.config, self.seed, budget, 1.0)
         order = problem.cluster_of[nodes]
