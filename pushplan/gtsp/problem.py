@@ -22,6 +22,7 @@ class Problem:
     costs: FloatArray  # (N, N) float64; inf forbids an arc. Arcs inside a cluster mean nothing.
     offsets: IntArray  # (m + 1,) cluster c has the nodes ``offsets[c]`` to ``offsets[c + 1] - 1``
     names: IntArray  # (N,) what the caller calls each node
+    forbidden: float | None = None  # `penalty` if it is that of a problem with more nodes
 
     @staticmethod
     def build(costs: NDArray[np.number], members: Sequence[IntArray]) -> Problem:
@@ -37,10 +38,12 @@ class Problem:
     def reduced(self) -> Problem:
         """The same without nodes that another one of their cluster can always stand for."""
         needed = needed_nodes(self.costs, self.offsets)
-        if len(needed) == len(self.costs):
-            return self
-        offsets = np.searchsorted(needed, self.offsets)
-        return Problem(self.costs[np.ix_(needed, needed)], offsets, self.names[needed])
+        return self if len(needed) == len(self.costs) else self.only(needed)
+
+    def only(self, kept: IntArray) -> Problem:
+        """The same with some nodes, (k,) ascending, at least one of each cluster."""
+        costs = self.costs[np.ix_(kept, kept)]
+        return Problem(costs, np.searchsorted(kept, self.offsets), self.names[kept], self.penalty)
 
     @property
     def count(self) -> int:
@@ -71,13 +74,19 @@ class Problem:
         return result
 
     @cached_property
-    def finite(self) -> FloatArray:
-        """(N, N + SPARE) costs; forbidden arcs at a cost that no tour over finite arcs reaches."""
+    def penalty(self) -> float:
+        """Cost of a forbidden arc, which no tour over finite arcs reaches."""
+        if self.forbidden is not None:
+            return self.forbidden
         inside = self.outer[np.isfinite(self.outer)]
         low, high = (inside.min(), inside.max()) if inside.size else (0.0, 1.0)
-        forbidden = high + (self.count + 1) * (high - low) + (abs(high) or 1.0)
-        wide = np.full((len(self.costs), len(self.costs) + SPARE), forbidden)
-        wide[:, :-SPARE] = np.where(np.isfinite(self.costs), self.costs, forbidden)
+        return float(high + (self.count + 1) * (high - low) + (abs(high) or 1.0))
+
+    @cached_property
+    def finite(self) -> FloatArray:
+        """(N, N + SPARE) costs; a forbidden arc costs `penalty`."""
+        wide = np.full((len(self.costs), len(self.costs) + SPARE), self.penalty)
+        wide[:, :-SPARE] = np.where(np.isfinite(self.costs), self.costs, self.penalty)
         return wide
 
     @cached_property

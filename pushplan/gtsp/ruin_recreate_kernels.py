@@ -162,6 +162,7 @@ class TourState(NamedTuple):
     best: IntArray  # (m,) best order so far
     best_nodes: IntArray  # (m,) its nodes
     values: FloatArray  # (2,) costs of both
+    slack: FloatArray  # (2, N) what tours cost more by through each node: the least, and the sum
     random: IntArray  # (1,) state of the random numbers
 
 
@@ -171,7 +172,7 @@ def search_tours(
 ) -> None:
     """Some rounds of simulated annealing; costs within the tolerance count as equal."""
     costs, reverse, into, onto, offsets, near, between, max_removed, blink, reach, symmetric = problem
-    current, current_nodes, best, best_choice, values, state = found
+    current, current_nodes, best, best_choice, values, slack, state = found
     count, root = len(offsets) - 1, current[0]
     tour = make_layers(costs, reverse, into, onto, offsets, root)
     layers = np.empty((count, tour.ahead.shape[1] + SPARE))
@@ -215,3 +216,15 @@ def search_tours(
         copy_into(current, order)
         copy_into(current_nodes, nodes)
         values[0] = build(tour, order, nodes[0])
+    _note_slack(tour, slack)
+
+
+@kernel
+def _note_slack(tour: Layers, slack: FloatArray) -> None:
+    """Take down what the tour would cost more by through each node."""
+    for c in range(len(tour.size)):
+        for v in range(tour.size[c]):
+            node = tour.at[c] + v
+            extra = tour.ahead[c, v] + tour.behind[c, v]
+            slack[0, node] = min(slack[0, node], extra)
+            slack[1, node] += extra
