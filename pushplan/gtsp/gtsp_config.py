@@ -64,9 +64,10 @@ class GtspConfig(CheckedFields):
     frozen: Fraction = 0.4
     reheat: PositiveFloat = 2.0
     whole: PositiveFloat = 0.8
-    narrow_at: PositiveFloat = 0.35
-    narrow: PositiveFloat = 4.0
+    narrow_at: PositiveFloat = 0.3
+    narrow: PositiveFloat = 1.0
     narrow_width: PositiveInt = 24
+    places: PositiveInt = 12
     restarts: PositiveInt = 12
     run_rounds: PositiveFloat = 8.0
     search_nodes: PositiveInt = 3000

@@ -135,6 +135,7 @@ class AnytimeSearch:
         self.near, self.between = problem.nearest(
             config.neighbours if problem.symmetric else config.neighbours * 4 // 3
         )
+        self.beside = problem.beside(config.places)
         self.slack = np.full((2, len(problem.names)), np.inf)
         self.slack[1] = 0.0
 
@@ -188,6 +189,7 @@ class AnytimeSearch:
             self.offsets,
             self.near,
             self.between,
+            self.beside,
             self.most,
             config.blink,
             min(config.swap_neighbours, self.near.shape[1]),
