@@ -7,7 +7,6 @@ import numpy as np
 from pushplan.compiled import kernel
 from pushplan.world.checks import FloatArray, IntArray
 
-
 EFFORT = 16
 """Comparisons for each pair of nodes, after which all nodes that are left count as needed."""
 

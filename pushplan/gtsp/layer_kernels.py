@@ -17,7 +17,6 @@ from pushplan.compiled import kernel
 from pushplan.gtsp.node_choice_kernels import SPARE, pull_values, push_values
 from pushplan.world.checks import FloatArray, IntArray
 
-
 NARROW = 3
 """Clusters of fewer nodes are entered along the rows of the transpose."""
 

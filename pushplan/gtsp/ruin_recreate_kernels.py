@@ -172,7 +172,20 @@ def search_tours(
     problem: TourProblem, found: TourState, temperature: float, tolerance: float, rounds: int
 ) -> None:
     """Some rounds of simulated annealing; costs within the tolerance count as equal."""
-    costs, reverse, into, onto, offsets, near, between, beside, max_removed, blink, reach, symmetric = problem
+    (
+        costs,
+        reverse,
+        into,
+        onto,
+        offsets,
+        near,
+        between,
+        beside,
+        max_removed,
+        blink,
+        reach,
+        symmetric,
+    ) = problem
     current, current_nodes, best, best_choice, values, slack, state = found
     count, root = len(offsets) - 1, current[0]
     tour = make_layers(costs, reverse, into, onto, offsets, root)

@@ -16,6 +16,8 @@ from pushplan.world.checks import FloatArray, IntArray
 from pushplan.world.stop import MaxIterations, Stop, StopCheck, rules_of
 
 MOST_ROUNDS = 2000
+NARROW_ROUNDS = 1000
+"""Rounds without which nothing is known of how promising a node is."""
 
 
 @dataclass
@@ -101,9 +103,9 @@ class AnytimeSearch:
         budget: Budget,  # of the call
         begin: float,  # fraction of it that is gone when the tour is hottest
         end: float,  # fraction that is gone when it is coldest, where the run ends at the latest
-        again: bool = False,  # from the best tour, not as hot
+        again: bool = False,  # from the best order, not as hot
     ) -> None:
-        """One annealing from a random order, until it is frozen."""
+        """One annealing until it is frozen, from a random order or again from the best one."""
         config, lowest, frozen, first = self.config, np.inf, 0.0, not again
         hot, cold = config.hot, config.cold
         if again:
@@ -118,7 +120,8 @@ class AnytimeSearch:
             progress = min(max((gone - begin) / (end - begin), 0.0), 1.0)
             heat = hot * (cold / hot) ** progress
             before = self.values[1]
-            if self.kept is None and progress > config.narrow_at:
+            seen = budget.used >= NARROW_ROUNDS and progress > config.narrow_after
+            if seen and self.kept is None:
                 self._narrow(heat * self.scale)
             self._rounds(budget, 0.0 if first else heat * self.scale)
             if self.values[1] < before and not first:
@@ -142,7 +145,7 @@ class AnytimeSearch:
     def _narrow(self, temperature: float) -> None:
         """Go on with nodes that good tours may use, judged by the tours so far."""
         config, offsets = self.config, self.offsets
-        good = self.slack[0] <= config.narrow * temperature
+        good = self.slack[0] <= config.narrow_slack * temperature
         for low, high in itertools.pairwise(offsets):
             if good[low:high].sum() > config.narrow_width:
                 score = np.where(good[low:high], self.slack[1, low:high], np.inf)
