@@ -18,6 +18,8 @@ from pushplan.world.stop import MaxIterations, Stop, StopCheck, rules_of
 MOST_ROUNDS = 2000
 NARROW_ROUNDS = 1000
 """Rounds without which nothing is known of how promising a node is."""
+NARROW_S = 1e-7
+"""Time that it takes to go on with fewer nodes at most, for each pair of nodes [s]."""
 
 
 @dataclass
@@ -120,8 +122,7 @@ class AnytimeSearch:
             progress = min(max((gone - begin) / (end - begin), 0.0), 1.0)
             heat = hot * (cold / hot) ** progress
             before = self.values[1]
-            seen = budget.used >= NARROW_ROUNDS and progress > config.narrow_after
-            if seen and self.kept is None:
+            if self.kept is None and progress > config.narrow_after and self._may_narrow(budget):
                 self._narrow(heat * self.scale)
             self._rounds(budget, 0.0 if first else heat * self.scale)
             if self.values[1] < before and not first:
@@ -142,6 +143,11 @@ class AnytimeSearch:
         self.slack = np.full((2, len(problem.names)), np.inf)
         self.slack[1] = 0.0
 
+    def _may_narrow(self, budget: Budget) -> bool:
+        """Whether enough is known of the nodes, and setting up anew fits into the budget."""
+        pairs = len(self.problem.names) ** 2
+        return budget.used >= NARROW_ROUNDS and NARROW_S * pairs < 0.5 * budget.seconds
+
     def _narrow(self, temperature: float) -> None:
         """Go on with nodes that good tours may use, judged by the tours so far."""
         config, offsets = self.config, self.offsets
@@ -158,6 +164,8 @@ class AnytimeSearch:
 
     def chosen(self) -> IntArray:
         """The cheapest of all nodes in the best order that was found."""
+        if self.kept is None:
+            return self.best_nodes
         problem, nodes = self.everything, np.empty_like(self.best_nodes)
         layers = np.empty((problem.count, problem.width + SPARE))
         best_nodes(problem.finite, problem.offsets, self.best, problem.count, nodes, layers)

@@ -12,6 +12,7 @@ import time
 import numpy as np
 import pytest
 
+from benchmarks.gtsp_instances import FAMILIES, instance
 from pushplan.gtsp import (
     GtspConfig,
     Tour,
@@ -336,6 +337,25 @@ def test_nodes_that_are_left_out_are_those_that_another_one_can_stand_for() -> N
                 and (costs[rest, u] <= costs[rest, v]).all()
             )
     assert gone > 50
+
+
+@pytest.mark.parametrize("family", list(FAMILIES))
+def test_families_of_instances_are_the_same_for_a_seed(family: str) -> None:
+    made, again = instance(family, 1000), instance(family, 1000)
+    np.testing.assert_array_equal(made.costs, again.costs)
+    assert made.clusters == again.clusters
+    assert sorted(itertools.chain(*made.clusters)) == list(range(len(made.costs)))
+    assert np.isfinite(made.costs).all() and (made.costs >= 0.0).all()
+
+
+def test_search_on_promising_nodes_ends_with_all_of_them() -> None:
+    """On wide clusters the search goes on with few nodes, and finds what dynamic programming does."""
+    costs, clusters = pushes(15, 16, 3)
+    exact = solve_gtsp(costs, clusters)
+    config = GtspConfig(method="search", narrow_width=2)
+    tour = solve_gtsp(costs, clusters, stop=MaxIterations(8000), config=config)
+    check_tour(tour, costs, clusters)
+    assert tour.cost == pytest.approx(exact.cost, rel=0.01)
 
 
 def test_node_choice_on_unstructured_costs() -> None:
