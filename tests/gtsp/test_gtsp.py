@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import itertools
 import math
+import runpy
 import subprocess
 import sys
 import threading
 import time
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from benchmarks.gtsp_instances import FAMILIES, instance
 from pushplan.gtsp import (
     GtspConfig,
     Tour,
@@ -35,6 +36,7 @@ from pushplan.gtsp.node_choice_kernels import SPARE, pull_values, push_values
 from pushplan.gtsp.segment_swap_kernels import improve_by_swaps
 from pushplan.world import Cancellation, Deadline, InvalidInputError, MaxIterations
 
+MADE = runpy.run_path(str(Path(__file__).parents[2] / "benchmarks" / "gtsp_instances.py"))
 SEARCH = GtspConfig(method="search")
 PROOF = GtspConfig(method="search", lower_bound=True)
 
@@ -339,9 +341,9 @@ def test_nodes_that_are_left_out_are_those_that_another_one_can_stand_for() -> N
     assert gone > 50
 
 
-@pytest.mark.parametrize("family", list(FAMILIES))
+@pytest.mark.parametrize("family", list(MADE["FAMILIES"]))
 def test_families_of_instances_are_the_same_for_a_seed(family: str) -> None:
-    made, again = instance(family, 1000), instance(family, 1000)
+    made, again = MADE["instance"](family, 1000), MADE["instance"](family, 1000)
     np.testing.assert_array_equal(made.costs, again.costs)
     assert made.clusters == again.clusters
     assert sorted(itertools.chain(*made.clusters)) == list(range(len(made.costs)))
@@ -349,7 +351,7 @@ def test_families_of_instances_are_the_same_for_a_seed(family: str) -> None:
 
 
 def test_search_on_promising_nodes_ends_with_all_of_them() -> None:
-    """On wide clusters the search goes on with few nodes, and finds what dynamic programming does."""
+    """On wide clusters the search goes on with few nodes, and its tour is near the optimum."""
     costs, clusters = pushes(15, 16, 3)
     exact = solve_gtsp(costs, clusters)
     config = GtspConfig(method="search", narrow_width=2)
