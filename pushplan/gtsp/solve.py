@@ -169,7 +169,7 @@ class _Call:
         self.method = "search"
         budget = self.budget
         few = promising(self.costs, kept, limit, lambda: budget.gone() > 0.3 or budget.stopped())
-        problem = Problem.build(self.costs, few).reduced()
+        problem = Problem.build(self.costs, few)
         self.detail["nodes"] = float(len(problem.names))
         nodes = search(problem, self.config, self.seed, budget, 1.0)
         order = problem.cluster_of[nodes]
