@@ -105,7 +105,7 @@ def roads(rng: np.random.Generator, count: int) -> Instance:
     length = rng.integers(5, 30, len(here))
     ways = rng.random((2, len(here)))
     forward, backward = ways[0] < 0.75, (ways[0] >= 0.75) | (ways[1] < 0.5)
-    # a tour of the edge of the town and slow ways back keep every corner within reach
+    # the wrong way takes eight times as long, which keeps every corner within reach
     slow = 8 * length
     rows = np.concatenate([here, there])
     columns = np.concatenate([there, here])
