@@ -30,12 +30,10 @@ class GtspConfig(CheckedFields):
         lower_bound: whether to spend time on a lower bound and a proof.
         proof_fraction: of a time budget that the proof may take.
         proof_states: paths that the proof keeps at once at most.
-        neighbours: clusters near each cluster, of which a round takes some out; a third more where
-            costs differ both ways.
+        neighbours: clusters on the list of each cluster; a third more where costs differ both ways.
         swap_neighbours: of these, how many a segment swap tries.
         max_removed: clusters that a round takes out at most.
         removed_fraction: the same, as a fraction of all clusters (but at least 4).
-        places: clusters before which, and as many behind which, an insertion tries to go.
         blink: fraction of places that an insertion overlooks (Christiaens and Vanden Berghe 2020).
         hot: temperature at the beginning of a run.
         cold: temperature at its end.
@@ -44,7 +42,9 @@ class GtspConfig(CheckedFields):
             the best tour was found.
         whole: fraction of a run from a random order; where less is left of the budget, runs begin
             from the best tour.
-        narrow_after: fraction of the first run after which the search keeps promising nodes only.
+        narrow_from: size of the cluster of a node, on average over nodes, from which on the search
+            keeps promising nodes only.
+        narrow_after: fraction of the first run after which it does.
         narrow_slack: a node is promising if one of the tours so far would have cost at most this
             much more by way of it, in units of the temperature.
         narrow_width: promising nodes of a cluster at most.
@@ -68,13 +68,13 @@ class GtspConfig(CheckedFields):
     swap_neighbours: PositiveInt = 8
     max_removed: PositiveInt = 20
     removed_fraction: Fraction = 0.3
-    places: PositiveInt = 12
     blink: Annotated[float, Limits(0.0, 0.5)] = 0.01
     hot: PositiveFloat = 2.0
     cold: PositiveFloat = 0.03
     frozen: Fraction = 0.4
     reheat: PositiveFloat = 2.0
     whole: Fraction = 0.8
+    narrow_from: PositiveFloat = 7.0
     narrow_after: Fraction = 0.3
     narrow_slack: PositiveFloat = 1.0
     narrow_width: PositiveInt = 24

@@ -121,9 +121,8 @@ class Problem:
         out = np.minimum.reduceat(self.outer.min(axis=1), starts)
         return max(math.fsum(into), math.fsum(out))  # rounded once, as the cost of a tour is
 
-    @cached_property
-    def arcs(self) -> FloatArray:
-        """(m, m) cheapest reduced cost of an arc from each cluster to each, inf to itself.
+    def nearest(self, most: int) -> tuple[IntArray, FloatArray]:
+        """(m, k) nearest clusters of each and their distances: reduced costs, the cheaper way.
 
         The column minima, then the row minima are taken off, as a cost of its own that every arc
         into a node has says nothing about which cluster is near.
@@ -131,20 +130,13 @@ class Problem:
         reduced = self.outer - _known(self.outer.min(axis=0))
         reduced -= _known(reduced.min(axis=1))[:, None]
         starts = self.offsets[:-1]
-        least = np.minimum.reduceat(np.minimum.reduceat(reduced, starts, 0), starts, 1)
-        np.fill_diagonal(least, np.inf)
-        return np.asarray(least)
-
-    def nearest(self, most: int) -> tuple[IntArray, FloatArray]:
-        """(m, k) nearest clusters of each and their distances, the cheaper way."""
-        between = np.minimum(self.arcs, self.arcs.T)
-        near = _first(between, most)
+        between = np.minimum.reduceat(np.minimum.reduceat(reduced, starts, 0), starts, 1)
+        between = np.minimum(between, between.T)
+        np.fill_diagonal(between, np.inf)
+        order = np.argsort(between, axis=1, kind="stable")
+        order = order[order != np.arange(self.count)[:, None]].reshape(self.count, -1)
+        near = np.ascontiguousarray(order[:, :most])
         return near, np.ascontiguousarray(np.take_along_axis(between, near, 1))
-
-    def beside(self, most: int) -> IntArray:
-        """(m, 2 k) clusters before which (even columns) and behind which (odd) each fits best."""
-        before, behind = _first(self.arcs, most), _first(self.arcs.T, most)
-        return np.ascontiguousarray(np.stack([before, behind], axis=-1).reshape(self.count, -1))
 
     def path_cost(self, nodes: Sequence[int] | IntArray) -> float:
         """Cost of a closed tour of own node numbers, rounded once; 0 for a single node."""
@@ -157,13 +149,6 @@ def tour_cost(costs: NDArray[np.number], nodes: Sequence[int] | IntArray) -> flo
         return 0.0
     arcs = costs[np.asarray(nodes), np.roll(nodes, -1)]
     return math.inf if np.isinf(arcs).any() else math.fsum(arcs.tolist())
-
-
-def _first(distances: FloatArray, most: int) -> IntArray:
-    """(m, k) the others in the order of their distances (m, m)."""
-    order = np.argsort(distances, axis=1, kind="stable")
-    order = order[order != np.arange(len(order))[:, None]].reshape(len(order), -1)
-    return np.ascontiguousarray(order[:, :most])
 
 
 def _cheapest(wide: FloatArray, offsets: IntArray) -> FloatArray:

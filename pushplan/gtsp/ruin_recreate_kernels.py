@@ -95,7 +95,7 @@ def _bring_forward(
 @kernel(inline=True)
 def _cheapest_place(
     tour: Layers,
-    beside: IntArray,
+    near: IntArray,
     gone: IntArray,
     seen: IntArray,
     c: int,
@@ -109,8 +109,8 @@ def _cheapest_place(
     skip = below(state, interval) if interval else -1
     seen[-1] += 1
     stamp = seen[-1]
-    for index in range(beside.shape[1]):
-        d = beside[c, index]
+    for index in range(2 * near.shape[1]):
+        d = near[c, index >> 1]
         if gone[d]:
             continue
         a = d if index & 1 else tour.before[d]
@@ -148,7 +148,6 @@ class TourProblem(NamedTuple):
     offsets: IntArray  # (m + 1,) with m at least 3
     near: IntArray  # (m, k) clusters by distance
     between: FloatArray  # (m, k) these distances
-    beside: IntArray  # (m, 2 k) clusters before which (even columns) and behind which one may go
     max_removed: int  # Clusters that a round removes at most, at most m - 2
     blink: float  # Fraction of places that an insertion overlooks
     reach: int  # Neighbours that a segment swap tries
@@ -180,7 +179,6 @@ def search_tours(
         offsets,
         near,
         between,
-        beside,
         max_removed,
         blink,
         reach,
@@ -203,7 +201,7 @@ def search_tours(
             if turn >= 2:
                 _bring_forward(near, between, removed, gone, i, taken, turn == 2)
             c = removed[i]
-            place = _cheapest_place(tour, beside, gone, seen, c, root, blink, state)
+            place = _cheapest_place(tour, near, gone, seen, c, root, blink, state)
             gone[c] = 0
             change += link_in(tour, c, place, root, now, tolerance)
         if change >= -temperature * np.log(1.0 - draw(state)):

@@ -139,14 +139,15 @@ class AnytimeSearch:
         self.near, self.between = problem.nearest(
             config.neighbours if problem.symmetric else config.neighbours * 4 // 3
         )
-        self.beside = problem.beside(config.places)
         self.slack = np.full((2, len(problem.names)), np.inf)
         self.slack[1] = 0.0
 
     def _may_narrow(self, budget: Budget) -> bool:
-        """Whether enough is known of the nodes, and setting up anew fits into the budget."""
-        pairs = len(self.problem.names) ** 2
-        return budget.used >= NARROW_ROUNDS and NARROW_S * pairs < 0.5 * budget.seconds
+        """Whether clusters are wide, enough is known, and setting up anew fits into the budget."""
+        nodes, sizes = len(self.problem.names), np.diff(self.offsets)
+        wide = float(sizes @ sizes) >= self.config.narrow_from * nodes
+        known = budget.used >= NARROW_ROUNDS
+        return wide and known and NARROW_S * nodes**2 < 0.5 * budget.seconds
 
     def _narrow(self, temperature: float) -> None:
         """Go on with nodes that good tours may use, judged by the tours so far."""
@@ -200,7 +201,6 @@ class AnytimeSearch:
             self.offsets,
             self.near,
             self.between,
-            self.beside,
             self.most,
             config.blink,
             min(config.swap_neighbours, self.near.shape[1]),
