@@ -1,17 +1,20 @@
 """The sequencing solver: exact times, proofs, and gaps on public instances, as Markdown.
 
-    python benchmarks/gtsp.py FOLDER [--seeds 3] [--cpu] [--only exact proofs public]
+    python -m benchmarks.gtsp FOLDER [--seeds 3] [--cpu] [--only exact proofs public families]
 
 FOLDER holds `*.gtsp` and `best_known.csv` (columns instance, nodes, clusters, best_known).
-Push-like and unstructured instances are made here. Times are wall-clock; the load of the machine
-is printed. With --cpu all of them, the budgets too, are of processor time, so that other programs
-matter less: the solver has one thread.
+Push-like and unstructured instances are made here, and with `--only families` those of
+`gtsp_instances`, four of each from `--family-seed` on. Their gaps are to the cheapest tour that
+any run of this command has found; it is kept in `reference/gtsp_families.json`. Times are
+wall-clock; the load of the machine is printed. With --cpu all of them, the budgets too, are of
+processor time, so that other programs matter less: the solver has one thread.
 """
 
 from __future__ import annotations
 
 import argparse
 import csv
+import json
 import os
 import time
 from collections.abc import Callable
@@ -19,6 +22,7 @@ from pathlib import Path
 
 import numpy as np
 
+from benchmarks.gtsp_instances import FAMILIES, SIZES, instance, pushes
 from pushplan.gtsp import (
     GtspConfig,
     TourStatus,
@@ -28,33 +32,13 @@ from pushplan.gtsp import (
 )
 from pushplan.world import Deadline
 
+KNOWN = Path(__file__).parent / "reference" / "gtsp_families.json"
 FIRST_SEED = 3000
 """Settings were chosen on seeds from 1000 on."""
-PARTS = ("exact", "proofs", "unstructured", "public", "large")
+PARTS = ("exact", "proofs", "unstructured", "public", "families", "large")
 PROOF_SECONDS = 10.0
 SEARCH_SHARE = 0.02
 """Of these seconds, for the search before the proof."""
-
-
-def pushes(boxes: int, options: int, seed: int) -> tuple[np.ndarray, list[list[int]]]:
-    """A robot in a 10 m square, boxes, straight pushes of each over the nearest edge on their way.
-
-    Costs are the approach to the pushing pose, 1 for each metre of it, the push, 2 for each metre,
-    and up to 0.5 for each push; going back to the start is free.
-    """
-    rng = np.random.default_rng(seed)
-    box = rng.uniform(1.0, 9.0, (boxes, 1, 2))
-    angle = rng.uniform(0.0, 2.0 * np.pi, (boxes, 1)) + np.arange(options) * 2.0 * np.pi / options
-    way = np.stack([np.cos(angle), np.sin(angle)], axis=-1)
-    with np.errstate(divide="ignore"):
-        out = np.where(way > 0.0, (10.0 - box) / way, -box / way).min(axis=-1)
-    begin = np.concatenate([[[5.0, 5.0]], (box - 0.6 * way).reshape(-1, 2)])
-    end = np.concatenate([[[5.0, 5.0]], (box + way * out[..., None]).reshape(-1, 2)])
-    costs = np.linalg.norm(end[:, None] - begin[None], axis=-1)
-    costs[:, 1:] += (2.0 * out + rng.uniform(0.0, 0.5, out.shape)).reshape(-1)
-    costs[:, 0] = 0.0
-    groups = [list(range(1 + b * options, 1 + (b + 1) * options)) for b in range(boxes)]
-    return costs, [[0], *groups]
 
 
 def timed(call: Callable[[], object]) -> float:
@@ -68,7 +52,7 @@ def exact(seeds: int) -> None:
     for boxes in (10, 12, 13, 15):
         times = []
         for seed in range(FIRST_SEED, FIRST_SEED + max(seeds, 5)):
-            costs, clusters = pushes(boxes, 16, seed)
+            costs, clusters = pushes(boxes, 16, np.random.default_rng(seed))
             config = GtspConfig(method="exact")
             times.append(timed(lambda c=costs, g=clusters, k=config: solve_gtsp(c, g, config=k)))
         low, middle = np.percentile(times, (25, 50)) * 1e3
@@ -79,7 +63,7 @@ def proofs(seeds: int) -> None:
     """20 boxes: when the optimum was found, when it was proven."""
     found, proven, late, missed = [], [], 0, 0
     for seed in range(FIRST_SEED, FIRST_SEED + max(seeds, 20)):
-        costs, clusters = pushes(20, 16, seed)
+        costs, clusters = pushes(20, 16, np.random.default_rng(seed))
         config = GtspConfig(method="search", lower_bound=True, proof_fraction=1.0 - SEARCH_SHARE)
         tour = solve_gtsp(costs, clusters, stop=Deadline(PROOF_SECONDS), config=config)
         if tour.status is not TourStatus.OPTIMAL:
@@ -133,9 +117,37 @@ def public(folder: Path, seeds: int) -> None:
     print(f"| all | | {' | '.join(means)} |", flush=True)
 
 
+def families(first: int, seeds: int, budgets: list[float]) -> None:
+    """Gaps on generated instances; writes down tours that are cheaper than those known."""
+    known: dict[str, float] = json.loads(KNOWN.read_text()) if KNOWN.exists() else {}
+    costs: dict[tuple[str, float], list[tuple[str, float]]] = {}
+    for family in FAMILIES:
+        for made in range(first, first + len(SIZES)):
+            name, (arcs, clusters) = f"{family}-{made}", instance(family, made)
+            for seconds in budgets:
+                for seed in range(FIRST_SEED, FIRST_SEED + seeds):
+                    rng, stop = np.random.default_rng(seed), Deadline(seconds)
+                    cost = solve_gtsp(arcs, clusters, stop=stop, rng=rng).cost
+                    known[name] = min(cost, known.get(name, cost))
+                    costs.setdefault((family, seconds), []).append((name, cost))
+    KNOWN.write_text(json.dumps(dict(sorted(known.items())), indent=1) + "\n")
+    print(f"\n| family | {' | '.join(f'gap at {s:g} s (mean, worst)' for s in budgets)} |")
+    print("|---|" + "---|" * len(budgets))
+    total: dict[float, list[float]] = {seconds: [] for seconds in budgets}
+    for family in FAMILIES:
+        cells = []
+        for seconds, every in total.items():
+            gaps = [100.0 * (cost / known[name] - 1.0) for name, cost in costs[family, seconds]]
+            every += gaps
+            cells.append(f"{np.mean(gaps):.2f} %, {max(gaps):.2f} %")
+        print(f"| {family} | {' | '.join(cells)} |")
+    means = [f"{np.mean(gaps):.2f} %, {max(gaps):.2f} %" for gaps in total.values()]
+    print(f"| all | {' | '.join(means)} |", flush=True)
+
+
 def large() -> None:
     """Ten times 20 boxes, with 40 pushes each: 8001 nodes."""
-    costs, clusters = pushes(200, 40, FIRST_SEED)
+    costs, clusters = pushes(200, 40, np.random.default_rng(FIRST_SEED))
     print("\n| 200 boxes x 40 pushes | cost | wall time |\n|---|---|---|")
     for seconds in (1.0, 10.0):
         tour = solve_gtsp(costs, clusters, stop=Deadline(seconds))
@@ -147,6 +159,8 @@ def main() -> None:
     parser.add_argument("folder", type=Path)
     parser.add_argument("--seeds", type=int, default=3)
     parser.add_argument("--cpu", action="store_true", help="processor time instead of wall-clock")
+    parser.add_argument("--family-seed", type=int, default=13000)
+    parser.add_argument("--budgets", type=float, nargs="+", default=[1.0, 10.0], help="families")
     parser.add_argument("--only", nargs="+", choices=PARTS, default=PARTS)
     options = parser.parse_args()
     warm_up_solver()
@@ -159,6 +173,7 @@ def main() -> None:
         "proofs": lambda: proofs(options.seeds),
         "unstructured": lambda: unstructured(options.seeds),
         "public": lambda: public(options.folder, options.seeds),
+        "families": lambda: families(options.family_seed, options.seeds, options.budgets),
         "large": large,
     }
     for name in options.only:

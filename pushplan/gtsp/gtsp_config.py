@@ -38,6 +38,16 @@ class GtspConfig(CheckedFields):
         hot: temperature at the beginning of a run.
         cold: temperature at its end.
         frozen: a run ends early at this fraction of the temperature at which its tour was cheapest.
+        reheat: temperature at which a run from the best tour begins, for each unit of that at which
+            the best tour was found.
+        whole: fraction of a run from a random order; where less is left of the budget, runs begin
+            from the best tour.
+        narrow_from: size of the cluster of a node, on average over nodes, from which on the search
+            keeps promising nodes only.
+        narrow_after: fraction of the first run after which it does.
+        narrow_slack: a node is promising if one of the tours so far would have cost at most this
+            much more by way of it, in units of the temperature.
+        narrow_width: promising nodes of a cluster at most.
         restarts: runs from a random order that a budget is planned for at most; where they end
             early there are more.
         run_rounds: rounds that a run should have for each pair of clusters; fewer runs where they
@@ -62,6 +72,12 @@ class GtspConfig(CheckedFields):
     hot: PositiveFloat = 2.0
     cold: PositiveFloat = 0.03
     frozen: Fraction = 0.4
+    reheat: PositiveFloat = 2.0
+    whole: Fraction = 0.8
+    narrow_from: PositiveFloat = 7.0
+    narrow_after: Fraction = 0.3
+    narrow_slack: PositiveFloat = 1.0
+    narrow_width: PositiveInt = 24
     restarts: PositiveInt = 12
     run_rounds: PositiveFloat = 8.0
     search_nodes: PositiveInt = 3000

@@ -14,8 +14,11 @@ from typing import NamedTuple
 import numpy as np
 
 from pushplan.compiled import kernel
-from pushplan.gtsp.node_choice_kernels import SPARE, push_values
+from pushplan.gtsp.node_choice_kernels import SPARE, pull_values, push_values
 from pushplan.world.checks import FloatArray, IntArray
+
+NARROW = 3
+"""Clusters of fewer nodes are entered along the rows of the transpose."""
 
 
 class Layers(NamedTuple):
@@ -30,10 +33,14 @@ class Layers(NamedTuple):
     ahead: FloatArray  # (m, K)
     behind: FloatArray  # (m, K)
     carry: FloatArray  # (m,)
+    least: FloatArray  # (m, 2) the least of ``ahead`` and of ``behind``
+    into: FloatArray  # (m, N) cheapest arc from a cluster to a node
+    onto: FloatArray  # (m, N) cheapest arc from a node to a cluster
     old_links: IntArray  # (m, 2) what ``after`` and ``before`` were when the round began
     old_ahead: FloatArray  # (m, K)
     old_behind: FloatArray  # (m, K)
     old_carry: FloatArray  # (m,)
+    old_least: FloatArray  # (m, 2)
     stamp: IntArray  # (m,) round in which a cluster was touched last
     touched: IntArray  # (m + 1,) how many clusters the round has touched, and which
     out: FloatArray  # (K + SPARE,) working memory, as the next two
@@ -42,7 +49,14 @@ class Layers(NamedTuple):
 
 
 @kernel(allocates=True)
-def make_layers(costs: FloatArray, reverse: FloatArray, offsets: IntArray, root: int) -> Layers:
+def make_layers(
+    costs: FloatArray,
+    reverse: FloatArray,
+    into: FloatArray,
+    onto: FloatArray,
+    offsets: IntArray,
+    root: int,
+) -> Layers:
     """Memory for a search."""
     count = len(offsets) - 1
     size = offsets[1:] - offsets[:-1]
@@ -58,10 +72,14 @@ def make_layers(costs: FloatArray, reverse: FloatArray, offsets: IntArray, root:
         np.empty((count, width)),
         np.empty((count, width)),
         np.zeros(count),
+        np.zeros((count, 2)),
+        into,
+        onto,
         np.empty((count, 2), np.int64),
         np.empty((count, width)),
         np.empty((count, width)),
         np.empty(count),
+        np.empty((count, 2)),
         np.full(count, -1, np.int64),
         np.zeros(count + 1, np.int64),
         np.empty(width + SPARE),
@@ -83,26 +101,43 @@ def build(tour: Layers, order: IntArray, root_node: int) -> float:
     tour.ahead[root, 0] = 0.0
     for p in range(1, count):
         c = order[p]
-        _from(tour.costs, tour.ahead, tour, order[p - 1], c, tour.out)
+        _from(tour, True, order[p - 1], c, tour.out)
         for v in range(tour.size[c]):
             tour.ahead[c, v] = tour.out[v]
-    _from(tour.costs, tour.ahead, tour, order[count - 1], root, tour.out)
+    _from(tour, True, order[count - 1], root, tour.out)
     total = tour.out[0]
     tour.behind[root, 0] = -total
+    tour.least[root, 0], tour.least[root, 1] = 0.0, -total
     for p in range(count - 1, 0, -1):
         c, d = order[p], order[p + 1 if p + 1 < count else 0]
-        _from(tour.reverse, tour.behind, tour, d, c, tour.out)
+        _from(tour, False, d, c, tour.out)
         for v in range(tour.size[c]):
             tour.behind[c, v] = tour.out[v]
+        _note_least(tour, c)
     return float(total)
 
 
 @kernel(inline=True)
-def _from(
-    costs: FloatArray, values: FloatArray, tour: Layers, a: int, b: int, out: FloatArray
-) -> None:
-    """Fill ``out`` with the values of cluster b from those of cluster a."""
-    push_values(costs, values, a, tour.at[a], tour.size[a], tour.at[b], tour.size[b], out)
+def _note_least(tour: Layers, c: int) -> None:
+    """Bring ``least`` of a cluster up to date."""
+    ahead = behind = np.inf
+    for v in range(tour.size[c]):
+        ahead = min(ahead, tour.ahead[c, v])
+        behind = min(behind, tour.behind[c, v])
+    tour.least[c, 0], tour.least[c, 1] = ahead, behind
+
+
+@kernel(inline=True)
+def _from(tour: Layers, forward: bool, a: int, b: int, out: FloatArray) -> None:
+    """Fill ``out`` with the values of cluster b from those of cluster a, one way or the other."""
+    values = tour.ahead if forward else tour.behind
+    n_at, n_to = tour.size[a], tour.size[b]
+    if n_to < NARROW and n_at > n_to:  # along the rows of the transpose, which lie in a piece
+        other = tour.reverse if forward else tour.costs
+        pull_values(other, values, a, tour.at[a], n_at, tour.at[b], n_to, out)
+    else:
+        costs = tour.costs if forward else tour.reverse
+        push_values(costs, values, a, tour.at[a], n_at, tour.at[b], n_to, out)
 
 
 @kernel(inline=True)
@@ -114,6 +149,7 @@ def keep(tour: Layers, c: int, now: int) -> None:
         tour.touched[tour.touched[0]] = c
         tour.old_links[c, 0], tour.old_links[c, 1] = tour.after[c], tour.before[c]
         tour.old_carry[c] = tour.carry[c]
+        tour.old_least[c, 0], tour.old_least[c, 1] = tour.least[c, 0], tour.least[c, 1]
         for v in range(tour.size[c]):
             tour.old_ahead[c, v], tour.old_behind[c, v] = tour.ahead[c, v], tour.behind[c, v]
 
@@ -125,33 +161,28 @@ def undo(tour: Layers) -> None:
         c = tour.touched[i]
         tour.after[c], tour.before[c] = tour.old_links[c, 0], tour.old_links[c, 1]
         tour.carry[c] = tour.old_carry[c]
+        tour.least[c, 0], tour.least[c, 1] = tour.old_least[c, 0], tour.old_least[c, 1]
         for v in range(tour.size[c]):
             tour.ahead[c, v], tour.behind[c, v] = tour.old_ahead[c, v], tour.old_behind[c, v]
 
 
 @kernel(inline=True)
-def _renew(
-    tour: Layers,
-    costs: FloatArray,
-    values: FloatArray,
-    onward: IntArray,
-    c: int,
-    root: int,
-    now: int,
-    tolerance: float,
-) -> None:
-    """Renew ``values`` past cluster c in one direction, up to where they are as they were."""
+def _renew(tour: Layers, forward: bool, c: int, root: int, now: int, tolerance: float) -> None:
+    """Renew the values past cluster c in one direction, up to where they are as they were."""
+    values, onward = (tour.ahead, tour.after) if forward else (tour.behind, tour.before)
     p, c = c, onward[c]
     out = tour.out
     while c != root:
-        _from(costs, values, tour, p, c, out)
-        changed = False
+        _from(tour, forward, p, c, out)
+        changed, least = False, np.inf
         for v in range(tour.size[c]):
             out[v] -= tour.carry[c]
+            least = min(least, out[v])
             changed = changed or abs(out[v] - values[c, v]) > tolerance
         if not changed:
             return
         keep(tour, c, now)
+        tour.least[c, 0 if forward else 1] = least
         for v in range(tour.size[c]):
             values[c, v] = out[v]
         p, c = c, onward[c]
@@ -159,9 +190,10 @@ def _renew(
 
 @kernel(inline=True)
 def _renew_both(tour: Layers, c: int, root: int, now: int, tolerance: float) -> None:
-    """Renew the values on both sides of cluster c."""
-    _renew(tour, tour.costs, tour.ahead, tour.after, c, root, now, tolerance)
-    _renew(tour, tour.reverse, tour.behind, tour.before, c, root, now, tolerance)
+    """Renew the values on both sides of cluster c, which have changed too."""
+    _note_least(tour, c)
+    _renew(tour, True, c, root, now, tolerance)
+    _renew(tour, False, c, root, now, tolerance)
 
 
 @kernel(inline=True)
@@ -179,13 +211,13 @@ def close_gap(
     keep(tour, b, now)
     tour.after[a], tour.before[b] = b, a
     out = tour.out
-    _from(tour.costs, tour.ahead, tour, a, b, out)
+    _from(tour, True, a, b, out)
     cost = np.inf
     for v in range(tour.size[b]):
         cost = min(cost, out[v] + tour.behind[b, v])
     if a != root:
         tour.carry[a] += cost
-        _from(tour.reverse, tour.behind, tour, b, a, out)
+        _from(tour, False, b, a, out)
         for v in range(tour.size[a]):
             tour.ahead[a, v] -= cost
             tour.behind[a, v] = out[v] - tour.carry[a]
@@ -200,13 +232,28 @@ def close_gap(
 
 
 @kernel(inline=True)
-def insertion_cost(tour: Layers, c: int, a: int, b: int) -> float:
-    """What the tour costs more by with cluster c between a and b."""
+def insertion_cost(tour: Layers, c: int, a: int, b: int, limit: float) -> float:
+    """What the tour costs more by with cluster c between a and b.
+
+    Infinite where a lower bound says that it is not below the limit.
+    """
+    at, size = tour.at[c], tour.size[c]
+    start, end = tour.least[a, 0], tour.least[b, 1]
+    bound = np.inf
+    for v in range(at, at + size):
+        bound = min(bound, tour.into[a, v] + tour.onto[b, v])
+    if start + bound + end >= limit:
+        return np.inf
     left, right = tour.left, tour.right
-    _from(tour.costs, tour.ahead, tour, a, c, left)
-    _from(tour.reverse, tour.behind, tour, b, c, right)
+    _from(tour, True, a, c, left)
+    bound = np.inf
+    for v in range(size):
+        bound = min(bound, left[v] + tour.onto[b, at + v])
+    if bound + end >= limit:
+        return np.inf
+    _from(tour, False, b, c, right)
     cost = np.inf
-    for v in range(tour.size[c]):
+    for v in range(size):
         cost = min(cost, left[v] + right[v])
     return float(cost)
 
@@ -215,7 +262,7 @@ def insertion_cost(tour: Layers, c: int, a: int, b: int) -> float:
 def link_in(tour: Layers, c: int, a: int, root: int, now: int, tolerance: float) -> float:
     """Put cluster c behind cluster a; returns the change of the tour's cost."""
     b = tour.after[a]
-    cost = insertion_cost(tour, c, a, b)
+    cost = insertion_cost(tour, c, a, b, np.inf)
     keep(tour, a, now)
     keep(tour, b, now)
     tour.after[a], tour.before[c], tour.after[c], tour.before[b] = c, a, b, c

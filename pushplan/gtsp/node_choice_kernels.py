@@ -59,6 +59,33 @@ def push_values(
         out[w], out[w + 1], out[w + 2], out[w + 3] = first, second, third, fourth
 
 
+@kernel(inline=True)
+def pull_values(
+    reverse: FloatArray,  # (N, N + SPARE); up to `SPARE` columns past the cluster are read
+    values: FloatArray,  # (m, >= n_at)
+    a: int,  # row of ``values``
+    at: int,  # first node of the cluster that the path comes from
+    n_at: int,
+    to: int,  # first node of the cluster that it goes to
+    n_to: int,
+    out: FloatArray,  # (>= n_to,)
+) -> None:
+    """Fill ``out[w] = min_v values[a, v] + reverse[to + w, at + v]``, row by row."""
+    whole = n_at - n_at % 4
+    for w in range(n_to):
+        first = second = third = fourth = np.inf
+        i = to + w
+        for v in range(0, whole, 4):
+            j = at + v
+            first = min(first, values[a, v] + reverse[i, j])
+            second = min(second, values[a, v + 1] + reverse[i, j + 1])
+            third = min(third, values[a, v + 2] + reverse[i, j + 2])
+            fourth = min(fourth, values[a, v + 3] + reverse[i, j + 3])
+        for v in range(whole, n_at):
+            first = min(first, values[a, v] + reverse[i, at + v])
+        out[w] = min(min(first, second), min(third, fourth))
+
+
 @kernel
 def best_nodes(
     costs: FloatArray,  # (N, N + SPARE)

@@ -10,6 +10,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from pushplan.gtsp.dominance_kernels import needed_nodes
 from pushplan.gtsp.node_choice_kernels import SPARE
 from pushplan.world.checks import FloatArray, IntArray
 
@@ -21,6 +22,7 @@ class Problem:
     costs: FloatArray  # (N, N) float64; inf forbids an arc. Arcs inside a cluster mean nothing.
     offsets: IntArray  # (m + 1,) cluster c has the nodes ``offsets[c]`` to ``offsets[c + 1] - 1``
     names: IntArray  # (N,) what the caller calls each node
+    forbidden: float | None = None  # `penalty` if it is that of a problem with more nodes
 
     @staticmethod
     def build(costs: NDArray[np.number], members: Sequence[IntArray]) -> Problem:
@@ -32,6 +34,16 @@ class Problem:
         else:
             gathered = costs[np.ix_(names, names)].astype(np.float64)
         return Problem(gathered, offsets.astype(np.int64), names.astype(np.int64))
+
+    def reduced(self) -> Problem:
+        """The same without nodes that another one of their cluster can always stand for."""
+        needed = needed_nodes(self.costs, self.offsets)
+        return self if len(needed) == len(self.costs) else self.only(needed)
+
+    def only(self, kept: IntArray) -> Problem:
+        """The same with some nodes, (k,) ascending, at least one of each cluster."""
+        costs = self.costs[np.ix_(kept, kept)]
+        return Problem(costs, np.searchsorted(kept, self.offsets), self.names[kept], self.penalty)
 
     @property
     def count(self) -> int:
@@ -62,13 +74,19 @@ class Problem:
         return result
 
     @cached_property
-    def finite(self) -> FloatArray:
-        """(N, N + SPARE) costs; forbidden arcs at a cost that no tour over finite arcs reaches."""
+    def penalty(self) -> float:
+        """Cost of a forbidden arc, which no tour over finite arcs reaches."""
+        if self.forbidden is not None:
+            return self.forbidden
         inside = self.outer[np.isfinite(self.outer)]
         low, high = (inside.min(), inside.max()) if inside.size else (0.0, 1.0)
-        forbidden = high + (self.count + 1) * (high - low) + (abs(high) or 1.0)
-        wide = np.full((len(self.costs), len(self.costs) + SPARE), forbidden)
-        wide[:, :-SPARE] = np.where(np.isfinite(self.costs), self.costs, forbidden)
+        return float(high + (self.count + 1) * (high - low) + (abs(high) or 1.0))
+
+    @cached_property
+    def finite(self) -> FloatArray:
+        """(N, N + SPARE) costs; a forbidden arc costs `penalty`."""
+        wide = np.full((len(self.costs), len(self.costs) + SPARE), self.penalty)
+        wide[:, :-SPARE] = np.where(np.isfinite(self.costs), self.costs, self.penalty)
         return wide
 
     @cached_property
@@ -79,6 +97,16 @@ class Problem:
         wide = np.full_like(self.finite, self.finite[0, -1])
         wide[:, :-SPARE] = self.finite[:, :-SPARE].T
         return wide
+
+    @cached_property
+    def into(self) -> FloatArray:
+        """(m, N) cheapest arc from each cluster to each node."""
+        return _cheapest(self.finite, self.offsets)
+
+    @cached_property
+    def onto(self) -> FloatArray:
+        """(m, N) cheapest arc from each node to each cluster."""
+        return self.into if self.symmetric else _cheapest(self.reverse, self.offsets)
 
     @cached_property
     def symmetric(self) -> bool:
@@ -121,6 +149,11 @@ def tour_cost(costs: NDArray[np.number], nodes: Sequence[int] | IntArray) -> flo
         return 0.0
     arcs = costs[np.asarray(nodes), np.roll(nodes, -1)]
     return math.inf if np.isinf(arcs).any() else math.fsum(arcs.tolist())
+
+
+def _cheapest(wide: FloatArray, offsets: IntArray) -> FloatArray:
+    least: FloatArray = np.minimum.reduceat(wide[:, :-SPARE], offsets[:-1], axis=0)
+    return np.ascontiguousarray(least)
 
 
 def _known(values: FloatArray) -> FloatArray:

@@ -121,7 +121,7 @@ def _cheapest_place(
             skip = below(state, interval)
             continue
         skip -= 1
-        cost = insertion_cost(tour, c, a, tour.after[a])
+        cost = insertion_cost(tour, c, a, tour.after[a], lowest)
         if cost < lowest:
             lowest, place = cost, a
     return place
@@ -143,6 +143,8 @@ class TourProblem(NamedTuple):
 
     costs: FloatArray  # (N, N + SPARE) finite
     reverse: FloatArray  # (N, N + SPARE) of the transpose
+    into: FloatArray  # (m, N) cheapest arc from each cluster to each node
+    onto: FloatArray  # (m, N) cheapest arc from each node to each cluster
     offsets: IntArray  # (m + 1,) with m at least 3
     near: IntArray  # (m, k) clusters by distance
     between: FloatArray  # (m, k) these distances
@@ -160,6 +162,7 @@ class TourState(NamedTuple):
     best: IntArray  # (m,) best order so far
     best_nodes: IntArray  # (m,) its nodes
     values: FloatArray  # (2,) costs of both
+    slack: FloatArray  # (2, N) what tours cost more by through each node: the least, and the sum
     random: IntArray  # (1,) state of the random numbers
 
 
@@ -168,10 +171,22 @@ def search_tours(
     problem: TourProblem, found: TourState, temperature: float, tolerance: float, rounds: int
 ) -> None:
     """Some rounds of simulated annealing; costs within the tolerance count as equal."""
-    costs, reverse, offsets, near, between, max_removed, blink, reach, symmetric = problem
-    current, current_nodes, best, best_choice, values, state = found
+    (
+        costs,
+        reverse,
+        into,
+        onto,
+        offsets,
+        near,
+        between,
+        max_removed,
+        blink,
+        reach,
+        symmetric,
+    ) = problem
+    current, current_nodes, best, best_choice, values, slack, state = found
     count, root = len(offsets) - 1, current[0]
-    tour = make_layers(costs, reverse, offsets, root)
+    tour = make_layers(costs, reverse, into, onto, offsets, root)
     layers = np.empty((count, tour.ahead.shape[1] + SPARE))
     order, nodes = np.empty(count, np.int64), np.empty(count, np.int64)
     removed, gone = np.empty(count, np.int64), np.zeros(count, np.int64)
@@ -213,3 +228,15 @@ def search_tours(
         copy_into(current, order)
         copy_into(current_nodes, nodes)
         values[0] = build(tour, order, nodes[0])
+    _note_slack(tour, slack)
+
+
+@kernel
+def _note_slack(tour: Layers, slack: FloatArray) -> None:
+    """Take down what the tour would cost more by through each node."""
+    for c in range(len(tour.size)):
+        for v in range(tour.size[c]):
+            node = tour.at[c] + v
+            extra = tour.ahead[c, v] + tour.behind[c, v]
+            slack[0, node] = min(slack[0, node], extra)
+            slack[1, node] += extra

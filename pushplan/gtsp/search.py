@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import time
 from dataclasses import dataclass, field
 
@@ -15,6 +16,10 @@ from pushplan.world.checks import FloatArray, IntArray
 from pushplan.world.stop import MaxIterations, Stop, StopCheck, rules_of
 
 MOST_ROUNDS = 2000
+NARROW_ROUNDS = 1000
+"""Rounds without which nothing is known of how promising a node is."""
+NARROW_S = 1e-7
+"""Time that it takes to go on with fewer nodes at most, for each pair of nodes [s]."""
 
 
 @dataclass
@@ -81,20 +86,18 @@ class AnytimeSearch:
     best: IntArray = field(init=False)
     best_nodes: IntArray = field(init=False)
     values: FloatArray = field(init=False)
+    kept: IntArray | None = field(init=False, default=None)
 
     def __post_init__(self) -> None:
         problem, config = self.problem, self.config
-        self.near, self.between = problem.nearest(
-            config.neighbours if problem.symmetric else config.neighbours * 4 // 3
-        )
-        self.offsets = problem.offsets
+        self.everything, self.root = problem, problem.root
+        self._use(problem)
         fraction = max(4, int(config.removed_fraction * problem.count))
         self.most = max(1, min(config.max_removed, fraction, problem.count - 2))
-        self.best = np.concatenate(
-            ([problem.root], np.delete(np.arange(problem.count), problem.root))
-        )
-        self.best_nodes = problem.offsets[self.best]
+        self.best = np.concatenate(([self.root], np.delete(np.arange(problem.count), self.root)))
         self.values = np.full(2, np.inf)
+        self.best_nodes = problem.offsets[self.best]
+        self.best_heat = self.config.cold
         self.pace = 3e-5 + 3e-7 * problem.width**2
 
     def run(
@@ -102,22 +105,72 @@ class AnytimeSearch:
         budget: Budget,  # of the call
         begin: float,  # fraction of it that is gone when the tour is hottest
         end: float,  # fraction that is gone when it is coldest, where the run ends at the latest
+        again: bool = False,  # from the best order, not as hot
     ) -> None:
-        """One annealing from a random order, until it is frozen."""
-        self._random_start(budget)
-        config, lowest, frozen, first = self.config, np.inf, 0.0, True
+        """One annealing until it is frozen, from a random order or again from the best one."""
+        config, lowest, frozen, first = self.config, np.inf, 0.0, not again
+        hot, cold = config.hot, config.cold
+        if again:
+            self.order, self.nodes = self.best.copy(), self.best_nodes.copy()
+            hot, cold = config.reheat * self.best_heat, 0.5 * config.frozen * self.best_heat
+        else:
+            self._random_start(budget)
         while not budget.stopped():
             gone = budget.gone()
             if gone >= end and np.isfinite(self.values[1]):
                 break
             progress = min(max((gone - begin) / (end - begin), 0.0), 1.0)
-            heat = config.hot * (config.cold / config.hot) ** progress
+            heat = hot * (cold / hot) ** progress
+            before = self.values[1]
+            if self.kept is None and progress > config.narrow_after and self._may_narrow(budget):
+                self._narrow(heat * self.scale)
             self._rounds(budget, 0.0 if first else heat * self.scale)
+            if self.values[1] < before and not first:
+                self.best_heat = heat
             first = False
             if self.values[0] < lowest - 1e-9 * abs(self.values[0]):  # not by rounding alone
                 lowest, frozen = self.values[0], config.frozen * heat
             elif heat < frozen:
                 break
+
+    def _use(self, problem: Problem) -> None:
+        config = self.config
+        self.problem, self.offsets = problem, problem.offsets
+        self.near, self.between = problem.nearest(
+            config.neighbours if problem.symmetric else config.neighbours * 4 // 3
+        )
+        self.slack = np.full((2, len(problem.names)), np.inf)
+        self.slack[1] = 0.0
+
+    def _may_narrow(self, budget: Budget) -> bool:
+        """Whether clusters are wide, enough is known, and setting up anew fits into the budget."""
+        nodes, sizes = len(self.problem.names), np.diff(self.offsets)
+        wide = float(sizes @ sizes) >= self.config.narrow_from * nodes
+        known = budget.used >= NARROW_ROUNDS
+        return wide and known and NARROW_S * nodes**2 < 0.5 * budget.seconds
+
+    def _narrow(self, temperature: float) -> None:
+        """Go on with nodes that good tours may use, judged by the tours so far."""
+        config, offsets = self.config, self.offsets
+        good = self.slack[0] <= config.narrow_slack * temperature
+        for low, high in itertools.pairwise(offsets):
+            if good[low:high].sum() > config.narrow_width:
+                score = np.where(good[low:high], self.slack[1, low:high], np.inf)
+                good[low + np.argsort(score, kind="stable")[config.narrow_width :]] = False
+        good[self.nodes] = good[self.best_nodes] = True
+        self.kept = np.flatnonzero(good)
+        self._use(self.problem.only(self.kept))
+        self.nodes = np.searchsorted(self.kept, self.nodes)
+        self.best_nodes = np.searchsorted(self.kept, self.best_nodes)
+
+    def chosen(self) -> IntArray:
+        """The cheapest of all nodes in the best order that was found."""
+        if self.kept is None:
+            return self.best_nodes
+        problem, nodes = self.everything, np.empty_like(self.best_nodes)
+        layers = np.empty((problem.count, problem.width + SPARE))
+        best_nodes(problem.finite, problem.offsets, self.best, problem.count, nodes, layers)
+        return nodes
 
     def runs_in(self, budget: Budget, fraction: float) -> int:
         """How many runs a fraction of the budget is good for."""
@@ -131,7 +184,7 @@ class AnytimeSearch:
     @property
     def scale(self) -> float:
         """Mean reduced arc of the best tour."""
-        spread = (self.values[1] - self.problem.floor) / self.problem.count
+        spread = (self.values[1] - self.everything.floor) / self.problem.count
         return float(spread) if np.isfinite(spread) else 0.0
 
     def _rounds(self, budget: Budget, temperature: float) -> None:
@@ -143,6 +196,8 @@ class AnytimeSearch:
         kernel_problem = TourProblem(
             problem.finite,
             problem.reverse,
+            problem.into,
+            problem.onto,
             self.offsets,
             self.near,
             self.between,
@@ -152,7 +207,7 @@ class AnytimeSearch:
             problem.symmetric,
         )
         found = TourState(
-            self.order, self.nodes, self.best, self.best_nodes, self.values, self.state
+            self.order, self.nodes, self.best, self.best_nodes, self.values, self.slack, self.state
         )
         tolerance = 1e-12 * max(abs(self.values[1]), abs(self.values[0]))
         search_tours(kernel_problem, found, temperature, tolerance, rounds)
@@ -167,9 +222,9 @@ class AnytimeSearch:
 
     def _random_start(self, budget: Budget) -> None:
         problem = self.problem
-        rest = np.delete(np.arange(problem.count), problem.root)
+        rest = np.delete(np.arange(problem.count), self.root)
         rng = np.random.default_rng(int(self.state[0]) + budget.used)
-        self.order = np.concatenate(([problem.root], rng.permutation(rest)))
+        self.order = np.concatenate(([self.root], rng.permutation(rest)))
         self.nodes = problem.offsets[self.order]
         layers = np.empty((problem.count, problem.width + SPARE))
         self.values[0] = best_nodes(
@@ -194,6 +249,7 @@ def search(
     while first or (left > 0.0 and not budget.stopped()):
         begin = min(budget.gone(), fraction)
         left = fraction - begin
-        state.run(budget, begin, begin + left / max(1, round(left / length)))
+        again = not first and left < config.whole * length
+        state.run(budget, begin, begin + left / max(1, round(left / length)), again)
         left, first = fraction - budget.gone(), False
-    return state.best_nodes
+    return state.chosen()

@@ -101,7 +101,7 @@ class _Call:
             limit = min(limit, int(NODES_PER_ROOT_SECOND * math.sqrt(self.budget.seconds)))
         if total > max(limit, len(kept)) and len(kept) > 2 and self.config.method != "exact":
             return self._large(kept, limit)
-        problem = Problem.build(self.costs, kept)
+        problem = Problem.build(self.costs, kept).reduced()
         if self._goes_exact(problem):
             found = self._exact(problem)
             if found is not None:

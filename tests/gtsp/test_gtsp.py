@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import itertools
 import math
+import runpy
 import subprocess
 import sys
 import threading
 import time
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -19,11 +21,22 @@ from pushplan.gtsp import (
     solve_gtsp,
     warm_up_solver,
 )
-from pushplan.gtsp.layer_kernels import build, close_gap, keep, link_in, make_layers, undo
-from pushplan.gtsp.node_choice_kernels import SPARE, push_values
+from pushplan.gtsp.dominance_kernels import needed_nodes
+from pushplan.gtsp.layer_kernels import (
+    Layers,
+    build,
+    close_gap,
+    insertion_cost,
+    keep,
+    link_in,
+    make_layers,
+    undo,
+)
+from pushplan.gtsp.node_choice_kernels import SPARE, pull_values, push_values
 from pushplan.gtsp.segment_swap_kernels import improve_by_swaps
 from pushplan.world import Cancellation, Deadline, InvalidInputError, MaxIterations
 
+MADE = runpy.run_path(str(Path(__file__).parents[2] / "benchmarks" / "gtsp_instances.py"))
 SEARCH = GtspConfig(method="search")
 PROOF = GtspConfig(method="search", lower_bound=True)
 
@@ -263,6 +276,19 @@ def test_push_values_is_a_minimum_over_nodes() -> None:
         push_values(costs, values, 1, at, n_at, to, n_to, out)
         expected = (values[1][:, None] + costs[at : at + n_at, to : to + n_to]).min(axis=0)
         np.testing.assert_array_equal(out[:n_to], expected)
+        reverse = np.full_like(costs, np.nan)
+        reverse[:, :20] = costs[:, :20].T
+        pull_values(reverse, values, 1, at, n_at, to, n_to, out)
+        np.testing.assert_array_equal(out[:n_to], expected)
+
+
+def layers_of(costs: np.ndarray, offsets: np.ndarray) -> Layers:
+    """Memory for a tour on (N, N) costs."""
+    wide, reverse = np.zeros((2, len(costs), len(costs) + SPARE))
+    wide[:, : len(costs)], reverse[:, : len(costs)] = costs, costs.T
+    into = np.minimum.reduceat(costs, offsets[:-1], axis=0)
+    onto = np.ascontiguousarray(np.minimum.reduceat(costs, offsets[:-1], axis=1).T)
+    return make_layers(wide, reverse, into, onto, offsets, 0)
 
 
 def test_changes_of_a_tour_cost_what_building_it_anew_says() -> None:
@@ -271,23 +297,67 @@ def test_changes_of_a_tour_cost_what_building_it_anew_says() -> None:
     for now in range(200):
         offsets = np.concatenate(([0], np.cumsum([1, *rng.integers(1, 6, 8)])))
         count = int(offsets[-1])
-        costs = np.zeros((count, count + SPARE))
-        costs[:, :count] = rng.random((count, count))
-        reverse = np.zeros_like(costs)
-        reverse[:, :count] = costs[:, :count].T
-        order, memory = np.arange(9), make_layers(costs, reverse, offsets, 0)
+        costs = rng.random((count, count))
+        order, memory = np.arange(9), layers_of(costs, offsets)
         before = build(memory, order, 0)
         cost, c = before, int(rng.integers(1, 9))
         keep(memory, c, now)
         cost += close_gap(memory, memory.before[c], memory.after[c], memory.carry[c], 0, now, 1e-12)
         behind = int(rng.choice(np.delete(order, c)))
+        full = insertion_cost(memory, c, behind, memory.after[behind], np.inf)
+        limited = insertion_cost(memory, c, behind, memory.after[behind], 0.3)
+        assert limited == full or (limited == np.inf and full >= 0.3 - 1e-12)
         cost += link_in(memory, c, behind, 0, now, 1e-12)
         changed = np.delete(order, c)
         changed = np.insert(changed, int(np.flatnonzero(changed == behind)[0]) + 1, c)
-        anew = make_layers(costs, reverse, offsets, 0)
+        anew = layers_of(costs, offsets)
         assert build(anew, changed, 0) == pytest.approx(cost)
         undo(memory)
         np.testing.assert_array_equal(memory.after, np.roll(order, -1))
+
+
+def test_nodes_that_are_left_out_are_those_that_another_one_can_stand_for() -> None:
+    rng = np.random.default_rng(3)
+    gone = 0
+    for _ in range(200):
+        offsets = np.concatenate(([0], np.cumsum(rng.integers(1, 6, 4))))
+        owner = np.repeat(np.arange(4), np.diff(offsets))
+        costs = rng.choice([0.0, 1.0, np.inf], (len(owner), len(owner)), p=[0.2, 0.7, 0.1])
+        needed = needed_nodes(costs, offsets)
+        gone += len(owner) - len(needed)
+        for v in np.setdiff1d(np.arange(len(owner)), needed):
+            rest = owner != owner[v]
+            assert any(
+                (costs[u, rest] <= costs[v, rest]).all()
+                and (costs[rest, u] <= costs[rest, v]).all()
+                for u in needed[owner[needed] == owner[v]]
+            )
+        for v, u in itertools.permutations(needed, 2):
+            rest = owner != owner[v]
+            assert owner[u] != owner[v] or not (
+                (costs[u, rest] <= costs[v, rest]).all()
+                and (costs[rest, u] <= costs[rest, v]).all()
+            )
+    assert gone > 50
+
+
+@pytest.mark.parametrize("family", list(MADE["FAMILIES"]))
+def test_families_of_instances_are_the_same_for_a_seed(family: str) -> None:
+    made, again = MADE["instance"](family, 1000), MADE["instance"](family, 1000)
+    np.testing.assert_array_equal(made.costs, again.costs)
+    assert made.clusters == again.clusters
+    assert sorted(itertools.chain(*made.clusters)) == list(range(len(made.costs)))
+    assert np.isfinite(made.costs).all() and (made.costs >= 0.0).all()
+
+
+def test_search_on_promising_nodes_ends_with_all_of_them() -> None:
+    """On wide clusters the search goes on with few nodes, and its tour is near the optimum."""
+    costs, clusters = pushes(15, 16, 3)
+    exact = solve_gtsp(costs, clusters)
+    config = GtspConfig(method="search", narrow_width=2)
+    tour = solve_gtsp(costs, clusters, stop=MaxIterations(8000), config=config)
+    check_tour(tour, costs, clusters)
+    assert tour.cost == pytest.approx(exact.cost, rel=0.01)
 
 
 def test_node_choice_on_unstructured_costs() -> None:
