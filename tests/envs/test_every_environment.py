@@ -104,7 +104,7 @@ def comparable(info):
 
 
 def test_every_task_runs_on_both_simulators():
-    tasks = {"maze", "ship_ice", "box_delivery", "area_clearing", "room"}
+    tasks = {"maze", "namo", "ship_ice", "box_delivery", "area_clearing", "room"}
     assert {task for task, _ in PAIRS} == tasks
     assert len(PAIRS) == 2 * len(tasks)
 
