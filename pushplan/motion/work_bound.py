@@ -18,7 +18,7 @@ import numpy as np
 
 from pushplan.geometry import VisibilityGraph
 from pushplan.motion.keep_out import keep_out
-from pushplan.motion.length_bound import SLIM, TOO_LONG, length_bound
+from pushplan.motion.length_bound import SLIM, TOO_LONG, is_clear, length_bound
 from pushplan.world import StaticMap, World
 from pushplan.world.checks import FloatArray
 from pushplan.world.outline import inscribed_radius
@@ -61,7 +61,8 @@ def work_bound(
 
     It counts what objects must make way for the robot, and that it may drive around them; not that
     they touch each other, and not that the robot turns. Overlaps that a simulator leaves are not
-    counted either.
+    counted either. Objects that are fixed are static. Where the robot starts too near to a wall it
+    is the `length_bound`.
 
     Args:
         world: the start.
@@ -72,6 +73,7 @@ def work_bound(
     Raises:
         InvalidInputError: if the goal is not one for the robot.
     """
+    world = world.with_fixed_as_static()
     search = _Relaxation(world)
     least = length_bound(world, stopped)
     root = search.root()
@@ -107,7 +109,9 @@ class _Relaxation:
         self.inner = (1.0 - SLIM) * np.array(inner, dtype=np.float64).reshape(count)
 
     def root(self) -> _Node | None:
-        """All depths are possible; None where there is no path at all."""
+        """All depths are possible; None where there is no path at all, or it begins in a wall."""
+        if not is_clear(self.static, self.start, self.clearance):
+            return None
         reach = self.clearance + self.inner
         away = np.hypot(*(self.centers - self.start).T)
         return self._node(np.maximum(0.0, reach - away), reach)

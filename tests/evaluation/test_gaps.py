@@ -43,7 +43,7 @@ def test_a_better_solution_takes_the_place():
 
 
 def test_files_keep_them(tmp_path):
-    bounds = {"b-1": KnownBounds(1.5, 2.25, 3.5, "p"), "a-0": KnownBounds(1.0, 2.0)}
+    bounds = {"b-1": KnownBounds(1.5, 2.25, 3.5, 'p, "q"'), "a-0": KnownBounds(1.0, 2.0)}
     save_bounds(tmp_path / "b.csv", bounds)
     assert load_bounds(tmp_path / "b.csv") == bounds
     assert (tmp_path / "b.csv").read_text().splitlines()[1].startswith("a-0,")
