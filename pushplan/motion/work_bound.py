@@ -86,8 +86,11 @@ def work_bound(
         bound, _, node = heap[0]
         if bound >= (1.0 - tolerance) * relaxed:
             break
+        children = search.split(node)
+        if not children:
+            break
         heapq.heappop(heap)
-        for child in search.split(node):
+        for child in children:
             nodes += 1
             if child is not None:
                 relaxed = min(relaxed, search.cost(child))
@@ -121,17 +124,23 @@ class _Relaxation:
         return node.bound + float(self.masses @ np.maximum(0.0, node.depths - node.low))
 
     def split(self, node: _Node) -> list[_Node | None]:
-        """Halve the interval of the object that the path owes most."""
-        depths = np.minimum(node.depths, node.high)  # deeper than r_i no disc keeps the path out
-        owed = self.masses * (depths - node.low)
+        """Halve the interval of the object that the path owes most; none where that proves nothing.
+
+        Deeper than r_i no disc keeps the path out, so that no interval beyond it is split.
+        """
+        depths = np.minimum(node.depths, node.high)
+        owed = np.where(node.low < self.inner, self.masses * (depths - node.low), 0.0)
         k = int(np.argmax(owed))
-        middle = 0.5 * (node.low[k] + depths[k])
+        if owed[k] <= 0.0:
+            return []
+        deep = node.high[k] > self.inner[k]
+        middle = self.inner[k] if deep else 0.5 * (node.low[k] + depths[k])
         less, more = node.high.copy(), node.low.copy()
         less[k] = more[k] = middle
         return [self._node(node.low, less), self._node(more, node.high)]
 
     def _node(self, low: FloatArray, high: FloatArray) -> _Node | None:
-        solid = np.flatnonzero(self.inner > high)
+        solid = np.flatnonzero(self.inner >= high)
         discs = np.concatenate([self.centers[solid], self.centers[solid]], axis=1)
         static = StaticMap(
             self.static.polygons,

@@ -152,3 +152,9 @@ def test_a_start_in_a_wall_proves_no_way_out_of_it():
         goal=GoalDisc([3.0, 0.0], 0.3),
     )
     assert work_bound(world).work == length_bound(world)
+
+
+def test_few_paths_prove_what_can_be_proven_of_one_object():
+    world = corridor(10.0, [[6.0, 0.0, 0.0]])
+    found, deeper = work_bound(world), work_bound(world, most_nodes=2000)
+    assert found.nodes < 30 and found == deeper

@@ -118,6 +118,9 @@ def test_bad_input_is_named() -> None:
         plan("a world")  # type: ignore[arg-type]
     with pytest.raises(InvalidInputError, match="clearance"):
         make_planner("namo", clearance=-1.0)
+    for wrong in ((np.nan,), (), ("a",), 5):
+        with pytest.raises(InvalidInputError, match="offsets"):
+            make_planner("namo", offsets=wrong)
     with pytest.raises(InvalidInputError, match=r"movables\.fixed"):
         world.believing([True, False, True])
     line = GoalLine(np.array([13.0, 4.0]), np.array([1.0, 0.0]))
@@ -171,7 +174,7 @@ def test_a_robot_that_cannot_turn_does_not_get_free_through_a_wall() -> None:
 
 @pytest.mark.clock
 def test_an_open_way_is_found_within_the_deadline() -> None:
-    places = np.random.default_rng(0).uniform(2.0, 40.0, (40, 2))
+    places = np.random.default_rng(0).uniform(2.0, 40.0, (2, 40)).T
     world = World(
         robot=maze_robot("differential"),
         robot_pose=[1.5, 1.5, 0.0],
