@@ -5,8 +5,9 @@ import math
 import pytest
 
 from pushplan.evaluation import ResultRow
+from pushplan.evaluation.bounding import scenario_bound
 from pushplan.evaluation.gaps import gaps, total_work
-from pushplan.scenarios import suite
+from pushplan.scenarios import Scenario, suite
 from pushplan.scenarios.known_bounds import KnownBounds, known_bounds, load_bounds, save_bounds
 from pushplan.world import InvalidInputError, SchemaError
 
@@ -78,3 +79,14 @@ def test_what_ships_belongs_to_scenarios_and_no_solution_undercuts_its_bound():
     assert suite("maze-2d-10").scenarios[0].key in shipped
     for key, one in shipped.items():
         assert one.best is None or one.best >= one.bound, key
+
+
+def test_what_a_policy_is_told_is_no_part_of_a_bound():
+    known, wrong = (
+        scenario_bound(
+            Scenario("namo", variations={"layout": "fixed", "movability": told}, seed=0),
+            most_nodes=60,
+        )
+        for told in ("known", "wrong")
+    )
+    assert known == wrong
