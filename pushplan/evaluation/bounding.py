@@ -24,7 +24,7 @@ def scenario_bound(scenario: Scenario, *, most_nodes: int = 400) -> KnownBounds:
     env = make(scenario, observation="state")
     try:
         env.reset(seed=scenario.seed)
-        world = env.world
+        world = env.true_world
     finally:
         env.close()
     return KnownBounds(world.robot.mass, _bound(world, most_nodes))

@@ -46,11 +46,25 @@ class FreeComponents(ArrayRecord):
         return {int(label) for label in np.unique(inside) if label}
 
 
-def object_clearance(movables: Movables, k: int, pose: FloatArray, grid: Grid) -> FloatArray:
-    """(rows, columns) distance [m] of each cell centre to object ``k`` at a pose (3,)."""
+def object_clearance(
+    movables: Movables, k: int, pose: FloatArray, grid: Grid, reach: float
+) -> FloatArray:
+    """(rows, columns) distance [m] of each cell centre to object ``k`` at a pose (3,).
+
+    Beyond ``reach`` [m] it may be infinite.
+    """
     outline = movables.moved_to(
         np.concatenate([movables.poses[:k], pose[None], movables.poses[k + 1 :]])
     ).outline_world(k)
-    low = grid.origin
-    high = low + grid.resolution * np.array([grid.shape[1], grid.shape[0]])
-    return frozen(clearance_field(StaticMap.build([outline], bounds=[*low, *high]), grid))
+    step, rows, cols = grid.resolution, *grid.shape
+    found = np.full(grid.shape, np.inf)
+    low = np.floor((outline.min(axis=0) - reach - grid.origin) / step)
+    high = np.ceil((outline.max(axis=0) + reach - grid.origin) / step)
+    left, bottom = np.clip(low, 0, (cols, rows)).astype(np.int64).tolist()
+    right, top = np.clip(high, 0, (cols, rows)).astype(np.int64).tolist()
+    if left < right and bottom < top:
+        corners = grid.origin + step * np.array([[left, bottom], [right, top]])
+        near = Grid(corners[0], step, (top - bottom, right - left))
+        shape = StaticMap.build([outline], bounds=corners.ravel())
+        found[bottom:top, left:right] = clearance_field(shape, near)
+    return frozen(found)

@@ -31,7 +31,7 @@ def length_bound(world: World, stopped: Callable[[], bool] = lambda: False) -> f
     around = 0.0
     clearance = (1.0 - SLIM) * world.robot.inscribed_radius
     start = world.robot_pose[:2]
-    if not stopped() and _is_clear(keep_out(world), start, clearance):
+    if not stopped() and is_clear(keep_out(world), start, clearance):
         path = VisibilityGraph(keep_out(world), clearance).to_goal(start, goal, stopped)
         length = float(path.length)
         around = length / (1.0 + TOO_LONG) if np.isfinite(length) else 0.0
@@ -44,7 +44,7 @@ def length_bound(world: World, stopped: Callable[[], bool] = lambda: False) -> f
     return robot.mass * max(around, turning)
 
 
-def _is_clear(static: StaticMap, point: FloatArray, clearance: float) -> bool:
+def is_clear(static: StaticMap, point: FloatArray, clearance: float) -> bool:
     """Whether a disc about a point (2,) touches no wall; else its path begins with a way out."""
     place = leave_inflation(static, clearance, point)
     return place is not None and bool(np.array_equal(place, point))

@@ -15,12 +15,14 @@ def transport_bound(world: World) -> float:
 
     The middle of each object that is not done travels at least the shortest path of a point around
     what is static, and its inscribed radius more, as all of the object has to be in the goal, or
-    out of the area over an open edge. The robot drives at least up to the nearest of them; how far
-    beyond that has no such bound, as it may push several objects at once.
+    out of the area over an open edge. The robot drives at least up to the nearest object, done or
+    not, as that may push the others; how far beyond that has no such bound, as it may push several
+    objects at once. Objects that are fixed are static, and need not get anywhere.
 
     Raises:
         InvalidInputError: if the goal is not one for the objects.
     """
+    world = world.with_fixed_as_static()
     goal, movables, robot = world.manipulation_goal, world.movables, world.robot
     left = np.flatnonzero(~world.completed)
     if len(left) == 0:
@@ -30,7 +32,7 @@ def transport_bound(world: World) -> float:
     for i, k in enumerate(left):
         way = distances.path_from(movables.poses[k, :2]).length / (1.0 + TOO_LONG)
         if 0.0 < way < np.inf:
-            lengths[i] = way + inscribed_radius(movables.outline(int(k)))
-    away = np.hypot(*(movables.poses[left, :2] - world.robot_pose[:2]).T)
-    approach = max(0.0, float((away - movables.radii[left]).min()) - robot.circumscribed_radius)
+            lengths[i] = way + inscribed_radius(movables.drawn_outline(int(k)))
+    away = np.hypot(*(movables.poses[:, :2] - world.robot_pose[:2]).T)
+    approach = max(0.0, float((away - movables.radii).min()) - robot.circumscribed_radius)
     return robot.mass * approach + float(movables.masses[left] @ lengths)

@@ -18,7 +18,7 @@ import numpy as np
 
 from pushplan.geometry import VisibilityGraph
 from pushplan.motion.keep_out import keep_out
-from pushplan.motion.length_bound import SLIM, TOO_LONG, length_bound
+from pushplan.motion.length_bound import SLIM, TOO_LONG, is_clear, length_bound
 from pushplan.world import StaticMap, World
 from pushplan.world.checks import FloatArray
 from pushplan.world.outline import inscribed_radius
@@ -61,7 +61,8 @@ def work_bound(
 
     It counts what objects must make way for the robot, and that it may drive around them; not that
     they touch each other, and not that the robot turns. Overlaps that a simulator leaves are not
-    counted either.
+    counted either. Objects that are fixed are static. Where the robot starts too near to a wall it
+    is the `length_bound`.
 
     Args:
         world: the start.
@@ -72,6 +73,7 @@ def work_bound(
     Raises:
         InvalidInputError: if the goal is not one for the robot.
     """
+    world = world.with_fixed_as_static()
     search = _Relaxation(world)
     least = length_bound(world, stopped)
     root = search.root()
@@ -84,8 +86,11 @@ def work_bound(
         bound, _, node = heap[0]
         if bound >= (1.0 - tolerance) * relaxed:
             break
+        children = search.split(node)
+        if not children:
+            break
         heapq.heappop(heap)
-        for child in search.split(node):
+        for child in children:
             nodes += 1
             if child is not None:
                 relaxed = min(relaxed, search.cost(child))
@@ -107,7 +112,9 @@ class _Relaxation:
         self.inner = (1.0 - SLIM) * np.array(inner, dtype=np.float64).reshape(count)
 
     def root(self) -> _Node | None:
-        """All depths are possible; None where there is no path at all."""
+        """All depths are possible; None where there is no path at all, or it begins in a wall."""
+        if not is_clear(self.static, self.start, self.clearance):
+            return None
         reach = self.clearance + self.inner
         away = np.hypot(*(self.centers - self.start).T)
         return self._node(np.maximum(0.0, reach - away), reach)
@@ -117,17 +124,23 @@ class _Relaxation:
         return node.bound + float(self.masses @ np.maximum(0.0, node.depths - node.low))
 
     def split(self, node: _Node) -> list[_Node | None]:
-        """Halve the interval of the object that the path owes most."""
-        depths = np.minimum(node.depths, node.high)  # deeper than r_i no disc keeps the path out
-        owed = self.masses * (depths - node.low)
+        """Halve the interval of the object that the path owes most; none where that proves nothing.
+
+        Deeper than r_i no disc keeps the path out, so that no interval beyond it is split.
+        """
+        depths = np.minimum(node.depths, node.high)
+        owed = np.where(node.low < self.inner, self.masses * (depths - node.low), 0.0)
         k = int(np.argmax(owed))
-        middle = 0.5 * (node.low[k] + depths[k])
+        if owed[k] <= 0.0:
+            return []
+        deep = node.high[k] > self.inner[k]
+        middle = self.inner[k] if deep else 0.5 * (node.low[k] + depths[k])
         less, more = node.high.copy(), node.low.copy()
         less[k] = more[k] = middle
         return [self._node(node.low, less), self._node(more, node.high)]
 
     def _node(self, low: FloatArray, high: FloatArray) -> _Node | None:
-        solid = np.flatnonzero(self.inner > high)
+        solid = np.flatnonzero(self.inner >= high)
         discs = np.concatenate([self.centers[solid], self.centers[solid]], axis=1)
         static = StaticMap(
             self.static.polygons,

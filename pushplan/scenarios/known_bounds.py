@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import io
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
@@ -89,8 +90,11 @@ def save_bounds(path: str | Path, bounds: Mapping[str, KnownBounds]) -> None:
     Raises:
         OSError: if the file cannot be written.
     """
-    lines = [",".join(_COLUMNS)]
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(_COLUMNS)
     for key, one in sorted(bounds.items()):
         best = "" if one.best is None else f"{one.best:.6g}"
-        lines.append(f"{key},{one.robot_mass:.6g},{one.bound:.6g},{best},{one.best_policy}")
-    write_atomic(Path(path), ("\n".join(lines) + "\n").encode())
+        numbers = f"{one.robot_mass:.6g}", f"{one.bound:.6g}", best
+        writer.writerow([key, *numbers, one.best_policy])
+    write_atomic(Path(path), text.getvalue().encode())

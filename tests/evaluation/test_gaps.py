@@ -5,8 +5,9 @@ import math
 import pytest
 
 from pushplan.evaluation import ResultRow
+from pushplan.evaluation.bounding import scenario_bound
 from pushplan.evaluation.gaps import gaps, total_work
-from pushplan.scenarios import suite
+from pushplan.scenarios import Scenario, suite
 from pushplan.scenarios.known_bounds import KnownBounds, known_bounds, load_bounds, save_bounds
 from pushplan.world import InvalidInputError, SchemaError
 
@@ -43,7 +44,7 @@ def test_a_better_solution_takes_the_place():
 
 
 def test_files_keep_them(tmp_path):
-    bounds = {"b-1": KnownBounds(1.5, 2.25, 3.5, "p"), "a-0": KnownBounds(1.0, 2.0)}
+    bounds = {"b-1": KnownBounds(1.5, 2.25, 3.5, 'p, "q"'), "a-0": KnownBounds(1.0, 2.0)}
     save_bounds(tmp_path / "b.csv", bounds)
     assert load_bounds(tmp_path / "b.csv") == bounds
     assert (tmp_path / "b.csv").read_text().splitlines()[1].startswith("a-0,")
@@ -78,3 +79,14 @@ def test_what_ships_belongs_to_scenarios_and_no_solution_undercuts_its_bound():
     assert suite("maze-2d-10").scenarios[0].key in shipped
     for key, one in shipped.items():
         assert one.best is None or one.best >= one.bound, key
+
+
+def test_what_a_policy_is_told_is_no_part_of_a_bound():
+    known, wrong = (
+        scenario_bound(
+            Scenario("namo", variations={"layout": "fixed", "movability": told}, seed=0),
+            most_nodes=60,
+        )
+        for told in ("known", "wrong")
+    )
+    assert known == wrong

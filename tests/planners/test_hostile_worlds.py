@@ -29,10 +29,12 @@ from pushplan.world import (
     PlanResult,
     PlanStats,
     PlanStatus,
+    Receptacle,
     RobotModel,
     StaticMap,
     Twist,
     World,
+    maze_robot,
 )
 from pushplan.world.outline import transform
 
@@ -346,3 +348,20 @@ def test_a_slow_axis_does_not_hold_up_the_other():
 def test_a_drive_that_cannot_stop_is_refused():
     with pytest.raises(InvalidInputError, match="min_speed"):
         make_robot(drive="differential", min_speed=0.05)
+
+
+@pytest.mark.parametrize("name", ["greedy", "gtsp", "gtsp-mpc", "mppi"])
+def test_nobody_pushes_boxes_that_are_fixed(name):
+    world = World(
+        robot=maze_robot("differential"),
+        robot_pose=[2.0, 4.0, 0.0],
+        static=StaticMap.build([], bounds=[0, 0, 12, 8]),
+        movables=Movables.from_outlines([0.5 * SQUARE], [[4.0, 4.0, 0.0]], fixed=[True]),
+        goal=Receptacle([[10, 2], [12, 2], [12, 6], [10, 6]]),
+    )
+    policy = make_policy(name)
+    policy.reset(world, np.random.default_rng(0))
+    assert policy.act(world) == Twist(0.0, 0.0)
+    free = world.believing([False])
+    policy.reset(free, np.random.default_rng(0))
+    assert policy.act(free) != Twist(0.0, 0.0)

@@ -34,10 +34,15 @@ class DiscSpace:
         self._objects: OrderedDict[tuple[int, bytes], FloatArray] = OrderedDict()
 
     def object_clearance(self, k: int, pose: FloatArray) -> FloatArray:
-        """(rows, columns) distance of each cell to object ``k`` at a pose (3,) [m]."""
+        """(rows, columns) distance of each cell to object ``k`` at a pose (3,) [m].
+
+        Infinite where that is farther than the disc and a cell.
+        """
         key = k, pose.tobytes()
         if key not in self._objects:
-            self._objects[key] = object_clearance(self.world.movables, k, pose, self.grid)
+            self._objects[key] = object_clearance(
+                self.world.movables, k, pose, self.grid, self.radius + self.cell
+            )
             if len(self._objects) > _KEPT:
                 self._objects.popitem(last=False)
         self._objects.move_to_end(key)

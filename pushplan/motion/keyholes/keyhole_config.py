@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from pushplan.world import InvalidInputError
 from pushplan.world.checked_fields import (
     CheckedFields,
     Fraction,
@@ -12,6 +13,7 @@ from pushplan.world.checked_fields import (
     PositiveFraction,
     PositiveInt,
 )
+from pushplan.world.checks import number
 
 
 @dataclass(frozen=True)
@@ -52,3 +54,10 @@ class KeyholeConfig(CheckedFields):
     rank_cost: NonNegativeFloat = 3.0
     most_objects: PositiveInt = 40
     default_pushes: PositiveInt = 600
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if not isinstance(self.offsets, tuple | list) or not self.offsets:
+            raise InvalidInputError(f"offsets must be one number or more, got {self.offsets!r}")
+        clean = tuple(number(f"offsets[{i}]", value) for i, value in enumerate(self.offsets))
+        object.__setattr__(self, "offsets", clean)

@@ -12,7 +12,7 @@ import numpy as np
 
 from pushplan.compiled import owned
 from pushplan.interaction import InteractionModel
-from pushplan.motion.collision import first_blocked, footprint, obstacles
+from pushplan.motion.collision import first_blocked, footprint, obstacles, static_depth
 from pushplan.motion.keyholes.disc_space import DiscSpace, DiscState
 from pushplan.motion.keyholes.keyhole_config import KeyholeConfig
 from pushplan.motion.keyholes.line_push import CONTACT, SPACING, LinePush, line_pushes, straight
@@ -124,6 +124,7 @@ class KeyholeSearch:
         self._size = size
         self._space = DiscSpace(world, config.clearance * size, config.cell * size)
         self._shape = footprint(world.robot, config.margin * size)
+        self._bare = footprint(world.robot)
         self._walls = obstacles(world.static)
         self._numbers = itertools.count()
         self._open: list[_Entry] = []
@@ -161,13 +162,19 @@ class KeyholeSearch:
         for length in sorted([*steps, *-steps[1:]], key=abs):
             along = np.linspace(0.0, length * self._size, 2 + int(abs(length) / SPACING))
             path = straight(robot, along)
-            if not state.is_free(path[-1]):
+            if not state.is_free(path[-1]) or self._hits_wall(path):
                 continue
             if length < 0.0 or self.interaction.sweep(self.world, path).work == 0.0:
                 state.robot = path[-1]
                 cost = abs(length) * self._size
                 return KeyholeEnd(state, cost, None, robot[None, :2], path, -1)
         return None
+
+    def _hits_wall(self, path: FloatArray) -> bool:
+        """Whether the robot gets deeper into something static on poses (N, 3) than at the first."""
+        shape, scratch = self._bare, np.empty_like(self._bare.vertices)
+        first, *others = (static_depth(pose, shape, self._walls, scratch) for pose in owned(path))
+        return any(depth > first + 1e-9 for depth in others)
 
     def _put(self, end: KeyholeEnd) -> None:
         state, cell = end.state, 2.0 * self._space.cell

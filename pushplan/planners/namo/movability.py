@@ -33,13 +33,23 @@ class Movability:
         self._stall = StallChecker(world.robot, _PATIENCE)
         self._ahead = False
         self._doubted = False
+        self._believed: tuple[float, set[int]] | None = None
         self.stopped_by: set[int] = set()
         """Ids of the objects that have stopped the robot."""
         self.seen_moving: set[int] = set()
         """Ids of the objects that have moved."""
 
     def update(self, world: World) -> World:
-        """The scene as it is believed to be now."""
+        """The scene as it is believed to be now; the same belief at the same time."""
+        if self._believed is None or world.time != self._believed[0]:
+            self._believed = world.time, self._believe(world)
+        fixed = np.isin(world.movables.ids, list(self._believed[1]))
+        if np.array_equal(fixed, world.movables.fixed):
+            return world
+        return world.believing(fixed)
+
+    def _believe(self, world: World) -> set[int]:
+        """Ids of the objects that are held not to move now, after what is seen."""
         objects = world.movables
         for number, pose in zip(objects.ids.tolist(), objects.poses, strict=True):
             first = self._first.setdefault(number, pose)
@@ -48,14 +58,8 @@ class Movability:
         if self._stall.update(world.robot_pose, world.time) and self._ahead:
             self.stopped_by |= self._touched(world) - self.seen_moving
         self.stopped_by -= self.seen_moving
-        fixed = [
-            number in self.stopped_by
-            or (bool(told) and not self._doubted and number not in self.seen_moving)
-            for number, told in zip(objects.ids.tolist(), objects.fixed, strict=True)
-        ]
-        if fixed == objects.fixed.tolist():
-            return world
-        return world.believing(fixed)
+        told = set() if self._doubted else set(objects.ids[objects.fixed].tolist())
+        return self.stopped_by | (told - self.seen_moving)
 
     def send(self, command: Twist) -> None:
         """Take the command that is driven until the next update."""

@@ -84,7 +84,8 @@ class Namo:
         if end is None and not search.exhausted:
             return call.result(call.stopped_status, iterations=search.pushes)
         if end is not None and end.before is None:
-            return self.navigator.plan(world, stop=stop, rng=call.rng)
+            rest = _Rest(call, search.pushes) if call.has_rule else stop
+            return self.navigator.plan(world, stop=rest, rng=call.rng)
         other = self._straight(call, search.pushes, wanted=end is None)
         if end is None:
             assert other is not None

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import time
 
 import numpy as np
 import pytest
@@ -11,11 +12,13 @@ from pushplan.envs.tasks.namo import NamoTask
 from pushplan.evaluation import JobSettings, run_episode
 from pushplan.interaction import QuasiStatic
 from pushplan.motion.collision import first_blocked, footprint, obstacles
+from pushplan.motion.keyholes import KeyholeConfig, KeyholeSearch
 from pushplan.planners import make_planner, make_policy
 from pushplan.planners.namo.movability import Movability
 from pushplan.scenarios import suite, suite_names
 from pushplan.world import (
     Cancellation,
+    Deadline,
     GoalDisc,
     GoalLine,
     InvalidInputError,
@@ -34,6 +37,7 @@ from pushplan.world import (
 pytestmark = pytest.mark.warm("namo")
 
 ENOUGH = MaxIterations(700)
+SQUARE = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
 
 
 @functools.cache
@@ -56,14 +60,13 @@ def digest(found: Plan) -> bytes:
 
 def dead_end() -> World:
     """A corridor with the goal at its end, and a box as wide as the corridor before it."""
-    square = 0.8 * np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
     ends = [[[-7, 0], [-6, 0], [-6, 2.2], [-7, 2.2]], [[10, 0], [11, 0], [11, 2.2], [10, 2.2]]]
     sides = [[[-7, y], [11, y], [11, y + 1], [-7, y + 1]] for y in (-1.0, 2.2)]
     return World(
         robot=maze_robot("differential"),
         robot_pose=[0.0, 1.1, 0.0],
         static=StaticMap.build([*sides, *ends], bounds=[-6, 0, 10, 2.2]),
-        movables=Movables.from_outlines([square], [[7.0, 1.1, 0.0]]),
+        movables=Movables.from_outlines([0.8 * SQUARE], [[7.0, 1.1, 0.0]]),
         goal=GoalDisc(np.array([9.0, 1.1]), 0.5),
     )
 
@@ -115,6 +118,9 @@ def test_bad_input_is_named() -> None:
         plan("a world")  # type: ignore[arg-type]
     with pytest.raises(InvalidInputError, match="clearance"):
         make_planner("namo", clearance=-1.0)
+    for wrong in ((np.nan,), (), ("a",), 5):
+        with pytest.raises(InvalidInputError, match="offsets"):
+            make_planner("namo", offsets=wrong)
     with pytest.raises(InvalidInputError, match=r"movables\.fixed"):
         world.believing([True, False, True])
     line = GoalLine(np.array([13.0, 4.0]), np.array([1.0, 0.0]))
@@ -140,7 +146,48 @@ def test_what_was_told_is_doubted_where_nothing_else_is_left() -> None:
     movability = Movability(world)
     assert movability.update(world).movables.fixed.all()
     movability.doubt()
-    assert not movability.update(world).movables.fixed.any()
+    assert movability.update(world).movables.fixed.all()  # the same instant
+    assert not movability.update(world.moved(time=1.0)).movables.fixed.any()
+
+
+def test_the_same_instant_has_one_command_where_there_is_no_plan() -> None:
+    world = start("one_box")[0].believing([True])
+    policy = make_policy("namo", stop=MaxIterations(40))
+    policy.reset(world, np.random.default_rng(0))
+    assert policy.act(world) == policy.act(world)
+    policy.act(world.moved(time=0.1))
+
+
+def test_a_robot_that_cannot_turn_does_not_get_free_through_a_wall() -> None:
+    """In a narrow dead end the nearest place to turn is behind the thin wall ahead."""
+    sides = [[-4.0, 0.65, 0.75, 0.65], [-4.0, -0.65, 0.75, -0.65], [0.75, -0.65, 0.75, 0.65]]
+    world = World(
+        robot=maze_robot("differential"),
+        robot_pose=[0.0, 0.0, 0.0],
+        static=StaticMap.build(segments=sides, radii=0.01, bounds=[-8, -5, 12, 5]),
+        movables=Movables.from_outlines([0.5 * SQUARE], [[8.0, 4.0, 0.0]]),
+        goal=GoalDisc(np.array([9.0, 0.0]), 0.5),
+    )
+    ends = KeyholeSearch(world, KeyholeConfig(), QuasiStatic(), lambda pushes: pushes > 50)
+    assert ends.run() is None and ends.exhausted
+
+
+@pytest.mark.clock
+def test_an_open_way_is_found_within_the_deadline() -> None:
+    places = np.random.default_rng(0).uniform(2.0, 40.0, (2, 40)).T
+    world = World(
+        robot=maze_robot("differential"),
+        robot_pose=[1.5, 1.5, 0.0],
+        static=StaticMap.build([[[20, 20], [21, 20], [21, 21], [20, 21]]], bounds=[0, 0, 42, 42]),
+        movables=Movables.from_outlines(
+            [0.5 * SQUARE] * 40, np.column_stack([places, np.zeros(40)])
+        ),
+        goal=GoalDisc(np.array([40.0, 40.0]), 0.5),
+    )
+    plan(world, MaxIterations(10))  # of this size for the first time
+    began = time.perf_counter()
+    found = plan(world, Deadline(0.5))
+    assert found.status is PlanStatus.SOLVED and time.perf_counter() - began < 0.75
 
 
 def episode_succeeds(name: str, number: int) -> bool:
