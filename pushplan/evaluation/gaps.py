@@ -55,7 +55,8 @@ def gaps(
         pair = (work / known.bound - 1.0, best)
         ratios.setdefault((row.setting, row.policy), []).append(pair)
     found = []
-    for setting, policy in sorted(ratios, key=lambda key: (key[0], policies.index(key[1]))):
+    place = {policy: i for i, policy in enumerate(policies)}
+    for setting, policy in sorted(ratios, key=lambda key: (key[0], place.get(key[1], len(place)))):
         to_bound, to_best = np.array(ratios[setting, policy]).T
         seen = to_best[~np.isnan(to_best)]
         mean = float(seen.mean()) if len(seen) else float("nan")

@@ -19,7 +19,7 @@ from pushplan.world.stop import DefaultBudget, StopCheck
 
 @dataclass(frozen=True)
 class NamoConfig(KeyholeConfig):
-    """Parameters of `Namo`: those of its search, described in `KeyholeConfig`, and one more.
+    """Parameters of `Namo`: those of its search, described in `KeyholeConfig`, and two more.
 
     Args:
         turn_fraction: fraction of the greatest turn rate that plans use; the rest is for tracking.
@@ -37,10 +37,10 @@ class Namo:
 
     Where the goal lies in the component of free space that the robot is in, the robot cannot turn
     on the spot or drive back, there are no walls or too many objects, the plan is that of the
-    navigator. Elsewhere a `KeyholeSearch` looks for
-    pushes that connect the component with that of the goal, at the cost l₀ + w Σ mᵢ lᵢ / m₀ and a
-    penalty for what they cut off. The robot drives as a disc between pushes, and backs off after
-    each. Where the navigator finds a cheaper plan, by pushing straight through, that is taken.
+    navigator. Elsewhere a `KeyholeSearch` looks for pushes that connect the component with that of
+    the goal, at the cost l₀ + w Σ mᵢ lᵢ / m₀ and a penalty for what they cut off. The robot drives
+    as a disc between pushes, and backs off after each. Where the navigator finds a cheaper plan,
+    by pushing straight through, that is taken.
 
     Use it where objects hold the doors, and a wrong push may close them for good. Without a stop
     rule it ends after a fixed number of pushes, so the same seed gives the same plan. One
