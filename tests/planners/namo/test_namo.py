@@ -204,7 +204,7 @@ def test_an_episode_ends_in_the_goal(name: str, number: int) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("name", [name for name in suite_names() if name.startswith("namo-")])
 def test_episodes_of_each_suite_end_in_the_goal(name: str) -> None:
-    """One has to; of three with boxes that may not move one may end at a wall, as one in 3D does."""
+    """Of three with boxes that may not move, one may end at a wall: in 3D one does."""
     if "fixed" in name:
         assert sum(episode_succeeds(name, number) for number in range(3)) >= 2
     else:
