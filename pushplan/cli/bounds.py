@@ -39,13 +39,13 @@ def run(options: argparse.Namespace) -> int:
     """Bound, look for solutions, print a line for each scenario."""
     from pathlib import Path
 
+    from pushplan.evaluation import Results
     from pushplan.evaluation.bounding import scenario_bound, with_solutions
     from pushplan.scenarios import suite
     from pushplan.scenarios.known_bounds import known_bounds, load_bounds, save_bounds
 
     check_file(options.out, [".csv"])
-    runs = options.runs.split(",") if options.runs else []
-    with_solutions({}, runs)  # refuses what is no run before the work begins
+    runs = [Results.load(path) for path in options.runs.split(",")] if options.runs else []
     scenarios = [
         scenario
         for name in options.suites.split(",")

@@ -59,7 +59,9 @@ def run(options: argparse.Namespace) -> int:
     results = Results.load(options.out)
     for row in results.rows:
         how = "success" if row.success else row.reason
-        say(f"  {row.policy} in {row.task}: {how}, work {row.interaction_work_kg_m:.3g} kg m")
+        if row.interaction_work_kg_m is not None:  # a job that failed has none
+            how += f", work {row.interaction_work_kg_m:.3g} kg m"
+        say(f"  {row.policy} in {row.task}: {how}")
     page = results.report()
     say(f"page: {page}")
     if not options.no_open and sys.stdout.isatty() and has_screen():  # no browser in the terminal

@@ -18,6 +18,7 @@ from numba.core.serialize import dumps
 from pushplan.compiled.cache_files import Folders, find_folders, read, remove, warn_once, write
 from pushplan.compiled.fingerprint import fingerprint, source_digest
 from pushplan.compiled.pipeline import rebuilt, reduced
+from pushplan.world.file_locks import is_locked
 
 try:
     import fcntl
@@ -101,16 +102,8 @@ class KernelCache(_Cache):
 
     def is_locked(self) -> bool:
         """Whether a process holds its place, to compile it."""
-        if fcntl is None or self._folders.write is None:
-            return False
-        try:
-            with (self._folders.write / f"{self._stem}.lock").open() as file:
-                fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
-        except FileNotFoundError:
-            return False
-        except OSError:
-            return True
-        return False
+        folder = self._folders.write
+        return folder is not None and is_locked(folder / f"{self._stem}.lock")
 
     @property
     def _folders(self) -> Folders:

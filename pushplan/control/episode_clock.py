@@ -38,11 +38,13 @@ class EpisodeClock:
 
         Args:
             world: the scene now.
-            choose: chooses a command for it; `command` and `held` tell of the one before.
+            choose: chooses a command for it, with the objects that are fixed among what is
+                static; `command` and `held` tell of the one before.
 
         Raises:
             InvalidInputError: as `advance`.
         """
+        world = world.with_fixed_as_static()
         if self.advance(world):
             self.command = choose(world)
         return self.command

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterable, Mapping
 
 from pushplan.envs.making import make
@@ -37,22 +38,17 @@ def _bound(world: World, most_nodes: int) -> float:
 
 
 def with_solutions(
-    bounds: Mapping[str, KnownBounds], runs: Iterable[str]
+    bounds: Mapping[str, KnownBounds], runs: Iterable[Results]
 ) -> dict[str, KnownBounds]:
     """The bounds, with the best solutions of some runs.
 
     Args:
         bounds: by `Scenario.key`; other scenarios of the runs are left out.
-        runs: run directories.
-
-    Raises:
-        InvalidInputError: if a directory holds no results.
+        runs: their results.
     """
     found = dict(bounds)
-    for path in runs:
-        for row in Results.load(path).rows:
-            if (known := found.get(row.scenario)) is None:
-                continue
-            if (work := total_work(row, known)) is not None:
-                found[row.scenario] = known.better(work, row.policy)
+    for row in itertools.chain.from_iterable(run.rows for run in runs):
+        known = found.get(row.scenario)
+        if known is not None and (work := total_work(row, known)) is not None:
+            found[row.scenario] = known.better(work, row.policy)
     return found

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import fcntl
 import sqlite3
 import time
 from dataclasses import dataclass
@@ -11,6 +10,7 @@ from pathlib import Path
 
 from pushplan.evaluation.database import read_about, reading
 from pushplan.evaluation.rows import Status
+from pushplan.world.file_locks import is_locked
 
 
 @dataclass(frozen=True)
@@ -49,7 +49,7 @@ def run_status(path: str | Path, slowest: int = 3) -> RunStatus:
         InvalidInputError: if it holds no results.
         SchemaError: if they cannot be read.
     """
-    active = _locked(Path(path) / ".lock")
+    active = is_locked(Path(path) / ".lock")
     with reading(path) as db:
         return _look(db, active, slowest)
 
@@ -82,14 +82,3 @@ def _look(db: sqlite3.Connection, active: bool, slowest: int) -> RunStatus:
         running=tuple((title, time.time() - at) for title, at in flying) if active else (),
         slowest=tuple((title, seconds) for title, seconds in took),
     )
-
-
-def _locked(path: Path) -> bool:
-    try:
-        with path.open("r") as file:
-            fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
-    except BlockingIOError:
-        return True
-    except OSError:
-        return False
-    return False

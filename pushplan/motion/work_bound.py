@@ -15,6 +15,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+import shapely
 
 from pushplan.geometry import VisibilityGraph
 from pushplan.motion.keep_out import keep_out
@@ -152,19 +153,7 @@ class _Relaxation:
         if not np.isfinite(path.length):
             return None
         length = float(path.length) / (1.0 + TOO_LONG)
-        near = _distances(self.centers, path.points)
+        driven = shapely.linestrings(path.points[[0, *range(len(path.points))]])  # two at least
+        near = shapely.distance(shapely.points(self.centers), driven)
         depths = np.maximum(0.0, self.clearance + self.inner - near)
         return _Node(low, high, self.mass * length + float(self.masses @ low), depths)
-
-
-def _distances(points: FloatArray, line: FloatArray) -> FloatArray:
-    """(K,) distances of points (K, 2) from a polyline (N, 2)."""
-    if len(line) < 2:
-        line = np.concatenate([line[:1], line[:1]])
-    a, along = line[:-1], np.diff(line, axis=0)
-    square = np.maximum((along**2).sum(axis=1), 1e-300)
-    offset = points[:, None] - a  # (K, N - 1, 2)
-    part = np.clip((offset * along).sum(axis=2) / square, 0.0, 1.0)
-    missed = offset - part[..., None] * along
-    found: FloatArray = np.hypot(missed[..., 0], missed[..., 1]).min(axis=1)
-    return found

@@ -217,6 +217,12 @@ def _static(data: object, folder: Path) -> StaticMap:
     )
 
 
+_MOVABLE_KEYS = (
+    *("id", "pose", "twist", "outline", "polygon"),
+    *("mass", "wheeled", "fixed", "contact_radius"),
+)
+
+
 def movables_from_list(data: object) -> Movables:
     """The objects, as the key ``movables`` of a world has them.
 
@@ -225,10 +231,9 @@ def movables_from_list(data: object) -> Movables:
     """
     outlines, poses, twists, masses, wheeled, ids, radii = [], [], [], [], [], [], []
     fixed: list[bool] = []
-    valid = ("id", "pose", "twist", "outline", "polygon", "mass", "wheeled", "contact_radius")
     for i, item in enumerate(_list("movables", data)):
         name = f"movables[{i}]"
-        known_keys(name, item, (*valid, "fixed"), ())
+        known_keys(name, item, _MOVABLE_KEYS, ())
         if ("polygon" in item) == ("outline" in item) or ("outline" in item) != ("pose" in item):
             raise SchemaError(
                 f"{name} needs either 'polygon' (world frame) or 'outline' (body frame) and 'pose'"

@@ -23,10 +23,11 @@ class DiscSpace:
         world: walls, objects and goal; where the objects are does not matter.
         radius: of the disc [m].
         cell: side of a cell [m].
+        closed_cost: extra cost per metre of floor that objects close, of `DiscState.relaxed`.
     """
 
-    def __init__(self, world: World, radius: float, cell: float) -> None:
-        self.world, self.radius, self.cell = world, radius, cell
+    def __init__(self, world: World, radius: float, cell: float, closed_cost: float) -> None:
+        self.world, self.radius, self.cell, self.closed_cost = world, radius, cell, closed_cost
         self.grid = Grid.cover(world.static.bounds, cell)
         self.static = clearance_field(world.static, self.grid)
         x, y = np.meshgrid(self.grid.x, self.grid.y)
@@ -141,17 +142,14 @@ class DiscState:
         cells = self._chain(self._costs[1], at)
         return self._corners(cells, self.space.points(cells[-1:])[0])
 
-    def relaxed(self, closed_cost: float) -> tuple[float, list[int]]:
+    @cached_property
+    def relaxed(self) -> tuple[float, list[int]]:
         """The cheapest path to the goal that may lead through objects.
 
-        Args:
-            closed_cost: extra cost per metre of floor that objects close.
-
-        Returns:
-            Its cost [m], infinite where walls are in the way, and the objects on it in order.
+        Its cost [m], infinite where walls are in the way, and the objects on it in order.
         """
         space = self.space
-        weights = np.where(self.clearance > space.radius, 1.0, 1.0 + closed_cost)
+        weights = np.where(self.clearance > space.radius, 1.0, 1.0 + space.closed_cost)
         weights[space.static <= space.radius] = np.inf
         costs, parents, order = self._dijkstra(weights, space.goal)
         last = int(order[-1])

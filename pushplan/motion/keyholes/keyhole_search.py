@@ -85,9 +85,13 @@ def nearest_free_pose(world: World, config: KeyholeConfig) -> FloatArray:
 
     The robot's own pose where there is none.
     """
-    size = world.robot.circumscribed_radius
-    space = DiscSpace(world, config.clearance * size, config.cell * size)
+    space = _disc_space(world, config)
     return DiscState(space, world.movables.poses).nearest_free(world.robot_pose)
+
+
+def _disc_space(world: World, config: KeyholeConfig) -> DiscSpace:
+    size = world.robot.circumscribed_radius
+    return DiscSpace(world, config.clearance * size, config.cell * size, config.closed_cost)
 
 
 class KeyholeSearch:
@@ -122,7 +126,7 @@ class KeyholeSearch:
         self._stopped = stopped
         size = world.robot.circumscribed_radius
         self._size = size
-        self._space = DiscSpace(world, config.clearance * size, config.cell * size)
+        self._space = _disc_space(world, config)
         self._shape = footprint(world.robot, config.margin * size)
         self._bare = footprint(world.robot)
         self._walls = obstacles(world.static)
@@ -183,13 +187,13 @@ class KeyholeSearch:
         if key in self._seen:
             return
         self._seen.add(key)
-        left, _ = state.relaxed(self.config.closed_cost)
+        left, _ = state.relaxed
         if math.isfinite(left):
             heapq.heappush(self._open, _Entry(end.cost + left, next(self._numbers), 0, end))
 
     def _expand(self, end: KeyholeEnd, rank: int) -> Iterator[KeyholeEnd]:
         """The scenes that one push leads to, of the objects of a rank."""
-        _, on_path = end.state.relaxed(self.config.closed_cost)
+        _, on_path = end.state.relaxed
         everyone = range(len(self.world.movables))
         chosen: list[int] = on_path[:1]
         if rank == 1:

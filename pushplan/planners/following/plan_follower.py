@@ -125,7 +125,6 @@ class PlanFollower:
 
     def act(self, world: World, observation: Any = None) -> Twist:
         """The twist for this step; plans first where that is necessary."""
-        world = world.with_fixed_as_static()
         if self._progress is None:
             self.reset(world, self._rng)
         return self._clock.command_for(world, self._act)

@@ -13,6 +13,7 @@ from pushplan.planners.mppi.mppi_config import MppiConfig
 from pushplan.search.grid_dijkstra import grid_dijkstra
 from pushplan.world import StaticMap, World
 from pushplan.world.checks import FloatArray
+from pushplan.world.outline import inscribed_radius
 
 _CELL = 0.35  # side of a cell [R]
 _MOST_CELLS = 6000
@@ -43,10 +44,8 @@ def _grid(world: World) -> tuple[Grid, FloatArray]:
 
 def standoff(world: World, k: int) -> float:
     """Distance of the robot from an object's middle when it pushes it [m]."""
-    outline = world.movables.outline(k)
-    edges = np.roll(outline, -1, axis=0) - outline
-    inside = (edges[:, 1] * outline[:, 0] - edges[:, 0] * outline[:, 1]) / np.hypot(*edges.T)
-    return float(world.robot.vertices[:, 0].max() + inside.min())
+    front = float(world.robot.vertices[:, 0].max())
+    return front + inscribed_radius(world.movables.outline(k))
 
 
 def place_behind(world: World, k: int, heading: float, skipped: int = 0) -> FloatArray:

@@ -97,7 +97,6 @@ class MppiPolicy:
         """
         if not isinstance(world.goal, GoalDisc | GoalLine):
             check_pusher(world, "pushing objects")
-        world = world.with_fixed_as_static()
         if not self._started:
             self.reset(world, self._rng)
         return self._clock.command_for(world, self._act)

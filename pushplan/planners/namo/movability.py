@@ -19,9 +19,9 @@ _PATIENCE = 2.0  # time for which an object has to stop the robot [s]
 class Movability:
     """What is believed of the objects of one episode.
 
-    An object is held not to move where the world says so, until that leaves no way (`doubt`), or
-    where it has stopped the robot that drove against it, which is the evidence; an object that
-    has been seen to move can be moved.
+    An object is held not to move where the world says so, until that leaves no way
+    (`drop_prior`), or where it has stopped the robot that drove against it, which is the evidence;
+    an object that has been seen to move can be moved.
 
     Args:
         world: the start of the episode.
@@ -32,7 +32,7 @@ class Movability:
         self._first: dict[int, FloatArray] = {}
         self._stall = StallChecker(world.robot, _PATIENCE)
         self._ahead = False
-        self._doubted = False
+        self._has_prior = True
         self._believed: tuple[float, set[int]] | None = None
         self.stopped_by: set[int] = set()
         """Ids of the objects that have stopped the robot."""
@@ -58,7 +58,7 @@ class Movability:
         if self._stall.update(world.robot_pose, world.time) and self._ahead:
             self.stopped_by |= self._touched(world) - self.seen_moving
         self.stopped_by -= self.seen_moving
-        told = set() if self._doubted else set(objects.ids[objects.fixed].tolist())
+        told = set(objects.ids[objects.fixed].tolist()) if self._has_prior else set()
         return self.stopped_by | (told - self.seen_moving)
 
     def send(self, command: Twist) -> None:
@@ -66,9 +66,9 @@ class Movability:
         self._ahead = command.linear > 0.0
         self._stall.send(command)
 
-    def doubt(self) -> None:
+    def drop_prior(self) -> None:
         """Stop believing what was told, where nothing else is left to try."""
-        self._doubted = True
+        self._has_prior = False
 
     def _touched(self, world: World) -> set[int]:
         """Ids of the objects that touch the robot ahead of its middle."""

@@ -16,7 +16,7 @@ class NamoFollower(PlanFollower):
     """Follows plans among objects of which some may not move, whatever it is told of them.
 
     An object that stops the robot is believed fixed from then on, and a new plan is made without
-    it. Where there is no plan any more, what was told is doubted.
+    it. Where there is no plan any more, what was told is dropped.
 
     Args:
         planner: makes the plans; `Namo` by default.
@@ -48,7 +48,7 @@ class NamoFollower(PlanFollower):
         assert self.movability is not None
         twist = super().act(self.movability.update(world), observation)
         if self.plan_log and not self.plan_log[-1].status.has_plan:
-            self.movability.doubt()
+            self.movability.drop_prior()
         self.movability.send(twist)
         return twist
 

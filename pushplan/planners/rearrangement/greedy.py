@@ -77,7 +77,7 @@ class GreedyPusher:
             InvalidInputError: if the goal is one for the robot, or the robot cannot stop.
         """
         check_world(world)
-        return self._clock.command_for(world.with_fixed_as_static(), self._act)
+        return self._clock.command_for(world, self._act)
 
     def _act(self, world: World) -> Twist:
         command = self._retreat(world) or self._work(PushScene(world, self.config))

@@ -60,7 +60,7 @@ class Gtsp:
             InvalidInputError: if the goal is one for the robot, or the robot cannot stop.
         """
         check_world(world)
-        return self._clock.command_for(world.with_fixed_as_static(), self._act)
+        return self._clock.command_for(world, self._act)
 
     def _act(self, world: World) -> Twist:
         if self._route_follower is None:

@@ -141,11 +141,11 @@ def test_what_stops_the_robot_is_believed_fixed_until_it_moves() -> None:
     assert not movability.update(later).movables.fixed.any()
 
 
-def test_what_was_told_is_doubted_where_nothing_else_is_left() -> None:
+def test_what_was_told_is_dropped_where_nothing_else_is_left() -> None:
     world = start("one_box")[0].believing([True])
     movability = Movability(world)
     assert movability.update(world).movables.fixed.all()
-    movability.doubt()
+    movability.drop_prior()
     assert movability.update(world).movables.fixed.all()  # the same instant
     assert not movability.update(world.moved(time=1.0)).movables.fixed.any()
 
