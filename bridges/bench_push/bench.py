@@ -6,7 +6,8 @@
 ``--python`` is the interpreter of a virtual environment that has ``benchnpin`` (see the README
 beside this file). Each policy of ours runs in a process of `pushplan serve`, each scene in a
 process of that interpreter; so do policies of theirs, ``theirs:NAME`` or ``theirs:FILE.py:CLASS``.
-Episodes that are there already are not run again.
+Episodes that are there already are not run again, nor those whose scores a file has that
+``--scores`` names, to which the new ones are added.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parent))
 
-from episodes import Run, file_of, mend, read, whole
+from episodes import Run, file_of, keep, mend, read, recalled, whole
 from tables import report, write
 
 HERE = Path(__file__).parent
@@ -53,6 +54,7 @@ and give --python benchnpin/bin/python"""
 def main() -> int:
     """Run what is missing and print the tables; 1 if episodes are missing then."""
     parser = parser_of()
+    parser.add_argument("--scores", type=Path, metavar="FILE.csv", help="go on with these scores")
     options = parser.parse_args()
     try:
         scenes = chosen(options.scenes)
@@ -67,15 +69,27 @@ def main() -> int:
     if there.returncode:
         parser.error(_REMEDY.format(python=options.python))
     options.out.mkdir(parents=True, exist_ok=True)
-    runs = [
-        finished(Run(scene, variation, policy, range(first, last + 1)), options)
+    seeds = range(first, last + 1)
+    wanted = [
+        Run(scene, variation, policy, seeds, options.most_steps)
         for scene, variation in scenes
         for policy in policies_for(scene, options)
     ]
-    text = report([run for run in runs if run.episodes])
-    say(text)
-    if options.page:
-        write(options.page, text)
+    if options.scores:
+        try:
+            wanted = [recalled(run, options.scores) for run in wanted]
+        except (OSError, ValueError) as error:
+            parser.error(str(error))
+    runs = []
+    for run in wanted:
+        runs.append(finished(run, options))
+        if options.scores:
+            keep(runs[-1:], options.scores)
+    for scene in dict.fromkeys(run.scene for run in runs if run.episodes):
+        text = report([run for run in runs if run.scene == scene and run.episodes])
+        say(text)
+        if options.page:
+            write(options.page, text, f"bench.py {scene}")
     lacking = [run for run in runs if run.missing]
     for run in lacking:
         say(f"{run.name}: {len(run.episodes)} of {len(run.seeds)} episodes; again to go on")
@@ -139,12 +153,12 @@ def finished(run: Run, options: argparse.Namespace) -> Run:
     """A run with all of its episodes, as far as they can be had."""
     out = file_of(options.out, run.scene, run.variation, run.policy)
     lines = whole(out, options.most_steps)
-    missing = [seed for seed in run.seeds if seed not in lines]
+    missing = [seed for seed in run.missing if seed not in lines]
     if missing and not options.only_report:
         say(f"{run.name}: {len(missing)} episodes")
         mend(out, lines)
         drive(run, missing, out, options)
-    return read(run, out, options.most_steps)
+    return read(run, out)
 
 
 def drive(run: Run, seeds: Sequence[int], out: Path, options: argparse.Namespace) -> None:

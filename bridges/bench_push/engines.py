@@ -80,8 +80,9 @@ def main() -> int:
     for scene, variation in scenes:
         names = options.policies.split(",") if options.policies else POLICIES[scene]
         for policy in names:
-            run = finished(Run(scene, variation, policy, range(first, last + 1)), options)
-            found.append(pairs(run, options))
+            seeds = range(first, last + 1)
+            run = Run(scene, variation, policy, seeds, options.most_steps)
+            found.append(pairs(finished(run, options), options))
     text = report(found)
     say(text)
     if options.page:
@@ -106,7 +107,7 @@ def pairs(run: Run, options: argparse.Namespace) -> Pairs:
             done = whole(path, options.most_steps)
         ours[engine] = {seed: json.loads(line) for seed, line in done.items()}
     both = [seed for seed in run.episodes if all(seed in done for done in ours.values())]
-    theirs = columns([run.episodes[seed]["ours"] for seed in both])
+    theirs = {name: [run.episodes[seed][f"ours_{name}"] for seed in both] for name in SCORES}
     scores = {engine: columns([done[seed] for seed in both]) for engine, done in ours.items()}
     return Pairs(run, both, theirs, scores)
 

@@ -1,10 +1,12 @@
-"""Episodes that `drive.py` wrote: which are there, and our scores beside theirs."""
+"""Episodes that `drive.py` wrote, their scores by both codes, and a file that keeps the scores."""
 
 from __future__ import annotations
 
+import csv
 import json
 import re
-from dataclasses import dataclass, field
+from collections.abc import Iterable
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +14,11 @@ import numpy as np
 
 from pushplan.metrics import compute
 from pushplan.world import Episode, world_from_dict
+
+SCORES = {"theirs": ("S", "E", "I"), "ours": ("S", "E", "I", "work")}
+WAITS = ("median_ms", "longest_ms")
+_KEYS = ("scene", "variation", "policy", "most_steps", "seed")
+_VALUES = (*(f"{by}_{name}" for by, names in SCORES.items() for name in names), *WAITS)
 
 
 @dataclass(frozen=True)
@@ -22,11 +29,12 @@ class Run:
     variation: str
     policy: str
     seeds: range
-    episodes: dict[int, dict[str, Any]] = field(default_factory=dict)
+    most_steps: int
+    episodes: dict[int, dict[str, float]] = field(default_factory=dict)  # by seed: all `_VALUES`
 
-    def values(self, by: str, name: str) -> dict[int, float]:
-        """A score of every seed, by ``"theirs"`` or by ``"ours"``."""
-        return {seed: one[by][name] for seed, one in self.episodes.items()}
+    def values(self, name: str) -> dict[int, float]:
+        """A value of every seed, such as ``"ours_E"``, or one of `WAITS`."""
+        return {seed: one[name] for seed, one in self.episodes.items()}
 
     @property
     def missing(self) -> list[int]:
@@ -65,15 +73,70 @@ def mend(path: Path, lines: dict[int, str]) -> None:
         partial.replace(path)
 
 
-def read(run: Run, path: Path, most_steps: int) -> Run:
-    """A run with the episodes of a file, with our scores beside theirs."""
-    episodes = {}
-    lines = whole(path, most_steps)
-    for seed in sorted(lines.keys() & set(run.seeds)):
+def read(run: Run, path: Path) -> Run:
+    """A run with the scores of the episodes of a file, beside those that it has."""
+    episodes = dict(run.episodes)
+    lines = whole(path, run.most_steps)
+    for seed in lines.keys() & set(run.seeds):
         one = json.loads(lines[seed])
         one["ours"] = ours(scored(one))
-        episodes[seed] = {key: one[key] for key in ("ours", "theirs", "act_s", "reason")}
-    return Run(run.scene, run.variation, run.policy, run.seeds, episodes)
+        waits = 1e3 * np.array(one["act_s"])
+        scores = {f"{by}_{name}": one[by][name] for by in SCORES for name in SCORES[by]}
+        episodes[seed] = {
+            **scores,
+            "median_ms": float(np.median(waits)),
+            "longest_ms": float(waits.max()),
+        }
+    return replace(run, episodes=dict(sorted(episodes.items())))
+
+
+def recalled(run: Run, path: Path) -> Run:
+    """A run with those of its scores that a file of `keep` has.
+
+    Raises:
+        ValueError: if the file is not one of `keep`.
+    """
+    episodes = {}
+    for key, values in _kept(path).items():
+        if key[:4] == (run.scene, run.variation, run.policy, run.most_steps):
+            if key[4] in run.seeds:
+                episodes[key[4]] = values
+    return replace(run, episodes=episodes)
+
+
+def keep(runs: Iterable[Run], path: Path) -> None:
+    """Write scores down, so that tables can be made and extended without the episodes."""
+    kept = _kept(path)
+    for run in runs:
+        for seed, one in run.episodes.items():
+            kept[run.scene, run.variation, run.policy, run.most_steps, seed] = one
+    partial = path.with_suffix(".part")
+    with partial.open("w", encoding="utf-8", newline="") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow([*_KEYS, *_VALUES])
+        for key in sorted(kept):
+            writer.writerow([*key, *(f"{kept[key][name]:.6g}" for name in _VALUES)])
+    partial.replace(path)
+
+
+def _kept(path: Path) -> dict[tuple[str, str, str, int, int], dict[str, float]]:
+    """Scores by scene, variation, policy, limit of steps and seed."""
+    if not path.is_file():
+        return {}
+    with path.open(encoding="utf-8", newline="") as file:
+        rows = csv.DictReader(file)
+        if rows.fieldnames != [*_KEYS, *_VALUES]:
+            raise ValueError(f"{path} must have the columns {', '.join([*_KEYS, *_VALUES])}")
+        return {
+            (
+                one["scene"],
+                one["variation"],
+                one["policy"],
+                int(one["most_steps"]),
+                int(one["seed"]),
+            ): {name: float(one[name]) for name in _VALUES}
+            for one in rows
+        }
 
 
 def scored(one: dict[str, Any]) -> Episode:

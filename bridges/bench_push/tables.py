@@ -9,7 +9,7 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 import numpy as np
-from episodes import Run
+from episodes import SCORES, WAITS, Run
 
 from pushplan.evaluation.statistics import Estimate, estimate
 
@@ -21,7 +21,6 @@ TITLES = {
     "box_delivery": "Box-Delivery",
 }
 OWN = ("theirs:rrt", "theirs:lattice", "theirs:gtsp")
-SCORES = {"theirs": ("S", "E", "I"), "ours": ("S", "E", "I", "work")}
 HEADINGS = {
     "theirs": "By the original's code",
     "ours": "By ours, on the same trajectories",
@@ -29,19 +28,19 @@ HEADINGS = {
 
 
 def report(runs: Sequence[Run]) -> str:
-    """All tables as Markdown."""
+    """The tables of one scene as Markdown."""
     today = datetime.datetime.now(tz=datetime.UTC).date().isoformat()
     lines = [
+        f"### {TITLES[runs[0].scene]}",
+        "",
         f"Measured until {today} ({os.cpu_count()}-core {platform.machine()}), every policy on the "
         "same starts; `seeds` are those that ran. Means with 95 % bootstrap intervals. Δ is the "
         "mean paired difference, on the seeds that both have, to the original's own planner where "
         "it ran, else to the first row of the variation. Rows `theirs:` are planners of the "
         "original, in its process, with its actions clipped to their limits.",
     ]
-    for scene in dict.fromkeys(run.scene for run in runs):
-        lines += ["", f"### {TITLES[scene]}"]
-        for by in SCORES:
-            lines += ["", f"{HEADINGS[by]}:", "", *table([r for r in runs if r.scene == scene], by)]
+    for by in SCORES:
+        lines += ["", f"{HEADINGS[by]}:", "", *table(runs, by)]
     return "\n".join(lines) + "\n"
 
 
@@ -50,7 +49,7 @@ def table(runs: Sequence[Run], by: str) -> list[str]:
     names = SCORES[by]
     heads = ["variation", "policy", "seeds", *(_head(name) for name in names)]
     heads += [f"Δ{name}" for name in names if name != "S"]
-    heads += ["decision: median, longest [ms]"] if by == "theirs" else []
+    heads += ["decision: median of medians, longest [ms]"] if by == "theirs" else []
     lines = ["| " + " | ".join(heads) + " |", "|" + "---|" * len(heads)]
     for variation in dict.fromkeys(run.variation for run in runs):
         group = [run for run in runs if run.variation == variation]
@@ -64,15 +63,15 @@ def row(run: Run, base: Run, by: str) -> str:
     cells = [run.variation.replace("_", " "), f"`{run.policy}`", ranges(run.episodes)]
     names = SCORES[by]
     for name in names:
-        cells.append(shown(estimate(list(run.values(by, name).values())), name))
+        cells.append(shown(estimate(list(run.values(f"{by}_{name}").values())), name))
     for name in names:
         if name != "S":
-            mine, other = run.values(by, name), base.values(by, name)
+            mine, other = run.values(f"{by}_{name}"), base.values(f"{by}_{name}")
             gaps = [mine[seed] - other[seed] for seed in sorted(mine.keys() & other.keys())]
             cells.append("" if run is base or not gaps else shown(estimate(gaps), name, "+"))
     if by == "theirs":
-        waits = [1e3 * wait for one in run.episodes.values() for wait in one["act_s"]]
-        cells.append(f"{np.median(waits):.2g}, {max(waits):.0f}")
+        medians, longest = (list(run.values(name).values()) for name in WAITS)
+        cells.append(f"{np.median(medians):.2g}, {max(longest):.0f}")
     return "| " + " | ".join(cells) + " |"
 
 
@@ -82,15 +81,14 @@ def shown(value: Estimate, name: str, sign: str = "") -> str:
     return f"{value.mean:{form}} [{value.low:{form}}, {value.high:{form}}]"
 
 
-def write(page: Path, text: str, command: str = "bench.py") -> None:
-    """Put the tables of a command between its marks in a page, or make a page of them."""
+def write(page: Path, text: str, command: str) -> None:
+    """Put the tables of a command between its marks in a page, or at its end."""
     begin = f"<!-- tables of {command} -->"
     block = f"{begin}\n{text}{END}\n"
     old = page.read_text(encoding="utf-8") if page.is_file() else ""
-    if begin in old and END in old:
-        before, _, rest = old.partition(begin)
-        block = before + block + rest.partition(END)[2].removeprefix("\n")
-    page.write_text(block, encoding="utf-8")
+    before, mark, rest = old.partition(begin)
+    after = rest.partition(END)[2].removeprefix("\n") if mark else ""
+    page.write_text(before + block + after, encoding="utf-8")
 
 
 def _head(name: str) -> str:

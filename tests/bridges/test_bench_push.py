@@ -140,14 +140,34 @@ def test_tables_replace_what_stands_between_the_marks(
     monkeypatch.syspath_prepend(str(BRIDGE))
     tables = importlib.import_module("tables")
     page = tmp_path / "page.md"
-    begin = "<!-- tables of bench.py -->"
+    begin = "<!-- tables of bench.py maze -->"
     page.write_text(f"# Page\n\n{begin}\nold\n{tables.END}\n\nMore.\n", encoding="utf-8")
     for text in ("new\n", "newer\n"):
-        tables.write(page, text)
+        tables.write(page, text, "bench.py maze")
         expected = f"# Page\n\n{begin}\n{text}{tables.END}\n\nMore.\n"
         assert page.read_text(encoding="utf-8") == expected
-    tables.write(tmp_path / "other.md", "new\n")
-    assert "new" in (tmp_path / "other.md").read_text(encoding="utf-8")
+    tables.write(page, "ice\n", "bench.py ship_ice")
+    text = page.read_text(encoding="utf-8")
+    assert text.startswith(expected) and "ice" in text
+
+
+def test_scores_are_kept_and_gone_on_with(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.syspath_prepend(str(BRIDGE))
+    episodes = importlib.import_module("episodes")
+    names = ["theirs_S", "theirs_E", "theirs_I", "ours_S", "ours_E", "ours_I", "ours_work"]
+    one = dict.fromkeys([*names, "median_ms", "longest_ms"], 0.5)
+    run = episodes.Run("maze", "5", "straight", range(4), 20_000, {1: one})
+    file = tmp_path / "scores.csv"
+    episodes.keep([run], file)
+    more = episodes.Run("maze", "5", "straight", range(4), 20_000, {3: {**one, "ours_E": 0.25}})
+    episodes.keep([more], file)
+    found = episodes.recalled(episodes.Run("maze", "5", "straight", range(4), 20_000), file)
+    assert found.missing == [0, 2] and found.values("ours_E") == {1: 0.5, 3: 0.25}
+    other = episodes.recalled(episodes.Run("maze", "5", "straight", range(4), 10), file)
+    assert not other.episodes
+    file.write_text("seed\n1\n", encoding="utf-8")
+    with pytest.raises(ValueError, match="must have the columns scene"):
+        episodes.recalled(run, file)
 
 
 def test_modules_of_a_checkout_are_read_under_the_name_that_is_installed(
