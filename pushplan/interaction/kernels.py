@@ -28,6 +28,7 @@ class Bodies(NamedTuple):
 
     robot_vertices: FloatArray  # (V, 2) convex parts of the robot in its body frame
     robot_offsets: IntArray  # (P + 1,)
+    wall_parts: int  # how many of the first parts count at walls: all but the wheels
     robot_radius: float
     vertices: FloatArray  # (W, 2) outlines of the objects in their body frames
     offsets: IntArray  # (K + 1,)
@@ -351,7 +352,7 @@ def robot_held(pose: FloatArray, bodies: Bodies, settings: Settings, scratch: Sc
             transform_points(pose, bodies.robot_vertices, scratch.robot)
             placed = True
         wall = bodies.static_vertices[bodies.static_offsets[part] : bodies.static_offsets[part + 1]]
-        for piece in range(bodies.robot_offsets.shape[0] - 1):
+        for piece in range(bodies.wall_parts):
             corners = scratch.robot[bodies.robot_offsets[piece] : bodies.robot_offsets[piece + 1]]
             gap = max(least_overlap(wall, corners)[0], least_overlap(corners, wall)[0])
             if gap < -settings.jam_depth:

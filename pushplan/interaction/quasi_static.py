@@ -153,7 +153,7 @@ class _Shapes:
 def _thinnest(robot: RobotModel, shapes: _Shapes) -> float:
     """Half diagonal of the square that is as wide as the thinnest body [m]."""
     movables = shapes.movables
-    outlines = [*robot.contact_parts, *unflatten(movables.vertices, movables.offsets)]
+    outlines = [*robot.wall_parts, *unflatten(movables.vertices, movables.offsets)]
     floor = robot.circumscribed_radius / 30.0
     sizes = {len(outline) for outline in outlines}  # those with as many corners at once
     widths = [_width(np.stack([o for o in outlines if len(o) == size])) for size in sizes]
@@ -179,6 +179,7 @@ def _bodies(robot: RobotModel, shapes: _Shapes, static: StaticMap, gyration: flo
     return Bodies(
         robot_vertices=owned(robot.vertices),
         robot_offsets=owned(robot.offsets),
+        wall_parts=len(robot.wall_parts),
         robot_radius=robot.circumscribed_radius,
         vertices=owned(movables.vertices),
         offsets=owned(movables.offsets),

@@ -9,6 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from shapely import Polygon
 
+from pushplan.envs.rollout import RolloutInteraction
 from pushplan.geometry import convex_penetration
 from pushplan.interaction import Interaction, InteractionModel, QuasiStatic
 from pushplan.world import InvalidInputError, RobotModel, StaticMap, World
@@ -192,6 +193,22 @@ def test_a_robot_of_several_parts_pushes_with_each():
     outline = Polygon(world.movables.moved_to(result.object_poses[-1]).outline_world(0))
     for part in fork.parts:
         assert outline.intersection(Polygon(part + np.array([2, 0]))).area < 1e-3
+
+
+def test_a_wheel_pushes_a_box_but_holds_the_robot_at_no_wall():
+    body = np.array([(-0.5, -0.3), (0.5, -0.3), (0.5, 0.3), (-0.5, 0.3)])
+    wheel = np.array([(-0.2, 0.3), (0.2, 0.3), (0.2, 0.5), (-0.2, 0.5)])
+    rolling = RolloutInteraction("pymunk")
+    for wheels, held in ((1, False), (0, True)):
+        robot = RobotModel((body, wheel), 1.0, make_robot().drive, 0.15, 0.105, wheel_parts=wheels)
+        wall = StaticMap.build([[(1, 0.4), (3, 0.4), (3, 0.6), (1, 0.6)]], bounds=(-2, -2, 6, 3))
+        boxes = [[4.0, 0.9, 0]]
+        world = make_u_maze(boxes, robot=robot, robot_pose=[0, 0, 0], static=wall)
+        path = straight_path(0, 5, 0, 51)
+        result, true = QuasiStatic().sweep(world, path), rolling.sweep(world, path)
+        assert (result.jammed_at >= 0) == (true.jammed_at >= 0) == held
+        if not held:
+            assert result.work == pytest.approx(true.work, rel=0.1) and result.work > 0.05
 
 
 @pytest.mark.parametrize("path", [[], [[1, 2]], [[np.nan, 0, 0]], "path", [[0, 0, 0], [1, 1]]])
