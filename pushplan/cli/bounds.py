@@ -31,6 +31,7 @@ def add(commands: Any) -> None:
     parser.add_argument(
         "--nodes", type=whole(1), default=400, metavar="N", help="of a proof (default %(default)s)"
     )
+    parser.add_argument("--anew", action="store_true", help="prove those again that are known")
     parser.add_argument("--out", metavar="FILE.csv", help="write, or go on with, this file")
     parser.add_argument("--json", action="store_true", help="print them as JSON")
 
@@ -55,8 +56,11 @@ def run(options: argparse.Namespace) -> int:
     if options.out is not None and Path(options.out).exists():
         found |= load_bounds(options.out)
     for scenario in scenarios:
-        if scenario.key not in found:
-            found[scenario.key] = scenario_bound(scenario, most_nodes=options.nodes)
+        if options.anew or scenario.key not in found:
+            proven = scenario_bound(scenario, most_nodes=options.nodes)
+            if (known := found.get(scenario.key)) is not None and known.best is not None:
+                proven = proven.better(known.best, known.best_policy)
+            found[scenario.key] = proven
     found = with_solutions(found, runs)
     if options.json:
         say_json([{"scenario": one.key, **asdict(found[one.key])} for one in scenarios])

@@ -11,12 +11,13 @@ from importlib import resources
 from pathlib import Path
 from types import MappingProxyType
 
-from pushplan.world import SchemaError
+from pushplan.world import InvalidInputError, SchemaError
 from pushplan.world.checks import number
 from pushplan.world.files import write_atomic
 
 BOUNDS_FILE = "data/bounds.csv"
 """Where the package keeps them."""
+_OVERLAPS = 0.01  # of a bound, by which what simulators leave overlapping may undercut it
 _COLUMNS = ("scenario", "robot_mass_kg", "bound_kg_m", "best_kg_m", "best_policy")
 
 
@@ -43,7 +44,16 @@ class KnownBounds:
             number("best", self.best, low=0.0)
 
     def better(self, work: float, policy: str) -> KnownBounds:
-        """The same, with one more solution known."""
+        """The same, with one more solution known.
+
+        Raises:
+            InvalidInputError: if it undercuts the bound by more than overlaps can explain.
+        """
+        if work < (1.0 - _OVERLAPS) * self.bound:
+            raise InvalidInputError(
+                f"a solution by {policy} of {work:g} kg m undercuts the bound of {self.bound:g} "
+                "kg m: the bound or the episode is wrong"
+            )
         if self.best is not None and self.best <= work:
             return self
         return KnownBounds(self.robot_mass, self.bound, work, policy)

@@ -4,9 +4,11 @@ import math
 
 import pytest
 
+from pushplan.envs import make
 from pushplan.evaluation import ResultRow
 from pushplan.evaluation.bounding import scenario_bound
 from pushplan.evaluation.gaps import gaps, total_work
+from pushplan.motion.work_bound import work_bound
 from pushplan.scenarios import Scenario, suite
 from pushplan.scenarios.known_bounds import KnownBounds, known_bounds, load_bounds, save_bounds
 from pushplan.world import InvalidInputError, SchemaError
@@ -41,6 +43,15 @@ def test_a_better_solution_takes_the_place():
     one = KnownBounds(1.0, 2.0)
     two = one.better(5.0, "a").better(6.0, "b").better(4.0, "c")
     assert (two.best, two.best_policy) == (4.0, "c")
+    with pytest.raises(InvalidInputError, match=r"by d of 1 kg m undercuts the bound of 2 kg m"):
+        two.better(1.0, "d")
+
+
+def test_a_bound_holds_for_robots_that_turn_on_the_spot_too():
+    for one in suite("maze-3d-3").scenarios[:4]:
+        env = make(one, action="velocity")
+        env.reset(seed=one.seed)
+        assert scenario_bound(one).bound <= work_bound(env.world).work
 
 
 def test_files_keep_them(tmp_path):
