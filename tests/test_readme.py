@@ -65,7 +65,7 @@ def test_the_commands_are_where_ci_looks_for_them() -> None:
     first, second = [text for kind, text in BLOCKS if kind == "bash"][:2]
     assert first.startswith('pip install ".[sim,plots]" && pushplan bench ')
     assert second.startswith('pip install ".[test]" && pytest')
-    assert len(BENCHES) == 2 and len(PYTHON) == 4
+    assert len(BENCHES) == 2 and len(PYTHON) == 3
 
 
 @pytest.mark.parametrize(
@@ -109,8 +109,10 @@ def test_its_deadline_holds() -> None:
     assert {result.status.label for result in results} == {"solved"}
 
 
-def test_an_environment_is_made(folder) -> None:
-    run_script(block("gym.make"), folder)
+def test_the_page_about_tasks_makes_an_environment(folder) -> None:
+    page = (ROOT / "docs" / "tasks.md").read_text("utf-8")
+    (text,) = re.findall(r"^```python\n(import gymnasium.*?)^```$", page, re.MULTILINE | re.DOTALL)
+    run_script(text, folder)
 
 
 def test_the_page_about_world_files_shows_the_room() -> None:
