@@ -11,14 +11,12 @@ if TYPE_CHECKING:
     from pushplan.drawing.files import save_animation, save_image
     from pushplan.drawing.legend import Entry, add_strips, legend_of
     from pushplan.drawing.scene import draw_world
-    from pushplan.drawing.sequence import draw_sequence
 
 __all__ = [
     "Entry",
     "Panel",
     "add_strips",
     "draw_figure",
-    "draw_sequence",
     "draw_world",
     "legend_of",
     "save_animation",
@@ -33,6 +31,5 @@ __getattr__, __dir__ = lazy_names(
         "files": "save_animation save_image",
         "legend": "Entry add_strips legend_of",
         "scene": "draw_world",
-        "sequence": "draw_sequence",
     },
 )

@@ -36,6 +36,8 @@ STYLE: Mapping[str, Any] = {
     "pdf.fonttype": 42,
 }
 """Settings of Matplotlib for figures that are printed as they are, one column wide."""
+_LEFT, _RIGHT, _TITLE, _BELOW = 0.55, 0.08, 0.15, 0.4  # around the axes [inch]
+_ENTRY = (1.12, 0.18)  # of the legend: width and height [inch]
 _NOMINAL = 600.0  # the longer side of a picture, to which widths of lines refer [px]
 
 
@@ -49,7 +51,7 @@ class Panel:
         trail: see `draw_world`.
         object_trails: see `draw_world`.
         pushes: paths of the robot in each push [m], (N, 2) or (N, 3), in order; they are numbered.
-        title: a line above it.
+        title: text above it.
     """
 
     world: World
@@ -78,38 +80,28 @@ def draw_figure(*panels: Panel, width_in: float = COLUMN, columns: int | None = 
     matplotlib = need("matplotlib")
     need("matplotlib.figure")
     columns = min(len(panels), columns or len(panels))
-    lines = -(-len(panels) // columns)
-    entries: dict[str, Entry] = {}
+    entries = {one.label: one for panel in panels for one in _entries(panel)}
+    across = max(1, int(width_in / _ENTRY[0]))
+    boxes = [np.array(view_bounds(panel.world, 600, None)) for panel in panels]
+    side = width_in / columns - _LEFT - _RIGHT
+    heights = [side * float((box[3] - box[1]) / (box[2] - box[0])) for box in boxes]
+    above = _RIGHT + _TITLE * max(len(panel.title.splitlines()) for panel in panels)
+    lines = [max(heights[i : i + columns]) for i in range(0, len(panels), columns)]
+    below = _ENTRY[1] * -(-len(entries) // across) + _RIGHT
+    height = below + sum(lines) + len(lines) * (above + _BELOW)
     with matplotlib.rc_context(STYLE):
-        boxes = [np.array(view_bounds(panel.world, 600, None)) for panel in panels]
-        shape = max(float((box[3] - box[1]) / (box[2] - box[0])) for box in boxes)
-        side = width_in / columns - 0.45
-        titled = any(panel.title for panel in panels)
-        height = lines * (side * shape + (0.6 if titled else 0.4))
-        figure = matplotlib.figure.Figure(figsize=(width_in, height), layout="constrained")
-        grid = figure.subplots(lines, columns, squeeze=False).ravel()
-        for axes in grid[len(panels) :]:
-            axes.set_visible(False)
-        for axes, panel, box in zip(grid, panels, boxes, strict=False):
-            inches = side * max(1.0, float((box[3] - box[1]) / (box[2] - box[0])))
-            _draw(axes, panel, box, inches)
-            entries |= {
-                one.label: one
-                for one in legend_of(
-                    panel.world,
-                    plan=panel.plan,
-                    trail=panel.trail is not None,
-                    object_trails=panel.object_trails is not None,
-                    pushes=bool(panel.pushes),
-                )
-            }
-        for index, axes in enumerate(grid):
-            axes.set_xlabel("x [m]" if index + columns >= len(panels) else "")
-            axes.set_ylabel("" if index % columns else "y [m]")
+        figure = matplotlib.figure.Figure(figsize=(width_in, height))
+        for n, (panel, box) in enumerate(zip(panels, boxes, strict=True)):
+            row, column = divmod(n, columns)
+            top = height - sum(lines[:row]) - row * _BELOW - (row + 1) * above
+            left, low = column * width_in / columns + _LEFT, top - heights[n]
+            place = (left / width_in, low / height, side / width_in, heights[n] / height)
+            axes = figure.add_axes(place)
+            _draw(axes, panel, box, max(side, heights[n]))
+            axes.set_xlabel("x [m]" if n + columns >= len(panels) else "")
+            axes.set_ylabel("" if column else "y [m]", labelpad=1.0)
         handles = [_handle(entry) for entry in entries.values()]
-        across = max(1, int(width_in / 1.05))
-        figure.set_figheight(height + 0.17 * -(-len(handles) // across))
-        figure.legend(handles=handles, loc="outside lower center", ncols=across, frameon=False)
+        figure.legend(handles=handles, loc="lower center", ncols=across, frameon=False)
     return figure
 
 
@@ -188,11 +180,22 @@ def rgb(color: Color) -> tuple[float, ...]:
     return tuple(value / 255.0 for value in color)
 
 
+def _entries(panel: Panel) -> list[Entry]:
+    return legend_of(
+        panel.world,
+        plan=panel.plan,
+        trail=panel.trail is not None,
+        object_trails=panel.object_trails is not None,
+        pushes=bool(panel.pushes),
+    )
+
+
 def _draw(axes: Any, panel: Panel, box: FloatArray, inches: float) -> None:
     world = panel.world
     axes.set(xlim=box[[0, 2]], ylim=box[[1, 3]], aspect="equal", facecolor=_floor(world))
     axes.set_title(panel.title)
-    axes.tick_params(direction="out", length=2.5, width=0.6)
+    axes.tick_params(length=2.5, width=0.6)
+    axes.locator_params(steps=[1, 2, 5, 10])
     draw_scene(
         _AxesPen(axes, box, inches),
         world,

@@ -13,7 +13,7 @@ from pushplan.drawing.canvas import SMOOTHING
 from pushplan.drawing.palette import FLOOR_PALETTE, palette_of
 from pushplan.drawing.pen import Color
 from pushplan.drawing.scene import Font, font_of, pushed
-from pushplan.world import Plan, World
+from pushplan.world import GoalDisc, Plan, World
 
 _GREY = (128, 128, 128)
 
@@ -60,7 +60,7 @@ def legend_of(
     predicted = plan is True or (not isinstance(plan, bool) and bool(pushed(world, plan)))
     entries = {
         Entry("robot", palette.robot, palette.robot_edge): True,
-        Entry("goal", *palette.goal): True,
+        Entry("goal", *palette.goal): _has_goal(world),
         Entry("wall", palette.wall, palette.wall): has_walls,
         Entry("movable object", *palette.box): bool((~wheeled & ~fixed).any()),
         Entry("object on casters", *palette.wheeled): bool(wheeled.any()),
@@ -72,6 +72,15 @@ def legend_of(
         Entry("on the way to a push", None, _GREY, line=True): pushes,
     }
     return [entry for entry, there in entries.items() if there]
+
+
+def _has_goal(world: World) -> bool:
+    """Whether some of the goal is within the bounds; goals of tests may be far away."""
+    goal, bounds = world.goal, world.static.bounds
+    if not isinstance(goal, GoalDisc):
+        return True
+    nearest = np.clip(goal.center, bounds[:2], bounds[2:])
+    return bool(np.hypot(*(goal.center - nearest)) < goal.radius)
 
 
 def add_strips(
