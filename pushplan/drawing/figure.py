@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -27,7 +27,7 @@ COLUMN = 3.4
 """Width of a column of a two-column paper [inch]."""
 FORMATS = (".png", ".svg", ".pdf")
 DPI = 200
-STYLE: Mapping[str, Any] = {
+STYLE: Any = {
     "font.size": 8.0,
     "axes.linewidth": 0.6,
     "axes.titlesize": 8.0,
@@ -90,7 +90,7 @@ def draw_figure(*panels: Panel, width_in: float = COLUMN, columns: int | None = 
     below = _ENTRY[1] * -(-len(entries) // across) + _RIGHT
     height = below + sum(lines) + len(lines) * (above + _BELOW)
     with matplotlib.rc_context(STYLE):
-        figure = matplotlib.figure.Figure(figsize=(width_in, height))
+        figure: Figure = matplotlib.figure.Figure(figsize=(width_in, height))
         for n, (panel, box) in enumerate(zip(panels, boxes, strict=True)):
             row, column = divmod(n, columns)
             top = height - sum(lines[:row]) - row * _BELOW - (row + 1) * above
@@ -122,7 +122,10 @@ def save_figure(path: str | Path, figure: Figure, *, title: str = "", source: st
     if ending not in FORMATS:
         raise InvalidInputError(f"a figure file ends in {' or '.join(FORMATS)}, got {path.name!r}")
     known: dict[str, Any] = {"Title": title, "Creator": "pushplan"}
-    undated = {".svg": {"Date": None, "Description": source}, ".png": {"Description": source}}
+    undated: dict[str, dict[str, Any]] = {
+        ".svg": {"Date": None, "Description": source},
+        ".png": {"Description": source},
+    }
     more = undated.get(ending, {"CreationDate": None, "Subject": source})
     buffer = io.BytesIO()
     with need("matplotlib").rc_context({**STYLE, "svg.hashsalt": title}):

@@ -33,6 +33,9 @@ SERIES = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#00
 """Colours of policies, and of whatever else is told apart, in their order."""
 MARKERS = ("o", "s", "^", "D", "v", "P", "X", "*")
 """Markers of the same, as print without colour tells them apart."""
+DASHES = ("-", "--", "-.", ":", (0, (5, 1)), (0, (3, 1, 1, 1)), (0, (1, 1)), (0, (6, 2, 1, 2)))
+"""Styles of their lines, as Matplotlib takes them."""
+
 
 FLOOR_PALETTE = Palette()
 WATER_PALETTE = Palette(
