@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from itertools import repeat
 from pathlib import Path
 
@@ -23,6 +24,7 @@ from pushplan.drawing import (
 from pushplan.drawing.figure import FORMATS
 from pushplan.drawing.files import Frame
 from pushplan.drawing.scene import pushed
+from pushplan.interaction.path_sweepers import default_interaction
 from pushplan.world import Episode, Plan, Policy, ShowsPlan, World
 
 FILMS = (".gif", ".mp4")
@@ -49,8 +51,20 @@ class Camera:
             self._steps.clear()
         self._steps.append((world, policy.current_plan if isinstance(policy, ShowsPlan) else None))
 
+    def _predict(self) -> None:
+        """Give plans that predict nothing what the default interaction model expects of them."""
+        known: dict[int, Plan] = {}
+        for step, (world, plan) in enumerate(self._steps):
+            if plan is None or plan.object_poses is not None:
+                continue
+            if id(plan) not in known:
+                swept = default_interaction(world).sweep(world, plan.poses)
+                known[id(plan)] = replace(plan, object_poses=swept.object_poses)
+            self._steps[step] = (world, known[id(plan)])
+
     def write(self, episode: Episode) -> None:
         """Draw what was seen, with the scores so far; a still shows the end."""
+        self._predict()
         count = len(self._steps)
         if self.path.suffix.lower() in FORMATS:
             world, plan = self._steps[-1]

@@ -98,7 +98,7 @@ def add_strips(
     """
     height, width = picture.shape[:2]
     k = SMOOTHING
-    size = max(10, round(width / 38))
+    size = max(10, round(min(max(height, width) / 40, width / 24)))
     font, step = font_of(k * size), round(1.45 * size)
     cells = _cells(entries, font, size, width)
     top = step * len(lines) + size // 2
