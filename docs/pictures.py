@@ -4,20 +4,20 @@ Usage::
 
     python docs/pictures.py [NAME ...]
 
-Writes into docs/images: `box-delivery-layouts`, `area-clearing-layouts`, `namo-order`, `mujoco`; all of them
-without a name. The last one needs OpenGL (docs/simulators-mujoco.md).
+Writes into docs/images: `box-delivery-layouts`, `area-clearing-layouts`, `namo-order`, `mujoco`;
+all of them without a name. The last one needs OpenGL (docs/simulators-mujoco.md).
 """
 
 from __future__ import annotations
 
 import sys
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from pushplan.drawing import Panel, draw_figure, save_figure, save_image
-from pushplan.envs import make
+from pushplan.envs import PushEnv, make
+from pushplan.envs.simulators.mujoco_simulator import MujocoSimulator
 from pushplan.evaluation import run_episode
 from pushplan.planners import make_policy
 from pushplan.scenarios import Scenario, suite
@@ -30,7 +30,7 @@ LAYOUTS = {
 
 
 def layouts(task: str) -> None:
-    """A start in every layout of a task, half of the boxes on casters."""
+    """A start in every layout of a task, two boxes of five on casters."""
     panels = []
     for layout in LAYOUTS[task]:
         variations = {"layout": layout, "wheeled": 0.4}
@@ -53,15 +53,21 @@ def namo_order() -> None:
 
 
 def mujoco() -> None:
-    """Box-Delivery and Ship-Ice by MuJoCo's camera."""
+    """Area-Clearing and Ship-Ice by MuJoCo's camera."""
     pictures = []
-    for name, size in (("box-delivery-3d-5", (720, 540)), ("ship-ice-3d-30", (360, 540))):
+    for name, width in (("area-clearing-3d-10", 720), ("ship-ice-3d-30", 480)):
         scenario = suite(name, episodes=1).scenarios[0]
-        with make(scenario) as env:
-            env.reset(seed=scenario.seed)
-            pictures.append(env.unwrapped.simulator.photograph(*size))
-    gap: Any = np.full((540, 6, 3), 255, dtype=np.uint8)
-    save_image(IMAGES / "mujoco.png", np.concatenate([pictures[0], gap, pictures[1]], axis=1))
+        simulator = MujocoSimulator()
+        env = PushEnv(
+            task=scenario.task,
+            simulator=simulator,
+            preset=scenario.preset,
+            variations=scenario.variations,
+        )
+        env.reset(seed=scenario.seed)
+        pictures += [simulator.photograph(width, 720), np.full((720, 8, 3), 255, dtype=np.uint8)]
+        env.close()
+    save_image(IMAGES / "mujoco.png", np.concatenate(pictures[:-1], axis=1))
 
 
 DRAWN = {
