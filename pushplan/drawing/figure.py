@@ -29,6 +29,7 @@ FORMATS = (".png", ".svg", ".pdf")
 DPI = 200
 STYLE: Any = {
     "font.size": 8.0,
+    "axes.grid": False,
     "axes.linewidth": 0.6,
     "axes.titlesize": 8.0,
     "legend.fontsize": 7.5,
