@@ -27,7 +27,7 @@ import numpy as np
 from numpy.typing import NDArray
 from yaml import safe_load
 
-from pushplan.drawing import draw_sequence, save_image
+from pushplan.drawing import Panel, draw_figure, save_figure
 from pushplan.envs import make
 from pushplan.evaluation import PolicySpec, ResultRow, bench
 from pushplan.planners.rearrangement import GtspMpc
@@ -106,21 +106,16 @@ def line(name: str, policy: str, mine: Sequence[ResultRow], first: Sequence[Resu
 
 def figure(path: str, seed: int) -> None:
     """Draw what the policy plans first in some scenes, side by side."""
-    pictures = []
+    panels = []
     for name in PICTURED:
         scenario = suite(name, episodes=1, first_seed=seed).scenarios[0]
         env = make(scenario, observation="state", action=("velocity",))
         env.reset(seed=scenario.seed)
         policy = GtspMpc()
         policy.act(env.world)
-        picture = draw_sequence(env.world, [push.poses for push in policy.plan], size_px=480)
-        pictures.append(picture)
+        panels.append(Panel(env.world, pushes=[push.poses for push in policy.plan], title=name))
         env.close()
-    height = max(len(picture) for picture in pictures)
-    filled = [
-        np.pad(p, ((0, height - len(p)), (0, 12), (0, 0)), constant_values=255) for p in pictures
-    ]
-    save_image(path, np.concatenate(filled, axis=1))
+    save_figure(path, draw_figure(*panels, width_in=7.0))
 
 
 def values(rows: Sequence[ResultRow], score: str) -> NDArray[np.float64]:

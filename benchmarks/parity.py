@@ -18,7 +18,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pushplan.drawing import draw_world, save_image
+from pushplan.drawing import Panel, draw_figure, save_figure
 from pushplan.envs.registry import SIMULATORS, TASKS
 from pushplan.world import GoalDisc, Movables, StaticMap, Twist, World, stream
 from pushplan.world.checks import FloatArray
@@ -132,18 +132,14 @@ def compare(case: Case) -> tuple[dict[str, NDArray[np.float64]], World, World]:
 def picture(cases: list[tuple[Case, World, World]], path: str) -> None:
     """Two rows: where the planar simulator ends, and where the other one does."""
     bounds = (-0.2, -0.25, 0.9, 0.5)
-    rows = []
+    panels = []
     for which, name in ((1, "pymunk"), (2, "mujoco")):
-        frames = []
         for entry in cases:
             world = entry[which]  # type: ignore[misc]
             assert isinstance(world, World)
-            static = StaticMap.build(bounds=bounds)
-            frames.append(
-                draw_world(replace(world, static=static), size_px=340, text=[name, entry[0].name])
-            )
-        rows.append(np.concatenate(frames, axis=1))
-    save_image(path, np.concatenate(rows, axis=0))
+            shown = replace(world, static=StaticMap.build(bounds=bounds))
+            panels.append(Panel(shown, title=f"{name}\n{entry[0].name}"))
+    save_figure(path, draw_figure(*panels, width_in=9.0, columns=len(cases)))
 
 
 def main() -> None:

@@ -26,7 +26,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pushplan.drawing import draw_world, save_image
+from pushplan.drawing import Panel, draw_figure, save_figure
 from pushplan.envs import RolloutInteraction, make
 from pushplan.evaluation import Results, bench, bootstrap_interval, wilson
 from pushplan.planners import make_planner, warm_up
@@ -235,7 +235,7 @@ def anytime(names: list[str], count: int, seed: int, longest: float, clock: Cloc
             say(f"| `{name}` | {label} | {cells} | {gap:.3f} | {rate[0]:.0f} | {rate[1]:.0f} |")
 
 
-def draw_door(path: str) -> None:
+def draw_door(file: str) -> None:
     """A plan through the only door, in which a box stands, as the simulator drives it."""
     square = np.array([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]])
     walls = [[0, 0, 16, 0], [0, 8, 16, 8], [0, 0, 0, 8], [16, 0, 16, 8]]
@@ -257,15 +257,15 @@ def draw_door(path: str) -> None:
         f"planned {plan.length:.2f} m, work {plan.interaction_cost:.2f} kg m predicted, "
         f"{driven.work:.2f} kg m in the simulator, jams: {driven.jammed_at >= 0}"
     )
-    frames = []
+    panels = []
     for share in (0.0, 0.5, 1.0):
         at = int(share * (len(plan.poses) - 1))
         now = world.moved(robot_pose=plan.poses[at], movable_poses=driven.object_poses[at])
         trails = driven.object_poses[: at + 1]
-        frames.append(
-            draw_world(now, size_px=520, trail=plan.poses[: at + 1], object_trails=trails)
-        )
-    save_image(path, np.concatenate(frames, axis=0))
+        path = plan.poses[: at + 1]
+        driving = {"trail": path, "object_trails": trails} if at else {"plan": plan}
+        panels.append(Panel(now, **driving))
+    save_figure(file, draw_figure(*panels, width_in=3.8, columns=1))
 
 
 def first_plan(name: str, world: World, seed: int, clock: Clock) -> float:

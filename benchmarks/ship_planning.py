@@ -23,6 +23,7 @@ from pathlib import Path
 
 import numpy as np
 
+from pushplan.drawing.palette import DASHES, SERIES
 from pushplan.envs.tasks.ship_ice import ShipIceTask
 from pushplan.evaluation import ResultRow, bench
 from pushplan.evaluation.statistics import estimate
@@ -220,10 +221,11 @@ def picture(file: Path, seed: int) -> None:
     hulls = PolyCollection(world.robot_outline_world(), facecolor="#444444", zorder=5)
     axes.add_collection(hulls)
     names = [name for name in POLICIES if name not in ("geometric-rrt", "ship-predictive-network")]
-    for name in names:
+    for name, color, dashes in zip(names, SERIES, DASHES, strict=False):
         plan = make_planner(name).plan(world).plan
         if plan is not None:
-            axes.plot(*plan.poses[:, :2].T, linewidth=1.8, label=name)
+            line = {"color": color, "linestyle": dashes, "linewidth": 1.8}
+            axes.plot(*plan.poses[:, :2].T, label=name, **line)
     axes.axhline(9.0, color="#666666", linestyle="--", linewidth=0.8)
     axes.set(aspect="equal", xlim=world.static.bounds[[0, 2]], ylim=(0.0, 9.6))
     axes.set_xlabel("x [m]")

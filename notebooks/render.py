@@ -1,11 +1,11 @@
-"""Run the notebooks, and write what they say and show into docs/notebooks.md.
+"""Run the notebooks, and write what they say and show into pages of docs, one for each.
 
 Usage::
 
     python notebooks/render.py [NAME ...] [--check]
 
-Without a name all notebooks are run, each in a process of its own; with names the parts of the
-others on the page stay as they are. With --check nothing is written.
+Without a name all notebooks are run, each in a process of its own; with names the pages of the
+others stay as they are. With --check nothing is written.
 
 No Jupyter kernel is needed: what a cell prints, the value of its last line and the figures that it
 leaves open are kept, as Jupyter shows them.
@@ -49,10 +49,10 @@ DPI = 110
 HEAD = """\
 # Notebooks
 
-Seven of them, in [`notebooks/`](../notebooks): open one with Jupyter. They are kept without outputs
-and run as tests, each in less than a minute. This page is what they say and show, made by
-`python notebooks/render.py` on a 2-core machine that was busy with other work, which makes every
-time on it longer.
+Seven of them, in [`notebooks/`](../notebooks): open one with Jupyter, or read here what it says and
+shows. They are kept without outputs and run as tests. `python notebooks/render.py` makes these
+pages; each took 5 to 80 s on a 2-core machine that was busy with other work (2026-11-25), which
+makes every time on them longer.
 """
 
 
@@ -140,10 +140,10 @@ def png(image: Image.Image) -> bytes:
 
 
 def markdown(path: Path, cells: list[Cell]) -> str:
-    """The part of the page that shows a notebook; writes its pictures."""
+    """The page that shows a notebook; writes its pictures."""
     for old in (DOCS / "images").glob(f"notebook-{path.stem}-*.png"):
         old.unlink()
-    blocks, count, heading = [f'<a id="{path.stem}"></a>'], 0, ""
+    blocks, count, heading = [], 0, ""
     for kind, source, output in cells:
         blocks.append(shown(kind, source))
         if output is None:
@@ -156,36 +156,33 @@ def markdown(path: Path, cells: list[Cell]) -> str:
             name = f"notebook-{path.stem}-{count}.png"
             (DOCS / "images" / name).write_bytes(picture)
             blocks.append(f"![{heading}](images/{name})")
+    blocks.append(f"The notebook: [`{path.name}`](../notebooks/{path.name}).")
     return "\n\n".join(blocks) + "\n"
 
 
 def shown(kind: str, source: str) -> str:
-    """How the page shows the source of a cell: headings one level down, links from where it is.
+    """How a page shows the source of a cell: links from where the page is.
 
     The semicolon that keeps Jupyter from showing a value is left out.
     """
     if kind == "code":
         return f"```python\n{source.removesuffix(';')}\n```"
-    return re.sub(r"^#", "##", source, flags=re.MULTILINE).replace("](../docs/", "](")
+    return source.replace("](../docs/", "](")
 
 
-def parts_of(page: str) -> dict[str, str]:
-    """The parts of a page that was written before, by notebook."""
-    pieces = re.split(r"^(?=<a id=)", page, flags=re.MULTILINE)[1:]
-    return {piece.split('"')[1]: piece.rstrip() + "\n" for piece in pieces}
+def page_of(path: Path) -> Path:
+    """Where the page of a notebook is."""
+    return DOCS / f"notebook-{path.stem}.md"
 
 
-def write_page(path: Path, cells: list[Cell]) -> None:
-    """Put a notebook in its place on the page."""
-    page = DOCS / "notebooks.md"
-    parts = parts_of(page.read_text("utf-8")) if page.exists() else {}
-    parts[path.stem] = markdown(path, cells)
-    links = []
-    for other in notebooks():
-        title = cells_of(other)[0][1].splitlines()[0].lstrip("# ")
-        links.append(f"- [{title}](#{other.stem}), [`{other.name}`](../notebooks/{other.name})")
-    known = [parts[other.stem] for other in notebooks() if other.stem in parts]
-    page.write_text("\n".join([HEAD, *links, "", *known]), "utf-8")
+def overview() -> str:
+    """The page with the list of notebooks, each with the first sentence of its text."""
+    lines = ["| notebook | what it shows |", "|---|---|"]
+    for path in notebooks():
+        title, _, text = cells_of(path)[0][1].partition("\n")
+        about = " ".join(text.split()).partition(". ")[0].removesuffix(".")
+        lines.append(f"| [{title.lstrip('# ')}]({page_of(path).name}) | {about} |")
+    return "\n".join([HEAD, *lines, ""])
 
 
 def main() -> int:
@@ -206,7 +203,8 @@ def main() -> int:
     cells = list(run_notebook(path))
     sys.stdout.write(f"{path.stem}: {time.perf_counter() - began:.1f} s\n")
     if not options.check:
-        write_page(path, cells)
+        page_of(path).write_text(markdown(path, cells), "utf-8")
+        (DOCS / "notebooks.md").write_text(overview(), "utf-8")
     return 0
 
 

@@ -83,6 +83,11 @@ def test_a_robot_needs_none_of_the_extras():
             ["plan", "examples/room.yaml", "--planner", "straight", "--render", "no.png"],
             "pictures",
         ),
+        (
+            "matplotlib",
+            ["plan", "examples/room.yaml", "--planner", "straight", "--render", "no.svg"],
+            "plots",
+        ),
         ("pymunk", ["run", "maze-2d-3", "--policy", "straight"], "sim"),
         ("mujoco", ["run", "maze-3d-3", "--policy", "straight"], "sim"),
         ("onnxruntime", ["run", "maze-2d-3", "--policy", "maze-ppo"], "learned"),

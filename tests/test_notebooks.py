@@ -56,16 +56,19 @@ def test_a_notebook_is_kept_without_outputs(path):
     assert code and not any(cell["outputs"] or cell["execution_count"] for cell in code)
 
 
-def test_the_page_shows_what_the_notebooks_say(render):
-    page = (ROOT / "docs" / "notebooks.md").read_text("utf-8")
+def test_the_pages_show_what_the_notebooks_say(render):
     for path in NOTEBOOKS:
+        page = render.page_of(path).read_text("utf-8")
         for kind, source in render.cells_of(path):
             assert render.shown(kind, source) in page, f"python notebooks/render.py {path.stem}"
+    assert (ROOT / "docs" / "notebooks.md").read_text("utf-8") == render.overview()
+    pages = {path.name for path in (ROOT / "docs").glob("notebook-*.md")}
+    assert pages == {render.page_of(path).name for path in NOTEBOOKS}
 
 
-def test_the_page_has_its_pictures():
-    page = (ROOT / "docs" / "notebooks.md").read_text("utf-8")
-    named = set(re.findall(r"images/(notebook-[\w-]+\.png)", page))
+def test_the_pages_have_their_pictures(render):
+    pages = "".join(render.page_of(path).read_text("utf-8") for path in NOTEBOOKS)
+    named = set(re.findall(r"images/(notebook-[\w-]+\.png)", pages))
     there = {path.name for path in (ROOT / "docs" / "images").glob("notebook-*.png")}
     assert named == there
     assert sum((ROOT / "docs" / "images" / name).stat().st_size for name in named) < 1_500_000

@@ -16,7 +16,6 @@ from pushplan.cli import build_parser
 if TYPE_CHECKING:
     from docutils.nodes import Element
 
-_ANCHOR = re.compile(r'^<a id="(\w+)"></a>$', re.MULTILINE)
 _LINK_UP = re.compile(r"\[([^\]]*)\]\((\.\./[^)#]+)(?:#[^)]*)?\)")
 
 
@@ -155,14 +154,14 @@ def _options(parser: argparse.ArgumentParser) -> list[str]:
 
 
 def prepare(app: Any, name: str, source: list[str]) -> None:
-    """Show links to what has no page as text, and let anchors be known to links of a page."""
+    """Show links to what has no page as text."""
     root = Path(app.srcdir) / Path(name).parent
 
     def shown(found: re.Match[str]) -> str:
         return found[1] if (root / found[2]).is_dir() or found[2].endswith(".md") else found[0]
 
     if not name.startswith("generated/"):
-        source[0] = _ANCHOR.sub(r"(\1)=", _LINK_UP.sub(shown, source[0]))
+        source[0] = _LINK_UP.sub(shown, source[0])
 
 
 def resolve(app: Any, env: Any, node: Element, contnode: Element) -> Element | None:

@@ -3,18 +3,31 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from itertools import repeat
 from pathlib import Path
 
 import numpy as np
 
-from pushplan.cli.outputs import check_picture
+from pushplan.cli.outputs import check_figure
 from pushplan.cli.scoreboard import Scoreboard, closing_lines
-from pushplan.drawing import draw_world, save_animation, save_image
+from pushplan.drawing import (
+    Entry,
+    Panel,
+    add_strips,
+    draw_figure,
+    draw_world,
+    legend_of,
+    save_animation,
+    save_figure,
+)
+from pushplan.drawing.figure import FORMATS
 from pushplan.drawing.files import Frame
+from pushplan.drawing.scene import pushed
+from pushplan.interaction.path_sweepers import default_interaction
 from pushplan.world import Episode, Plan, Policy, ShowsPlan, World
 
-ENDINGS = (".png", ".gif", ".mp4")
+FILMS = (".gif", ".mp4")
 FRAMES = 240
 """A film has at most so many frames; longer episodes are shown faster."""
 FPS = 20
@@ -29,7 +42,7 @@ class Camera:
 
     def __init__(self, path: str) -> None:
         self.path = Path(path)
-        check_picture(path, ENDINGS)
+        check_figure(path, FILMS)
         self._steps: list[tuple[World, Plan | None]] = []
 
     def __call__(self, step: int, world: World, policy: Policy) -> None:
@@ -38,19 +51,40 @@ class Camera:
             self._steps.clear()
         self._steps.append((world, policy.current_plan if isinstance(policy, ShowsPlan) else None))
 
+    def _predict(self) -> None:
+        """Give plans that predict nothing what the default interaction model expects of them."""
+        known: dict[int, Plan] = {}
+        for step, (world, plan) in enumerate(self._steps):
+            if plan is None or plan.object_poses is not None:
+                continue
+            if id(plan) not in known:
+                swept = default_interaction(world).sweep(world, plan.poses)
+                known[id(plan)] = replace(plan, object_poses=swept.object_poses)
+            self._steps[step] = (world, known[id(plan)])
+
     def write(self, episode: Episode) -> None:
-        """Draw what was seen, with the scores so far."""
+        """Draw what was seen, with the scores so far; a still shows the end."""
+        self._predict()
         count = len(self._steps)
-        if self.path.suffix.lower() == ".png":
-            *_, last = self._frames(episode, [count - 1])
-            save_image(self.path, last)
+        if self.path.suffix.lower() in FORMATS:
+            world, plan = self._steps[-1]
+            text = "   ".join(closing_lines(episode))
+            panel = Panel(world, plan=plan, trail=episode.robot_poses, title=text)
+            save_figure(self.path, draw_figure(panel), title=text)
             return
         stride = -(-count // FRAMES)
         chosen = [*range(0, count - 1, stride), count - 1]
         save_animation(self.path, self._frames(episode, chosen), FPS)
 
+    def _legend(self) -> list[Entry]:
+        """What some frame shows; the same in all of them."""
+        plans = [(world, plan) for world, plan in self._steps if plan is not None]
+        predicted = any(pushed(world, plan) for world, plan in plans)
+        first = self._steps[0][0]
+        return legend_of(first, plan=predicted or (plans[0][1] if plans else None), trail=True)
+
     def _frames(self, episode: Episode, chosen: list[int]) -> Iterator[Frame]:
-        board, seen = Scoreboard(episode.world), 1
+        board, seen, legend = Scoreboard(episode.world), 1, self._legend()
         for index in chosen:
             world, plan = self._steps[index]
             now = int(np.searchsorted(episode.times, world.time + 1e-9))
@@ -58,8 +92,7 @@ class Camera:
             seen, trail = now, episode.robot_poses[:now]
             text = board.lines()
             if index == chosen[-1]:
-                text = [text[0], *closing_lines(episode)]
-            frame = draw_world(world, plan=plan, trail=trail, text=text)
+                text = [text[0], "   ".join(closing_lines(episode))]
+            frame = add_strips(draw_world(world, plan=plan, trail=trail), text, legend)
             yield frame
-        if len(chosen) > 1:  # a second to look at the end
-            yield from repeat(frame, FPS)
+        yield from repeat(frame, FPS)  # a second to look at the end

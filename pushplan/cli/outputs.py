@@ -45,6 +45,24 @@ def check_picture(path: str | None, endings: Sequence[str] = (".png",)) -> None:
         need("PIL")
 
 
+def check_figure(path: str | None, films: Sequence[str] = ()) -> None:
+    """Refuse a picture with axes and a legend, or a film, as `check_picture` does.
+
+    Args:
+        path: the file; None is none to be written.
+        films: endings of films that may be written, too.
+    """
+    if path is not None:
+        from pushplan.world.libraries import need
+
+        need("PIL")
+        from pushplan.drawing.figure import FORMATS
+
+        check_picture(path, (*FORMATS, *films))
+        if Path(path).suffix.lower() in FORMATS:
+            need("matplotlib")
+
+
 def check_directory(path: str | None) -> None:
     """Refuse a folder that can neither be made nor written to; it may be there or not.
 

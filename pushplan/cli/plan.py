@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from pushplan.cli.common import add_command, complete, milliseconds, positive, say, say_json, whole
 from pushplan.cli.kernel_progress import kernel_progress
-from pushplan.cli.outputs import check_file, check_picture
+from pushplan.cli.outputs import check_figure, check_file
 
 if TYPE_CHECKING:
     from pushplan.world import PlanResult, Stop
@@ -18,7 +18,7 @@ SCHEMA = "pushplan-plan/1"
 _EXAMPLES = """\
   pushplan plan room.yaml --planner kinodynamic-rrt
   pushplan plan room.yaml --planner kinodynamic-rrt --deadline 0.5 --out plan.json
-  pushplan plan room.yaml --planner geometric-rrt --iterations 2000 --seed 7 --render plan.png
+  pushplan plan room.yaml --planner geometric-rrt --iterations 2000 --seed 7 --render plan.svg
 """
 
 
@@ -40,7 +40,11 @@ def add(commands: Any) -> None:
     parser.add_argument("--seed", type=whole(0), default=0, help="of the planner (default 0)")
     parser.add_argument("--out", metavar="plan.json", help="write the plan and its statistics")
     parser.add_argument("--json", action="store_true", help="print what --out writes, alone")
-    parser.add_argument("--render", metavar="plan.png", help="write a picture of the plan")
+    parser.add_argument(
+        "--render",
+        metavar="FILE",
+        help="picture of the plan with a scale and a legend: .png, .svg or .pdf",
+    )
 
 
 def run(options: argparse.Namespace) -> int:
@@ -49,7 +53,7 @@ def run(options: argparse.Namespace) -> int:
     from pushplan.world import load_world, stream
 
     check_file(options.out)
-    check_picture(options.render)
+    check_figure(options.render)
     world = load_world(options.world)
     planner = make_planner(options.planner)
     with kernel_progress(options.planner):
@@ -63,9 +67,11 @@ def run(options: argparse.Namespace) -> int:
     if options.out:
         Path(options.out).write_text(json.dumps(data, indent=1) + "\n", encoding="utf-8")
     if options.render:
-        from pushplan.drawing import draw_world, save_image
+        from pushplan.drawing import Panel, draw_figure, save_figure
 
-        save_image(options.render, draw_world(world, plan=result.plan))
+        title = f"{options.planner}: {result.status.label}"
+        figure = draw_figure(Panel(world, plan=result.plan))
+        save_figure(options.render, figure, title=title)
     for file in (options.out, options.render):
         if file and not options.json:
             say(f"wrote {file}")

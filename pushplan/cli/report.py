@@ -18,6 +18,7 @@ _EXAMPLES = """\
   pushplan report runs/first
   pushplan report runs/first --metrics E_nav_to_goal_point,my_metrics:jerk
   pushplan report runs/first --format latex > tables.tex
+  pushplan report runs/first --figures pdf,png
   pushplan report runs/first --replays beside --replay-most 1000
 """
 
@@ -52,6 +53,11 @@ def add(commands: Any) -> None:
         metavar="N",
         help="replays of at most N episodes, scenarios with failures first (default %(default)s)",
     )
+    parser.add_argument(
+        "--figures",
+        metavar="A,B",
+        help="write the figures in these formats too, for a paper: pdf, png; always in svg",
+    )
 
 
 def run(options: argparse.Namespace) -> int:
@@ -60,7 +66,8 @@ def run(options: argparse.Namespace) -> int:
 
     results = Results.load(options.directory)
     if options.metrics is None and options.format is None:
-        show(results, replays=options.replays, most=options.replay_most)
+        figures = options.figures.split(",") if options.figures else ()
+        show(results, replays=options.replays, most=options.replay_most, figures=figures)
         return 0
     wanted = options.metrics
     tables = results.measure(wanted.split(",")) if wanted else results.tables()

@@ -47,7 +47,11 @@ def add(commands: Any) -> None:
     )
     add_latency(parser)
     add_trust(parser)
-    parser.add_argument("--render", metavar="FILE", help="picture or film: .png, .gif or .mp4")
+    parser.add_argument(
+        "--render",
+        metavar="FILE",
+        help="picture of the end (.png, .svg, .pdf) or film (.gif, .mp4)",
+    )
     parser.add_argument("--live", action="store_true", help="show the episode in a window")
     parser.add_argument("--out", metavar="FILE", help="write the episode: .npz or .mcap")
 

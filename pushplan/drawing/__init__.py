@@ -7,13 +7,29 @@ from typing import TYPE_CHECKING
 from pushplan.world.lazy_names import lazy_names
 
 if TYPE_CHECKING:
+    from pushplan.drawing.figure import Panel, draw_figure, save_figure
     from pushplan.drawing.files import save_animation, save_image
+    from pushplan.drawing.legend import Entry, add_strips, legend_of
     from pushplan.drawing.scene import draw_world
-    from pushplan.drawing.sequence import draw_sequence
 
-__all__ = ["draw_sequence", "draw_world", "save_animation", "save_image"]
+__all__ = [
+    "Entry",
+    "Panel",
+    "add_strips",
+    "draw_figure",
+    "draw_world",
+    "legend_of",
+    "save_animation",
+    "save_figure",
+    "save_image",
+]
 
 __getattr__, __dir__ = lazy_names(
     __name__,
-    {"files": "save_animation save_image", "scene": "draw_world", "sequence": "draw_sequence"},
+    {
+        "figure": "Panel draw_figure save_figure",
+        "files": "save_animation save_image",
+        "legend": "Entry add_strips legend_of",
+        "scene": "draw_world",
+    },
 )

@@ -2,23 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 from PIL import Image, ImageDraw
 
+from pushplan.drawing.pen import Color, Pen
 from pushplan.world.checks import FloatArray
-from pushplan.world.polyline import arc_lengths
 
 SMOOTHING = 2
 """Everything is drawn this many times larger and then averaged."""
 THIN = 3
 """Edges up to this width [px, before smoothing] need no round joints."""
 
-Color = tuple[int, int, int]
 
-
-class Canvas:
+class Canvas(Pen):
     """A picture of a rectangle of the world, y upwards.
 
     Args:
@@ -73,14 +69,10 @@ class Canvas:
         if width:
             self.draw.line([*spots, spots[0], spots[1]], fill=edge, width=width, joint="curve")
 
-    def line(self, points: FloatArray, color: Color, width_px: float, dash_m: float = 0.0) -> None:
-        """An open line through (N, 2) points [m], dashed if ``dash_m`` is positive."""
-        if len(points) < 2:
-            return
-        pieces: Sequence[FloatArray] = [points] if dash_m <= 0.0 else _dashes(points, dash_m)
-        for piece in pieces:
-            spots = self.pixels(piece)
-            self.draw.line(spots, fill=color, width=self._width(width_px), joint="curve")
+    def stroke(self, points: FloatArray, color: Color, width_px: float) -> None:
+        """An open line through (N, 2) points [m]."""
+        spots = self.pixels(points)
+        self.draw.line(spots, fill=color, width=self._width(width_px), joint="curve")
 
     def disc(
         self, center: FloatArray, radius_m: float, fill: Color | None, edge: Color, width_px: float
@@ -90,19 +82,6 @@ class Canvas:
         box = (x - r, y - r, x + r, y + r)
         self.draw.ellipse(box, fill=fill, outline=edge, width=self._width(width_px))
 
-    def thick_segment(self, ends: FloatArray, radius_m: float, color: Color) -> None:
-        """A segment (4,) x1, y1, x2, y2 [m] with round ends."""
-        a, b = ends[:2], ends[2:]
-        along = b - a
-        length = float(np.hypot(along[0], along[1]))
-        if length > 0.0:
-            side = radius_m * np.array([-along[1], along[0]]) / length
-            self.draw.polygon(
-                self.pixels(np.array([a + side, b + side, b - side, a - side])), fill=color
-            )
-        for end in (a, b):
-            self.disc(end, radius_m, color, color, 0.0)
-
     def finish(self) -> Image.Image:
         """The smooth picture at its final size."""
         return self.image.reduce(SMOOTHING)
@@ -110,14 +89,3 @@ class Canvas:
     @staticmethod
     def _width(width_px: float) -> int:
         return max(1, round(width_px * SMOOTHING)) if width_px > 0.0 else 0
-
-
-def _dashes(points: FloatArray, dash_m: float) -> list[FloatArray]:
-    """Cut a line into dashes of this length with gaps as long."""
-    along = arc_lengths(points)
-    pieces = []
-    for start in np.arange(0.0, float(along[-1]), 2.0 * dash_m):
-        inner = along[(along > start) & (along < start + dash_m)]
-        at = np.concatenate([[start], inner, [min(start + dash_m, float(along[-1]))]])
-        pieces.append(np.column_stack([np.interp(at, along, points[:, axis]) for axis in range(2)]))
-    return pieces

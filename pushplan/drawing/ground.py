@@ -9,6 +9,7 @@ from PIL import Image
 
 from pushplan.drawing.canvas import Canvas
 from pushplan.drawing.palette import Palette
+from pushplan.drawing.pen import Pen
 from pushplan.world import ClearanceArea, Goal, GoalDisc, GoalLine, StaticMap
 from pushplan.world.checks import FloatArray
 
@@ -16,10 +17,10 @@ Bounds = tuple[float, float, float, float]
 
 
 @functools.lru_cache(maxsize=8)
-def draw_ground(
+def ground_picture(
     static: StaticMap, goal: Goal, palette: Palette, shown: Bounds, size_px: int
 ) -> Image.Image:
-    """Draw it; the picture is kept, so copy it before drawing on it.
+    """Draw it on a canvas; the picture is kept, so copy it before drawing on it.
 
     Args:
         static: walls.
@@ -29,7 +30,12 @@ def draw_ground(
         size_px: longer side of the picture [px].
     """
     canvas = Canvas(np.array(shown), size_px, palette.floor)
-    unit = size_px / 600.0
+    draw_ground(canvas, static, goal, palette, size_px / 600.0)
+    return canvas.image
+
+
+def draw_ground(canvas: Pen, static: StaticMap, goal: Goal, palette: Palette, unit: float) -> None:
+    """Draw it; ``unit`` is the width of a thin line [px]."""
     fill, edge = palette.goal
     if isinstance(goal, GoalDisc):
         canvas.disc(goal.center, goal.radius, fill, edge, 1.5 * unit)
@@ -45,11 +51,10 @@ def draw_ground(
         canvas.thick_segment(
             line, max(float(radius), 1.5 * unit / canvas.pixels_per_metre), palette.wall
         )
-    return canvas.image
 
 
 def _goal_line(
-    canvas: Canvas, static: StaticMap, goal: GoalLine, palette: Palette, unit: float
+    canvas: Pen, static: StaticMap, goal: GoalLine, palette: Palette, unit: float
 ) -> None:
     fill, edge = palette.goal
     reach = 2.0 * float(np.hypot(*(static.bounds[2:] - static.bounds[:2])))
@@ -60,7 +65,7 @@ def _goal_line(
     canvas.line(np.stack([a, b]), edge, 2.5 * unit)
 
 
-def _clearance_area(canvas: Canvas, goal: ClearanceArea, palette: Palette, unit: float) -> None:
+def _clearance_area(canvas: Pen, goal: ClearanceArea, palette: Palette, unit: float) -> None:
     """Open edges are thick and have arrows that point out; closed ones are thin and dashed."""
     fill, edge = palette.goal
     canvas.polygon(goal.polygon, fill, fill, 0.0)
@@ -81,7 +86,7 @@ def _clearance_area(canvas: Canvas, goal: ClearanceArea, palette: Palette, unit:
 
 
 def _arrow(
-    canvas: Canvas,
+    canvas: Pen,
     tip_line: FloatArray,
     half_width: FloatArray,
     height: FloatArray,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from pushplan.drawing.canvas import Color
+from pushplan.drawing.pen import Color
 from pushplan.world import GoalLine, World
 
 
@@ -21,11 +21,20 @@ class Palette:
     wheeled: tuple[Color, Color] = ((226, 192, 140), (150, 112, 62))  # objects on casters
     fixed: tuple[Color, Color] = ((126, 122, 120), (72, 70, 70))  # objects held not to move
     box_edge_px: float = 1.5  # width of their edges at 600 px
-    ghost: Color = (214, 160, 116)  # where objects were or will be
+    ghost: Color = (214, 160, 116)  # where objects were
+    prediction: Color = (204, 121, 167)  # where objects will be
     goal: tuple[Color, Color] = ((206, 236, 222), (0, 158, 115))  # where something has to go
     plan: Color = (213, 94, 0)  # the planned path
     trail: Color = (86, 180, 233)  # the path so far
     text: Color = (40, 40, 44)  # letters
+
+
+SERIES = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000", "#8C6D31")
+"""Colours of policies, and of whatever else is told apart, in their order."""
+MARKERS = ("o", "s", "^", "D", "v", "P", "X", "*")
+"""Markers of the same, as print without colour tells them apart."""
+DASHES = ("-", "--", "-.", ":", (0, (5, 1)), (0, (3, 1, 1, 1)), (0, (1, 1)), (0, (6, 2, 1, 2)))
+"""Styles of their lines, as Matplotlib takes them."""
 
 
 FLOOR_PALETTE = Palette()

@@ -4,21 +4,26 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from PIL import Image, ImageDraw, ImageFont
 
 from pushplan.drawing.canvas import Canvas
-from pushplan.drawing.ground import Bounds, draw_ground
+from pushplan.drawing.ground import Bounds, draw_ground, ground_picture
 from pushplan.drawing.palette import FLOOR_PALETTE, Palette, palette_of
+from pushplan.drawing.pen import Pen
 from pushplan.world import Movables, Plan, StaticMap, World
 from pushplan.world.checks import FloatArray, array, frozen, integer, number
 from pushplan.world.outline import transform
 
+Font = ImageFont.FreeTypeFont | ImageFont.ImageFont
 LONG, LONGEST = 2.5, 1.6
 """Of a world whose longer side is more than `LONG` times the shorter one, a picture shows
 `LONGEST` times the shorter side by default."""
+SHORT = 6.0
+"""Length of the dashes of a plan at least, at 600 px [px]."""
 RIM = 0.02
 """Fraction of the longer side that walls outside the bounds add to a picture on each side."""
 
@@ -42,7 +47,8 @@ def draw_world(
         size_px: longer side of the picture [px].
         view: length of the world's longer side that is shown [m]; the picture then follows the
             robot. By default all of it, unless the world is very long.
-        plan: drawn as a dashed line, with the outlines of where it expects to leave the objects.
+        plan: drawn as a dashed line, with the paths on which it expects objects to be pushed and
+            their outlines at the end.
         trail: (N, 2) or (N, 3) positions where the robot has been [m].
         object_trails: (N, K, 3) poses that the objects have had.
         text: lines for the top left corner.
@@ -56,27 +62,48 @@ def draw_world(
     size_px = integer("size_px", size_px, low=16, high=8192)
     shown = view_bounds(world, size_px, view)
     palette = palette_of(world)
-    ground = draw_ground(world.static, world.goal, palette, shown, size_px)
+    ground = ground_picture(world.static, world.goal, palette, shown, size_px)
     canvas = Canvas(np.array(shown), size_px, palette.floor, ground.copy())
     unit = size_px / 600.0
-    size_m = world.robot.circumscribed_radius
-    if object_trails is not None:
-        paths: FloatArray = array("object_trails", object_trails, (None, len(world.movables), 3))
-        for k in range(paths.shape[1]):
-            canvas.line(paths[:, k, :2], palette.ghost, 1.5 * unit)
-    if plan is not None and plan.object_poses is not None:
-        _ghosts(canvas, world, plan, palette, unit)
-    _objects(canvas, world.movables, palette, unit)
-    if trail is not None:
-        points = np.atleast_2d(np.asarray(trail, dtype=np.float64))
-        canvas.line(array("trail", points[:, :2], (None, 2)), palette.trail, 2.5 * unit)
-    if plan is not None:
-        canvas.line(plan.poses[:, :2], palette.plan, 2.0 * unit, dash_m=0.25 * size_m)
-    _robot(canvas, world, palette, unit)
+    draw_moving(canvas, world, unit, plan=plan, trail=trail, object_trails=object_trails)
     picture = canvas.finish()
     if text:
         _write([text] if isinstance(text, str) else [str(line) for line in text], picture, unit)
     return np.asarray(picture)
+
+
+def draw_scene(pen: Pen, world: World, unit: float, **paths: Any) -> None:
+    """Draw the ground and then all of `draw_moving` by any pen; ``unit`` is a thin line [px]."""
+    draw_ground(pen, world.static, world.goal, palette_of(world), unit)
+    draw_moving(pen, world, unit, **paths)
+
+
+def draw_moving(
+    pen: Pen,
+    world: World,
+    unit: float,
+    *,
+    plan: Plan | None = None,
+    trail: ArrayLike | None = None,
+    object_trails: ArrayLike | None = None,
+) -> None:
+    """Draw robot, objects, plan and paths of `draw_world` over the ground."""
+    palette = palette_of(world)
+    size_m = world.robot.circumscribed_radius
+    if object_trails is not None:
+        paths: FloatArray = array("object_trails", object_trails, (None, len(world.movables), 3))
+        for k in range(paths.shape[1]):
+            pen.line(paths[:, k, :2], palette.ghost, 1.5 * unit)
+    _objects(pen, world.movables, palette, unit)
+    if plan is not None:
+        _prediction(pen, world, plan, palette, unit)
+    if trail is not None:
+        points = np.atleast_2d(np.asarray(trail, dtype=np.float64))
+        pen.line(array("trail", points[:, :2], (None, 2)), palette.trail, 2.5 * unit)
+    if plan is not None:
+        dash = max(0.25 * size_m, SHORT * unit / pen.pixels_per_metre)
+        pen.line(plan.poses[:, :2], palette.plan, 2.0 * unit, dash_m=dash)
+    _robot(pen, world, palette, unit)
 
 
 def view_bounds(world: World, size_px: int, view: float | None) -> Bounds:
@@ -113,51 +140,59 @@ def _with_walls(static: StaticMap) -> FloatArray:
     return frozen(np.concatenate([low, high]))
 
 
-def _objects(canvas: Canvas, objects: Movables, palette: Palette, unit: float) -> None:
+def _objects(pen: Pen, objects: Movables, palette: Palette, unit: float) -> None:
     if len(objects) == 0:
         return
     corners = objects.vertices_world
-    reach, (middles, radii) = canvas.bounds, (objects.poses[:, :2], objects.radii[:, None])
+    reach, (middles, radii) = pen.bounds, (objects.poses[:, :2], objects.radii[:, None])
     seen = ((middles + radii > reach[:2]) & (middles - radii < reach[2:])).all(axis=1)
     for k in np.flatnonzero(seen).tolist():
         fill, edge = palette.wheeled if objects.wheeled[k] else palette.box
         if objects.fixed[k]:
             fill, edge = palette.fixed
         outline = corners[objects.offsets[k] : objects.offsets[k + 1]]
-        canvas.polygon(outline, fill, edge, palette.box_edge_px * unit)
+        pen.polygon(outline, fill, edge, palette.box_edge_px * unit)
 
 
-def _ghosts(canvas: Canvas, world: World, plan: Plan, palette: Palette, unit: float) -> None:
-    """Outlines of where the plan expects to leave the objects that it moves."""
-    assert plan.object_poses is not None
+def pushed(world: World, plan: Plan | None) -> list[int]:
+    """The objects that a plan expects to move."""
+    if plan is None or plan.object_poses is None:
+        return []
     if plan.object_poses.shape[1] != len(world.movables):
-        return
-    for k in range(len(world.movables)):
-        first, last = plan.object_poses[0, k], plan.object_poses[-1, k]
-        if np.hypot(*(last - first)[:2]) > 1e-3 * world.movables.radii[k]:
-            outline = transform(last, world.movables.outline(k))
-            canvas.polygon(outline, None, palette.ghost, 1.5 * unit)
+        return []
+    ways = np.hypot(*np.moveaxis(plan.object_poses[-1] - plan.object_poses[0], -1, 0)[:2])
+    return [int(k) for k in np.flatnonzero(ways > 1e-3 * world.movables.radii)]
 
 
-def _robot(canvas: Canvas, world: World, palette: Palette, unit: float) -> None:
+def _prediction(pen: Pen, world: World, plan: Plan, palette: Palette, unit: float) -> None:
+    """The path of each object that the plan expects to move, and its outline at the end."""
+    for k in pushed(world, plan):
+        assert plan.object_poses is not None
+        poses = plan.object_poses[:, k]
+        pen.line(poses[:, :2], palette.prediction, 1.5 * unit)
+        outline = transform(poses[-1], world.movables.outline(k))
+        pen.polygon(outline, None, palette.prediction, 2.0 * unit)
+
+
+def _robot(pen: Pen, world: World, palette: Palette, unit: float) -> None:
     """The bumper's parts as one shape, the chassis on it, and an arrow where it faces."""
     chassis, *bumper = world.robot_outline_world()
     for part in (chassis, *bumper):
-        canvas.polygon(part, None, palette.robot_edge, 2.5 * unit)
+        pen.polygon(part, None, palette.robot_edge, 2.5 * unit)
     for part in bumper:
-        canvas.polygon(part, palette.bumper, palette.bumper, 0.0)
+        pen.polygon(part, palette.bumper, palette.bumper, 0.0)
     if bumper:
-        canvas.polygon(chassis, palette.robot, palette.robot_edge, 1.0 * unit)
+        pen.polygon(chassis, palette.robot, palette.robot_edge, 1.0 * unit)
     else:
-        canvas.polygon(chassis, palette.robot, palette.robot, 0.0)
+        pen.polygon(chassis, palette.robot, palette.robot, 0.0)
     size = world.robot.inscribed_radius or 0.5 * world.robot.circumscribed_radius
     arrow = size * np.array([[0.75, 0.0], [-0.45, 0.5], [-0.2, 0.0], [-0.45, -0.5]])
-    canvas.polygon(transform(world.robot_pose, arrow), (255, 255, 255), palette.robot, 0.0)
+    pen.polygon(transform(world.robot_pose, arrow), (255, 255, 255), palette.robot, 0.0)
 
 
 def _write(lines: list[str], picture: Image.Image, unit: float) -> None:
     """Lines of text in the top left corner, on a panel that keeps them readable."""
-    font = _font(max(9, round(15 * unit)))
+    font = font_of(max(9, round(15 * unit)))
     draw = ImageDraw.Draw(picture, "RGBA")
     pad = round(8 * unit)
     text = "\n".join(lines)
@@ -171,5 +206,6 @@ def _write(lines: list[str], picture: Image.Image, unit: float) -> None:
 
 
 @functools.cache
-def _font(size: int) -> ImageFont.FreeTypeFont | ImageFont.ImageFont:
+def font_of(size: int) -> Font:
+    """Pillow's own font in a size [px]."""
     return ImageFont.load_default(size)

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import pushplan
+from pushplan.drawing.palette import FLOOR_PALETTE, SERIES
 from pushplan.evaluation.provenance import in_words
 from pushplan.evaluation.replays import chosen, packed, write_beside
 from pushplan.evaluation.rows import ResultRow
@@ -96,6 +97,7 @@ def page_data(run: RunRecord, replays: Mapping[str, int]) -> dict[str, Any]:
     return {
         "folder": str(run.path) if run.path is not None else "DIR",
         "policies": policies,
+        "colours": _colours(),
         "settings": list(titles.values()),
         "scenarios": listed,
         "statuses": list(statuses),
@@ -112,6 +114,22 @@ def page_data(run: RunRecord, replays: Mapping[str, int]) -> dict[str, Any]:
             "replay": [replays.get(row.job, 0) for row in run.rows],
             "values": {"outcome": [_outcome(row) for row in run.rows], **values},
         },
+    }
+
+
+def _colours() -> dict[str, Any]:
+    """The palette of figures and films, for replays and the names of policies."""
+    palette = FLOOR_PALETTE
+    shown = {
+        **{name: getattr(palette, name) for name in ("wall", "robot", "trail", "plan")},
+        **{name: getattr(palette, name) for name in ("ghost", "prediction", "robot_edge")},
+        "goal": palette.goal[1],
+        "object": palette.box[0],
+        "edge": palette.box[1],
+    }
+    return {
+        "policies": SERIES,
+        **{name: "#" + bytes(colour).hex() for name, colour in shown.items()},
     }
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import json
 import math
 from collections.abc import Callable, Sequence
@@ -11,9 +10,11 @@ from typing import Any
 
 import numpy as np
 from matplotlib import rc_context
-from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 
+from pushplan.drawing.figure import FORMATS, STYLE, save_figure
+from pushplan.evaluation.interval_plot import draw_intervals
+from pushplan.evaluation.plot_style import PANEL, abreast, dots, interval, line, tidy
 from pushplan.evaluation.rows import ResultRow
 from pushplan.evaluation.run_record import RunRecord
 from pushplan.evaluation.statistics import estimate
@@ -21,35 +22,43 @@ from pushplan.evaluation.statistics_aggregate import performance_profile
 from pushplan.evaluation.summary import grouped, values_of
 from pushplan.evaluation.tables import heading
 from pushplan.metrics import Role, metric_names
-from pushplan.world.files import write_atomic
+from pushplan.world.checks import choice
 
-# Okabe and Ito's colours, told apart by colour-blind readers too
-COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000", "#8C6D31")
-MARKERS = ("o", "s", "^", "D", "v", "P", "X", "*")
-PANEL = (4.6, 3.9)
-"""Width and height of one panel [inch]."""
-_DPI = 130
 _MANY = 300  # so many dots of a policy in a panel are drawn as an image
 _TRACES = 300  # of so many episodes every planning call is read from the trace
 
 
-def write_plots(run: RunRecord, folder: Path) -> dict[str, Path]:
+def write_plots(run: RunRecord, folder: Path, formats: Sequence[str] = ()) -> dict[str, Path]:
     """Draw everything that the rows allow, with where the rows come from in the files.
+
+    Args:
+        run: the rows.
+        folder: where the files go.
+        formats: endings without the dot, of `FORMATS`, to write beside SVG.
 
     Returns:
         Caption -> path of an SVG file.
+
+    Raises:
+        InvalidInputError: if there is no such format.
     """
+    endings = [choice("figures", f".{one}", FORMATS) for one in formats]
+    source = json.dumps({"runs": run.about.get("runs", []), "policies": run.about.get("policies")})
     plots: dict[str, Path] = {}
     for name, (caption, _) in FIGURES.items():
-        if (figure := draw(run, name)) is not None:
-            plots[caption] = folder / f"{name}.svg"
-            write_atomic(plots[caption], _svg(figure, caption, run))
+        if (figure := draw(run, name)) is None:
+            continue
+        plots[caption] = folder / f"{name}.svg"
+        for ending in dict.fromkeys((".svg", *endings)):
+            path = folder / f"{name}{ending}"
+            save_figure(path, figure, title=caption, source=source)
     return plots
 
 
 def draw(run: RunRecord, name: str) -> Figure | None:
     """One of `FIGURES`; None if the rows have nothing for it."""
-    figure: Figure | None = FIGURES[name][1](run)
+    with rc_context(STYLE):
+        figure: Figure | None = FIGURES[name][1](run)
     return figure
 
 
@@ -70,24 +79,23 @@ def _tradeoff(run: RunRecord) -> Figure | None:
             if not points:
                 continue
             xy = np.array(points, dtype=float)
-            style = {"color": COLOURS[i % 8], "marker": MARKERS[(i + i // 8) % 8]}
             many = len(xy) > _MANY
-            axes.scatter(*xy.T, s=16, alpha=0.35, linewidths=0, rasterized=many, **style)
+            axes.scatter(*xy.T, s=10, alpha=0.35, linewidths=0, rasterized=many, **dots(i))
             across, up = estimate(xy[:, 0]), estimate(xy[:, 1])
             axes.errorbar(
                 across.mean,
                 up.mean,
-                xerr=[[across.mean - across.low], [across.high - across.mean]],
-                yerr=[[up.mean - up.low], [up.high - up.mean]],
-                markersize=9,
+                xerr=interval(across.mean, across.low, across.high),
+                yerr=interval(up.mean, up.low, up.high),
+                markersize=6,
                 markeredgecolor="black",
                 ecolor="black",
-                elinewidth=1.2,
-                capsize=3,
+                elinewidth=1.0,
+                capsize=2,
                 linestyle="none",
                 label=label,
                 zorder=5,
-                **style,
+                **dots(i),
             )
         axes.set_xlabel(f"effort {names[0]} (1 = pushed nothing)")
         axes.set_ylabel(f"efficiency {names[1]} (1 = shortest path)")
@@ -106,19 +114,19 @@ def _spread(run: RunRecord) -> Figure | None:
     if not metrics:
         return None
     settings = list(run.titles)
-    figure = Figure(figsize=(PANEL[0] * len(settings), 2.6 * len(metrics) + 0.4))
+    figure = Figure(figsize=(PANEL[0] * len(settings), 1.7 * len(metrics) + 0.6))
     grid = figure.subplots(len(metrics), len(settings), squeeze=False)
     rng = np.random.default_rng(0)
     for column, setting in enumerate(settings):
         rows = run.rows_of(setting)
-        for line, name in enumerate(metrics):
-            axes = grid[line][column]
+        for row, name in enumerate(metrics):
+            axes = grid[row][column]
             _boxes(axes, run.policies, rows, name, rng)
-            if line == 0:
-                axes.set_title(run.titles[setting], fontsize=9)
+            if row == 0:
+                axes.set_title(run.titles[setting])
             if column == 0:
                 axes.set_ylabel(heading(name))
-            if line < len(metrics) - 1:
+            if row < len(metrics) - 1:
                 axes.tick_params(labelbottom=False)
     figure.tight_layout()
     return figure
@@ -131,7 +139,7 @@ def _boxes(
         values = np.array(values_of([r for r in rows if r.policy == label], name))
         if len(values) == 0:
             continue
-        colour = COLOURS[i % 8]
+        colour = dots(i)["color"]
         axes.boxplot(
             [values],
             positions=[i],
@@ -147,8 +155,8 @@ def _boxes(
         many = len(values) > _MANY
         axes.scatter(
             *(places, values),
-            s=9,
-            color=colour,
+            s=6,
+            **dots(i),
             alpha=0.55,
             linewidths=0,
             zorder=3,
@@ -158,12 +166,11 @@ def _boxes(
     axes.set_xticks(
         range(len(labels)),
         labels,
-        fontsize=8,
         rotation=25 if steep else 0,
         ha="right" if steep else "center",
     )
     axes.set_xlim(-0.6, len(labels) - 0.4)
-    _quiet(axes)
+    tidy(axes)
 
 
 def _profiles(run: RunRecord) -> Figure | None:
@@ -183,14 +190,14 @@ def _profiles(run: RunRecord) -> Figure | None:
             if not strata:
                 continue
             found = performance_profile(strata, thresholds)
-            axes.step(thresholds, found.fractions, where="post", color=COLOURS[i % 8], label=label)
-            band = {"step": "post", "color": COLOURS[i % 8], "alpha": 0.18, "linewidth": 0}
+            axes.step(thresholds, found.fractions, where="post", label=label, **line(i))
+            band = {"step": "post", "color": line(i)["color"], "alpha": 0.18, "linewidth": 0}
             axes.fill_between(thresholds, found.low, found.high, **band)
         axes.set_xlabel(f"{heading(name)} above")
         axes.set_ylim(0.0, 1.02)
-        _quiet(axes)
+        tidy(axes)
     figure.axes[0].set_ylabel("share of episodes")
-    figure.axes[0].legend(fontsize=8, frameon=False, loc="lower left")
+    figure.axes[0].legend(frameon=False, loc="lower left")
     figure.set_layout_engine("constrained")
     return figure
 
@@ -212,10 +219,10 @@ def _planning_time(run: RunRecord) -> Figure | None:
                 continue
             fractions = np.arange(1, len(times) + 1) / len(times)
             shown = np.unique(np.linspace(0, len(times) - 1, 500).round().astype(int))
-            colour, text = COLOURS[i % 8], f"{label} ({len(times)} calls)"
-            axes.step(1e3 * times[shown], fractions[shown], where="post", color=colour, label=text)
+            text = f"{label} ({len(times)} calls)"
+            axes.step(1e3 * times[shown], fractions[shown], where="post", label=text, **line(i))
             if (deadline := run.about.get("deadlines", {}).get(label)) is not None:
-                axes.axvline(1e3 * deadline, color=colour, linestyle=":", linewidth=1.2)
+                axes.axvline(1e3 * deadline, color=line(i)["color"], linestyle=":", linewidth=1.0)
         axes.set_xscale("log")
         axes.xaxis.set_major_formatter("{x:g}")
         axes.set_ylim(0.0, 1.02)
@@ -237,16 +244,20 @@ def _panels(
 ) -> Figure:
     """One panel a setting."""
     settings = list(run.titles)
-    columns = min(3, len(settings))
+    columns = min(2, len(settings))
     lines = math.ceil(len(settings) / columns)
-    figure = Figure(figsize=(max(5.6, PANEL[0] * columns), PANEL[1] * lines + 0.5))
+    figure = Figure(figsize=(PANEL[0] * columns, PANEL[1] * lines + 0.4))
     grid = figure.subplots(lines, columns, squeeze=False, sharex=True, sharey=True).ravel()
     for axes in grid[len(settings) :]:
         axes.set_visible(False)
-    for axes, setting in zip(grid, settings, strict=False):
+    for n, (axes, setting) in enumerate(zip(grid, settings, strict=False)):
         draw(axes, run.rows_of(setting))
-        axes.set_title(run.titles[setting], fontsize=9)
-        _quiet(axes)
+        axes.set_title(run.titles[setting])
+        tidy(axes)
+        lowest = n + columns >= len(settings)
+        axes.tick_params(labelbottom=lowest)
+        axes.set_xlabel(axes.get_xlabel() if lowest else "")
+        axes.set_ylabel("" if n % columns else axes.get_ylabel())
     if legend:
         found = dict[str, Any]()
         for axes in grid:
@@ -256,36 +267,15 @@ def _panels(
             found.values(),
             found.keys(),
             loc="outside lower center",
-            ncols=min(4, len(found)),
-            fontsize=8,
+            ncols=abreast(PANEL[0] * columns, found),
             frameon=False,
         )
         figure.set_layout_engine("constrained")
     return figure
 
 
-def _quiet(axes: Any) -> None:
-    axes.grid(alpha=0.25, linewidth=0.6)
-    axes.set_axisbelow(True)
-    for side in ("top", "right"):
-        axes.spines[side].set_visible(False)
-
-
-def _svg(figure: Figure, title: str, run: RunRecord) -> bytes:
-    buffer = io.BytesIO()
-    FigureCanvasSVG(figure)
-    source = json.dumps({"runs": run.about.get("runs", []), "policies": run.about.get("policies")})
-    with rc_context({"svg.fonttype": "none", "svg.hashsalt": title}):
-        figure.savefig(
-            buffer,
-            format="svg",
-            dpi=_DPI,
-            metadata={"Title": title, "Creator": "pushplan", "Description": source, "Date": None},
-        )
-    return buffer.getvalue()
-
-
 FIGURES = {
+    "intervals": ("Success and scores with 95 % intervals", draw_intervals),
     "tradeoff": ("Efficiency against effort", _tradeoff),
     "scores": ("Scores of every episode", _spread),
     "profiles": ("Share of episodes above each score, all settings alike", _profiles),

@@ -19,7 +19,6 @@ from pushplan.evaluation.summary import (
     PairedDifference,
     PolicySummary,
     paired_differences,
-    summarise,
 )
 from pushplan.evaluation.table_formats import differences_csv, markdown, summary_csv, text
 from pushplan.evaluation.tables import (
@@ -53,11 +52,7 @@ class Results(RunRecord):
 
     def summary(self) -> list[PolicySummary]:
         """What the rows say about each policy in each setting."""
-        return list(self._summaries)
-
-    @functools.cached_property
-    def _summaries(self) -> list[PolicySummary]:
-        return summarise(self.rows, self.policies)
+        return list(self.summaries)
 
     def compare(self) -> list[PairedDifference]:
         """Paired differences of all policies on the same scenarios."""
@@ -121,7 +116,8 @@ class Results(RunRecord):
         """One figure of the report, to show or to save.
 
         Args:
-            name: ``"tradeoff"``, ``"scores"``, ``"profiles"`` or ``"planning_time"``.
+            name: ``"intervals"``, ``"tradeoff"``, ``"scores"``, ``"profiles"`` or
+                ``"planning_time"``.
 
         Returns:
             A `matplotlib.figure.Figure`; None if the rows have nothing for it.
@@ -154,7 +150,12 @@ class Results(RunRecord):
         return len(self.rows)
 
     def report(
-        self, out: str | Path | None = None, *, replays: str = "embed", most: int = 40
+        self,
+        out: str | Path | None = None,
+        *,
+        replays: str = "embed",
+        most: int = 40,
+        figures: Sequence[str] = (),
     ) -> Path:
         """Write ``report.html``, its figures, the summaries and ``results.csv``, all of these rows.
 
@@ -162,6 +163,7 @@ class Results(RunRecord):
             out: folder; the run directory by default.
             replays: ``"embed"`` in the page, ``"beside"`` it as files, or ``"none"``.
             most: how many episodes have a replay: whole scenarios, those with failures first.
+            figures: formats to write the figures in beside SVG: ``"pdf"``, ``"png"``.
 
         Returns:
             The path of the page.
@@ -184,7 +186,7 @@ class Results(RunRecord):
         write_atomic(
             folder / "differences.csv", differences_csv(self.compare(), self.titles).encode()
         )
-        plots = need("pushplan.evaluation.plots").write_plots(self, folder)
+        plots = need("pushplan.evaluation.plots").write_plots(self, folder, figures)
         return write_page(self, tables, plots, folder, replays=replays, most=most)
 
     def _check_same_run(self, folder: Path) -> None:

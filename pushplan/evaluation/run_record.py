@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from pushplan.evaluation.rows import ResultRow
-from pushplan.evaluation.summary import natural, policies_of, settings_of
+from pushplan.evaluation.summary import PolicySummary, natural, policies_of, settings_of, summarise
 from pushplan.world import Episode
 
 
@@ -43,6 +44,11 @@ class RunRecord:
     def rows_of(self, setting: str) -> list[ResultRow]:
         """The rows of one setting."""
         return [row for row in self.rows if row.setting == setting]
+
+    @functools.cached_property
+    def summaries(self) -> list[PolicySummary]:
+        """What the rows say about each policy in each setting."""
+        return summarise(self.rows, self.policies)
 
     def episode(self, row: ResultRow) -> Episode | None:
         """The recorded episode of a row; None if none was kept.

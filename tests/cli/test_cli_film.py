@@ -13,7 +13,7 @@ from PIL import Image
 from pushplan.cli.film import Camera
 from pushplan.cli.scoreboard import Scoreboard, closing_lines
 from pushplan.metrics import manipulation_scores, navigation_scores
-from pushplan.world import ClearanceArea, Episode, Receptacle, World
+from pushplan.world import ClearanceArea, Episode, Plan, Receptacle, World
 
 AREA = ClearanceArea([[2, 6], [9, 6], [9, 12], [2, 12]], [True, True, False, True])
 
@@ -84,3 +84,31 @@ def test_films_follow_an_episode(name: str, tmp_path: Path) -> None:
     with Image.open(tmp_path / name) as film:
         assert getattr(film, "n_frames", 1) == (1 if name == "a.png" else 6)
     assert closing_lines(episode)[0] == "stopped"
+
+
+class Ahead(Nobody):
+    """Its plan is through a box, and says nothing of it."""
+
+    def __init__(self, start: World) -> None:
+        x, y, _ = start.robot_pose
+        poses = np.column_stack(
+            [np.full(20, x), np.linspace(y, y + 3.0, 20), np.full(20, np.pi / 2)]
+        )
+        zero = np.zeros(20)
+        self.current_plan = Plan(np.arange(20.0), poses, zero, zero, 3.0)
+
+
+@pytest.mark.slow
+def test_plans_that_predict_nothing_are_shown_with_a_prediction(tmp_path: Path) -> None:
+    x, y, _ = make_u_maze().robot_pose
+    for box, seen in (((x, y + 2.0, 0.0), True), ((4.0, 13.0, 0.0), False)):
+        episode = wander(make_u_maze([box]), steps=3)
+        camera = Camera(str(tmp_path / "a.gif"))
+        policy = Ahead(episode.world)
+        for step in range(3):
+            camera(step, episode.world, policy)  # type: ignore[arg-type]
+        camera.write(episode)
+        with Image.open(tmp_path / "a.gif") as film:
+            picture = np.asarray(film.convert("RGB")).astype(int)
+        purple = (np.abs(picture - [204, 121, 167]).max(axis=2) < 12).sum()
+        assert (purple > 50) == seen

@@ -146,11 +146,41 @@ def test_report_files(results: Results) -> None:
     plain = next(s for s in results.summary() if s.policy == "plain").metrics["E_nav"]
     assert (float(line["mean"]), float(line["low"])) == (plain.mean, plain.low)
     assert "| better |" in (folder / "summary.md").read_text()
-    for name in ("tradeoff.svg", "scores.svg", "profiles.svg", "planning_time.svg"):
+    for name in (
+        "intervals.svg",
+        "tradeoff.svg",
+        "scores.svg",
+        "profiles.svg",
+        "planning_time.svg",
+    ):
         assert "mine.py:Better" in (folder / name).read_text()  # where it comes from
     before = (folder / "differences.csv").read_bytes()
     results.report()
     assert (folder / "differences.csv").read_bytes() == before
+
+
+def test_intervals_are_drawn_as_the_tables_have_them(results: Results) -> None:
+    figure = results.figure("intervals")
+    assert figure.get_figwidth() == pytest.approx(3.4)  # a column
+    panels = {axes.get_xlabel(): axes for axes in figure.axes}
+    for name, axes in panels.items():
+        for summary, bar in zip(results.summary(), axes.containers, strict=True):
+            found = summary.success if name == "success" else summary.metrics[name]
+            (segment,) = bar.lines[2][0].get_segments()
+            assert segment[:, 0].tolist() == pytest.approx([found.low, found.high])
+    markers = {bar.lines[0].get_marker() for bar in panels["success"].containers}
+    assert len(markers) == len(results.policies)  # told apart in print without colour
+
+
+@pytest.mark.slow
+def test_figures_for_a_paper(results: Results, capsys: pytest.CaptureFixture[str]) -> None:
+    assert results.path is not None
+    for formats, code in (("pdf,png", 0), ("gif", 2)):
+        options = ["--replays", "none", "--figures", formats]
+        assert main(["report", str(results.path), *options]) == code
+    assert (results.path / "intervals.pdf").read_bytes().startswith(b"%PDF")
+    assert (results.path / "tradeoff.png").is_file()
+    assert "pdf" in capsys.readouterr().err
 
 
 def test_tables_for_documents(results: Results, capsys: pytest.CaptureFixture[str]) -> None:

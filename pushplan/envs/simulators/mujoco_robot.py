@@ -21,11 +21,11 @@ from pushplan.envs.simulators.mujoco_shapes import (
     color_of,
     set_mass,
 )
+from pushplan.envs.simulators.mujoco_shell import CONTACT_GROUP, TYRE, add_shell, add_tyre
 from pushplan.world import RobotModel
 from pushplan.world.outline import centroid
 
 GRAVITY = 9.81
-_TYRE = (0.16, 0.16, 0.17)
 _WHEEL_MASS = 0.03  # of one wheel, in units of the robot's mass
 _CASTER = 0.25  # radius of the caster's ball, in units of the wheel radius
 _CLEARANCE = 0.35  # height of the chassis above ground, in units of the wheel radius
@@ -62,20 +62,23 @@ def add_wheeled_robot(
     set_mass(body, hull, height, mass - 2.0 * wheel_mass, middle)
     low = _CLEARANCE * radius
     add_hull(spec, body, robot, materials, solids, low=low, ground=radius)
+    body.geoms[0].group = CONTACT_GROUP  # the shell is what one sees
+    add_shell(spec, body, robot, solids)
     ball = _CASTER * radius
     # a body of its own, so that a sensor can tell its contacts from those of the hull
     body.add_body(name="caster", pos=[caster, 0.0, ball - radius]).add_geom(
         name="caster",
         type=mujoco.mjtGeom.mjGEOM_SPHERE,
         size=[ball, 0.0, 0.0],
-        **Surface(WHEEL_BIT, FLOOR_BIT, 0.0, 3, _TYRE).options(),
+        **Surface(WHEEL_BIT, FLOOR_BIT, 0.0, 3, TYRE).options(),
     )
     torque = 0.5 * options.motor_force * mass * GRAVITY * radius
     rotor = options.rotor_inertia * mass * radius**2
     gain = (0.5 * mass * radius**2 + rotor) / options.motor_time
     for name, side in (("left wheel", 0.5), ("right wheel", -0.5)):
         y = side * robot.wheel_separation
-        _add_wheel(body, name, y, radius, wheel_mass, rotor, options.wheel_friction)
+        wheel = _add_wheel(body, name, y, radius, wheel_mass, rotor, options.wheel_friction)
+        add_tyre(wheel, robot, radius, 2.0 * side)
         motor = spec.add_actuator(
             name=name, target=name, trntype=mujoco.mjtTrn.mjTRN_JOINT, forcerange=[-torque, torque]
         )
@@ -85,7 +88,7 @@ def add_wheeled_robot(
 
 def _add_wheel(
     body: Any, name: str, y: float, radius: float, mass: float, rotor: float, friction: float
-) -> None:
+) -> Any:
     """One driven wheel at the end of the axle.
 
     Args:
@@ -107,19 +110,12 @@ def _add_wheel(
     wheel.add_joint(
         name=name, type=mujoco.mjtJoint.mjJNT_HINGE, axis=[0.0, 1.0, 0.0], armature=rotor
     )
-    tyre = Surface(WHEEL_BIT, FLOOR_BIT, friction, 3, _TYRE)
-    sphere = tyre.options()
-    sphere["rgba"] = [0.0, 0.0, 0.0, 0.0]  # only touches; the disc below is what one sees
-    wheel.add_geom(name=name, type=mujoco.mjtGeom.mjGEOM_SPHERE, size=[radius, 0.0, 0.0], **sphere)
+    options = Surface(WHEEL_BIT, FLOOR_BIT, friction, 3, TYRE).options()
+    size = [radius, 0.0, 0.0]
     wheel.add_geom(
-        type=mujoco.mjtGeom.mjGEOM_CYLINDER,
-        size=[radius, 0.5 * width, 0.0],
-        quat=[np.sqrt(0.5), np.sqrt(0.5), 0.0, 0.0],
-        rgba=[*_TYRE, 1.0],
-        contype=0,
-        conaffinity=0,
-        mass=0.0,
+        name=name, type=mujoco.mjtGeom.mjGEOM_SPHERE, size=size, group=CONTACT_GROUP, **options
     )
+    return wheel
 
 
 def add_hull(

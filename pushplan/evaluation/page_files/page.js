@@ -4,6 +4,7 @@ const $ = (id) => document.getElementById(id);
 const make = (tag, text = "", properties = {}) =>
   Object.assign(document.createElement(tag), { textContent: text }, properties);
 const data = JSON.parse($("data").textContent);
+const colourOf = (policy) => data.colours.policies[policy % data.colours.policies.length]; // as in the figures
 const ROW = 28; // height of a row of the matrix [px], as in the style sheet
 
 // ---- light and dark
@@ -65,6 +66,10 @@ const table = make("table");
 const head = make("tr");
 ["scenario", ...data.policies].forEach((name, column) => {
   const cell = make("th", "", { scope: "col" });
+  if (column > 0) {
+    cell.className = "policy";
+    cell.style.setProperty("--policy", colourOf(column - 1));
+  }
   cell.append(make("button", name, { type: "button", onclick: () => sortBy(column - 1) }));
   head.append(cell);
 });

@@ -61,7 +61,9 @@ async function setViews(policy) {
     if (!replay) continue;
     const box = make("figure");
     const canvas = make("canvas");
-    box.append(make("figcaption", data.policies[shown[i]]), canvas);
+    const caption = make("figcaption", data.policies[shown[i]], { className: "policy" });
+    caption.style.setProperty("--policy", colourOf(shown[i]));
+    box.append(caption, canvas);
     views.push({ canvas, box, replay: await unpacked(replay), policy: shown[i] });
   }
   player.views = views;
@@ -106,7 +108,7 @@ $("play").onclick = togglePlay;
 $("time").oninput = () => seek(Number($("time").value) / 1000 * player.end);
 addEventListener("resize", () => seek(player.time));
 
-const COLOURS = { wall: "#555", goal: "#009e73", robot: "#0072b2", object: "#e69f00", ghost: "#e69f0055", trail: "#0072b2", plan: "#d55e00" };
+const COLOURS = data.colours;
 function drawView({ canvas, box, replay }) {
   const [x0, y0, x1, y1] = replay.bounds;
   const width = box.clientWidth || 400;
@@ -150,7 +152,7 @@ function drawView({ canvas, box, replay }) {
     pen.restore();
   };
   replay.objects.forEach((points, i) => placed([points], pose(i + 1, 0), null, COLOURS.ghost));
-  replay.objects.forEach((points, i) => placed([points], pose(i + 1, k), `${COLOURS.object}aa`, "#8a5f00"));
+  replay.objects.forEach((points, i) => placed([points], pose(i + 1, k), `${COLOURS.object}cc`, COLOURS.edge));
   pen.beginPath();
   for (let frame = 0; frame <= k; frame++) pen.lineTo(...pose(0, frame).slice(0, 2));
   pen.strokeStyle = COLOURS.trail; pen.stroke();
@@ -160,11 +162,11 @@ function drawView({ canvas, box, replay }) {
     pen.beginPath();
     for (let i = 0; i < plan.path.length; i += 2) pen.lineTo(plan.path[i], plan.path[i + 1]);
     pen.strokeStyle = COLOURS.plan; pen.stroke();
-    plan.moved.forEach((body, i) => placed([replay.objects[body]], plan.ends.slice(3 * i, 3 * i + 3), null, COLOURS.plan));
+    plan.moved.forEach((body, i) => placed([replay.objects[body]], plan.ends.slice(3 * i, 3 * i + 3), null, COLOURS.prediction));
     pen.setLineDash([]);
   }
   const [x, y, angle] = pose(0, k);
-  placed(replay.robot, [x, y, angle], `${COLOURS.robot}cc`, "#003a5d");
+  placed(replay.robot, [x, y, angle], `${COLOURS.robot}cc`, COLOURS.robot_edge);
   const size = Math.max(...replay.robot.flat().map(Math.abs));
   pen.beginPath(); pen.moveTo(x, y); pen.lineTo(x + size * Math.cos(angle), y + size * Math.sin(angle));
   pen.strokeStyle = "#fff"; pen.stroke();

@@ -6,11 +6,13 @@ import numpy as np
 
 from pushplan.control import Legs
 from pushplan.geometry.angles import wrap_angle
+from pushplan.planners.rearrangement.goal_kernels import REMOVED
 from pushplan.planners.rearrangement.push import Push
 from pushplan.world import Plan, SubTask, World
 from pushplan.world.checks import FloatArray
 from pushplan.world.polyline import arc_lengths, goes_back, step_lengths
 
+_INSIDE = 0.7  # inscribed over circumscribed radius of a box
 _STILL = 1e-6  # a step that is shorter turns on the spot [circumscribed radii]
 
 
@@ -18,7 +20,8 @@ def push_plan(world: World, route: Legs | None, push: Push) -> Plan:
     """The way to a push and the push itself, at full speed and turn rate.
 
     A push is predicted at its end only: in between, ``object_poses`` follow the straight line from
-    where the objects are, as far as the robot has pushed.
+    where the objects are, as far as the robot has pushed. An object that leaves the world ends in
+    front of the robot.
 
     Args:
         world: the snapshot from which the robot starts, with the objects that the push knows.
@@ -39,7 +42,12 @@ def push_plan(world: World, route: Legs | None, push: Push) -> Plan:
     turn_rates[:-1][moving] = turns[moving] / steps[moving]
     done = np.maximum(along - along[first], 0.0) / max(float(along[-1] - along[first]), 1e-12)
     start = world.movables.poses
-    moves = push.object_poses - start
+    ends = np.array(push.object_poses)
+    gone = ends[:, 0] >= 0.5 * REMOVED
+    ahead = np.max(robot.vertices[:, 0]) + _INSIDE * world.movables.radii[gone]
+    x, y, theta = poses[-1]
+    ends[gone, 0], ends[gone, 1] = x + ahead * np.cos(theta), y + ahead * np.sin(theta)
+    moves = ends - start
     moves[:, 2] = wrap_angle(moves[:, 2])
     return Plan(
         times=np.concatenate([[0.0], np.cumsum(steps)]),

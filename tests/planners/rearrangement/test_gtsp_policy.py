@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 from conftest import make_boxes, make_robot, make_u_maze
 
-from pushplan.drawing import draw_sequence
 from pushplan.envs import PushEnv
 from pushplan.planners import make_policy, policy_names
 from pushplan.planners.rearrangement import GtspMpc, RearrangementConfig
@@ -198,14 +197,3 @@ def test_settings_of_the_policies_are_checked():
         make_policy("gtsp-mpc", prize=1.0)
     policy = make_policy("gtsp-mpc", mpc=False, friction=0.4)
     assert policy.config == RearrangementConfig(mpc=False, friction=0.4)
-
-
-def test_a_sequence_is_drawn():
-    world = room([(0.0, 0.0, 0.0)])
-    policy = GtspMpc()
-    policy.act(world)
-    plain = draw_sequence(world, [], size_px=200)
-    drawn = draw_sequence(world, [push.poses for push in policy.plan], size_px=200)
-    assert plain.shape == drawn.shape and (plain != drawn).any()
-    with pytest.raises(InvalidInputError):
-        draw_sequence(world, [np.zeros((3, 1))])

@@ -4,9 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from conftest import make_u_maze
 
 from pushplan.envs import make
 from pushplan.planners import make_policy
+from pushplan.planners.rearrangement.goal_kernels import REMOVED
+from pushplan.planners.rearrangement.push import Push
+from pushplan.planners.rearrangement.push_plan import push_plan
 from pushplan.scenarios import suite
 from pushplan.world import ShowsPlan
 
@@ -43,3 +47,18 @@ def test_gtsp_mpc_shows_the_push_in_hand() -> None:
             )
             assert stage.direction == 0 or (stage.direction * ahead.sum(axis=1) > -1e-3).all()
     assert any(stage.direction == 0 for _, plan in seen for stage in plan.stages)
+
+
+def test_an_object_that_leaves_ends_in_front_of_the_robot() -> None:
+    world = make_u_maze([[4.0, 9.0, 0.3], [10.0, 13.0, 0.0]])
+    ends = np.array(world.movables.poses)
+    ends[0, 0] = REMOVED
+    path = np.column_stack([np.linspace(3.0, 8.0, 11), np.full(11, 9.0), np.zeros(11)])
+    box = int(world.movables.ids[0])
+    push = Push((box,), box, "line", path, length=5.0, work=1.0, cost=5.0, object_poses=ends)
+    plan = push_plan(world, None, push)
+    assert plan.object_poses is not None
+    x, y, _ = plan.object_poses[-1, 0]
+    front, size = world.robot.vertices[:, 0].max(), world.movables.radii[0]
+    assert y == 9.0 and 0.5 * size < x - (8.0 + front) < size
+    assert np.allclose(plan.object_poses[-1, 1], world.movables.poses[1])
