@@ -130,12 +130,15 @@ def _objects(canvas: Canvas, objects: Movables, palette: Palette, unit: float) -
 def _ghosts(canvas: Canvas, world: World, plan: Plan, palette: Palette, unit: float) -> None:
     """Outlines of where the plan expects to leave the objects that it moves."""
     assert plan.object_poses is not None
-    if plan.object_poses.shape[1] != len(world.movables):
+    objects, count = world.movables, plan.object_poses.shape[1]
+    if count != len(objects):  # planners count fixed objects as static
+        objects = world.with_fixed_as_static().movables
+    if count != len(objects):
         return
-    for k in range(len(world.movables)):
+    for k in range(count):
         first, last = plan.object_poses[0, k], plan.object_poses[-1, k]
-        if np.hypot(*(last - first)[:2]) > 1e-3 * world.movables.radii[k]:
-            outline = transform(last, world.movables.outline(k))
+        if np.hypot(*(last - first)[:2]) > 1e-3 * objects.radii[k]:
+            outline = transform(last, objects.outline(k))
             canvas.polygon(outline, None, palette.ghost, 1.5 * unit)
 
 
