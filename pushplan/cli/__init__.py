@@ -16,6 +16,7 @@ from pushplan.cli import (
     compare,
     compiling,
     demo,
+    describe,
     doctor,
     experiment,
     gtsp,
@@ -51,6 +52,7 @@ COMMANDS = (
     ice,
     gtsp,
     train,
+    describe,
     compiling,
     codegen,
 )

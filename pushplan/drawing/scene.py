@@ -154,24 +154,25 @@ def _objects(pen: Pen, objects: Movables, palette: Palette, unit: float) -> None
         pen.polygon(outline, fill, edge, palette.box_edge_px * unit)
 
 
-def pushed(world: World, plan: Plan | None) -> list[int]:
-    """The objects that a plan expects to move."""
+def pushed(world: World, plan: Plan | None) -> list[tuple[FloatArray, FloatArray]]:
+    """The objects that a plan expects to move: (N, 3) poses and (V, 2) outline of each."""
     if plan is None or plan.object_poses is None:
         return []
-    if plan.object_poses.shape[1] != len(world.movables):
+    objects, poses = world.movables, plan.object_poses
+    if poses.shape[1] != len(objects):  # planners count fixed objects as static
+        objects = world.with_fixed_as_static().movables
+    if poses.shape[1] != len(objects):
         return []
-    ways = np.hypot(*np.moveaxis(plan.object_poses[-1] - plan.object_poses[0], -1, 0)[:2])
-    return [int(k) for k in np.flatnonzero(ways > 1e-3 * world.movables.radii)]
+    ways = np.hypot(*np.moveaxis(poses[-1] - poses[0], -1, 0)[:2])
+    moved = np.flatnonzero(ways > 1e-3 * objects.radii)
+    return [(poses[:, k], objects.outline(int(k))) for k in moved]
 
 
 def _prediction(pen: Pen, world: World, plan: Plan, palette: Palette, unit: float) -> None:
     """The path of each object that the plan expects to move, and its outline at the end."""
-    for k in pushed(world, plan):
-        assert plan.object_poses is not None
-        poses = plan.object_poses[:, k]
+    for poses, outline in pushed(world, plan):
         pen.line(poses[:, :2], palette.prediction, 1.5 * unit)
-        outline = transform(poses[-1], world.movables.outline(k))
-        pen.polygon(outline, None, palette.prediction, 2.0 * unit)
+        pen.polygon(transform(poses[-1], outline), None, palette.prediction, 2.0 * unit)
 
 
 def _robot(pen: Pen, world: World, palette: Palette, unit: float) -> None:

@@ -119,7 +119,7 @@ class PushEnv(gymnasium.Env[NDArray[Any], NDArray[Any]]):
     def _use_action(self, name: str) -> None:
         mode: type[ActionMode] = look_up("action", ACTIONS, name)
         self.task: Task = self._make_task(action=name)
-        self._mode = mode(self.task)
+        self._mode, self._mode_name = mode(self.task), name
         self.action_space: Any = self._mode.space
 
     def take_velocities(self) -> bool:
@@ -137,6 +137,16 @@ class PushEnv(gymnasium.Env[NDArray[Any], NDArray[Any]]):
                 self._over = "the action mode has changed"
                 return True
         return False
+
+    @property
+    def action_mode(self) -> str:
+        """The name of the action mode, such as ``"turn_rate"``."""
+        return self._mode_name
+
+    @property
+    def observation_builder(self) -> ObservationBuilder:
+        """What makes the observations."""
+        return self._builder
 
     def warm_up(self) -> None:
         """Load the kernels of the simulator; ends the episode."""

@@ -1,7 +1,7 @@
 """Run trained networks as policies. ONNX Runtime is enough; no learning library is imported.
 
 `load_policy("onnx:FILE")` gives a `pushplan.world.Policy`. What a file has to say about itself is a
-`Specification`.
+`Specification`; `describe` makes it from an environment.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 from pushplan.world.lazy_names import lazy_names
 
 if TYPE_CHECKING:
+    from pushplan.learned.describing import describe
     from pushplan.learned.features import FeatureObservation
     from pushplan.learned.loading import LEARNED_PREFIXES, learned_names, load_policy
     from pushplan.learned.network_policy import NetworkPolicy
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
     from pushplan.learned.onnx_policy import OnnxPolicy
     from pushplan.learned.outputs import ActionSpec
     from pushplan.learned.sb3_policy import Sb3Policy
+    from pushplan.learned.sb3_saving import save_sb3
     from pushplan.learned.specification import RobotSpec, Specification
 
 __all__ = [
@@ -30,13 +32,16 @@ __all__ = [
     "RobotSpec",
     "Sb3Policy",
     "Specification",
+    "describe",
     "learned_names",
     "load_policy",
+    "save_sb3",
 ]
 
 __getattr__, __dir__ = lazy_names(
     __name__,
     {
+        "describing": "describe",
         "features": "FeatureObservation",
         "loading": "LEARNED_PREFIXES learned_names load_policy",
         "network_policy": "NetworkPolicy",
@@ -44,6 +49,7 @@ __getattr__, __dir__ = lazy_names(
         "onnx_policy": "OnnxPolicy",
         "outputs": "ActionSpec",
         "sb3_policy": "Sb3Policy",
+        "sb3_saving": "save_sb3",
         "specification": "RobotSpec Specification",
     },
 )

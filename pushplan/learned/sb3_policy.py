@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import logging
 import os
 import zipfile
@@ -80,7 +79,6 @@ def _look(path: Path) -> tuple[Specification, str]:
     """Specification and algorithm, read as text only."""
     if not path.is_file():
         raise InvalidInputError(f"there is no file {path}")
-    beside = path.with_suffix(f".{MEMBER}")
     try:
         with zipfile.ZipFile(path) as archive:
             names = archive.namelist()
@@ -91,12 +89,12 @@ def _look(path: Path) -> tuple[Specification, str]:
                 text = archive.read(MEMBER).decode()
     except _UNREADABLE as error:
         raise InvalidInputError(f"{path} is no readable zip: {error}") from error
-    if text is None and beside.is_file():
-        text = read_text(beside, "specification")
+    if text is None and beside(path).is_file():
+        text = read_text(beside(path), "specification")
     if text is None:
         raise InvalidInputError(
             f"{path} does not say what it observes and how it acts: put a specification beside it "
-            f"as {beside.name}, see docs/learned.md"
+            f"as {beside(path).name}; pushplan.learned.save_sb3 and 'pushplan describe' write one"
         )
     specification = Specification.from_json(text)
     algorithm = str(specification.training.get("algorithm", "")).upper()
@@ -117,7 +115,6 @@ def _load(path: Path, algorithm: str) -> Any:
         raise InvalidInputError(f"{path} cannot be loaded: {reason}") from error
 
 
-def attach(path: str | Path, specification: Specification) -> None:
-    """Put a specification into a Stable-Baselines3 zip, which stays loadable as before."""
-    with zipfile.ZipFile(path, "a") as archive:
-        archive.writestr(MEMBER, json.dumps(json.loads(specification.to_json()), indent=1))
+def beside(path: Path) -> Path:
+    """Where the specification of a zip lies that has none inside."""
+    return path.with_suffix(f".{MEMBER}")

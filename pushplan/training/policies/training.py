@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from pushplan.learned.sb3_policy import attach
+from pushplan.learned.sb3_saving import attach
 from pushplan.training.libraries import chosen_device, hardware, parameter_count
 from pushplan.training.policies.config import TrainingConfig
 from pushplan.training.policies.environment import TrainingEnv
