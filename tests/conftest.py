@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import gc
 import os
 import shutil
 import tempfile
@@ -107,6 +108,12 @@ def pytest_configure(config: pytest.Config) -> None:
         first = [str(Path(pushplan.__file__).parents[1]), os.environ.get("PYTHONPATH", "")]
         os.environ["PYTHONPATH"] = os.pathsep.join(filter(None, first))
     config.stash[TURNSTILE] = Turnstile(Path(os.environ["PUSHPLAN_TEST_LOCKS"]))
+
+
+def pytest_collection_finish() -> None:
+    """Collect garbage more rarely: what is imported and compiled stays, and is gone through."""
+    gc.freeze()
+    gc.set_threshold(50_000, 20, 20)
 
 
 def pytest_unconfigure(config: pytest.Config) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from importlib import import_module
@@ -44,6 +45,18 @@ def compiling_kernels(names: Iterable[str]) -> frozenset[str]:
     return frozenset(name for name, kernel in _kernels(names) if kernel.cache.is_locked())
 
 
+@contextmanager
+def _garbage_left() -> Iterator[None]:
+    """Collect no garbage meanwhile: Numba makes much that is still in use."""
+    collected = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if collected:
+            gc.enable()
+
+
 def _kernels(names: Iterable[str]) -> Iterator[tuple[str, KernelDispatcher]]:
     for name in names:
         module, _, function = name.rpartition(".")
@@ -71,7 +84,8 @@ class _CachedDispatcher(CPUDispatcher):
             return super().compile(sig)
         hits = sum(self._cache_hits.values())
         try:
-            entry = super().compile(sig)
+            with _garbage_left():
+                entry = super().compile(sig)
         finally:
             self._cache.release()
         if self.form == KernelDispatcher.form:

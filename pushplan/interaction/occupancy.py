@@ -16,6 +16,7 @@ from typing import Annotated, Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import ArrayLike
 
+from pushplan.compiled import owned
 from pushplan.interaction.occupancy_kernels import Patch, cover_objects, cover_sweep
 from pushplan.world import World
 from pushplan.world.checked_fields import CheckedFields, PositiveFloat, Shape
@@ -169,11 +170,11 @@ def make_batch(passages: Sequence[Passage], *, ahead: float = 0.5 * math.pi) -> 
     for i, passage in enumerate(passages):
         frames[i] = patch_frame(passage.path, ahead, cell)
         movables, robot = passage.world.movables, passage.world.robot
-        shapes = (movables.vertices, movables.offsets)
-        cover_objects(movables.poses, *shapes, frames[i], cell, patches[i, 0])
-        hull = (robot.vertices, robot.offsets)
-        cover_sweep(passage.path[:1], *hull, frames[i], cell, patches[i, 1])
-        cover_sweep(passage.path, *hull, frames[i], cell, patches[i, 2])
+        shapes = (owned(movables.vertices), owned(movables.offsets))
+        cover_objects(owned(movables.poses), *shapes, frames[i], cell, patches[i, 0])
+        hull, path = (owned(robot.vertices), owned(robot.offsets)), owned(passage.path)
+        cover_sweep(path[:1], *hull, frames[i], cell, patches[i, 1])
+        cover_sweep(path, *hull, frames[i], cell, patches[i, 2])
     return PassageBatch(patches, cell, ice_density(first), frames, tuple(passages))
 
 
@@ -184,5 +185,6 @@ def patch_after(batch: PassageBatch, index: int, poses: ArrayLike) -> Patch:
     movables = batch.passages[index].world.movables
     at: FloatArray = array("poses", poses, (len(movables), 3))
     out = np.empty((PATCH_CELLS, PATCH_CELLS), np.float32)
-    cover_objects(at, movables.vertices, movables.offsets, batch.frames[index], batch.cell, out)
+    shapes = (owned(movables.vertices), owned(movables.offsets))
+    cover_objects(owned(at), *shapes, owned(batch.frames[index]), batch.cell, out)
     return out

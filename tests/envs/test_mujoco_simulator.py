@@ -25,6 +25,7 @@ from mujoco_scenes import (
     turtlebot,
 )
 
+from pushplan.compiled import owned
 from pushplan.envs import PushEnv
 from pushplan.envs.registry import SIMULATORS
 from pushplan.envs.simulators.mujoco_kernels import drag_damping, planar_rows, rest_cycles
@@ -363,9 +364,8 @@ def test_objects_that_may_touch_sleep_together():
     movables = Movables.from_outlines([SQUARE] * 5, at)
     quiet = np.array([True, True, True, True, False])
     asleep = np.full(6, -11, dtype=np.int32)
-    rest_cycles(
-        movables.poses, movables.vertices, movables.offsets, movables.radii, quiet, 0.0005, asleep
-    )
+    shapes = (movables.vertices, movables.offsets, movables.radii)
+    rest_cycles(owned(movables.poses), *shapes, quiet, 0.0005, asleep)
     assert asleep.tolist() == [-11, 2, 1, 3, -11, -11]
 
 

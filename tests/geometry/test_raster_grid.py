@@ -31,11 +31,11 @@ def test_fill_sets_the_pixels_whose_centre_is_inside(seed: int, clockwise: bool)
 
 
 def test_fill_is_clipped_and_ignores_what_is_outside_or_broken() -> None:
-    image = np.zeros((4, 4), dtype=np.bool_)
+    image = np.zeros((4, 4), dtype=np.uint8)
     for shift in ([9.0, 0.0], [-9.0, 0.0], [0.0, 9.0], [0.0, -9.0], [np.nan, np.nan], [1e300, 0.0]):
-        fill_convex(image, np.array([[0.0, 0.0], [4.0, 0.0], [4.0, 4.0]]) + shift, True)
+        fill_convex(image, np.array([[0.0, 0.0], [4.0, 0.0], [4.0, 4.0]]) + shift, 1)
     assert not image.any()
-    fill_convex(image, np.array([[-1e9, -1e9], [1e9, -1e9], [1e9, 1e9], [-1e9, 1e9]]), True)
+    fill_convex(image, np.array([[-1e9, -1e9], [1e9, -1e9], [1e9, 1e9], [-1e9, 1e9]]), 1)
     assert image.all()
 
 

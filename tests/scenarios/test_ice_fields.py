@@ -215,7 +215,10 @@ def test_cells_and_floes_agree_with_shapely():
         pairs = np.concatenate([np.delete(np.arange(count), k) for k in range(count)])
         offsets = np.arange(count + 1) * (count - 1)
         discs = Discs(centres, weights, np.full(count, reach), pairs, offsets)
-        water = IceWater(np.array([0.0, 0.0, 6.0, 6.0]), block, np.array([0, 4]), gap)
+        parts = (np.array([0.0, 0.0, 6.0, 6.0]), block, np.array([0, 4]))
+        for part in parts:
+            part.setflags(write=False)  # as in the generator: another kernel otherwise
+        water = IceWater(*parts, gap)
         cells, sizes = cut_cells(discs, water)
         shapes = Outlines(np.repeat(octagon[None], count, axis=0), np.full(count, 8))
         floes, corners = fit_floes(

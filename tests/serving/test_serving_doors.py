@@ -239,6 +239,7 @@ def test_mutated_messages_harm_nobody_else(count, tmp_path):
                         began = time.monotonic()
                         client.act(time=0.1 * step, robot_pose=POSE)
                         worst[0] = max(worst[0], time.monotonic() - began)
+                        over.wait(0.005)  # else it takes a core of its own
 
         other = threading.Thread(target=drive)
         other.start()

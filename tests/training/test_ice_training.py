@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from pushplan.compiled import owned
 from pushplan.interaction.network import IceNetwork
 from pushplan.training import ice_data, ice_evaluation
 from pushplan.training.ice_data import IcePairs, read_shards, write_shard, write_shards
@@ -42,8 +43,8 @@ class TestPassages:
 
             hull = np.empty((40, 40), np.float32)
             robot = passage.world.robot
-            shape = (robot.vertices, robot.offsets)
-            cover_sweep(passage.path[-1:].copy(), *shape, frame, made.cell, hull)
+            shape = (owned(robot.vertices), owned(robot.offsets))
+            cover_sweep(owned(passage.path[-1:]), *shape, owned(frame), made.cell, hull)
             assert (after * (hull > 0.99)).sum() < 0.05 * hull.sum()
 
     def test_voyages_can_be_driven(self):

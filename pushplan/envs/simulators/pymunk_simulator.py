@@ -173,7 +173,7 @@ class PymunkSimulator(Simulator):
         return struck(
             loaded,
             paths,
-            self._rows[1:, :3],
+            np.ascontiguousarray(self._rows[1:, :3]),
             movables.vertices,
             movables.offsets,
             movables.radii,

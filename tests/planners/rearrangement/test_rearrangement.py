@@ -10,6 +10,7 @@ import pytest
 import shapely
 from conftest import SQUARE, make_boxes
 
+from pushplan.compiled import owned
 from pushplan.control import PoseFollower
 from pushplan.gtsp import solve_gtsp
 from pushplan.motion.recovery_path import recovery_path
@@ -361,7 +362,7 @@ def test_the_search_is_that_of_dijkstra():
     here, _ = example("clearing")
     contact_grid = here.coarse
     grid, (depths, touch) = contact_grid.grid, contact_grid.contacts()
-    starts, costs = near_poses(grid, here.world.robot_pose, 1.5)
+    starts, costs = near_poses(grid, owned(here.world.robot_pose), 1.5)
     none = np.zeros(0, dtype=np.int64)
     problem = PoseSearchProblem(starts, costs, grid, depths, touch, 0.02, 0.5, none)
     best, before = search_poses(problem)

@@ -223,8 +223,8 @@ def test_the_frame_does_not_matter():
 @pytest.mark.parametrize("name", ["ship-predictive", "ship-predictive-published"])
 def test_the_margin_of_a_world_is_kept_from_the_sides_of_the_channel(name):
     """The ice leaves a gap at a side, 6 m from the middle; half a beam is 0.25 m."""
-    ice_row = [(2.0 * SQUARE, [x, 6.0, 0.0]) for x in (-5.0, -2.8, -0.6, 1.6, 3.6)]
-    world = channel(ice_row, pose=[4.5, 1.0, np.pi / 2])
+    ice_row = [(2.0 * SQUARE, [x, 4.0, 0.0]) for x in (-5.0, -2.8, -0.6, 1.6, 3.6)]
+    world = channel(ice_row, pose=[4.25, 1.0, np.pi / 2])
     sides = [
         float(make_planner(name).plan(replace(world, margin=margin)).plan.poses[:, 0].max())
         for margin in (0.0, 1.0)
