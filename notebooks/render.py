@@ -49,8 +49,8 @@ DPI = 110
 HEAD = """\
 # Notebooks
 
-Seven of them, in [`notebooks/`](../notebooks): `pip install "pushplan[notebooks]"` brings what they need, and
-`jupyter lab` opens them. They are kept without outputs
+Seven of them, in [`notebooks/`](../notebooks): `pip install "pushplan[notebooks]"` brings what
+they need, and `jupyter lab` opens them. They are kept without outputs
 and run as tests, each in less than a minute. This page is what they say and show, made by
 `python notebooks/render.py` on a 2-core machine that was busy with other work, which makes every
 time on it longer.
