@@ -18,8 +18,8 @@ from pushplan.runtime import CommandStatus, Runner
 from pushplan.world import Deadline, OwnBudget, Twist
 
 PERIOD = 0.05  # of commands [s]; perception comes with every second one
-DEADLINE = 1.0  # of a planning call [s]; it runs in another thread, commands go on
-NOISE = [0.002, 0.002, 0.004]  # standard deviations of what is seen [m, m, rad]
+DEADLINE = 2.0  # of a planning call [s]; it runs in another thread, commands go on
+NOISE = [0.001, 0.001, 0.002]  # standard deviations of what is seen [m, m, rad]
 PATIENCE = 3  # failures after which a person is called
 
 

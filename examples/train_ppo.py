@@ -1,6 +1,6 @@
 """Train a network with Stable-Baselines3 on an environment of pushplan, and compare it.
 
-``python examples/train_ppo.py`` trains for a minute or two, which is too short to be good;
+``python examples/train_ppo.py`` trains for two minutes of processor time, too short to be good;
 ``python examples/train_ppo.py runs/ppo 200000`` takes what `maze-ppo` took. It needs
 ``pip install "pushplan[learn]"``. Afterwards the file is a policy like any other:
 

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import subprocess
+from dataclasses import replace
 from pathlib import Path
 
 import imageio_ffmpeg
@@ -85,6 +86,25 @@ def test_plan_and_trail_change_the_picture_only_near_them() -> None:
     np.testing.assert_array_equal(
         draw_world(world, size_px=SIZE, trail=trail[:, :2]), trailed.astype(np.uint8)
     )
+
+
+def test_predictions_leave_out_fixed_objects_as_planners_do() -> None:
+    world = scene()
+    boxes = world.movables
+    held = Movables.from_outlines(
+        [SQUARE, SQUARE], boxes.poses, masses=boxes.masses, fixed=[False, True]
+    )
+    world = replace(world, movables=held)
+    whole = plan_of(world)
+    told = replace(whole, object_poses=whole.object_poses[:, :1])
+    pictures = [draw_world(world, size_px=SIZE, plan=plan) for plan in (whole, told)]
+    assert np.array_equal(*pictures)
+    assert not np.array_equal(pictures[1], draw_world(world, size_px=SIZE, plan=bare(whole)))
+
+
+def bare(plan: Plan) -> Plan:
+    """The same without a prediction."""
+    return replace(plan, object_poses=None)
 
 
 def test_text_stays_in_its_corner() -> None:
