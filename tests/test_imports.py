@@ -36,7 +36,7 @@ for room in {ROOMS!r}:
 
 @pytest.fixture(scope="module")
 def loaded() -> dict[str, list[str]]:
-    """The heavy libraries that each room loads in a process where it is the first to be imported."""
+    """What each room loads of them where it is the first to be imported."""
     done = subprocess.run(
         [sys.executable, "-c", EACH_ALONE], capture_output=True, text=True, check=False
     )
