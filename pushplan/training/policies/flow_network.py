@@ -17,8 +17,8 @@ class FlowPolicy(nn.Module):
 
     Conditional flow matching (Lipman et al. 2022, arXiv 2210.02747, equations 20 to 23 with no
     noise left at the end): the velocity is fitted to ``chunk - noise`` on the straight lines
-    between Gaussian noise and the chunks of a data set. A decision follows it from the middle of
-    the noise, by Euler's method, so the same observation gives the same chunk.
+    between Gaussian noise and the chunks of a data set. A decision follows it from fresh noise by
+    Euler's method, so it is one of the things that were done in such a case, not their mean.
 
     Args:
         shape: of an observation, image in [0, 255] or vector.
@@ -34,18 +34,24 @@ class FlowPolicy(nn.Module):
         self.chunk, self.euler = chunk, euler
         self.encoder = Encoder(shape)
         size = math.prod(chunk)
+        self.noise = (size,)
         self.of_seen = nn.Linear(self.encoder.outputs, widths[0])
         self.of_chunk = nn.Linear(size, widths[0], bias=False)
         self.of_time = nn.Linear(1, widths[0], bias=False)
         self.body = layers(widths[0], widths[1:], size)
 
-    def forward(self, observations: Tensor) -> Tensor:
-        """(B, horizon, n) actions in [-1, 1]."""
+    def forward(self, observations: Tensor, noise: Tensor | None = None) -> Tensor:
+        """(B, horizon, n) actions in [-1, 1].
+
+        Args:
+            observations: (B, ...).
+            noise: (B, horizon n) Gaussian; drawn if None.
+        """
         context = self.of_seen(self.encoder(observations))
-        chunk = self.body(F.relu(context)) / self.euler  # at time 0 from the mean of the noise, 0
-        for step in range(1, self.euler):
+        chunk = torch.randn(len(context), *self.noise) if noise is None else noise
+        for step in range(self.euler):
             time = torch.tensor([[step / self.euler]])
-            chunk = chunk + self._velocity(context, chunk, time) / self.euler
+            chunk = chunk + self._velocity(context, chunk.to(context), time) / self.euler
         actions: Tensor = chunk.clamp(-1.0, 1.0).reshape(-1, *self.chunk)
         return actions
 
