@@ -597,11 +597,13 @@ class TestCard:
 
     def test_the_best_is_the_one_with_the_greatest_share(self, tmp_path):
         run = TrainingRun(tmp_path, tiny("ppo"))
-        point = CurvePoint(1, 1.0, 0, 0.0, 0.0, 5.0, 0.0, 0.5, 0.0)
+        point = CurvePoint(1_000_001, 1.0, 0, 0.0, 0.0, 5.0, 0.0, 0.5, 0.0)
         for i, share in enumerate((0.5, 0.9, 0.2)):
             run.save({"weights": {"i": i}}, dataclasses.replace(point, valid_share=share))
         assert run.best_weights() == {"i": 1}
         assert run.load()["chunks"] == 3
+        again = TrainingRun(tmp_path, tiny("ppo"), resume=True)
+        assert [one.steps for one in again.curve] == [1_000_001] * 3
 
 
 class TestCommands:
