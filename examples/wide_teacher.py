@@ -3,8 +3,7 @@
 A network that copies a planner is never as exact as the planner. The planner itself passes the tip
 of the maze's wall at a few centimetres; a copy of it runs into that wall.
 
-    pushplan dataset export --policy examples/wide_teacher.py:teacher --task maze --episodes 200 \\
-        --noise 0.03 --out runs/maze-data
+    pushplan dataset export --policy wide=examples/wide_teacher.py:teacher --task maze ...
 """
 
 from pushplan.planners import make_policy
