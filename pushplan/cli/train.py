@@ -23,12 +23,15 @@ _EXAMPLES = """\
   pushplan train ppo --config mine.yaml --out runs/mine
   pushplan train ppo --task maze --out runs/maze-ppo --resume
   pushplan train bc --task maze --data runs/maze-data --out runs/maze-bc
+  pushplan train flow --task maze --data runs/maze-data runs/maze-driven --out runs/maze-flow
 
 The folder then holds policy.onnx, its model card, the learning curve and a checkpoint.
 """
 _DATASET_EXAMPLES = """\
   pushplan dataset export --policy push-aware-constant-speed --task maze --episodes 200 \\
       --noise 0.02 --out runs/maze-data
+  pushplan dataset export --policy push-aware-constant-speed --task maze --episodes 200 \\
+      --noise 0.05 --hold 20 --driver maze-bc --out runs/maze-dagger
   pushplan dataset export --policy ship-predictive --task ship_ice --episodes 100 --out runs/ice
   pushplan dataset export --policy push-aware-constant-speed --task maze --episodes 5 \\
       --out runs/few --minari pushplan/maze/push-aware-v0
@@ -38,7 +41,7 @@ _DATASET_EXAMPLES = """\
 def add(commands: Any) -> None:
     """Add the commands."""
     parser = add_command(commands, "train", "train a policy", _EXAMPLES, run)
-    parser.add_argument("algorithm", choices=("ppo", "sac", "sam", "bc"))
+    parser.add_argument("algorithm", choices=("ppo", "sac", "sam", "bc", "flow"))
     parser.add_argument("--task", metavar="NAME", help="take the configuration that ships for it")
     parser.add_argument(
         "--variant", metavar="NAME", help="with --task: another one that ships, such as image"
@@ -48,7 +51,13 @@ def add(commands: Any) -> None:
     parser.add_argument("--seed", type=whole(0), metavar="S", help="default: the configuration's")
     parser.add_argument("--out", required=True, metavar="DIR", help="folder of the training")
     parser.add_argument("--resume", action="store_true", help="go on with what is in the folder")
-    parser.add_argument("--data", metavar="DIR", help="with bc: a data set, see pushplan dataset")
+    parser.add_argument(
+        "--data",
+        nargs="+",
+        default=(),
+        metavar="DIR",
+        help="with bc and flow: data sets, see pushplan dataset",
+    )
     parser.add_argument(
         "--device", default="auto", metavar="NAME", help="auto (default), cpu or cuda"
     )
@@ -122,9 +131,10 @@ def _config(options: argparse.Namespace) -> TrainingConfig:
 def _command(options: argparse.Namespace, config: TrainingConfig) -> str:
     """What starts this training again."""
     words = ["pushplan", "train", options.algorithm]
-    for name in ("task", "variant", "config", "data", "out"):
+    for name in ("task", "variant", "config", "out"):
         if (value := getattr(options, name)) is not None:
             words += [f"--{name}", value]
+    words += ["--data", *options.data] if options.data else []
     words += ["--steps", str(config.steps), "--seed", str(config.seed)]
     words += ["--threads", str(options.threads)]
     return shlex.join(words)
@@ -203,6 +213,24 @@ def _add_dataset(commands: Any) -> None:
         metavar="P",
         help="probability that a random action is carried out instead (default 0)",
     )
+    parser.add_argument(
+        "--hold",
+        type=whole(1),
+        default=4,
+        metavar="N",
+        help="for how many steps it is (default %(default)s)",
+    )
+    parser.add_argument(
+        "--driver",
+        metavar="NAME",
+        help="with --noise: a policy that drives then, instead of random actions",
+    )
+    parser.add_argument(
+        "--first-seed",
+        type=whole(0),
+        metavar="S",
+        help="of the layouts (default: the first of training)",
+    )
     parser.add_argument("--minari", metavar="NAME", help="also make a data set of Minari's own")
 
 
@@ -219,6 +247,7 @@ def _export(options: argparse.Namespace) -> int:
     if config.task != options.task:
         raise InvalidInputError(f"{given} is for task {config.task!r}, not {options.task!r}")
     spec = parse_policy(options.policy)
+    driver = None if options.driver is None else parse_policy(options.driver)
     request = DatasetRequest(
         task=config.task,
         scenarios=config.scenarios,
@@ -227,8 +256,17 @@ def _export(options: argparse.Namespace) -> int:
         simulator=config.simulator,
         preset=config.preset,
         noise=options.noise,
+        hold=options.hold,
+        **({} if options.first_seed is None else {"first_seed": options.first_seed}),
     )
-    folder = record(request, spec.make(), spec.label, options.out)
+    folder = record(
+        request,
+        spec.make(),
+        spec.label,
+        options.out,
+        driver=None if driver is None else driver.make(),
+        driver_label=None if driver is None else driver.label,
+    )
     about = read_metadata(folder)
     say(
         f"wrote {folder}: {about['total_episodes']} episodes, {about['total_steps']} steps, "

@@ -25,7 +25,7 @@ Function = Callable[[NDArray[Any]], NDArray[Any]]
 
 
 class NetworkPolicy:
-    """Asks a network what to do, and holds each decision for as long as it was trained to.
+    """Asks a network what to do, and keeps to each decision for as long as it was trained to.
 
     With ``pixel_values``, a pixel that was chosen before in the episode, when robot and objects
     were where they are now, is not chosen again, nor are its neighbours, as long as others are
@@ -43,8 +43,7 @@ class NetworkPolicy:
         self.specification = specification
         self.label = label
         self._function = function
-        self._left = 0
-        self._action: FloatArray = np.zeros(0)
+        self._ahead: deque[FloatArray] = deque()  # actions that are decided
         self._decisions: deque[_Decision] = deque(maxlen=_REMEMBERED)
 
     def __repr__(self) -> str:
@@ -62,7 +61,7 @@ class NetworkPolicy:
 
     @property
     def steps_per_decision(self) -> int:
-        """Steps for which it holds an action."""
+        """Steps for which a decision stands."""
         return self.specification.action.repeat
 
     def incompatibility(self, scenario: Any) -> str | None:
@@ -87,7 +86,7 @@ class NetworkPolicy:
         Raises:
             InvalidInputError: if the robot is another one than the network was made for.
         """
-        self._left = 0
+        self._ahead.clear()
         self._decisions.clear()
         if self.specification.robot is None:
             return
@@ -108,28 +107,27 @@ class NetworkPolicy:
             InvalidInputError: if the observation has another shape or type.
             BadOutputError: if the network gives something that is no action.
         """
-        if self._left == 0:
+        if not self._ahead:
             seen = self.observation.observe(world) if observation is None else observation
             self._check(seen)
             try:
-                action = self._decide(world, seen)
+                actions = self._decide(world, seen)
             except BadOutputError as error:
                 raise BadOutputError(f"policy {self.label!r}: {error}") from None
-            self._action = action.astype(np.float64)
-            self._left = self.specification.action.repeat
-        self._left -= 1
-        return self._action
+            self._ahead.extend(actions.astype(np.float64))
+        return self._ahead.popleft()
 
     def _decide(self, world: World, seen: NDArray[Any]) -> NDArray[np.float32]:
+        """(repeat, n) the next actions."""
         spec, output = self.specification.action, self._function(seen)
         if spec.output != "pixel_values":
-            return spec.read(output)
+            return spec.steps(output)
         still = _STILL * spec.window
         tried = [old.pixel for old in self._decisions if old.was_made_at(world, still)]
         pixel = spec.pixel(output, tried)
         objects = world.movables
         self._decisions.append(_Decision(objects.ids, world.robot_pose, objects.poses, pixel))
-        return spec.waypoint(*pixel)
+        return spec.held(spec.waypoint(*pixel))
 
     def _check(self, seen: Any) -> None:
         shape, dtype = self.observation.shape, self.observation.dtype

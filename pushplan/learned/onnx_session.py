@@ -19,6 +19,10 @@ LONGEST_DECISION_S = 10.0
 """After that much time of one decision the network is told to stop [s]."""
 
 
+NOISE = "noise"
+"""Name of the input for random numbers, of a network that samples its output."""
+
+
 @dataclass(frozen=True)
 class Door:
     """Input or output of a network."""
@@ -32,7 +36,8 @@ class Network:
     """A model whose file has been checked, ready to run.
 
     Raises:
-        NotOnnxError: if ONNX Runtime does not take it, or it has several inputs or outputs.
+        NotOnnxError: if ONNX Runtime does not take it, or it has more inputs than an observation
+            and ``noise``, or several outputs.
         MissingDependencyError: without onnxruntime.
     """
 
@@ -58,15 +63,22 @@ class Network:
             )
         except Exception as error:  # its errors share no root of their own
             raise NotOnnxError(f"ONNX Runtime does not take it: {_short(error)}") from error
+        noise = [door for door in inputs if door.name == NOISE]
+        inputs = [door for door in inputs if door.name != NOISE]
         if len(inputs) != 1 or len(outputs) != 1:
             raise NotOnnxError(
-                "a policy has one input and one output, this one has "
+                f"a policy has one input and one output beside an input {NOISE!r}, this one has "
                 f"{len(inputs)} and {len(outputs)}"
             )
         self.input, self.output = inputs[0], outputs[0]
+        self.noise = noise[0] if noise else None
 
-    def run(self, batch: NDArray[Any]) -> NDArray[Any]:
+    def run(self, batch: NDArray[Any], noise: NDArray[np.float32] | None = None) -> NDArray[Any]:
         """The output for a batch.
+
+        Args:
+            batch: of observations.
+            noise: a batch for the input ``noise``, where the network has one.
 
         Raises:
             NotOnnxError: if it fails, also for want of memory or time.
@@ -83,7 +95,7 @@ class Network:
         timer.daemon = True
         timer.start()
         try:
-            result: NDArray[Any] = self._session.run(None, {self.input.name: batch}, limits)[0]
+            result: NDArray[Any] = self._session.run(None, self._fed(batch, noise), limits)[0]
         except Exception as error:
             if over.is_set():
                 raise NotOnnxError(
@@ -94,13 +106,20 @@ class Network:
             timer.cancel()
         return np.asarray(result)
 
-    def run_fast(self, batch: NDArray[Any]) -> NDArray[Any]:
+    def run_fast(
+        self, batch: NDArray[Any], noise: NDArray[np.float32] | None = None
+    ) -> NDArray[Any]:
         """`run` without a limit of time, for a network that has kept it."""
         try:
-            result: NDArray[Any] = self._session.run(None, {self.input.name: batch})[0]
+            result: NDArray[Any] = self._session.run(None, self._fed(batch, noise))[0]
         except Exception as error:
             raise NotOnnxError(f"the network cannot be run: {_short(error)}") from error
         return result
+
+    def _fed(
+        self, batch: NDArray[Any], noise: NDArray[np.float32] | None
+    ) -> dict[str, NDArray[Any]]:
+        return {self.input.name: batch} | ({} if noise is None else {NOISE: noise})
 
 
 @functools.lru_cache(maxsize=1)

@@ -17,7 +17,7 @@ from pushplan.world.checks import choice, integer, known_keys
 MODES = {"turn_rate": 1, "velocity": 2, "wheels": 2, "heading": 1, "waypoint": 2}
 """Action modes of `pushplan.envs` and the number of elements of an action."""
 
-OUTPUTS = ("continuous", "direction", "pixel_values")
+OUTPUTS = ("continuous", "direction", "pixel_values", "chunk")
 NEIGHBOURS = 1.0 / 32.0
 """How far around a tried pixel `ActionSpec.pixel` leaves pixels out, in sides of the map."""
 
@@ -39,7 +39,8 @@ class ActionSpec(CheckedFields):
             the robot goes. ``"pixel_values"``, with mode ``waypoint``: a value for each pixel of
             a map around the robot, row 0 ahead and column 0 to the left; the robot drives to the
             middle of the pixel with the greatest, of equals the first, without those that
-            `NetworkPolicy` leaves out.
+            `NetworkPolicy` leaves out. ``"chunk"``: the actions of the next steps, a row each, of
+            which the first ``repeat`` are carried out.
         shape: of the output, without the batch axis.
         repeat: steps of the environment for which a decision stands.
         window: with ``pixel_values``, the side of the map [m], which has to be the task's
@@ -74,12 +75,19 @@ class ActionSpec(CheckedFields):
             )
         if self.output == "pixel_values":
             fits = len(self.shape) == 2
+        elif self.output == "chunk":
+            fits = len(self.shape) == 2 and self.shape[1] == MODES[self.mode]
         else:
             fits = self.shape == (2 if self.output == "direction" else MODES[self.mode],)
         if not fits:
             raise InvalidInputError(
                 f"output {self.output!r} of action mode {self.mode!r} cannot have shape "
                 f"{self.shape}"
+            )
+        if self.output == "chunk" and self.repeat > self.shape[0]:
+            raise InvalidInputError(
+                f"action.repeat must be at most the {self.shape[0]} actions of a chunk, got "
+                f"{self.repeat}"
             )
         for name, needed in (
             ("window", self.output == "pixel_values"),
@@ -88,8 +96,22 @@ class ActionSpec(CheckedFields):
             if needed and getattr(self, name) == 0.0:
                 raise InvalidInputError(f"action.{name} must be given for mode {self.mode!r}")
 
+    def steps(self, output: ArrayLike) -> NDArray[np.float32]:
+        """(repeat, n) the actions in [-1, 1] of the steps for which an output stands.
+
+        Raises:
+            BadOutputError: as `read`.
+        """
+        if self.output == "chunk":
+            return _clipped(self._checked(output)[: self.repeat])
+        return self.held(self.read(output))
+
+    def held(self, action: NDArray[np.float32]) -> NDArray[np.float32]:
+        """(repeat, n) one action for all steps of a decision."""
+        return np.tile(action, (self.repeat, 1))
+
     def read(self, output: ArrayLike) -> NDArray[np.float32]:
-        """The action in [-1, 1] that an output asks for.
+        """The action in [-1, 1] that an output asks for; of a chunk the first.
 
         Raises:
             BadOutputError: if it is not finite or has another shape.
@@ -100,8 +122,7 @@ class ActionSpec(CheckedFields):
         if self.output == "direction":
             heading = math.atan2(float(values[1]), float(values[0])) / math.pi
             return np.array([heading], dtype=np.float32)
-        clipped: NDArray[np.float32] = np.clip(values, -1.0, 1.0).astype(np.float32)
-        return clipped
+        return _clipped(values[0] if self.output == "chunk" else values)
 
     def pixel(self, output: ArrayLike, tried: Collection[tuple[int, int]] = ()) -> tuple[int, int]:
         """Row and column of the best pixel of ``pixel_values``.
@@ -157,3 +178,8 @@ class ActionSpec(CheckedFields):
         """
         known_keys("action", data, _KEYS, ("mode", "output", "shape"))
         return cls(**data)
+
+
+def _clipped(values: NDArray[Any]) -> NDArray[np.float32]:
+    clipped: NDArray[np.float32] = np.clip(values, -1.0, 1.0).astype(np.float32)
+    return clipped

@@ -50,20 +50,21 @@ def write_onnx(network: Any, example: Any, path: str | Path, names: tuple[str, .
 
     Args:
         network: the module.
-        example: a batch that it takes.
+        example: a batch that it takes, or a tuple of them.
         path: the ``.onnx`` file; its folder is made if it is not there.
-        names: of its input, then of its outputs.
+        names: of its inputs, then of its outputs.
     """
+    inputs = example if isinstance(example, tuple) else (example,)
     Path(path).parent.mkdir(parents=True, exist_ok=True)
     with warnings.catch_warnings():
         # the exporter that needs no further package; it is marked as old
         warnings.simplefilter("ignore")
         need("torch").onnx.export(
             network,
-            (example,),
+            inputs,
             str(path),
-            input_names=[names[0]],
-            output_names=list(names[1:]),
+            input_names=list(names[: len(inputs)]),
+            output_names=list(names[len(inputs) :]),
             dynamic_axes={name: {0: "batch"} for name in names},
             opset_version=OPSET,
             dynamo=False,

@@ -61,7 +61,7 @@ class ChecksScenario(Protocol):
 
 @runtime_checkable
 class HoldsDecisions(Protocol):
-    """Decides every few steps and gives the same action in between."""
+    """Decides every few steps and keeps to what it decided in between."""
 
     @property
     def steps_per_decision(self) -> int:

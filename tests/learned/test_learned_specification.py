@@ -119,6 +119,28 @@ class TestOutputs:
         spec = ActionSpec("velocity", "continuous", (2,))
         assert spec.read(np.array([-3.0, 0.5])).tolist() == [-1.0, 0.5]
 
+    def test_a_chunk_is_carried_out_action_by_action(self):
+        spec = ActionSpec("velocity", "chunk", (4, 2), repeat=3)
+        chunk = np.array([[0.1, 0.2], [0.3, -7.0], [0.5, 0.6], [0.7, 0.8]])
+        assert spec.steps(chunk) == pytest.approx(
+            np.array([[0.1, 0.2], [0.3, -1.0], [0.5, 0.6]]), abs=1e-6
+        )
+        asked = []
+        policy = NetworkPolicy(
+            lambda seen: asked.append(seen) or chunk,
+            maze_specification(robot=None, action=spec),
+        )
+        env = PushEnv(task="maze", observation="state")
+        seen, _ = env.reset(seed=0)
+        policy.reset(env.world, np.random.default_rng(0))
+        done = [policy.act(env.world, seen).tolist()[0] for _ in range(4)]
+        assert done == pytest.approx([0.1, 0.3, 0.5, 0.1])
+        assert len(asked) == 2
+        policy.reset(env.world, np.random.default_rng(0))
+        assert policy.act(env.world, seen)[0] == pytest.approx(0.1)
+        with pytest.raises(InvalidInputError, match=r"at most the 4 actions of a chunk, got 5"):
+            ActionSpec("velocity", "chunk", (4, 2), repeat=5)
+
     @given(st.floats(-3.1, 3.1), st.floats(0.1, 50.0))
     def test_a_direction_is_a_heading(self, angle, size):
         spec = ActionSpec("heading", "direction", (2,), step=1.0)

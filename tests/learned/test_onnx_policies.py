@@ -47,6 +47,24 @@ def constant(name, values):
     return numpy_helper.from_array(np.asarray(values), name)
 
 
+def noisy(shape):
+    """A graph that gives the sum of its noise, whatever is seen."""
+    nodes = [
+        helper.make_node("MatMul", ["seen", "none"], ["nothing"]),
+        helper.make_node("ReduceSum", ["noise", "axis"], ["sum"], keepdims=1),
+        helper.make_node("Add", ["nothing", "sum"], ["action"]),
+    ]
+    constants = [
+        constant("none", np.zeros((106, 1), np.float32)),
+        constant("axis", np.array([1], np.int64)),
+    ]
+    inputs = [
+        helper.make_tensor_value_info("seen", TensorProto.FLOAT, ["batch", 106]),
+        helper.make_tensor_value_info("noise", TensorProto.FLOAT, shape),
+    ]
+    return graph(nodes, constants=constants, inputs=inputs)
+
+
 class TestGood:
     def test_it_drives(self, tmp_path):
         policy = OnnxPolicy(turning(tmp_path / "turn.onnx"))
@@ -87,6 +105,28 @@ class TestGood:
         path = save(linear_model(maze_specification(), rng.normal(size=(106, 1))), tmp_path / "r")
         seen = rng.normal(size=106).astype(np.float32)
         assert OnnxPolicy(path).decide(seen) == OnnxPolicy(path).decide(seen)
+
+    def test_noise_is_of_the_episode(self, tmp_path):
+        spec = maze_specification()
+        path = save(finish(noisy(["batch", 2]), spec), tmp_path / "noisy.onnx")
+        policy = OnnxPolicy(path)
+        env = PushEnv(task="maze", observation=policy.observation)
+        seen, _ = env.reset(seed=1000)
+        rows = []
+        for seed in (0, 0, 1):
+            policy.reset(env.world, np.random.default_rng(seed))
+            rows.append([float(policy.act(env.world, seen)[0]) for _ in range(4)])
+        assert rows[0] == rows[1] != rows[2]
+        assert len(set(rows[0])) > 1
+        assert policy.decide(seen, np.float32([0.5, 0.25])) == pytest.approx([0.75])
+
+    @pytest.mark.parametrize("shape", [["batch", "any"], ["batch", 2, 1], [3, 2], ["batch", 5000]])
+    def test_noise_of_another_shape(self, tmp_path, shape):
+        path = save(finish(noisy(shape), maze_specification()), tmp_path / "noisy.onnx")
+        with pytest.raises(
+            InvalidInputError, match=r"'noise' must be float32 of shape \(batch, N\)"
+        ):
+            OnnxPolicy(path)
 
     @pytest.mark.clock
     def test_it_takes_little_time(self, tmp_path):

@@ -17,6 +17,7 @@ from pushplan.envs import PushEnv
 from pushplan.learned import FeatureObservation, OnnxPolicy
 from pushplan.training.policies.card import write_card
 from pushplan.training.policies.config import (
+    IMITATING,
     TrainingConfig,
     config_named,
     read_config,
@@ -29,6 +30,7 @@ from pushplan.training.policies.dataset import (
     record,
     to_minari,
 )
+from pushplan.training.policies.demonstrations import action_chunks
 from pushplan.training.policies.environment import TRAINING_SEEDS, TrainingEnv
 from pushplan.training.policies.options import OPTIONS
 from pushplan.training.policies.replay import Lookahead, ReplayBuffer
@@ -63,6 +65,7 @@ TINY = {
         "follow": 0.01,
     },
     "bc": {"batch": 16, "widths": [8]},
+    "flow": {"batch": 16, "widths": [8, 8], "euler": 2},
 }
 
 
@@ -82,6 +85,8 @@ def tiny(algorithm: str, **changes: object) -> TrainingConfig:
         "options": TINY[algorithm],
         "suites": ["maze-2d-3"],
     }
+    if algorithm == "flow":
+        data["action"] = {"mode": "turn_rate", "output": "chunk", "horizon": 8, "repeat": 4}
     if algorithm == "sam":
         data |= {
             "task": "box_delivery",
@@ -107,7 +112,7 @@ def data(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def trained(config: TrainingConfig, folder: Path, data: Path, **options: object) -> Path | None:
-    if config.algorithm == "bc":
+    if config.algorithm in IMITATING:
         options["data"] = data
     return train_policy(config, folder, device="cpu", **options)
 
@@ -123,7 +128,7 @@ def behaviour(path: Path) -> np.ndarray:
 
 @pytest.mark.learn
 class TestTraining:
-    @pytest.mark.parametrize("algorithm", ["ppo", "sac", "sam", "bc"])
+    @pytest.mark.parametrize("algorithm", ["ppo", "sac", "sam", "bc", "flow"])
     @pytest.mark.slow
     def test_left_off_and_taken_up_it_ends_the_same(self, algorithm, tmp_path, data):
         config = tiny(algorithm)
@@ -366,6 +371,43 @@ class TestDataset:
             if entry.name != "success":
                 assert np.array_equal(getattr(first, entry.name), getattr(again, entry.name))
 
+    def test_a_driver_drives_and_the_policy_is_asked(self, tmp_path):
+        from pushplan.planners import make_policy
+
+        class Turning:
+            def reset(self, world, rng):
+                self.steps = 0
+
+            def act(self, world):
+                self.steps += 1
+                return np.array([0.01 * self.steps])
+
+        request = DatasetRequest("maze", ({"boxes": 1},), SMALL, 1, noise=0.2, hold=3)
+        straight = make_policy("straight")
+        folder = record(
+            request, straight, "straight", tmp_path / "x", driver=Turning(), driver_label="turning"
+        )
+        about, found = read_metadata(folder), next(episodes(folder))
+        assert (about["driver"], about["hold"]) == ("turning", 3)
+        driven = np.flatnonzero(found.executed != found.actions)
+        own = np.isin(found.executed.ravel(), np.float32([0.01, 0.02, 0.03]))
+        assert len(driven) >= 3 and own[driven].all()
+
+    def test_what_a_disturbance_leaves_of_a_chunk(self):
+        wanted = np.arange(6, dtype=np.float32)[:, None]
+        executed = wanted.copy()
+        executed[2] = 9.0
+        chunks, counted = action_chunks(wanted, executed, 3)
+        assert chunks[:, :, 0].tolist()[:2] == [[0.0, 1.0, 2.0], [1.0, 2.0, 3.0]]
+        assert counted.tolist() == [
+            [1.0, 1.0, 1.0],
+            [1.0, 1.0, 0.0],  # what was wanted at 2, where something else was done
+            [1.0, 0.0, 0.0],
+            [1.0, 1.0, 1.0],
+            [1.0, 1.0, 0.0],  # beyond the end
+            [1.0, 0.0, 0.0],
+        ]
+
     def test_damage_is_said(self, data, tmp_path):
         with pytest.raises(InvalidInputError, match="not empty"):
             record(DatasetRequest("maze", ({},), SMALL, 1), None, "x", data)
@@ -555,11 +597,13 @@ class TestCard:
 
     def test_the_best_is_the_one_with_the_greatest_share(self, tmp_path):
         run = TrainingRun(tmp_path, tiny("ppo"))
-        point = CurvePoint(1, 1.0, 0, 0.0, 0.0, 5.0, 0.0, 0.5, 0.0)
+        point = CurvePoint(1_000_001, 1.0, 0, 0.0, 0.0, 5.0, 0.0, 0.5, 0.0)
         for i, share in enumerate((0.5, 0.9, 0.2)):
             run.save({"weights": {"i": i}}, dataclasses.replace(point, valid_share=share))
         assert run.best_weights() == {"i": 1}
         assert run.load()["chunks"] == 3
+        again = TrainingRun(tmp_path, tiny("ppo"), resume=True)
+        assert [one.steps for one in again.curve] == [1_000_001] * 3
 
 
 class TestCommands:
@@ -587,6 +631,7 @@ class TestCommands:
             (["ppo", "--config", "no.yaml"], "cannot read configuration no.yaml"),
             (["ppo", "--config", "no.yaml", "--variant", "image"], "--variant belongs to --task"),
             (["bc", "--task", "maze"], "bc needs a data set"),
+            (["flow", "--task", "maze"], "flow needs a data set"),
         ):
             assert main(["train", *call, "--out", out]) != 0
             assert message in capsys.readouterr().err

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from pushplan.training.policies.config import IMITATING
 from pushplan.training.policies.run import RECORD
 from pushplan.world import SchemaError
 
@@ -19,6 +20,7 @@ _WORDS = {
     "sac": "SAC (Stable-Baselines3)",
     "sam": "Spatial action maps, double deep Q-learning",
     "bc": "Behaviour cloning",
+    "flow": "Flow matching of chunks of a planner's actions",
 }
 
 
@@ -67,7 +69,7 @@ def _training(record: Mapping[str, Any]) -> list[str]:
         "",
         f"- Data: {_data(record)}",
         *begin,
-        f"- {record['steps']:,} {'pairs' if config['algorithm'] == 'bc' else 'decisions'}, "
+        f"- {record['steps']:,} {'pairs' if config['algorithm'] in IMITATING else 'decisions'}, "
         f"{hours:.2f} h of training on a {record['hardware']}, seed {config['seed']}.",
         f"- The weights are those after {record['best_steps']:,}: the best in validation on "
         f"{config['validation']} starts that are neither for training nor for scores.",
@@ -81,15 +83,22 @@ def _training(record: Mapping[str, Any]) -> list[str]:
 
 def _data(record: Mapping[str, Any]) -> str:
     config = record["config"]
-    if config["algorithm"] == "bc":
-        about = record["data"]
-        return (
-            f"{about['total_episodes']} episodes of `{about['policy']}` "
-            f"({about['total_steps']:,} pairs, {about['successes']} successes, noise "
-            f"{about['noise']:g})."
-        )
+    if config["algorithm"] in IMITATING:
+        return "; ".join(map(_dataset, record["data"])) + "."
     drawn = "; ".join(json.dumps(one) for one in config["scenarios"])
     return f"random starts of {drawn}; rewards of the task times {config['reward_scale']:g}."
+
+
+def _dataset(about: Mapping[str, Any]) -> str:
+    if about.get("driver") is None:
+        disturbed = f"noise {about['noise']:g}"
+    else:
+        name = Path(about["driver"]).name
+        disturbed = f"`{name}` drives {about['hold']} steps with probability {about['noise']:g}"
+    return (
+        f"{about['total_episodes']} episodes of `{about['policy']}` ({about['total_steps']:,} "
+        f"pairs, {about['successes']} successes, {disturbed})"
+    )
 
 
 def _scores(scores: Sequence[ScoreRow]) -> list[str]:

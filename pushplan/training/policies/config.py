@@ -27,6 +27,9 @@ from pushplan.world.checks import choice, integer, known_keys
 from pushplan.world.safe_files import read_data
 
 ALGORITHMS = tuple(OPTIONS)
+IMITATING = ("bc", "flow")
+"""Algorithms that learn from a data set."""
+_OUTPUT_OF = {"pixel_values": "sam", "chunk": "flow"}
 _SCIENTIFIC = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)[eE][-+]?\d+")
 
 
@@ -37,17 +40,21 @@ class ActionChoice:
     mode: str  # action mode of the environment
     output: str = "continuous"  # see `pushplan.learned.ActionSpec`
     repeat: int = 1  # control steps, or actions, for which a decision stands
+    horizon: int = 1  # actions of a chunk, of which the first ``repeat`` are carried out
 
     def __post_init__(self) -> None:
         choice("output", self.output, OUTPUTS)
         integer("action.repeat", self.repeat, low=1)
+        integer("action.horizon", self.horizon, low=1)
 
 
 @dataclass(frozen=True)
 class TrainingConfig(CheckedFields):
     """What is trained on what. The same configuration, seed and machine give the same policy."""
 
-    algorithm: Annotated[str, OneOf(ALGORITHMS)]  # ``"ppo"``, ``"sac"``, ``"sam"`` or ``"bc"``
+    algorithm: Annotated[
+        str, OneOf(ALGORITHMS)
+    ]  # ``"ppo"``, ``"sac"``, ``"sam"``, ``"bc"``, ``"flow"``
     task: str  # name of the task
     # variations of the task; each episode draws one of them
     scenarios: tuple[Mapping[str, Any], ...]
@@ -84,12 +91,12 @@ class TrainingConfig(CheckedFields):
                 f"{type(self.options).__name__}"
             )
         builder_from_dict(self.observation)
-        is_map = self.action.output == "pixel_values"
-        if is_map != (self.algorithm == "sam"):
-            raise InvalidInputError(
-                f"algorithm {self.algorithm!r} cannot train output {self.action.output!r}: "
-                "pixel_values belong to sam"
-            )
+        for output, algorithm in _OUTPUT_OF.items():
+            if (self.action.output == output) != (self.algorithm == algorithm):
+                raise InvalidInputError(
+                    f"algorithm {self.algorithm!r} cannot train output {self.action.output!r}: "
+                    f"{output} belongs to {algorithm}"
+                )
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> TrainingConfig:

@@ -2,8 +2,9 @@
 
 A data set is a folder: ``metadata.json``, and ``data/episode_00000.npz`` and so on with the arrays
 ``observations`` (T + 1, ...), ``actions``, ``rewards``, ``terminations`` and ``truncations``
-(T, ...) of each episode, as Minari (https://minari.farama.org) names them. No pickles. `to_minari`
-makes a data set of Minari's own.
+(T, ...) of each episode, as Minari (https://minari.farama.org) names them, and ``executed``
+(T, ...), the actions that were carried out, which differ from ``actions`` where the policy was
+disturbed. No pickles. `to_minari` makes a data set of Minari's own.
 """
 
 from __future__ import annotations
@@ -38,10 +39,12 @@ from pushplan.world.safe_files import read_data, read_npz
 SCHEMA = "pushplan-dataset/1"
 METADATA = "metadata.json"
 ARRAYS = ("observations", "actions", "rewards", "terminations", "truncations")
+_EXECUTED = "executed"
 _KEYS = (
     *("format", "task", "simulator", "preset", "scenarios", "policy", "action_mode", "observation"),
     *("robot", "control_step", "total_episodes", "total_steps", "successes", "first_seed", "noise"),
 )
+_LATER_KEYS = ("driver", "hold")
 
 
 @dataclass(frozen=True)
@@ -56,10 +59,12 @@ class DatasetRequest(CheckedFields):
     preset: str | None = None  # of the task
     # of the first layout; by default beyond all that scores are made on
     first_seed: NonNegativeInt = TRAINING_SEEDS
-    # probability for each action that a random one is carried out instead, for a few steps. The one
-    # that the policy wanted is recorded all the same, so that a learner sees how to come back.
+    # probability for each action that another one is carried out instead, for a few steps: a random
+    # one, or those of a driver. The one that the policy wanted is recorded all the same, so that a
+    # learner sees how to come back.
     noise: Fraction = 0.0
-    hold: PositiveInt = 4  # for how many steps a random action stands
+    # for how many steps a random action stands, or a driver drives
+    hold: PositiveInt = 4
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -76,11 +81,31 @@ class EpisodeData:
     rewards: NDArray[np.float32]
     terminations: NDArray[np.bool_]
     truncations: NDArray[np.bool_]
+    executed: NDArray[np.float32]
     success: bool = field(default=False)
 
 
-def record(request: DatasetRequest, policy: Any, label: str, folder: str | Path) -> Path:
-    """Run a policy and write what it saw and did.
+def record(
+    request: DatasetRequest,
+    policy: Any,
+    label: str,
+    folder: str | Path,
+    *,
+    driver: Any = None,
+    driver_label: str | None = None,
+) -> Path:
+    """Run a policy and write what it saw and wanted.
+
+    Args:
+        request: what is recorded.
+        policy: whose actions are recorded.
+        label: what the data set calls it.
+        folder: a new one.
+        driver: a policy with the same actions that observes by itself, such as a network that is
+            learning. It drives where else random actions are carried out, so that the data set
+            shows what ``policy`` does where the driver gets to (DAgger, Ross et al. 2011, arXiv
+            1011.0686).
+        driver_label: what the data set calls it.
 
     Raises:
         InvalidInputError: if the folder holds something, or the request makes no sense.
@@ -95,9 +120,9 @@ def record(request: DatasetRequest, policy: Any, label: str, folder: str | Path)
     steps = successes = 0
     for number_ in range(request.episodes):
         env = envs[number_ % len(envs)]
-        episode = _run(env, policy, builder, request, request.first_seed + number_)
+        episode = _run(env, (policy, driver), builder, request, request.first_seed + number_)
         steps, successes = steps + len(episode.actions), successes + episode.success
-        arrays = {name: getattr(episode, name) for name in ARRAYS}
+        arrays = {name: getattr(episode, name) for name in (*ARRAYS, _EXECUTED)}
         np.savez_compressed(folder / "data" / f"episode_{number_:05d}.npz", **arrays)
     env = envs[0]
     about = {
@@ -116,6 +141,8 @@ def record(request: DatasetRequest, policy: Any, label: str, folder: str | Path)
         "successes": successes,
         "first_seed": request.first_seed,
         "noise": request.noise,
+        "hold": request.hold,
+        "driver": driver_label,
     }
     (folder / METADATA).write_text(json.dumps(about, indent=2) + "\n", encoding="utf-8")
     for env in envs:
@@ -145,21 +172,31 @@ def _mode(env: PushEnv) -> str:
 
 
 def _run(
-    env: PushEnv, policy: Any, builder: ObservationBuilder, request: DatasetRequest, seed: int
+    env: PushEnv,
+    policies: tuple[Any, Any],
+    builder: ObservationBuilder,
+    request: DatasetRequest,
+    seed: int,
 ) -> EpisodeData:
+    policy, driver = policies
     seen, _ = env.reset(seed=seed)
     policy.reset(env.world, stream(seed, "policy"))
     rng = stream(seed, "noise")
     observed = [builder.observe(env.world)]
-    actions, rewards, terminations, truncations = [], [], [], []
+    actions, executed, rewards, terminations, truncations = [], [], [], [], []
     held, disturbed, over = 0, np.zeros(0), False
     while not over:
         action = env.encode(policy.act(env.world, seen))
         actions.append(action)
         if held == 0 and request.noise and rng.random() < request.noise:
             held, disturbed = request.hold, rng.uniform(-1.0, 1.0, action.shape)
-        carried_out = disturbed if held else action
+            if driver is not None:
+                driver.reset(env.world, stream(seed, "driver"))
+        carried_out: NDArray[Any] = action
+        if held:
+            carried_out = disturbed if driver is None else env.encode(driver.act(env.world))
         held = max(0, held - 1)
+        executed.append(carried_out)
         seen, reward, terminated, truncated, info = env.step(carried_out)
         observed.append(builder.observe(env.world))
         rewards.append(reward)
@@ -172,6 +209,7 @@ def _run(
         np.array(rewards, np.float32),
         np.array(terminations),
         np.array(truncations),
+        np.stack(executed).astype(np.float32),
         bool(info["success"]),
     )
 
@@ -186,7 +224,7 @@ def read_metadata(folder: str | Path) -> dict[str, Any]:
     data = read_data(path, "data set")
     if not isinstance(data, dict) or data.get("format") != SCHEMA:
         raise SchemaError(f"{folder} is no data set of format {SCHEMA!r}")
-    known_keys("the metadata of a data set", data, _KEYS, _KEYS)
+    known_keys("the metadata of a data set", data, (*_KEYS, *_LATER_KEYS), _KEYS)
     return data
 
 
@@ -199,8 +237,9 @@ def episodes(folder: str | Path) -> Iterator[EpisodeData]:
     about = read_metadata(folder)
     for number_ in range(int(about["total_episodes"])):
         path = Path(folder) / "data" / f"episode_{number_:05d}.npz"
-        arrays: dict[str, Any] = {**read_npz(path, "episode of a data set", ARRAYS)}
-        lengths = {len(arrays[name]) for name in ARRAYS[1:]}
+        found = read_npz(path, "episode of a data set", ARRAYS, (_EXECUTED,))
+        arrays: dict[str, Any] = {_EXECUTED: found.get("actions"), **found}
+        lengths = {len(arrays[name]) for name in (*ARRAYS[1:], _EXECUTED)}
         if lengths != {len(arrays["observations"]) - 1}:
             raise SchemaError(f"{path}: the arrays have lengths that do not belong together")
         yield EpisodeData(**arrays)

@@ -120,13 +120,13 @@ class TrainingEnv(gymnasium.Env[NDArray[Any], Any]):
 
     def step(self, action: Any) -> tuple[NDArray[Any], float, bool, bool, dict[str, Any]]:
         """Carry out one decision."""
-        command = (
-            self.action.waypoint(*divmod(int(action), self.action.shape[1]))
+        commands = (
+            self.action.held(self.action.waypoint(*divmod(int(action), self.action.shape[1])))
             if self.action.output == "pixel_values"
-            else self.action.read(action)
+            else self.action.steps(action)
         )
         total = 0.0
-        for _ in range(self.action.repeat):
+        for command in commands:
             _, reward, terminated, truncated, info = self._env.step(command)
             total += reward
             if terminated or truncated:
@@ -158,6 +158,8 @@ def action_spec(config: TrainingConfig, env: PushEnv) -> ActionSpec:
     """What the output of the network means in an environment."""
     output, mode = config.action.output, config.action.mode
     shape: tuple[int, ...] = (2 if output == "direction" else MODES[mode],)
+    if output == "chunk":
+        shape = (config.action.horizon, MODES[mode])
     if output == "pixel_values":
         view = builder_from_dict(config.observation)
         side = env.task.waypoint_window

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pushplan.learned import OnnxPolicy, Specification
+from pushplan.learned.onnx_session import NOISE
 from pushplan.learned.specification import METADATA_KEY
 from pushplan.training.libraries import write_onnx
 from pushplan.training.policies.config import TrainingConfig
@@ -26,7 +27,7 @@ def export(network: Any, specification: Specification, path: str | Path) -> Path
 
     Args:
         network: a PyTorch module from a batch of observations, as they are observed, to a batch
-            of outputs.
+            of outputs. If it has ``noise``, a shape, then it also takes a batch of such noise.
         specification: what is said about it in the file.
         path: the ``.onnx`` file.
 
@@ -37,8 +38,9 @@ def export(network: Any, specification: Specification, path: str | Path) -> Path
     torch, onnx = need("torch"), need("onnx")
     path = Path(path)
     network = network.to("cpu").eval()
-    example = torch.from_numpy(examples(specification, 2))
-    write_onnx(network, example, path, ("observation", "output"))
+    inputs = tuple(map(torch.from_numpy, _inputs(network, specification, 2)))
+    names = ("observation", NOISE)[: len(inputs)]
+    write_onnx(network, inputs, path, (*names, "output"))
     model = onnx.load(str(path))
     del model.metadata_props[:]
     entry = model.metadata_props.add()
@@ -54,10 +56,10 @@ def difference(network: Any, path: Path, specification: Specification, count: in
     """Greatest difference of outputs between PyTorch and the file, relative to the greatest."""
     torch = need("torch")
     policy = OnnxPolicy(path)
-    seen = examples(specification, count)
+    inputs = _inputs(network, specification, count)
     with torch.no_grad():
-        wanted = network(torch.from_numpy(seen)).numpy()
-    found = np.stack([policy.decide(one) for one in seen])
+        wanted = network(*map(torch.from_numpy, inputs)).numpy()
+    found = np.stack([policy.decide(*one) for one in zip(*inputs, strict=True)])
     scale = max(1.0, float(np.abs(wanted).max()))
     return float(np.abs(found - wanted).max()) / scale
 
@@ -88,6 +90,15 @@ def observation_time(config: TrainingConfig, count: int = 50) -> float:
             env.reset(options={"layout": len(times)})
     env.close()
     return float(np.median(times))
+
+
+def _inputs(network: Any, specification: Specification, count: int) -> tuple[NDArray[Any], ...]:
+    """Random batches of all that a network takes."""
+    seen = examples(specification, count)
+    if (shape := getattr(network, "noise", None)) is None:
+        return (seen,)
+    rng = np.random.default_rng(1)
+    return seen, rng.standard_normal((count, *shape), dtype=np.float32)
 
 
 def examples(specification: Specification, count: int) -> NDArray[Any]:

@@ -48,25 +48,42 @@ def layers(inputs: int, widths: Sequence[int], outputs: int) -> nn.Sequential:
     return nn.Sequential(*hidden, nn.Linear(sizes[-1], outputs))
 
 
+class Encoder(nn.Module):
+    """Observation to vector: images in [0, 255] by a `SmallEncoder`, vectors as they are."""
+
+    def __init__(self, shape: tuple[int, ...]) -> None:
+        super().__init__()
+        self.is_image = len(shape) == 3
+        self.layers: nn.Module = nn.Identity()
+        self.outputs = shape[0]
+        if self.is_image:
+            self.layers = SmallEncoder(shape[0], (shape[1], shape[2]))
+            self.outputs = 128
+
+    def forward(self, observations: Tensor) -> Tensor:
+        """(B, outputs)."""
+        seen = observations.float()
+        if self.is_image:
+            seen = seen / IMAGE_SCALE
+        encoded: Tensor = self.layers(seen)
+        return encoded
+
+
 class DirectPolicy(nn.Module):
     """Observation to action, for behaviour cloning; images in [0, 255] or vectors."""
 
     def __init__(self, shape: tuple[int, ...], widths: Sequence[int], outputs: int) -> None:
         super().__init__()
-        self.is_image = len(shape) == 3
-        self.encoder: nn.Module = nn.Identity()
-        inputs = shape[0]
-        if self.is_image:
-            self.encoder = SmallEncoder(shape[0], (shape[1], shape[2]))
-            inputs = 128
-        self.body = layers(inputs, widths, outputs)
+        self.encoder = Encoder(shape)
+        self.body = layers(self.encoder.outputs, widths, outputs)
 
     def forward(self, observations: Tensor) -> Tensor:
         """(B, outputs) in [-1, 1]."""
-        seen = observations.float()
-        if self.is_image:
-            seen = seen / IMAGE_SCALE
-        return torch.tanh(self.body(self.encoder(seen)))
+        return torch.tanh(self.body(self.encoder(observations)))
+
+    def loss(self, observations: Tensor, wanted: Tensor, counted: Tensor) -> Tensor:
+        """Smooth error of the outputs; all of them count."""
+        return F.smooth_l1_loss(self(observations), wanted)
 
 
 class _Residual(nn.Module):

@@ -113,10 +113,23 @@ class BcOptions(AlgorithmOptions):
     decay: NonNegativeFloat = 1e-5  # of the weights
 
 
-Options = PpoOptions | SacOptions | SamOptions | BcOptions
+@dataclass(frozen=True)
+class FlowOptions(BcOptions):
+    """Conditional flow matching (Lipman et al. 2022, arXiv 2210.02747) of chunks of actions.
+
+    Chunks of which a few actions are carried out are those of diffusion policies (Chi et al. 2023,
+    arXiv 2303.04137).
+    """
+
+    widths: tuple[int, ...] = (256, 256)  # of the hidden layers of the velocity
+    euler: PositiveInt = 5  # steps of Euler's method from noise to a chunk
+
+
+Options = PpoOptions | SacOptions | SamOptions | BcOptions | FlowOptions
 OPTIONS: dict[str, type[Options]] = {
     "ppo": PpoOptions,
     "sac": SacOptions,
     "sam": SamOptions,
     "bc": BcOptions,
+    "flow": FlowOptions,
 }

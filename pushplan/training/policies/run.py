@@ -159,7 +159,8 @@ class TrainingRun:
         writer = csv.writer(text)
         writer.writerow(names)
         for point in self.curve:
-            writer.writerow([f"{value:.6g}" for value in dataclasses.astuple(point)])
+            values = dataclasses.astuple(point)
+            writer.writerow([v if isinstance(v, int) else f"{v:.6g}" for v in values])
         write_atomic(self.path(CURVE), text.getvalue().encode())
 
 
@@ -257,11 +258,12 @@ def _same(old: TrainingConfig, new: TrainingConfig, folder: Path) -> None:
 def _read_curve(path: Path) -> list[CurvePoint]:
     with path.open(newline="", encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
-    whole = ("steps", "episodes")
+    whole = ("steps", "episodes")  # older files have 1e+06
     try:
+        numbers = [{name: float(text) for name, text in row.items()} for row in rows]
         return [
-            CurvePoint(**{k: (int if k in whole else float)(v) for k, v in row.items()})  # type: ignore[arg-type]
-            for row in rows
+            CurvePoint(**{k: int(v) if k in whole else v for k, v in row.items()})  # type: ignore[arg-type]
+            for row in numbers
         ]
     except (TypeError, ValueError) as error:
         raise InvalidInputError(f"{path} is no learning curve: {error}") from error

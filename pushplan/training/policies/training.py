@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from pushplan.learned.sb3_saving import attach
 from pushplan.training.libraries import chosen_device, hardware, parameter_count
-from pushplan.training.policies.config import TrainingConfig
+from pushplan.training.policies.config import IMITATING, TrainingConfig
 from pushplan.training.policies.environment import TrainingEnv
 from pushplan.training.policies.run import CURVE, PICTURE, POLICY, TrainingRun, Until
 from pushplan.world import InvalidInputError
@@ -24,7 +25,7 @@ def train_policy(
     device: str = "auto",
     processes: bool = False,
     threads: int = 1,
-    data: str | Path | None = None,
+    data: str | Path | Sequence[str | Path] = (),
     command: str = "",
     until: Until | None = None,
 ) -> Path | None:
@@ -37,7 +38,7 @@ def train_policy(
         device: ``"auto"``, ``"cpu"`` or ``"cuda"``.
         processes: with PPO and SAC, a process for each environment.
         threads: of PyTorch.
-        data: with ``bc``, the folder of a data set.
+        data: with ``bc`` and ``flow``, the folders of data sets, or one of them.
         command: what the model card says that the training was started with.
         until: asked with the number of chunks that are done; true leaves the training off.
 
@@ -48,32 +49,39 @@ def train_policy(
         InvalidInputError: if something does not fit.
         MissingDependencyError: without the extra ``learn``.
     """
-    if config.algorithm == "bc" and data is None:
+    folders = [data] if isinstance(data, str | Path) else list(data)
+    imitates = config.algorithm in IMITATING
+    if imitates and not folders:
         raise InvalidInputError(
-            "bc needs a data set (--data DIR): make one with 'pushplan dataset export'"
+            f"{config.algorithm} needs a data set (--data DIR): make one with 'pushplan dataset "
+            "export'"
         )
-    if config.algorithm != "bc" and data is not None:
-        raise InvalidInputError(f"a data set belongs to bc, not to {config.algorithm}")
+    if folders and not imitates:
+        raise InvalidInputError(
+            f"a data set belongs to {' and '.join(IMITATING)}, not to {config.algorithm}"
+        )
     need("torch").set_num_threads(threads)
     device = chosen_device(device)
     run = TrainingRun(folder, config, resume=resume)
     options: dict[str, Any] = {"device": device, "until": until}
     try:
-        network = _train(run, processes, str(data), options)
+        network = _train(run, processes, folders, options)
     except InvalidInputError:  # the configuration asks for what cannot be
         run.abandon()
         raise
     _draw(run)
     if run.done < run.chunks:
         return None
-    return _finish(run, network, device, threads, data, command)
+    return _finish(run, network, device, threads, folders, command)
 
 
-def _train(run: TrainingRun, processes: bool, data: str, options: dict[str, Any]) -> Any:
-    if run.config.algorithm == "bc":
-        from pushplan.training.policies.cloning import train_bc
+def _train(
+    run: TrainingRun, processes: bool, data: Sequence[str | Path], options: dict[str, Any]
+) -> Any:
+    if run.config.algorithm in IMITATING:
+        from pushplan.training.policies.cloning import train_imitation
 
-        return train_bc(run, data, **options)
+        return train_imitation(run, data, **options)
     if run.config.algorithm == "sam":
         from pushplan.training.policies.sam import train_sam
 
@@ -132,7 +140,7 @@ def _draw(run: TrainingRun) -> None:
         axes.plot(steps, [getattr(p, name) for p in points], style, label=label, lw=1, ms=3)
     fractions.set_ylim(-0.02, 1.02)
     for axes in (returns, fractions):
-        axes.set_xlabel("pairs" if algorithm == "bc" else "decisions")
+        axes.set_xlabel("pairs" if algorithm in IMITATING else "decisions")
         axes.locator_params(axis="x", nbins=6)
         axes.grid(alpha=0.3)
         axes.legend(fontsize=8)
@@ -145,7 +153,7 @@ def _finish(
     network: Any,
     device: str,
     threads: int,
-    data: str | Path | None,
+    data: Sequence[str | Path],
     command: str,
 ) -> Path:
     from pushplan.training.policies.dataset import read_metadata
@@ -166,7 +174,7 @@ def _finish(
         hardware=f"{hardware(device)}, {threads} thread{'s' * (threads > 1)}",
         versions=_versions(run.config.algorithm),
         command=command,
-        data=None if data is None else read_metadata(data),
+        data=[read_metadata(folder) for folder in data],
         curve=CURVE,
     )
     return path
