@@ -1,7 +1,7 @@
-"""`push-aware-constant-speed` that keeps a quarter of a metre from the walls, as a teacher.
+"""`push-aware-constant-speed` that plans with a quarter of a metre to the walls, as a teacher.
 
 A network that copies a planner is never as exact as the planner. The planner itself passes the tip
-of the maze's wall at a few centimetres; a copy of it runs into that wall.
+of the maze's wall at a few centimetres; copies of it ran into that wall.
 
     pushplan dataset export --policy wide=examples/wide_teacher.py:teacher --task maze ...
 """

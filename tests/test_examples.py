@@ -113,6 +113,20 @@ class TestPlanner:
 
 
 class TestPolicies:
+    @pytest.mark.slow
+    def test_the_teacher_keeps_further_from_walls(self, tmp_path, capsys):
+        wide = f"wide={EXAMPLES / 'wide_teacher.py'}:teacher"
+        for name, policy in (("wide", wide), ("own", "push-aware-constant-speed")):
+            call = ["--policy", policy, "--task", "maze", "--episodes", "1"]
+            assert main(["dataset", "export", *call, "--out", str(tmp_path / name)]) == 0
+            assert "1 successes" in capsys.readouterr().out
+        nearest = {  # rays of features: 1 touches a wall, at a range of 6 m
+            name: np.load(tmp_path / name / "data" / "episode_00000.npz")["observations"][:, 10:34]
+            for name in ("wide", "own")
+        }
+        gap = 6.0 * (nearest["own"].max() - nearest["wide"].max())  # [m]
+        assert gap > 0.1
+
     def test_bull_turns_towards_the_goal(self):
         bull = parse_policy(f"{EXAMPLES / 'my_policy.py'}:Bull").make()
         ahead = world("room").moved(robot_pose=[1.0, 1.0, np.pi / 4])

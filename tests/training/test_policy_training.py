@@ -319,7 +319,7 @@ class TestConfigs:
             ({"options": {"rates": 1}}, "did you mean 'rate'"),
             ({"options": {"widths": []}}, "widths"),
             ({"action": {"output": "continuous"}}, "action"),
-            ({"action": {"mode": "turn_rate", "output": "pixel_values"}}, "belong to sam"),
+            ({"action": {"mode": "turn_rate", "output": "pixel_values"}}, "belongs to sam"),
             ({"observation": {"kind": "sound"}}, "unknown observation kind"),
             ({"steps": 0}, "steps"),
             ({"reward_scale": float("nan")}, "reward_scale"),
