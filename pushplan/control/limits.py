@@ -12,6 +12,8 @@ try:
 except ImportError:
     ruckig = None
 
+_BRAKES = 0.5  # fraction of the greatest deceleration that an end is approached with
+
 
 def clamp_twist(robot: RobotModel, linear: float, angular: float) -> Twist:
     """The nearest twist that the robot's speed and turn limits allow.
@@ -68,6 +70,17 @@ def ramp_twist(
     linear = min(max(linear, last.linear - dv), last.linear + dv)
     angular = min(max(angular, last.angular - dw), last.angular + dw)
     return clamp_twist(robot, linear, angular)
+
+
+def approach_speed(left: float, deceleration: float, held: float) -> float:
+    """The speed with which what is left is gone through so as to stand at its end.
+
+    Args:
+        left: distance or angle to the end.
+        deceleration: the greatest, infinite without a limit.
+        held: time for which the command stands [s].
+    """
+    return min(left / held, math.sqrt(2.0 * _BRAKES * deceleration * max(left, 0.0)))
 
 
 def driven_twist(world: World) -> Twist:

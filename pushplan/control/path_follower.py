@@ -6,10 +6,10 @@ import math
 from dataclasses import dataclass
 
 from pushplan.control.episode_clock import EpisodeClock
-from pushplan.control.limits import TwistLimiter, clamp_twist, driven_twist
+from pushplan.control.limits import TwistLimiter, approach_speed, clamp_twist, driven_twist
 from pushplan.control.stage_follower import StageFollower
 from pushplan.control.tracking import Progress
-from pushplan.world import Drive, Plan, Twist, World
+from pushplan.world import Drive, Plan, RobotModel, Twist, World
 from pushplan.world.checks import number
 
 
@@ -20,8 +20,9 @@ class PathFollower:
     With offset d (left of the path positive), heading error ψ and path curvature κ the command is
     ω = v (κ cos ψ / (1 - κ d) - d / l² - 2 sin ψ / l): a critically damped return to the path over
     the distance l (the chained-form path follower of Samson, 1995, linearised). The curvature is
-    taken half a control period ahead, since a command is held for one. Ruckig keeps speed and
-    turn rate within the robot's acceleration limits.
+    taken half a control period ahead, since a command is held for one. The feedback turns no
+    faster than the robot can stop turning by the time that the error is gone, so that limits of
+    its turn acceleration bring no oscillation. Ruckig keeps speed and turn rate within the limits.
 
     Args:
         distance: l, in units of the robot's circumscribed radius.
@@ -72,23 +73,28 @@ class PathFollower:
         offset = math.cos(path_theta) * (y - path_y) - math.sin(path_theta) * (x - path_x)
         error = (theta - path_theta + math.pi) % (2.0 * math.pi) - math.pi
         length = self.distance * size
-        wanted = curvature * math.cos(error) / max(1.0 - curvature * offset, 0.2)
+        own = curvature * math.cos(error) / max(1.0 - curvature * offset, 0.2)
         # a large offset asks for a heading across the path, not for ever sharper turns
-        wanted -= max(min(offset / length**2, 1.2 / length), -1.2 / length)
-        wanted -= 2.0 * math.sin(error) / length
+        left = math.sin(error) + max(min(0.5 * offset / length, 0.6), -0.6)
+        wanted = own - 2.0 * left / length
         if abs(error) > math.pi / 2:
             wanted = -math.copysign(math.inf, error)
         if robot.drive is Drive.DIFFERENTIAL:
             if abs(error) > math.pi / 4:
-                turn = math.copysign(robot.max_turn_rate, -error)
-                return self._limit(clamp_twist(robot, 0.0, turn))
+                turn = self._approach(robot, abs(error))
+                return self._limit(clamp_twist(robot, 0.0, math.copysign(turn, -error)))
         elif robot.drive is Drive.CAR:
             sharpest = 1.0 / robot.min_turning_radius
             wanted = max(min(wanted, sharpest), -sharpest)
         if robot.can_stop:
             speed = min(speed, robot.max_turn_rate / max(abs(wanted), 1e-9))
         turn = max(min(speed * wanted, robot.max_turn_rate), -robot.max_turn_rate)
-        return self._limit(Twist(speed, turn))
+        back, most = turn - speed * own, self._approach(robot, abs(left))
+        return self._limit(Twist(speed, speed * own + max(min(back, most), -most)))
+
+    def _approach(self, robot: RobotModel, left: float) -> float:
+        """The turn rate from which the robot can stop turning within an angle."""
+        return approach_speed(left, robot.max_turn_acceleration, self._clock.held)
 
     def _prepare(self, world: World) -> Progress:
         """Start afresh in a new episode, or where the robot is another one."""

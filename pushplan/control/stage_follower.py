@@ -10,11 +10,10 @@ from dataclasses import replace
 import numpy as np
 
 from pushplan.control.episode_clock import EpisodeClock
-from pushplan.control.limits import ramp_twist
+from pushplan.control.limits import approach_speed, ramp_twist
 from pushplan.control.tracking import Progress
 from pushplan.world import Plan, RobotModel, Stage, Twist, World
 
-_BRAKES = 0.5  # fraction of the greatest deceleration that an end is approached with
 _WINDOW = 2.0  # of its progress [circumscribed radii]
 
 
@@ -82,7 +81,7 @@ class StageFollower:
         if stage.direction == 0:
             side = math.copysign(1.0, float(plan.turn_rates[stage.first]))
             left = progress.left_to_turn
-            return Twist(0.0, side * _approach(left, robot.max_turn_acceleration, held))
+            return Twist(0.0, side * approach_speed(left, robot.max_turn_acceleration, held))
         if self._part is None:
             self._part = _part(plan, stage)
         if stage.direction < 0:
@@ -92,16 +91,11 @@ class StageFollower:
             wanted = self._follow(world, self._part)
         if progress.is_last:
             return wanted
-        fastest = _approach(progress.left_of_stage, robot.max_acceleration, held)
+        fastest = approach_speed(progress.left_of_stage, robot.max_acceleration, held)
         if abs(wanted.linear) <= fastest:
             return wanted
         slower = fastest / abs(wanted.linear)
         return Twist(slower * wanted.linear, slower * wanted.angular)
-
-
-def _approach(left: float, deceleration: float, held: float) -> float:
-    """The speed with which what is left is driven so as to stand at the end."""
-    return min(left / held, math.sqrt(2.0 * _BRAKES * deceleration * max(left, 0.0)))
 
 
 def _part(plan: Plan, stage: Stage) -> Plan:

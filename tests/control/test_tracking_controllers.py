@@ -10,9 +10,16 @@ from conftest import make_robot, make_u_maze
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from pushplan.control import PathFollower, Progress, PurePursuit, TwistLimiter, clamp_twist
+from pushplan.control import (
+    MpcTracker,
+    PathFollower,
+    Progress,
+    PurePursuit,
+    TwistLimiter,
+    clamp_twist,
+)
 from pushplan.motion.dubins import along_arc
-from pushplan.world import Controller, InvalidInputError, Plan, StaticMap, Twist, World
+from pushplan.world import Controller, InvalidInputError, Plan, RobotModel, StaticMap, Twist, World
 
 FLOOR = StaticMap.build(bounds=[-50, -50, 50, 50])
 
@@ -148,6 +155,24 @@ def test_commands_stay_within_accelerations():
     for _ in range(60):
         now = limiter.step(Twist(0.2, 1.0), 0.05)
     assert (now.linear, now.angular) == (pytest.approx(0.2), pytest.approx(1.0))
+
+
+@pytest.mark.parametrize("controller", [PathFollower, PurePursuit, MpcTracker])
+@pytest.mark.parametrize("acceleration", [1.0, 3.0])
+def test_a_robot_that_turns_lazily_does_not_swing_about_the_plan(controller, acceleration):
+    quick = {"max_speed": 0.22, "max_turn_rate": 2.84, "max_acceleration": 0.5}
+    outline = 0.1 * np.array([(1, 1), (-1, 1), (-1, -1), (1, -1)])
+    robot = RobotModel.from_outline(
+        outline, mass=1.0, drive="differential", max_turn_acceleration=acceleration, **quick
+    )
+    world = make_u_maze(static=FLOOR, robot=robot, robot_pose=[0.0, 0.0, 0.0])
+    plan = arc_plan(world, [(3.0, 0.0)], spacing=0.02)
+    poses, commands = drive(
+        world.moved(robot_pose=[0.0, 0.1, 1.0]), plan, controller(), period=0.05, steps=240
+    )
+    late = slice(100, 200)
+    assert distance_to(plan, poses[late]).max() < 0.02
+    assert max(abs(one.angular) for one in commands[late]) < 0.1
 
 
 def test_limits_are_kept():
