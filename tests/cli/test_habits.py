@@ -19,6 +19,7 @@ from pushplan.world.libraries import EXTRAS
 ROOM = str(Path(__file__).parents[2] / "examples" / "room.yaml")
 USERS_MISTAKES = {
     "demo": [["--out", "FILE/demo"]],
+    "describe": [["no-suite"], ["maze-2d-3", "--for", "/no/such/model.zip", "--algorithm", "ppo"]],
     "doctor": [["--yaml"]],
     "run": [["maze-2d-3", "--policy", "nobody"], ["no-suite", "--policy", "straight"]],
     "teleop": [["no-suite"], ["maze-2d-3", "--out", "/no/such/folder/episode.npz"]],

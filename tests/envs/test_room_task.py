@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from dataclasses import replace
 from pathlib import Path
 
@@ -51,12 +52,10 @@ def test_the_file_says_what_there_is(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("simulator", ["pymunk", "mujoco"])
-def test_a_policy_gets_there(simulator: str) -> None:
-    results = bench(
-        [one for one in world_suite(ROOM.parent, simulator=simulator, preset="testbed").scenarios],
-        ["straight"],
-        workers=0,
-    )
+def test_a_policy_gets_there(simulator: str, tmp_path: Path) -> None:
+    shutil.copy(ROOM, tmp_path)
+    worlds = world_suite(tmp_path, simulator=simulator, preset="testbed")
+    results = bench(list(worlds.scenarios), ["straight"], workers=0)
     assert [row.reason for row in results.rows] == ["goal"]
 
 
