@@ -15,7 +15,7 @@ import yaml
 
 from pushplan.cli import main
 from pushplan.envs import make
-from pushplan.evaluation import JobSettings, run_episode
+from pushplan.evaluation import JobSettings, Results, run_episode
 from pushplan.evaluation.policies import parse_policy
 from pushplan.learned import learned_names
 from pushplan.metrics import compute
@@ -154,9 +154,13 @@ class TestStudies:
 
     @pytest.mark.slow
     def test_the_short_one_runs(self, tmp_path):
-        call = ["experiment", str(EXAMPLES / "study.yaml"), "--out", str(tmp_path / "study")]
-        assert main([*call, "--workers", "1"]) == 0
-        assert "mean_speed" in (tmp_path / "study" / "results.csv").read_text()
+        out = tmp_path / "study"
+        call = ["experiment", str(EXAMPLES / "study.yaml"), "--out", str(out), "--workers", "1"]
+        assert main(call) == 0
+        stored = Results.load(out)
+        assert not any(row.failed for row in stored.rows)
+        speeds = [stored.measured[row.job]["mean_speed"] for row in stored.rows]
+        assert all(0.0 < speed <= 0.15 for speed in speeds)
 
 
 @pytest.mark.warm("straight")
