@@ -159,7 +159,7 @@ class TestStudies:
         assert main(call) == 0
         stored = Results.load(out)
         assert not any(row.failed for row in stored.rows)
-        speeds = [stored.measured[row.job]["mean_speed"] for row in stored.rows]
+        speeds = [stored.measured[row.job]["my_metric.py:mean_speed"] for row in stored.rows]
         assert all(0.0 < speed <= 0.15 for speed in speeds)
 
 
