@@ -101,7 +101,7 @@ class Plan(ArrayRecord, CheckedFields):
         travel_cost: robot mass times path length [kg m].
         interaction_cost: expected sum of object mass times path length [kg m].
         object_poses: (N, K, 3) where the objects are expected to be at each time, or None where
-            the planner makes no prediction.
+            the planner makes no prediction. Fixed objects count as static and are left out.
         subtasks: the pushes in order, for manipulation.
     """
 
