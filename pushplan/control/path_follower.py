@@ -78,7 +78,7 @@ class PathFollower:
         left = math.sin(error) + max(min(0.5 * offset / length, 0.6), -0.6)
         wanted = own - 2.0 * left / length
         if abs(error) > math.pi / 2:
-            wanted = -math.copysign(math.inf, error)
+            left, wanted = error, -math.copysign(math.inf, error)
         if robot.drive is Drive.DIFFERENTIAL:
             if abs(error) > math.pi / 4:
                 turn = self._approach(robot, abs(error))

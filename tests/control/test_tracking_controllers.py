@@ -175,6 +175,16 @@ def test_a_robot_that_turns_lazily_does_not_swing_about_the_plan(controller, acc
     assert max(abs(one.angular) for one in commands[late]) < 0.1
 
 
+@pytest.mark.parametrize("heading", [2.0, 3.0, -3.1])
+def test_a_robot_that_faces_away_turns_as_sharply_as_it_can(heading):
+    world = make_u_maze(static=FLOOR)
+    plan = arc_plan(world, [(3.0, 0.0)])
+    x, y, theta = world.robot_pose
+    turned = world.moved(robot_pose=[x, y, theta + heading])
+    twist = PathFollower(period=0.8).command(turned, plan)
+    assert twist.angular == pytest.approx(-math.copysign(world.robot.max_turn_rate, heading))
+
+
 def test_limits_are_kept():
     car = make_robot()
     assert clamp_twist(car, -3.0, 9.0) == Twist(0.15, 0.105)
