@@ -84,7 +84,7 @@ def main() -> int:
     for run in wanted:
         runs.append(finished(run, options))
         if options.scores:
-            keep(runs[-1:], options.scores)
+            keep(runs[-1], options.scores)
     for scene in dict.fromkeys(run.scene for run in runs if run.episodes):
         text = report([run for run in runs if run.scene == scene and run.episodes])
         say(text)

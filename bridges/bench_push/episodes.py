@@ -5,7 +5,6 @@ from __future__ import annotations
 import csv
 import json
 import re
-from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -96,20 +95,18 @@ def recalled(run: Run, path: Path) -> Run:
     Raises:
         ValueError: if the file is not one of `keep`.
     """
-    episodes = {}
-    for key, values in _kept(path).items():
-        if key[:4] == (run.scene, run.variation, run.policy, run.most_steps):
-            if key[4] in run.seeds:
-                episodes[key[4]] = values
-    return replace(run, episodes=episodes)
-
-
-def keep(runs: Iterable[Run], path: Path) -> None:
-    """Write scores down, so that tables can be made and extended without the episodes."""
+    of_run = (run.scene, run.variation, run.policy, run.most_steps)
     kept = _kept(path)
-    for run in runs:
-        for seed, one in run.episodes.items():
-            kept[run.scene, run.variation, run.policy, run.most_steps, seed] = one
+    return replace(
+        run, episodes={k[4]: kept[k] for k in kept if k[:4] == of_run and k[4] in run.seeds}
+    )
+
+
+def keep(run: Run, path: Path) -> None:
+    """Write its scores down, so that tables can be made and extended without the episodes."""
+    kept = _kept(path)
+    for seed, one in run.episodes.items():
+        kept[run.scene, run.variation, run.policy, run.most_steps, seed] = one
     partial = path.with_suffix(".part")
     with partial.open("w", encoding="utf-8", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")

@@ -158,9 +158,9 @@ def test_scores_are_kept_and_gone_on_with(tmp_path: Path, monkeypatch: pytest.Mo
     one = dict.fromkeys([*names, "median_ms", "longest_ms"], 0.5)
     run = episodes.Run("maze", "5", "straight", range(4), 20_000, {1: one})
     file = tmp_path / "scores.csv"
-    episodes.keep([run], file)
+    episodes.keep(run, file)
     more = episodes.Run("maze", "5", "straight", range(4), 20_000, {3: {**one, "ours_E": 0.25}})
-    episodes.keep([more], file)
+    episodes.keep(more, file)
     found = episodes.recalled(episodes.Run("maze", "5", "straight", range(4), 20_000), file)
     assert found.missing == [0, 2] and found.values("ours_E") == {1: 0.5, 3: 0.25}
     other = episodes.recalled(episodes.Run("maze", "5", "straight", range(4), 10), file)
