@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
+from matplotlib import rcParams
 from matplotlib.figure import Figure
 from matplotlib.transforms import blended_transform_factory
 
@@ -15,6 +16,7 @@ from pushplan.evaluation.summary import PolicySummary
 from pushplan.metrics import Role, metric_names
 
 _LINE = 0.16  # height of a line [inch]
+_LETTERS = 46  # of the common size, in the width of the figure
 
 
 def draw_intervals(run: RunRecord) -> Figure:
@@ -27,9 +29,8 @@ def draw_intervals(run: RunRecord) -> Figure:
         if any(name in summary.metrics for summary in run.summaries):
             columns.setdefault(name[0], []).append(name)
     found = {(one.setting, one.policy): one for one in run.summaries}
-    policies = run.policies
     titled = len(run.titles) > 1
-    lines = len(run.titles) * (len(policies) + titled)
+    lines = sum(len(run.policies_in(setting)) + titled for setting in run.titles)
     figure = Figure(figsize=(COLUMN, _LINE * lines + 0.5), layout="constrained")
     panels = figure.subplots(1, 1 + len(columns), squeeze=False, sharey=True)[0]
     where = blended_transform_factory(figure.transFigure, panels[0].transData)
@@ -41,16 +42,19 @@ def draw_intervals(run: RunRecord) -> Figure:
             place = len(ticks)
             ticks[place] = ""
             box = {"facecolor": "white", "edgecolor": "none", "pad": 1.0}
-            text = panels[0].text(0.02, place, title, transform=where, va="center", bbox=box)
+            size = rcParams["font.size"] * min(1.0, _LETTERS / len(title))
+            text = panels[0].text(
+                0.02, place, title, transform=where, va="center", bbox=box, fontsize=size
+            )
             text.set_in_layout(False)  # it reaches over all panels
-        for index, policy in enumerate(policies):
+        for policy, index in run.policies_in(setting).items():
             if (summary := found.get((setting, policy))) is not None:
                 for axes, names in zip(panels, [[], *columns.values()], strict=True):
                     _bar(axes, summary, names, len(ticks), index)
             ticks[len(ticks)] = policy
     for axes, names in zip(panels, [["success"], *columns.values()], strict=True):
         axes.set_xlabel(names[0] if len(names) == 1 else names[0][0])
-        axes.locator_params(axis="x", nbins=3, steps=[1, 2, 5, 10])
+        axes.locator_params(axis="x", nbins=2, steps=[1, 2, 5, 10])
         axes.margins(x=0.08)
         tidy(axes)
     panels[0].set_xlim(-0.06, 1.06)

@@ -61,7 +61,7 @@ def write_page(
         title=_title(run),
         facts=_facts(run),
         style=Markup(_file("page.css")),
-        script=Markup(_file("page.js") + _file("replay.js") + "filter();\n"),
+        script=Markup(_file("page.js") + _file("replay.js") + "filter();\nchooseFirst();\n"),
         scores=[table for table in tables if table not in pairs],
         pairs=pairs,
         figures=[(c, p.name, Markup(_inline(p))) for c, p in figures.items()],

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -31,6 +31,8 @@ _TRACES = 300  # of so many episodes every planning call is read from the trace
 def write_plots(run: RunRecord, folder: Path, formats: Sequence[str] = ()) -> dict[str, Path]:
     """Draw everything that the rows allow, with where the rows come from in the files.
 
+    Figures show how episodes differ: there are none if no policy has two in a setting.
+
     Args:
         run: the rows.
         folder: where the files go.
@@ -45,6 +47,8 @@ def write_plots(run: RunRecord, folder: Path, formats: Sequence[str] = ()) -> di
     endings = [choice("figures", f".{one}", FORMATS) for one in formats]
     source = json.dumps({"runs": run.about.get("runs", []), "policies": run.about.get("policies")})
     plots: dict[str, Path] = {}
+    if max(map(len, grouped(run.rows).values()), default=0) < 2:
+        return plots
     for name, (caption, _) in FIGURES.items():
         if (figure := draw(run, name)) is None:
             continue
@@ -97,49 +101,50 @@ def _tradeoff(run: RunRecord) -> Figure | None:
                 zorder=5,
                 **dots(i),
             )
-        axes.set_xlabel(f"effort {names[0]} (1 = pushed nothing)")
-        axes.set_ylabel(f"efficiency {names[1]} (1 = shortest path)")
+        axes.set_xlabel("effort I (1 = pushed nothing)")
+        axes.set_ylabel("efficiency E (1 = shortest path)")
         axes.margins(0.08)
         axes.set_xlim(right=1.02)
         axes.set_ylim(top=max(1.03, axes.get_ylim()[1]))
 
-    if not any(values_of(run.rows, name) for name in ("I_nav", "I_manip")):
-        return None
-    return _panels(run, panel, legend=True)
+    return _panels(run, ("I_nav", "I_manip"), panel)
 
 
 def _spread(run: RunRecord) -> Figure | None:
-    """A box and all dots for each policy, one row of panels a metric."""
+    """A box and all dots for each policy: a row of panels a metric, a column a setting."""
     metrics = [name for name in metric_names(Role.SCORE, Role.DETAIL) if values_of(run.rows, name)]
     if not metrics:
         return None
-    settings = list(run.titles)
-    figure = Figure(figsize=(PANEL[0] * len(settings), 1.7 * len(metrics) + 0.6))
-    grid = figure.subplots(len(metrics), len(settings), squeeze=False)
+    columns = {
+        setting: [name for name in metrics if values_of(run.rows_of(setting), name)]
+        for setting in run.titles
+    }
+    lines = max(map(len, columns.values()))
+    figure = Figure(figsize=(PANEL[0] * len(columns), 1.7 * lines + 0.6))
+    grid = figure.subplots(lines, len(columns), squeeze=False)
     rng = np.random.default_rng(0)
-    for column, setting in enumerate(settings):
+    for column, (setting, names) in enumerate(columns.items()):
         rows = run.rows_of(setting)
-        for row, name in enumerate(metrics):
-            axes = grid[row][column]
-            _boxes(axes, run.policies, rows, name, rng)
-            if row == 0:
-                axes.set_title(run.titles[setting])
-            if column == 0:
-                axes.set_ylabel(heading(name))
-            if row < len(metrics) - 1:
-                axes.tick_params(labelbottom=False)
+        grid[0][column].set_title(run.titles[setting])
+        for axes, name in zip(grid[:, column], names, strict=False):
+            _boxes(axes, run.policies_in(setting), rows, name, rng)
+            axes.set_ylabel(heading(name))
+            axes.tick_params(labelbottom=name == names[-1])
+        for axes in grid[len(names) :, column]:
+            axes.set_axis_off()
     figure.tight_layout()
     return figure
 
 
 def _boxes(
-    axes: Any, labels: Sequence[str], rows: Sequence[ResultRow], name: str, rng: Any
+    axes: Any, policies: Mapping[str, int], rows: Sequence[ResultRow], name: str, rng: Any
 ) -> None:
-    for i, label in enumerate(labels):
+    """The values of a metric by policy; ``policies`` gives each its place in the palette."""
+    for i, (label, place) in enumerate(policies.items()):
         values = np.array(values_of([r for r in rows if r.policy == label], name))
         if len(values) == 0:
             continue
-        colour = dots(i)["color"]
+        colour = dots(place)["color"]
         axes.boxplot(
             [values],
             positions=[i],
@@ -156,20 +161,20 @@ def _boxes(
         axes.scatter(
             *(places, values),
             s=6,
-            **dots(i),
+            **dots(place),
             alpha=0.55,
             linewidths=0,
             zorder=3,
             rasterized=many,
         )
-    steep = len(labels) > 3
+    steep = len(policies) > 3
     axes.set_xticks(
-        range(len(labels)),
-        labels,
+        range(len(policies)),
+        list(policies),
         rotation=25 if steep else 0,
         ha="right" if steep else "center",
     )
-    axes.set_xlim(-0.6, len(labels) - 0.4)
+    axes.set_xlim(-0.6, len(policies) - 0.4)
     tidy(axes)
 
 
@@ -208,8 +213,6 @@ def _planning_time(run: RunRecord) -> Figure | None:
     Of long runs, each episode counts with its median and its slowest call.
     """
     read = len(run.rows) <= _TRACES
-    if not values_of(run.rows, "plan_time_median_s"):
-        return None
 
     def panel(axes: Any, rows: Sequence[ResultRow]) -> None:
         for i, label in enumerate(run.policies):
@@ -229,7 +232,7 @@ def _planning_time(run: RunRecord) -> Figure | None:
         axes.set_xlabel("time of a planning call [ms]")
         axes.set_ylabel("fraction of calls")
 
-    return _panels(run, panel, legend=True)
+    return _panels(run, ("plan_time_median_s",), panel)
 
 
 def _calls(run: RunRecord, row: ResultRow, read: bool) -> Any:
@@ -240,10 +243,16 @@ def _calls(run: RunRecord, row: ResultRow, read: bool) -> Any:
 
 
 def _panels(
-    run: RunRecord, draw: Callable[[Any, Sequence[ResultRow]], None], *, legend: bool
-) -> Figure:
-    """One panel a setting."""
-    settings = list(run.titles)
+    run: RunRecord, names: Sequence[str], draw: Callable[[Any, Sequence[ResultRow]], None]
+) -> Figure | None:
+    """One panel for each setting that has values of one of these columns, and a legend."""
+    settings = [
+        setting
+        for setting in run.titles
+        if any(values_of(run.rows_of(setting), name) for name in names)
+    ]
+    if not settings:
+        return None
     columns = min(2, len(settings))
     lines = math.ceil(len(settings) / columns)
     figure = Figure(figsize=(PANEL[0] * columns, PANEL[1] * lines + 0.4))
@@ -258,19 +267,18 @@ def _panels(
         axes.tick_params(labelbottom=lowest)
         axes.set_xlabel(axes.get_xlabel() if lowest else "")
         axes.set_ylabel("" if n % columns else axes.get_ylabel())
-    if legend:
-        found = dict[str, Any]()
-        for axes in grid:
-            for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
-                found.setdefault(label if len(settings) == 1 else label.split(" (")[0], handle)
-        figure.legend(
-            found.values(),
-            found.keys(),
-            loc="outside lower center",
-            ncols=abreast(PANEL[0] * columns, found),
-            frameon=False,
-        )
-        figure.set_layout_engine("constrained")
+    found = dict[str, Any]()
+    for axes in grid:
+        for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
+            found.setdefault(label if len(settings) == 1 else label.split(" (")[0], handle)
+    figure.legend(
+        found.values(),
+        found.keys(),
+        loc="outside lower center",
+        ncols=abreast(PANEL[0] * columns, found),
+        frameon=False,
+    )
+    figure.set_layout_engine("constrained")
     return figure
 
 

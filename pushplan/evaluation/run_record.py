@@ -45,6 +45,11 @@ class RunRecord:
         """The rows of one setting."""
         return [row for row in self.rows if row.setting == setting]
 
+    def policies_in(self, setting: str) -> dict[str, int]:
+        """Labels of the policies that ran in a setting -> their places in `policies`."""
+        ran = {row.policy for row in self.rows_of(setting)}
+        return {label: place for place, label in enumerate(self.policies) if label in ran}
+
     @functools.cached_property
     def summaries(self) -> list[PolicySummary]:
         """What the rows say about each policy in each setting."""

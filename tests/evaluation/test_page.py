@@ -13,9 +13,10 @@ import pytest
 from synthetic_rows import many_rows
 
 from pushplan.cli import main
-from pushplan.evaluation import Results, bench
+from pushplan.evaluation import Job, Results, bench, parse_policy, run_batch
 from pushplan.evaluation.page import page_data
 from pushplan.evaluation.replays import chosen
+from pushplan.scenarios import suite
 
 api = pytest.importorskip("playwright.sync_api", reason="needs Playwright")
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
@@ -160,6 +161,24 @@ def test_nothing_is_cut_off(browser: Any, folder: Path, width: int, scheme: str)
     )
     assert one.state("document.documentElement.scrollWidth") <= width
     assert one.state("isDark()") == (scheme == "dark")
+
+
+def test_single_episodes_of_several_tasks(browser: Any, tmp_path: Path) -> None:
+    tasks = {"maze-2d-3": "straight", "ship-ice-2d-10": "random"}
+    jobs = [
+        Job(parse_policy(policy), suite(name, episodes=1).scenarios[0])
+        for name, policy in tasks.items()
+    ]
+    run_batch(jobs, out=tmp_path, workers=0)
+    results = Results.load(tmp_path)
+    names = [label.get_text() for label in results.figure("intervals").axes[0].get_yticklabels()]
+    assert names == ["", "straight", "", "random"]  # each only in its own task
+    one = Opened(browser, results.report(), viewport={"width": 390, "height": 800})
+    assert not list(tmp_path.glob("*.svg"))
+    assert one.page.locator("#figures").count() == 0
+    one.page.wait_for_function("player.views.length === 1 && player.time === player.end")
+    assert one.state("document.documentElement.scrollWidth") <= 390
+    assert one.wrong == []
 
 
 @pytest.mark.slow

@@ -165,7 +165,7 @@ for (const id of ["find", "setting", "outcome", "measure"]) $(id).addEventListen
 // ---- the chosen episode
 function choose(one, policy) {
   const row = one.rows[policy];
-  if (row < 0) return;
+  if (row < 0) return null;
   const rows = data.rows;
   const list = make("dl");
   const say = (name, ...parts) => { const dd = make("dd"); dd.append(...parts); list.append(make("dt", name), dd); };
@@ -182,7 +182,18 @@ function choose(one, policy) {
   if (files.length) say("files", ...files);
   say("again", make("code", `pushplan reproduce ${data.folder} --job ${rows.job[row].slice(0, 12)}`));
   $("chosen").replaceChildren(list);
-  showReplays(one, policy);
+  return showReplays(one, policy);
+}
+
+function chooseFirst() { // the first episode in the matrix that has a replay, as it ended
+  for (const [line, one] of state.shown.entries()) {
+    const column = one.rows.findIndex((row) => row >= 0 && data.rows.replay[row] === 1);
+    if (column < 0) continue;
+    Object.assign(state, { line, column });
+    draw();
+    choose(one, column).then(() => seek(player.end));
+    return;
+  }
 }
 
 // ---- keys
