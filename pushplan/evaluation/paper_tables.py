@@ -34,29 +34,31 @@ def preface(results: Results, command: str = "") -> str:
 # Beside the Bench-Push paper
 
 {made} {date.today().isoformat()} ({machine}, pushplan {pushplan.__version__}), {span} of \
-each suite. Which numbers of the paper are used, and where they stand there, is data: \
-`pushplan/evaluation/data/bench_push.yaml`.
+each suite. `pushplan/evaluation/data/bench_push.yaml` holds the numbers of the paper and where \
+they stand in it.
 
-- **Rows**: first the policies of the paper, in its own simulator and with its own metrics (mean ± \
-standard deviation, or medians read off its plots), then ours on the suite named in the heading: \
-mean ± standard deviation with the 95 % bootstrap interval of the mean, success with Wilson's. \
-Every policy of ours gets the same scenarios; no network was trained or validated on them.
-- **▲**: above the best of the paper (in simulation, robots left out): with the whole interval, or \
-with the median where the paper's value is a median. S: at least the best. I: only among those, \
+- **Rows**: the policies of the paper come first, in its simulator and by its metrics (mean ± \
+standard deviation, or medians read off its plots). Ours follow, on the suite that the heading \
+names: mean ± standard deviation with the 95 % bootstrap interval of the mean, success with \
+Wilson's interval. All policies of ours get the same scenarios, which no network saw in training \
+or validation.
+- **▲**: above the best of the paper in simulation, with the whole interval, or with the median \
+where the paper's value is a median. S counts if it equals the best. I counts only for policies, \
 ours and the paper's, that succeed in nine of ten episodes or bring nine of ten boxes home.
-- **E_nav**: the paper's l₀\\* ends at the goal's centre, so its values stand under *E_nav to goal \
-point*. Its code finds it on a grid whose diagonal steps count 1, which makes it shorter: in the \
-2D maze it gives 4 to 7 % less than our E_nav on the same trajectory, measured inside the original \
-environment ([how](bench-push.md)); in the 3D testbed, on most starts, it lies between our two \
-columns. Both are held against the paper's ([conventions](metrics.md)): a lead of less than 7 % in \
-E_nav says nothing in the 2D maze.
-- **time a step [ms]**: from world to action, without simulation: making the observation, if the \
-policy asks for one, and the policy's own call. Median over episodes of the median step, then the \
-mean and the slowest step. A network that holds a decision for several steps counts in the median \
-with the steps in which it decides; a planner's slowest step is the one in which it plans.
-- **training**: decisions taken in training and its time, by the model card.
-- The scores are those of [metrics](metrics.md), to be read together: I is 1 for a robot that does \
-nothing. The paper gives no success in navigation; E_nav is 0 without it.
+- **E_nav**: the paper's l₀\* ends at the goal's centre, so its values stand under *E_nav to goal \
+point*. Its code finds l₀\* on a grid whose diagonal steps cost 1, which shortens it. In the 2D \
+maze its E_nav is 4 to 7 % below ours on the same trajectory, measured inside the original \
+environment ([how](bench-push.md)). In the 3D testbed it lies between our two columns on most \
+starts. Both columns are compared with the paper's ([conventions](metrics.md)); a lead of less \
+than 7 % in E_nav says nothing in the 2D maze.
+- **time a step [ms]**: from world to action without simulation, which is the observation, if the \
+policy uses one, and the policy's call. The first value is the median over episodes of the median \
+step; the mean and the slowest step follow. A network that holds a decision for several steps \
+counts in the median with the steps in which it decides. A planner's slowest step is the one in \
+which it plans.
+- **training**: decisions taken in training, and its duration, from the model card.
+- Read the [scores](metrics.md) together: I is 1 for a robot that does nothing. The paper reports \
+no success in navigation; here E_nav is 0 without success.
 """
 
 
