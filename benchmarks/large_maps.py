@@ -16,6 +16,8 @@ from collections.abc import Callable, Iterator, Sequence
 import numpy as np
 import shapely
 
+from pushplan.drawing.figure import COLUMN, DPI, STYLE
+from pushplan.drawing.palette import DASHES, MARKERS
 from pushplan.planners import make_planner, warm_up
 from pushplan.world import (
     Deadline,
@@ -167,17 +169,21 @@ def draw_growth(path: str, planners: Sequence[str], calls: int) -> None:
     """Write a figure of median times on new maps, against polygons and against objects."""
     import matplotlib.pyplot as plt
 
+    plt.rcParams.update(STYLE)
     counts = {"polygons": (125, 250, 500, 1000, 2000, 4000), "objects": (0, 125, 250, 500, 1000)}
     makers: dict[str, Callable[[int], tuple[MakeMap, int]]] = {
         "polygons": lambda count: (lambda rng: posts(count, rng), 0),
         "objects": lambda count: (hall, count),
     }
-    figure, axes = plt.subplots(1, 2, figsize=(8.0, 3.0), layout="constrained", sharey=True)
+    figure, axes = plt.subplots(
+        1, 2, figsize=(2.0 * COLUMN, 2.6), layout="constrained", sharey=True
+    )
     for axis, (kind, numbers) in zip(axes, counts.items(), strict=True):
         for name in planners:
             times = [measure(name, *makers[kind](count), calls)[0] for count in numbers]
             middle = [1e3 * np.percentile(values, 50, method="higher") for values in times]
-            axis.plot(numbers, middle, "o-", label=name)
+            index = planners.index(name)
+            axis.plot(numbers, middle, label=name, linestyle=DASHES[index], marker=MARKERS[index])
             print(
                 kind,
                 name,
@@ -186,8 +192,8 @@ def draw_growth(path: str, planners: Sequence[str], calls: int) -> None:
         axis.axhline(50.0 if kind == "polygons" else 100.0, color="0.6", linestyle=":")
         axis.set(xlabel=kind, yscale="log")
     axes[0].set_ylabel("first plan, new map [ms]")
-    axes[0].legend(fontsize=8)
-    figure.savefig(path, dpi=90)
+    axes[0].legend()
+    figure.savefig(path, dpi=DPI)
 
 
 def main() -> None:

@@ -1,11 +1,11 @@
-"""The front of (E_nav, I_nav) in the maze, drawn by sweeping the price of pushing.
+"""The front of (E_nav, I_nav) in the maze, drawn by sweeping the weight of pushing.
 
 Usage::
 
     python benchmarks/pareto_maze.py [--episodes 50] [--boxes 10] [--weights 0.5,1,2.5,5,10]
 
 Closed-loop episodes of the 2D benchmark preset, U-shape, with the turn rate at constant speed:
-`push-aware-constant-speed` and `kinodynamic-rrt` with the same prices w. Prints a table in
+`push-aware-constant-speed` and `kinodynamic-rrt` with the same weights w. Prints a table in
 Markdown and writes a picture.
 """
 
@@ -22,17 +22,19 @@ matplotlib.use("Agg")
 
 from matplotlib import pyplot as plt
 
+from pushplan.drawing.figure import COLUMN, DPI, STYLE
+from pushplan.drawing.palette import DASHES, MARKERS
 from pushplan.evaluation import PolicySpec, bench, bootstrap_interval
 from pushplan.planners.following.plan_follower import PlanFollower
 from pushplan.planners.push_aware import PushAware, PushAwareConfig, cautious_model
 from pushplan.planners.push_aware.policies import push_aware_constant_speed
 from pushplan.planners.rrt import KinodynamicRRT, KinodynamicRRTConfig
 
-NAMES = {"push-aware-constant-speed": "o-", "kinodynamic-rrt": "s--"}
+NAMES = ("push-aware-constant-speed", "kinodynamic-rrt")
 
 
 def policy(name: str, weight: float) -> PlanFollower:
-    """A policy with this price of pushing."""
+    """A policy with this weight of pushing."""
     if name == "kinodynamic-rrt":
         return PlanFollower(KinodynamicRRT(KinodynamicRRTConfig(push_weight=weight)))
     return push_aware_constant_speed(
@@ -62,9 +64,10 @@ def main() -> None:
     rows = bench(
         suite, specs, episodes=options.episodes, seed=options.seed, workers=options.workers
     ).rows
-    figure, axes = plt.subplots(figsize=(4.6, 3.4), dpi=90, layout="constrained")
+    plt.rcParams.update(STYLE)
+    figure, axes = plt.subplots(figsize=(COLUMN, 2.6), layout="constrained")
     sys.stdout.write("| policy | w | success | E_nav | I_nav |\n|---|---|---|---|---|\n")
-    for name, style in NAMES.items():
+    for name, marker, dashes in zip(NAMES, MARKERS, DASHES, strict=False):
         front = []
         for weight in weights:
             mine = [row for row in rows if row.policy == spec(name, weight).label]
@@ -77,13 +80,13 @@ def main() -> None:
             ]
             success = np.mean([row.success for row in mine])
             sys.stdout.write(f"| `{name}` | {weight:g} | {success:.2f} | {' | '.join(cells)} |\n")
-        axes.plot(*np.array(front).T, style, label=name, markersize=4)
+        axes.plot(*np.array(front).T, label=name, marker=marker, linestyle=dashes, markersize=4)
         for weight, at in zip(weights, front, strict=True):
             axes.annotate(f"{weight:g}", at, fontsize=7, textcoords="offset points", xytext=(3, 3))
     axes.set(xlabel="E_nav", ylabel="I_nav", title=f"{suite}, {options.episodes} episodes, by w")
-    axes.legend(fontsize=8)
+    axes.legend()
     axes.grid(alpha=0.3)
-    figure.savefig(options.picture)
+    figure.savefig(options.picture, dpi=DPI)
 
 
 if __name__ == "__main__":

@@ -31,6 +31,7 @@ STYLE: Any = {
     "font.size": 8.0,
     "axes.grid": False,
     "axes.linewidth": 0.6,
+    "axes.prop_cycle": f"cycler(color={list(SERIES)})",
     "axes.titlesize": 8.0,
     "legend.fontsize": 7.5,
     "svg.fonttype": "none",

@@ -8,6 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from pushplan.drawing.figure import COLUMN, DPI, STYLE
 from pushplan.learned.sb3_saving import attach
 from pushplan.training.libraries import chosen_device, hardware, parameter_count
 from pushplan.training.policies.config import IMITATING, TrainingConfig
@@ -119,33 +120,35 @@ def specification_of(run: TrainingRun, **facts: Any) -> Any:
 
 def _draw(run: TrainingRun) -> None:
     """Draw return and success over decisions, for training and validation."""
+    from matplotlib import rc_context
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
     points, algorithm = run.curve, run.config.algorithm
     if not points:
         return
-    figure: Any = Figure(figsize=(8.0, 3.2), layout="constrained")
-    FigureCanvasAgg(figure)
-    returns, fractions = figure.subplots(1, 2)
-    returns.set_ylabel("reward of an episode")
-    steps = [point.steps for point in points]
-    for axes, name, style, label in (
-        (returns, "train_return", ".-", "training"),
-        (returns, "valid_return", "o-", "validation"),
-        (fractions, "train_success", ".-", "success, training"),
-        (fractions, "valid_success", "o-", "success"),
-        (fractions, "valid_share", "--", "sub-tasks done"),
-    ):
-        axes.plot(steps, [getattr(p, name) for p in points], style, label=label, lw=1, ms=3)
-    fractions.set_ylim(-0.02, 1.02)
-    for axes in (returns, fractions):
-        axes.set_xlabel("pairs" if algorithm in IMITATING else "decisions")
-        axes.locator_params(axis="x", nbins=6)
-        axes.grid(alpha=0.3)
-        axes.legend(fontsize=8)
-    figure.suptitle(f"{run.config.task}, {algorithm}", fontsize=10)
-    figure.savefig(str(run.path(PICTURE)), dpi=110)
+    with rc_context(STYLE):
+        figure: Any = Figure(figsize=(2.0 * COLUMN, 2.6), layout="constrained")
+        FigureCanvasAgg(figure)
+        returns, fractions = figure.subplots(1, 2)
+        returns.set_ylabel("reward of an episode")
+        steps = [point.steps for point in points]
+        for axes, name, style, label in (
+            (returns, "train_return", ".-", "training"),
+            (returns, "valid_return", "o-", "validation"),
+            (fractions, "train_success", ".-", "success, training"),
+            (fractions, "valid_success", "o-", "success"),
+            (fractions, "valid_share", "--", "sub-tasks done"),
+        ):
+            axes.plot(steps, [getattr(p, name) for p in points], style, label=label, lw=1, ms=3)
+        fractions.set_ylim(-0.02, 1.02)
+        for axes in (returns, fractions):
+            axes.set_xlabel("pairs" if algorithm in IMITATING else "decisions")
+            axes.locator_params(axis="x", nbins=6)
+            axes.grid(alpha=0.3)
+            axes.legend()
+        figure.suptitle(f"{run.config.task}, {algorithm}")
+    figure.savefig(str(run.path(PICTURE)), dpi=DPI)
 
 
 def _finish(
