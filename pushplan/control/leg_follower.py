@@ -230,7 +230,7 @@ class LegFollower:
             self._away = []
             self._take_up()
             return None
-        self.steady = 0.0
+        self.steady = left / abs(speed)
         return clamp_twist(robot, math.copysign(min(left / held, abs(speed)), speed), 0.0)
 
 

@@ -15,7 +15,6 @@ from pushplan.world.checks import FloatArray
 from pushplan.world.outline import transform
 
 _ESCAPES = 2  # how often one action makes room for a turn
-_LONGEST = 5  # control steps for which a command may stand
 
 
 def _motion(robot: RobotModel, points: FloatArray, period: float) -> Motion:
@@ -23,7 +22,7 @@ def _motion(robot: RobotModel, points: FloatArray, period: float) -> Motion:
 
     def next_command(pose: FloatArray, time: float, held: bool) -> tuple[Twist, float] | None:
         command = follower.command(pose, time, period, stopped=held)
-        steps = min(max(1, int(follower.steady / period + 1e-9)), _LONGEST)
+        steps = max(1, int(follower.steady / period + 1e-9))
         return None if command is None else (command, steps)
 
     return next_command

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Mapping, Sequence
 from functools import partial
@@ -28,6 +29,7 @@ from pushplan.world import (
     PushplanError,
     Receptacle,
     ScenarioError,
+    Twist,
     UnknownNameError,
     World,
     stream,
@@ -36,6 +38,7 @@ from pushplan.world.checks import frozen, integer, number
 from pushplan.world.lazy_names import look_up
 
 _SEED_LIMIT = 2**31
+_LONGEST = 5.0  # control steps for which a command stands that may touch something
 
 
 class EpisodeOverError(PushplanError, gymnasium.error.ResetNeeded):
@@ -276,11 +279,10 @@ class PushEnv(gymnasium.Env[NDArray[Any], NDArray[Any]]):
         before, simulator, roster = self.true_world, self._simulator, self._roster
         traces = []
         touched = held = now_held = False
-        several = simulator.is_exact and not self.task.objects_leave
         now = before.time
         while (wanted := motion(simulator.robot_pose, now, now_held)) is not None:
             command, periods = wanted
-            duration = self.task.control_step * (periods if several else min(periods, 1))
+            duration = self._stands_for(command, periods)
             self._meanwhile = self._mode.afterwards(command)
             traces.append(roster.widen(simulator.step(command, duration)))
             now = float(traces[-1].times[-1])
@@ -306,6 +308,18 @@ class PushEnv(gymnasium.Env[NDArray[Any], NDArray[Any]]):
             outcome.truncated,
             _info(outcome, work, held),
         )
+
+    def _stands_for(self, command: Twist, periods: float) -> float:
+        """How long a command stands [s] that may stand for some control steps.
+
+        Long where the robot touches nothing; otherwise the robot may be held, or an object leave.
+        """
+        period = self.task.control_step
+        if periods <= 1.0 or not self._simulator.is_exact:
+            return period * min(periods, 1.0)
+        clear = self._simulator.clear_for(command, period * periods)
+        most = 1.0 if self.task.objects_leave else min(periods, _LONGEST)
+        return period * max(most, math.floor(clear / period + 1e-9))
 
     def _observe(self, world: World) -> NDArray[Any]:
         began = time.perf_counter()

@@ -43,8 +43,10 @@ def driven(name, action, pose, static=ROOM):
     motion = m.start(m.read(action), world)
     poses, time = [np.array(pose, dtype=float)], 0.0
     while (wanted := motion(poses[-1], time, False)) is not None:
-        poses.append(advanced(poses[-1], wanted[0], 0.15 * wanted[1]))
-        time += 0.15 * wanted[1]
+        twist, duration = wanted[0], 0.15 * wanted[1]
+        start = poses[-1]
+        poses += [advanced(start, twist, f * duration) for f in np.linspace(0.1, 1.0, 10)]
+        time += duration
     return np.array(poses)
 
 

@@ -147,6 +147,10 @@ def test_variations():
     np.testing.assert_array_equal(world.robot_pose, (2.5, 1.0, 1.2))
     assert world.goal.point[1] == 11.0
     assert task(goal_distance=39.0).goal.point[1] == 40.0
+    long = task(channel_length=60.0, goal_distance=59.0)
+    assert long.goal.point[1] == 60.0
+    floes = long.start(np.random.default_rng(0)).movables.poses
+    assert 55.0 < floes[:, 1].max() < 60.0
 
 
 @pytest.mark.parametrize(
@@ -160,6 +164,7 @@ def test_variations():
         ({"clumping": 1.5}, ScenarioError, "clumping"),
         ({"goal_distance": 0.0}, ScenarioError, "goal_distance"),
         ({"goal_distance": 40.0}, ScenarioError, "at most 39 m"),
+        ({"channel_length": 8.9}, ScenarioError, "at least 9 m"),
         ({"start_x": 13.0}, ScenarioError, r"start_x must lie in the channel, \[0, 12\]"),
         ({"start_x": "left"}, ScenarioError, "start_x"),
         ({"start_heading": float("inf")}, ScenarioError, "start_heading"),

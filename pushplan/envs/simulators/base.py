@@ -102,6 +102,13 @@ class Simulator(ABC):
         something static; `held` then says so.
         """
 
+    def clear_for(self, command: Twist, limit: float) -> float:
+        """How long [s], at most ``limit``, the robot certainly touches nothing at this velocity.
+
+        Meanwhile nothing but the robot moves. An engine that cannot tell says 0.
+        """
+        return 0.0
+
     @abstractmethod
     def follow(self, path: ArrayLike) -> Interaction:
         """Put the robot at the first of (N, 3) poses and sweep it through the others.

@@ -108,6 +108,7 @@ class PymunkDriver:
         start: FloatArray,
         active: IntArray,
         counts: tuple[int, int],
+        course: float,
     ) -> FloatArray:
         """Run the substeps of one step.
 
@@ -117,13 +118,15 @@ class PymunkDriver:
             start: (1 + A, 6) rows of the robot and the objects that are simulated.
             active: (A,) indices of those objects.
             counts: samples, and substeps between two of them.
+            course: direction in the world [rad] that the robot keeps, if it keeps one.
 
         Returns:
             (samples, 1 + A, 6) rows.
         """
-        rows = self._run(command, duration, start, active, counts, careful=False)
+        held = course if self._holds_direction else None
+        rows = self._run(command, duration, start, active, counts, held, careful=False)
         if rows is None:
-            rows = self._run(command, duration, start, active, counts, careful=True)
+            rows = self._run(command, duration, start, active, counts, held, careful=True)
             assert rows is not None
         return rows
 
@@ -134,6 +137,7 @@ class PymunkDriver:
         start: FloatArray,
         active: IntArray,
         counts: tuple[int, int],
+        held: float | None,
         *,
         careful: bool,
     ) -> FloatArray | None:
@@ -147,7 +151,6 @@ class PymunkDriver:
         h = duration / (samples * each)
         half = 0.5 * w * h
         # the chord of an arc is shorter than the arc by sin(x) / x
-        held = float(start[0, 2]) if self._holds_direction else None
         chord = command.linear * (math.sin(half) / half if half and held is None else 1.0)
         bodies.load(active, start)
         self.held = False

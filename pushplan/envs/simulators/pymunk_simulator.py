@@ -13,15 +13,17 @@ from pushplan.envs.simulators.base import Materials, Simulator, SimulatorState, 
 from pushplan.envs.simulators.momentum import Momentum
 from pushplan.envs.simulators.pymunk_bodies import PymunkBodies
 from pushplan.envs.simulators.pymunk_drive import PymunkDriver, PymunkOptions
-from pushplan.envs.simulators.reach import footprint_gap, struck, within_reach
+from pushplan.envs.simulators.reach import arc_pose, clear_time, struck, within_reach
 from pushplan.envs.trace import Trace
-from pushplan.geometry.obstacles import obstacle_distance, obstacles_of
+from pushplan.geometry.obstacles import obstacles_of
 from pushplan.interaction.model import Interaction
 from pushplan.world import Twist, World
 from pushplan.world.checks import BoolArray, FloatArray, IntArray, frozen, number
 
 _GLIDE_SAMPLES = 4
-"""Poses recorded in a step in which nothing can happen; one where the robot drives straight."""
+"""Poses recorded at least in a step in which the robot turns and touches nothing."""
+_GLIDE_TURN = 0.15
+"""Turn between two of them at most [rad]; driving, they are at most a robot's radius apart."""
 _SAMPLED = 24.0  # steps of fewer substeps than this are sampled more coarsely
 _LEAST_SIZE = 0.01
 """Objects far smaller than this fraction of the robot or of the others do not refine the steps."""
@@ -85,26 +87,64 @@ class PymunkSimulator(Simulator):
         radius = self._world.robot.circumscribed_radius
         speed = abs(command.linear) + abs(command.angular) * radius
         own = self._object_speeds() * duration
-        loaded = self._in_reach(speed * duration, own)
         self._held = self._touched = False
-        if not loaded.any() and self._far_from_static(speed * duration):
-            return self._glide(command, duration)
+        clear = self.clear_for(command, duration)
+        if clear >= duration:
+            turn, way = abs(command.angular) * duration, abs(command.linear) * duration
+            samples = max(1, math.ceil(turn / _GLIDE_TURN), math.ceil(way / radius))
+            poses = self._glide(command, duration, max(samples, _GLIDE_SAMPLES if turn else 1))
+            return self._traced(duration, poses, self._resting(len(poses)))
         wanted = self._substeps(max(speed * duration, own.max(initial=0.0)), duration)
         samples = max(2, math.ceil(self.options.samples * min(1.0, wanted / _SAMPLED)))
         each = max(1, math.ceil(wanted / samples))
+        free = int(samples * clear / duration)  # samples before anything is touched
+        course = float(self._rows[0, 2])
+        robot = self._glide(command, duration * free / samples, free)
+        left = samples - free
+        rest = duration * left / samples
+        loaded = self._in_reach(speed * rest, own)
         while True:
             active = np.flatnonzero(loaded)
             start = self._start(active)
-            found = self._driver.run(command, duration, start, active, (samples, each))
-            paths = np.repeat(self._rows[None, 1:, :3], samples, axis=0)
+            found = self._driver.run(command, rest, start, active, (left, each), course)
+            paths = self._resting(left)
             paths[:, active] = found[:, 1:, :3]
             missed = self._struck(loaded, paths)
             if not missed.any():
                 break
             loaded |= missed
+        paths = np.concatenate([self._resting(free), paths])
         self._keep(active, found[-1])
         self._held, self._touched = self._driver.held, self._driver.touched
-        return self._traced(duration, found[:, 0, :3], paths)
+        return self._traced(duration, np.concatenate([robot, found[:, 0, :3]]), paths)
+
+    def clear_for(self, command: Twist, limit: float) -> float:
+        """How long the robot certainly touches nothing, as `Simulator.clear_for`."""
+        held = self.options.holds_direction
+        return self._clear_time(self._rows[0, 2], command.linear, command.angular, held, limit)
+
+    def _clear_time(
+        self, course: float, linear: float, angular: float, holds: bool, limit: float
+    ) -> float:
+        if self._object_speeds().any():
+            return 0.0
+        robot, movables = self._world.robot, self._world.movables
+        return clear_time(
+            self._rows[0, :3],
+            course,
+            linear,
+            angular,
+            holds,
+            limit,
+            self.options.travel * self._size,
+            robot.vertices,
+            robot.offsets,
+            np.ascontiguousarray(self._rows[1:, :3]),
+            movables.vertices,
+            movables.offsets,
+            movables.radii,
+            self._obstacles,
+        )
 
     def _substeps(self, travel: float, duration: float) -> float:
         """How many substeps a step needs in which some point moves by ``travel`` [m]."""
@@ -112,28 +152,22 @@ class PymunkSimulator(Simulator):
         by_travel = travel / (self.options.travel * self._size)
         return max(by_travel, duration * decay / self.options.decay)
 
-    def _glide(self, command: Twist, duration: float) -> Trace:
-        """A step in which nothing can touch the robot."""
-        samples = _GLIDE_SAMPLES if command.angular else 1
+    def _glide(self, command: Twist, duration: float, samples: int) -> FloatArray:
+        """(samples, 3) poses of a robot that touches nothing; it ends at the last one."""
         poses = np.empty((samples, 3))
-        x, y, theta = self._rows[0, :3].tolist()
-        turn = command.angular * duration / samples
-        half = 0.5 * turn
-        chord = command.linear * duration / samples
-        held = theta if self.options.holds_direction else None
-        if held is None and half:
-            chord *= math.sin(half) / half
+        start, v, w = self._rows[0, :3].copy(), command.linear, command.angular
         for i in range(samples):
-            middle = theta + half if held is None else held
-            x += chord * math.cos(middle)
-            y += chord * math.sin(middle)
-            theta += turn
-            poses[i] = x, y, theta
-        v = command.linear
-        self._rows[1:, 3:] = 0.0
-        self._rows[0] = x, y, theta, v * math.cos(theta), v * math.sin(theta), command.angular
-        paths = np.repeat(self._rows[None, 1:, :3], samples, axis=0)
-        return self._traced(duration, poses, paths)
+            time = duration * (i + 1) / samples
+            arc_pose(start, start[2], v, w, self.options.holds_direction, time, poses[i])
+        if samples:
+            theta = poses[-1, 2]
+            self._rows[1:, 3:] = 0.0
+            self._rows[0] = *poses[-1], v * math.cos(theta), v * math.sin(theta), w
+        return poses
+
+    def _resting(self, samples: int) -> FloatArray:
+        """(samples, K, 3) poses of the objects where nothing moves them."""
+        return np.repeat(self._rows[None, 1:, :3], samples, axis=0)
 
     def _traced(self, duration: float, robot: FloatArray, paths: FloatArray) -> Trace:
         times = self._time + duration * np.arange(1, len(robot) + 1) / len(robot)
@@ -147,6 +181,8 @@ class PymunkSimulator(Simulator):
         What has become slower than can matter has stopped.
         """
         velocities = self._rows[1:, 3:]
+        if not velocities.any():
+            return np.zeros(len(velocities))
         turning = np.abs(velocities[:, 2]) * self._world.movables.radii
         speeds: FloatArray = np.hypot(velocities[:, 0], velocities[:, 1]) + turning
         speeds[speeds < _REST * self._size] = 0.0
@@ -177,21 +213,6 @@ class PymunkSimulator(Simulator):
             movables.vertices,
             movables.offsets,
             movables.radii,
-        )
-
-    def _far_from_static(self, reach: float) -> bool:
-        x, y = self._rows[0, 0], self._rows[0, 1]
-        robot, shapes = self._world.robot, self._obstacles
-        gap = obstacle_distance(x, y, shapes)
-        if gap > robot.circumscribed_radius + reach:
-            return True
-        return reach < footprint_gap(
-            self._rows[0, :3],
-            robot.vertices,
-            robot.offsets,
-            shapes.vertices,
-            shapes.offsets,
-            shapes.radii,
         )
 
     def _start(self, active: IntArray) -> FloatArray:
@@ -225,14 +246,16 @@ class PymunkSimulator(Simulator):
         duration = max(length / robot.max_speed, abs(turn) / robot.max_turn_rate)
         if duration == 0.0:
             return True
-        reach = length + abs(turn) * robot.circumscribed_radius
-        own = self._object_speeds() * duration
-        loaded = self._in_reach(reach, own)
-        if not loaded.any() and self._far_from_static(reach):
+        course = math.atan2(dy, dx)
+        clear = self._clear_time(course, length / duration, turn / duration, True, duration)
+        if clear >= duration:
             self._rows[1:, 3:] = 0.0
             self._rows[0, :3] = b
             self._time += duration
             return True
+        reach = length + abs(turn) * robot.circumscribed_radius
+        own = self._object_speeds() * duration
+        loaded = self._in_reach(reach, own)
         count = max(1, math.ceil(reach / (self.options.travel * self._size)))
         h = duration / count
         velocity = (dx / duration, dy / duration, turn / duration)

@@ -8,8 +8,11 @@ import numpy as np
 
 from pushplan.compiled import kernel
 from pushplan.geometry import convex_distance, convex_overlap
+from pushplan.geometry.obstacles import Obstacles, core_distance
 from pushplan.geometry.transforms import transform_points
 from pushplan.world.checks import BoolArray, FloatArray, IntArray
+
+_ADVANCES = 64  # looks at the gap at most
 
 
 @kernel(allocates=True)
@@ -58,24 +61,99 @@ def within_reach(
 
 
 @kernel(allocates=True)
-def footprint_gap(
+def clear_time(
     robot: FloatArray,  # (3,) pose of the robot
+    course: float,  # in which direction of the world it begins to go [rad]
+    linear: float,  # its speed in this direction [m/s]
+    angular: float,  # its turn rate [rad/s]
+    holds: bool,  # whether it keeps its course; else this turns with it
+    limit: float,  # no longer than this [s]
+    margin: float,  # distance that counts as contact [m]
     parts: FloatArray,  # corners of its footprint, body frame
     part_offsets: IntArray,  # where each part starts
-    vertices: FloatArray,  # corners of the cores of the obstacles, world frame
-    offsets: IntArray,  # where each core starts
-    radii: FloatArray,  # how far each obstacle reaches beyond its core [m]
+    rows: FloatArray,  # (K, 3) poses of the objects
+    vertices: FloatArray,  # corners of the objects, body frames
+    offsets: IntArray,  # where each object starts
+    radii: FloatArray,  # (K,) their circumscribed radii [m]
+    obstacles: Obstacles,  # what is static
 ) -> float:
-    """Distance [m] between the robot's footprint and what is static, 0 or less where they touch."""
-    corners = np.empty_like(parts)
-    transform_points(robot, parts, corners)
-    best = math.inf
-    for k in range(radii.shape[0]):
-        core = vertices[offsets[k] : offsets[k + 1]]
-        for p in range(part_offsets.shape[0] - 1):
-            part = corners[part_offsets[p] : part_offsets[p + 1]]
-            best = min(best, convex_distance(part, core) - radii[k])
-    return best
+    """Time [s] for which a robot that drives an arc certainly touches nothing.
+
+    Conservative advancement (Mirtich 1996): what is a distance away is not reached before the
+    fastest point of the robot has gone that far.
+    """
+    size = 0.0
+    for i in range(parts.shape[0]):
+        size = max(size, math.hypot(parts[i, 0], parts[i, 1]))
+    speed = abs(linear) + abs(angular) * size
+    reach = speed * limit + margin
+    shapes, near = np.empty_like(vertices), np.empty(rows.shape[0], np.int64)
+    count = 0
+    for k in range(rows.shape[0]):
+        gap = math.hypot(rows[k, 0] - robot[0], rows[k, 1] - robot[1]) - size - radii[k]
+        if gap <= reach:
+            a, b = offsets[k], offsets[k + 1]
+            transform_points(rows[k], vertices[a:b], shapes[a:b])
+            near[count] = k
+            count += 1
+    corners, starts, grown, _ = obstacles
+    close, walls = np.empty(grown.shape[0], np.int64), 0
+    for k in range(grown.shape[0]):
+        gap = core_distance(robot[0], robot[1], corners, starts[k], starts[k + 1])
+        if gap - grown[k] - size <= reach:
+            close[walls] = k
+            walls += 1
+    if count + walls == 0:
+        return limit
+    placed, here, time = np.empty_like(parts), np.empty(3), 0.0
+    for _ in range(_ADVANCES):
+        arc_pose(robot, course, linear, angular, holds, time, here)
+        transform_points(here, parts, placed)
+        least = math.inf
+        for index in range(count + walls):
+            if index < count:
+                k = near[index]
+                shape, round_by = shapes[offsets[k] : offsets[k + 1]], 0.0
+                gap = math.hypot(rows[k, 0] - here[0], rows[k, 1] - here[1]) - radii[k]
+            else:
+                k = close[index - count]
+                shape, round_by = corners[starts[k] : starts[k + 1]], grown[k]
+                gap = core_distance(here[0], here[1], corners, starts[k], starts[k + 1]) - round_by
+            if gap - size >= least:
+                continue
+            for p in range(part_offsets.shape[0] - 1):
+                part = placed[part_offsets[p] : part_offsets[p + 1]]
+                least = min(least, convex_distance(part, shape) - round_by)
+        if least <= margin:
+            break
+        if speed == 0.0:
+            return limit
+        time += (least - 0.5 * margin) / speed
+        if time >= limit:
+            return limit
+    return time
+
+
+@kernel
+def arc_pose(
+    start: FloatArray,
+    course: float,
+    linear: float,
+    angular: float,
+    holds: bool,
+    time: float,
+    out: FloatArray,
+) -> None:
+    """Fill (3,) ``out`` with the pose after some time [s]; arguments as in `clear_time`."""
+    half = 0.5 * angular * time
+    chord, middle = linear * time, course
+    if not holds:
+        middle += half
+        if half != 0.0:
+            chord *= math.sin(half) / half
+    out[0] = start[0] + chord * math.cos(middle)
+    out[1] = start[1] + chord * math.sin(middle)
+    out[2] = start[2] + 2.0 * half
 
 
 @kernel(allocates=True)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Annotated, ClassVar
 
 import numpy as np
@@ -46,6 +46,7 @@ class ShipIceVariations(TaskVariations):
     concentration: Annotated[float, Limits(0.0, 0.5)] | None = None
     # 0 for ice that is equally likely everywhere, 1 for patches and open water
     clumping: Fraction = 0.6
+    channel_length: PositiveFloat | None = None  # with ice to the same distance from its end [m]
     # how far the goal line lies ahead of the start line [m]
     goal_distance: PositiveFloat | None = None
     start_x: float | None = None  # where on the start line the ship starts [m]; anywhere if None
@@ -81,6 +82,8 @@ class ShipIceTask(Task):
     variation_class = ShipIceVariations
 
     def _prepare(self) -> None:
+        if self.variations.channel_length is not None:
+            self.preset = self._lengthened(self.variations.channel_length)
         self._drive(self.preset.robot())
         self.materials = self.preset.materials
         bounds = self.preset.bounds
@@ -90,6 +93,16 @@ class ShipIceTask(Task):
         self._file_ice = self._read_ice()
         self._check_start_x()
         self._steps = 0
+
+    def _lengthened(self, length: float) -> ShipPreset:
+        """The preset with a longer channel, or a shorter one as far as its goal allows."""
+        (width, before), (first, last) = self.preset.channel, self.preset.ice
+        least = self.preset.goal_y + before - last
+        if length < least:
+            raise ScenarioError(
+                f"ship_ice: channel_length must be at least {least:g} m, got {length:g}"
+            )
+        return replace(self.preset, channel=(width, length), ice=(first, length - (before - last)))
 
     def _goal_y(self) -> float:
         start, away = self.preset.start_y, self.variations.goal_distance
