@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from mujoco_scenes import GROUND, JACKAL_GROUND, built, jackal, room, turtlebot
 
+from pushplan.envs.push_env import PushEnv
 from pushplan.envs.simulators import mujoco_model, mujoco_robot
 from pushplan.world import Drive, RobotModel, Twist
 
@@ -42,6 +43,21 @@ def test_the_shell_changes_no_bit_of_a_trajectory(monkeypatch, robot, ground):
     mujoco_model._store.clear()
     assert with_shell == bare
     assert len(set(bare)) == len(bare)  # it does drive
+
+
+def test_the_house_of_a_ship_changes_no_bit_of_a_trajectory(monkeypatch):
+    def driven_ship() -> bytes:
+        mujoco_model._store.clear()
+        env = PushEnv(task="ship_ice", simulator="mujoco", variations={"concentration": 0.1})
+        env.reset(seed=3)
+        for _ in range(40):
+            env.step([0.3])
+        return env.world.robot_pose.tobytes() + env.world.movables.poses.tobytes()
+
+    with_house = driven_ship()
+    monkeypatch.setattr(mujoco_robot, "add_superstructure", lambda *arguments: None)
+    assert driven_ship() == with_house
+    mujoco_model._store.clear()
 
 
 def test_the_shell_has_neither_contacts_nor_mass():

@@ -21,7 +21,13 @@ from pushplan.envs.simulators.mujoco_shapes import (
     color_of,
     set_mass,
 )
-from pushplan.envs.simulators.mujoco_shell import CONTACT_GROUP, TYRE, add_shell, add_tyre
+from pushplan.envs.simulators.mujoco_shell import (
+    CONTACT_GROUP,
+    TYRE,
+    add_shell,
+    add_superstructure,
+    add_tyre,
+)
 from pushplan.world import RobotModel
 from pushplan.world.outline import centroid
 
@@ -158,6 +164,7 @@ def add_ship(
     set_mass(body, hull, solids.robot_height, robot.mass, [*centroid(hull), 0.0])
     half = 0.5 * solids.object_height
     add_hull(spec, body, robot, materials, solids, low=-half, ground=0.0)
+    add_superstructure(spec, body, robot, solids)
     body.add_site(name="thrusters")
     force = options.thrust * robot.mass
     moment = 0.5 * float(np.ptp(robot.vertices[:, 0])) * options.thruster_lever * force

@@ -1,4 +1,4 @@
-"""How a robot on wheels looks to MuJoCo's camera; none of it touches or weighs anything."""
+"""How robots on wheels and ships look to MuJoCo's camera; nothing here touches or weighs."""
 
 from __future__ import annotations
 
@@ -21,6 +21,8 @@ CONTACT_GROUP = 3
 """Group of the geoms that touch, where others show the robot; the camera leaves it out."""
 _DARK: Color = (0.20, 0.22, 0.25)
 _WHITE: Color = (0.97, 0.97, 0.97)
+_DECK: Color = (0.36, 0.53, 0.42)
+_FUNNEL: Color = (0.84, 0.37, 0.0)
 _WELL = 1.15  # length of a wheel's recess over the wheel's diameter
 _TYRE_WIDTH = 0.5  # in units of the wheel radius
 _WAIST, _ROOF = 0.66, 0.76  # body above the wheels and deck on it, in units of the footprint
@@ -60,6 +62,37 @@ def add_shell(spec: Any, body: Any, robot: RobotModel, solids: Solids) -> None:
         pos=[-0.55 * size, 0.0, top + 0.12 * size - radius],
         **_unfelt(TYRE),
     )
+
+
+def add_superstructure(spec: Any, body: Any, robot: RobotModel, solids: Solids) -> None:
+    """What stands on the hull of a ship: a deck, the house with its bridge forward, a funnel.
+
+    Args:
+        spec: the model.
+        body: the ship's, whose frame is at the waterline.
+        robot: footprint, the hull first.
+        solids: heights.
+    """
+    hull, top = robot.contact_parts[0], solids.robot_height
+    stern, bow = float(hull[:, 0].min()), float(hull[:, 0].max())
+    length, half = bow - stern, float(np.abs(hull[:, 1]).max())
+    middle = centroid(hull)
+    deck = middle + (0.93, 0.82) * (hull - middle)
+    step = 0.3 * half  # height of a storey
+    _prism(spec, body, "shell deck", deck, top, top + 0.05 * step, 0.0, _DECK)
+    # begin and end as fractions of the length from the stern, half width, storeys, colour
+    for n, (rear, front, wide, low, high, color) in enumerate(
+        (
+            (0.55, 0.76, 0.62, 0.0, 1.5, _WHITE),
+            (0.60, 0.72, 0.56, 1.5, 2.3, _WHITE),
+            (0.68, 0.73, 0.60, 1.6, 2.1, _DARK),
+            (0.56, 0.60, 0.14, 1.5, 3.0, _FUNNEL),
+        )
+    ):
+        x, y = (stern + rear * length, stern + front * length), wide * half
+        outline = np.array([(x[0], -y), (x[1], -y), (x[1], y), (x[0], y)])
+        heights = (top + low * step, top + high * step)
+        _prism(spec, body, f"shell house {n}", outline, *heights, 0.0, color)
 
 
 def add_tyre(wheel: Any, robot: RobotModel, radius: float, side: float) -> None:
