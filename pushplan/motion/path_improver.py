@@ -19,7 +19,7 @@ from pushplan.motion.keep_out import keep_out
 from pushplan.motion.path_problem import PathProblem, SweptPath, make_swept_path
 from pushplan.motion.path_search_config import PathSearchConfig
 from pushplan.motion.shortcutting import shortcut
-from pushplan.motion.speed_profile import TIGHTEST, start_margin, timed_plan
+from pushplan.motion.speed_profile import TIGHTEST, goal_is_outside, start_margin, timed_plan
 from pushplan.motion.time_slicing import Pace
 from pushplan.world import Drive, PlanResult, PlanStatus
 from pushplan.world.checks import FloatArray
@@ -98,6 +98,8 @@ class PathImprover:
         margin = start_margin(self.world, self.config.margin * self.size)
         if margin is None:
             return PlanStatus.START_BLOCKED
+        if goal_is_outside(self.world):
+            return PlanStatus.GOAL_UNREACHABLE
         self._set_margin(margin)
         if self.goal.distance(*self.world.robot_pose[:2]) <= 0.0:
             here = make_swept_path(1, len(self.world.movables))
@@ -112,16 +114,18 @@ class PathImprover:
         self.lead = self._no_lead if lead is None else lead
 
     def relax(self) -> None:
-        """Allow tighter turns and less margin, from the second time on.
+        """Allow tighter turns from the second time on, and less margin from the fourth.
 
         That helps where the robot starts in a tight place or has to turn round first. A
         constant-speed robot may then use its whole turn rate; one that can slow down turns on half
-        the radius, to a tenth of its size.
+        the radius, to a tenth of its size. The margin comes last: who drives without it may touch
+        a wall.
         """
         self.relaxed += 1
         if self.relaxed < 2:
             return
-        self._set_margin(0.4 * self._margin if self._margin > 0.01 * self.size else 0.0)
+        if self.relaxed >= 4:
+            self._set_margin(0.4 * self._margin if self._margin > 0.01 * self.size else 0.0)
         radius = self.world.robot.turning_radius
         if self.world.robot.drive is Drive.DIFFERENTIAL:
             radius = 0.5 * self.problem.turning_radius

@@ -8,7 +8,7 @@ from pushplan.compiled import owned
 from pushplan.motion.collision import footprint, is_free, obstacles
 from pushplan.motion.keep_out import keep_out
 from pushplan.motion.path_problem import SweptPath
-from pushplan.world import Drive, InvalidInputError, Plan, RobotModel, World
+from pushplan.world import Drive, GoalDisc, InvalidInputError, Plan, RobotModel, World
 from pushplan.world.polyline import goes_back
 
 TIGHTEST = 0.1
@@ -55,6 +55,15 @@ def start_margin(world: World, margin: float) -> float | None:
         if is_free(owned(world.robot_pose), shape, walls, np.empty_like(shape.vertices)):
             return fraction * margin
     return None
+
+
+def goal_is_outside(world: World) -> bool:
+    """Whether the goal is a disc that lies outside the workspace, where no path can lead."""
+    goal, bounds = world.navigation_goal, world.static.bounds
+    if not isinstance(goal, GoalDisc):
+        return False
+    nearest = np.clip(goal.center, bounds[:2], bounds[2:])
+    return goal.distance(float(nearest[0]), float(nearest[1])) > 0.0
 
 
 def timed_plan(world: World, path: SweptPath, turn_fraction: float) -> Plan:

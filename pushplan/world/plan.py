@@ -36,7 +36,7 @@ class PlanStatus(enum.Enum):
     TIMED_OUT = (
         "timed_out",
         "No plan was found before the stop rule fired: allow more time or iterations, "
-        "or lower the price of pushing.",
+        "or lower the weight of pushing.",
     )
     CANCELLED = ("cancelled", "The call was cancelled before there was a plan: call again.")
     START_BLOCKED = (

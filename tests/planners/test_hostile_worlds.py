@@ -281,6 +281,13 @@ def test_a_start_in_a_wall_or_out_of_bounds_is_blocked(name):
     )
 
 
+@pytest.mark.parametrize("name", planner_names(open_water=False))
+def test_a_goal_out_of_bounds_is_said_to_be_out_of_reach(name):
+    world = make_u_maze(goal=GoalDisc((40.0, 4.0), 0.5))
+    result = make_planner(name).plan(world, stop=MaxIterations(50))
+    assert result.status is PlanStatus.GOAL_UNREACHABLE
+
+
 def test_the_geometric_tree_stays_in_bounds():
     world = make_u_maze(
         static=StaticMap.build(bounds=[0, 0, 5, 5]),

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+import time
+from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
 
-from pushplan.control import EpisodeClock, ImmediateExecutor, PathFollower, waiting_twist
+from pushplan.control import EpisodeClock, ImmediateExecutor, waiting_twist
 from pushplan.control.limits import driven_twist, ramp_twist
 from pushplan.control.tracking import Progress
 from pushplan.interaction import InteractionModel, QuasiStatic
+from pushplan.planners.following.plan_controller import PlanController
 from pushplan.planners.following.recovery import RecoveryRule
 from pushplan.planners.following.replanning import (
     Reason,
@@ -46,6 +50,8 @@ class _PendingPlan:
     """A planning call whose plan may not be there yet."""
 
     call: PendingResult[PlanResult]
+    start: World
+    """The snapshot that it plans from."""
     stretch: Plan | None
     reason: Reason
     made: float
@@ -65,7 +71,8 @@ class PlanFollower:
 
     Args:
         planner: makes the plans.
-        controller: drives them; `pushplan.control.PathFollower` by default.
+        controller: drives them; by default `pushplan.control.PathFollower`, but
+            `pushplan.control.PurePursuit` where the turn rates of a plan do not give its headings.
         replanning: when to plan again.
         interaction: predicts what the rest of a plan will do; quasi-static by default.
         stop: stop rule of each planning call; the planner's own default if None.
@@ -84,7 +91,7 @@ class PlanFollower:
         stop: Stop | None = None,
     ) -> None:
         self.planner = planner
-        self.controller = PathFollower() if controller is None else controller
+        self.controller: Controller = PlanController() if controller is None else controller
         self.replanning = Replanning() if replanning is None else replanning
         self.interaction = QuasiStatic() if interaction is None else interaction
         self.stop = stop
@@ -193,13 +200,12 @@ class PlanFollower:
             self._progress.update(plan, world.robot_pose)
             now = self._progress.time
         start, stretch = world_ahead(world, plan, now, latency, self.interaction)
-        planner, rng = self.planner, self._rng
         self._planned_at, self._planned_from = world.time, world.robot_pose[:2]
         self._planned_ids = world.movables.ids
         call = self._executor.submit(
-            lambda stop: planner.plan(start, stop=stop, rng=rng), world.time, self.stop
+            partial(_timed_call, self.planner, start, self._rng), world.time, self.stop
         )
-        self._pending = _PendingPlan(call, stretch, reason, world.time)
+        self._pending = _PendingPlan(call, start, stretch, reason, world.time)
 
     def _receive(self, world: World) -> None:
         """Take up a plan that is there."""
@@ -207,10 +213,11 @@ class PlanFollower:
         if pending is None or not pending.call.ready(world.time):
             return
         self._pending = None
-        result = expect("what the planner returns", pending.call.result(), PlanResult)
+        result = pending.call.result()
         self.plan_log.append(result)
         if result.plan is None:
             return
+        _check(result.plan, pending.start)
         new = joined(pending.stretch, result.plan)
         if world.time > pending.made:
             new = rest_of(new, passed(world, new, world.time - pending.made), None)
@@ -288,6 +295,38 @@ class PlanFollower:
         expected = float(path_lengths(predicted[part]) @ world.movables.masses)
         allowed = surprise * world.robot.circumscribed_radius * world.robot.mass
         return Reason.SURPRISE if rested and now.work - expected > allowed else None
+
+
+def _timed_call(
+    planner: Planner, start: World, rng: np.random.Generator, stop: Stop | None
+) -> PlanResult:
+    """What a planner returns, with the time that it took by our clock."""
+    began = time.perf_counter()
+    result = planner.plan(start, stop=stop, rng=rng)
+    took = time.perf_counter() - began
+    result = expect("what the planner returns", result, PlanResult)
+    return replace(result, stats=replace(result.stats, wall_time_s=took))
+
+
+def _check(plan: Plan, start: World) -> None:
+    """Refuse a plan that is not one for this snapshot.
+
+    Raises:
+        InvalidInputError: if it begins elsewhere, or predicts other objects.
+    """
+    (x, y), (x0, y0) = plan.poses[0, :2].tolist(), start.robot_pose[:2].tolist()
+    most = start.robot.circumscribed_radius
+    if math.hypot(x - x0, y - y0) > most:
+        raise InvalidInputError(
+            f"plan.poses must begin within {most:g} m of the robot, which is at [{x0:g}, {y0:g}], "
+            f"got [{x:g}, {y:g}]"
+        )
+    count = len(start.movables)
+    if plan.object_poses is not None and plan.object_poses.shape[1] != count:
+        raise InvalidInputError(
+            f"plan.object_poses must be ({len(plan.poses)}, {count}, 3) for the {count} objects of "
+            f"the world, got {plan.object_poses.shape}"
+        )
 
 
 def policy_for(planner: Planner) -> PlanFollower:

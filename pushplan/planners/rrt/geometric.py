@@ -13,7 +13,7 @@ from pushplan.motion.collision import ConvexObstacles, obstacles
 from pushplan.motion.keep_out import keep_out
 from pushplan.motion.polyline import polyline_plan, polyline_status
 from pushplan.motion.random_tree.ompl_lock import own_state, seeded_ompl
-from pushplan.motion.speed_profile import start_margin
+from pushplan.motion.speed_profile import goal_is_outside, start_margin
 from pushplan.world import MaxIterations, NavigationGoal, PlanResult, PlanStatus, Stop, World
 from pushplan.world.checked_fields import CheckedFields, Fraction, PositiveFloat, PositiveInt
 from pushplan.world.checks import FloatArray, expect
@@ -74,6 +74,8 @@ class GeometricRRT:
         iterations = 0
         if start_margin(world, 0.0) is None:
             return call.result(PlanStatus.START_BLOCKED)
+        if goal_is_outside(world):
+            return call.result(PlanStatus.GOAL_UNREACHABLE)
         start = owned(world.robot_pose[:2])
         size = world.robot.circumscribed_radius
         wide, narrow = config.clearance * size, world.robot.inscribed_radius

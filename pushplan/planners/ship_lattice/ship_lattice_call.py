@@ -15,7 +15,7 @@ from pushplan.motion.coarse_path import reachable
 from pushplan.motion.collision import first_blocked, footprint, is_free, obstacles
 from pushplan.motion.keep_out import keep_out
 from pushplan.motion.path_problem import SweptPath
-from pushplan.motion.speed_profile import check_turns, timed_plan, turning_radius
+from pushplan.motion.speed_profile import check_turns, goal_is_outside, timed_plan, turning_radius
 from pushplan.motion.state_lattice.built_lattice import BuiltLattice
 from pushplan.motion.state_lattice.lattice_builder import LatticeBuilder
 from pushplan.motion.state_lattice.lattice_path import bare_path, lay_path
@@ -74,6 +74,8 @@ class ShipLatticeCall:
         shape, walls = footprint(world.robot), obstacles(keep_out(world))
         if not is_free(owned(world.robot_pose), shape, walls, np.empty_like(shape.vertices)):
             return PlanStatus.START_BLOCKED
+        if goal_is_outside(world):
+            return PlanStatus.GOAL_UNREACHABLE
         if self.goal.distance(*(float(v) for v in world.robot_pose[:2])) <= 0.0:
             self.poses, self.curvatures = world.robot_pose[None].copy(), np.zeros(1)
             self.first_solution_s = self.call.elapsed
