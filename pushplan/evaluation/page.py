@@ -23,6 +23,8 @@ REPLAYS = ("embed", "beside", "none")
 _FILES = files("pushplan.evaluation") / "page_files"
 _TIMES = ("plan_time_median_s", "decision_time_median_s", "wall_time_s")
 _DIGITS = 5
+_USUAL = {"make_env": "pushplan.envs:make", "observation": "auto"}
+"""Facts of a run that say nothing."""
 
 
 def write_page(
@@ -169,7 +171,8 @@ def _title(run: RunRecord) -> str:
 
 def _facts(run: RunRecord) -> str:
     facts = {"episodes": len(run.rows), **run.about.get("configuration", {})}
-    return ", ".join(f"{key} {value}" for key, value in facts.items() if value is not None)
+    told = {key: value for key, value in facts.items() if value not in (None, _USUAL.get(key))}
+    return ", ".join(f"{key} {value}" for key, value in told.items())
 
 
 def _file(name: str) -> str:

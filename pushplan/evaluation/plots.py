@@ -25,6 +25,7 @@ from pushplan.metrics import Role, metric_names
 from pushplan.world.checks import choice
 
 _MANY = 300  # so many dots of a policy in a panel are drawn as an image
+_ABREAST = 36  # letters of all names of a panel that fit side by side
 _TRACES = 300  # of so many episodes every planning call is read from the trace
 
 
@@ -167,7 +168,7 @@ def _boxes(
             zorder=3,
             rasterized=many,
         )
-    steep = len(policies) > 3
+    steep = sum(map(len, policies)) > _ABREAST
     axes.set_xticks(
         range(len(policies)),
         list(policies),

@@ -118,7 +118,8 @@ def paired_differences(
 ) -> list[PairedDifference]:
     """Every pair of policies on the scenarios that both ran, for success, scores and lengths.
 
-    Metrics of which neither direction is better are left out.
+    Metrics of which neither direction is better are left out. Path and work are compared where
+    both succeed: who fails has driven and pushed less.
     """
     labels = policies_of(rows, order)
     pairs = [(a, b) for i, a in enumerate(labels) for b in labels[i + 1 :]]
@@ -127,7 +128,11 @@ def paired_differences(
     for metric in ("success", *metric_names(Role.SCORE, Role.DETAIL)):
         if (higher := METRICS[metric].higher_is_better) is None:
             continue
-        values = {key: _by_scenario(mine, metric) for key, mine in groups.items()}
+        every = METRICS[metric].role is not Role.DETAIL
+        values = {
+            key: _by_scenario([row for row in mine if every or row.success], metric)
+            for key, mine in groups.items()
+        }
         gaps: dict[tuple[str, str, str], FloatArray] = {}
         for setting in settings_of(rows):
             for first, second in pairs:

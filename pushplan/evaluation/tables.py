@@ -48,22 +48,23 @@ class Table:
 
 SCORE_NOTE = (
     "mean ± standard deviation over episodes, 95 % bootstrap interval of the mean below; success "
-    "with its Wilson interval; a failed job counts as no success and E_nav = 0; plan is the "
-    "median over episodes of each episode's median planning call, its slowest call below; step "
-    "is the same for the time from world to action, without simulation"
+    "with its Wilson interval; a failed job counts as no success and E_nav = 0; path and work "
+    "include episodes that ended early, without success; plan is the median over episodes of each "
+    "episode's median planning call, its slowest call below; step is the same for the time from "
+    "world to action, without simulation"
 )
 MEASURED_NOTE = (
     "mean ± standard deviation over the episodes that did not fail, 95 % bootstrap interval of "
     "the mean below; med is the median"
 )
 PAIR_NOTE = (
-    "second policy minus first on the same scenarios: mean, 95 % bootstrap interval; better and "
-    "worse count the scenarios in which the second policy has the better or worse value, by the "
-    "metric's own direction; p is of the signed-rank test (sign test for success), corrected by "
-    "Holm over all pairs and settings of a metric; effect is the rank-biserial correlation, "
-    "1 where the second is better every time; * where p < 0.05 with 10 scenarios at least; more is "
-    "how many further scenarios would separate the pair, were the differences to go on like this "
-    "(power 0.8)"
+    "second policy minus first on the same scenarios, path and work only where both succeed: "
+    "mean, 95 % bootstrap interval; better and worse count the scenarios in which the second "
+    "policy has the better or worse value, by the metric's own direction; p is of the signed-rank"
+    " test (sign test for success), corrected by Holm over all pairs and settings of a metric; "
+    "effect is the rank-biserial correlation, 1 where the second is better every time; * where p "
+    "< 0.05 with 10 scenarios at least; more is how many further scenarios would separate the "
+    "pair, were the differences to go on like this (power 0.8)"
 )
 GAP_NOTE = (
     "work of robot and objects, m₀ l₀ + Σ mᵢ lᵢ, of the successful episodes: mean of how much it "

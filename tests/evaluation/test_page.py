@@ -139,8 +139,9 @@ def test_an_episode_is_played_beside_another_in_step(opened: Opened, folder: Pat
 
 
 def test_keys_move_in_the_matrix_and_choose(opened: Opened) -> None:
+    assert opened.state("[state.line, state.column]") == [0, 1]  # who has no success comes first
     opened.page.locator("#matrix").focus()
-    for key in ("ArrowDown", "ArrowDown", "ArrowUp", "ArrowRight", "Enter"):
+    for key in ("ArrowDown", "ArrowDown", "ArrowUp", "ArrowRight", "ArrowLeft", "Enter"):
         opened.page.keyboard.press(key)
     assert opened.state("[state.line, state.column]") == [1, 1]
     assert "random" in opened.page.locator("#chosen").inner_text()

@@ -109,6 +109,11 @@ def test_less_work_is_better_and_nothing_is_starred_below_ten(results: Results) 
     sign = 1 if pair.second == "better" else -1
     assert sign * pair.difference.mean < 0.0
     assert (pair.verdict, pair.effect) == ("better" if sign > 0 else "worse", float(sign))
+    # who fails early has done less work, which is no merit
+    failed = {"success": False, "reason": "wall"}
+    bad = [replace(row, **(failed if row.seed < 4 else {})) for row in rows]
+    fewer = next(p for p in Results(tuple(bad)).compare() if p.metric == "interaction_work_kg_m")
+    assert fewer.difference.count == pair.difference.count - 4
     few = Results(tuple(row for row in rows if row.seed < 9)).compare()
     assert {p.verdict for p in few} == {"equal", "not separated"}
     assert all(p.needed is None or p.needed >= 10 for p in few)

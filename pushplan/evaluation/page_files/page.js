@@ -185,10 +185,11 @@ function choose(one, policy) {
   return showReplays(one, policy);
 }
 
-function chooseFirst() { // the first episode in the matrix that has a replay, as it ended
+function chooseFirst() { // of the first scenario with a replay in the page the worst episode, as it ended
   for (const [line, one] of state.shown.entries()) {
-    const column = one.rows.findIndex((row) => row >= 0 && data.rows.replay[row] === 1);
-    if (column < 0) continue;
+    const worth = one.rows.map((row) => (row >= 0 && data.rows.replay[row] === 1 ? rank(row) : -1));
+    const column = worth.indexOf(Math.max(...worth));
+    if (worth[column] < 0) continue;
     Object.assign(state, { line, column });
     draw();
     choose(one, column).then(() => seek(player.end));
