@@ -12,6 +12,8 @@ LONGEST_MESSAGE = 300
 MOST_CHOICES = 12
 """Most choices that a message lists; of more, the `NEAREST` to the name that was given."""
 NEAREST = 3
+_ALIKE = 0.55
+"""Similarity above which the nearest choice may be meant: "circle" is no "receptacle"."""
 _OURS = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 _PYTHONS = os.path.dirname(os.__file__)
 _NOT_A_USERS = ("<", f"{_OURS}{os.sep}", f"{_PYTHONS}{os.sep}")
@@ -61,7 +63,8 @@ def unknown_name_message(kind: str, name: object, choices: Iterable[str]) -> str
     """One line that names the unknown value, and every choice or, of many, the three nearest."""
     valid = sorted(choices)
     near = difflib.get_close_matches(str(name)[:80], valid, n=NEAREST, cutoff=0.5)
-    hint = f"; did you mean {near[0]!r}?" if near else ""
+    alike = difflib.get_close_matches(str(name)[:80], near, n=1, cutoff=_ALIKE)
+    hint = f"; did you mean {alike[0]!r}?" if alike else ""
     if len(valid) <= MOST_CHOICES:
         return f"unknown {kind} {short(name)}{hint} (valid: {', '.join(valid) or 'none'})"
     shown = f"nearest of {len(valid)}: {', '.join(near)}"

@@ -40,9 +40,10 @@ def load_object(spec: str) -> Any:
 
 
 def objects_of_file(path: str | Path) -> dict[str, Any]:
-    """The classes and functions that a file defines, by name, in its order; errors as `load_object`.
+    """The classes and functions that a file defines, by name, in its order.
 
-    What it imports from elsewhere, and what begins with an underscore, is left out.
+    What it imports from elsewhere, and what begins with an underscore, is left out. Errors are
+    those of `load_object`.
     """
     return _callables_of(_load_file(Path(path)))
 
