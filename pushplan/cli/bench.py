@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import os
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from pushplan.cli import paper
@@ -91,7 +92,7 @@ def run(options: argparse.Namespace) -> int:
 
     paper.check(options)
     check_file(options.markdown)
-    out = options.out or os.path.join("runs", options.suite)
+    out = options.out or _default_out(options.suite)
     check_directory(out)
     comparison = None
     with progress_of(*(options.policies or "").split(","), out=out) as progress:
@@ -122,3 +123,9 @@ def _results(options: argparse.Namespace, out: str, progress: Progress) -> Resul
         progress=progress,
         **batch_options(options),
     )
+
+
+def _default_out(suites: str) -> str:
+    """The run directory of suites, and of folders of worlds by their names."""
+    names = (Path(name).resolve().name if "/" in name else name for name in suites.split(","))
+    return os.path.join("runs", ",".join(names))
