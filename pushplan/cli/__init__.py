@@ -6,7 +6,7 @@ import argparse
 import os
 import sys
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any, NoReturn
 
 from pushplan import __version__
 from pushplan.cli import (
@@ -32,6 +32,10 @@ from pushplan.cli import (
     teleop,
     train,
 )
+from pushplan.cli.common import see_help
+
+if TYPE_CHECKING:
+    from pushplan.world import PushplanError
 
 COMMANDS = (
     demo,
@@ -117,11 +121,27 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if not isinstance(error, PushplanError | OSError):
             raise
         users = (InvalidInputError, UnknownNameError, MissingDependencyError, *_USER_OS_ERRORS)
-        return _fail(str(error), 2 if isinstance(error, users) else 1)
+        return _fail(_said(error), 2 if isinstance(error, users) else 1)
 
 
 class _Parser(argparse.ArgumentParser):
-    """Names the nearest choices, as every other message of an unknown name does."""
+    """Says in one line what is wrong, with the nearest choices, as all of pushplan does."""
+
+    def error(self, message: str) -> NoReturn:
+        """Say it without the usage, and end."""
+        sys.exit(_fail(see_help(message, self.prog), 2))
+
+    def parse_known_args(self, args: Any = None, namespace: Any = None) -> tuple[Any, list[str]]:
+        """Refuse what is not known here, where it is known which options are."""
+        found, unknown = super().parse_known_args(args, namespace)
+        if unknown and unknown[0].startswith("-"):
+            from pushplan.world.errors import unknown_name_message
+
+            options = [name for name in self._option_string_actions if name.startswith("--")]
+            self.error(unknown_name_message("option", unknown[0].partition("=")[0], options))
+        if unknown:
+            self.error(f"unrecognized arguments: {' '.join(unknown)}")
+        return found, unknown
 
     def _check_value(self, action: argparse.Action, value: Any) -> None:
         if action.choices is not None and value not in action.choices:
@@ -147,6 +167,13 @@ def build_parser() -> argparse.ArgumentParser:
     for command in COMMANDS:
         command.add(commands)
     return parser
+
+
+def _said(error: PushplanError | OSError) -> str:
+    """An error in words; that of the operating system without its number."""
+    if isinstance(error, OSError) and error.strerror and error.filename is not None:
+        return f"{error.filename!r}: {error.strerror}"
+    return str(error)
 
 
 def _fail(message: str, code: int) -> int:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 import os
-import sys
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from pushplan.cli import paper
@@ -18,7 +18,7 @@ from pushplan.cli.common import (
     positive,
     whole,
 )
-from pushplan.cli.outputs import check_directory
+from pushplan.cli.outputs import check_directory, check_file
 from pushplan.cli.progress import progress_of
 
 if TYPE_CHECKING:
@@ -84,29 +84,23 @@ def add(commands: Any) -> None:
     add_run_options(parser)
     parser.add_argument("--json", action="store_true", help="print the end's tables as JSON")
     paper.add_options(parser)
-    parser.set_defaults(usage=parser.print_usage)
 
 
 def run(options: argparse.Namespace) -> int:
     """Run the batch, print the table, write plots and page."""
     from pushplan.cli.report import exit_code, show, show_json
 
-    if (wrong := paper.check(options)) is not None:
-        options.usage(sys.stderr)
-        return _refuse(wrong)
-    out = options.out or os.path.join("runs", options.suite)
+    paper.check(options)
+    check_file(options.markdown)
+    out = options.out or _default_out(options.suite)
     check_directory(out)
     comparison = None
-    with progress_of(*(options.policies or "").split(",")) as progress:
-        try:
-            if options.suite == paper.SUITE:
-                comparison = paper.compare(options, out, progress)
-                results = comparison.results
-            else:
-                results = _results(options, out, progress)
-        except KeyboardInterrupt:
-            sys.stderr.write(f"stopped; the same command continues the run in {out}\n")
-            raise
+    with progress_of(*(options.policies or "").split(","), out=out) as progress:
+        if options.suite == paper.SUITE:
+            comparison = paper.compare(options, out, progress)
+            results = comparison.results
+        else:
+            results = _results(options, out, progress)
     if options.json:
         show_json(results)
     elif comparison is None:
@@ -131,6 +125,7 @@ def _results(options: argparse.Namespace, out: str, progress: Progress) -> Resul
     )
 
 
-def _refuse(message: str) -> int:
-    sys.stderr.write(f"pushplan: {' '.join(message.split())}\n")
-    return 2
+def _default_out(suites: str) -> str:
+    """The run directory of suites, and of folders of worlds by their names."""
+    names = (Path(name).resolve().name if "/" in name else name for name in suites.split(","))
+    return os.path.join("runs", ",".join(names))

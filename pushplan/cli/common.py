@@ -29,6 +29,18 @@ def add_command(
     return parser
 
 
+def see_help(message: str, program: str) -> str:
+    """What is wrong with the words of a command, and what lists its options."""
+    return f"{message}; see '{program} --help'"
+
+
+def usage_error(command: str, message: str) -> Exception:
+    """An error for words of a command that the parser alone cannot refuse."""
+    from pushplan.world import InvalidInputError
+
+    return InvalidInputError(see_help(message, f"pushplan {command}"))
+
+
 def complete(action: argparse.Action, kind: str) -> None:
     """Let the shell complete an argument with the names of a kind of `pushplan list`."""
 

@@ -52,7 +52,7 @@ def run(options: argparse.Namespace) -> int:
     for library in ("gymnasium", "pymunk", "rich", "jinja2", "matplotlib"):
         need(library)  # before the work, not after it
     say(f"{len(EPISODES)} episodes; the first time they take up to a minute:")
-    with progress_of(*EPISODES.values()) as progress:
+    with progress_of(*EPISODES.values(), out=options.out) as progress:
         workers = min(os.cpu_count() or 1, _MOST_WORKERS)
         about = {"suite": "demo"}
         run_batch(_jobs(), out=options.out, workers=workers, about=about, progress=progress)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import os
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -50,11 +49,7 @@ def run(options: argparse.Namespace) -> int:
         return 0
     out = options.out or os.path.join("runs", Path(options.file).stem)
     check_directory(out)
-    with progress_of(*(one.label for one in experiment.policies)) as progress:
-        try:
-            results = experiment.run(out, progress=progress, **run_options(options))
-        except KeyboardInterrupt:
-            sys.stderr.write(f"stopped; the same command continues the run in {out}\n")
-            raise
+    with progress_of(*(one.label for one in experiment.policies), out=out) as progress:
+        results = experiment.run(out, progress=progress, **run_options(options))
     show(results)
     return exit_code(results)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -28,8 +29,11 @@ def check_file(path: str | None, endings: Sequence[str] = ()) -> None:
         raise InvalidInputError(f"cannot write {path!r}: it is a folder")
     if not file.absolute().parent.is_dir():
         raise InvalidInputError(f"there is no folder {file.parent} for {path!r}")
-    if not os.access(file if file.exists() else file.absolute().parent, os.W_OK):
-        raise InvalidInputError(f"cannot write {path!r}: permission denied")
+    if file.exists():
+        if not os.access(file, os.W_OK):
+            raise InvalidInputError(f"cannot write {path!r}: permission denied")
+    elif not _takes_files(file.absolute().parent):
+        raise InvalidInputError(f"cannot write {path!r}: {file.parent} takes no new files")
 
 
 def check_picture(path: str | None, endings: Sequence[str] = (".png",)) -> None:
@@ -77,5 +81,14 @@ def check_directory(path: str | None) -> None:
     there = next(one for one in (folder, *folder.parents) if one.exists())
     if not there.is_dir():
         raise InvalidInputError(f"cannot use {path!r} as a folder: {there} is a file")
-    if not os.access(there, os.W_OK | os.X_OK):
-        raise InvalidInputError(f"cannot use {path!r} as a folder: {there} cannot be written to")
+    if not _takes_files(there):
+        raise InvalidInputError(f"cannot use {path!r} as a folder: {there} takes no new files")
+
+
+def _takes_files(folder: Path) -> bool:
+    """Whether something can be made in a folder: on some disks only a try can tell."""
+    try:
+        with tempfile.TemporaryDirectory(prefix=".pushplan-", dir=folder):
+            return True
+    except OSError:
+        return False

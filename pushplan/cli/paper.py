@@ -9,8 +9,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from pushplan.cli.common import batch_options, say
-from pushplan.cli.outputs import check_file
+from pushplan.cli.common import batch_options, say, usage_error
 
 if TYPE_CHECKING:
     from pushplan.evaluation import Comparison
@@ -29,19 +28,20 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def check(options: argparse.Namespace) -> str | None:
-    """What is wrong with the options, if anything."""
+def check(options: argparse.Namespace) -> None:
+    """Refuse options that do not belong to the suite.
+
+    Raises:
+        InvalidInputError: naming the first.
+    """
     if options.suite != SUITE:
         if options.policies is None:
-            return "the following arguments are required: --policies"
+            raise usage_error("bench", "the following arguments are required: --policies")
         for name in ("only", "markdown"):
             if getattr(options, name) is not None:
-                return f"--{name} is for 'bench {SUITE}' only"
-    elif options.markdown is not None and os.path.isdir(options.markdown):
-        return f"--markdown takes a file, {options.markdown!r} is a folder"
+                raise usage_error("bench", f"--{name} is for 'bench {SUITE}' only")
     elif options.latency is not None or options.observation != "auto":
-        return f"'bench {SUITE}' takes neither --latency nor --observation"
-    return None
+        raise usage_error("bench", f"'bench {SUITE}' takes neither --latency nor --observation")
 
 
 def compare(options: argparse.Namespace, out: str, progress: Callable[..., None]) -> Comparison:
@@ -49,7 +49,6 @@ def compare(options: argparse.Namespace, out: str, progress: Callable[..., None]
     from pushplan.evaluation import bench_paper
     from pushplan.evaluation.paper import EPISODES
 
-    check_file(options.markdown)
     given = {"only": options.only, "policies": options.policies, "episodes": options.episodes}
     words = [word for key, value in given.items() if value for word in (f"--{key}", str(value))]
     return bench_paper(

@@ -18,6 +18,7 @@ SCHEMA = "pushplan-plan/1"
 _EXAMPLES = """\
   pushplan plan room.yaml --planner kinodynamic-rrt
   pushplan plan room.yaml --planner kinodynamic-rrt --deadline 0.5 --out plan.json
+  pushplan plan room.yaml --planner my_planner.py:MyPlanner
   pushplan plan room.yaml --planner geometric-rrt --iterations 2000 --seed 7 --render plan.svg
 """
 
@@ -29,7 +30,10 @@ def add(commands: Any) -> None:
     )
     parser.add_argument("world", metavar="WORLD.yaml", help="world file (.yaml, .yml or .json)")
     planner = parser.add_argument(
-        "--planner", required=True, metavar="NAME", help="see 'pushplan list planners'"
+        "--planner",
+        required=True,
+        metavar="NAME",
+        help="name ('pushplan list planners'), 'file.py:Class' or 'module:Class'",
     )
     complete(planner, "planners")
     budget = parser.add_mutually_exclusive_group()
@@ -49,27 +53,38 @@ def add(commands: Any) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Plan, say what came of it, write files."""
-    from pushplan.planners import make_planner, warm_up
-    from pushplan.world import load_world, stream
+    from pushplan.evaluation import parse_planner
+    from pushplan.planners import warm_up
+    from pushplan.world import PlanResult, PushplanError, load_world, stream
+    from pushplan.world.checks import expect
+    from pushplan.world.errors import describe
 
     check_file(options.out)
     check_figure(options.render)
     world = load_world(options.world)
-    planner = make_planner(options.planner)
-    with kernel_progress(options.planner):
-        warm_up(options.planner)  # a deadline is for planning, not for loading kernels
-    result = planner.plan(world, stop=_stop(options), rng=stream(options.seed, "policy"))
-    data = _as_dict(options, result)
+    spec = parse_planner(options.planner)
+    planner = spec.make_planner()
+    if isinstance(spec.source, str) and spec.is_ours:
+        with kernel_progress(spec.source):
+            warm_up(spec.source)  # a deadline is for planning, not for loading kernels
+    try:
+        made = planner.plan(world, stop=_stop(options), rng=stream(options.seed, "policy"))
+        result = expect("what the planner returns", made, PlanResult)
+    except (Exception, SystemExit) as error:
+        if spec.is_ours:
+            raise
+        raise PushplanError(f"planner {spec.label!r} failed: {describe(error)}") from error
+    data = _as_dict(options, spec.label, result)
     if options.json:
         say_json(data)
     else:
-        _print(options.planner, result)
+        _print(spec.label, result)
     if options.out:
         Path(options.out).write_text(json.dumps(data, indent=1) + "\n", encoding="utf-8")
     if options.render:
         from pushplan.drawing import Panel, draw_figure, save_figure
 
-        title = f"{options.planner}: {result.status.label}"
+        title = f"{spec.label}: {result.status.label}"
         figure = draw_figure(Panel(world, plan=result.plan))
         save_figure(options.render, figure, title=title)
     for file in (options.out, options.render):
@@ -102,11 +117,11 @@ def _print(name: str, result: PlanResult) -> None:
     say(f"  {stats.iterations} iterations, {stats.nodes} nodes")
 
 
-def _as_dict(options: argparse.Namespace, result: PlanResult) -> dict[str, Any]:
+def _as_dict(options: argparse.Namespace, label: str, result: PlanResult) -> dict[str, Any]:
     stats, plan = result.stats, result.plan
     data: dict[str, Any] = {
         "schema": SCHEMA,
-        "planner": options.planner,
+        "planner": label,
         "seed": options.seed,
         "status": result.status.label,
         "stats": {

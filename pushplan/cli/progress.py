@@ -23,21 +23,40 @@ _LINE_EVERY_S = 10.0
 
 
 @contextmanager
-def progress_of(*policies: str) -> Iterator[Progress]:
-    """Kernels while they are compiled, here or in workers; then jobs.
+def progress_of(*policies: str, out: str | None = None) -> Iterator[Progress]:
+    """Kernels while they are compiled, here or in workers; then jobs; after Ctrl-C what is kept.
 
     Args:
         policies: names; what they compile is known of those that come with pushplan.
+        out: the run directory, if it is kept.
     """
-    with ExitStack() as running, ExitStack() as compiling:
-        compiling.enter_context(kernel_progress(*policies))
-        show = _bar(running, policies) if sys.stderr.isatty() else _Lines(policies)
+    finished = 0
+    try:
+        with ExitStack() as running, ExitStack() as compiling:
+            compiling.enter_context(kernel_progress(*policies))
+            show = _bar(running, policies) if sys.stderr.isatty() else _Lines(policies)
 
-        def update(done: int, total: int, row: ResultRow | None) -> None:
-            compiling.close()
-            show(done, total, row)
+            def update(done: int, total: int, row: ResultRow | None) -> None:
+                nonlocal finished
+                compiling.close()
+                show(done, total, row)
+                finished = done
 
-        yield update
+            yield update
+    except KeyboardInterrupt:
+        if out is not None:
+            sys.stderr.write(_stopped(finished, out))
+        raise
+
+
+def _stopped(finished: int, out: str) -> str:
+    if not finished:
+        return "stopped before an episode was finished\n"
+    episodes = "1 finished episode is" if finished == 1 else f"{finished} finished episodes are"
+    return (
+        f"stopped: {episodes} kept in {out}; the same command goes on with the others, "
+        f"and 'pushplan report {out}' makes the tables of those that are there\n"
+    )
 
 
 def _bar(running: ExitStack, policies: tuple[str, ...]) -> Progress:

@@ -79,8 +79,12 @@ def run(options: argparse.Namespace) -> int:
 
 
 def show(results: Results, **options: Any) -> None:
-    """Print the tables of a run, write its report, say where it is."""
+    """Print the tables of a run and why episodes did not succeed, write its report."""
+    from pushplan.evaluation.endings import unsuccessful_lines
+
     _print(results.tables())
+    for line in unsuccessful_lines(results):
+        say(line)
     page = results.report(**options)
     say(f"page:    {page}")
 
@@ -94,13 +98,13 @@ def show_json(results: Results) -> None:
 
 
 def exit_code(results: Results) -> int:
-    """1 where jobs of a run failed, with a line that says where to look; else 0."""
-    failed = sum(row.failed for row in results.rows)
-    if not failed:
-        return 0
-    where = "" if results.path is None else f" in {results.path / 'results.csv'}"
-    sys.stderr.write(f"{failed} of {len(results.rows)} jobs failed: see status and reason{where}\n")
-    return 1
+    """1 where jobs of a run failed, with a line for each policy that says why; else 0."""
+    from pushplan.evaluation.endings import failure_lines
+
+    lines = failure_lines(results)
+    for line in lines:
+        sys.stderr.write(f"{line}\n")
+    return 1 if lines else 0
 
 
 def _print(tables: Sequence[Table]) -> None:

@@ -59,7 +59,7 @@ def add(commands: Any) -> None:
 def run(options: argparse.Namespace) -> int:
     """Run the episode, print its scores, write files."""
     from pushplan.cli.film import Camera
-    from pushplan.evaluation import Job, JobSettings, parse_policy, run_episode
+    from pushplan.evaluation import Job, JobSettings, PolicyError, parse_policy, run_episode
     from pushplan.evaluation.execute import dry_run
 
     scenario = scenario_of(options)
@@ -76,6 +76,8 @@ def run(options: argparse.Namespace) -> int:
         episode = run_episode(
             env, policy, scenario, observer=camera, latency_factor=options.latency
         )
+    except PolicyError as error:
+        raise PolicyError(f"policy {spec.label!r} failed: {error}") from error
     finally:
         env.close()
     _print(spec.label, scenario, episode)

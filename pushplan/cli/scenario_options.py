@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import os
 import re
 from typing import TYPE_CHECKING, Any
 
@@ -50,7 +51,7 @@ def scenario_of(options: argparse.Namespace) -> Scenario:
         InvalidInputError: if options contradict each other.
     """
     from pushplan.envs.registry import default_preset
-    from pushplan.scenarios import Scenario, suite
+    from pushplan.scenarios import Scenario, suite, suite_names
     from pushplan.world import InvalidInputError
 
     shown = {"boxes": options.boxes, "shape": options.shape}
@@ -67,6 +68,11 @@ def scenario_of(options: argparse.Namespace) -> Scenario:
     if given:
         raise InvalidInputError(
             f"a suite says what its scenarios are: {', '.join(sorted(given))} needs --task instead"
+        )
+    if options.suite not in suite_names() and os.path.exists(options.suite):
+        raise InvalidInputError(
+            f"{options.suite!r} is a file or a folder, no suite: a world is given as "
+            "--task room --set world_file=FILE"
         )
     return suite(options.suite, episodes=1, first_seed=options.seed).scenarios[0]
 

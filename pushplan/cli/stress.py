@@ -75,7 +75,7 @@ def run(options: argparse.Namespace) -> int:
     from pushplan.evaluation.table_formats import markdown, text
 
     check_directory(options.out)
-    with progress_of(options.policy) as progress:
+    with progress_of(options.policy, out=options.out) as progress:
         sheet = stress(
             options.policy,
             options.suite,

@@ -13,14 +13,19 @@ if TYPE_CHECKING:
     from pushplan.evaluation.batch import run_batch
     from pushplan.evaluation.benchmark import bench
     from pushplan.evaluation.comparing import Rule, Verdict, compare_runs
-    from pushplan.evaluation.compatibility import UnusablePolicyError
     from pushplan.evaluation.database import DamagedResultsError
     from pushplan.evaluation.episode import InvalidActionError, PolicyError, run_episode
     from pushplan.evaluation.experiment import Experiment
     from pushplan.evaluation.jobs import Job, JobResult, JobSettings
     from pushplan.evaluation.merging import Merged, merge
     from pushplan.evaluation.paper import Comparison, bench_paper
-    from pushplan.evaluation.policies import PolicySpec, parse_policies, parse_policy
+    from pushplan.evaluation.policies import (
+        PolicySpec,
+        UnusablePolicyError,
+        parse_planner,
+        parse_policies,
+        parse_policy,
+    )
     from pushplan.evaluation.reproduction import Reproduction, reproduce
     from pushplan.evaluation.rescoring import Rescored, rescore
     from pushplan.evaluation.results import Results
@@ -66,6 +71,7 @@ __all__ = [
     "columns",
     "compare_runs",
     "merge",
+    "parse_planner",
     "parse_policies",
     "parse_policy",
     "reproduce",
@@ -84,14 +90,13 @@ __getattr__, __dir__ = lazy_names(
         "batch": "run_batch",
         "benchmark": "bench",
         "comparing": "Rule Verdict compare_runs",
-        "compatibility": "UnusablePolicyError",
         "database": "DamagedResultsError",
         "episode": "InvalidActionError PolicyError run_episode",
         "experiment": "Experiment",
         "jobs": "Job JobResult JobSettings",
         "merging": "Merged merge",
         "paper": "Comparison bench_paper",
-        "policies": "PolicySpec parse_policies parse_policy",
+        "policies": "PolicySpec UnusablePolicyError parse_policies parse_policy parse_planner",
         "reproduction": "Reproduction reproduce",
         "rescoring": "Rescored rescore",
         "results": "Results",

@@ -13,6 +13,7 @@ from pushplan.evaluation.jobs import JobSettings
 from pushplan.evaluation.limits import MEMORY_MB
 from pushplan.evaluation.policies import PolicySpec
 from pushplan.evaluation.results import Results
+from pushplan.world import InvalidInputError
 
 if TYPE_CHECKING:
     from pushplan.scenarios import Suite
@@ -96,11 +97,23 @@ def bench(
 
 
 def suites_of(given: Any, episodes: int | None, seed: int) -> tuple[Suite, ...]:
-    """Suites and folders of worlds, with commas between them, a suite, or a list of scenarios."""
-    from pushplan.scenarios import Suite, suite, world_suite
+    """Suites and folders of worlds, with commas between them, a suite, or a list of scenarios.
+
+    Raises:
+        UnknownNameError: if there is no suite of a name.
+        InvalidInputError: if there is no such folder, or a file is given.
+    """
+    from pushplan.scenarios import Suite, suite, suite_names, world_suite
 
     if isinstance(given, str):
         names = [name.strip() for name in given.split(",")]
+        for name in names:
+            if name not in suite_names() and Path(name).is_file():
+                raise InvalidInputError(
+                    f"{name!r} is a file, no suite and no folder of worlds: give its folder as "
+                    f"'{Path(name).parent}/', or run one world with "
+                    f"'pushplan run --task room --set world_file={name} --policy NAME'"
+                )
         return tuple(
             (world_suite if "/" in name else suite)(name, episodes=episodes, first_seed=seed)
             for name in names

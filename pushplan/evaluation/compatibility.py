@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from pushplan.control import ImmediateExecutor
 from pushplan.evaluation.jobs import Job, JobSettings
 from pushplan.evaluation.limits import EpisodeTimeout, soft_limit
-from pushplan.evaluation.policies import PolicySpec, parse_policies
+from pushplan.evaluation.policies import PolicySpec, UnusablePolicyError, parse_policies
 from pushplan.world import (
     ChecksScenario,
     InvalidInputError,
@@ -19,14 +19,9 @@ from pushplan.world import (
     PushplanError,
     stream,
 )
-from pushplan.world.errors import describe
 
 if TYPE_CHECKING:
     from pushplan.scenarios import Suite
-
-
-class UnusablePolicyError(InvalidInputError):
-    """A policy cannot be made, or is made for nothing that it is asked to run."""
 
 
 def misfits(
@@ -98,9 +93,6 @@ def incompatibility(spec: PolicySpec, scenario: Any, settings: JobSettings) -> s
         raise UnusablePolicyError(
             f"policy {spec.label!r} cannot be made: not done after {settings.timeout_s:g} s"
         ) from None
-    except (Exception, SystemExit) as error:
-        said = str(error) if isinstance(error, PushplanError) else describe(error)
-        raise UnusablePolicyError(f"policy {spec.label!r} cannot be made: {said}") from error
     if isinstance(policy, ChecksScenario) and (reason := policy.incompatibility(scenario)):
         return reason
     try:

@@ -27,6 +27,7 @@ from pushplan.evaluation.jobs import (
     timeout_reason,
 )
 from pushplan.evaluation.limits import EpisodeTimeout, hard_limit, soft_limit
+from pushplan.evaluation.policies import UnusablePolicyError
 from pushplan.evaluation.rows import Status, blank_row, clean_reason, instant, scored_row
 from pushplan.world.errors import describe
 from pushplan.world.policy_abilities import WarmsUp
@@ -66,10 +67,8 @@ def _execute(job: Job, settings: JobSettings) -> JobResult:
     np.random.seed(job.scenario.seed % 2**32)  # noqa: NPY002
     try:
         policy = job.policy.make()
-    except MemoryError:
-        raise
-    except (Exception, SystemExit) as error:
-        return failed_result(job, Status.POLICY_ERROR, describe(error), traceback.format_exc())
+    except UnusablePolicyError as error:
+        return failed_result(job, Status.POLICY_ERROR, str(error), traceback.format_exc())
     recording = Recording(
         policy, job.scenario, job.policy.label, latency_factor=settings.latency_factor
     )

@@ -87,7 +87,7 @@ def _copy(one: StoredResult, folder: Path, store: RunDirectory) -> bool:
         trace = path.read_bytes() if path.is_file() else b""
         if trace_digest(trace) != one.row.trace:
             return False
-    note = folder / "failures" / f"{one.row.job}.txt"
+    note = folder / one.row.detail_file
     detail = note.read_text(errors="replace") if note.is_file() else ""
     store.add(one.row, trace, detail, one.spec, show=one.current)
     store.measure((one.row.job, *value) for value in one.measured)

@@ -2,20 +2,27 @@
 
 from __future__ import annotations
 
+import contextlib
 import functools
 import hashlib
 import importlib.util
 import re
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, cast
 
-from pushplan.world import InvalidInputError, Policy, UnknownNameError
-from pushplan.world.named_objects import load_object
+from pushplan.world import InvalidInputError, Planner, Policy, PushplanError, UnknownNameError
+from pushplan.world.errors import MOST_CHOICES, describe, place
+from pushplan.world.libraries import missing
+from pushplan.world.named_objects import load_object, objects_of_file
 
 _LABEL = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.+@-]{0,63}")
+
+
+class UnusablePolicyError(InvalidInputError):
+    """A policy cannot be made, or is made for nothing that it is asked to run."""
 
 
 @dataclass(frozen=True)
@@ -93,20 +100,65 @@ class PolicySpec:
         """A fresh policy.
 
         Raises:
-            UnknownNameError: if there is no policy of that name.
-            InvalidInputError: if the source gives neither a policy nor a planner.
+            UnusablePolicyError: if the source gives neither a policy nor a planner, or raises: with
+                what it raised and where.
         """
-        if not isinstance(self.source, str):
-            return as_policy(self.source(**self.options), self.label)
-        if _network_file(self.source) is not None:
-            from pushplan.learned import load_policy
+        with _saying_what_fails("policy", self.label):
+            if not isinstance(self.source, str) or _is_object(self.source):
+                return as_policy(self._made_object(), self.label)
+            if _network_file(self.source) is not None:
+                from pushplan.learned import load_policy
 
-            return load_policy(self.source, self.label, **self.options)
-        if ":" in self.source:
-            return as_policy(load_object(self.source)(**self.options), self.label)
-        from pushplan.planners import make_policy
+                return load_policy(self.source, self.label, **self.options)
+            from pushplan.planners import make_policy
 
-        return make_policy(self.source, **self.options)
+            return make_policy(self.source, **self.options)
+
+    def make_planner(self) -> Planner:
+        """A fresh planner, of a source that `parse_planner` read.
+
+        Raises:
+            UnusablePolicyError: if the source gives no planner, or raises: with what it raised and
+                where.
+        """
+        with _saying_what_fails("planner", self.label):
+            if isinstance(self.source, str) and not _is_object(self.source):
+                from pushplan.planners import make_planner
+
+                return make_planner(self.source, **self.options)
+            made = self._made_object()
+        if callable(getattr(made, "plan", None)):
+            return cast(Planner, made)
+        if callable(getattr(made, "act", None)):
+            raise UnusablePolicyError(_NO_PLANNER.format(self.label))
+        raise UnusablePolicyError(
+            f"planner {self.label!r} is a {type(made).__name__}, which has no method plan"
+        )
+
+    def _made_object(self) -> Any:
+        """What the callable gives that the source is or names."""
+        source = load_object(self.source) if isinstance(self.source, str) else self.source
+        return source(**self.options)
+
+
+_NO_PLANNER = "{!r} is a policy, not a planner: give it to 'pushplan run' or 'pushplan bench'"
+
+
+@contextlib.contextmanager
+def _saying_what_fails(kind: str, label: str) -> Iterator[None]:
+    """Raise one error for whatever goes wrong while something of a user's is made.
+
+    Raises:
+        UnusablePolicyError: with what was raised, and where in the user's code.
+    """
+    try:
+        yield
+    except (MemoryError, UnusablePolicyError):
+        raise
+    except (Exception, SystemExit) as error:
+        ours = None if place(error) else missing(error) or error
+        said = str(ours) if isinstance(ours, PushplanError) else describe(error)
+        raise UnusablePolicyError(f"{kind} {label!r} cannot be made: {said}") from error
 
 
 def as_policy(thing: Any, label: str) -> Policy:
@@ -126,8 +178,8 @@ def as_policy(thing: Any, label: str) -> Policy:
 
         return ObjectPolicy(thing, label)
     raise InvalidInputError(
-        f"policy {label!r} is a {type(thing).__name__}, which has neither the methods of a policy "
-        "(reset, act) nor of a planner (plan) nor of a network (predict)"
+        f"a {type(thing).__name__} has neither the methods of a policy (reset, act) nor of a "
+        "planner (plan) nor of a network (predict)"
     )
 
 
@@ -194,26 +246,7 @@ def parse_policy(given: str | Callable[..., Any] | PolicySpec) -> PolicySpec:
     if isinstance(given, PolicySpec):
         return given
     if isinstance(given, str):
-        from pushplan.learned.loading import LEARNED_PREFIXES, learned_file
-
-        label, equals, source = given.partition("=")
-        if not equals:
-            label, source = "", given
-        if source.startswith(LEARNED_PREFIXES):
-            path = learned_file(source)
-            name = re.sub(r"[^A-Za-z0-9_.+@-]", "_", path.stem).lstrip(".+@-")[:64]
-            return PolicySpec(label or name or "policy", f"{source.partition(':')[0]}:{path}")
-        if ":" in source:
-            where, _, name = source.rpartition(":")
-            if where.endswith(".py"):
-                path = Path(where).expanduser().resolve()
-                if not path.is_file():
-                    raise InvalidInputError(f"policy {given!r}: there is no file {where}")
-                source = f"{path}:{name}"
-            return PolicySpec(label or name, source)
-        if source not in policy_names():
-            raise UnknownNameError("policy", source, policy_names())
-        return PolicySpec(label or source, source)
+        return _parse_text(given, "policy", policy_names())
     if not callable(given):
         raise InvalidInputError(
             "a policy is given as a name, 'onnx:FILE', 'sb3:FILE', 'module:Class', "
@@ -221,6 +254,67 @@ def parse_policy(given: str | Callable[..., Any] | PolicySpec) -> PolicySpec:
         )
     name = getattr(given, "__name__", type(given).__name__)
     return PolicySpec(re.sub(r"[^A-Za-z0-9_.-]", "", name) or "policy", given)
+
+
+def parse_planner(given: str) -> PolicySpec:
+    """Read one planner as users give it: a text as for `parse_policy`.
+
+    Raises:
+        UnknownNameError: if it looks like a name and is not one.
+        InvalidInputError: if it can be no planner at all, or is a policy's name.
+    """
+    from pushplan.planners import planner_names
+
+    names = planner_names()
+    source = given.rpartition("=")[2]
+    if source not in names and source in policy_names():
+        raise InvalidInputError(_NO_PLANNER.format(source))
+    return _parse_text(given, "planner", names)
+
+
+def _parse_text(given: str, kind: str, names: Sequence[str]) -> PolicySpec:
+    """Read a name, ``"onnx:FILE"``, ``"module:Class"`` ...; errors as `parse_policy`."""
+    from pushplan.learned.loading import LEARNED_PREFIXES, learned_file
+
+    label, equals, source = given.partition("=")
+    if not equals:
+        label, source = "", given
+    if source.startswith(LEARNED_PREFIXES):
+        path = learned_file(source)
+        name = re.sub(r"[^A-Za-z0-9_.+@-]", "_", path.stem).lstrip(".+@-")[:64]
+        return PolicySpec(label or name or "policy", f"{source.partition(':')[0]}:{path}")
+    where, colon, name = source.rpartition(":")
+    file = where if colon else source
+    if file.endswith(".py"):
+        path = Path(file).expanduser().resolve()
+        if not path.is_file():
+            raise InvalidInputError(f"{kind} {given!r}: there is no file {file}")
+        if not colon or not name:
+            raise InvalidInputError(f"{kind} {given!r} names no class: {_classes_to_give(file)}")
+        return PolicySpec(label or name, f"{path}:{name}")
+    if colon:
+        return PolicySpec(label or name, source)
+    if source not in names:
+        raise UnknownNameError(kind, source, names)
+    return PolicySpec(label or source, source)
+
+
+def _is_object(source: str) -> bool:
+    """Whether a source names a class or another callable, not one of ours or a network's file."""
+    return ":" in source and _network_file(source) is None
+
+
+def _classes_to_give(file: str) -> str:
+    """What to give instead of a file alone: its classes that could be policies or planners."""
+    with _saying_what_fails("policy", file):
+        found = [
+            f"{file}:{name}"
+            for name, one in objects_of_file(file).items()
+            if isinstance(one, type) and {"act", "plan", "predict"} & {*dir(one)}
+        ]
+    if not found:
+        return f"{file} has no class with plan or act"
+    return f"give {' or '.join(found[:MOST_CHOICES])}"
 
 
 def parse_policies(

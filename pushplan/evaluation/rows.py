@@ -140,6 +140,11 @@ class ResultRow:
         return f"episodes/{self.trace}.npz" if self.trace else None
 
     @property
+    def detail_file(self) -> str:
+        """Where the traceback of a failed job is in a run directory, if one was kept."""
+        return f"failures/{self.job}.txt"
+
+    @property
     def failed(self) -> bool:
         """Whether the job ended otherwise than by the rules of its task."""
         return self.status != Status.DONE

@@ -62,7 +62,7 @@ def salvage(path: str | Path, out: str | Path) -> Salvaged:
             trace = _trace(path, row)
             if row.trace and trace is None:
                 without.append(row.job)
-            note = path / "failures" / f"{row.job}.txt"
+            note = path / row.detail_file
             detail = note.read_text(errors="replace") if note.is_file() else ""
             store.add(replace(row, trace=""), trace, detail, spec, show=shown)
         store.write_csv()

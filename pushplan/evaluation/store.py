@@ -169,7 +169,7 @@ class RunDirectory:
                 assert row.trace_file is not None
                 write_atomic(self.path / row.trace_file, trace)
             if detail:
-                write_atomic(self.failures / f"{row.job}.txt", detail.encode(errors="replace"))
+                write_atomic(self.path / row.detail_file, detail.encode(errors="replace"))
             insert(db, row, json.dumps(spec or {}))
             if show:
                 db.execute(HIDE_OTHERS, (row.job, row.job))

@@ -52,12 +52,15 @@ def number(
         result = float(value)
     except OverflowError:
         result = math.inf
-    if math.isnan(result) or (finite and math.isinf(result)):
-        raise InvalidInputError(f"{name} must be finite, got {result}")
-    if result < low or result > high or (open_low and result == low):
-        bracket = "(" if open_low else "["
-        raise InvalidInputError(f"{name} must lie in {bracket}{low:g}, {high:g}], got {result:g}")
-    return result
+    outside = math.isnan(result) or result < low or result > high or (open_low and result == low)
+    if not outside and not (finite and math.isinf(result)):
+        return result
+    if finite and low == -math.inf and high == math.inf:
+        raise InvalidInputError(f"{name} must be finite, got {result:g}")
+    opening = "(" if open_low or (finite and low == -math.inf) else "["
+    closing = ")" if finite and high == math.inf else "]"
+    rule = f"{opening}{low:g}, {high:g}{closing}"
+    raise InvalidInputError(f"{name} must lie in {rule}, got {result:g}")
 
 
 def integer(name: str, value: object, *, low: int | None = None, high: int | None = None) -> int:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import os
 import reprlib
 from collections.abc import Iterable
 
@@ -11,6 +12,12 @@ LONGEST_MESSAGE = 300
 MOST_CHOICES = 12
 """Most choices that a message lists; of more, the `NEAREST` to the name that was given."""
 NEAREST = 3
+_ALIKE = 0.55
+"""Similarity above which the nearest choice may be meant: "circle" is no "receptacle"."""
+_OURS = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
+_PYTHONS = os.path.dirname(os.__file__)
+_NOT_A_USERS = ("<", f"{_OURS}{os.sep}", f"{_PYTHONS}{os.sep}")
+_INSTALLED = {"site-packages", "dist-packages"}
 
 
 class PushplanError(Exception):
@@ -56,7 +63,8 @@ def unknown_name_message(kind: str, name: object, choices: Iterable[str]) -> str
     """One line that names the unknown value, and every choice or, of many, the three nearest."""
     valid = sorted(choices)
     near = difflib.get_close_matches(str(name)[:80], valid, n=NEAREST, cutoff=0.5)
-    hint = f"; did you mean {near[0]!r}?" if near else ""
+    alike = difflib.get_close_matches(str(name)[:80], near, n=1, cutoff=_ALIKE)
+    hint = f"; did you mean {alike[0]!r}?" if alike else ""
     if len(valid) <= MOST_CHOICES:
         return f"unknown {kind} {short(name)}{hint} (valid: {', '.join(valid) or 'none'})"
     shown = f"nearest of {len(valid)}: {', '.join(near)}"
@@ -66,13 +74,28 @@ def unknown_name_message(kind: str, name: object, choices: Iterable[str]) -> str
 
 
 def describe(error: BaseException) -> str:
-    """One line for an exception: its type and its message."""
+    """One line for an exception: its type, its message, and its `place` in a user's code."""
     try:
         text = one_line(str(error))
     except Exception:  # its text may be code of a stranger
         text = ""
-    name = type(error).__name__
-    return f"{name}: {text}" if text else name
+    name, where = type(error).__name__, place(error)
+    return one_line(f"{name}{': ' if text else ''}{text}{f' ({where})' if where else ''}")
+
+
+def place(error: BaseException) -> str:
+    """``file.py:line`` of the innermost frame that an exception left in a user's code.
+
+    A user's is what belongs neither to pushplan nor to Python nor to an installed library. Empty
+    if there is no such frame, or the message says the place itself, as that of a SyntaxError.
+    """
+    frame, found = error.__traceback__, ""
+    while frame is not None and not isinstance(error, SyntaxError):
+        file = frame.tb_frame.f_code.co_filename
+        if not file.startswith(_NOT_A_USERS) and not _INSTALLED & {*file.split(os.sep)}:
+            found = f"{os.path.basename(file)}:{frame.tb_lineno}"
+        frame = frame.tb_next
+    return found
 
 
 def one_line(text: str) -> str:

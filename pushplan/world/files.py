@@ -188,7 +188,9 @@ def robot_from_dict(data: object) -> tuple[RobotModel, Any, Any]:
     fields["parts"] = tuple(fields["parts"])
     if fields["drive"] not in [drive.value for drive in Drive]:
         raise SchemaError(unknown_name_message("drive", fields["drive"], [d.value for d in Drive]))
-    return RobotModel(**fields), data["pose"], data.get("twist")
+    pose = array("robot.pose", data["pose"], (3,))
+    twist = data.get("twist")
+    return RobotModel(**fields), pose, None if twist is None else array("robot.twist", twist, (3,))
 
 
 def _static(data: object, folder: Path) -> StaticMap:

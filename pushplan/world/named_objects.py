@@ -32,9 +32,32 @@ def load_object(spec: str) -> Any:
         raise InvalidInputError(f"a module has at most {_DEEPEST} parts in its name, got {spec!r}")
     module = _load_file(Path(where)) if where.endswith(".py") else _load_module(where, spec)
     if not hasattr(module, name):
-        choices = [key for key in vars(module) if not key.startswith("_")]
-        raise InvalidInputError(unknown_name_message(f"name in {where}", name, choices))
+        shown = Path(where).name if where.endswith(".py") else where
+        raise InvalidInputError(
+            unknown_name_message(f"name in {shown}", name, _callables_of(module))
+        )
     return getattr(module, name)
+
+
+def objects_of_file(path: str | Path) -> dict[str, Any]:
+    """The classes and functions that a file defines, by name, in its order.
+
+    What it imports from elsewhere, and what begins with an underscore, is left out. Errors are
+    those of `load_object`.
+    """
+    return _callables_of(_load_file(Path(path)))
+
+
+def _callables_of(module: ModuleType) -> dict[str, Any]:
+    """Classes and functions of a module, or of the modules in it."""
+    name = module.__name__
+    return {
+        key: value
+        for key, value in vars(module).items()
+        if not key.startswith("_")
+        and callable(value)
+        and f"{getattr(value, '__module__', None)}.".startswith(f"{name}.")
+    }
 
 
 def _load_module(name: str, spec: str) -> ModuleType:

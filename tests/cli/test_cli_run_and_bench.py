@@ -17,7 +17,7 @@ from pushplan.evaluation import TIMING_COLUMNS, Results, bench
 from pushplan.world import Episode
 
 MINE = """
-import math
+import math, os, time
 from pushplan.world import Twist
 
 class Spin:
@@ -33,6 +33,14 @@ class NotANumber(Spin):
 class Planless:
     def plan(self, world, *, stop=None, rng=None):
         raise ValueError("no plan today")
+
+class Dies(Spin):
+    def act(self, world, observation):
+        os._exit(3)
+
+class Hangs(Spin):
+    def act(self, world, observation):
+        time.sleep(1000.0)
 """
 
 
@@ -75,19 +83,24 @@ def test_run_takes_a_task_with_variations(
 @pytest.mark.slow
 def test_bench_with_a_file_of_ones_own(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "mine.py").write_text(MINE)
-    names = ",".join(["straight", *(f"{tmp_path}/mine.py:{n}" for n in ("Spin", "NotANumber"))])
+    classes = ("Spin", "NotANumber", "Dies", "Hangs")
+    names = ",".join(["straight", *(f"{tmp_path}/mine.py:{name}" for name in classes)])
     names += f",planner={tmp_path}/mine.py:Planless"
     out = tmp_path / "run"
     options = ["--episodes", "2", "--workers", "2", "--out", str(out), "--seed", "5"]
+    options += ["--timeout", "10"]
     assert main(["bench", "maze-2d-3", "--policies", names, *options]) == 1  # some jobs failed
-    text = capsys.readouterr().out
+    said = capsys.readouterr()
+    text = said.out
     assert "Spin - straight" in text and str(out / "report.html") in text
+    assert "Dies: 2 of 2 failed: the worker process exited with code 3; traceback: " in said.err
+    assert "Hangs: 2 of 2 failed: not done after 10 s of wall-clock time; traceback: " in said.err
     rows = {(row.policy, row.seed): row for row in Results.load(out).rows}
     assert {seed for _, seed in rows} == {5, 6}
     assert rows["straight", 5].success and rows["straight", 5].plan_calls == 1
     assert rows["Spin", 5].status == "done" and not rows["Spin", 5].success
     assert rows["NotANumber", 5].status == "invalid_action"
-    assert rows["planner", 6].reason == "ValueError: no plan today"
+    assert rows["planner", 6].reason == "ValueError: no plan today (mine.py:17)"
     assert main(["report", str(out)]) == 0
     assert main(["report", str(out), "--metrics", "E_nav_to_goal_point"]) == 0
 

@@ -101,7 +101,7 @@ def test_a_failed_run_is_code_1(tmp_path: Path, capsys: pytest.CaptureFixture[st
     options = ["--episodes", "1", "--workers", "0", "--out", str(tmp_path / "run"), "--json"]
     assert main(["bench", "maze-2d-3", "--policies", f"bad={policy},straight", *options]) == 1
     said = capsys.readouterr()
-    assert "1 of 2 jobs failed" in said.err
+    assert "bad: 1 of 1 failed: ValueError: no (failing.py:3); traceback: " in said.err
     bad, straight = json.loads(said.out)["policies"]
     assert (bad["policy"], bad["failed"], straight["failed"]) == ("bad", 1, 0)
     assert straight["success"]["fraction"] == 1.0 and straight["metrics"]["E_nav"]["count"] == 1

@@ -71,7 +71,7 @@ def test_what_is_no_message(body, said):
         ({"period": 0}, "period must lie in (0"),
         ({"period": "fast"}, "period must be a number, got 'fast'"),
         ({"period": True}, "period must be a number"),
-        ({"period": float("nan")}, "period must be finite"),
+        ({"period": float("nan")}, "period must lie in (0"),
         ({"settings": []}, "settings must be a mapping"),
         ({"settings": {"max_ages": 1}}, "did you mean 'max_age'?"),
         ({"settings": {"max_age": -1}}, "max_age must lie in (0"),
