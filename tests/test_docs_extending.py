@@ -15,11 +15,32 @@ from pathlib import Path
 
 import pytest
 
+from pushplan import geometry
 from pushplan.envs import registry
 from pushplan.metrics import METRICS
+from pushplan.world import Movables, RobotModel, StaticMap, World
 
 PAGE = Path(__file__).parents[1] / "docs" / "extending.md"
 BLOCK = re.compile(r"^```(\w+)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+
+
+def test_the_tables_of_a_world_name_what_is_there() -> None:
+    text = PAGE.read_text(encoding="utf-8").partition("## What a planner sees")[2]
+    first, second = text.partition("\n## ")[0].split("|---|---|")[1:]
+    known = {"robot": RobotModel, "static": StaticMap, "movables": Movables}
+    named = set()
+    for row in re.findall(r"^\| (.*?) \| .*? \| (.*) \|$", first, re.MULTILINE):
+        names = re.findall(r"`([\w.]+)", row[0])
+        named |= set(names)
+        kind = known.get(names[0]) if names else None
+        for name in re.findall(r"`(\w+)`", row[1]) if kind else ():
+            assert name in dir(kind) or name in kind.__dataclass_fields__, name
+    fields = set(World.__dataclass_fields__)
+    assert fields <= named and named <= fields | set(dir(World)) | {"movables.outline_world"}
+    helpers = re.findall(r"^\| (.*?) \|", second, re.MULTILINE)
+    assert len(helpers) >= 7
+    for name in re.findall(r"`(\w+)", " ".join(helpers)):
+        assert name in geometry.__all__
 
 
 def run(line: str) -> str:
