@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import re
 import shutil
 import subprocess
@@ -83,6 +84,10 @@ def test_a_bench_runs(at, size, folder) -> None:
     rows = (out / "results.csv").read_text().splitlines()
     assert len(rows) == 1 + episodes * (arguments[4].count(",") + 1)
     assert (out / "report.html").exists() and (out / "tradeoff.svg").exists()
+    if at == 1:  # the reader's own planner arrives too, and has measured its time
+        table = [row for row in csv.DictReader(rows) if row["policy"] == "AroundWalls"]
+        assert all(row["reason"] == "goal" for row in table)
+        assert all(float(row["plan_time_median_s"]) > 0.0 for row in table)
 
 
 @pytest.mark.parametrize(
