@@ -45,8 +45,8 @@ or validation.
 - **▲**: above the best of the paper in simulation, with the whole interval, or with the median \
 where the paper's value is a median. S counts if it equals the best. I counts only for policies, \
 ours and the paper's, that succeed in nine of ten episodes or bring nine of ten boxes home.
-- **E_nav**: the paper's l₀\* ends at the goal's centre, so its values stand under *E_nav to goal \
-point*. Its code finds l₀\* on a grid whose diagonal steps cost 1, which shortens it. In the 2D \
+- **E_nav**: the paper's l₀\\* ends at the goal's centre, so its values stand under *E_nav to goal \
+point*. Its code finds l₀\\* on a grid whose diagonal steps cost 1, which shortens it. In the 2D \
 maze its E_nav is 4 to 7 % below ours on the same trajectory, measured inside the original \
 environment ([how](bench-push.md)). In the 3D testbed it lies between our two columns on most \
 starts. Both columns are compared with the paper's ([conventions](metrics.md)); a lead of less \

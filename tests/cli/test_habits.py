@@ -199,7 +199,8 @@ def test_the_demo_shows_three_episodes(tmp_path: Path, capsys: pytest.CaptureFix
     assert main(["demo", "--out", str(out)]) == 0
     text = capsys.readouterr().out
     assert text.count(": success") == 3 and f"page: {out / 'report.html'}" in text
-    assert os.path.getsize(out / "report.html") > 100_000
+    page = (out / "report.html").read_text(encoding="utf-8")
+    assert page.count('<script type="application/json" class="replay">') == 3
 
 
 def test_bounds_are_printed_and_kept(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
