@@ -156,15 +156,18 @@ def metric_function(name: str) -> Callable[[Episode], float | None]:
 
     Raises:
         UnknownNameError: if there is no such metric.
-        InvalidInputError: if there is no such file, module or function.
+        InvalidInputError: if there is no such file, module or function, or loading it raises.
     """
     target = METRICS[name].function if name in METRICS else name
     if ":" not in target:
         raise UnknownNameError("metric", name, METRICS)
     try:
         function = load_object(target)
-    except (ImportError, InvalidInputError) as error:
-        raise InvalidInputError(f"cannot load metric {name!r}: {error}") from error
+    except MemoryError:
+        raise
+    except (Exception, SystemExit) as error:  # whatever a user's file raises
+        said = error if isinstance(error, InvalidInputError) else describe(error)
+        raise InvalidInputError(f"cannot load metric {name!r}: {said}") from error
     if not callable(function):
         raise InvalidInputError(f"metric {name!r} is no function, but {short(function)}")
     return cast("Callable[[Episode], float | None]", function)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -145,7 +146,7 @@ def test_registry_leaves_out_what_does_not_apply() -> None:
     assert "E_nav" not in compute(episode([[0, 0], [9, 0]], goal=corner))
 
 
-def test_registry_takes_functions_by_text_and_names_unknown_metrics() -> None:
+def test_registry_takes_functions_by_text_and_names_unknown_metrics(tmp_path: Path) -> None:
     run = episode([[0, 0], [3, 4]])
     name = "pushplan.metrics.lengths:robot_path_length"
     assert compute(run, [name]) == {name: pytest.approx(5.0)}
@@ -153,3 +154,6 @@ def test_registry_takes_functions_by_text_and_names_unknown_metrics() -> None:
         compute(run, ["E_nva"])
     with pytest.raises(InvalidInputError, match="cannot load metric"):
         compute(run, ["pushplan.metrics.lengths:nothing"])
+    (tmp_path / "broken.py").write_text("def f(:")
+    with pytest.raises(InvalidInputError, match=r"cannot load metric .*SyntaxError.*broken.py"):
+        compute(run, [f"{tmp_path}/broken.py:f"])
