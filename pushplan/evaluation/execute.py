@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import logging
 import os
 import platform
 import random
@@ -29,10 +30,12 @@ from pushplan.evaluation.jobs import (
 from pushplan.evaluation.limits import EpisodeTimeout, hard_limit, soft_limit
 from pushplan.evaluation.policies import UnusablePolicyError
 from pushplan.evaluation.rows import Status, blank_row, clean_reason, instant, scored_row
+from pushplan.world import InvalidInputError
 from pushplan.world.errors import describe
 from pushplan.world.policy_abilities import WarmsUp
 
 DRY_RUN_STEPS = 2
+_log = logging.getLogger(__name__)
 _dry_runs: set[tuple[str, str, str]] = set()
 
 
@@ -104,7 +107,12 @@ def _execute(job: Job, settings: JobSettings) -> JobResult:
     episode = recording.episode(reason)
     calls = plan_times(policy)
     row = scored_row(row, episode, None if calls is None else len(calls))
-    return JobResult(row, episode.to_bytes(), clipped(detail))
+    try:
+        trace = episode.to_bytes()
+    except InvalidInputError as error:  # too large: the scores are there all the same
+        _log.warning("%s in %s is not kept: %s", job.policy.label, job.title, error)
+        trace = None
+    return JobResult(row, trace, clipped(detail))
 
 
 def dry_run(job: Job, settings: JobSettings) -> None:

@@ -16,7 +16,7 @@ from pushplan.world.checks import ArrayRecord, BoolArray, FloatArray, array, kno
 from pushplan.world.errors import InvalidInputError, SchemaError
 from pushplan.world.files import world_from_dict, world_to_dict
 from pushplan.world.recorded_plans import RecordedPlans
-from pushplan.world.safe_files import parse_json, read_npz
+from pushplan.world.safe_files import MAX_BYTES, parse_json, read_npz
 from pushplan.world.scene import World
 
 SCHEMA = "pushplan-episode/1"
@@ -102,11 +102,15 @@ class Episode(ArrayRecord, CheckedFields):
         )
 
     def save(self, path: str | Path) -> None:
-        """Write to a compressed ``.npz`` file that holds no pickles."""
+        """Write to a compressed ``.npz`` file that holds no pickles.
+
+        Raises:
+            InvalidInputError: if it is larger than what `load` reads.
+        """
         Path(path).write_bytes(self.to_bytes())
 
     def to_bytes(self) -> bytes:
-        """What `save` writes."""
+        """What `save` writes; errors as there."""
         header = {
             "schema": SCHEMA,
             "world": world_to_dict(self.world),
@@ -117,8 +121,15 @@ class Episode(ArrayRecord, CheckedFields):
         arrays: dict[str, Any] = {key: getattr(self, key) for key in _ARRAYS}
         if self.plans is not None:
             arrays |= {key: getattr(self.plans, name) for key, name in _PLANS.items()}
+        arrays["header"] = np.array(json.dumps(header))
+        size = sum(one.nbytes for one in arrays.values())
+        if size > MAX_BYTES:
+            raise InvalidInputError(
+                f"an episode of {len(self.times)} instants and {len(self.world.movables)} objects "
+                f"has {size:,} bytes, {MAX_BYTES:,} are the greatest size of a file"
+            )
         file = io.BytesIO()
-        np.savez_compressed(file, header=np.array(json.dumps(header)), **arrays)
+        np.savez_compressed(file, **arrays)
         return file.getvalue()
 
     @classmethod
