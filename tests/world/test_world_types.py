@@ -43,7 +43,7 @@ NAN = float("nan")
     [
         (lambda: make_robot(mass=-1), "robot.mass"),
         (lambda: make_robot(mass="heavy"), "must be a number"),
-        (lambda: make_robot(max_speed=NAN), "finite"),
+        (lambda: make_robot(max_speed=NAN), "must lie in (0, inf), got nan"),
         (lambda: make_robot(drive="diferential"), "did you mean 'differential'"),
         (lambda: RobotModel((), 1.0, "differential", 1.0, 1.0), "non-empty"),
         (lambda: make_boxes([[0, 0, NAN]]), "finite"),
