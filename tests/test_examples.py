@@ -84,7 +84,8 @@ class TestWorlds:
     def test_the_door_is_opened_on_purpose(self):
         result = make_planner("namo").plan(world("blocked_door"), rng=stream(0, "policy"))
         first, last = result.plan.object_poses[0, 0], result.plan.object_poses[-1, 0]
-        assert np.allclose(last - first, [0.0, 0.75, 0.0], atol=0.1)  # along the wall
+        x, y, turn = last - first
+        assert y > 0.4 and abs(x) < 0.15 and abs(turn) < 0.1  # along the wall
         quick = make_planner("push-aware").plan(world("blocked_door"), stop=MaxIterations(1000))
         assert quick.status is PlanStatus.TIMED_OUT
 
