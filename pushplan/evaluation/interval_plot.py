@@ -48,9 +48,8 @@ def draw_intervals(run: RunRecord) -> Figure:
             )
             text.set_in_layout(False)  # it reaches over all panels
         for policy, index in run.policies_in(setting).items():
-            if (summary := found.get((setting, policy))) is not None:
-                for axes, names in zip(panels, [[], *columns.values()], strict=True):
-                    _bar(axes, summary, names, len(ticks), index)
+            for axes, names in zip(panels, [[], *columns.values()], strict=True):
+                _bar(axes, found[setting, policy], names, len(ticks), index)
             ticks[len(ticks)] = policy
     for axes, names in zip(panels, [["success"], *columns.values()], strict=True):
         axes.set_xlabel(names[0] if len(names) == 1 else names[0][0])

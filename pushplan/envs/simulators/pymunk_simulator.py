@@ -86,7 +86,6 @@ class PymunkSimulator(Simulator):
         duration = number("duration", duration, low=0.0, open_low=True)
         radius = self._world.robot.circumscribed_radius
         speed = abs(command.linear) + abs(command.angular) * radius
-        own = self._object_speeds() * duration
         self._held = self._touched = False
         clear = self.clear_for(command, duration)
         if clear >= duration:
@@ -94,6 +93,7 @@ class PymunkSimulator(Simulator):
             samples = max(1, math.ceil(turn / _GLIDE_TURN), math.ceil(way / radius))
             poses = self._glide(command, duration, max(samples, _GLIDE_SAMPLES if turn else 1))
             return self._traced(duration, poses, self._resting(len(poses)))
+        own = self._object_speeds() * duration
         wanted = self._substeps(max(speed * duration, own.max(initial=0.0)), duration)
         samples = max(2, math.ceil(self.options.samples * min(1.0, wanted / _SAMPLED)))
         each = max(1, math.ceil(wanted / samples))
