@@ -42,6 +42,7 @@ from pushplan.world.checks import expect
 from pushplan.world.polyline import path_lengths
 
 _PERIOD = 0.1  # for which the first command is taken to be held [s]
+_AT_ONCE = 3  # so many poses ahead a jam lets nothing wait
 _PAUSE = 0.1  # between two plans, of the time for which the robot has not got on
 
 
@@ -63,8 +64,9 @@ class PlanFollower:
 
     At every step the rest of the plan is swept again from where everything is now; where that
     costs more than was predicted, or jams, or the robot has left the path, or the plan is used
-    up, a new plan is made. If none is found the old one is kept. A differential drive that does
-    not get on, with a plan or without, recovers (`pushplan.control.Recovery`) and plans anew.
+    up, a new plan is made. If none is found the old one is kept, but a robot that can stop stands
+    where it would jam next. A differential drive that does not get on, with a plan or without,
+    recovers (`pushplan.control.Recovery`) and plans anew.
 
     With an executor that takes time (`plan_with`) planning goes on beside driving: a call plans
     from where the robot will be when it is done, and the old plan is driven until then.
@@ -114,7 +116,7 @@ class PlanFollower:
 
     def _forget(self, rng: np.random.Generator) -> None:
         self.plan_log: list[PlanResult] = []
-        """Every planning call since the last reset."""
+        """Every planning call since the last reset; only the last one keeps its predictions."""
         self.current_plan: Plan | None = None
         self.plan_with(ImmediateExecutor())
         self._clock = EpisodeClock(_PERIOD)
@@ -214,8 +216,12 @@ class PlanFollower:
             return
         self._pending = None
         result = pending.call.result()
+        if self.plan_log:
+            self.plan_log[-1] = _without_predictions(self.plan_log[-1])
         self.plan_log.append(result)
         if result.plan is None:
+            if pending.reason is Reason.BLOCKED and world.robot.can_stop:
+                self.current_plan = None
             return
         _check(result.plan, pending.start)
         new = joined(pending.stretch, result.plan)
@@ -290,8 +296,10 @@ class PlanFollower:
             return None
         now, _ = sweep_rest(world, plan, part.start, self.interaction, part.stop)
         if now.jammed_at >= 0:
-            at_once = now.jammed_at <= 3 and self._recovery.idle <= self._recovery.patience
-            return Reason.JAM if rested or at_once else None
+            if now.jammed_at > _AT_ONCE:
+                return Reason.JAM if rested else None
+            gets_on = self._recovery.idle <= self._recovery.patience
+            return Reason.BLOCKED if rested or gets_on else None
         expected = float(path_lengths(predicted[part]) @ world.movables.masses)
         allowed = surprise * world.robot.circumscribed_radius * world.robot.mass
         return Reason.SURPRISE if rested and now.work - expected > allowed else None
@@ -306,6 +314,13 @@ def _timed_call(
     took = time.perf_counter() - began
     result = expect("what the planner returns", result, PlanResult)
     return replace(result, stats=replace(result.stats, wall_time_s=took))
+
+
+def _without_predictions(result: PlanResult) -> PlanResult:
+    """The same result without the objects' predicted poses, which take most of its memory."""
+    if result.plan is None or result.plan.object_poses is None:
+        return result
+    return replace(result, plan=replace(result.plan, object_poses=None))
 
 
 def _check(plan: Plan, start: World) -> None:

@@ -23,6 +23,7 @@ class Reason(enum.Enum):
     USED_UP = ("the plan is used up", True)
     TIGHT = ("out of a tight place", True)
     JAM = ("the robot would jam", True)
+    BLOCKED = ("the robot is about to jam", True)
     SURPRISE = ("the plan costs more than was predicted", False)
     PERIOD = ("it is time", False)
 

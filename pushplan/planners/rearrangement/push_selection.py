@@ -64,9 +64,9 @@ def _select(scene: PushScene, graph: PushGraph, penalty: Callable[[Push], float]
     known: dict[int, SimulatedPush] = {}
     forward = _ForwardSimulator(scene, graph.approach)
 
-    def simulated_cost(n: int) -> tuple[float, tuple[int, ...]]:
+    def simulated_cost(n: int) -> tuple[float, tuple[int, ...]] | None:
         if scene.budget.is_over and any(math.isfinite(one.cost) for one in known.values()):
-            return math.inf, ()
+            return None
         push = graph.pushes[n]
         found = forward.of(push)
         if found is None:

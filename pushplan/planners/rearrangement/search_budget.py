@@ -8,13 +8,13 @@ from pushplan.world import Stop
 
 
 class SearchBudget:
-    """Counts simulated pushes; a stop rule ends the search between two of them.
+    """Counts simulated drives; a stop rule ends the search between two of them.
 
     Args:
         stop: the rule; None for no end.
 
     Attributes:
-        used: simulated pushes so far.
+        used: simulated drives so far.
         cost: of the best order so far [m]; infinite while there is none.
         interrupted: whether something was left out because of the rule.
     """

@@ -74,9 +74,12 @@ def push_order(graph: PushGraph, iterations: int = 300) -> tuple[list[int], floa
     return reduced.order([int(node) for node in tour.nodes]), float(tour.cost)
 
 
-def sequence_pushes(
-    graph: PushGraph, simulated_cost: Callable[[int], tuple[float, tuple[int, ...]]], most: int
-) -> list[int]:
+SimulatedCost = Callable[[int], tuple[float, tuple[int, ...]] | None]
+"""From the index of a push to its cost from where the robot is now [m], and what it then delivers;
+None where the search has to return with what is simulated by now."""
+
+
+def sequence_pushes(graph: PushGraph, simulated_cost: SimulatedCost, most: int) -> list[int]:
     """The order of pushes, with the first one simulated.
 
     The graph knows approaches roughly. The push that the cheapest order begins with is
@@ -84,8 +87,7 @@ def sequence_pushes(
 
     Args:
         graph: the pushes and their costs.
-        simulated_cost: from the index of a push to its cost from where the robot is now [m], and
-            what it then delivers.
+        simulated_cost: simulates a push.
         most: how many pushes are simulated at most.
     """
     sets = delivery_sets(graph)
@@ -101,7 +103,10 @@ def sequence_pushes(
     for n in np.argsort(guess, kind="stable").tolist()[:most]:
         if guess[n] >= value:
             break
-        cost, delivers = simulated_cost(n)
+        found = simulated_cost(n)
+        if found is None:
+            break
+        cost, delivers = found
         after = sets.mask(delivers) | int(sets.masks[n])
         total = cost + float(best[after, n])
         if total < value:
@@ -109,9 +114,7 @@ def sequence_pushes(
     return _order_after(following, sets.masks, mask, chosen, [chosen]) if chosen >= 0 else []
 
 
-def _by_tours(
-    graph: PushGraph, simulated_cost: Callable[[int], tuple[float, tuple[int, ...]]], most: int
-) -> list[int]:
+def _by_tours(graph: PushGraph, simulated_cost: SimulatedCost, most: int) -> list[int]:
     """As `sequence_pushes`, with a tour anew for every push that is simulated."""
     costs: FloatArray = graph.costs.copy()
     known: dict[int, float] = {}
@@ -121,6 +124,10 @@ def _by_tours(
             break
         if order[0] in known:
             return order
-        known[order[0]] = costs[-1, order[0]] = simulated_cost(order[0])[0]
+        found = simulated_cost(order[0])
+        if found is None:
+            costs[-1, [n for n in range(costs.shape[1]) if n not in known]] = np.inf
+        else:
+            known[order[0]] = costs[-1, order[0]] = found[0]
     rest = [n for n in known if math.isfinite(known[n])]
     return [min(rest, key=lambda n: (known[n] / len(graph.pushes[n].serves), n))] if rest else []

@@ -342,6 +342,29 @@ class TestHonestTime:
         assert policy.current_plan is not None
 
 
+@pytest.mark.parametrize(("drive", "stands"), [("differential", True), ("constant_speed", False)])
+def test_a_robot_that_can_stop_stands_before_a_jam_that_no_plan_avoids(drive, stands):
+    walls = StaticMap.build(polygons=[[[6, -5], [7, -5], [7, 5], [6, 5]]])
+    robot = make_robot(drive=drive)
+    planner = Scripted(line_plan, None)
+    policy = follower(planner)
+    scene = {"robot": robot, "static": walls, "robot_pose": [4.5, 0.0, 0.0]}
+    policy.act(floor([[4.0, 3.0, 0.0]], **scene))
+    twist = policy.act(floor([[5.4, 0.0, 0.0]], **scene, time=9.0))
+    assert len(planner.asked) == 2
+    assert (policy.current_plan is None) is stands
+    assert (twist.linear < 0.5 * robot.max_speed) is stands  # it brakes
+
+
+def test_only_the_last_plan_of_the_log_keeps_its_predictions():
+    policy = follower(Scripted(line_plan), every_seconds=5.0)
+    for step in range(12):
+        policy.act(floor([[4.0, 3.0, 0.0]], robot_pose=[0.15 * step, 0, 0], time=float(step)))
+    *before, last = (result.plan.object_poses for result in policy.plan_log)
+    assert before == [None, None] and last is not None
+    assert policy.current_plan.object_poses is not None
+
+
 def test_urgent_reasons():
     assert {reason for reason in Reason if not reason.urgent} == {
         Reason.OBJECTS,

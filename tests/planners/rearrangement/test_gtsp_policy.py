@@ -14,7 +14,9 @@ from pushplan.envs import PushEnv
 from pushplan.planners import make_policy, policy_names
 from pushplan.planners.rearrangement import GtspMpc, RearrangementConfig
 from pushplan.world import (
+    Deadline,
     InvalidInputError,
+    OwnBudget,
     Receptacle,
     StaticMap,
     Twist,
@@ -131,6 +133,15 @@ def test_a_decision_is_bounded_however_far_the_boxes_are(apart):
     before = time.process_time()
     assert GtspMpc().act(here) != Twist(0.0, 0.0)
     assert time.process_time() - before < 10.0
+
+
+def test_the_rollouts_of_a_choice_are_bounded():
+    boxes = [(x, y, 0.1 * x * y) for x in (-2.0, 0.0, 2.0) for y in (-2.0, 0.0, 2.0)]
+    few, many, ruled = GtspMpc(max_rollouts=20), GtspMpc(), GtspMpc(max_rollouts=20)
+    ruled.stop = OwnBudget() | Deadline(1e4)
+    commands = [policy.act(room(boxes)) for policy in (few, many, ruled)]
+    assert 0 < len(few.graph.pushes) < len(many.graph.pushes)
+    assert commands[0] == commands[2] != Twist(0.0, 0.0)  # an own budget is the same one
 
 
 def test_a_box_delivered_by_accident_is_dropped():
