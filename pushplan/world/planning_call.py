@@ -10,7 +10,7 @@ import numpy as np
 from pushplan.world.checks import expect
 from pushplan.world.plan import Plan, PlanResult, PlanStats, PlanStatus
 from pushplan.world.scene import World
-from pushplan.world.stop import Stop, StopCheck, check_rules, wants_own_budget, with_own_budget
+from pushplan.world.stop import AnyOf, Stop, StopCheck, check_rules, wants_own_budget
 
 
 class PlanningCall:
@@ -34,9 +34,11 @@ class PlanningCall:
         self.world: World = expect("world", world, World).with_fixed_as_static()
         given, generator = check_rules(stop, rng)
         self.rng = np.random.default_rng(0) if generator is None else generator
-        self.has_rule = not wants_own_budget(given)
+        own = wants_own_budget(given)
+        self.has_rule = not own
         """Whether a rule of the caller takes the place of the planner's own budget."""
-        self._rule = with_own_budget(given, default)
+        rules = [rule for rule in (given, default if own else None) if rule is not None]
+        self._rule = AnyOf(tuple(rules)) if len(rules) > 1 else rules[0] if rules else None
         self.arm()
 
     def arm(self) -> None:

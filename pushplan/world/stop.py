@@ -182,15 +182,8 @@ def rules_of(stop: Stop) -> tuple[Stop, ...]:
 
 
 def wants_own_budget(stop: Stop | None) -> bool:
-    """Whether a call ends when the planner would without a rule, or before."""
+    """Whether a call ends where the planner would without a rule, too."""
     return stop is None or any(isinstance(rule, OwnBudget) for rule in rules_of(stop))
-
-
-def with_own_budget(stop: Stop | None, budget: Stop | None) -> Stop | None:
-    """The rule that ends a call: the caller's, and the planner's own budget if that is wanted."""
-    if budget is None or not wants_own_budget(stop):
-        return stop
-    return budget if stop is None else stop | budget
 
 
 def check_rules(stop: object, rng: object) -> tuple[Stop | None, np.random.Generator | None]:

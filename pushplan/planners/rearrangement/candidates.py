@@ -79,7 +79,7 @@ def can_be_pushed(simulator: PushSimulator, k: int, horizon: float) -> bool:
 def pushes_with(simulator: PushSimulator, k: int, row: PushPrimitive) -> Iterator[Push]:
     """The pushes of one object by one row of the table that deliver something."""
     for start, how in _attempts(simulator, k, row):
-        if simulator.scene.budget.is_over:
+        if simulator.scene.budget.is_used_up:
             return
         found = simulator.simulate(start, k, **how)
         if found and all(
@@ -100,7 +100,7 @@ def partial_pushes(simulator: PushSimulator, k: int) -> Iterator[Push]:
         if row.controller != "path" or row.deep or row.partners:
             continue
         for start, how in _attempts(simulator, k, row):
-            if scene.budget.is_over:
+            if scene.budget.is_used_up:
                 return
             for whole in simulator.simulate(start, k, relocates=True, **how):
                 how["limit"] = whole.length - scene.config.early * scene.size

@@ -36,8 +36,8 @@ class GtspMpc:
 
     Args:
         config: settings.
-        stop: stop rule of each choice, counted in simulated drives; what was found until then is
-            driven. ``max_rollouts`` of the config by default.
+        stop: stop rule of each choice, counted in simulated pushes; what was found until then is
+            driven. By default ``max_rollouts`` of the config.
         overrides: fields of the default config to change, in place of ``config``.
 
     Attributes:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -15,9 +16,9 @@ from pushplan.planners.rearrangement.push_poses import pose_distance
 from pushplan.planners.rearrangement.push_scene import PushScene
 from pushplan.planners.rearrangement.push_selection import Selection, select_push
 from pushplan.planners.rearrangement.search_budget import SearchBudget
-from pushplan.world import MaxIterations, PendingResult, PlanningExecutor, Stop
+from pushplan.world import PendingResult, PlanningExecutor, Stop
 from pushplan.world.checks import FloatArray
-from pushplan.world.stop import with_own_budget
+from pushplan.world.stop import wants_own_budget
 
 _ROBOT, _OBJECT = 0.5, 0.2  # how far a scene may be from the predicted one [circumscribed radii]
 
@@ -80,7 +81,7 @@ def choose_push(
         scene: now, or where everything is expected to be.
         history: what has been tried; it is copied.
         executor: runs the search.
-        stop: its stop rule; by default ``max_rollouts`` of the config.
+        stop: its stop rule; without one no more pushes than the config allows are simulated.
         ahead: whether the scene is still to come.
     """
     penalty = partial(history.copy().penalty, size=scene.size)
@@ -88,8 +89,8 @@ def choose_push(
     def choose(rule: Stop | None) -> PushChoice:
         assert scene.cache is not None
         scene.cache.age()
-        own = MaxIterations(scene.config.max_rollouts)
-        budget = SearchBudget(with_own_budget(rule, own))
+        most = scene.config.max_rollouts if wants_own_budget(rule) else math.inf
+        budget = SearchBudget(rule, most)
         selection = select_push(scene.with_budget(budget), penalty)
         margin = 0.5 * scene.config.margin * scene.size
         way_out = recovery_path(scene.world, margin) if selection.first is None else None

@@ -97,7 +97,7 @@ def candidate_pushes(
     if onward:
         pushes += [push for k in objects for push in partial_pushes(simulator, k)]
     for k in objects:
-        if not relocations:
+        if not relocations or scene.budget.is_used_up:
             break
         found = relocating_pushes(simulator, k, approach, thorough)
         pushes += found

@@ -52,7 +52,7 @@ def select_push(scene: PushScene, penalty: Callable[[Push], float]) -> Selection
     left = int((~scene.done).sum())
     few = min(scene.config.relocation.objects, left)
     for relocations, thorough in ((0, False), (few, False), (left, True)):
-        if selection.first is None and not scene.budget.is_over:
+        if selection.first is None and not scene.budget.is_used_up:
             graph = build_push_graph(
                 scene, penalty, onward=True, relocations=relocations, thorough=thorough
             )
@@ -65,7 +65,7 @@ def _select(scene: PushScene, graph: PushGraph, penalty: Callable[[Push], float]
     forward = _ForwardSimulator(scene, graph.approach)
 
     def simulated_cost(n: int) -> tuple[float, tuple[int, ...]] | None:
-        if scene.budget.is_over and any(math.isfinite(one.cost) for one in known.values()):
+        if scene.budget.is_used_up and any(math.isfinite(one.cost) for one in known.values()):
             return None
         push = graph.pushes[n]
         found = forward.of(push)

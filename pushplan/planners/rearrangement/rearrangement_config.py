@@ -52,8 +52,8 @@ class RearrangementConfig(CheckedFields):
         max_pushes: how many are kept for all together, by which the time of a plan is bounded.
         max_steps: how many steps a predicted push has at most.
         max_simulations: how many pushes are simulated before one is chosen.
-        max_rollouts: after how many simulated drives a choice is made from what is known, unless a
-            stop rule is given.
+        max_rollouts: after how many simulated pushes a choice is made among those that are known,
+            unless a stop rule is given; searches for relocations have limits of their own.
         max_searches: how many objects relocations are searched for before one is chosen.
         response: time in which an error of heading or place is driven off [s]; longer than the
             robot's delay.
@@ -104,7 +104,7 @@ class RearrangementConfig(CheckedFields):
     max_pushes: Annotated[int, Limits(1, 10_000)] = 80
     max_steps: Annotated[int, Limits(1, 100_000)] = 5000
     max_simulations: Annotated[int, Limits(1, 1000)] = 30
-    max_rollouts: PositiveInt = 600
+    max_rollouts: PositiveInt = 1000
     max_searches: PositiveInt = 6
     response: Annotated[float, Limits(0.0, 1e3, open_low=True)] = 0.2
     mpc: bool = True

@@ -213,7 +213,6 @@ class _RelocationSearch:
         scene, k = self._scene, self._k
         # copies may be written to: one kernel for all
         start, before = np.array(state.track[-1]), np.array(state.poses)
-        scene.budget.used += len(self._arcs)
         tracks, poses, marks = sweep_arcs(
             start,
             before,
