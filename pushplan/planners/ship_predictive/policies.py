@@ -14,13 +14,13 @@ from pushplan.world import Planner, Stop
 
 
 def ship_predictive(planner: Planner | None = None, stop: Stop | None = None) -> PlanFollower:
-    """Predicts the floes along each path, and looks for a better one about every half hull."""
-    return _renewed(planner or PredictiveShip(), stop)
+    """Predicts the floes along each path, and looks for a better one about every quarter hull."""
+    return _renewed(planner or PredictiveShip(), 0.6, stop)
 
 
 def network(planner: Planner | None = None, stop: Stop | None = None) -> PlanFollower:
-    """Predicts the occupancy with a network, and looks for a better path as often."""
-    return _renewed(planner or PredictiveShipNetwork(), stop)
+    """Predicts the occupancy with a network, and looks for a better path half as often."""
+    return _renewed(planner or PredictiveShipNetwork(), 1.2, stop)
 
 
 def published(planner: Planner | None = None, stop: Stop | None = None) -> PlanFollower:
@@ -31,6 +31,6 @@ def published(planner: Planner | None = None, stop: Stop | None = None) -> PlanF
     )
 
 
-def _renewed(planner: Planner, stop: Stop | None) -> PlanFollower:
+def _renewed(planner: Planner, renewal: float, stop: Stop | None) -> PlanFollower:
     rule = Replanning(margin=0.01)
-    return RenewingFollower(planner, renewal=1.2, replanning=rule, stop=stop)
+    return RenewingFollower(planner, renewal=renewal, replanning=rule, stop=stop)

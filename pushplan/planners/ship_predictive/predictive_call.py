@@ -90,6 +90,8 @@ class PredictiveCall:
     def _widen(self, root: BeamNode[Any]) -> None:
         beam, config = self.beam, self.beam.config
         width = config.beam_width(len(beam.view.near))
+        if self.widening:
+            width = max(2, width // 4)
         while not beam.stopped:
             node = beam.search(root, width, config.horizon * beam.view.length)
             if node is not None:

@@ -29,7 +29,8 @@ class PredictiveConfig(CheckedFields):
         width: partial paths kept from piece to piece.
         sparse: with fewer floes than this in reach the beam is wider in proportion, up to twice;
             predictions are cheap then.
-        widest: with a stop rule the search is repeated with twice the width up to this.
+        widest: with a stop rule the search begins with a quarter of the width, and is repeated
+            with twice as much up to this.
         tries: pieces that are predicted exactly for each path kept; the others are left out by
             their estimate.
         horizon: length of path for which the ice is predicted; from there on the costs to go count.
@@ -43,9 +44,9 @@ class PredictiveConfig(CheckedFields):
 
     push_weight: NonNegativeFloat = 1.5
     turn_fraction: PositiveFraction = 0.9
-    arc: PositiveFloat = 0.4
-    curvatures: PositiveInt = 2
-    width: PositiveInt = 6
+    arc: PositiveFloat = 0.25
+    curvatures: PositiveInt = 3
+    width: PositiveInt = 12
     sparse: NonNegativeInt = 150
     widest: int = 48
     tries: Annotated[float, Limits(1.0)] = 2.5

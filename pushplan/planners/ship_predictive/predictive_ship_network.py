@@ -17,6 +17,9 @@ from pushplan.world import PlanResult, Stop, World
 from pushplan.world.checks import expect
 from pushplan.world.planning_call import PlanningCall
 
+NETWORK_CONFIG = PredictiveConfig(arc=0.4, curvatures=2, width=6, widest=24, sparse=0)
+"""Fewer and longer pieces than by default, as the network takes longer to predict one."""
+
 
 @dataclass(frozen=True)
 class PredictiveShipNetwork:
@@ -36,7 +39,7 @@ class PredictiveShipNetwork:
     warm_up_iterations: ClassVar[int] = 30
     """After which it has used all of its kernels."""
 
-    config: PredictiveConfig = field(default_factory=lambda: PredictiveConfig(widest=24, sparse=0))
+    config: PredictiveConfig = NETWORK_CONFIG
     network: IceNetwork = field(default_factory=IceNetwork)
     interaction: IceInteraction = field(default_factory=IceInteraction)
 
