@@ -159,7 +159,7 @@ def table(wanted: Wanted, episodes: Sequence[StoredEpisode]) -> str:
     body = [headings, ("---",) * len(headings), *lines]
     text = "".join(f"| {' | '.join(cells)} |\n" for cells in body)
     above = fill(f"{_origin(wanted, chosen)} {note}", WIDTH, break_on_hyphens=False)
-    return f"{above}\n\n{text}"
+    return f"\n{above}\n\n{text}\n"  # an empty line ends a table
 
 
 def _origin(wanted: Wanted, episodes: Sequence[StoredEpisode]) -> str:
