@@ -7,7 +7,7 @@ of the scenario, and where the episode comes from. Numbers have 6 significant di
 from __future__ import annotations
 
 import csv
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -91,28 +91,30 @@ def take(run: Path, experiment: Path) -> str:
     """
     fields = fields_of(read_data(experiment, "experiment file"), experiment.parent)
     labels = [policy.label for policy in fields["policies"]]
-    suites = {str(job.key): one.name for one in fields["suites"] for job in one.scenarios}
-    wanted = {
-        (one.name, label, str(job.seed)): ""
+    suites = {str(start.key): one.name for one in fields["suites"] for start in one.scenarios}
+    wanted = [
+        (one.name, label, str(start.seed))
         for one in fields["suites"]
         for label in fields["only"].get(one.name, labels)
-        for job in one.scenarios
-    }
+        for start in one.scenarios
+    ]
     results, path = Results.load(run), experiment.with_suffix(".csv")
-    taken = {
-        tuple(texts[name] for name in WHO): texts
-        for row in results.rows
-        if (suite := suites.get(row.scenario)) is not None
-        for texts in [_texts(row, suite, results)]
-    }
-    if not taken.keys() & wanted.keys():
+    known = [row for row in results.rows if row.scenario in suites]
+    found = _by_key([_texts(row, suites[row.scenario], results) for row in known])
+    taken = found.keys() & set(wanted)
+    if not taken:
         raise InvalidInputError(f"{run} has no episode that {experiment} names")
-    there = {tuple(t[name] for name in WHO): t for t in _lines(path)} if path.is_file() else {}
-    kept = [found for key in wanted if (found := taken.get(key, there.get(key))) is not None]
+    every = {**_by_key(_lines(path) if path.is_file() else []), **found}
+    kept = [every[key] for key in wanted if key in every]
     names = [name for name in COLUMNS if any(texts.get(name) for texts in kept)]
     lines = [[texts.get(name, "") for name in names] for texts in kept]
     write_atomic(path, csv_text(names, lines).encode())
-    return f"{path}: {len(taken.keys() & wanted.keys())} episodes taken, {len(kept)} stored"
+    return f"{path}: {len(taken)} episodes taken, {len(kept)} stored"
+
+
+def _by_key(lines: Sequence[Texts]) -> dict[tuple[str, ...], Texts]:
+    """Suite, policy and seed -> line."""
+    return {tuple(texts[name] for name in WHO): texts for texts in lines}
 
 
 def _lines(path: Path) -> list[Texts]:
