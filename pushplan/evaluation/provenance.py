@@ -62,15 +62,19 @@ def provenance(workers: int) -> dict[str, Any]:
 
 def in_words(run: dict[str, Any]) -> str:
     """One line of what `provenance` gave."""
-    commit = run["commit"]
-    code = run["pushplan"] + (f" at {commit[:12]}" if commit else "")
     packages = ", ".join(f"{name} {version}" for name, version in run["packages"].items())
     return (
-        f"{run['began']}: {run['command'] or 'Python'}; pushplan {code}"
-        f"{' with changes' if run['changed'] else ''}; {run['workers']} workers on "
+        f"{run['began']}: {run['command'] or 'Python'}; pushplan "
+        f"{code_in_words(run)}; {run['workers']} workers on "
         f"{run['cores']} cores at load {run['load']}, {run['system']} {run['machine']}, Python "
         f"{run['python']}; {packages}"
     )
+
+
+def code_in_words(run: dict[str, Any]) -> str:
+    """Version and commit of the code of a run: of what `provenance` gave."""
+    commit = f" at {run['commit'][:12]}" if run["commit"] else ""
+    return f"{run['pushplan']}{commit}{' with changes' if run['changed'] else ''}"
 
 
 def _version(name: str) -> str | None:

@@ -265,7 +265,7 @@ def _policy_cells(summary: PolicySummary, metrics: Sequence[str], wide: bool) ->
             cells.append("")
         elif name in _TIMES:
             worst = summary.metrics[_TIMES[name]].highest
-            cells.append(f"{_milliseconds(value.median)}\nmax {_milliseconds(worst)}")
+            cells.append(f"{milliseconds(value.median)}\nmax {milliseconds(worst)}")
         else:
             cells.append(_estimate(value, _digits(name), wide=wide))
     return tuple(cells)
@@ -291,6 +291,7 @@ def _number(value: float, digits: int, *, sign: bool = False) -> str:
     return f"{value:+.{digits}f}" if sign else f"{value:.{digits}f}"
 
 
-def _milliseconds(seconds: float) -> str:
+def milliseconds(seconds: float) -> str:
+    """A time in milliseconds, as tables show it."""
     value = 1e3 * seconds
     return f"{value:.0f}" if value >= 100.0 else f"{value:.3g}"
