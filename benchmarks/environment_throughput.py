@@ -21,6 +21,7 @@ import os
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -62,7 +63,7 @@ ROWS = (
     Row("ship_ice", "mujoco", "turn_rate", {"concentration": 0.1}, 40, simulated=True),
     Row("ship_ice", "mujoco", "turn_rate", {"concentration": 0.5}, 10, simulated=True),
 )
-VECTOR = (ROWS[1], ROWS[5], ROWS[9], ROWS[11])
+VECTOR = (ROWS[1], ROWS[4], ROWS[9], ROWS[11])
 
 
 class Stopwatch:
@@ -207,26 +208,30 @@ def memory(only: str, count: int = 20) -> None:
         print(f"{row.name:58} {(resident() - before) / count:8.2f} MB each")
 
 
-def vector(seconds: float) -> None:
-    """Two environments in two worker processes against two in this one."""
-    from gymnasium.vector import AsyncVectorEnv, AutoresetMode, SyncVectorEnv
+def vector(seconds: float, only: str) -> None:
+    """16 environments in two worker processes against one, in turns."""
+    from pushplan.envs import WorkerVectorEnv
 
     for row in VECTOR:
-        rates = {}
-        for kind in (SyncVectorEnv, AsyncVectorEnv):
-            envs = kind([lambda row=row: make(row)] * 2, autoreset_mode=AutoresetMode.SAME_STEP)
+        if only not in row.name:
+            continue
+        kinds = {n: WorkerVectorEnv([partial(make, row)] * 16, workers=n) for n in (1, 2)}
+        act, taken, steps = driver(row), dict.fromkeys(kinds, 0.0), dict.fromkeys(kinds, 0)
+        for envs in kinds.values():
             envs.reset(seed=1)
-            act = driver(row)
-            for i in range(20):
-                envs.step(np.stack([act(i)] * 2))
-            begin, steps = time.perf_counter(), 0
-            while time.perf_counter() - begin < seconds:
-                envs.step(np.stack([act(steps)] * 2))
-                steps += 1
-            rates[kind.__name__] = 2 * steps / (time.perf_counter() - begin)
+            for i in range(3):
+                envs.step(np.stack([act(i)] * 16))
+        for _ in range(4):
+            for n, envs in kinds.items():
+                begin = time.perf_counter()
+                while time.perf_counter() - begin < seconds / 4.0:
+                    envs.step(np.stack([act(steps[n] // 16)] * 16))
+                    steps[n] += 16
+                taken[n] += time.perf_counter() - begin
+        one, two = (steps[n] / taken[n] for n in kinds)
+        print(f"{row.name:58} {one:7.0f} {two:7.0f} steps/s  gain {two / one:.2f}", flush=True)
+        for envs in kinds.values():
             envs.close()
-        one, two = rates["SyncVectorEnv"], rates["AsyncVectorEnv"]
-        print(f"{row.name:58} sync {one:7.0f}  async {two:7.0f} steps/s  gain {two / one:.2f}")
 
 
 def main() -> None:
@@ -235,12 +240,12 @@ def main() -> None:
     parser.add_argument("--seconds", type=float, default=4.0, help="of stepping for each row")
     parser.add_argument("--only", default="", help="rows whose name holds this text")
     parser.add_argument("--memory", action="store_true", help="memory of an environment instead")
-    parser.add_argument("--vector", action="store_true", help="gain of two processes instead")
+    parser.add_argument("--vector", action="store_true", help="gain of two workers instead")
     options = parser.parse_args()
     if options.memory:
         memory(options.only)
     elif options.vector:
-        vector(options.seconds)
+        vector(options.seconds, options.only)
     else:
         throughput(options.seconds, options.only)
 

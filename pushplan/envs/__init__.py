@@ -16,20 +16,32 @@ from pushplan.world.lazy_names import lazy_names
 from pushplan.world.libraries import need
 
 if TYPE_CHECKING:
-    from pushplan.envs.making import make
+    from pushplan.envs.making import make, make_vector
     from pushplan.envs.push_env import EpisodeOverError, PushEnv
     from pushplan.envs.rollout import RolloutInteraction
     from pushplan.envs.trace import Trace
+    from pushplan.envs.vector_env import VectorWorkerError, WorkerVectorEnv
 
-__all__ = ["EpisodeOverError", "PushEnv", "RolloutInteraction", "Trace", "make", "register_all"]
+__all__ = [
+    "EpisodeOverError",
+    "PushEnv",
+    "RolloutInteraction",
+    "Trace",
+    "VectorWorkerError",
+    "WorkerVectorEnv",
+    "make",
+    "make_vector",
+    "register_all",
+]
 
 __getattr__, __dir__ = lazy_names(
     __name__,
     {
-        "making": "make",
+        "making": "make make_vector",
         "push_env": "EpisodeOverError PushEnv",
         "rollout": "RolloutInteraction",
         "trace": "Trace",
+        "vector_env": "VectorWorkerError WorkerVectorEnv",
     },
 )
 

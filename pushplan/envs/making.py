@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
+from functools import partial
 from typing import Any
 
+from gymnasium.vector import AutoresetMode
+
 from pushplan.envs.push_env import PushEnv
+from pushplan.envs.vector_env import WorkerVectorEnv
 from pushplan.observation import ObservationBuilder
 from pushplan.scenarios import Scenario
+from pushplan.world.checks import integer
 
 _OWN = ("simulator", "preset", "observation", "action", "render_mode")
 
@@ -37,6 +43,38 @@ def make(
         action=action,
         render_mode=render_mode,
         seed=scenario.seed,
+    )
+
+
+def make_vector(
+    scenario: Scenario,
+    num_envs: int,
+    *,
+    workers: int | None = None,
+    observation: str | ObservationBuilder | None = None,
+    action: str | Sequence[str] | None = None,
+    copy: bool = True,
+    autoreset_mode: str | AutoresetMode = AutoresetMode.NEXT_STEP,
+) -> WorkerVectorEnv:
+    """Environments of a scenario in worker processes, several in each, as one.
+
+    Each has another seed, given to `reset`.
+
+    Args:
+        scenario: what to run.
+        num_envs: how many environments; four or more for each core.
+        workers: processes; by default one for each core, at most one for each environment.
+        observation: as in `make`.
+        action: as in `make`.
+        copy: see `WorkerVectorEnv`.
+        autoreset_mode: likewise.
+    """
+    num_envs = integer("num_envs", num_envs, low=1)
+    one = partial(make, scenario, observation=observation, action=action)
+    if workers is None:
+        workers = min(len(os.sched_getaffinity(0)), num_envs)
+    return WorkerVectorEnv(
+        [one] * num_envs, workers=workers, copy=copy, autoreset_mode=autoreset_mode
     )
 
 

@@ -1,0 +1,93 @@
+"""Environments in worker processes: the same as in this one, for any number of workers."""
+
+import os
+import signal
+from functools import partial
+
+import numpy as np
+import pytest
+from gymnasium.utils.env_checker import data_equivalence
+from gymnasium.vector import AutoresetMode, SyncVectorEnv
+
+from pushplan.envs import VectorWorkerError, WorkerVectorEnv, make, make_vector
+from pushplan.scenarios import Scenario
+from pushplan.world import InvalidInputError, ScenarioError
+
+MAZE = Scenario("maze", variations={"boxes": 3, "time_limit": 4.0})
+CLEARING = Scenario("area_clearing", variations={"boxes": 2, "idle_limit": 3})
+
+
+def episodes(envs, steps=9):
+    """All that some steps return, with resets on the way."""
+    envs.action_space.seed(3)
+    seen = [envs.reset(seed=5)]
+    for _ in range(steps):
+        seen.append(envs.step(envs.action_space.sample()))
+    envs.close()
+    return seen
+
+
+@pytest.mark.parametrize(
+    ("scenario", "observation", "mode"),
+    [(MAZE, "image", AutoresetMode.SAME_STEP), (CLEARING, "state", AutoresetMode.NEXT_STEP)],
+)
+def test_the_same_as_in_one_process(scenario, observation, mode):
+    one = partial(make, scenario, observation=observation)
+    here = episodes(SyncVectorEnv([one] * 3, autoreset_mode=mode))
+    options = {"observation": observation, "autoreset_mode": mode}
+    there = episodes(make_vector(scenario, 3, workers=2, **options))
+    assert data_equivalence(here, there, exact=True)
+    assert any(step[3].any() for step in here[1:])  # episodes end, and others begin
+
+
+def test_a_mask_resets_some_of_them():
+    envs = make_vector(MAZE, 3, workers=2, observation="state", autoreset_mode="Disabled")
+    first, _ = envs.reset(seed=1)
+    mask = np.array([False, True, True])
+    second, infos = envs.reset(seed=[7, 8, 9], options={"reset_mask": mask})
+    alone = make(MAZE, observation="state")
+    np.testing.assert_array_equal(second[0], first[0])
+    np.testing.assert_array_equal(second[2], alone.reset(seed=9)[0])
+    assert all((infos[key] == mask).all() for key in infos if key.startswith("_"))
+    assert envs.get_attr("render_mode") == (None,) * 3
+    envs.set_attr("note", [1, 2, 3])
+    assert envs.get_attr("note") == (1, 2, 3)
+    envs.close()
+
+
+def test_observations_stay_unless_that_is_not_wanted():
+    for copy in (True, False):
+        envs = make_vector(MAZE, 2, workers=1, observation="state", copy=copy)
+        before, _ = envs.reset(seed=0)
+        kept = before.copy()
+        envs.step(envs.action_space.sample())
+        assert np.array_equal(before, kept) is copy
+        envs.close()
+
+
+def test_errors_of_a_worker_arrive_here_and_harm_nothing():
+    envs = make_vector(MAZE, 2, workers=2, observation="state")
+    envs.reset(seed=0)
+    with pytest.raises(AttributeError, match="nonsense"):
+        envs.call("nonsense")
+    assert envs.step(envs.action_space.sample())[1].shape == (2,)
+    for seed in ([1], [1, 2, 3]):
+        with pytest.raises(InvalidInputError, match="seed must have one value for each"):
+            envs.reset(seed=seed)
+    os.kill(envs._processes[1].pid, signal.SIGKILL)
+    with pytest.raises(VectorWorkerError, match="environments 1 to 1 has ended with exit code -9"):
+        envs.step(envs.action_space.sample())
+    envs.close()
+    with pytest.raises(InvalidInputError, match="closed"):
+        envs.reset()
+
+
+def test_what_makes_no_sense_is_refused():
+    with pytest.raises(InvalidInputError, match="num_envs"):
+        make_vector(MAZE, 0)
+    with pytest.raises(InvalidInputError, match="workers"):
+        make_vector(MAZE, 2, workers=3)
+    with pytest.raises(InvalidInputError, match="at least one environment"):
+        WorkerVectorEnv([], workers=1)
+    with pytest.raises(ScenarioError):
+        make_vector(Scenario("maze", variations={"boxes": -1}), 2)
