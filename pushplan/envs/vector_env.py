@@ -8,6 +8,7 @@ import pickle
 from collections.abc import Callable, Mapping, Sequence
 from itertools import pairwise
 from multiprocessing.connection import Connection
+from multiprocessing.reduction import ForkingPickler
 from typing import Any
 
 import numpy as np
@@ -98,7 +99,11 @@ class WorkerVectorEnv(VectorEnv[Any, Any, Any]):
             theirs.close()
             self._connections.append(ours)
             self._processes.append(process)
-        self._answers()  # of `__init__`
+        try:
+            self._answers()  # of `__init__`
+        except BaseException:
+            self.close()
+            raise
 
     def reset(
         self,
@@ -126,10 +131,17 @@ class WorkerVectorEnv(VectorEnv[Any, Any, Any]):
                     f"{name} must have one value for each environment, of which there are {count}, "
                     f"got {len(values)}"
                 )
-        for share, connection in zip(self._shares, self._connections, strict=True):
-            mine = None if mask is None else np.asarray(mask)[share]
-            self._send(connection, "reset", (seeds[share], given or None, mine))
-        infos = _merged(self._answers(), self._shares, count)
+        if mask is not None:
+            mask = np.asarray(mask)
+            if mask.dtype != np.bool_ or not mask.any():
+                raise InvalidInputError(
+                    f"reset_mask must be of dtype bool with at least one True, got {mask}"
+                )
+        arguments = [
+            (seeds[share], given or None, None if mask is None else mask[share])
+            for share in self._shares
+        ]
+        infos = _merged(self._ask("reset", arguments), self._shares, count)
         return self._seen(), infos
 
     def step(
@@ -137,9 +149,8 @@ class WorkerVectorEnv(VectorEnv[Any, Any, Any]):
     ) -> tuple[Any, NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]]:
         """One step of every environment; see `gymnasium.vector.SyncVectorEnv.step`."""
         each = list(iterate(self.action_space, actions))
-        for share, connection in zip(self._shares, self._connections, strict=True):
-            self._send(connection, "step", each[share])
-        rewards, terminated, truncated, infos = zip(*self._answers(), strict=True)
+        answers = self._ask("step", [each[share] for share in self._shares])
+        rewards, terminated, truncated, infos = zip(*answers, strict=True)
         return (
             self._seen(),
             np.concatenate(rewards),
@@ -150,9 +161,8 @@ class WorkerVectorEnv(VectorEnv[Any, Any, Any]):
 
     def call(self, name: str, *args: Any, **kwargs: Any) -> tuple[Any, ...]:
         """What a method of every environment returns, or the value of an attribute."""
-        for connection in self._connections:
-            self._send(connection, "call", (name, args, kwargs))
-        return tuple(value for values in self._answers() for value in values)
+        answers = self._ask("call", [(name, args, kwargs)] * len(self._shares))
+        return tuple(value for values in answers for value in values)
 
     def get_attr(self, name: str) -> tuple[Any, ...]:
         """An attribute of every environment."""
@@ -165,9 +175,7 @@ class WorkerVectorEnv(VectorEnv[Any, Any, Any]):
             raise InvalidInputError(
                 f"values must be one for each of {self.num_envs} environments, got {len(each)}"
             )
-        for share, connection in zip(self._shares, self._connections, strict=True):
-            self._send(connection, "set_attr", (name, list(each[share])))
-        self._answers()
+        self._ask("set_attr", [(name, list(each[share])) for share in self._shares])
 
     def render(self) -> tuple[Any, ...]:
         """The picture of every environment."""
@@ -185,11 +193,16 @@ class WorkerVectorEnv(VectorEnv[Any, Any, Any]):
                 process.kill()
                 process.join()
 
-    def _send(self, connection: Connection, request: str, argument: Any) -> None:
+    def _ask(self, request: str, arguments: Sequence[Any]) -> list[Any]:
+        """What the workers answer to a request, with an argument for each."""
         if self.closed:
             raise InvalidInputError(f"{request}: this vector environment has been closed")
-        with contextlib.suppress(OSError):  # it has ended: `_answers` says so
-            connection.send((request, argument))
+        # All are pickled before one is sent: after an error no worker has a request.
+        messages = [ForkingPickler.dumps((request, argument)) for argument in arguments]
+        for connection, message in zip(self._connections, messages, strict=True):
+            with contextlib.suppress(OSError):  # it has ended: `_answers` says so
+                connection.send_bytes(message)
+        return self._answers()
 
     def _answers(self) -> list[Any]:
         """What the workers answer, in order."""
@@ -206,6 +219,8 @@ class WorkerVectorEnv(VectorEnv[Any, Any, Any]):
                     f"the worker process of environments {share.start} to {share.stop - 1} has "
                     f"ended with exit code {code}: close this vector environment, make another"
                 )
+            except Exception as error:  # what it sent cannot be read here; the next can
+                is_well, value = False, error
             (values if is_well else errors).append(value)
         if errors:
             raise errors[0]
@@ -243,10 +258,10 @@ def _work(
             if request == "close":
                 break
             try:
-                answer = True, _do(envs, request, argument, shared, share)
+                answer = ForkingPickler.dumps((True, _do(envs, request, argument, shared, share)))
             except Exception as error:
-                answer = False, _portable(error)
-            connection.send(answer)
+                answer = ForkingPickler.dumps((False, _portable(error)))
+            connection.send_bytes(answer)
     envs.close()
 
 

@@ -70,6 +70,13 @@ def test_errors_of_a_worker_arrive_here_and_harm_nothing():
     envs.reset(seed=0)
     with pytest.raises(AttributeError, match="nonsense"):
         envs.call("nonsense")
+    for unreadable in (lambda: None, [1, lambda: None]):
+        with pytest.raises(Exception, match="pickle"):
+            envs.set_attr("note", unreadable)
+    envs.set_attr("note", [1, 2])
+    assert envs.get_attr("note") == (1, 2)  # answers are those of this request
+    with pytest.raises(InvalidInputError, match="reset_mask must be of dtype bool"):
+        envs.reset(options={"reset_mask": np.zeros(2, dtype=bool)})
     assert envs.step(envs.action_space.sample())[1].shape == (2,)
     for seed in ([1], [1, 2, 3]):
         with pytest.raises(InvalidInputError, match="seed must have one value for each"):
