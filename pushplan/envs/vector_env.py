@@ -244,7 +244,6 @@ def _work(
     share: slice,
 ) -> None:
     """Answer requests until told to close, or until the other process has ended."""
-    envs = None
     try:
         envs = SyncVectorEnv(env_fns, copy=False, autoreset_mode=mode)
         shared = read_from_shared_memory(envs.single_observation_space, memory, count)
