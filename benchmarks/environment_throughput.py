@@ -19,7 +19,7 @@ from __future__ import annotations
 import argparse
 import os
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
@@ -63,6 +63,7 @@ ROWS = (
     Row("ship_ice", "mujoco", "turn_rate", {"concentration": 0.1}, 40, simulated=True),
     Row("ship_ice", "mujoco", "turn_rate", {"concentration": 0.5}, 10, simulated=True),
 )
+COUNT = 16  # environments in a vector
 VECTOR = (ROWS[1], ROWS[4], ROWS[9], ROWS[11])
 
 
@@ -208,30 +209,57 @@ def memory(only: str, count: int = 20) -> None:
         print(f"{row.name:58} {(resident() - before) / count:8.2f} MB each")
 
 
+def step_together(envs: Any, actions: Sequence[Any]) -> float:
+    """Time [s] of steps of environments that wait for each other."""
+    envs.reset(seed=1)
+    begin = time.perf_counter()
+    for action in actions:
+        envs.step(np.stack([action] * COUNT))
+    return time.perf_counter() - begin
+
+
+def step_apart(envs: Any, actions: Sequence[Any]) -> float:
+    """Time [s] of the same steps where the environments of a worker do not wait for the others."""
+    envs.async_reset(seed=1)
+    batches = [envs.recv()[-1]["env_id"] for _ in range(envs.workers)]
+    done, owed = dict.fromkeys((batch[0] for batch in batches), 0), 0
+    begin = time.perf_counter()
+    while True:
+        for batch in batches:
+            if done[batch[0]] < len(actions):
+                envs.send(np.stack([actions[done[batch[0]]]] * len(batch)), batch)
+                done[batch[0]] += 1
+                owed += 1
+        if not owed:
+            return time.perf_counter() - begin
+        batches = [envs.recv()[-1]["env_id"]]
+        owed -= 1
+
+
 def vector(seconds: float, only: str) -> None:
-    """16 environments in two worker processes against one, in turns."""
+    """The same steps of 16 environments in one worker process and in two, in turns."""
     from pushplan.envs import WorkerVectorEnv
 
     for row in VECTOR:
         if only not in row.name:
             continue
-        kinds = {n: WorkerVectorEnv([partial(make, row)] * 16, workers=n) for n in (1, 2)}
-        act, taken, steps = driver(row), dict.fromkeys(kinds, 0.0), dict.fromkeys(kinds, 0)
-        for envs in kinds.values():
-            envs.reset(seed=1)
-            for i in range(3):
-                envs.step(np.stack([act(i)] * 16))
-        for _ in range(4):
-            for n, envs in kinds.items():
-                begin = time.perf_counter()
-                while time.perf_counter() - begin < seconds / 4.0:
-                    envs.step(np.stack([act(steps[n] // 16)] * 16))
-                    steps[n] += 16
-                taken[n] += time.perf_counter() - begin
-        one, two = (steps[n] / taken[n] for n in kinds)
-        print(f"{row.name:58} {one:7.0f} {two:7.0f} steps/s  gain {two / one:.2f}", flush=True)
-        for envs in kinds.values():
-            envs.close()
+        make_all = partial(WorkerVectorEnv, [partial(make, row)] * COUNT)
+        one, two = make_all(workers=1), make_all(workers=2)
+        act = driver(row)
+        actions = [act(i) for i in range(100)]
+        for envs in (one, two):
+            step_together(envs, actions[:3])
+        turns = max(1, round(seconds / step_together(one, actions)))
+        kinds = (one, step_together), (two, step_together), (two, step_apart)
+        times = sum(np.array([run(envs, actions) for envs, run in kinds]) for _ in range(turns))
+        alone, together, apart = turns * COUNT * len(actions) / times
+        print(
+            f"{row.name:45} one worker {alone:6.0f} steps/s, two {together:6.0f} "
+            f"({together / alone:.2f}), without waiting {apart:6.0f} ({apart / alone:.2f})",
+            flush=True,
+        )
+        one.close()
+        two.close()
 
 
 def main() -> None:

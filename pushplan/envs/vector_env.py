@@ -4,33 +4,29 @@ from __future__ import annotations
 
 import contextlib
 import multiprocessing
-import pickle
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from copy import deepcopy
 from itertools import pairwise
-from multiprocessing.connection import Connection
+from multiprocessing.connection import Connection, wait
 from multiprocessing.reduction import ForkingPickler
 from typing import Any
 
 import numpy as np
-from gymnasium.vector import AutoresetMode, SyncVectorEnv, VectorEnv
+from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import (
     CloudpickleWrapper,
     batch_space,
-    create_empty_array,
     create_shared_memory,
     iterate,
     read_from_shared_memory,
 )
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from pushplan.world import InvalidInputError, PushplanError
+from pushplan.envs.vector_worker import VectorWorkerError, work
+from pushplan.world import InvalidInputError, UnknownNameError
 from pushplan.world.checks import integer
 
 _PATIENCE_S = 5.0  # for which a worker may take to close its environments
-
-
-class VectorWorkerError(PushplanError):
-    """A worker process has ended."""
 
 
 class WorkerVectorEnv(VectorEnv[Any, Any, Any]):
@@ -42,6 +38,10 @@ class WorkerVectorEnv(VectorEnv[Any, Any, Any]):
     environment, as in `gymnasium.vector.AsyncVectorEnv`, a short step costs less than its message.
     The same seeds give the same episodes for every number of workers.
 
+    `step` waits for the slowest worker. `async_reset`, `recv` and `send`, named as in EnvPool (Weng
+    et al. 2022), do not: the environments of one worker are a batch of its own, and take their next
+    actions while the others are still busy.
+
     Worker processes are spawned: a script needs its ``if __name__ == "__main__":``.
 
     Args:
@@ -52,8 +52,12 @@ class WorkerVectorEnv(VectorEnv[Any, Any, Any]):
             change.
         autoreset_mode: as in `gymnasium.vector.SyncVectorEnv`.
 
+    Attributes:
+        workers: how many there are, and so how many batches `recv` has after `async_reset`.
+
     Raises:
         InvalidInputError: if there is no environment, or a number makes no sense.
+        UnknownNameError: if the mode is unknown; the message lists the valid ones.
     """
 
     def __init__(
@@ -67,7 +71,10 @@ class WorkerVectorEnv(VectorEnv[Any, Any, Any]):
         super().__init__()
         if not env_fns:
             raise InvalidInputError("env_fns must have at least one environment, got none")
-        workers = integer("workers", workers, low=1, high=len(env_fns))
+        self.workers = workers = integer("workers", workers, low=1, high=len(env_fns))
+        modes = [known.value for known in AutoresetMode]
+        if not isinstance(autoreset_mode, AutoresetMode) and autoreset_mode not in modes:
+            raise UnknownNameError("autoreset_mode", autoreset_mode, modes)
         mode = AutoresetMode(autoreset_mode)
         first = env_fns[0]()
         self.single_observation_space = first.observation_space
@@ -85,13 +92,18 @@ class WorkerVectorEnv(VectorEnv[Any, Any, Any]):
         )
         ends = [n * self.num_envs // workers for n in range(workers + 1)]
         self._shares = [slice(first, end) for first, end in pairwise(ends)]
+        self._action_spaces = [
+            batch_space(self.single_action_space, share.stop - share.start)
+            for share in self._shares
+        ]
+        self._pending: list[int] = []  # workers that owe a batch, the one asked first at the front
         self._connections: list[Connection] = []
         self._processes = []
         for share in self._shares:
             ours, theirs = context.Pipe()
             made = [CloudpickleWrapper(env_fn) for env_fn in env_fns[share]]
             process = context.Process(
-                target=_work,
+                target=work,
                 args=(theirs, made, mode, memory, self.num_envs, share),
                 daemon=True,
             )
@@ -100,7 +112,7 @@ class WorkerVectorEnv(VectorEnv[Any, Any, Any]):
             self._connections.append(ours)
             self._processes.append(process)
         try:
-            self._answers()  # of `__init__`
+            self._answers(range(workers))  # of `__init__`
         except BaseException:
             self.close()
             raise
@@ -117,6 +129,14 @@ class WorkerVectorEnv(VectorEnv[Any, Any, Any]):
             seed: of the first environment, the others count on from there; or one for each.
             options: for each environment; ``"reset_mask"`` (num_envs,) bool says which.
         """
+        arguments = self._reset_arguments(seed, options)
+        infos = _merged(self._ask("reset", arguments), self._shares, self.num_envs)
+        return self._seen(), infos
+
+    def _reset_arguments(
+        self, seed: int | Sequence[int | None] | None, options: Mapping[str, Any] | None
+    ) -> list[Any]:
+        """What each worker needs to reset its environments."""
         count, given = self.num_envs, dict(options or {})
         if seed is None or isinstance(seed, int | np.integer):
             seeds: list[int | None] = [
@@ -137,12 +157,10 @@ class WorkerVectorEnv(VectorEnv[Any, Any, Any]):
                 raise InvalidInputError(
                     f"reset_mask must be of dtype bool with at least one True, got {mask}"
                 )
-        arguments = [
+        return [
             (seeds[share], given or None, None if mask is None else mask[share])
             for share in self._shares
         ]
-        infos = _merged(self._ask("reset", arguments), self._shares, count)
-        return self._seen(), infos
 
     def step(
         self, actions: Any
@@ -159,9 +177,88 @@ class WorkerVectorEnv(VectorEnv[Any, Any, Any]):
             _merged(infos, self._shares, self.num_envs),
         )
 
+    def async_reset(
+        self,
+        *,
+        seed: int | Sequence[int | None] | None = None,
+        options: Mapping[str, Any] | None = None,
+    ) -> None:
+        """Begin new episodes as `reset` does, without waiting; `recv` returns the observations.
+
+        Args:
+            seed: as in `reset`.
+            options: likewise.
+        """
+        self._check_idle("async_reset")
+        arguments = self._reset_arguments(seed, options)
+        self._request("reset", dict(enumerate(arguments)))
+        self._pending = list(range(self.workers))
+
+    def recv(
+        self,
+    ) -> tuple[Any, NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]]:
+        """What `step` returns, for the environments of the first worker that is ready.
+
+        Which worker that is depends on the machine, an episode of an environment does not.
+
+        Returns:
+            As `step`; ``info["env_id"]`` (n,) int says which environments these are. After
+            `async_reset` rewards are 0. With ``copy=False`` the observations are valid until the
+            next `send` to the same environments.
+
+        Raises:
+            InvalidInputError: if no worker has been asked for anything.
+        """
+        self._check_open("recv")
+        if not self._pending:
+            raise InvalidInputError(
+                "recv: no environment has been asked for anything: call async_reset() or send()"
+            )
+        ready = wait([self._connections[n] for n in self._pending])
+        n = next(n for n in self._pending if self._connections[n] in ready)
+        self._pending.remove(n)
+        (answer,) = self._answers([n])
+        share = self._shares[n]
+        env_id = np.arange(share.start, share.stop)
+        if isinstance(answer, dict):  # of a reset
+            still = np.zeros(len(env_id), dtype=np.bool_)
+            answer = (np.zeros(len(env_id)), still, still.copy(), answer)
+        rewards, terminated, truncated, infos = answer
+        return self._seen(share), rewards, terminated, truncated, {**infos, "env_id": env_id}
+
+    def send(self, actions: Any, env_id: ArrayLike) -> None:
+        """Step the environments of one worker, without waiting; `recv` returns what comes of it.
+
+        Args:
+            actions: one for each of them.
+            env_id: (n,) which they are, as `recv` said.
+
+        Raises:
+            InvalidInputError: if these are not the environments of one worker, or those are still
+                busy.
+        """
+        self._check_open("send")
+        shares = [range(share.start, share.stop) for share in self._shares]
+        wanted = np.asarray(env_id).tolist()
+        n = next((n for n, share in enumerate(shares) if list(share) == wanted), None)
+        if n is None:
+            raise InvalidInputError(
+                "env_id must name the environments of one worker, as info['env_id'] of recv does "
+                f"({', '.join(f'{share[0]} to {share[-1]}' for share in shares)}), got {wanted}"
+            )
+        if n in self._pending:
+            raise InvalidInputError(f"send: environments {wanted} are still busy: call recv()")
+        each = list(iterate(self._action_spaces[n], actions))
+        if len(each) != len(wanted):
+            raise InvalidInputError(
+                f"actions must be one for each of {len(wanted)} environments, got {len(each)}"
+            )
+        self._request("step", {n: each})
+        self._pending.append(n)
+
     def call(self, name: str, *args: Any, **kwargs: Any) -> tuple[Any, ...]:
         """What a method of every environment returns, or the value of an attribute."""
-        answers = self._ask("call", [(name, args, kwargs)] * len(self._shares))
+        answers = self._ask("call", [(name, args, kwargs)] * self.workers)
         return tuple(value for values in answers for value in values)
 
     def get_attr(self, name: str) -> tuple[Any, ...]:
@@ -195,22 +292,37 @@ class WorkerVectorEnv(VectorEnv[Any, Any, Any]):
 
     def _ask(self, request: str, arguments: Sequence[Any]) -> list[Any]:
         """What the workers answer to a request, with an argument for each."""
-        if self.closed:
-            raise InvalidInputError(f"{request}: this vector environment has been closed")
-        # All are pickled before one is sent: after an error no worker has a request.
-        messages = [ForkingPickler.dumps((request, argument)) for argument in arguments]
-        for connection, message in zip(self._connections, messages, strict=True):
-            with contextlib.suppress(OSError):  # it has ended: `_answers` says so
-                connection.send_bytes(message)
-        return self._answers()
+        self._check_idle(request)
+        self._request(request, dict(enumerate(arguments)))
+        return self._answers(range(self.workers))
 
-    def _answers(self) -> list[Any]:
-        """What the workers answer, in order."""
+    def _check_open(self, name: str) -> None:
+        if self.closed:
+            raise InvalidInputError(f"{name}: this vector environment has been closed")
+
+    def _check_idle(self, name: str) -> None:
+        self._check_open(name)
+        if self._pending:
+            raise InvalidInputError(
+                f"{name}: environments of {len(self._pending)} workers are still busy: call recv() "
+                f"{len(self._pending)} times first"
+            )
+
+    def _request(self, request: str, arguments: Mapping[int, Any]) -> None:
+        """Send a request to some workers, with an argument for each."""
+        # All are pickled before one is sent: after an error no worker has a request.
+        messages = {n: ForkingPickler.dumps((request, each)) for n, each in arguments.items()}
+        for n, message in messages.items():
+            with contextlib.suppress(OSError):  # it has ended: `_answers` says so
+                self._connections[n].send_bytes(message)
+
+    def _answers(self, workers: Iterable[int]) -> list[Any]:
+        """What some workers answer, in order."""
         values: list[Any] = []
         errors: list[Exception] = []
-        for n, connection in enumerate(self._connections):
+        for n in workers:
             try:
-                is_well, value = connection.recv()
+                is_well, value = self._connections[n].recv()
             except (EOFError, OSError):
                 self._processes[n].join(_PATIENCE_S)
                 share, code = self._shares[n], self._processes[n].exitcode
@@ -226,75 +338,19 @@ class WorkerVectorEnv(VectorEnv[Any, Any, Any]):
             raise errors[0]
         return values
 
-    def _seen(self) -> Any:
-        """The observations in shared memory, or a copy of them."""
-        if not self.copy:
-            return self._observations
-        out = create_empty_array(self.single_observation_space, self.num_envs, np.empty)
-        _copy_into(out, self._observations, slice(None))
-        return out
+    def _seen(self, share: slice = slice(None)) -> Any:
+        """The observations of a share in shared memory, or a copy of them."""
+        seen = _part(self._observations, share)
+        return deepcopy(seen) if self.copy else seen
 
 
-def _work(
-    connection: Connection,
-    env_fns: Sequence[CloudpickleWrapper],
-    mode: AutoresetMode,
-    memory: Any,
-    count: int,
-    share: slice,
-) -> None:
-    """Answer requests until told to close, or until the other process has ended."""
-    try:
-        envs = SyncVectorEnv(env_fns, copy=False, autoreset_mode=mode)
-        shared = read_from_shared_memory(envs.single_observation_space, memory, count)
-        connection.send((True, None))
-    except Exception as error:
-        connection.send((False, _portable(error)))
-        return
-    with contextlib.suppress(EOFError, KeyboardInterrupt, BrokenPipeError):
-        while True:
-            request, argument = connection.recv()
-            if request == "close":
-                break
-            try:
-                answer = ForkingPickler.dumps((True, _do(envs, request, argument, shared, share)))
-            except Exception as error:
-                answer = ForkingPickler.dumps((False, _portable(error)))
-            connection.send_bytes(answer)
-    envs.close()
-
-
-def _do(envs: SyncVectorEnv, request: str, argument: Any, shared: Any, share: slice) -> Any:
-    """Carry out a request; observations go to their share of what all processes see."""
-    if request == "step":
-        observations, *rest = envs.step(argument)
-        _copy_into(shared, observations, share)
-        return rest
-    if request == "reset":
-        seeds, options, mask = argument
-        if mask is not None and not mask.any():
-            return {}
-        if mask is not None:
-            options = {**(options or {}), "reset_mask": mask}
-        observations, infos = envs.reset(seed=seeds, options=options)
-        _copy_into(shared, observations, share)
-        return infos
-    if request == "set_attr":
-        return envs.set_attr(*argument)
-    name, args, kwargs = argument
-    return envs.call(name, *args, **kwargs)
-
-
-def _copy_into(out: Any, values: Any, part: slice) -> None:
-    """Copy batched values into a part of a larger batch, of any space."""
+def _part(values: Any, part: slice) -> Any:
+    """A part of a batch, of any space, in the same memory."""
     if isinstance(values, Mapping):
-        for key, value in values.items():
-            _copy_into(out[key], value, part)
-    elif isinstance(values, tuple):
-        for place, value in zip(out, values, strict=True):
-            _copy_into(place, value, part)
-    else:
-        out[part] = values
+        return {key: _part(value, part) for key, value in values.items()}
+    if isinstance(values, tuple):
+        return tuple(_part(value, part) for value in values)
+    return values[part]
 
 
 def _merged(
@@ -314,12 +370,3 @@ def _merged(
             if value is not None:
                 out[key][share] = value
     return out
-
-
-def _portable(error: Exception) -> Exception:
-    """The error itself where it can be sent, else one with its text."""
-    try:
-        pickle.loads(pickle.dumps(error))
-    except Exception:
-        return VectorWorkerError(f"{type(error).__name__}: {error}")
-    return error

@@ -11,7 +11,7 @@ from gymnasium.vector import AutoresetMode, SyncVectorEnv
 
 from pushplan.envs import VectorWorkerError, WorkerVectorEnv, make, make_vector
 from pushplan.scenarios import Scenario
-from pushplan.world import InvalidInputError, ScenarioError
+from pushplan.world import InvalidInputError, ScenarioError, UnknownNameError
 
 MAZE = Scenario("maze", variations={"boxes": 3, "time_limit": 4.0})
 CLEARING = Scenario("area_clearing", variations={"boxes": 2, "idle_limit": 3})
@@ -38,6 +38,68 @@ def test_the_same_as_in_one_process(scenario, observation, mode):
     there = episodes(make_vector(scenario, 3, workers=2, **options))
     assert data_equivalence(here, there, exact=True)
     assert any(step[3].any() for step in here[1:])  # episodes end, and others begin
+
+
+def test_workers_that_do_not_wait_for_each_other_run_the_same_episodes():
+    one, steps, count = partial(make, MAZE, observation="state"), 9, 3
+    actions = np.random.default_rng(0).uniform(-1, 1, (steps, count, 1)).astype(np.float32)
+    envs = SyncVectorEnv([one] * count)
+    here = [[envs.reset(seed=5)[0][i]] for i in range(count)]
+    for action in actions:
+        observations, rewards, terminated, truncated, _ = envs.step(action)
+        for i in range(count):
+            here[i].append((observations[i], rewards[i], terminated[i], truncated[i]))
+    envs.close()
+    for copy in (True, False):
+        envs = make_vector(MAZE, count, workers=2, observation="state", copy=copy)
+        envs.async_reset(seed=5)
+        there, owed = [[] for _ in range(count)], 2
+        while owed:
+            observations, rewards, terminated, truncated, infos = envs.recv()
+            owed -= 1
+            batch = infos["env_id"]
+            for n, i in enumerate(batch):
+                seen = observations[n].copy()
+                row = (seen, rewards[n], terminated[n], truncated[n])
+                there[i].append(row if there[i] else seen)
+            done = len(there[batch[0]]) - 1
+            if done < steps:
+                envs.send(actions[done, batch], batch)
+                owed += 1
+        assert data_equivalence(here, there, exact=True)
+        envs.close()
+
+
+def test_requests_out_of_turn_are_refused():
+    envs = make_vector(MAZE, 3, workers=2, observation="state")
+    with pytest.raises(InvalidInputError, match=r"call async_reset\(\) or send\(\)"):
+        envs.recv()
+    envs.async_reset(seed=0)
+    for request in (envs.reset, envs.async_reset, lambda: envs.step(envs.action_space.sample())):
+        with pytest.raises(InvalidInputError, match=r"busy: call recv\(\) 2 times first"):
+            request()
+    *_, infos = envs.recv()
+    batch = infos["env_id"]
+    actions = np.zeros((len(batch), 1), dtype=np.float32)
+    for wrong in ([0, 1, 2], [7], 0, batch + 0.5, []):
+        with pytest.raises(InvalidInputError, match="0 to 0, 1 to 2"):
+            envs.send(actions, wrong)
+    with pytest.raises(InvalidInputError, match="actions must be one for each"):
+        envs.send(np.zeros((5, 1), dtype=np.float32), batch)
+    envs.send(actions, batch)
+    with pytest.raises(InvalidInputError, match="are still busy"):
+        envs.send(actions, batch)
+    envs.recv()
+    envs.recv()
+    assert envs.step(envs.action_space.sample())[1].shape == (3,)
+    envs.async_reset(seed=0)
+    os.kill(envs._processes[1].pid, signal.SIGKILL)
+    with pytest.raises(VectorWorkerError, match="environments 1 to 2"):
+        for _ in range(2):
+            envs.recv()
+    envs.close()
+    with pytest.raises(InvalidInputError, match="closed"):
+        envs.recv()
 
 
 def test_a_mask_resets_some_of_them():
@@ -98,3 +160,5 @@ def test_what_makes_no_sense_is_refused():
         WorkerVectorEnv([], workers=1)
     with pytest.raises(ScenarioError):
         make_vector(Scenario("maze", variations={"boxes": -1}), 2)
+    with pytest.raises(UnknownNameError, match="Disabled, NextStep, SameStep"):
+        make_vector(MAZE, 2, autoreset_mode="never")
