@@ -1,7 +1,8 @@
 """Scores of episodes that figures in ``docs`` come from: one CSV file beside each experiment file.
 
 A line is an episode. Its columns are those of ``results.csv`` that tables need, the suite in place
-of the scenario, and where the episode comes from. Numbers have 6 significant digits.
+of the scenario (with the variations in which its scenarios differ), and where the episode comes
+from. Numbers have 6 significant digits.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from pushplan.evaluation.experiment_file import fields_of
 from pushplan.evaluation.provenance import code_in_words
 from pushplan.evaluation.rows import columns, csv_text, row_from_texts
 from pushplan.metrics import METRICS, Role, metric_names
+from pushplan.scenarios import Suite
 from pushplan.world import InvalidInputError
 from pushplan.world.files import write_atomic
 from pushplan.world.safe_files import read_data
@@ -38,7 +40,8 @@ class StoredEpisode:
     """One line of a file.
 
     Attributes:
-        row: what tables are made of; its setting is the name of the suite.
+        row: what tables are made of; its setting is the name of the suite, with the variations in
+            which the scenarios of the suite differ.
         date: on which the episode ran (ISO 8601, UTC).
         pushplan: version and commit of the code.
         machine: cores and architecture.
@@ -91,9 +94,10 @@ def take(run: Path, experiment: Path) -> str:
     """
     fields = fields_of(read_data(experiment, "experiment file"), experiment.parent)
     labels = [policy.label for policy in fields["policies"]]
-    suites = {str(start.key): one.name for one in fields["suites"] for start in one.scenarios}
+    names = {one.name: _names(one) for one in fields["suites"]}
+    suites = {key: name for some in names.values() for key, name in some.items()}
     wanted = [
-        (one.name, label, str(start.seed))
+        (names[one.name][str(start.key)], label, str(start.seed))
         for one in fields["suites"]
         for label in fields["only"].get(one.name, labels)
         for start in one.scenarios
@@ -106,10 +110,25 @@ def take(run: Path, experiment: Path) -> str:
         raise InvalidInputError(f"{run} has no episode that {experiment} names")
     every = {**_by_key(_lines(path) if path.is_file() else []), **found}
     kept = [every[key] for key in wanted if key in every]
-    names = [name for name in COLUMNS if any(texts.get(name) for texts in kept)]
-    lines = [[texts.get(name, "") for name in names] for texts in kept]
-    write_atomic(path, csv_text(names, lines).encode())
+    columns_used = [name for name in COLUMNS if any(texts.get(name) for texts in kept)]
+    lines = [[texts.get(name, "") for name in columns_used] for texts in kept]
+    write_atomic(path, csv_text(columns_used, lines).encode())
     return f"{path}: {len(taken)} episodes taken, {len(kept)} stored"
+
+
+def _names(suite: Suite) -> dict[str, str]:
+    """Scenario -> suite, with the variations in which its scenarios differ."""
+    sets = [set(start.variations.items()) for start in suite.scenarios]
+    shared = set.intersection(*sets)
+    names = {}
+    for start in suite.scenarios:
+        own = [
+            f"{name}={value}"
+            for name, value in start.variations.items()
+            if (name, value) not in shared
+        ]
+        names[str(start.key)] = suite.name + (f"[{','.join(own)}]" if own else "")
+    return names
 
 
 def _by_key(lines: Sequence[Texts]) -> dict[tuple[str, ...], Texts]:

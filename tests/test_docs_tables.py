@@ -98,6 +98,21 @@ def test_a_run_is_taken_written_and_checked(
     assert code == 1 and "may have an episode once" in said
 
 
+def test_scenarios_of_a_suite_that_share_a_seed_are_kept_apart(
+    tables: Command, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    stored = tmp_path / "benchmarks" / "experiments" / "doors.csv"
+    stored.parent.mkdir(parents=True)
+    text = EXPERIMENT.replace("[maze-2d-3, {suite: maze-2d-5, policies: [random]}]", "[FIXED]")
+    text = text.replace("episodes: 2", "episodes: 3").replace("FIXED", "namo-2d-fixed")
+    stored.with_suffix(".yaml").write_text(text)
+    bench("namo-2d-fixed", ["random"], episodes=3, seed=7, workers=0, out=tmp_path / "run")
+    assert tables(["--root", str(tmp_path), "--take", str(tmp_path / "run"), "doors"]) == 0
+    assert "3 episodes taken, 3 stored" in capsys.readouterr().out
+    names = [f"namo-2d-fixed[movability={name}]" for name in ("known", "unknown", "wrong")]
+    assert [line.split(",")[0] for line in stored.read_text().splitlines()[1:]] == names
+
+
 @pytest.mark.parametrize(
     ("marker", "said"),
     [
