@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import itertools
+import math
 from collections import deque
 from dataclasses import dataclass, field
 
@@ -278,3 +279,27 @@ def test_a_robot_without_a_plan_does_not_run_away():
         assert first is not None and (first.linear < 0.0) == backwards
         assert policy.stuck and twist == Twist(0.0, 0.0)
         assert np.hypot(*(robot.world.robot_pose[:2] - pose[:2])) < 6.0
+
+
+def test_without_a_plan_the_robot_asks_less_often_until_it_has_moved():
+    asked = []
+
+    class NoPlan:
+        def plan(self, world, *, stop=None, rng=None):
+            asked.append(world.time)
+            return PlanResult(PlanStatus.TIMED_OUT, None, PlanStats(0.0))
+
+    robot = make_robot(**REVERSING, max_speed=2.0)
+    scene = Unicycle(make_u_maze(robot=robot, robot_pose=(1.3, 5.0, 0.0)), 0.05)
+    policy = policy_for(NoPlan())
+    recovered = math.inf
+    while scene.world.time < recovered + 3.0:
+        scene.drive(policy.act(scene.world))
+        if policy._recovery.is_on:
+            recovered = min(recovered, scene.world.time)
+    first = asked[1] - asked[0]
+    before = np.array([time for time in asked if time < recovered])
+    after = [time for time in asked if time > recovered]
+    assert len(before) > 3
+    np.testing.assert_allclose(np.diff(before), first * 2.0 ** np.arange(len(before) - 1), atol=0.1)
+    assert after[1] - after[0] == pytest.approx(first, abs=0.1)
