@@ -17,7 +17,7 @@ from pushplan.world import InvalidInputError, World
 from pushplan.world.checks import FloatArray, IntArray
 
 _STILL, _STILL_TURN = 0.005, 0.02
-"""What moves less than this has hardly moved [sides of the map of pixel values, rad]."""
+"""What moves less than this has hardly moved [sides of a map of pixels or heading steps, rad]."""
 _REMEMBERED = 1000
 
 Function = Callable[[NDArray[Any]], NDArray[Any]]
@@ -27,9 +27,9 @@ Function = Callable[[NDArray[Any]], NDArray[Any]]
 class NetworkPolicy:
     """Asks a network what to do, and keeps to each decision for as long as it was trained to.
 
-    With ``pixel_values``, a pixel that was chosen before in the episode, when robot and objects
-    were where they are now, is not chosen again, nor are its neighbours, as long as others are
-    left: without memory, a network that drives against a wall does so for ever.
+    A pixel (``pixel_values``) or ``direction`` that was chosen before in the episode, when robot
+    and objects were where they are now, is not chosen again, nor are its neighbours, as long as
+    others are left: without memory, a network that drives against a wall does so for ever.
 
     Args:
         function: the network.
@@ -96,8 +96,9 @@ class NetworkPolicy:
     def act(self, world: World, observation: Any = None) -> FloatArray:
         """The action for this step.
 
-        With ``pixel_values``, to be asked for once for each waypoint, when the last one was reached
-        or given up: from the same place it gives another one the next time.
+        With ``pixel_values`` or ``direction``, to be asked for once for each waypoint or heading,
+        when the last one was reached or given up: from the same place it gives another one the
+        next time.
 
         Args:
             world: the snapshot.
@@ -120,14 +121,20 @@ class NetworkPolicy:
     def _decide(self, world: World, seen: NDArray[Any]) -> NDArray[np.float32]:
         """(repeat, n) the next actions."""
         spec, output = self.specification.action, self._function(seen)
-        if spec.output != "pixel_values":
+        if spec.output not in ("pixel_values", "direction"):
             return spec.steps(output)
-        still = _STILL * spec.window
-        tried = [old.pixel for old in self._decisions if old.was_made_at(world, still)]
-        pixel = spec.pixel(output, tried)
+        still = _STILL * (spec.window or spec.step)
+        tried = [old.choice for old in self._decisions if old.was_made_at(world, still)]
+        choice: Any
+        if spec.output == "pixel_values":
+            choice = spec.pixel(output, tried)
+            action = spec.waypoint(*choice)
+        else:
+            choice = spec.direction(output, tried)
+            action = spec.heading(choice)
         objects = world.movables
-        self._decisions.append(_Decision(objects.ids, world.robot_pose, objects.poses, pixel))
-        return spec.held(spec.waypoint(*pixel))
+        self._decisions.append(_Decision(objects.ids, world.robot_pose, objects.poses, choice))
+        return spec.held(action)
 
     def _check(self, seen: Any) -> None:
         shape, dtype = self.observation.shape, self.observation.dtype
@@ -141,12 +148,12 @@ class NetworkPolicy:
 
 
 class _Decision(NamedTuple):
-    """Where things were when a pixel was chosen, and which."""
+    """Where things were when a pixel or a direction was chosen, and which."""
 
     ids: IntArray
     robot: FloatArray
     objects: FloatArray
-    pixel: tuple[int, int]
+    choice: Any  # (row, column), or an angle [rad]
 
     def was_made_at(self, world: World, still: float) -> bool:
         """Whether robot and centres of the objects, still the same ones, are within ``still``."""

@@ -20,6 +20,8 @@ MODES = {"turn_rate": 1, "velocity": 2, "wheels": 2, "heading": 1, "waypoint": 2
 OUTPUTS = ("continuous", "direction", "pixel_values", "chunk")
 NEIGHBOURS = 1.0 / 32.0
 """How far around a tried pixel `ActionSpec.pixel` leaves pixels out, in sides of the map."""
+APART = 0.3
+"""How far `ActionSpec.direction` keeps from a tried direction [rad]."""
 
 _KEYS = ("mode", "output", "shape", "repeat", "window", "step")
 
@@ -36,7 +38,8 @@ class ActionSpec(CheckedFields):
         mode: the action mode of the environment.
         output: ``"continuous"``: the action itself, clipped to [-1, 1]. ``"direction"``, with mode
             ``heading``: a vector (2,) in the robot's frame, x ahead and y to the left, along which
-            the robot goes. ``"pixel_values"``, with mode ``waypoint``: a value for each pixel of
+            the robot goes, but for directions that `NetworkPolicy` leaves out.
+            ``"pixel_values"``, with mode ``waypoint``: a value for each pixel of
             a map around the robot, row 0 ahead and column 0 to the left; the robot drives to the
             middle of the pixel with the greatest, of equals the first, without those that
             `NetworkPolicy` leaves out. ``"chunk"``: the actions of the next steps, a row each, of
@@ -118,10 +121,9 @@ class ActionSpec(CheckedFields):
         """
         if self.output == "pixel_values":
             return self.waypoint(*self.pixel(output))
-        values = self._checked(output)
         if self.output == "direction":
-            heading = math.atan2(float(values[1]), float(values[0])) / math.pi
-            return np.array([heading], dtype=np.float32)
+            return self.heading(self.direction(output))
+        values = self._checked(output)
         return _clipped(values[0] if self.output == "chunk" else values)
 
     def pixel(self, output: ArrayLike, tried: Collection[tuple[int, int]] = ()) -> tuple[int, int]:
@@ -148,6 +150,31 @@ class ActionSpec(CheckedFields):
         row, col = divmod(int(np.argmax(values)), self.shape[1])
         return row, col
 
+    def direction(self, output: ArrayLike, tried: Collection[float] = ()) -> float:
+        """The angle of a ``direction`` in the robot's frame [rad].
+
+        Args:
+            output: the vector.
+            tried: angles to keep `APART` from, by the least turn; if no angle is left then, the
+                vector's own is given.
+
+        Raises:
+            InvalidInputError: if the output is another one.
+            BadOutputError: as `read`.
+        """
+        if self.output != "direction":
+            raise InvalidInputError(f"output {self.output!r} has no direction")
+        values = self._checked(output)
+        wanted = math.atan2(float(values[1]), float(values[0]))
+        least = APART - 1e-9
+        beside = (old + side for old in tried for side in (APART, -APART))
+        free = [
+            angle
+            for angle in (wanted, *beside)
+            if all(abs(math.remainder(angle - old, math.tau)) >= least for old in tried)
+        ]
+        return min(free, key=lambda a: abs(math.remainder(a - wanted, math.tau)), default=wanted)
+
     def _checked(self, output: ArrayLike) -> NDArray[Any]:
         values = np.asarray(output)
         if values.shape != self.shape or values.dtype.kind not in "fiu":
@@ -164,6 +191,10 @@ class ActionSpec(CheckedFields):
         rows, cols = self.shape
         ahead, left = 1.0 - 2.0 * (row + 0.5) / rows, 1.0 - 2.0 * (col + 0.5) / cols
         return np.array([ahead, left], dtype=np.float32)
+
+    def heading(self, angle: float) -> NDArray[np.float32]:
+        """(1,) the action that goes along an angle in the robot's frame [rad]."""
+        return np.array([math.remainder(angle, math.tau) / math.pi], dtype=np.float32)
 
     def to_dict(self) -> dict[str, Any]:
         """JSON values."""

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import json
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -12,7 +13,7 @@ from policy_files import map_specification, maze_specification
 from pushplan.envs import PushEnv
 from pushplan.learned import ActionSpec, FeatureObservation, RobotSpec, Specification
 from pushplan.learned.network_policy import NetworkPolicy
-from pushplan.learned.outputs import BadOutputError
+from pushplan.learned.outputs import APART, BadOutputError
 from pushplan.observation import ImageObservation
 from pushplan.world import InvalidInputError, SchemaError, UnknownNameError
 from pushplan.world.outline import transform
@@ -190,6 +191,20 @@ class TestOutputs:
         everywhere = [(row, col) for row in range(96) for col in range(96)]
         assert spec.pixel(values, everywhere) == best
 
+    def test_a_tried_direction_is_left_out_with_its_neighbours(self):
+        spec = ActionSpec("heading", "direction", (2,), step=1.75)
+        ahead = np.array([2.0, 0.2])
+        first = spec.direction(ahead)
+        assert first == pytest.approx(math.atan2(0.2, 2.0))
+        assert spec.direction(ahead, [first]) == pytest.approx(first + APART)
+        assert spec.direction(ahead, [first + 0.1]) == pytest.approx(first + 0.1 - APART)
+        back = np.array([-1.0, 0.0])  # across the seam of the circle
+        beside = spec.direction(back, [np.pi - 0.1])
+        assert math.remainder(beside + np.pi, math.tau) == pytest.approx(APART - 0.1)
+        assert spec.direction(back, np.linspace(-3.0, 3.0, 20)) == pytest.approx(np.pi)
+        with pytest.raises(InvalidInputError, match="no direction"):
+            ActionSpec("turn_rate", "continuous", (1,)).direction(np.zeros(1))
+
 
 class TestNoRepeat:
     @pytest.fixture()
@@ -246,6 +261,20 @@ class TestNoRepeat:
         chosen = [self.act(policy, world) for _ in range(300)]
         assert len(set(chosen)) == 256  # neighbours go with each
         assert chosen[-1] == chosen[0]
+
+    def test_a_direction_that_led_nowhere_is_not_chosen_again(self, world):
+        action = ActionSpec("heading", "direction", (2,), step=1.75)
+        spec = maze_specification(action=action, robot=None)
+        policy = NetworkPolicy(lambda seen: np.array([1.0, 0.0], np.float32), spec)
+        seen = np.zeros(policy.observation.shape, np.float32)
+        chosen = [float(policy.act(world, seen)[0]) for _ in range(25)]
+        assert chosen[0] == 0.0
+        assert len(set(chosen[:20])) == 20  # a full turn of neighbours
+        assert chosen[24] == 0.0  # everything was tried
+        moved = world.moved(robot_pose=world.robot_pose + np.array([0.01, 0.0, 0.0]))
+        assert float(policy.act(moved, seen)[0]) == 0.0
+        policy.reset(world, np.random.default_rng(0))
+        assert [float(policy.act(world, seen)[0]) for _ in range(25)] == chosen
 
     def test_other_outputs_repeat(self, world):
         policy = NetworkPolicy(lambda seen: np.array([0.5], np.float32), maze_specification())
