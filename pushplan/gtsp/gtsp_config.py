@@ -40,8 +40,8 @@ class GtspConfig(CheckedFields):
         frozen: a run ends early at this fraction of the temperature at which its tour was cheapest.
         reheat: temperature at which a run from the best tour begins, for each unit of that at which
             the best tour was found.
-        whole: fraction of a run from a random order; where less is left of the budget, runs begin
-            from the best tour.
+        whole: fraction of what a run from a random order has taken on average; where less is left
+            of the budget, runs begin from the best tour.
         narrow_from: size of the cluster of a node, on average over nodes, from which on the search
             keeps promising nodes only.
         narrow_after: fraction of the first run after which it does.

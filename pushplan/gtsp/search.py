@@ -245,11 +245,13 @@ def search(
     """
     state = AnytimeSearch(problem, config, seed)
     length = max(fraction - budget.gone(), 1e-9) / state.runs_in(budget, fraction)
-    left, first = fraction, True
-    while first or (left > 0.0 and not budget.stopped()):
+    left, whole, runs = fraction, 0.0, 0
+    while runs == 0 or (left > 0.0 and not budget.stopped()):
         begin = min(budget.gone(), fraction)
         left = fraction - begin
-        again = not first and left < config.whole * length
+        again = runs > 0 and left < config.whole * whole / runs
         state.run(budget, begin, begin + left / max(1, round(left / length)), again)
-        left, first = fraction - budget.gone(), False
+        left = fraction - budget.gone()
+        if not again:  # it may have ended early
+            whole, runs = whole + budget.gone() - begin, runs + 1
     return state.chosen()

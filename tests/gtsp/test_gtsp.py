@@ -33,6 +33,7 @@ from pushplan.gtsp.layer_kernels import (
     undo,
 )
 from pushplan.gtsp.node_choice_kernels import SPARE, pull_values, push_values
+from pushplan.gtsp.search import AnytimeSearch
 from pushplan.gtsp.segment_swap_kernels import improve_by_swaps
 from pushplan.world import Cancellation, Deadline, InvalidInputError, MaxIterations
 
@@ -513,3 +514,26 @@ def test_the_solver_knows_no_robot() -> None:
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout == "[]\n"
+
+
+@pytest.mark.parametrize(
+    ("each", "again"),
+    [
+        (10, [False] * 10),
+        (15, [False] * 6 + [True]),
+        (60, [False, True]),
+        (100, [False]),
+    ],
+)
+def test_runs_begin_at_random_as_long_as_there_is_time_for_one(monkeypatch, each, again):
+    """Runs that end early leave time for others: 35ftv170 missed its best tour otherwise."""
+    made = []
+
+    def run(self, budget, begin, end, again=False):
+        made.append(again)
+        budget.used += each
+
+    monkeypatch.setattr(AnytimeSearch, "run", run)
+    costs, clusters = MADE["instance"]("uniform", 1000)
+    solve_gtsp(costs, clusters, stop=MaxIterations(100), config=SEARCH)
+    assert made == again
