@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import tempfile
+from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -88,8 +89,8 @@ class StressRow:
         condition: its name.
         episodes: how many there were.
         successes: how many reached the task's goal.
-        walls: how many ended at a wall.
-        failed: how many did not end by the rules of the task.
+        ends: how the others ended: reason -> how many. What the task does not know is an episode
+            that failed, such as one that took too long.
         scores: mean of each score that there is.
         kept: each score over that of the undisturbed episodes with the same seeds.
         missed: what was asked for and not reached, in words.
@@ -98,8 +99,7 @@ class StressRow:
     condition: str
     episodes: int
     successes: int
-    walls: int
-    failed: int
+    ends: Mapping[str, int]
     scores: Mapping[str, float]
     kept: Mapping[str, float]
     missed: tuple[str, ...]
@@ -131,10 +131,11 @@ class ScoreSheet:
             for name in names:
                 line.append(f"{row.scores[name]:.3f}" if name in row.scores else "")
                 line.append(f"{row.kept[name]:.2f}" if name in row.kept else "")
-            cells.append((*line, str(row.walls), str(row.failed), "; ".join(row.missed)))
+            ends = ", ".join(f"{count} {reason}" for reason, count in row.ends.items())
+            cells.append((*line, ends, "; ".join(row.missed)))
         return Table(
             f"{self.policy} on {self.suite}, {self.rows[0].episodes} episodes a condition",
-            (*headings, "at a wall", "failed", "missed"),
+            (*headings, "without success", "missed"),
             tuple(cells),
             "success with its Wilson 95 % interval; kept is the mean over that of the undisturbed "
             "episodes with the same seeds",
@@ -250,14 +251,15 @@ def _judged(
     scores: Mapping[str, float],
     kept: Mapping[str, float],
 ) -> StressRow:
-    successes, walls = sum(row.success for row in rows), sum(row.reason == "wall" for row in rows)
+    ends = Counter(row.reason for row in rows if not row.success)
+    successes = len(rows) - ends.total()
     missed = []
     if condition.success is not None and successes < condition.success * len(rows):
         missed.append(f"success ≥ {condition.success:g}")
-    if walls and condition.success is not None:
+    if ends["wall"] and condition.success is not None:
         missed.append("no wall")
     for score, part in kept.items():
         if part < condition.kept:
             missed.append(f"{score} kept ≥ {condition.kept:g}")
-    failed = sum(row.failed for row in rows)
-    return StressRow(name, len(rows), successes, walls, failed, scores, kept, tuple(missed))
+    counts = dict(ends.most_common())
+    return StressRow(name, len(rows), successes, counts, scores, kept, tuple(missed))

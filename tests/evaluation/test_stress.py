@@ -1,0 +1,57 @@
+"""A stress test: a row for each condition, and what was missed."""
+
+from __future__ import annotations
+
+import pytest
+
+from pushplan.evaluation import Condition, stress
+from pushplan.evaluation.stress_testing import CONDITIONS, UNDISTURBED
+from pushplan.runtime.disturbances import Disturbances
+from pushplan.world import InvalidInputError, UnknownNameError
+
+
+def test_a_policy_that_stands_it_misses_nothing():
+    given = {"conditions": ["noise-1cm-2deg"], "episodes": 1, "seed": 2, "workers": 0}
+    sheet = stress("straight", "maze-3d-3", **given)
+    calm, noisy = sheet.rows
+    assert (calm.condition, noisy.condition) == (UNDISTURBED, "noise-1cm-2deg")
+    assert calm.successes == calm.episodes == noisy.successes == 1
+    assert calm.ends == {}
+    assert calm.kept["E_nav"] == 1.0
+    assert noisy.scores["E_nav"] != calm.scores["E_nav"]
+    assert noisy.kept["E_nav"] == noisy.scores["E_nav"] / calm.scores["E_nav"]
+    assert sheet.missed == ()
+    assert stress("straight", "maze-3d-3", **given) == sheet
+
+
+def test_what_is_missed_is_said_and_why():
+    own = {
+        "asked": Condition(Disturbances(delay=0.2), success=0.5),
+        "free": Condition(Disturbances(delay=0.2), success=None),
+    }
+    sheet = stress("random", "maze-3d-3", conditions=own, episodes=2, workers=0)
+    rows = {row.condition: row for row in sheet.rows}
+    assert rows["asked"].ends == {"wall": 2}
+    assert rows["asked"].missed == ("success ≥ 0.5", "no wall")
+    assert rows["free"].missed == ()
+    assert sheet.missed == (UNDISTURBED, "asked")
+    table = sheet.table()
+    cells = dict(zip(table.headings, table.cells[1], strict=True))
+    assert cells["without success"] == "2 wall"
+    assert cells["missed"] == "success ≥ 0.5; no wall"
+
+
+def test_what_makes_no_sense_is_one_error():
+    with pytest.raises(UnknownNameError, match="condition"):
+        stress("straight", "maze-2d-3", conditions=["fog"], episodes=1, workers=0)
+    with pytest.raises(InvalidInputError, match="rate must lie"):
+        stress("straight", "maze-2d-3", rate=0.0, episodes=1, workers=0)
+    with pytest.raises(InvalidInputError, match="at least one scenario"):
+        stress("straight", [], workers=0)
+
+
+@pytest.mark.slow
+def test_by_default_all_conditions_that_the_task_has_the_variations_for():
+    ran = [row.condition for row in stress("random", "ship-ice-2d-0", episodes=1, workers=0).rows]
+    assert ran == [name for name, one in CONDITIONS.items() if not one.variations]
+    assert "friction-0" not in ran
