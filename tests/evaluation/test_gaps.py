@@ -9,7 +9,7 @@ from pushplan.evaluation import ResultRow
 from pushplan.evaluation.bounding import scenario_bound
 from pushplan.evaluation.gaps import gaps, total_work
 from pushplan.motion.work_bound import work_bound
-from pushplan.scenarios import Scenario, suite
+from pushplan.scenarios import Scenario, suite, suite_names
 from pushplan.scenarios.known_bounds import KnownBounds, known_bounds, load_bounds, save_bounds
 from pushplan.world import InvalidInputError, SchemaError
 
@@ -101,3 +101,14 @@ def test_what_a_policy_is_told_is_no_part_of_a_bound():
         for told in ("known", "wrong")
     )
     assert known == wrong
+
+
+WITHOUT = ("box-delivery-2d-large-columns-20", "box-delivery-2d-large-divider-20", "smoke")
+"""Suites of which some scenarios have no best known solution, and the one of several tasks."""
+
+
+@pytest.mark.parametrize("name", [name for name in suite_names() if name not in WITHOUT])
+def test_a_solution_is_known_of_every_scenario(name):
+    known = known_bounds()
+    scenarios = [one for one in suite(name).scenarios if one.seed < 50]
+    assert [one.key for one in scenarios if known[one.key].best is None] == []
