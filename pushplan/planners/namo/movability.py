@@ -13,7 +13,7 @@ from pushplan.world.checks import FloatArray
 
 _TOUCH = 0.05  # gap at which the robot touches an object [circumscribed radii]
 _MOVED = 0.05  # motion that proves that an object can be moved [circumscribed radii]
-_PATIENCE = 2.0  # time for which an object has to stop the robot [s]
+_PATIENCE = 1.0  # time for which an object has to stop the robot [s]
 
 
 class Movability:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -11,7 +11,7 @@ from pushplan.motion.keyholes import KeyholeConfig, KeyholeSearch, suits_keyhole
 from pushplan.motion.keyholes.keyhole_plan import keyhole_plan
 from pushplan.planners.registry import make_planner
 from pushplan.world import MaxIterations, Plan, Planner, PlanResult, PlanStatus, Stop, World
-from pushplan.world.checked_fields import NonNegativeInt, PositiveFraction
+from pushplan.world.checked_fields import Fraction, NonNegativeInt, PositiveFraction
 from pushplan.world.checks import expect
 from pushplan.world.planning_call import PlanningCall
 from pushplan.world.stop import DefaultBudget, StopCheck
@@ -19,16 +19,18 @@ from pushplan.world.stop import DefaultBudget, StopCheck
 
 @dataclass(frozen=True)
 class NamoConfig(KeyholeConfig):
-    """Parameters of `Namo`: those of its search, described in `KeyholeConfig`, and two more.
+    """Parameters of `Namo`: those of its search, described in `KeyholeConfig`, and three more.
 
     Args:
         turn_fraction: fraction of the greatest turn rate that plans use; the rest is for tracking.
         straight_iterations: of the navigator at most, where the way is closed; at 0 it is asked
             only where no push is found.
+        straight_margin: distance from walls that it keeps there, where pushes are found [R].
     """
 
     turn_fraction: PositiveFraction = 0.9
     straight_iterations: NonNegativeInt = 6000
+    straight_margin: Fraction = 0.15
 
 
 @dataclass(frozen=True)
@@ -40,7 +42,7 @@ class Namo:
     navigator. Elsewhere a `KeyholeSearch` looks for pushes that connect the component with that of
     the goal, at the cost l₀ + w Σ mᵢ lᵢ / m₀ and a penalty for what they cut off. The robot drives
     as a disc between pushes, and backs off after each. Where the navigator finds a cheaper plan,
-    by pushing straight through, that is taken.
+    by pushing straight through with more distance from walls, that is taken.
 
     Use it where objects hold the doors, and a wrong push may close them for good. Without a stop
     rule it ends after a fixed number of pushes, so the same seed gives the same plan. One
@@ -114,7 +116,11 @@ class Namo:
         rest: Stop = MaxIterations(budget or self.config.default_pushes)
         if call.has_rule:
             rest |= _Rest(call, pushes)
-        return self.navigator.plan(call.world, stop=rest, rng=call.rng)
+        world = call.world
+        if not wanted:  # such a plan has to be worth its risk: it pushes and turns beside walls
+            margin = self.config.straight_margin * world.robot.circumscribed_radius
+            world = replace(world, margin=max(world.margin, margin))
+        return self.navigator.plan(world, stop=rest, rng=call.rng)
 
 
 def _cost(plan: Plan | None, weight: float) -> float:
