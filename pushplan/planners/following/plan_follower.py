@@ -14,6 +14,7 @@ from pushplan.control import EpisodeClock, ImmediateExecutor, waiting_twist
 from pushplan.control.limits import driven_twist, ramp_twist
 from pushplan.control.tracking import Progress
 from pushplan.interaction import InteractionModel, QuasiStatic
+from pushplan.planners.following.fruitless_calls import FruitlessCalls
 from pushplan.planners.following.plan_controller import PlanController
 from pushplan.planners.following.recovery import RecoveryRule
 from pushplan.planners.following.replanning import (
@@ -44,8 +45,6 @@ from pushplan.world.polyline import path_lengths
 _PERIOD = 0.1  # for which the first command is taken to be held [s]
 _NEAR = 3  # so many poses ahead a jam lets nothing wait
 _AT_ONCE = 3  # calls without a plan at one place, after which a jam waits too
-_MOST_DOUBLINGS = 5  # of the pause after calls without a plan at one place
-_PLACE = 0.5  # size of such a place [R]
 _PAUSE = 0.1  # between two plans, of the time for which the robot has not got on
 
 
@@ -129,7 +128,7 @@ class PlanFollower:
         self._planned_from = np.full(2, np.nan)
         self._planned_ids = np.zeros(0, dtype=np.int64)
         self._tight = False
-        self._fruitless, self._fruitless_at = 0, np.full(2, np.nan)
+        self._fruitless = FruitlessCalls()
 
     @property
     def stuck(self) -> bool:
@@ -224,13 +223,11 @@ class PlanFollower:
             self.plan_log[-1] = _without_predictions(self.plan_log[-1])
         self.plan_log.append(result)
         if result.plan is None:
-            self._fruitless = 1 + self._fruitless_here(world)
-            if self._fruitless == 1:
-                self._fruitless_at = world.robot_pose[:2]
+            self._fruitless.add(world)
             if pending.reason is Reason.BLOCKED and world.robot.can_stop:
                 self.current_plan = None
             return
-        self._fruitless = 0
+        self._fruitless.clear()
         _check(result.plan, pending.start)
         new = joined(pending.stretch, result.plan)
         if world.time > pending.made:
@@ -266,9 +263,7 @@ class PlanFollower:
         plan, rule = self.current_plan, self.replanning
         size = world.robot.circumscribed_radius
         waited = world.time - self._planned_at
-        pause = rule.interval * size / world.robot.max_speed
-        # where no plan is found again and again, planners without randomness search the same again
-        pause *= 2.0 ** min(max(self._fruitless_here(world) - 1, 0), _MOST_DOUBLINGS)
+        pause = rule.interval * size / world.robot.max_speed * self._fruitless.delay(world)
         # a robot that stays stuck thinks less and less often, so that the episode ends in time
         pause = max(pause, _PAUSE * self._recovery.idle)
         rested = waited >= pause - 1e-9
@@ -297,12 +292,6 @@ class PlanFollower:
             end = self._progress.index(along + rule.look_ahead * size) + 2
         return self._surprise(world, plan, slice(index, end), rested)
 
-    def _fruitless_here(self, world: World) -> int:
-        """How many calls in a row have found no plan since the robot is at this place."""
-        away = np.hypot(*(world.robot_pose[:2] - self._fruitless_at))
-        near = away <= _PLACE * world.robot.circumscribed_radius
-        return self._fruitless if near else 0
-
     def _surprise(self, world: World, plan: Plan, part: slice, rested: bool) -> Reason | None:
         """Whether a part of the plan would do something else than was predicted."""
         surprise = self.replanning.surprise
@@ -316,7 +305,7 @@ class PlanFollower:
             if now.jammed_at > _NEAR:
                 return Reason.JAM if rested else None
             gets_on = self._recovery.idle <= self._recovery.patience
-            at_once = gets_on and self._fruitless_here(world) < _AT_ONCE
+            at_once = gets_on and self._fruitless.count(world) < _AT_ONCE
             return Reason.BLOCKED if rested or at_once else None
         expected = float(path_lengths(predicted[part]) @ world.movables.masses)
         allowed = surprise * world.robot.circumscribed_radius * world.robot.mass
