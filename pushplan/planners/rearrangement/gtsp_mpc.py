@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from typing import Any
 
@@ -74,6 +75,7 @@ class GtspMpc:
         self._cache = RolloutCache()
         self._history = PushHistory(self.config)
         self._left, self._rounds, self._stuck = -1, 0, 0
+        self._way_at_end = math.inf
         self._recovered_from: FloatArray | None = None
         self._stopped_at: PushScene | None = None
         self._clock = EpisodeClock(self.config.response)
@@ -115,6 +117,7 @@ class GtspMpc:
         left = int((~scene.done).sum())
         if left != self._left:  # something was done, or has come back
             self._left, self._rounds, self._stopped_at = left, 0, None
+            self._way_at_end = math.inf
             self._history.count_progress()
         if not left:
             self._execution, self.given_up, self.plan, self.current_plan = None, {}, (), None
@@ -213,8 +216,19 @@ class GtspMpc:
             self._rounds += 1
             return True
         if choice.searches < self.config.max_searches:  # else the search goes on
-            self._stopped_at = scene
+            return self._tries_anew(scene)
         return False
+
+    def _tries_anew(self, scene: PushScene) -> bool:
+        """Forget all that was tried where objects have got nearer since the last time, or stop."""
+        remaining = scene.remaining_now[~scene.done]
+        way = float(remaining[np.isfinite(remaining)].sum())
+        if self._history.is_empty or way >= self._way_at_end - scene.size:
+            self._stopped_at = scene
+            return False
+        self._way_at_end, self._rounds = way, 0
+        self._history = PushHistory(self.config)
+        return True
 
     def _close(self, scene: PushScene, execution: PushExecution, end: ExecutionEnd) -> None:
         """Draw the conclusions from how an execution ended."""

@@ -29,6 +29,11 @@ class PushHistory:
         return other
 
     @property
+    def is_empty(self) -> bool:
+        """Whether there is nothing to forget."""
+        return not (self._failures or self._relocations)
+
+    @property
     def has_failures(self) -> bool:
         """Whether any push has failed."""
         return bool(self._failures)

@@ -269,22 +269,33 @@ class PushSimulator:
             path = np.vstack([start, push.poses[1:]])
             path[:, 2] = np.unwrap(path[:, 2])
             ends = self.simulate_primitive(path, target, poses, spent)
-            there, size = push.object_poses[target], scene.size
-            return [
-                end for end in ends if pose_distance(end.object_poses[target], there, size) < _ALIKE
-            ]
-        return self.simulate(
-            start,
-            target,
-            path=push.object_path if push.controller == "path" else None,
-            shift=push.shift,
-            limit=push.length if push.relocates else None,
-            wanted=np.flatnonzero(np.isin(ids, push.delivers) & ~scene.done).tolist(),
-            gain=push.gain,
-            relocates=push.relocates,
-            poses=poses,
-            spent=spent,
-        )
+        else:
+            ends = self.simulate(
+                start,
+                target,
+                path=push.object_path if push.controller == "path" else None,
+                shift=push.shift,
+                limit=push.length if push.relocates else None,
+                wanted=np.flatnonzero(np.isin(ids, push.delivers) & ~scene.done).tolist(),
+                gain=push.gain,
+                relocates=push.relocates,
+                poses=poses,
+                spent=spent,
+            )
+        return self._still_relocating(push, target, ends, poses) if push.relocates else ends
+
+    def _still_relocating(
+        self, push: Push, target: int, ends: Sequence[Push], poses: FloatArray | None
+    ) -> list[Push]:
+        """Those that get the target where it was to be relocated to, or half the way on a path."""
+        if len(push.object_poses) != len(self.scene.poses):
+            return []  # planned among other objects
+        size, there = self.scene.size, push.object_poses[target]
+        near = _ALIKE
+        if push.controller != "arc":
+            now = (self.scene.poses if poses is None else poses)[target]
+            near = max(near, 0.5 * pose_distance(now, there, size))
+        return [end for end in ends if pose_distance(end.object_poses[target], there, size) < near]
 
     def _effort(self, poses: FloatArray, lengths: FloatArray, done: BoolArray) -> float:
         """Work, and what the objects that are left behind have farther or less far to go [m]."""
