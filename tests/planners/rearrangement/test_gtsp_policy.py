@@ -125,6 +125,14 @@ def test_a_box_that_nobody_can_reach_is_given_up_with_a_reason():
     assert policy.plan == ()
 
 
+@pytest.mark.slow
+def test_nothing_is_given_up_while_boxes_get_nearer():
+    impatient = GtspMpc(max_relocations=1, max_failures=1, max_rounds=0)
+    options = {"variations": {"layout": "small_columns", "boxes": 1}, "limit": 900}
+    info = run(impatient, task="box_delivery", preset="benchmark", seed=1019, **options)
+    assert info["success"]
+
+
 @pytest.mark.parametrize("apart", [1e3, 1e6])
 def test_a_decision_is_bounded_however_far_the_boxes_are(apart):
     here = room([(0.5, 0.1, 0.0), (apart, apart, 0.3)])

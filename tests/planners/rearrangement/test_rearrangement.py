@@ -21,6 +21,7 @@ from pushplan.planners.rearrangement import (
     push_order,
 )
 from pushplan.planners.rearrangement.approach import approach_tree
+from pushplan.planners.rearrangement.candidates import partial_pushes
 from pushplan.planners.rearrangement.cost_to_go_kernels import cost_to_go
 from pushplan.planners.rearrangement.goal_kernels import all_done
 from pushplan.planners.rearrangement.gtsp_reduction import parts_of, reduce_to_gtsp
@@ -208,6 +209,17 @@ def test_a_box_at_a_wall_is_relocated():
     here = scene([(0.0, -4.49, 0.0)])
     graph = build_push_graph(here, relocations=1)
     assert graph.pushes and not graph.infeasible
+
+
+def test_a_relocation_that_leaves_its_object_behind_is_none():
+    here = scene([(0.0, 0.5, 0.4)])
+    simulator, push = PushSimulator(here), next(partial_pushes(PushSimulator(here), 0))
+    [again] = simulator.resimulate(push, push.start)
+    assert np.array_equal(again.object_poses, push.object_poses)
+    aside = here.poses + np.array([0.0, 3.0 * here.size, 0.0])
+    assert simulator.resimulate(push, push.start, poses=aside) == []
+    other = PushSimulator(scene([(0.0, 0.5, 0.4), (4.0, -4.0, 0.0)]))
+    assert other.resimulate(push, push.start) == []  # among other objects
 
 
 def small_box(pose, extra=(), robot=(-3.0, -3.0, 0.0)):
