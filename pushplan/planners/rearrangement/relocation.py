@@ -34,6 +34,7 @@ from pushplan.planners.rearrangement.rollout_cache import Primitive
 from pushplan.world.checks import FloatArray
 
 _Cell = tuple[float, ...]
+_LITTLE = 0.25  # part of the gain that helps too where nothing else does
 _DRAWS = 10  # so many places are looked at for each start
 _PLACE, _TURN = 0.2, 0.5  # sides of a box of like poses of the object [circumscribed radii, rad]
 _SPREAD = np.array([0.8191725134, 0.6710436067, 0.5497004779])
@@ -118,8 +119,8 @@ class _RelocationSearch:
         self, scene: PushScene, k: int, approach: ApproachTree, thorough: bool = False
     ) -> None:
         self._scene, self._k, self._approach = scene, k, approach
-        self._slack = math.inf if thorough else scene.config.relocation.slack * scene.size
-        self._config = scene.config.relocation
+        self._config, self._thorough = scene.config.relocation, thorough
+        self._slack = math.inf if thorough else self._config.slack * scene.size
         self._horizon = self._config.horizon * scene.size
         self._cost_to_go = scene.push_cost_to_go(float(scene.world.movables.radii[k]))
         self._arcs = _arcs(scene)
@@ -166,31 +167,34 @@ class _RelocationSearch:
                 alike[place] += 1
             expansions[state.depth > 0] += 1
             self._expand(state)
-        return self._delivering() or self._better(now)
+        found = self._delivering()
+        if self._thorough or not found:
+            found += self._better(now)
+        return self._from_all_sides(found)
 
     def _put(self, state: _State) -> None:
         heapq.heappush(self._open, (state.cost, len(self._states), state))
         self._states.append(state)
 
-    def _delivering(self) -> list[Primitive]:
-        """Drives after which the object can be pushed home."""
+    def _delivering(self) -> list[tuple[float, _State]]:
+        """Ends of drives after which the object can be pushed home, with what that costs [m]."""
         most = len(self._config.margins)
         found: list[tuple[float, _State]] = []
         for state in self._states:
             failing = self._failing.get(self._place(state), most)
             if state.depth and failing < most:
                 found.append((failing * self._scene.size, state))
-        return self._from_all_sides(found)
+        return found
 
-    def _better(self, now: float) -> list[Primitive]:
-        """Drives after which less is left to be done than there is now [m]."""
-        size = self._scene.size
+    def _better(self, now: float) -> list[tuple[float, _State]]:
+        """Ends of drives after which less is left to be done than there is now [m]."""
+        size, gain = self._scene.size, self._config.gain * (_LITTLE if self._thorough else 1.0)
         found: list[tuple[float, _State]] = []
         for state in self._states:
-            if state.rest < now - self._config.gain * size:
+            if state.rest < now - gain * size:
                 left = float(self._scene.remaining(state.poses[[self._k]])[0])
                 found.append((state.rest - left + 2.0 * size, state))
-        return self._from_all_sides(found)
+        return found
 
     def _from_all_sides(self, found: list[tuple[float, _State]]) -> list[Primitive]:
         """The best drives that begin in different places, of states with their extra cost [m]."""
