@@ -222,6 +222,28 @@ def test_a_relocation_that_leaves_its_object_behind_is_none():
     assert other.resimulate(push, push.start) == []  # among other objects
 
 
+@pytest.mark.slow
+def test_boxes_wedged_between_columns_are_nudged_where_nothing_else_is_left():
+    columns = [
+        [(1.75, 0.96), (2.75, 0.96), (2.75, 1.96), (1.75, 1.96)],
+        [(-0.12, 1.95), (0.88, 1.95), (0.88, 2.95), (-0.12, 2.95)],
+    ]
+    boxes = [(1.0905, 1.8834, 1.144), (1.5228, 1.6, 3.1381)]
+    room = scene(boxes, extra=columns, pose=(3.9, 3.0, 1.1)).world
+    small = Movables.from_outlines([0.44 * SQUARE] * 2, boxes)
+    here = PushScene(replace(room, movables=small), RearrangementConfig())
+    simulator, approach = PushSimulator(here), approach_tree(here)
+    few, many = (
+        [push for k in (0, 1) for push in relocating_pushes(simulator, k, approach, thorough)]
+        for thorough in (False, True)
+    )
+    assert not few and many
+    to_go = here.push_cost_to_go(float(small.radii[0]))
+    for push in many:
+        k = int(push.target)
+        assert to_go.at(push.object_poses[k]) < to_go.at(here.poses[k])
+
+
 def small_box(pose, extra=(), robot=(-3.0, -3.0, 0.0)):
     room = scene([(0.0, 0.0, 0.0)], extra=extra, pose=robot)
     small = Movables.from_outlines([0.44 * SQUARE], [pose])
