@@ -20,6 +20,7 @@ _CELL = 0.6  # sides of the boxes of poses of which one is looked at each [steps
 _REACH = 3.0  # how far away the place to turn may be [circumscribed radii]
 _MOST = 100_000  # poses that are looked at
 _CLEARANCE = 1.05  # clearance that the robot needs to turn about [circumscribed radii]
+_CURVATURES = (0.0, 0.5, -0.5, 1.0, -1.0)  # of the arcs [1 / circumscribed radius]
 _DEEPER = 1e-3  # by how much the robot may get deeper into what it touches [circumscribed radii]
 
 
@@ -28,7 +29,8 @@ class RecoveryProblem(NamedTuple):
 
     start: FloatArray  # (3,) pose of the robot
     steps: FloatArray  # (A, 2) distance [m] and turn [rad] of each step that it may take
-    shape: Footprint
+    body: Footprint
+    grown: Footprint  # by the distance to keep from what it does not touch
     among: ConvexObstacles
     size: float  # Circumscribed radius of the robot [m]
 
@@ -65,16 +67,31 @@ def _path_to(node: int, nodes: FloatArray, before: IntArray) -> FloatArray:
     return path
 
 
+@kernel
+def _gets_deeper(
+    pose: FloatArray, problem: RecoveryProblem, allowed: FloatArray, scratch: FloatArray
+) -> bool:
+    """Whether the robot is deeper than ``allowed`` (2,) in something, itself or grown."""
+    deeper: bool = (
+        static_depth(pose, problem.body, problem.among, scratch) > allowed[0]
+        or static_depth(pose, problem.grown, problem.among, scratch) > allowed[1]
+    )
+    return deeper
+
+
 @kernel(allocates=True)
 def search_recovery(problem: RecoveryProblem) -> FloatArray:
     """The drive with the fewest steps, (N, 3), to where it can turn; (0, 3) if there is none."""
-    start, shape, among, size = problem.start, problem.shape, problem.among, problem.size
+    start, body, grown, among = problem.start, problem.body, problem.grown, problem.among
+    size = problem.size
     unit = _CELL * STEP
     half, turns = int(_REACH / unit), math.ceil(2.0 * math.pi / unit)
     seen = np.zeros((2 * half + 1, 2 * half + 1, turns), dtype=np.bool_)
     nodes, before = np.empty((_MOST, 3)), np.empty(_MOST, dtype=np.int64)
-    scratch, pose, between = np.empty_like(shape.vertices), np.empty(3), np.empty(3)
-    limit = static_depth(start, shape, among, scratch) + _DEEPER * size
+    scratch = np.empty((max(len(body.vertices), len(grown.vertices)), 2))
+    pose, between, allowed = np.empty(3), np.empty(3), np.empty(2)
+    allowed[0] = static_depth(start, body, among, scratch) + _DEEPER * size
+    allowed[1] = static_depth(start, grown, among, scratch) + _DEEPER * size
     copy_into(nodes[0], start)
     before[0], count = -1, 1
     at = 0
@@ -86,10 +103,10 @@ def search_recovery(problem: RecoveryProblem) -> FloatArray:
             t = math.floor(pose[2] % (2.0 * math.pi) / unit)
             if not (0 <= j <= 2 * half and 0 <= i <= 2 * half) or seen[i, j, t]:
                 continue
-            if static_depth(pose, shape, among, scratch) > limit:
+            if _gets_deeper(pose, problem, allowed, scratch):
                 continue
             arc_step(nodes[at], 0.5 * distance, 0.5 * turn, between)
-            if static_depth(between, shape, among, scratch) > limit:
+            if _gets_deeper(between, problem, allowed, scratch):
                 continue
             seen[i, j, t] = True
             copy_into(nodes[count], pose)
@@ -119,14 +136,14 @@ def recovery_path(world: World, margin: float) -> FloatArray | None:
     among, start = obstacles(world.static, objects), np.array(world.robot_pose)
     if can_turn(start, size, among):
         return None
-    steps = size * STEP * np.array([(1.0, 0.0), (1.0, 1.0), (1.0, -1.0)])
-    steps[:, 1] /= size
+    steps = STEP * np.array([(size, curvature) for curvature in _CURVATURES])
     if world.robot.min_speed < 0.0:
         steps = np.concatenate([steps, steps * (-1.0, 1.0)])
     steps = np.concatenate([steps, [(0.0, STEP), (0.0, -STEP)]])
+    body = footprint(world.robot)
     for distance in (margin, 0.0):
-        shape = footprint(world.robot, distance)
-        path = search_recovery(RecoveryProblem(start, steps, shape, among, size))
+        grown = footprint(world.robot, distance)
+        path = search_recovery(RecoveryProblem(start, steps, body, grown, among, size))
         if len(path):
             return path
     return None

@@ -208,6 +208,7 @@ class GtspMpc:
         if choice.way_out is not None and moved:
             self._recovered_from = here
             self._away = PoseFollower(scene.world.robot, choice.way_out, self.config.response)
+            self._cache = RolloutCache()  # that nothing was found is no longer true out there
             return True
         if choice.interrupted:  # the next search begins with what is known by now
             return False

@@ -13,12 +13,14 @@ import heapq
 import itertools
 import math
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
-from pushplan.planners.rearrangement.approach import ApproachTree, arrival_poses
+from pushplan.interaction.kernels import sweep_path
+from pushplan.planners.rearrangement.approach import ApproachTree, approach_tree, arrival_poses
 from pushplan.planners.rearrangement.arc_kernels import sweep_arcs
 from pushplan.planners.rearrangement.candidates import can_be_pushed
 from pushplan.planners.rearrangement.goal_kernels import REMOVED
@@ -31,6 +33,7 @@ from pushplan.planners.rearrangement.push_poses import (
 from pushplan.planners.rearrangement.push_scene import PushScene
 from pushplan.planners.rearrangement.push_simulator import PushSimulator
 from pushplan.planners.rearrangement.rollout_cache import Primitive
+from pushplan.planners.rearrangement.route import RoutePlanner
 from pushplan.world.checks import FloatArray
 
 _Cell = tuple[float, ...]
@@ -68,9 +71,17 @@ def relocating_pushes(
             cache.keep_primitives(int(movables.ids[k]), around, robot.tobytes(), thorough, found)
     return [
         replace(push, cost=push.cost + extra)
-        for path, extra in found
-        for push in simulator.simulate_primitive(path, k)
+        for path, extra, moved in found
+        for push in simulator.simulate_primitive(path, k, _with_moved(scene, moved))
     ]
+
+
+def _with_moved(scene: PushScene, moved: Mapping[int, FloatArray]) -> FloatArray:
+    """(K, 3) poses of the objects, with those in other places that a route moves."""
+    poses = scene.poses.copy()
+    for number, pose in moved.items():
+        poses[scene.world.movables.ids == number] = pose
+    return poses
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,9 +118,15 @@ class _State:
         return np.concatenate(tracks[::-1])
 
     @property
+    def first(self) -> _State:
+        """Where the drive begins."""
+        return self if self.before is None else self.before.first
+
+    @property
     def start(self) -> FloatArray:
-        """(3,) where the drive begins."""
-        return self.track[0] if self.before is None else self.before.start
+        """(3,) where the robot begins."""
+        start: FloatArray = self.first.track[0]
+        return start
 
 
 class _RelocationSearch:
@@ -152,6 +169,11 @@ class _RelocationSearch:
             state = heapq.heappop(self._open)[2]
             if state.cost > best + self._slack:
                 break
+            if self._thorough and not state.depth:
+                arrived = self._arrived(state)
+                if arrived is None:
+                    continue
+                state = arrived
             if state.depth and not self._has_moved(state):
                 continue
             if state.depth:
@@ -202,7 +224,7 @@ class _RelocationSearch:
         for extra, state in sorted(found, key=lambda entry: entry[0] + entry[1].cost):
             side = self._side(state)
             if side not in sides:
-                sides[side] = state.path(), extra
+                sides[side] = state.path(), extra, self._moved_before(state.first)
             if len(sides) == self._config.sides:
                 break
         return list(sides.values())
@@ -211,6 +233,33 @@ class _RelocationSearch:
         """What it costs to get to a start (3,) [m]."""
         nodes, extra = arrival_poses(self._scene.fine, start)
         return float((self._approach.costs[nodes] + extra).min()) if len(nodes) else math.inf
+
+    def _moved_before(self, start: _State) -> dict[int, FloatArray]:
+        """Where the route to a start has moved objects to, by id."""
+        moved = np.flatnonzero((start.poses != self._scene.poses).any(axis=1))
+        ids = self._scene.world.movables.ids[moved].tolist()
+        return dict(zip(ids, start.poses[moved], strict=True))
+
+    def _arrived(self, state: _State) -> _State | None:
+        """A start as the route to it leaves robot and objects; None if there is none."""
+        scene = self._scene
+        for tree in (self._approach, self._around_object):
+            route = self._routes.route(tree, state.start, self._k)
+            if route is not None:
+                path, after = self._routes.poses_along(route), scene.poses.copy()
+                out = np.empty((len(path), *after.shape))
+                if sweep_path(path, after, scene.bodies, scene.settings, out) < 0:
+                    return replace(state, track=path[-1:], poses=after)
+        return None
+
+    @cached_property
+    def _routes(self) -> RoutePlanner:
+        return RoutePlanner(self._scene)
+
+    @cached_property
+    def _around_object(self) -> ApproachTree:
+        """Paths on which the object is not moved."""
+        return approach_tree(self._scene, self._k)
 
     def _expand(self, state: _State) -> None:
         """Drive on from a state along every arc; each place that the object gets to is a state."""

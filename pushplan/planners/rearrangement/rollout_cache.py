@@ -13,8 +13,9 @@ from pushplan.world.checks import BoolArray, FloatArray, IntArray
 
 _OLD = 8  # for how many plans what is not asked for is kept
 
-Primitive = tuple[FloatArray, float]
-"""Poses (N, 3) of the robot in a relocation, and the cost of what it leaves to be done [m]."""
+Primitive = tuple[FloatArray, float, dict[int, FloatArray]]
+"""Poses (N, 3) of the robot in a relocation, the cost of what it leaves to be done [m], and poses
+(3,) of the objects, by id, that the route to it has moved."""
 
 
 @dataclass(frozen=True, eq=False)

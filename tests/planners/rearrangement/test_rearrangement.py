@@ -314,6 +314,25 @@ def test_the_recovery_path_from_between_two_columns_is_to_and_fro():
         assert np.array_equal(path, way_out(tight))
 
 
+def test_the_recovery_path_of_a_wedged_robot_leads_deeper_into_neither_column():
+    """The bumper is 4 mm in one, 15 mm from the other, and the only way out is a slight bend."""
+    columns = [
+        [(x, y), (x + 1.0, y), (x + 1.0, y + 1.0), (x, y + 1.0)]
+        for x, y in ((-2.1318, 0.7832), (-0.1196, 1.3619))
+    ]
+    tight = scene([(4.0, -4.0, 0.0)], extra=columns, pose=(-0.5417, 1.7491, -1.7874))
+    path = way_out(tight)
+    assert path is not None
+    robot = tight.world.robot
+    bodies = [
+        shapely.union_all([shapely.Polygon(transform(p, part)) for part in robot.parts])
+        for p in path
+    ]
+    for column in columns:
+        inside = shapely.area(shapely.intersection(shapely.Polygon(column), bodies))
+        assert inside.max() < inside[0] + 1e-5
+
+
 def test_there_is_no_recovery_path_out_of_a_cell():
     sides = [[(-1, -1), (1, -1), (1, -0.9), (-1, -0.9)], [(-1, 0.9), (1, 0.9), (1, 1), (-1, 1)]]
     sides += [[(-1, -1), (-0.9, -1), (-0.9, 1), (-1, 1)], [(0.9, -1), (1, -1), (1, 1), (0.9, 1)]]
