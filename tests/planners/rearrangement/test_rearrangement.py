@@ -20,7 +20,7 @@ from pushplan.planners.rearrangement import (
     build_push_graph,
     push_order,
 )
-from pushplan.planners.rearrangement.approach import approach_tree
+from pushplan.planners.rearrangement.approach import approach_tree, reach
 from pushplan.planners.rearrangement.candidates import partial_pushes
 from pushplan.planners.rearrangement.cost_to_go_kernels import cost_to_go
 from pushplan.planners.rearrangement.goal_kernels import all_done
@@ -331,6 +331,31 @@ def test_the_recovery_path_of_a_wedged_robot_leads_deeper_into_neither_column():
     for column in columns:
         inside = shapely.area(shapely.intersection(shapely.Polygon(column), bodies))
         assert inside.max() < inside[0] + 1e-5
+
+
+def test_the_recovery_path_pushes_what_closes_the_only_way_out():
+    side = [(-1.0, 0.56), (0.6, 0.56), (0.6, 1.0), (-1.0, 1.0)]
+    walls = [side, [(x, -y) for x, y in side], [(-1, -1), (-0.6, -1), (-0.6, 1), (-1, 1)]]
+    for box, pushes in (((4.0, 4.0, 0.0), False), ((0.5, 0.0, 0.0), True)):
+        tight = scene([box], extra=walls, pose=(-0.2, 0.0, 0.0))
+        path = way_out(tight)
+        assert path is not None and path[-1, 0] > 0.8
+        work = PushSimulator(tight).simulate_primitive(path, 0)[0].work
+        assert (work > 0.0) == pushes
+
+
+def test_a_recovery_path_leads_out_of_a_pocket_with_room_to_turn():
+    """All its gaps are wider than the robot by less than a cell of the lattice of approaches."""
+    corners = ((-1.578, -1.499), (0.311, -2.74), (0.514, -0.567))
+    columns = [[(x, y), (x + 1.0, y), (x + 1.0, y + 1.0), (x, y + 1.0)] for x, y in corners]
+    pocket = scene([(1.8, -1.1, 0.0)], extra=columns, pose=(0.158, -1.107, 0.0))
+    assert way_out(pocket) is None
+    around = reach(pocket, approach_tree(pocket))
+    assert around < 2.0 * pocket.size
+    path = recovery_path(pocket.world, 0.0, around)
+    assert path is not None
+    outside = PushScene(replace(pocket.world, robot_pose=path[-1]), pocket.config)
+    assert reach(outside, approach_tree(outside)) > 6.0 * pocket.size
 
 
 def test_there_is_no_recovery_path_out_of_a_cell():
