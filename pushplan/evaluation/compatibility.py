@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from pushplan.control import ImmediateExecutor
@@ -29,6 +29,7 @@ def misfits(
     suites: Sequence[Suite],
     settings: JobSettings,
     *,
+    only: Mapping[str, Sequence[str]] | None = None,
     allow_all: bool = False,
 ) -> dict[tuple[str, str], str]:
     """Make each policy once for each kind of scene, so that what cannot run is known before.
@@ -37,6 +38,7 @@ def misfits(
         specs: the policies.
         suites: what they are to run.
         settings: of the environments.
+        only: labels of the policies that a suite, by name, is for; else for all of them.
         allow_all: whether a policy may fit no suite at all.
 
     Returns:
@@ -49,7 +51,8 @@ def misfits(
     found: dict[tuple[str, str], str] = {}
     for spec in specs:
         first = ""
-        for suite in suites:
+        wanted = [one for one in suites if spec.label in (only or {}).get(one.name, [spec.label])]
+        for suite in wanted:
             starts = {Job(spec, scenario).title: scenario for scenario in suite.scenarios}
             for title, scenario in starts.items():
                 if (spec.label, title) not in known:
@@ -59,7 +62,7 @@ def misfits(
                     break
                 found[suite.name, spec.label] = reason
                 first = first or f"{title}: {reason}"
-        if not allow_all and all((suite.name, spec.label) in found for suite in suites):
+        if not allow_all and first and all((suite.name, spec.label) in found for suite in wanted):
             raise UnusablePolicyError(f"policy {spec.label!r} cannot run {first}")
     return found
 

@@ -74,8 +74,6 @@ class Experiment:
         for metric in self.metrics:
             metric_function(metric)
         object.__setattr__(self, "policies", tuple(read_policies(self.policies)))
-        found = misfits(self.policies, self.suites, self.settings, allow_all=self.allow_misfits)
-        object.__setattr__(self, "skipped", found)
         labels, names = [p.label for p in self.policies], [one.name for one in self.suites]
         for name, wanted in self.only.items():
             if name not in names:
@@ -83,6 +81,14 @@ class Experiment:
             for label in wanted:
                 if label not in labels:
                     raise UnknownNameError("policy of this experiment", label, labels)
+        found = misfits(
+            self.policies,
+            self.suites,
+            self.settings,
+            only=self.only,
+            allow_all=self.allow_misfits,
+        )
+        object.__setattr__(self, "skipped", found)
 
     @classmethod
     def load(cls, path: str | Path) -> Experiment:

@@ -158,6 +158,24 @@ def test_a_suite_may_name_its_policies() -> None:
         Experiment.from_dict(data)
 
 
+def test_only_what_was_asked_for_is_left_out() -> None:
+    data = {
+        "schema": "pushplan-experiment/1",
+        "suites": [
+            {"suite": "maze-2d-3", "policies": ["straight"]},
+            {"suite": "area-clearing-2d-10", "policies": ["gtsp"]},
+        ],
+        "policies": ["straight", "gtsp"],
+        "episodes": 1,
+    }
+    experiment = Experiment.from_dict(data)
+    assert len(experiment.jobs) == 2 and not experiment.skipped
+    data["suites"].pop()
+    data["suites"].append({"suite": "maze-2d-5", "policies": ["gtsp"]})
+    with pytest.raises(UnusablePolicyError, match="gtsp"):
+        Experiment.from_dict(data)
+
+
 @pytest.mark.slow
 def test_the_papers_comparison_is_an_experiment_file() -> None:
     shipped = Experiment.load(Path(__file__).parents[2] / "examples" / "paper.yaml")
