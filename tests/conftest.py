@@ -12,12 +12,16 @@ from collections.abc import Callable, Iterator
 from importlib.util import find_spec
 from pathlib import Path
 
+import hypothesis
 import numpy as np
 import pytest
 from turnstile import Turnstile
 
 import pushplan
 from pushplan.world import Drive, GoalDisc, Movables, PlanStatus, RobotModel, StaticMap, World
+
+hypothesis.settings.register_profile("busy", deadline=None)  # a shared machine has no speed
+hypothesis.settings.load_profile("busy")
 
 LEARN = ("torch", "stable_baselines3", "onnx", "minari", "h5py", "tensorboard")
 MISSING = [name for name in LEARN if find_spec(name) is None]

@@ -33,7 +33,6 @@ class RecoveryProblem(NamedTuple):
     grown: Footprint  # by the distance to keep from what it does not touch
     among: ConvexObstacles
     size: float  # Circumscribed radius of the robot [m]
-    beyond: float  # how far away the place to turn is at least [m]
 
 
 @kernel
@@ -115,25 +114,23 @@ def search_recovery(problem: RecoveryProblem) -> FloatArray:
             count += 1
             if count == _MOST:
                 return nodes[:0]
-            away = math.hypot(pose[0] - start[0], pose[1] - start[1])
-            if away >= problem.beyond and can_turn(pose, size, among):
+            if can_turn(pose, size, among):
                 return _path_to(count - 1, nodes, before)
         at += 1
     return nodes[:0]
 
 
-def recovery_path(world: World, margin: float, beyond: float = 0.0) -> FloatArray | None:
-    """A drive (N, 3) to the nearest place with clearance to turn about, at least ``beyond`` away.
+def recovery_path(world: World, margin: float) -> FloatArray | None:
+    """A drive (N, 3) to the nearest place with clearance to turn about.
 
     It moves no object if it can; where objects close the way out, it pushes them along. None if
-    there is no such place within reach, or the robot is in one and need not leave it. What the
-    robot touches at first it may touch on the way, but no deeper: a bumper can hook on a corner.
-    The drive keeps away from all else if it can.
+    there is no such place within reach, or the robot is in one. What the robot touches at first it
+    may touch on the way, but no deeper: a bumper can hook on a corner. The drive keeps away from
+    all else if it can.
 
     Args:
         world: the snapshot.
         margin: distance to keep from what is static if it can [m].
-        beyond: how far away that place is at least [m].
     """
     size = world.robot.circumscribed_radius
     objects = [world.movables.outline_world(k) for k in range(len(world.movables))]
@@ -144,11 +141,11 @@ def recovery_path(world: World, margin: float, beyond: float = 0.0) -> FloatArra
     steps = np.concatenate([steps, [(0.0, STEP), (0.0, -STEP)]])
     body = footprint(world.robot)
     for among in (obstacles(world.static, objects), walls) if objects else (walls,):
-        if beyond <= 0.0 and can_turn(start, size, among):
+        if can_turn(start, size, among):
             return None
         for distance in (margin, 0.0):
             grown = footprint(world.robot, distance)
-            path = search_recovery(RecoveryProblem(start, steps, body, grown, among, size, beyond))
+            path = search_recovery(RecoveryProblem(start, steps, body, grown, among, size))
             if len(path):
                 return path
     return None

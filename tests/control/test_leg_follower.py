@@ -48,7 +48,7 @@ def run(
     return follower, np.array(poses)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(points=st.lists(places, min_size=1, max_size=3), heading=st.floats(-3.0, 3.0), rate=rates)
 @pytest.mark.slow
 def test_it_arrives_by_every_point_at_any_rate(points, heading, rate):

@@ -63,7 +63,6 @@ def energy(world):
     return 0.5 * movables.masses @ (speed + movables.twists[:, 2] ** 2 / 6.0)
 
 
-@settings(deadline=None)
 @given(
     speed=st.floats(1e-3, 3.0), b=st.floats(0.0, 2.0), c=st.floats(0.0, 2.0), h=st.floats(1e-3, 2.0)
 )
@@ -96,7 +95,7 @@ def test_a_floating_object_coasts_as_drag_says():
     assert after.twists[0, 1] / after.twists[0, 0] == pytest.approx(0.75)
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(
     offset=st.floats(-0.9, 0.9),
     turn=st.floats(-1.0, 1.0),

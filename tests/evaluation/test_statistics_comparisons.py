@@ -49,7 +49,7 @@ def test_success_is_compared_by_its_signs() -> None:
     assert signed_rank_test(np.zeros(5)) == (1.0, 0.0)
 
 
-@settings(deadline=None, max_examples=40)
+@settings(max_examples=40)
 @given(st.lists(st.floats(-10.0, 10.0), min_size=1, max_size=25))
 def test_the_other_way_round_is_the_same_test(values: list[float]) -> None:
     gaps = np.array(values)

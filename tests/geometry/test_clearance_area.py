@@ -59,7 +59,7 @@ def open_floor() -> StaticMap:
 
 
 @given(st.integers(0, 2**32 - 1))
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 def test_without_obstacles_it_is_the_straight_distance(seed: int) -> None:
     rng = np.random.default_rng(seed)
     area = ClearanceArea(HEXAGON, rng.random(6) < 0.5)

@@ -37,7 +37,7 @@ def convex_polygons(draw: st.DrawFn, reach: float = 3.0) -> np.ndarray:
 
 
 @given(convex_polygons())
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 def test_area_and_centroid_equal_shapely(v: np.ndarray) -> None:
     shape = shapely.Polygon(v)
     assert polygon_area(v) == pytest.approx(shape.area, rel=1e-9, abs=1e-12)
@@ -57,7 +57,7 @@ def test_inertia_of_known_shapes() -> None:
 
 
 @given(convex_polygons())
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 def test_inertia_equals_sum_over_triangles(v: np.ndarray) -> None:
     cx, cy = polygon_centroid(v)
     assume(polygon_area(v) > 1e-4)
@@ -77,7 +77,7 @@ def test_transform_points_may_work_in_place() -> None:
 
 
 @given(convex_polygons(reach=1.0), convex_polygons(reach=1.0))
-@settings(max_examples=400, deadline=None)
+@settings(max_examples=400)
 def test_overlap_distance_and_penetration_equal_shapely(a: np.ndarray, b: np.ndarray) -> None:
     pa, pb = shapely.Polygon(a), shapely.Polygon(b)
     depth, nx, ny = convex_penetration(a, b)
@@ -89,7 +89,7 @@ def test_overlap_distance_and_penetration_equal_shapely(a: np.ndarray, b: np.nda
 
 
 @given(convex_polygons(reach=0.2), convex_polygons(reach=0.2))
-@settings(max_examples=300, deadline=None, suppress_health_check=[HealthCheck.filter_too_much])
+@settings(max_examples=300, suppress_health_check=[HealthCheck.filter_too_much])
 def test_moving_by_the_penetration_separates_and_less_does_not(
     a: np.ndarray, b: np.ndarray
 ) -> None:

@@ -17,7 +17,7 @@ def random_convex(rng: np.random.Generator, centre: float, spread: float) -> np.
 
 
 @given(st.integers(0, 2**32 - 1), st.booleans())
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 def test_fill_sets_the_pixels_whose_centre_is_inside(seed: int, clockwise: bool) -> None:
     rng = np.random.default_rng(seed)
     v = random_convex(rng, rng.uniform(-10, 40), 10.0 ** rng.uniform(-1.0, 1.7))
@@ -58,7 +58,7 @@ def test_grid_refuses_nonsense(bounds: list[float], resolution: float) -> None:
 
 
 @given(st.integers(0, 2**32 - 1))
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 def test_clearance_equals_shapely(seed: int) -> None:
     rng = np.random.default_rng(seed)
     polygons = [random_convex(rng, 5.0, 2.0) for _ in range(rng.integers(0, 4))]

@@ -34,7 +34,7 @@ def hull(rng: np.random.Generator) -> np.ndarray:
 
 
 @given(st.integers(0, 2**32 - 1), st.sampled_from(["free", "corner", "side"]))
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 @pytest.mark.slow
 def test_a_shadow_is_what_cannot_be_seen(seed: int, where: str) -> None:
     rng = np.random.default_rng(seed)

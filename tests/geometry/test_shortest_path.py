@@ -319,7 +319,7 @@ def test_equal_maps_share_the_field() -> None:
 
 
 @given(st.integers(0, 2**32 - 1))
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 def test_sampling_is_close_to_exact_and_never_reads_across_a_wall(seed: int) -> None:
     rng = np.random.default_rng(seed)
     wall = StaticMap.build([], [[5, -1, 5, 8]], 0.01, bounds=[0, 0, 10, 10])

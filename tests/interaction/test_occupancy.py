@@ -43,7 +43,7 @@ def batch(scale=1.0):
 
 
 class TestCoverage:
-    @settings(max_examples=30, deadline=None)
+    @settings(max_examples=30)
     @given(seed=st.integers(0, 10_000))
     def test_cells_hold_the_covered_area(self, seed):
         rng = np.random.default_rng(seed)

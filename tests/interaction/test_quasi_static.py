@@ -112,7 +112,7 @@ def random_drive(seed: int, steps: int = 120) -> np.ndarray:
     return path
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(st.integers(0, 10_000))
 def test_nothing_overlaps_after_a_sweep(seed):
     world = make_u_maze(scattered_boxes(10, seed))
@@ -129,7 +129,7 @@ def test_nothing_overlaps_after_a_sweep(seed):
             assert convex_penetration(np.ascontiguousarray(other), outline)[0] <= depth
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(st.integers(0, 10_000), st.floats(-3, 3), st.floats(-20, 20), st.floats(-20, 20))
 def test_it_does_not_matter_where_the_scene_is(seed, turn, dx, dy):
     boxes = scattered_boxes(6, seed)

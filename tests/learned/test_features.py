@@ -14,7 +14,7 @@ from pushplan.world import InvalidInputError
 from pushplan.world.outline import flatten
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(st.integers(0, 2**31), st.integers(1, 40))
 def test_rays_are_as_long_as_shapely_says(seed, count):
     rng = np.random.default_rng(seed)

@@ -208,7 +208,7 @@ COLUMNS = StaticMap.build(
 
 
 @given(st.integers(0, 2**32 - 1))
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 def test_bounds_of_the_scores(seed: int) -> None:
     rng = np.random.default_rng(seed)
     count = int(rng.integers(1, 6))
@@ -228,7 +228,7 @@ def test_bounds_of_the_scores(seed: int) -> None:
 
 
 @given(st.integers(0, 2**32 - 1))
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 def test_the_tree_is_that_of_networkx(seed: int) -> None:
     points = np.random.default_rng(seed).uniform(-5, 5, (6, 2))
     graph = nx.Graph()

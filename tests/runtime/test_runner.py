@@ -299,7 +299,7 @@ STEPS = st.tuples(
 )
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(st.lists(STEPS, min_size=5, max_size=60), st.integers(0, 2**32 - 1))
 def test_no_stream_of_worlds_leads_to_a_command_beyond_the_limits(steps, seed):
     rng = np.random.default_rng(seed)

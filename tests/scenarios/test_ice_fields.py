@@ -238,7 +238,7 @@ def test_cells_and_floes_agree_with_shapely():
             assert 0.85 * limit <= floe.area <= limit * (1.0 + 1e-6)
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(
     concentration=st.floats(0.02, 0.6),
     width=st.floats(4.0, 20.0),

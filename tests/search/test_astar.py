@@ -75,7 +75,7 @@ def lattice_of(graph: csr_matrix, bounds: np.ndarray) -> GraphLattice:
     return GraphLattice(*rows, graph.data, bounds, goals)
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 @given(seed=st.integers(0, 10**6), batch=st.integers(1, 50))
 def test_cost_is_least_whatever_the_batch_and_the_admissible_bound(seed: int, batch: int) -> None:
     graph, exact = random_graph(seed)
@@ -161,7 +161,7 @@ def test_config_is_checked() -> None:
         PrimitiveConfig(radius=float("nan"))
 
 
-@settings(max_examples=80, deadline=None)
+@settings(max_examples=80)
 @given(
     heading=st.floats(-3.1, 3.1),
     distance=st.floats(0.01, 20.0),

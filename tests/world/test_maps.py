@@ -32,7 +32,7 @@ def cells_of(grid, side, origin):
     return shapely.union_all(squares)
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 @given(arrays(np.bool_, SHAPES))
 def test_rectangles_cover_the_occupied_cells_and_no_other(grid):
     covered = np.zeros_like(grid)
@@ -44,7 +44,7 @@ def test_rectangles_cover_the_occupied_cells_and_no_other(grid):
     assert (covered == grid).all()
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(
     arrays(np.bool_, SHAPES),
     st.floats(0.01, 5.0),

@@ -40,7 +40,7 @@ def test_a_world_survives_its_file(tmp_path, ending, goal):
     assert load_world(tmp_path / f"w.{ending}") == world
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 @given(st.lists(st.tuples(numbers, numbers, numbers), max_size=4), numbers, st.booleans())
 def test_every_number_survives_json(poses, time, wheeled):
     boxes = Movables.from_outlines(

@@ -43,15 +43,6 @@ def approach_tree(scene: PushScene, target: int = -1) -> ApproachTree:
     return search_approaches(scene, scene.fine, scene.world.robot_pose, target=target)
 
 
-def reach(scene: PushScene, tree: ApproachTree) -> float:
-    """How far from the robot the farthest place is that paths lead to [m]."""
-    grid = scene.fine.grid
-    rows, columns = np.nonzero(np.isfinite(tree.costs).reshape(grid.blocked.shape).any(axis=0))
-    x, y = scene.world.robot_pose[:2]
-    away = np.hypot(grid.x + grid.step * columns - x, grid.y + grid.step * rows - y)
-    return float(away.max(initial=0.0))
-
-
 def search_approaches(
     scene: PushScene,
     contact_grid: ContactGrid,

@@ -9,7 +9,6 @@ from functools import partial
 import numpy as np
 
 from pushplan.motion.recovery_path import recovery_path
-from pushplan.planners.rearrangement.approach import approach_tree, reach
 from pushplan.planners.rearrangement.goal_kernels import REMOVED
 from pushplan.planners.rearrangement.push import Push
 from pushplan.planners.rearrangement.push_history import PushHistory
@@ -22,7 +21,6 @@ from pushplan.world.checks import FloatArray
 from pushplan.world.stop import wants_own_budget
 
 _ROBOT, _OBJECT = 0.5, 0.2  # how far a scene may be from the predicted one [circumscribed radii]
-_CLOSED = 2.5  # a place is closed from which paths lead no farther than this [circumscribed radii]
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,17 +92,11 @@ def choose_push(
         most = scene.config.max_rollouts if wants_own_budget(rule) else math.inf
         budget = SearchBudget(rule, most)
         selection = select_push(scene.with_budget(budget), penalty)
-        way_out = _way_out(scene) if selection.first is None else None
+        margin = 0.5 * scene.config.margin * scene.size
+        way_out = recovery_path(scene.world, margin) if selection.first is None else None
         return PushChoice(selection, way_out, budget.interrupted, scene.cache.searches)
 
     return PendingChoice(scene, executor.submit(choose, scene.world.time, stop), ahead)
-
-
-def _way_out(scene: PushScene) -> FloatArray | None:
-    """Out of a tight place, or of one that no path on the lattice leaves; None if in neither."""
-    margin, around = 0.5 * scene.config.margin * scene.size, reach(scene, approach_tree(scene))
-    closed = around < _CLOSED * scene.size
-    return recovery_path(scene.world, margin, around if closed else 0.0)
 
 
 def scene_after(scene: PushScene, push: Push) -> PushScene:

@@ -128,6 +128,13 @@ class PushScene:
         other.__dict__["budget"] = budget
         return other
 
+    def on_finer_lattice(self) -> PushScene:
+        """The same with approaches on half the cells, that keep little distance from walls."""
+        other, config = copy.copy(self), self.config
+        cell, margin = 0.5 * self.fine.grid.step / self.size, 0.3 * config.margin
+        other.__dict__["fine"] = self._contact_grid(cell, margin)
+        return other
+
     def with_objects_at(self, poses: FloatArray) -> PushScene:
         """The same with the objects at poses (K, 3), as far as rolling out pushes goes.
 
@@ -233,19 +240,22 @@ class PushScene:
     @cached_property
     def fine(self) -> ContactGrid:
         """The lattice on which the next approach is planned."""
-        return self._contact_grid(self.config.cell)
+        return self._contact_grid(self._least_cell(self.config.cell), self.config.margin)
 
     @cached_property
     def coarse(self) -> ContactGrid:
         """The lattice on which the cost of approaches between pushes is computed."""
-        return self._contact_grid(self.config.coarse_cell)
+        return self._contact_grid(self._least_cell(self.config.coarse_cell), self.config.margin)
 
-    def _contact_grid(self, cell: float) -> ContactGrid:
+    def _least_cell(self, cell: float) -> float:
+        """A cell that is not too small for the map [circumscribed radii]."""
+        sides = self.world.static.bounds[2:] - self.world.static.bounds[:2]
+        return max(cell, 0.012 * float(sides.max()) / self.size)
+
+    def _contact_grid(self, cell: float, margin: float) -> ContactGrid:
         world, size = self.world, self.size
-        sides = world.static.bounds[2:] - world.static.bounds[:2]
-        step = max(cell, 0.012 * float(sides.max()) / size) * size
-        grid = make_pose_grid(world.robot, world.static, step, self.config.margin * size)
-        shape = footprint(world.robot, self.config.margin * size)
+        grid = make_pose_grid(world.robot, world.static, cell * size, margin * size)
+        shape = footprint(world.robot, margin * size)
         layers = contact_depths(grid, shape, self.poses, self.bodies)
         return ContactGrid(grid, layers, self.contact_weights, self.config.target_cost)
 

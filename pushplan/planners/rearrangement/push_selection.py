@@ -53,6 +53,8 @@ def select_push(scene: PushScene, penalty: Callable[[Push], float]) -> Selection
     few = min(scene.config.relocation.objects, left)
     for relocations, thorough in ((0, False), (few, False), (left, True)):
         if selection.first is None and not scene.budget.is_used_up:
+            if thorough:
+                scene = scene.on_finer_lattice()
             graph = build_push_graph(
                 scene, penalty, onward=True, relocations=relocations, thorough=thorough
             )

@@ -78,7 +78,7 @@ def check_plan(world: World, result, planner: PushAware) -> None:
 
 
 @pytest.mark.slow
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(st.integers(0, 100_000), st.integers(0, 12), st.sampled_from([0.105, 0.3]))
 def test_plans_can_be_driven_and_cost_what_is_predicted(seed, boxes, rate):
     world = make_u_maze(scattered_boxes(boxes, seed), robot=make_robot(max_turn_rate=rate))
@@ -91,7 +91,7 @@ def test_plans_can_be_driven_and_cost_what_is_predicted(seed, boxes, rate):
 
 
 @pytest.mark.slow
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(st.integers(0, 100_000))
 def test_any_room_gives_a_status_and_never_a_path_through_a_wall(seed):
     rng = generator(seed)

@@ -175,7 +175,7 @@ def made(robot, friction, offset, angle):
     return model, 0.8 * offset * model.bumper.half, 0.4 * angle
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 @given(robots, st.floats(0.0, 1.0), unit, unit, unit)
 def test_forces_obey_coulomb_and_the_limit_surface(robot, friction, offset, angle, bend):
     model, s, phi = made(robot, friction, offset, angle)
@@ -201,7 +201,7 @@ def test_forces_obey_coulomb_and_the_limit_surface(robot, friction, offset, angl
             assert shear * (ut - vt) >= -1e-9
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @example(turtlebot3_burger("collector"), 0.75, 0.25, 0.0, 1.0, 3.0)
 @given(robots, st.floats(0.0, 1.0), unit, unit, unit, st.floats(0.3, 30.0))
 def test_mirrored_and_scaled_pushes(robot, friction, offset, angle, bend, factor):

@@ -135,7 +135,7 @@ def check_plan(world: World, result, planner: KinodynamicRRT) -> None:
 
 
 @pytest.mark.slow
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(st.integers(0, 100_000), st.integers(0, 12))
 def test_kinodynamic_plans_can_be_driven(seed, boxes):
     world = make_u_maze(scattered_boxes(boxes, seed))

@@ -150,7 +150,7 @@ def test_the_estimate_saves_most_nodes_and_costs_little_more() -> None:
     assert results["estimate"][1] < 1.05 * results["bound"][1]
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(seed=st.integers(0, 10**6), half=st.integers(0, 3), reach=st.integers(0, 4))
 @pytest.mark.slow
 def test_the_bound_holds_for_random_walks_over_random_prices(

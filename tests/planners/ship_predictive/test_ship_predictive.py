@@ -172,7 +172,7 @@ def turn_fits(world, side):
     return bool((np.abs(xs[:end]) < 6.0).all() and (ys[:end] > -1.0).all())
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(seed=st.integers(0, 100_000))
 def test_plans_from_anywhere_can_be_driven(seed):
     rng = np.random.default_rng(seed)
