@@ -111,6 +111,7 @@ def test_the_same_again():
         assert np.array_equal(one.robot_poses, again.robot_poses)
 
 
+@pytest.mark.slow
 def test_the_program_gives_little_away():
     config = PushingConfig(parameters=PushParameters(0.3), period=0.2, horizon=12, moves=8)
     gains = []

@@ -20,7 +20,7 @@ from pushplan.planners.rearrangement import (
     build_push_graph,
     push_order,
 )
-from pushplan.planners.rearrangement.approach import approach_tree, reach
+from pushplan.planners.rearrangement.approach import approach_tree
 from pushplan.planners.rearrangement.candidates import partial_pushes
 from pushplan.planners.rearrangement.cost_to_go_kernels import cost_to_go
 from pushplan.planners.rearrangement.goal_kernels import all_done
@@ -344,18 +344,20 @@ def test_the_recovery_path_pushes_what_closes_the_only_way_out():
         assert (work > 0.0) == pushes
 
 
-def test_a_recovery_path_leads_out_of_a_pocket_with_room_to_turn():
-    """All its gaps are wider than the robot by less than a cell of the lattice of approaches."""
+def test_finer_lattices_lead_through_gaps_that_are_hardly_wider_than_the_robot():
     corners = ((-1.578, -1.499), (0.311, -2.74), (0.514, -0.567))
     columns = [[(x, y), (x + 1.0, y), (x + 1.0, y + 1.0), (x, y + 1.0)] for x, y in corners]
-    pocket = scene([(1.8, -1.1, 0.0)], extra=columns, pose=(0.158, -1.107, 0.0))
-    assert way_out(pocket) is None
-    around = reach(pocket, approach_tree(pocket))
-    assert around < 2.0 * pocket.size
-    path = recovery_path(pocket.world, 0.0, around)
-    assert path is not None
-    outside = PushScene(replace(pocket.world, robot_pose=path[-1]), pocket.config)
-    assert reach(outside, approach_tree(outside)) > 6.0 * pocket.size
+    pocket = scene([(3.0, 3.0, 0.0)], extra=columns, pose=(0.158, -1.107, 0.0))
+
+    def farthest(here):
+        grid = here.fine.grid
+        costs = approach_tree(here).costs.reshape(grid.blocked.shape)
+        rows, columns = np.nonzero(np.isfinite(costs).any(axis=0))
+        away = (grid.x + grid.step * columns - 0.158, grid.y + grid.step * rows + 1.107)
+        return np.hypot(*away).max()
+
+    assert farthest(pocket) < 2.0 * pocket.size
+    assert farthest(pocket.on_finer_lattice()) > 6.0 * pocket.size
 
 
 def test_there_is_no_recovery_path_out_of_a_cell():
