@@ -27,10 +27,12 @@ class ApproachTree:
     Args:
         costs: (16 * rows * columns,) [m].
         before: the pose before each, -1 for none.
+        target: index of an object that is not to be moved on the way; -1 if none.
     """
 
     costs: FloatArray
     before: IntArray
+    target: int = -1
 
 
 def approach_tree(scene: PushScene, target: int = -1) -> ApproachTree:
@@ -76,7 +78,7 @@ def search_approaches(
         arm=scene.arm,
         targets=until,
     )
-    return ApproachTree(*search_poses(problem))
+    return ApproachTree(*search_poses(problem), target)
 
 
 def arrivals_at(contact_grid: ContactGrid, pushes: Sequence[Push]) -> Arrivals:

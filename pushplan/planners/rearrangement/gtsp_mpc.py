@@ -221,7 +221,10 @@ class GtspMpc:
         return False
 
     def _tries_anew(self, scene: PushScene) -> bool:
-        """Forget all that was tried where objects have got nearer since the last time, or stop."""
+        """Forget what was searched elsewhere, or tried when objects were farther away, or stop."""
+        if self._cache.is_from_elsewhere(scene.robot_cell):
+            self._cache = RolloutCache()
+            return True
         remaining = scene.remaining_now[~scene.done]
         way = float(remaining[np.isfinite(remaining)].sum())
         if self._history.is_empty or way >= self._way_at_end - scene.size:

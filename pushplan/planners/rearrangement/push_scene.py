@@ -77,13 +77,13 @@ class ContactGrid:
         grid: the lattice.
         layers: (K, 16, rows, columns) depth in each object [m].
         weights: (K,) cost of carrying each object along.
-        target_cost: what is added to that of an object that is to be pushed afterwards.
+        around_cost: what is added to that of an object that is not to be moved.
     """
 
     grid: PoseGrid
     layers: Layers
     weights: FloatArray
-    target_cost: float
+    around_cost: float
 
     def contacts(
         self, fraction: float = 1.0, without: IntArray | None = None, target: int = -1
@@ -99,7 +99,7 @@ class ContactGrid:
         if without is not None:
             weights[without] = 0.0
         if target >= 0:
-            weights[target] += self.target_cost
+            weights[target] += self.around_cost
         return add_layers(self.layers, weights)
 
 
@@ -150,6 +150,11 @@ class PushScene:
     def size(self) -> float:
         """Circumscribed radius of the robot [m]."""
         return self.world.robot.circumscribed_radius
+
+    @property
+    def robot_cell(self) -> bytes:
+        """About where the robot is."""
+        return np.round(self.world.robot_pose[:2] / (2.0 * self.size)).tobytes()
 
     @cached_property
     def half(self) -> float:
@@ -257,7 +262,7 @@ class PushScene:
         grid = make_pose_grid(world.robot, world.static, cell * size, margin * size)
         shape = footprint(world.robot, margin * size)
         layers = contact_depths(grid, shape, self.poses, self.bodies)
-        return ContactGrid(grid, layers, self.contact_weights, self.config.target_cost)
+        return ContactGrid(grid, layers, self.contact_weights, self.config.around_cost)
 
     def remaining(self, poses: FloatArray) -> FloatArray:
         """(K,) shortest path [m] of each object's middle to the goal from poses (K, 3)."""

@@ -42,7 +42,8 @@ def select_push(scene: PushScene, penalty: Callable[[Push], float]) -> Selection
     """Sequence anew: the pushes to make, and the first of them with the route to it.
 
     Where no push home can be carried out, those that end on the way count as well, and where none
-    of these can, drives that free an object: first for the nearest objects, then for all.
+    of these can, drives that free an object: first for the nearest objects, then for all, with
+    approaches on a finer lattice.
 
     Args:
         scene: the scene.

@@ -39,6 +39,7 @@ class RearrangementConfig(CheckedFields):
         far: cost of getting to what cannot be got to later [diagonals of the map].
         contact_cost: least cost of carrying an object along on an approach, however light it is.
         target_cost: what is added to it for the object that is to be pushed.
+        around_cost: the same where that has spoilt the push, so that the route leads around it.
         arm: how far a turn by one radian carries an object along.
         slack: clearance between the bumper and the object where a push begins.
         margin: distance that approaches keep from what is static.
@@ -93,6 +94,7 @@ class RearrangementConfig(CheckedFields):
     far: PositiveFloat = 5.0
     contact_cost: Annotated[float, Limits(0.0, 1e6)] = 1.0
     target_cost: NonNegativeFloat = 5.0
+    around_cost: NonNegativeFloat = 50.0
     arm: NonNegativeFloat = 0.8
     slack: Fraction = 0.05
     margin: Fraction = 0.03

@@ -59,16 +59,16 @@ def relocating_pushes(
     movables, cache = scene.world.movables, scene.cache
     away = np.hypot(*(scene.poses[:, :2] - scene.poses[k, :2]).T)
     near = away < scene.config.relocation.near * scene.size
-    robot = np.round(scene.world.robot_pose[:2] / (2.0 * scene.size))
+    robot = scene.robot_cell
     around = movables.ids[near].tobytes() + scene.poses[near].tobytes()
     if cache is not None:
-        found = cache.primitives(int(movables.ids[k]), around, robot.tobytes(), thorough)
+        found = cache.primitives(int(movables.ids[k]), around, robot, thorough)
         if found is None and cache.searches >= scene.config.max_searches:
             return []
     if found is None:
         found = _RelocationSearch(scene, k, approach, thorough).run()
         if cache is not None and not scene.budget.interrupted:
-            cache.keep_primitives(int(movables.ids[k]), around, robot.tobytes(), thorough, found)
+            cache.keep_primitives(int(movables.ids[k]), around, robot, thorough, found)
     return [
         replace(push, cost=push.cost + extra)
         for path, extra, moved in found

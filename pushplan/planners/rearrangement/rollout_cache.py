@@ -91,6 +91,10 @@ class RolloutCache:
         self._primitives[target] = _Relocations(around, robot, thorough, found)
         self.searches += 1
 
+    def is_from_elsewhere(self, robot: bytes) -> bool:
+        """Whether drives were searched when the robot was in another place."""
+        return any(known.robot != robot for known in self._primitives.values())
+
     def __len__(self) -> int:
         return len(self._entries)
 

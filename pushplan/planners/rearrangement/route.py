@@ -20,6 +20,7 @@ from pushplan.world.checks import FloatArray
 
 _MOST = 14  # corners of the lattice's path that a route may have corners at
 _LONGEST = 6
+_MORE = 1.5  # by this factor a route may cost more than the lattice's path, and a radius
 """Points further on that a leg may end at, where the robot has to keep to the lattice's path."""
 _AWAY = (0.3, -0.3, 0.6, -0.6, 1.0, -1.0)
 """How far ahead the robot may drive first to get to where it can turn [circumscribed radii]."""
@@ -81,7 +82,9 @@ class RoutePlanner:
         ahead = scene.size * np.array([math.cos(here[2]), math.sin(here[2])])
         near = [here[:2], *(here[:2] + fraction * ahead for fraction in _AWAY)]
         corners, every = _corners(poses), _places(poses)
-        problem = self._problem_with(target)
+        around, cheapest = approach.target == target >= 0, None
+        problem = self._problem_with(target, around)
+        expected = _MORE * float(total[best]) + scene.size if around else math.inf
         for last in ([start[:2]], []):  # it may be too near to a wall to turn there
             for first, points, longest in (
                 ([here[:2]], corners, len(corners) + 1),
@@ -90,9 +93,12 @@ class RoutePlanner:
             ):
                 through = np.array([*first, *points, *last])
                 found = _cheapest(through, float(here[2]), end, len(first), longest, problem)
-                if found is not None:
+                if found is None or (cheapest is not None and found.cost >= cheapest.cost):
+                    continue
+                cheapest = found
+                if found.cost <= expected:  # else it has left the lattice's path for a worse one
                     return found
-        return None
+        return cheapest
 
     def poses_along(self, route: Route) -> FloatArray:
         """(N, 3) poses on the route, close enough together for a prediction."""
@@ -108,12 +114,12 @@ class RoutePlanner:
         found.append(_turned(here, route.heading, float(route.turns[-1])))
         return np.concatenate(found)
 
-    def _problem_with(self, target: int) -> RouteProblem:
-        """The problem where object ``target`` must not be moved."""
+    def _problem_with(self, target: int, around: bool) -> RouteProblem:
+        """The problem where object ``target`` must not be moved, or rather not."""
         if target < 0:
             return self._problem
-        weights = self._problem.weights.copy()
-        weights[target] += self.scene.config.target_cost
+        weights, config = self._problem.weights.copy(), self.scene.config
+        weights[target] += config.around_cost if around else config.target_cost
         return self._problem._replace(weights=weights)
 
 

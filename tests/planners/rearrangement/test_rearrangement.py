@@ -28,7 +28,8 @@ from pushplan.planners.rearrangement.gtsp_reduction import parts_of, reduce_to_g
 from pushplan.planners.rearrangement.pose_grid_kernels import LENGTHS, MOVES, TURNS, near_poses
 from pushplan.planners.rearrangement.pose_search_kernels import PoseSearchProblem, search_poses
 from pushplan.planners.rearrangement.push import signature
-from pushplan.planners.rearrangement.push_graph import candidate_pushes
+from pushplan.planners.rearrangement.push_graph import candidate_pushes, no_penalty
+from pushplan.planners.rearrangement.push_selection import select_push
 from pushplan.planners.rearrangement.push_simulator import PushSimulator
 from pushplan.planners.rearrangement.relocation import relocating_pushes
 from pushplan.planners.rearrangement.rollout_cache import RolloutCache
@@ -342,6 +343,24 @@ def test_the_recovery_path_pushes_what_closes_the_only_way_out():
         assert path is not None and path[-1, 0] > 0.8
         work = PushSimulator(tight).simulate_primitive(path, 0)[0].work
         assert (work > 0.0) == pushes
+
+
+def test_a_route_leads_around_the_box_that_it_would_push_away():
+    """The box fills the passage, and the other way is five times as long."""
+    room = [[(-5, 2.5), (5, 2.5), (5, 5), (-5, 5)], [(-5, -5), (5, -5), (5, -2.5), (-5, -2.5)]]
+    columns = [
+        [(x, y), (x + 1.0, y), (x + 1.0, y + 1.0), (x, y + 1.0)]
+        for x, y in ((-2.62, -0.72), (1.64, -0.84), (-0.58, -0.27))
+    ]
+    here = scene(
+        [(0.06, 1.583, 0.14)],
+        Receptacle([(3.5, 1.0), (5.0, 1.0), (5.0, 2.5), (3.5, 2.5)]),
+        [*room, *columns],
+        pose=(0.929, 1.708, -0.438),
+    )
+    first = select_push(here, no_penalty).first
+    assert first is not None and first.push.delivers
+    assert first.route.cost > 6.0
 
 
 def test_finer_lattices_lead_through_gaps_that_are_hardly_wider_than_the_robot():
