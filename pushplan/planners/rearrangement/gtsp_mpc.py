@@ -101,6 +101,7 @@ class GtspMpc:
         from pushplan.planners.rearrangement import kernel_warmup
 
         kernel_warmup.warm_up_rearrangement()
+        kernel_warmup.warm_up_steering()
         kernel_warmup.drive_in_small_worlds(GtspMpc)
 
     def act(self, world: World, observation: Any = None) -> Twist:

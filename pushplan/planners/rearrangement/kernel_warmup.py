@@ -13,6 +13,7 @@ from pushplan.geometry.transforms import arc_step
 from pushplan.gtsp import warm_up_solver
 from pushplan.planners.pushing import warm_up as warm_up_pushing
 from pushplan.planners.rearrangement.approach import approach_tree
+from pushplan.planners.rearrangement.controller_kernels import steer_push
 from pushplan.planners.rearrangement.push_scene import PushScene
 from pushplan.planners.rearrangement.push_simulator import PushSimulator
 from pushplan.planners.rearrangement.rearrangement_config import RearrangementConfig
@@ -40,6 +41,13 @@ def warm_up_rearrangement() -> None:
     scene = PushScene(_worlds()[0], RearrangementConfig())
     relocating_pushes(PushSimulator(scene), 0, approach_tree(scene))
     warm_up_recovery()
+
+
+@functools.cache
+def warm_up_steering() -> None:
+    """Steer a push outside rollouts, as `GeometricPusher` does; few episodes come to that."""
+    here, scene = np.zeros(3), PushScene(_worlds()[0], RearrangementConfig())
+    steer_push(here, here, np.eye(2), 0.0, 0.0, scene.controller)
 
 
 @functools.cache
