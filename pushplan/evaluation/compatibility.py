@@ -51,7 +51,7 @@ def misfits(
     found: dict[tuple[str, str], str] = {}
     for spec in specs:
         first = ""
-        wanted = [one for one in suites if spec.label in (only or {}).get(one.name, [spec.label])]
+        wanted = [one for one in suites if is_wanted(spec, one, only or {})]
         for suite in wanted:
             starts = {Job(spec, scenario).title: scenario for scenario in suite.scenarios}
             for title, scenario in starts.items():
@@ -65,6 +65,11 @@ def misfits(
         if not allow_all and first and all((suite.name, spec.label) in found for suite in wanted):
             raise UnusablePolicyError(f"policy {spec.label!r} cannot run {first}")
     return found
+
+
+def is_wanted(spec: PolicySpec, suite: Suite, only: Mapping[str, Sequence[str]]) -> bool:
+    """Whether a policy is asked for in a suite; ``only`` as in `misfits`."""
+    return spec.label in only.get(suite.name, [spec.label])
 
 
 def read_policies(given: Any) -> list[PolicySpec]:

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from pushplan.evaluation.batch import TRACES, Progress, run_batch
-from pushplan.evaluation.compatibility import misfits, read_policies
+from pushplan.evaluation.compatibility import is_wanted, misfits, read_policies
 from pushplan.evaluation.jobs import Job, JobSettings
 from pushplan.evaluation.limits import MEMORY_MB
 from pushplan.evaluation.policies import PolicySpec
@@ -117,8 +117,7 @@ class Experiment:
             for suite in self.suites
             for scenario in suite.scenarios
             for spec in self.policies
-            if (suite.name, spec.label) not in self.skipped
-            and spec.label in self.only.get(suite.name, [spec.label])
+            if (suite.name, spec.label) not in self.skipped and is_wanted(spec, suite, self.only)
         ]
 
     def run(

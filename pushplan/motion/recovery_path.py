@@ -143,7 +143,7 @@ def recovery_path(world: World, margin: float) -> FloatArray | None:
     for among in (obstacles(world.static, objects), walls) if objects else (walls,):
         if can_turn(start, size, among):
             return None
-        for distance in (margin, 0.0):
+        for distance in dict.fromkeys((margin, 0.0)):
             grown = footprint(world.robot, distance)
             path = search_recovery(RecoveryProblem(start, steps, body, grown, among, size))
             if len(path):

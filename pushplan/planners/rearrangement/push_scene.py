@@ -130,9 +130,8 @@ class PushScene:
 
     def on_finer_lattice(self) -> PushScene:
         """The same with approaches on half the cells, that keep little distance from walls."""
-        other, config = copy.copy(self), self.config
-        cell, margin = 0.5 * self.fine.grid.step / self.size, 0.3 * config.margin
-        other.__dict__["fine"] = self._contact_grid(cell, margin)
+        other = copy.copy(self)
+        other.__dict__["fine"] = self._contact_grid(0.5 * self.fine.grid.step, self._least_margin)
         return other
 
     def with_objects_at(self, poses: FloatArray) -> PushScene:
@@ -245,22 +244,28 @@ class PushScene:
     @cached_property
     def fine(self) -> ContactGrid:
         """The lattice on which the next approach is planned."""
-        return self._contact_grid(self._least_cell(self.config.cell), self.config.margin)
+        return self._contact_grid(self._step(self.config.cell), self.config.margin * self.size)
 
     @cached_property
     def coarse(self) -> ContactGrid:
         """The lattice on which the cost of approaches between pushes is computed."""
-        return self._contact_grid(self._least_cell(self.config.coarse_cell), self.config.margin)
+        step = self._step(self.config.coarse_cell)
+        return self._contact_grid(step, self.config.margin * self.size)
 
-    def _least_cell(self, cell: float) -> float:
-        """A cell that is not too small for the map [circumscribed radii]."""
+    def _step(self, cell: float) -> float:
+        """Side of a cell that is not too small for the map [m]."""
         sides = self.world.static.bounds[2:] - self.world.static.bounds[:2]
-        return max(cell, 0.012 * float(sides.max()) / self.size)
+        return max(cell, 0.012 * float(sides.max()) / self.size) * self.size
 
-    def _contact_grid(self, cell: float, margin: float) -> ContactGrid:
-        world, size = self.world, self.size
-        grid = make_pose_grid(world.robot, world.static, cell * size, margin * size)
-        shape = footprint(world.robot, margin * size)
+    @property
+    def _least_margin(self) -> float:
+        """Distance from what is static that the robot keeps wherever it is placed [m]."""
+        return 0.3 * self.config.margin * self.size
+
+    def _contact_grid(self, step: float, margin: float) -> ContactGrid:
+        world = self.world
+        grid = make_pose_grid(world.robot, world.static, step, margin)
+        shape = footprint(world.robot, margin)
         layers = contact_depths(grid, shape, self.poses, self.bodies)
         return ContactGrid(grid, layers, self.contact_weights, self.config.around_cost)
 
@@ -304,15 +309,14 @@ class PushScene:
             radius=round(radius, 6),
             half_width=self.half,
             slack=config.slack * self.size,
-            margin=0.3 * config.margin * self.size,
+            margin=self._least_margin,
             config=config.relocation,
         )
 
     @cached_property
     def fit(self) -> tuple[Footprint, ConvexObstacles, FloatArray]:
         """Footprint, obstacles and memory for `is_free`."""
-        margin = 0.3 * self.config.margin * self.size
-        shape, among = _fit_of(self.world.robot, self.world.static, margin)
+        shape, among = _fit_of(self.world.robot, self.world.static, self._least_margin)
         return shape, among, np.empty_like(shape.vertices)
 
     def fits(self, pose: FloatArray) -> bool:

@@ -19,10 +19,10 @@ from functools import cached_property
 
 import numpy as np
 
-from pushplan.interaction.kernels import sweep_path
 from pushplan.planners.rearrangement.approach import ApproachTree, approach_tree, arrival_poses
 from pushplan.planners.rearrangement.arc_kernels import sweep_arcs
 from pushplan.planners.rearrangement.candidates import can_be_pushed
+from pushplan.planners.rearrangement.forward_simulation import simulate_route
 from pushplan.planners.rearrangement.goal_kernels import REMOVED
 from pushplan.planners.rearrangement.push import Push
 from pushplan.planners.rearrangement.push_poses import (
@@ -242,14 +242,12 @@ class _RelocationSearch:
 
     def _arrived(self, state: _State) -> _State | None:
         """A start as the route to it leaves robot and objects; None if there is none."""
-        scene = self._scene
         for tree in (self._approach, self._around_object):
             route = self._routes.route(tree, state.start, self._k)
-            if route is not None:
-                path, after = self._routes.poses_along(route), scene.poses.copy()
-                out = np.empty((len(path), *after.shape))
-                if sweep_path(path, after, scene.bodies, scene.settings, out) < 0:
-                    return replace(state, track=path[-1:], poses=after)
+            driven = None if route is None else simulate_route(self._routes, route)
+            if driven is not None:
+                path, objects = driven
+                return replace(state, track=path[-1:], poses=objects[-1].copy())
         return None
 
     @cached_property

@@ -82,9 +82,10 @@ class RoutePlanner:
         ahead = scene.size * np.array([math.cos(here[2]), math.sin(here[2])])
         near = [here[:2], *(here[:2] + fraction * ahead for fraction in _AWAY)]
         corners, every = _corners(poses), _places(poses)
-        around, cheapest = approach.target == target >= 0, None
+        around = target >= 0 and approach.target == target
         problem = self._problem_with(target, around)
         expected = _MORE * float(total[best]) + scene.size if around else math.inf
+        cheapest: Route | None = None
         for last in ([start[:2]], []):  # it may be too near to a wall to turn there
             for first, points, longest in (
                 ([here[:2]], corners, len(corners) + 1),

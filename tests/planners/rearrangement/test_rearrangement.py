@@ -50,6 +50,19 @@ COLUMN = [(-0.5, 0.0), (0.5, 0.0), (0.5, 1.0), (-0.5, 1.0)]
 AREA = [(-3.0, -3.0), (3.0, -3.0), (3.0, 3.0), (-3.0, 3.0)]
 
 
+def columns_at(*corners):
+    """Columns of 1 m, by their lower left corners."""
+    return [[(x, y), (x + 1.0, y), (x + 1.0, y + 1.0), (x, y + 1.0)] for x, y in corners]
+
+
+def bodies_along(path, robot):
+    """The robot's shape at each pose of a path."""
+    return [
+        shapely.union_all([shapely.Polygon(transform(p, part)) for part in robot.parts])
+        for p in path
+    ]
+
+
 def way_out(here):
     return recovery_path(here.world, 0.015 * here.size)
 
@@ -296,7 +309,7 @@ def test_the_recovery_path_of_a_gap_touches_nothing():
 
 def test_the_recovery_path_from_between_two_columns_is_to_and_fro():
     """Neither straight on nor along one arc, and there is no room to turn about."""
-    columns = [[(0.0, y), (1.0, y), (1.0, y + 1.0), (0.0, y + 1.0)] for y in (0.0, 2.0)]
+    columns = columns_at((0.0, 0.0), (0.0, 2.0))
     for pose in ((0.8, 1.47, -1.57), (0.4, 1.5, 1.4)):
         tight = scene([(4.0, -4.0, 0.0)], extra=columns, pose=pose)
         path = way_out(tight)
@@ -304,12 +317,7 @@ def test_the_recovery_path_from_between_two_columns_is_to_and_fro():
         moves = np.diff(path, axis=0)
         assert np.abs(moves[:, 2]).max() < 0.1 and np.hypot(*moves[:, :2].T).max() < 0.1
         walls = shapely.union_all([shapely.Polygon(column) for column in columns])
-        bodies = [
-            shapely.union_all(
-                [shapely.Polygon(transform(p, part)) for part in tight.world.robot.parts]
-            )
-            for p in path
-        ]
+        bodies = bodies_along(path, tight.world.robot)
         assert shapely.area(shapely.intersection(walls, bodies)).max() < 1e-3
         assert shapely.distance(walls, shapely.Point(path[-1, :2])) > tight.size
         assert np.array_equal(path, way_out(tight))
@@ -317,18 +325,11 @@ def test_the_recovery_path_from_between_two_columns_is_to_and_fro():
 
 def test_the_recovery_path_of_a_wedged_robot_leads_deeper_into_neither_column():
     """The bumper is 4 mm in one, 15 mm from the other, and the only way out is a slight bend."""
-    columns = [
-        [(x, y), (x + 1.0, y), (x + 1.0, y + 1.0), (x, y + 1.0)]
-        for x, y in ((-2.1318, 0.7832), (-0.1196, 1.3619))
-    ]
+    columns = columns_at((-2.1318, 0.7832), (-0.1196, 1.3619))
     tight = scene([(4.0, -4.0, 0.0)], extra=columns, pose=(-0.5417, 1.7491, -1.7874))
     path = way_out(tight)
     assert path is not None
-    robot = tight.world.robot
-    bodies = [
-        shapely.union_all([shapely.Polygon(transform(p, part)) for part in robot.parts])
-        for p in path
-    ]
+    bodies = bodies_along(path, tight.world.robot)
     for column in columns:
         inside = shapely.area(shapely.intersection(shapely.Polygon(column), bodies))
         assert inside.max() < inside[0] + 1e-5
@@ -348,10 +349,7 @@ def test_the_recovery_path_pushes_what_closes_the_only_way_out():
 def test_a_route_leads_around_the_box_that_it_would_push_away():
     """The box fills the passage, and the other way is five times as long."""
     room = [[(-5, 2.5), (5, 2.5), (5, 5), (-5, 5)], [(-5, -5), (5, -5), (5, -2.5), (-5, -2.5)]]
-    columns = [
-        [(x, y), (x + 1.0, y), (x + 1.0, y + 1.0), (x, y + 1.0)]
-        for x, y in ((-2.62, -0.72), (1.64, -0.84), (-0.58, -0.27))
-    ]
+    columns = columns_at((-2.62, -0.72), (1.64, -0.84), (-0.58, -0.27))
     here = scene(
         [(0.06, 1.583, 0.14)],
         Receptacle([(3.5, 1.0), (5.0, 1.0), (5.0, 2.5), (3.5, 2.5)]),
@@ -364,8 +362,7 @@ def test_a_route_leads_around_the_box_that_it_would_push_away():
 
 
 def test_finer_lattices_lead_through_gaps_that_are_hardly_wider_than_the_robot():
-    corners = ((-1.578, -1.499), (0.311, -2.74), (0.514, -0.567))
-    columns = [[(x, y), (x + 1.0, y), (x + 1.0, y + 1.0), (x, y + 1.0)] for x, y in corners]
+    columns = columns_at((-1.578, -1.499), (0.311, -2.74), (0.514, -0.567))
     pocket = scene([(3.0, 3.0, 0.0)], extra=columns, pose=(0.158, -1.107, 0.0))
 
     def farthest(here):
@@ -391,10 +388,7 @@ def test_an_object_that_cannot_be_got_to_later_does_not_keep_the_others_waiting(
     columns = [(1.82, -1.47), (0.92, 2.02), (0.49, -0.16), (1.34, 1.01), (-0.73, 0.01)]
     here = scene(
         [(3.77, -1.61, 1.01), (-0.3, 3.13, -2.82), (0.41, -0.63, -2.08)],
-        extra=[
-            [(x, y), (x + 1.0, y), (x + 1.0, y + 1.0), (x, y + 1.0)]
-            for x, y in [*columns, (1.22, -3.56), (0.53, 1.15), (-1.21, -0.45), (-2.4, 0.55)]
-        ],
+        extra=columns_at(*columns, (1.22, -3.56), (0.53, 1.15), (-1.21, -0.45), (-2.4, 0.55)),
         pose=(2.97, -2.73, -2.82),
     )
     graph = build_push_graph(here)
