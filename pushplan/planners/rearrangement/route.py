@@ -20,10 +20,11 @@ from pushplan.world.checks import FloatArray
 
 _MOST = 14  # corners of the lattice's path that a route may have corners at
 _LONGEST = 6
-_MORE = 1.5  # by this factor a route may cost more than the lattice's path, and a radius
 """Points further on that a leg may end at, where the robot has to keep to the lattice's path."""
+_MORE = 1.5  # By this factor a route may cost more than the lattice's path, and a radius
 _AWAY = (0.3, -0.3, 0.6, -0.6, 1.0, -1.0)
-"""How far ahead the robot may drive first to get to where it can turn [circumscribed radii]."""
+"""How far ahead the robot may drive first, to get to where it can turn, and off an object that it
+has just pushed [circumscribed radii]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,13 +88,9 @@ class RoutePlanner:
         expected = _MORE * float(total[best]) + scene.size if around else math.inf
         cheapest: Route | None = None
         for last in ([start[:2]], []):  # it may be too near to a wall to turn there
-            for first, points, longest in (
-                ([here[:2]], corners, len(corners) + 1),
-                (near, every, _LONGEST),
-                (near, every, 1),
-            ):
-                through = np.array([*first, *points, *last])
-                found = _cheapest(through, float(here[2]), end, len(first), longest, problem)
+            for points, longest in ((corners, len(corners) + 1), (every, _LONGEST), (every, 1)):
+                through = np.array([*near, *points, *last])
+                found = _cheapest(through, float(here[2]), end, len(near), longest, problem)
                 if found is None or (cheapest is not None and found.cost >= cheapest.cost):
                     continue
                 cheapest = found

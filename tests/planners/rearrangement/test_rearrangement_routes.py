@@ -1,6 +1,7 @@
 """Routes to the start of a push, driven as the policy drives them: nothing static is touched."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,9 +11,11 @@ from conftest import make_boxes
 from pushplan.control import LegFollower
 from pushplan.planners.rearrangement import PushScene, RearrangementConfig
 from pushplan.planners.rearrangement.approach import approach_tree
+from pushplan.planners.rearrangement.forward_simulation import simulate_route
 from pushplan.planners.rearrangement.route import RoutePlanner
 from pushplan.world import Receptacle, StaticMap, World, box_delivery_robot
 from pushplan.world.outline import transform
+from pushplan.world.polyline import path_lengths
 
 CORNER = Receptacle([(3.0, 3.0), (5.0, 3.0), (5.0, 5.0), (3.0, 5.0)])
 COLUMNS = [shapely.box(x, -0.5, x + 1.0, 0.5) for x in (-2.7, -0.6, 1.5)]
@@ -121,3 +124,17 @@ def test_out_of_a_wall_but_not_into_it():
     poses = driven(scene, route)
     assert touched(scene, poses) <= touched(scene, poses[:1]) + 1e-9
     assert touched(scene, poses[-1:]) == 0.0
+
+
+@pytest.mark.parametrize("heading", [0.0, 0.4, 2.0, -2.5])
+@pytest.mark.parametrize("to", [(-3.5, 1.5, 2.0), (3.5, 1.5, -0.5), (0.0, 4.0, 0.3)])
+def test_a_robot_drives_off_the_box_that_it_has_pushed_before_it_turns(heading, to):
+    ahead = np.array([math.cos(heading), math.sin(heading)])
+    alone = among_columns((0.0, 2.0, heading))
+    at = alone.world.robot_pose[:2] + (alone.front + 0.5) * ahead
+    world = replace(alone.world, movables=make_boxes([(*at, heading)]))
+    planner = RoutePlanner(PushScene(world, RearrangementConfig()))
+    route = planner.route(approach_tree(planner.scene), np.array(to))
+    simulated = simulate_route(planner, route)
+    assert simulated is not None
+    assert path_lengths(simulated[1]).max() < 0.02
