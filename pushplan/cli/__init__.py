@@ -12,7 +12,6 @@ from pushplan import __version__
 from pushplan.cli import (
     bench,
     bounds,
-    codegen,
     compare,
     compiling,
     demo,
@@ -58,7 +57,6 @@ COMMANDS = (
     train,
     describe,
     compiling,
-    codegen,
 )
 
 _USER_OS_ERRORS = (FileNotFoundError, FileExistsError, PermissionError, IsADirectoryError)

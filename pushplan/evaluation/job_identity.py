@@ -19,7 +19,7 @@ from pushplan.evaluation.policies import PolicySpec, file_digest
 from pushplan.world import InvalidInputError
 
 _ENGINES = {"pymunk": "pymunk", "mujoco": "mujoco"}
-_UNSEEN = ("cli", "codegen", "drawing", "evaluation", "ros", "training")
+_UNSEEN = ("cli", "drawing", "evaluation", "ros", "training")
 """Rooms of the package that no episode depends on."""
 _OURS = "pushplan."
 

@@ -23,7 +23,6 @@ COMMANDS = (
     "score",
     "report",
     "compile",
-    "codegen",
     "ice",
     "teleop",
 )

@@ -60,7 +60,6 @@ USERS_MISTAKES = {
         [*"export --policy straight --task maze --episodes 1 --out FILE/run".split()],
     ],
     "compile": [["nobody"]],
-    "codegen": [["nobody", "--out", "FOLDER"], ["tracking-mpc", "--out", "FILE/c"]],
 }
 
 
