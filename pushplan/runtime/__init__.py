@@ -1,6 +1,8 @@
 """From worlds to motor commands, in a robot's own loop."""
 
 from pushplan.runtime.command import Command, CommandStatus
+from pushplan.runtime.disturbances import Disturbances
+from pushplan.runtime.disturbed_policy import DisturbedPolicy
 from pushplan.runtime.run_log import RunLog
 from pushplan.runtime.runner import PLAN_STOP, Runner
 from pushplan.runtime.state_estimator import StateEstimator
@@ -10,6 +12,8 @@ __all__ = [
     "PLAN_STOP",
     "Command",
     "CommandStatus",
+    "Disturbances",
+    "DisturbedPolicy",
     "PlanningError",
     "RunLog",
     "Runner",
