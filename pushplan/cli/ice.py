@@ -16,7 +16,7 @@ PICTURE_PX = 1000
 _EXAMPLES = """\
   pushplan ice --concentration 0.3 --seed 1 --out field.json --picture field.png
   pushplan ice --concentration 0.5 --size 200x1000 --radius 12.5 --radii 6,25 --out big.npz
-  pushplan ice --check field.json
+  pushplan ice field.json --hull --overlaps --picture field.png
 """
 
 
@@ -57,7 +57,13 @@ def add(commands: Any) -> None:
     )
     parser.add_argument("--check", metavar="FILE", help="read this field instead of making one")
     parser.add_argument(
-        "--hull", action="store_true", help="with --check: hulls of what is not convex"
+        "check", nargs="?", default=argparse.SUPPRESS, metavar="FIELD", help="as --check FIELD"
+    )
+    parser.add_argument(
+        "--hull", action="store_true", help="of a field that is read: hulls of what is not convex"
+    )
+    parser.add_argument(
+        "--overlaps", action="store_true", help="of a field that is read: floes may overlap"
     )
     parser.add_argument("--out", metavar="FILE", help="write the field (.json or .npz)")
     parser.add_argument("--picture", metavar="FILE.png", help="draw the field")
@@ -90,7 +96,9 @@ def _field(options: argparse.Namespace) -> IceField:
     if options.check:
         if options.concentration is not None:
             raise InvalidInputError("--check reads a field: leave out --concentration")
-        return load_ice(options.check, hull=options.hull)
+        return load_ice(options.check, hull=options.hull, overlaps=options.overlaps)
+    if options.hull or options.overlaps:
+        raise InvalidInputError("--hull and --overlaps go with a field to read: give its file")
     if options.concentration is None:
         raise InvalidInputError("pushplan ice needs --concentration, or --check and a file")
     least, greatest = options.radii

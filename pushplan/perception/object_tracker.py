@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-import shapely
 from numpy.typing import ArrayLike
 
 from pushplan.perception.assignment import assign
@@ -15,7 +14,7 @@ from pushplan.perception.sighting import Sighting, sightings_of
 from pushplan.perception.track import Track, see_all
 from pushplan.world import InvalidInputError, Movables
 from pushplan.world.checks import FloatArray, array, boolean, frozen, integer, number
-from pushplan.world.outline import areas_and_centroids, flatten, signed_area
+from pushplan.world.outline import areas_and_centroids, convex_hull, convex_outlines, flatten
 
 _SAME_SIZE = 0.2  # relative difference of sizes up to which a jump may be of the same object
 
@@ -243,7 +242,8 @@ class ObjectTracker:
         gone = [label for label in self._shown if label not in shown]
         movables, self._shown = self._movables, shown
         if better or gone:
-            hulls = [_hull(np.column_stack([one.shape.real, one.shape.imag])) for one in better]
+            shapes = [np.column_stack([one.shape.real, one.shape.imag]) for one in better]
+            hulls = convex_outlines("outline", [convex_hull(shape) for shape in shapes])
             areas, centres = areas_and_centroids(*flatten(hulls))
             for one, area, centre in zip(better, areas.tolist(), centres.tolist(), strict=True):
                 one.area, one.middle = area, complex(*centre)
@@ -278,10 +278,3 @@ def _is_same(one: Sighting, other: Sighting, reach: float) -> bool:
 def _plane(points: Sequence[complex]) -> FloatArray:
     values = np.array(points)
     return np.column_stack([values.real, values.imag])
-
-
-def _hull(corners: FloatArray) -> FloatArray:
-    """(H, 2) corners of the convex hull, counter-clockwise."""
-    ring = shapely.MultiPoint(corners).convex_hull.exterior.coords[:-1]
-    hull = np.array(ring)
-    return hull if signed_area(hull) > 0.0 else np.ascontiguousarray(hull[::-1])

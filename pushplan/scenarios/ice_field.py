@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
-from pushplan.world import InvalidInputError
 from pushplan.world.checks import ArrayRecord, FloatArray, checked_bounds, frozen
 from pushplan.world.outline import areas_and_centroids, convex_outlines, flatten
 
@@ -33,8 +31,6 @@ class IceField(ArrayRecord):
     def __post_init__(self) -> None:
         put = object.__setattr__
         put(self, "bounds", checked_bounds("ice bounds", self.bounds))
-        if isinstance(self.polygons, str) or not isinstance(self.polygons, Sequence | np.ndarray):
-            raise InvalidInputError(f"floes must be a list of outlines, got {self.polygons!r:.60}")
         put(self, "polygons", tuple(convex_outlines("floe", self.polygons)))
 
     def __len__(self) -> int:

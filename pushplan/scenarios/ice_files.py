@@ -9,12 +9,20 @@ from typing import Any
 
 import numpy as np
 import shapely
+from numpy.typing import ArrayLike
 
 from pushplan.scenarios.ice_field import IceField
 from pushplan.world import InvalidInputError, SchemaError
-from pushplan.world.checks import FloatArray, array, checked_bounds, known_keys
+from pushplan.world.checks import FloatArray, array, checked_bounds, expect, known_keys
 from pushplan.world.errors import short
-from pushplan.world.outline import flatten, signed_area, unflatten, well_formed
+from pushplan.world.outline import (
+    NotConvexError,
+    convex_hull,
+    convex_outline,
+    convex_outlines,
+    flatten,
+    unflatten,
+)
 from pushplan.world.safe_files import read_data, read_npy, read_npz
 
 SCHEMA = "pushplan-ice/1"
@@ -28,19 +36,21 @@ def load_ice(path: str | Path, *, hull: bool = False, overlaps: bool = False) ->
     """Read an ice field.
 
     - ``.json``: a list of polygons, each a list of [x, y] corners [m]; or a mapping with
-      ``polygons``, and ``bounds`` and ``schema`` if you like.
+      ``polygons``, and ``bounds`` and ``schema`` if you like; or the fields of the National
+      Research Council of Canada, a mapping with ``ice``, each floe of it with ``location`` [x, y]
+      and ``perimeter``, the corners relative to it.
     - ``.npz``: arrays ``vertices`` (V, 2) [m] and ``offsets`` (K + 1,), where each floe starts in
       them and the last ends, and ``bounds`` if you like.
     - ``.npy``: an array (K, N, 2) of K floes with N corners each.
 
-    Corners may go round either way, and the first may be repeated at the end. Without bounds, the
+    Outlines are checked as `pushplan.world.outline.convex_outline` does. Without bounds, the
     rectangle around all floes counts.
 
     Args:
         path: the file.
         hull: take the convex hull of a floe that is not convex, instead of refusing it.
-        overlaps: take floes that overlap, as those of the 2D benchmark do, instead of refusing
-            them.
+        overlaps: take floes that overlap, as those of the 2D benchmark do and hulls of floes that
+            a camera sees, instead of refusing them.
 
     Raises:
         SchemaError: if the file cannot be read or has another form.
@@ -107,6 +117,9 @@ def _path(path: object) -> Path:
 def _read_json(path: Path) -> tuple[Sequence[Any], object]:
     data = read_data(path, "ice field")
     bounds: object = None
+    if isinstance(data, Mapping) and "ice" in data:
+        known_keys(f"ice field {path}", data, ("ice", "properties"), ("ice",))
+        return _placed(data["ice"]), None
     if isinstance(data, Mapping):
         known_keys(f"ice field {path}", data, ("schema", "bounds", "polygons"), ("polygons",))
         if data.get("schema", SCHEMA) != SCHEMA:
@@ -117,6 +130,17 @@ def _read_json(path: Path) -> tuple[Sequence[Any], object]:
     if not isinstance(data, list):
         raise SchemaError(f"{path}: polygons must be a list of lists of corners, got {short(data)}")
     return data, bounds
+
+
+def _placed(floes: object) -> list[FloatArray]:
+    """Outlines that are stated relative to a place each."""
+    polygons = []
+    for name, floe in expect("ice", floes, dict).items():
+        known_keys(f"floe {name!r:.20}", floe, None, ("location", "perimeter"))
+        place = array(f"location of floe {name!r:.20}", floe["location"], (2,))
+        corners = array(f"perimeter of floe {name!r:.20}", floe["perimeter"], (None, 2))
+        polygons.append(corners + place)
+    return polygons
 
 
 def _read_npz(path: Path) -> tuple[Sequence[Any], object]:
@@ -146,27 +170,21 @@ _READERS = {".json": _read_json, ".npz": _read_npz, ".npy": _read_npy}
 
 
 def _clean(polygons: Sequence[Any], hull: bool) -> tuple[FloatArray, ...]:
-    """Counter-clockwise outlines without a repeated last corner; of hulls where asked for."""
-    floes: list[FloatArray] = []
-    for i, corners in enumerate(polygons):
-        points: FloatArray = array(f"polygon {i}", corners, (None, 2))
-        if len(points) > 1 and (points[0] == points[-1]).all():
-            points = points[:-1]
-        if len(points) < 3:
-            raise InvalidInputError(f"polygon {i} must have at least 3 corners, got {len(points)}")
-        floes.append(points if signed_area(points) > 0.0 else points[::-1])
-    for i in np.flatnonzero(~well_formed(*flatten(floes))).tolist():
-        shape = shapely.MultiPoint(floes[i]).convex_hull
-        if not isinstance(shape, shapely.Polygon):
-            raise InvalidInputError(f"polygon {i} must have an area, got {floes[i].tolist()!s:.80}")
-        if not hull:
-            raise InvalidInputError(
-                f"polygon {i} must be convex and must not repeat a corner, "
-                f"got {floes[i].tolist()!s:.80}; load_ice(..., hull=True) takes its convex hull"
-            )
-        around = np.asarray(shape.exterior.coords)[:-1]
-        floes[i] = around if signed_area(around) > 0.0 else around[::-1]
-    return tuple(floes)
+    """Convex outlines; of others the hulls where that is asked for."""
+    if hull:
+        return tuple(_or_hull(f"polygon {i}", corners) for i, corners in enumerate(polygons))
+    try:
+        return tuple(convex_outlines("polygon", polygons))
+    except NotConvexError as error:
+        way_on = "hull=True (--hull, the variation ice_hull) takes its convex hull"
+        raise InvalidInputError(f"{error}; {way_on}") from error
+
+
+def _or_hull(name: str, corners: ArrayLike) -> FloatArray:
+    try:
+        return convex_outline(name, corners)
+    except InvalidInputError:
+        return convex_outline(name, convex_hull(array(name, corners, (None, 2))))
 
 
 def _bounds(floes: Sequence[FloatArray], bounds: object) -> FloatArray:
@@ -199,5 +217,6 @@ def _check_apart(field: IceField) -> None:
         worst = int(np.argmax(np.where(bad, shared, 0.0)))
         raise InvalidInputError(
             f"floes must not overlap: polygons {first[worst]} and {second[worst]} share "
-            f"{shared[worst]:.3g} m², and {int(bad.sum())} pairs overlap in all"
+            f"{shared[worst]:.3g} m², the most of {int(bad.sum())} pairs; overlaps=True "
+            "(--overlaps, the variation ice_overlaps) takes them so"
         )

@@ -15,7 +15,7 @@ from pushplan.scenarios.floe_sizes import MARGIN, FloeSizes
 from pushplan.scenarios.ice_field import IceField
 from pushplan.world import InvalidInputError, ScenarioError
 from pushplan.world.checks import FloatArray, IntArray, checked_bounds, number
-from pushplan.world.outline import convex_outline, flatten, unflatten
+from pushplan.world.outline import convex_outlines, flatten, unflatten
 
 MOST_FLOES = 20_000
 """More than this is refused: a typing error rather than a wish."""
@@ -70,9 +70,7 @@ def generate_ice(
     clumping = number("ice clumping", clumping, low=0.0, high=1.0)
     gap = 0.03 * sizes.mean_radius if gap is None else gap
     gap = number("ice gap", gap, low=0.0, high=sizes.least, open_low=True)
-    if isinstance(keep_off, str) or not isinstance(keep_off, Sequence):
-        raise InvalidInputError(f"keep_off must be a list of outlines, got {keep_off!r:.60}")
-    blocks = flatten([convex_outline(f"keep_off[{i}]", b) for i, b in enumerate(keep_off)])
+    blocks = flatten(convex_outlines("keep_off", keep_off))
     water = IceWater(box, *blocks, gap)
     wanted = concentration * float(np.prod(box[2:] - box[:2]))
     if wanted == 0.0:

@@ -180,8 +180,10 @@ def frozen(values: NDArray[Any]) -> NDArray[Any]:
     return values
 
 
-def known_keys(kind: str, data: object, valid: Sequence[str], required: Sequence[str]) -> None:
-    """Check the keys of a mapping that was read from a file.
+def known_keys(
+    kind: str, data: object, valid: Sequence[str] | None, required: Sequence[str]
+) -> None:
+    """Check the keys of a mapping from a file, of which ``valid`` may be there; any if None.
 
     Raises:
         SchemaError: if it is no mapping, a required key is missing, or a key is unknown.
@@ -189,7 +191,7 @@ def known_keys(kind: str, data: object, valid: Sequence[str], required: Sequence
     if not isinstance(data, Mapping):
         raise SchemaError(f"{kind} must be a mapping, got {short(data)}")
     for key in data:
-        if key not in valid:
+        if valid is not None and key not in valid:
             raise SchemaError(unknown_name_message(f"key in {kind}", key, valid))
     for key in required:
         if key not in data:

@@ -241,19 +241,20 @@ def movables_from_list(data: object) -> Movables:
                 f"{name} needs either 'polygon' (world frame) or 'outline' (body frame) and 'pose'"
             )
         if "polygon" in item:
-            shape = Movables.from_polygons([item["polygon"]])
+            corners = convex_outline(f"{name}.polygon", item["polygon"])
+            shape = Movables.from_polygons([corners])
             outline, pose = shape.outline(0), shape.poses[0]
         else:
-            outline = array(f"{name}.outline", item["outline"], (None, 2))
+            outline = convex_outline(f"{name}.outline", item["outline"])
             pose = array(f"{name}.pose", item["pose"], (3,))
         outlines.append(outline)
         poses.append(pose)
         twists.append(array(f"{name}.twist", item.get("twist", [0.0, 0.0, 0.0]), (3,)))
         mass = item.get("mass")
         if mass is None:
-            mass = abs(signed_area(convex_outline(f"{name}.outline", outline)))
+            mass = signed_area(outline)
         masses.append(number(f"{name}.mass", mass, low=0.0, open_low=True))
-        wheeled.append(item.get("wheeled", False))
+        wheeled.append(boolean(f"{name}.wheeled", item.get("wheeled", False)))
         fixed.append(boolean(f"{name}.fixed", item.get("fixed", False)))
         radii.append(number(f"{name}.contact_radius", item.get("contact_radius", 0.0), low=0.0))
         ids.append(integer(f"{name}.id", item.get("id", i), high=2**63 - 1))

@@ -8,9 +8,9 @@ from typing import Annotated
 import numpy as np
 
 from pushplan.world.checked_fields import CheckedFields, PositiveFloat, Shape
-from pushplan.world.checks import ArrayRecord, BoolArray, FloatArray, IntArray, array
+from pushplan.world.checks import ArrayRecord, BoolArray, FloatArray, IntArray, array, frozen
 from pushplan.world.errors import InvalidInputError
-from pushplan.world.outline import convex_outline, next_corner
+from pushplan.world.outline import convex_outline, next_corner, signed_area
 
 Point = Annotated[FloatArray, Shape(2)]
 
@@ -112,8 +112,9 @@ class ClearanceArea(ArrayRecord):
     """An object is cleared when its outline no longer touches ``polygon``.
 
     Args:
-        polygon: convex (N, 2) corners [m], world frame, counter-clockwise.
-        open_edges: (N,) whether the edge from corner i to i + 1 can be crossed.
+        polygon: convex (N, 2) corners [m], world frame; kept counter-clockwise.
+        open_edges: (N,) flags of the edges from corner i to i + 1 that can be crossed; kept with
+            their edges where corners are left out or turned round.
     """
 
     polygon: FloatArray
@@ -122,10 +123,15 @@ class ClearanceArea(ArrayRecord):
     def __post_init__(self) -> None:
         given = array("goal.polygon", self.polygon, (None, 2))
         polygon = convex_outline("goal.polygon", given)
+        if (given[0] == given[-1]).all():
+            given = given[:-1]
+        edges = array("goal.open_edges", self.open_edges, (len(given),), dtype=np.bool_)
         if not np.array_equal(given, polygon):
-            raise InvalidInputError("goal.polygon of a clearance area must be counter-clockwise")
+            # of a repeated corner the last one is kept, so its edge is the one with a length
+            at = [np.flatnonzero((given == corner).all(axis=1))[-1] for corner in polygon]
+            turned = signed_area(given) < 0.0
+            edges = frozen(edges[np.array(at) - (1 if turned else 0)])
         object.__setattr__(self, "polygon", polygon)
-        edges = array("goal.open_edges", self.open_edges, (len(polygon),), dtype=np.bool_)
         object.__setattr__(self, "open_edges", edges)
 
     def contains(self, outline: FloatArray) -> bool:

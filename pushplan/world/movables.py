@@ -49,8 +49,8 @@ class Movables(ArrayRecord, CheckedFields):
         twists: (K, 3) velocities in the world frame [m/s, m/s, rad/s].
         masses: (K,) masses as the metrics count them [kg], positive.
         wheeled: (K,) whether the object stands on casters and rolls.
-        drawn_vertices: (V, 2) convex outlines as drawn, in body frames, flattened,
-            counter-clockwise [m].
+        drawn_vertices: (V, 2) convex outlines as drawn, in body frames, flattened [m];
+            `convex_outline` says what is taken.
         drawn_offsets: (K + 1,) where each outline starts in ``drawn_vertices``.
         contact_radii: (K,) distances from the drawn outlines at which objects touch others [m]:
             they are rounded by them. `vertices` are grown by them, and everything but masses,
@@ -78,8 +78,9 @@ class Movables(ArrayRecord, CheckedFields):
     )
 
     def __post_init__(self) -> None:
-        if self.fixed is None or (len(self.fixed) == 0 and len(self.ids)):
-            object.__setattr__(self, "fixed", np.zeros(len(self.ids), dtype=np.bool_))
+        ids: IntArray = array("movables.ids", self.ids, (None,), dtype=np.int64)
+        if self.fixed is None or np.array_equal(self.fixed, []):
+            object.__setattr__(self, "fixed", np.zeros(len(ids), dtype=np.bool_))
         super().__post_init__()
         array("movables.drawn_offsets", self.drawn_offsets, (len(self.ids) + 1,), dtype=np.int64)
         if len(np.unique(self.ids)) != len(self.ids):
@@ -89,19 +90,24 @@ class Movables(ArrayRecord, CheckedFields):
         if (self.contact_radii < 0.0).any():
             least = self.contact_radii.min()
             raise InvalidInputError(f"movables.contact_radii must not be negative, got {least}")
-        if self.drawn_offsets[0] != 0 or self.drawn_offsets[-1] != len(self.drawn_vertices):
-            raise InvalidInputError("movables.drawn_offsets must run from 0 to len(drawn_vertices)")
+        ends = self.drawn_offsets[[0, -1]].tolist()
+        if ends != [0, len(self.drawn_vertices)] or (np.diff(self.drawn_offsets) < 0).any():
+            raise InvalidInputError(
+                "movables.drawn_offsets must rise from 0 to len(drawn_vertices)"
+            )
         self._check_outlines()
 
     def _check_outlines(self) -> None:
-        vertices, offsets = self.drawn_vertices, self.drawn_offsets
-        good = well_formed(vertices, offsets)
+        good = well_formed(self.drawn_vertices, self.drawn_offsets)
         if not good.all():
-            k = int(np.argmin(good))
-            name = f"outline of movable {self.ids[k]}"
-            convex_outline(name, vertices[offsets[k] : offsets[k + 1]])
-            raise InvalidInputError(f"{name} must be counter-clockwise")
-        _, centres = areas_and_centroids(vertices, offsets)
+            outlines = [
+                convex_outline(f"outline of movable {self.ids[k]}", self.drawn_outline(k))
+                for k in range(len(self))
+            ]
+            vertices, offsets = flatten(outlines)
+            object.__setattr__(self, "drawn_vertices", vertices)
+            object.__setattr__(self, "drawn_offsets", offsets)
+        _, centres = areas_and_centroids(self.drawn_vertices, self.drawn_offsets)
         for k in np.flatnonzero(np.abs(centres).max(axis=1) > 1e-6 * self.radii).tolist():
             raise InvalidInputError(
                 f"outline of movable {self.ids[k]} must have its centroid at the body origin, it "
@@ -149,17 +155,18 @@ class Movables(ArrayRecord, CheckedFields):
         if masses is None:
             density = number("density", density, low=0.0, open_low=True)
             masses = areas_and_centroids(vertices, offsets)[0] * density
-        return cls(
-            ids=np.asarray(np.arange(count) if ids is None else ids),
-            poses=np.asarray(poses),
-            twists=np.asarray(np.zeros((count, 3)) if twists is None else twists),
-            masses=np.asarray(masses),
-            wheeled=np.asarray(np.zeros(count, dtype=bool) if wheeled is None else wheeled),
-            drawn_vertices=vertices,
-            drawn_offsets=offsets,
-            contact_radii=np.broadcast_to(np.asarray(contact_radii), (count,)),
-            fixed=np.asarray(np.zeros(count, dtype=bool) if fixed is None else fixed),
-        )
+        values: dict[str, Any] = {
+            "ids": np.arange(count) if ids is None else ids,
+            "poses": poses,
+            "twists": np.zeros((count, 3)) if twists is None else twists,
+            "masses": masses,
+            "wheeled": np.zeros(count, dtype=bool) if wheeled is None else wheeled,
+            "contact_radii": contact_radii,
+            "fixed": fixed,
+        }
+        if not np.iterable(contact_radii):
+            values["contact_radii"] = [contact_radii] * count
+        return cls(drawn_vertices=vertices, drawn_offsets=offsets, **values)
 
     @classmethod
     def from_polygons(

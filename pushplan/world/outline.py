@@ -9,7 +9,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pushplan.world.checks import BoolArray, FloatArray, IntArray, array, frozen
-from pushplan.world.errors import InvalidInputError
+from pushplan.world.errors import InvalidInputError, short
+
+_LARGEST_M = 1e70
+"""Greatest coordinate [m]: its fourth power is finite still."""
+
+
+class NotConvexError(InvalidInputError):
+    """An outline is not convex, by more than rounding."""
 
 
 def signed_area(corners: FloatArray) -> float:
@@ -48,29 +55,86 @@ def inscribed_radius(corners: FloatArray) -> float:
 def convex_outline(name: str, corners: ArrayLike) -> FloatArray:
     """Check one convex outline and return it counter-clockwise, as (N, 2) [m].
 
+    The corners may go round either way, and the first may be repeated at the end. An outline that
+    breaks a rule only by rounding is mended: corners that are repeated, or that rounding has put
+    inside, are left out. See `_rounding`.
+
     Raises:
-        InvalidInputError: fewer than 3 corners, no area, repeated corners, or not convex.
+        InvalidInputError: fewer than 3 corners, no area, or not convex.
     """
     points: FloatArray = array(name, corners, (None, 2))
+    largest = float(np.abs(points).max(initial=0.0))
+    if largest > _LARGEST_M:
+        raise InvalidInputError(f"{name} must lie within {_LARGEST_M:g} m, got {largest:g} m")
     if len(points) < 3:
         raise InvalidInputError(f"{name} must have at least 3 corners, got {len(points)}")
-    size = float(np.ptp(points, axis=0).max())
-    area = signed_area(points)
-    if abs(area) <= 1e-9 * size * size:
-        raise InvalidInputError(f"{name} must have an area, got {abs(area):g} m²")
-    if area < 0.0:
-        points = frozen(np.ascontiguousarray(points[::-1]))
-    edges = np.roll(points, -1, axis=0) - points
-    if (np.hypot(edges[:, 0], edges[:, 1]) <= 1e-9 * size).any():
-        raise InvalidInputError(f"{name} must not repeat a corner, got {points.tolist()}")
-    following = np.roll(edges, -1, axis=0)
-    cross = edges[:, 0] * following[:, 1] - edges[:, 1] * following[:, 0]
-    turns = np.arctan2(cross, (edges * following).sum(axis=1))
-    if (cross < -1e-9 * size * size).any() or abs(turns.sum() - 2.0 * np.pi) > 1e-6:
-        raise InvalidInputError(
-            f"{name} must be convex: split it into convex parts first, got {points.tolist()}"
+    ring = _counter_clockwise(points)
+    if _is_well_formed(ring):
+        return ring
+    rounding = _rounding(points)
+    steps = np.roll(points, -1, axis=0) - points
+    lengths = np.hypot(steps[:, 0], steps[:, 1])
+    for least in (1e-3 * rounding, rounding):  # a closed ring is not to lose its short edges
+        ring = _counter_clockwise(points[lengths > least])
+        if len(ring) < 3:
+            raise InvalidInputError(f"{name} must have at least 3 corners that differ")
+        if _is_well_formed(ring):
+            return frozen(ring)
+    return frozen(_without_dents(name, ring, rounding))
+
+
+def convex_hull(corners: FloatArray) -> FloatArray:
+    """(H, 2) those of (N, 2) corners [m] that span the hull, counter-clockwise.
+
+    Fewer than three where the corners lie on a line.
+    """
+    import shapely  # takes long to load, and few outlines need it
+
+    ring = shapely.get_coordinates(shapely.convex_hull(shapely.multipoints(corners)))[:-1]
+    return _counter_clockwise(ring)
+
+
+def _without_dents(name: str, ring: FloatArray, rounding: float) -> FloatArray:
+    """The corners of a ring that span its hull, if the others lie on its edges up to rounding."""
+    import shapely
+
+    hull, points = shapely.convex_hull(shapely.multipoints(ring)), shapely.points(ring)
+    size = float(np.ptp(ring, axis=0).max())
+    if hull.area <= 1e-9 * size * size:
+        raise InvalidInputError(f"{name} must have an area, got {hull.area:g} m²")
+    depth = float(shapely.distance(points, hull.exterior).max())
+    # a ring may cross itself though all corners lie on the hull: then it has another area
+    lost = abs(hull.area - signed_area(ring))
+    spanning: FloatArray = ring[
+        shapely.distance(points, shapely.multipoints(hull.exterior.coords)) == 0.0
+    ]
+    if depth > rounding or lost > rounding * hull.length or not _is_well_formed(spanning):
+        raise NotConvexError(
+            f"{name} must be convex: split it into convex parts first, got {ring.tolist()}"
         )
-    return points
+    return spanning
+
+
+def _rounding(points: FloatArray) -> float:
+    """Distance [m] that counts as rounding in an outline.
+
+    A millionth of its size, and four times what float32 loses of its greatest coordinate; at most
+    a thousandth of its size, as far from the origin float32 tells little of a small outline.
+    """
+    size = float(np.ptp(points, axis=0).max())
+    single = float(np.finfo(np.float32).eps) * float(np.abs(points).max())
+    return min(1e-6 * size + 4.0 * single, 1e-3 * size)
+
+
+def _counter_clockwise(points: FloatArray) -> FloatArray:
+    """The corners in the other order if they run clockwise."""
+    if len(points) < 3 or signed_area(points) >= 0.0:
+        return points
+    return frozen(np.ascontiguousarray(points[::-1]))
+
+
+def _is_well_formed(points: FloatArray) -> bool:
+    return bool(well_formed(*flatten([points]))[0])
 
 
 def grown_outline(corners: FloatArray, margin: float) -> FloatArray:
@@ -107,6 +171,8 @@ def grown_outlines(
 
 def convex_outlines(name: str, outlines: Sequence[ArrayLike]) -> list[FloatArray]:
     """`convex_outline` of each of many outlines, called ``name`` and its index; much quicker."""
+    if isinstance(outlines, str) or not isinstance(outlines, Sequence | np.ndarray):
+        raise InvalidInputError(f"{name} must be a list of outlines, got {short(outlines)}")
     points: list[FloatArray] = [
         array(f"{name} {i}", outline, (None, 2)) for i, outline in enumerate(outlines)
     ]
@@ -120,7 +186,7 @@ def convex_outlines(name: str, outlines: Sequence[ArrayLike]) -> list[FloatArray
 def well_formed(vertices: FloatArray, offsets: IntArray) -> BoolArray:
     """Which of some flattened outlines are convex, counter-clockwise and have an area.
 
-    The rules of `convex_outline`, for all of them at once.
+    The rules of `convex_outline` without its allowance for rounding, for all of them at once.
 
     Args:
         vertices: (V, 2) corners [m].
@@ -131,6 +197,8 @@ def well_formed(vertices: FloatArray, offsets: IntArray) -> BoolArray:
     """
     counts = np.diff(offsets)
     good: BoolArray = counts >= 3
+    if np.abs(vertices).max(initial=0.0) > _LARGEST_M:
+        good &= [np.abs(corners).max() <= _LARGEST_M for corners in unflatten(vertices, offsets)]
     if not good.all():
         outlines = unflatten(vertices, offsets)
         good[good] = well_formed(*flatten([outlines[k] for k in np.flatnonzero(good)]))

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import enum
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Annotated
@@ -81,7 +80,7 @@ class RobotModel(ArrayRecord, CheckedFields):
     name: str = "robot"
 
     def __post_init__(self) -> None:
-        if isinstance(self.parts, str) or not isinstance(self.parts, Sequence) or not self.parts:
+        if not isinstance(self.parts, list | tuple) or not self.parts:
             raise InvalidInputError("robot.parts must be a non-empty list of convex outlines")
         super().__post_init__()
         put = object.__setattr__
@@ -106,7 +105,7 @@ class RobotModel(ArrayRecord, CheckedFields):
     @classmethod
     def from_outline(cls, outline: ArrayLike, **limits: object) -> RobotModel:
         """A robot whose footprint is one convex outline (N, 2) [m]; the rest as in the class."""
-        return cls(parts=(np.asarray(outline),), **limits)  # type: ignore[arg-type]
+        return cls(parts=(outline,), **limits)  # type: ignore[arg-type]
 
     def inflated(self, margin: float) -> RobotModel:
         """The same robot with every part grown by ``margin`` [m], with sharp corners.

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -45,8 +45,6 @@ class StaticMap(ArrayRecord, CheckedFields):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if isinstance(self.polygons, str) or not isinstance(self.polygons, Sequence):
-            raise InvalidInputError("static.polygons must be a list of convex outlines")
         put = object.__setattr__
         put(self, "polygons", tuple(convex_outlines("static.polygons", self.polygons)))
         put(self, "bounds", checked_bounds("static.bounds", self.bounds))
@@ -56,7 +54,7 @@ class StaticMap(ArrayRecord, CheckedFields):
     @classmethod
     def build(
         cls,
-        polygons: Sequence[ArrayLike] = (),
+        polygons: Sequence[Any] = (),
         segments: ArrayLike = (),
         radii: ArrayLike | float = 0.0,
         bounds: ArrayLike | None = None,
@@ -73,10 +71,10 @@ class StaticMap(ArrayRecord, CheckedFields):
             raise InvalidInputError(
                 f"static.radii must be one number or {len(lines)} of them, got {radii!r}"
             ) from error
-        shapes = tuple(convex_outlines("static.polygons", polygons))
         if bounds is None:
+            polygons = convex_outlines("static.polygons", polygons)
             corners = [
-                *shapes,
+                *polygons,
                 lines[:, :2] - thick[:, None],
                 lines[:, :2] + thick[:, None],
                 lines[:, 2:] - thick[:, None],
@@ -86,7 +84,7 @@ class StaticMap(ArrayRecord, CheckedFields):
             if len(every) == 0:
                 raise InvalidInputError("a static map without obstacles needs bounds")
             bounds = np.concatenate([every.min(axis=0), every.max(axis=0)])
-        return cls(shapes, lines, thick, array("static.bounds", bounds, (4,)))
+        return cls(tuple(polygons), lines, thick, array("static.bounds", bounds, (4,)))
 
     @classmethod
     def from_occupancy(

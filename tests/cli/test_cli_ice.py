@@ -44,6 +44,7 @@ def test_a_field_is_made_checked_and_drawn(
         (["--check", "missing.json"], "cannot read ice field missing.json"),
         (["--check", "field.pkl"], "never from pickles"),
         (["--check", "field.json", "--concentration", "0.3"], "leave out --concentration"),
+        (["--concentration", "0.3", "--overlaps"], "--hull and --overlaps go with a field"),
     ],
 )
 def test_one_line_says_what_is_wrong(
@@ -63,3 +64,16 @@ def test_bad_sizes_are_bad_usage(size: str, capsys: pytest.CaptureFixture[str]) 
 def test_help_has_examples(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["ice", "--help"]) == 0
     assert "examples:\n  pushplan ice" in capsys.readouterr().out
+
+
+def test_floes_as_a_camera_sees_them(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    seen, clean = tmp_path / "seen.json", tmp_path / "clean.json"
+    seen.write_text("[[[0,0],[2,0],[1,0.5],[2,2],[0,2]], [[1.9,0],[3,0],[3,2],[1.9,2],[1.9,0]]]")
+    for given, way_on in (([], "--hull"), (["--hull"], "--overlaps")):
+        assert main(["ice", str(seen), *given]) == 2
+        assert way_on in capsys.readouterr().err
+    for given in ([str(seen)], ["--check", str(seen)]):
+        assert main(["ice", *given, "--hull", "--overlaps", "--out", str(clean)]) == 0
+        assert capsys.readouterr().out.startswith("2 floes, concentration 103.33 %")
+    assert main(["ice", str(clean), "--overlaps"]) == 0
+    assert load_ice(clean, overlaps=True) == load_ice(seen, hull=True, overlaps=True)

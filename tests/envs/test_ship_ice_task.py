@@ -201,6 +201,17 @@ def test_ice_from_a_file(tmp_path):
     assert len(env.world.movables) == len(field)
 
 
+def test_ice_from_a_file_may_be_as_a_camera_sees_it(tmp_path):
+    path = tmp_path / "seen.json"
+    path.write_text("[[[1,9],[3,9],[2,9.5],[3,11],[1,11]], [[2.9,9],[4,9],[4,11],[2.9,11]]]")
+    with pytest.raises(ScenarioError, match="ice_hull"):
+        task(ice_file=str(path))
+    with pytest.raises(ScenarioError, match="ice_overlaps"):
+        task(ice_file=str(path), ice_hull=True)
+    ship = task(ice_file=str(path), ice_hull=True, ice_overlaps=True)
+    assert len(ship.start(stream(0, "layout")).movables) == 2
+
+
 def test_ice_from_a_file_must_fit(tmp_path):
     wall = tmp_path / "wall.json"
     wall.write_text("[[[0, 0], [12, 0], [12, 3], [0, 3]]]")

@@ -58,11 +58,32 @@ def test_hulls_only_when_asked_for(tmp_path):
     assert load_ice(path, hull=True).areas.tolist() == [1.0, 2.0]
 
 
+def test_fields_of_the_national_research_council(tmp_path):
+    path = tmp_path / "field.json"
+    near = [[0.0, 0.0], [1e-9, 1e-10], *SQUARE[1:]][::-1]
+    floes = {str(k): {"location": [3 * k, 5], "perimeter": near, "yaw": 9} for k in range(3)}
+    path.write_text(json.dumps({"properties": {"field_size": [9, 9]}, "ice": floes}))
+    field = load_ice(path)
+    assert field.bounds.tolist() == [0.0, 5.0, 7.0, 6.0]
+    assert field.areas.tolist() == pytest.approx([1.0] * 3)
+    for broken, problem in (
+        ({"location": [0, 0]}, "floe '1' lacks the required key 'perimeter'"),
+        ({"location": [0], "perimeter": near}, "location of floe '1' must have shape"),
+        (3, "floe '1' must be a mapping"),
+    ):
+        path.write_text(json.dumps({"ice": {"1": broken}}))
+        with pytest.raises(InvalidInputError, match=problem):
+            load_ice(path)
+    path.write_text('{"ice": []}')
+    with pytest.raises(InvalidInputError, match="ice must be a dict"):
+        load_ice(path)
+
+
 def test_overlapping_floes_are_refused_and_touching_ones_are_not(tmp_path):
     path = tmp_path / "ice.json"
     polygons = [SQUARE, np.add(SQUARE, (1.0, 0.0)).tolist(), np.add(SQUARE, (0.5, 0.5)).tolist()]
     path.write_text(json.dumps(polygons))
-    with pytest.raises(InvalidInputError, match=r"polygons \d and 2 share 0\.25 m², and 2 pairs"):
+    with pytest.raises(InvalidInputError, match=r"\d and 2 share 0\.25 m², the most of 2 pairs"):
         load_ice(path)
     path.write_text(json.dumps(polygons[:2]))
     assert len(load_ice(path)) == 2
@@ -174,7 +195,7 @@ def test_hostile_archives(tmp_path):
     for nothing in (None, 3, b"ice.json"):
         with pytest.raises(InvalidInputError, match="must be a text"):
             load_ice(nothing)
-    with pytest.raises(InvalidInputError, match="floes must be a list"):
+    with pytest.raises(InvalidInputError, match="must be a list of outlines"):
         IceField(3, BASIN)
     with pytest.raises(SchemaError, match="cannot read"):
         (tmp_path / "folder.json").mkdir()

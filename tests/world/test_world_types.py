@@ -36,6 +36,7 @@ from pushplan.world import (
 from pushplan.world.files import world_from_dict, world_to_dict
 
 NAN = float("nan")
+LIMITS = {"mass": 1.0, "drive": "differential", "max_speed": 1.0, "max_turn_rate": 1.0}
 
 
 @pytest.mark.parametrize(
@@ -50,7 +51,10 @@ NAN = float("nan")
         (lambda: Movables.from_polygons([[[0, 0], [1, 1]]]), "at least 3 corners"),
         (lambda: Movables.from_polygons([[[0, 0], [1, 1], [2, 2]]]), "area"),
         (lambda: Movables.from_polygons([[[0, 0], [2, 0], [0.5, 0.5], [0, 2]]]), "convex"),
-        (lambda: Movables.from_polygons([[[0, 0], [1, 0], [1, 0], [0, 1]]]), "repeat"),
+        (lambda: Movables.from_polygons([[[0, 0], [1, 0], [1, 0], [0, 0]]]), "3 corners"),
+        (lambda: Movables.from_polygons([[[0, 0], [1, 0], [1e80, 1]]]), "within 1e+70 m"),
+        (lambda: Movables.from_polygons(3), "list of outlines, got 3"),
+        (lambda: RobotModel.from_outline([[0, 0], [1]], **LIMITS), "array of float64"),
         (lambda: Movables.from_polygons([[["a", 0], [1, 0], [0, 1]]]), "array of float64"),
         (lambda: Movables.from_outlines([SQUARE + 3], [[0, 0, 0]]), "centroid"),
         (lambda: Movables.from_outlines([SQUARE], [[0, 0, 0]], masses=[0.0]), "positive"),
@@ -61,7 +65,7 @@ NAN = float("nan")
         (lambda: StaticMap.build(bounds=[0, 0, 0, 1]), "min < max"),
         (lambda: GoalDisc([0, 0], 0.0), "goal.radius"),
         (lambda: GoalLine([0, 0], [0, 0]), "not be zero"),
-        (lambda: ClearanceArea(SQUARE[::-1], [True] * 4), "counter-clockwise"),
+        (lambda: ClearanceArea(SQUARE, [True] * 3), "goal.open_edges must have shape (4,)"),
         (lambda: Receptacle([[0, 0], [1, 0]]), "3 corners"),
         (lambda: make_u_maze(robot_pose=[0, 0]), "shape (3,)"),
         (lambda: make_u_maze(goal="there"), "world.goal"),
@@ -109,7 +113,7 @@ def test_radii_of_the_octagon():
 
 
 def test_clockwise_outlines_are_turned_around():
-    limits = {"mass": 1.0, "drive": "differential", "max_speed": 1.0, "max_turn_rate": 1.0}
+    limits = LIMITS
     forward = RobotModel.from_outline(OCTAGON, **limits).vertices
     backward = RobotModel.from_outline(OCTAGON[::-1], **limits).vertices
     assert np.array_equal(np.sort(forward, axis=0), np.sort(backward, axis=0))

@@ -53,6 +53,8 @@ class ShipIceVariations(TaskVariations):
     start_heading: float = _UP  # [rad], straight ahead by default
     # ice from a file, as `pushplan.scenarios.load_ice` reads it, instead of random ice
     ice_file: str | None = None
+    ice_hull: bool = False  # take the convex hulls of floes of the file that are not convex
+    ice_overlaps: bool = False  # take floes of the file that overlap
     time_limit: PositiveFloat | None = None  # when the episode is cut off [s]
 
     def __post_init__(self) -> None:
@@ -129,7 +131,8 @@ class ShipIceTask(Task):
         if path is None:
             return None
         try:
-            field = load_ice(path, overlaps=self.preset.overlaps)
+            overlaps = self.variations.ice_overlaps or self.preset.overlaps
+            field = load_ice(path, hull=self.variations.ice_hull, overlaps=overlaps)
         except InvalidInputError as error:
             raise ScenarioError(f"ship_ice: {error}") from error
         low, high = self.preset.bounds[:2], self.preset.bounds[2:]
