@@ -105,9 +105,8 @@ def _without_dents(name: str, ring: FloatArray, rounding: float) -> FloatArray:
     depth = float(shapely.distance(points, hull.exterior).max())
     # a ring may cross itself though all corners lie on the hull: then it has another area
     lost = abs(hull.area - signed_area(ring))
-    spanning: FloatArray = ring[
-        shapely.distance(points, shapely.multipoints(hull.exterior.coords)) == 0.0
-    ]
+    corners = shapely.multipoints(hull.exterior.coords)
+    spanning: FloatArray = ring[shapely.distance(points, corners) == 0.0]
     if depth > rounding or lost > rounding * hull.length or not _is_well_formed(spanning):
         raise NotConvexError(
             f"{name} must be convex: split it into convex parts first, got {ring.tolist()}"
