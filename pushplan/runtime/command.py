@@ -15,6 +15,8 @@ class CommandStatus(enum.StrEnum):
     """What the policy wants, within the robot's limits."""
     WAITING = "waiting"
     """The robot stands until a plan is there."""
+    BLOCKED = "blocked"
+    """Slowed down or stopped, because something new is in the way, or closes it."""
     DONE = "done"
     """The robot, or every object, is where the goal wants it."""
     STALE = "stale"

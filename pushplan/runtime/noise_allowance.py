@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from pushplan.world import GoalDisc, World
+from pushplan.world import GoalDisc, RobotModel, World
 from pushplan.world.checks import expect
 
 
@@ -25,6 +25,10 @@ class NoiseAllowance:
     period: float
     margin: float | None
 
+    def noise_margin(self, robot: RobotModel) -> float:
+        """Twice what noise leaves at the robot's farthest point [m]."""
+        return 2.0 * (self.place + self.heading * robot.circumscribed_radius)
+
     def planning_world(self, world: World) -> World:
         """The world with the margin, and with a goal in which the robot is sure to be."""
         world = expect("world", world, World)
@@ -36,6 +40,5 @@ class NoiseAllowance:
             )
         margin = self.margin
         if margin is None:
-            reach = world.robot.circumscribed_radius
-            margin = max(world.margin, 2.0 * (self.place + self.heading * reach))
+            margin = max(world.margin, self.noise_margin(world.robot))
         return world if margin == world.margin else replace(world, margin=margin)

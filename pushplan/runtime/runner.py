@@ -10,13 +10,14 @@ from collections.abc import Callable
 import numpy as np
 
 from pushplan.control import waiting_twist
-from pushplan.control.limits import driven_twist, ramp_twist
+from pushplan.control.limits import driven_twist
 from pushplan.planners.kernel_warmup import warm_up_policy
 from pushplan.runtime.command import Command, CommandStatus
 from pushplan.runtime.held_actions import drivable
 from pushplan.runtime.interpreter_turns import take_short_turns, take_usual_turns
 from pushplan.runtime.noise_allowance import NoiseAllowance
 from pushplan.runtime.object_memory import ObjectMemory
+from pushplan.runtime.obstacle_guard import ObstacleGuard
 from pushplan.runtime.run_log import QuietLog, RunLog
 from pushplan.runtime.state_estimator import StateEstimator
 from pushplan.runtime.thread_executor import ThreadExecutor
@@ -26,6 +27,7 @@ from pushplan.world import (
     GoalDisc,
     GoalLine,
     InvalidInputError,
+    LogsPlans,
     OwnBudget,
     Plan,
     Planner,
@@ -131,6 +133,7 @@ class Runner:
         self.policy = drivable(policy, self.max_age)
         left = math.sqrt(gain / (2.0 - gain))  # of white noise, after a filter of that gain
         self._allowance = NoiseAllowance(left * noise[0], left * noise[1], self.period, self.margin)
+        self._guard = ObstacleGuard(self._allowance, self.period)
         if any(noise) and isinstance(self.policy, ExpectsNoise):
             self.policy.expect_noise(left * noise[0], left * noise[1])
         self._believed = max(self.max_age, _BLIND if self.on_stale == "continue" else 0.0)
@@ -180,6 +183,7 @@ class Runner:
         self._forget()
         self._estimator.observe(world)
         self._memory = ObjectMemory(self.keep_unseen)
+        self._guard.reset(world)
         self._memory.complete(world, world)
         self._begin(world)
         if not self._prompt:
@@ -258,14 +262,17 @@ class Runner:
             newest = self._newest
         if newest is not self._observed:
             predicted = self._estimator.at(newest.time)
-            self._estimator.observe(self._memory.complete(newest, predicted))
+            seen = self._guard.observe(newest)
+            self._estimator.observe(self._memory.complete(seen, predicted))
             self._observed = newest
         held = self.period if last is None else now - last.time
         world = self._estimator.at(now + self._delay)
         chosen, status, reason = self._choose(world, now, now - newest.time)
         wanted = waiting_twist(world) if chosen is None else chosen
         before = driven_twist(newest) if last is None else last.twist
-        twist = ramp_twist(world.robot, before, wanted.linear, wanted.angular, held)
+        twist, obstacle = self._guard.limited(world, before, wanted, held)
+        if obstacle and status in (CommandStatus.DRIVING, CommandStatus.WAITING):
+            status, reason = CommandStatus.BLOCKED, obstacle
         self._estimator.sent(now, twist)
         plan = self.policy.current_plan if isinstance(self.policy, ShowsPlan) else None
         if plan is not self._plan:
@@ -310,8 +317,10 @@ class Runner:
             return None, CommandStatus.FAILED, self._failure
         if is_done(world):
             return wanted, CommandStatus.DONE, ""
-        if self._running_s and wanted.linear == 0.0 == wanted.angular:
-            return wanted, CommandStatus.WAITING, "a plan is on its way"
+        if wanted.linear == 0.0 == wanted.angular:
+            why = "a plan is on its way" if self._running_s else _missing_plan(self.policy)
+            if why:
+                return wanted, CommandStatus.WAITING, why
         return wanted, CommandStatus.DRIVING, ""
 
     @property
@@ -319,6 +328,16 @@ class Runner:
         """For how long a planning call has been running [s]; 0 if none is."""
         executor = self._executor
         return executor.running_s if isinstance(executor, ThreadExecutor) else 0.0
+
+
+def _missing_plan(policy: Policy) -> str:
+    """Why a policy that follows plans has none; empty where it has one, or does not say."""
+    if not (isinstance(policy, LogsPlans) and isinstance(policy, ShowsPlan)):
+        return ""
+    if policy.current_plan is not None or not policy.plan_log:
+        return ""
+    status = policy.plan_log[-1].status
+    return "" if status.has_plan else f"{status.label}: {status.remedy}"
 
 
 def is_done(world: World) -> bool:

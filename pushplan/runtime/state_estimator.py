@@ -10,12 +10,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from pushplan.geometry.transforms import arc_step
+from pushplan.control.stopping import add_arc
 from pushplan.interaction.path_sweepers import default_interaction
 from pushplan.world import Twist, World
 from pushplan.world.checks import FloatArray
 
-_STEP = 0.15  # greatest length of a predicted step [circumscribed radii], and turn [rad]
 _REACH = 1.1  # what is farther from the robot's path than this many radii is not moved
 
 
@@ -102,11 +101,7 @@ class StateEstimator:
         for begin, end in itertools.pairwise(edges):
             twist = self._driven(0.5 * (begin + end))
             length, turn = twist.linear * (end - begin), twist.angular * (end - begin)
-            steps = math.ceil(max(abs(length) / (_STEP * size), abs(turn) / _STEP))
-            for _ in range(steps):
-                there = np.empty(3)
-                arc_step(poses[-1], length / steps, turn / steps, there)
-                poses.append(there)
+            add_arc(poses, length, turn, size)
         return np.array(poses)
 
     def _driven(self, time: float) -> Twist:
@@ -140,6 +135,6 @@ def _pushed(world: World, path: FloatArray) -> FloatArray | None:
     near = ((places > low - reach) & (places < high + reach)).all(axis=1)
     if not near.any():
         return None
-    swept = default_interaction(world).sweep(world, path)
-    poses: FloatArray = swept.object_poses[-1]
+    solid, poses = world.with_fixed_as_static(), np.array(movables.poses)
+    poses[~movables.fixed] = default_interaction(solid).sweep(solid, path).object_poses[-1]
     return poses

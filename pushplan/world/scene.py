@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from dataclasses import dataclass, replace
 from typing import Annotated, Any
 
@@ -118,9 +119,7 @@ class World(ArrayRecord, CheckedFields):
         fixed = self.movables.fixed
         if not fixed.any():
             return self
-        static = self.static
-        held = [self.movables.outline_world(k) for k in np.flatnonzero(fixed).tolist()]
-        solid = StaticMap((*static.polygons, *held), static.segments, static.radii, static.bounds)
+        solid = _with_objects(self.static, self.movables.select(fixed))
         return replace(self, static=solid, movables=self.movables.select(~fixed))
 
     def robot_outline_world(self) -> tuple[FloatArray, ...]:
@@ -175,3 +174,11 @@ class World(ArrayRecord, CheckedFields):
         """
         world = self.moved(robot_pose=robot_pose, robot_twist=robot_twist, time=time)
         return replace(world, movables=self.movables.updated(objects, removed))
+
+
+@functools.lru_cache(maxsize=8)
+def _with_objects(static: StaticMap, objects: Movables) -> StaticMap:
+    """A map with objects among what is static; the same one for the same objects."""
+    outlines = [objects.outline_world(k) for k in range(len(objects))]
+    polygons = (*static.polygons, *outlines)
+    return StaticMap(polygons, static.segments, static.radii, static.bounds)

@@ -12,6 +12,7 @@ import numpy as np
 
 from pushplan.control import EpisodeClock, ImmediateExecutor, waiting_twist
 from pushplan.control.limits import driven_twist, ramp_twist
+from pushplan.control.stopping import stopping_path
 from pushplan.control.tracking import Progress
 from pushplan.interaction import InteractionModel, QuasiStatic
 from pushplan.planners.following.fruitless_calls import FruitlessCalls
@@ -21,6 +22,7 @@ from pushplan.planners.following.replanning import (
     Reason,
     Replanning,
     cost_of_rest,
+    free_length,
     rest_of,
     sweep_rest,
 )
@@ -35,6 +37,8 @@ from pushplan.world import (
     Planner,
     PlanningExecutor,
     PlanResult,
+    PlanStatus,
+    StaticMap,
     Stop,
     Twist,
     World,
@@ -45,6 +49,7 @@ from pushplan.world.polyline import path_lengths
 _PERIOD = 0.1  # for which the first command is taken to be held [s]
 _NEAR = 3  # so many poses ahead a jam lets nothing wait
 _AT_ONCE = 3  # calls without a plan at one place, after which a jam waits too
+_CLOSED = (PlanStatus.GOAL_UNREACHABLE, PlanStatus.WAY_CLOSED)
 _PAUSE = 0.1  # between two plans, of the time for which the robot has not got on
 
 
@@ -128,6 +133,10 @@ class PlanFollower:
         self._planned_from = np.full(2, np.nan)
         self._planned_ids = np.zeros(0, dtype=np.int64)
         self._tight = False
+        self._map: StaticMap | None = None
+        self._map_has_changed = False
+        self._fits: StaticMap | None = None
+        """What is static that the present plan is known to be clear of."""
         self._fruitless = FruitlessCalls()
 
     @property
@@ -139,6 +148,11 @@ class PlanFollower:
         """The twist for this step; plans first where that is necessary."""
         if self._progress is None:
             self.reset(world, self._rng)
+        if self._map is not world.static:
+            if self._map not in (None, world.static):
+                self._map_has_changed = True
+                self._fruitless.clear()
+            self._map = world.static
         return self._clock.command_for(world, self._act)
 
     def _act(self, world: World) -> Twist:
@@ -179,6 +193,8 @@ class PlanFollower:
         """Whether the robot need not get on: it is there, or its first plan is on its way."""
         if self.current_plan is None:
             found_none = bool(self.plan_log) and self.plan_log[-1].plan is None
+            if found_none and self._map_has_changed and self.plan_log[-1].status in _CLOSED:
+                return True  # it waits before a door, and does not get free
             return self._pending is not None and not found_none
         goal, (x, y, _) = world.goal, world.robot_pose
         there = isinstance(goal, GoalDisc | GoalLine) and goal.distance(float(x), float(y)) == 0.0
@@ -197,13 +213,13 @@ class PlanFollower:
     def _ask(self, world: World, reason: Reason) -> None:
         """Call the planner; its plan is there after the time that the call takes."""
         assert self._progress is not None
-        latency = self.replanning.latency
-        if latency is None:
-            latency = self._executor.expected(self.stop)
+        latency = self._latency()
         plan, now = self.current_plan, 0.0
         if plan is not None and latency > 0.0:
             self._progress.update(plan, world.robot_pose)
             now = self._progress.time
+        if plan is None and reason is Reason.BLOCKED:
+            world = _at_rest(world, self._clock.held)
         start, stretch = world_ahead(world, plan, now, latency, self.interaction)
         self._planned_at, self._planned_from = world.time, world.robot_pose[:2]
         self._planned_ids = world.movables.ids
@@ -235,12 +251,15 @@ class PlanFollower:
         if self._keeps_old(world, new, pending.reason):
             return
         self.current_plan = new
+        self._fits = pending.start.static
         self._tight = result.stats.detail.get("tight", 0.0) > 0.0
 
     def _keeps_old(self, world: World, new: Plan, reason: Reason) -> bool:
         """Whether the new plan is not enough better than what is left of the old one."""
         old, margin = self.current_plan, self.replanning.margin
         if margin is None or reason.urgent or old is None:
+            return False
+        if self._free_length(world, old) < math.inf:
             return False
         assert self._progress is not None
         index = self._progress.index(self._progress.along)
@@ -269,10 +288,18 @@ class PlanFollower:
         rested = waited >= pause - 1e-9
         if plan is None:
             return Reason.NO_PLAN if rested else None
+        if not (rule.never or np.array_equal(world.movables.ids, self._planned_ids)):
+            return Reason.OBJECTS  # something was delivered, lost or found
+        left = self._free_length(world, plan)
+        if left <= self._reaction(world):
+            if world.robot.can_stop:
+                self.current_plan = None  # it brakes at once
+                return Reason.BLOCKED
+            return Reason.BLOCKED if rested or self._fruitless.count(world) < _AT_ONCE else None
+        if rested and left < math.inf:
+            return Reason.JAM
         if rule.never:
             return None
-        if not np.array_equal(world.movables.ids, self._planned_ids):
-            return Reason.OBJECTS  # something was delivered, lost or found
         assert self._progress is not None
         x, y = (float(value) for value in world.robot_pose[:2])
         along = self._progress.update(plan, world.robot_pose)
@@ -291,6 +318,30 @@ class PlanFollower:
         if np.isfinite(rule.look_ahead):
             end = self._progress.index(along + rule.look_ahead * size) + 2
         return self._surprise(world, plan, slice(index, end), rested)
+
+    def _free_length(self, world: World, plan: Plan) -> float:
+        """How far the rest of a plan leads before something static that it was not made for [m]."""
+        if self._fits is world.static:
+            return math.inf
+        assert self._progress is not None
+        index = self._progress.index(self._progress.update(plan, world.robot_pose))
+        path = np.concatenate([world.robot_pose[None], plan.poses[index + 1 :]])
+        free = math.inf if self._fits == world.static else free_length(world, path)
+        if free == math.inf:
+            self._fits = world.static
+        return free
+
+    def _reaction(self, world: World) -> float:
+        """How far the robot drives until a plan that is asked for now can be followed [m]."""
+        robot = world.robot
+        speed = abs(driven_twist(world).linear)
+        braking = 0.5 * speed * speed / robot.max_acceleration
+        return self._latency() * speed + braking + robot.circumscribed_radius
+
+    def _latency(self) -> float:
+        """Time that the next planning call will take [s]."""
+        latency = self.replanning.latency
+        return self._executor.expected(self.stop) if latency is None else latency
 
     def _surprise(self, world: World, plan: Plan, part: slice, rested: bool) -> Reason | None:
         """Whether a part of the plan would do something else than was predicted."""
@@ -321,6 +372,12 @@ def _timed_call(
     took = time.perf_counter() - began
     result = expect("what the planner returns", result, PlanResult)
     return replace(result, stats=replace(result.stats, wall_time_s=took))
+
+
+def _at_rest(world: World, period: float) -> World:
+    """The world with the robot where it stands when it has braked."""
+    path = stopping_path(world.robot, world.robot_pose, driven_twist(world), period, period)
+    return world.moved(robot_pose=path[-1], robot_twist=np.zeros(3))
 
 
 def _without_predictions(result: PlanResult) -> PlanResult:

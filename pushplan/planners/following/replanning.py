@@ -9,9 +9,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from pushplan.interaction import Interaction, InteractionModel
+from pushplan.motion.collision import first_blocked, footprint, obstacles
 from pushplan.world import GoalDisc, GoalLine, InvalidInputError, Plan, World
 from pushplan.world.checks import FloatArray, number
-from pushplan.world.polyline import path_length
+from pushplan.world.polyline import arc_lengths, path_length
+
+_SPACING = 0.15  # distance between the poses of a path that are looked at [R]
 
 
 class Reason(enum.Enum):
@@ -131,6 +134,26 @@ def sweep_rest(
     """
     path = np.concatenate([world.robot_pose[None], plan.poses[index + 1 : end]])
     return interaction.sweep(world, path), path
+
+
+def free_length(world: World, path: FloatArray) -> float:
+    """How far a path leads before the robot meets what is static [m]; inf where it does not.
+
+    Args:
+        world: the scene; half of its margin counts as met.
+        path: (N, 3) poses, from that of the robot on.
+    """
+    size = world.robot.circumscribed_radius
+    headings = np.unwrap(path[:, 2])
+    lengths = arc_lengths(path)
+    along = lengths + size * np.concatenate([[0.0], np.cumsum(np.abs(np.diff(headings)))])
+    fine = np.linspace(0.0, along[-1], 1 + math.ceil(along[-1] / (_SPACING * size)))
+    columns = (path[:, 0], path[:, 1], headings)
+    poses = np.column_stack([np.interp(fine, along, column) for column in columns])
+    shape = footprint(world.robot, 0.5 * world.margin)
+    scratch = np.empty_like(shape.vertices)
+    first = first_blocked(poses, len(fine), shape, obstacles(world.static), scratch)
+    return math.inf if first == len(fine) else float(np.interp(fine[first], along, lengths))
 
 
 def cost_of_rest(world: World, path: FloatArray, swept: Interaction, weight: float) -> float:

@@ -1,0 +1,59 @@
+"""Where a robot gets to before it stands."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from pushplan.control.limits import ramp_twist
+from pushplan.geometry.transforms import arc_step
+from pushplan.world import RobotModel, Twist
+from pushplan.world.checks import FloatArray
+
+_STEP = 0.15
+"""Greatest length of a step [circumscribed radii], and turn [rad]."""
+_BRAKING_STEPS = 50
+
+
+def add_arc(poses: list[FloatArray], length: float, turn: float, size: float) -> None:
+    """Append the poses of an arc in short steps, from the last pose on.
+
+    Args:
+        poses: each (3,); at least one.
+        length: of the arc, negative for back [m].
+        turn: on it [rad].
+        size: circumscribed radius of the robot [m].
+    """
+    steps = math.ceil(max(abs(length) / (_STEP * size), abs(turn) / _STEP))
+    for _ in range(steps):
+        there = np.empty(3)
+        arc_step(poses[-1], length / steps, turn / steps, there)
+        poses.append(there)
+
+
+def stopping_path(
+    robot: RobotModel, pose: FloatArray, twist: Twist, held: float, period: float
+) -> FloatArray:
+    """The path of a robot that holds a velocity for a while, and then brakes.
+
+    Args:
+        robot: one that can stop.
+        pose: (3,) where it is.
+        twist: what it drives.
+        held: for how long it does [s].
+        period: time between two commands [s].
+
+    Returns:
+        (N, 3) poses up to where it stands, the first one included.
+    """
+    seconds = abs(twist.linear) / robot.max_acceleration
+    seconds = max(seconds, abs(twist.angular) / robot.max_turn_acceleration)
+    step = max(period, seconds / _BRAKING_STEPS)
+    held += 0.5 * (step - period)  # longer steps brake too early
+    poses = [np.array(pose, dtype=np.float64)]
+    while twist.linear or twist.angular:
+        add_arc(poses, twist.linear * held, twist.angular * held, robot.circumscribed_radius)
+        twist = ramp_twist(robot, twist, 0.0, 0.0, step)
+        held = step
+    return np.array(poses)

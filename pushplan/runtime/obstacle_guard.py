@@ -1,0 +1,192 @@
+"""`ObstacleGuard`: the robot stops before what was not there when it set out."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+
+from pushplan.control import waiting_twist
+from pushplan.control.limits import ramp_twist
+from pushplan.control.stopping import add_arc, stopping_path
+from pushplan.motion.collision import (
+    ConvexObstacles,
+    Footprint,
+    first_blocked,
+    footprint,
+    obstacles,
+    static_depth,
+)
+from pushplan.runtime.noise_allowance import NoiseAllowance
+from pushplan.world import StaticMap, Twist, World
+from pushplan.world.checks import FloatArray
+
+_CLEARANCE = 0.02  # kept from what is new, beside the noise [circumscribed radii]
+_RESUMED = 1.5  # times the clearance where the robot has stood, so that noise moves it nowhere
+_DEEPER = 1e-6  # by how much the robot may get nearer to what it is too near to [radii]
+_SLOWER = (1.0, 0.75, 0.5, 0.25, 0.1)
+"""Fractions of the wanted velocity that are tried in turn; then the robot brakes."""
+_HELD = 2.0  # for how long each command may be driven before the next one comes [periods]
+_MOVED = 4.0  # how far something fixed may be seen from where it was [clearances]
+_ANYWHERE = StaticMap.build(bounds=(-1e9, -1e9, 1e9, 1e9))
+
+
+class ObstacleGuard:
+    """Looks at each command: the robot has to be able to stop before what is new.
+
+    New is what is static, or held not to move, and was not so in each world since the start. All
+    else is left to the policy, which knows it: a guard of it would hinder pushes along walls. A
+    robot that is too near already may drive wherever it comes no nearer.
+
+    Args:
+        allowance: noise of the poses.
+        period: time between two commands [s].
+    """
+
+    def __init__(self, allowance: NoiseAllowance, period: float) -> None:
+        self._allowance, self._period = allowance, period
+
+    def reset(self, world: World) -> None:
+        """Take all that a world holds as known."""
+        self._static: StaticMap | None = None
+        self._known = {part.tobytes() for part in world.static.convex_parts}
+        self._known_fixed = _fixed(world)
+        self._new: list[FloatArray] = []
+        self._stands = False
+        self.observe(world)
+
+    def observe(self, world: World) -> World:
+        """Take a snapshot.
+
+        Returns:
+            It, with a margin that keeps plans at twice the clearance from what is new.
+        """
+        if world.static is not self._static:
+            self._static = world.static
+            parts = {part.tobytes(): part for part in world.static.convex_parts}
+            self._known &= parts.keys()
+            self._new = [part for key, part in parts.items() if key not in self._known]
+        clearance = self._clearance(world)
+        fixed = _fixed(world)
+        self._known_fixed = {
+            label: pose
+            for label, pose in self._known_fixed.items()
+            if label in fixed and math.dist(pose[:2], fixed[label][:2]) <= _MOVED * clearance
+        }
+        self._new_fixed = fixed.keys() - self._known_fixed.keys()
+        if not self._new and not self._new_fixed:
+            return world
+        return replace(world, margin=max(world.margin, 2.0 * clearance))
+
+    def limited(self, world: World, before: Twist, wanted: Twist, held: float) -> tuple[Twist, str]:
+        """The velocity to command, and why it is not the wanted one; empty where it is.
+
+        Args:
+            world: the scene when the command takes effect.
+            before: the velocity that is driven then.
+            wanted: what the policy asks for.
+            held: time since the last command [s].
+        """
+        robot = world.robot
+        twist = ramp_twist(robot, before, wanted.linear, wanted.angular, held)
+        near = self._near(world, twist)
+        if not near:
+            self._stands = False
+            return twist, ""
+        grown = self._clearance(world) * (_RESUMED if self._stands else 1.0)
+        closeness = _Closeness(footprint(robot, grown), world.robot_pose, near)
+        for fraction in _SLOWER if robot.can_stop else (1.0,):
+            slower = ramp_twist(
+                robot, before, fraction * wanted.linear, fraction * wanted.angular, held
+            )
+            if closeness.allows(self._path(world, slower)):
+                self._stands = False
+                reason = "" if fraction == 1.0 else _reason(world, near, "slows down")
+                return slower, reason
+        rest = waiting_twist(world.with_fixed_as_static())
+        twist = ramp_twist(robot, before, rest.linear, rest.angular, held)
+        self._stands = robot.can_stop
+        return twist, _reason(world, near, "stops" if robot.can_stop else "turns away")
+
+    def _path(self, world: World, twist: Twist) -> FloatArray:
+        """(N, 3) where a command leads to, at the latest."""
+        robot, held = world.robot, _HELD * self._period
+        if robot.can_stop:
+            return stopping_path(robot, world.robot_pose, twist, held, self._period)
+        poses = [np.array(world.robot_pose)]
+        add_arc(poses, twist.linear * held, twist.angular * held, robot.circumscribed_radius)
+        last = waiting_twist(world.moved(robot_pose=poses[-1]).with_fixed_as_static())
+        circle = math.tau * robot.turning_radius / robot.max_speed
+        add_arc(poses, last.linear * circle, last.angular * circle, robot.circumscribed_radius)
+        return np.array(poses)
+
+    def _near(self, world: World, twist: Twist) -> list[FloatArray]:
+        """Outlines of what is new and within reach."""
+        if not self._new and not self._new_fixed:
+            return []
+        objects = world.movables
+        chosen = np.flatnonzero(np.isin(objects.ids, list(self._new_fixed))).tolist()
+        solid = [*self._new, *(objects.outline_world(k) for k in chosen)]
+        path = self._path(world, twist)
+        reach = world.robot.circumscribed_radius + 2.0 * _RESUMED * self._clearance(world)
+        low, high = path[:, :2].min(axis=0) - reach, path[:, :2].max(axis=0) + reach
+        return [
+            part
+            for part in solid
+            if (part.max(axis=0) >= low).all() and (part.min(axis=0) <= high).all()
+        ]
+
+    def _clearance(self, world: World) -> float:
+        reach = world.robot.circumscribed_radius
+        return self._allowance.noise_margin(world.robot) + _CLEARANCE * reach
+
+
+class _Closeness:
+    """Tells whether a path comes nearer to something than it should, or than the robot is.
+
+    Args:
+        shape: the footprint, grown by the clearance.
+        pose: (3,) where the robot is.
+        outlines: what is near.
+    """
+
+    def __init__(self, shape: Footprint, pose: FloatArray, outlines: list[FloatArray]) -> None:
+        self._shape, self._scratch = shape, np.empty_like(shape.vertices)
+        self._too_near: list[tuple[ConvexObstacles, float]] = []
+        clear = []
+        for outline in outlines:
+            one = obstacles(_ANYWHERE, (outline,))
+            depth = self._depth(pose, one)
+            if depth > 0.0:
+                self._too_near.append((one, depth + _DEEPER * shape.radius))
+            else:
+                clear.append(outline)
+        self._clear = obstacles(_ANYWHERE, tuple(clear))
+
+    def allows(self, path: FloatArray) -> bool:
+        """Tell whether a path (N, 3) may be driven."""
+        count = len(path)
+        if first_blocked(path, count, self._shape, self._clear, self._scratch) < count:
+            return False
+        return all(
+            self._depth(pose, one) <= depth for one, depth in self._too_near for pose in path
+        )
+
+    def _depth(self, pose: FloatArray, one: ConvexObstacles) -> float:
+        return float(static_depth(pose, self._shape, one, self._scratch))
+
+
+def _fixed(world: World) -> dict[int, FloatArray]:
+    """Poses (3,) of the objects that are held not to move, by their ids."""
+    objects = world.movables
+    held = np.flatnonzero(objects.fixed)
+    return dict(zip(objects.ids[held].tolist(), objects.poses[held], strict=True))
+
+
+def _reason(world: World, near: list[FloatArray], what: str) -> str:
+    """The robot does something because of the nearest outline."""
+    at = world.robot_pose[:2]
+    middles = [part.mean(axis=0) for part in near]
+    x, y = min(middles, key=lambda middle: math.dist(at, middle))
+    return f"the robot {what} because something new is in its way, at ({x:.2f}, {y:.2f})"
