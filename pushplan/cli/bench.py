@@ -20,6 +20,7 @@ from pushplan.cli.common import (
 )
 from pushplan.cli.outputs import check_directory, check_file
 from pushplan.cli.progress import progress_of
+from pushplan.cli.report import add_table_options
 
 if TYPE_CHECKING:
     from pushplan.cli.progress import Progress
@@ -53,7 +54,10 @@ def add(commands: Any) -> None:
     )
     complete(policies, "policies")
     parser.add_argument(
-        "--episodes", type=whole(1), metavar="N", help="default: the suite's own; paper: 100 each"
+        "--episodes",
+        type=whole(1),
+        metavar="N",
+        help="default: the suite's own, 1 for each file of a folder; paper: 100 each",
     )
     parser.add_argument("--out", metavar="DIR", help="run directory (default: runs/SUITE)")
     parser.add_argument(
@@ -82,6 +86,7 @@ def add(commands: Any) -> None:
     add_latency(parser)
     add_trust(parser)
     add_run_options(parser)
+    add_table_options(parser)
     parser.add_argument("--json", action="store_true", help="print the end's tables as JSON")
     paper.add_options(parser)
 
@@ -102,9 +107,9 @@ def run(options: argparse.Namespace) -> int:
         else:
             results = _results(options, out, progress)
     if options.json:
-        show_json(results)
+        show_json(results, options.pairs)
     elif comparison is None:
-        show(results)
+        show(results, options)
     else:
         paper.show(comparison, out, options.markdown)
     return exit_code(results)

@@ -10,6 +10,7 @@ from typing import Any
 from pushplan.cli.common import add_command, add_run_options, add_trust, run_options, say
 from pushplan.cli.outputs import check_directory
 from pushplan.cli.progress import progress_of
+from pushplan.cli.report import add_table_options
 
 _EXAMPLES = """\
   pushplan experiment study.yaml
@@ -28,6 +29,7 @@ def add(commands: Any) -> None:
     parser.add_argument("--out", metavar="DIR", help="run directory (default: runs/NAME of FILE)")
     parser.add_argument("--check", action="store_true", help="say what would be run, and end")
     add_run_options(parser)
+    add_table_options(parser)
     add_trust(parser)
 
 
@@ -51,5 +53,5 @@ def run(options: argparse.Namespace) -> int:
     check_directory(out)
     with progress_of(*(one.label for one in experiment.policies), out=out) as progress:
         results = experiment.run(out, progress=progress, **run_options(options))
-    show(results)
+    show(results, options)
     return exit_code(results)

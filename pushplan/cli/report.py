@@ -40,6 +40,7 @@ def add(commands: Any) -> None:
         choices=("text", "markdown", "latex"),
         help="only print the tables, as a document (LaTeX needs booktabs and makecell)",
     )
+    add_table_options(parser)
     parser.add_argument(
         "--replays",
         choices=("embed", "beside", "none"),
@@ -67,10 +68,12 @@ def run(options: argparse.Namespace) -> int:
     results = Results.load(options.directory)
     if options.metrics is None and options.format is None:
         figures = options.figures.split(",") if options.figures else ()
-        show(results, replays=options.replays, most=options.replay_most, figures=figures)
+        written = {"replays": options.replays, "most": options.replay_most, "figures": figures}
+        show(results, options, **written)
         return 0
     wanted = options.metrics
-    tables = results.measure(wanted.split(",")) if wanted else results.tables()
+    chosen = table_options(options)
+    tables = results.measure(wanted.split(",")) if wanted else results.tables(**chosen)
     if options.format is None:
         _print(tables)
     else:
@@ -78,23 +81,56 @@ def run(options: argparse.Namespace) -> int:
     return 0
 
 
-def show(results: Results, **options: Any) -> None:
-    """Print the tables of a run and why episodes did not succeed, write its report."""
-    from pushplan.evaluation.endings import unsuccessful_lines
+def add_table_options(parser: argparse.ArgumentParser) -> None:
+    """Add what says which tables are shown."""
+    parser.add_argument(
+        "--settings",
+        action="store_true",
+        help="print the tables of each setting too, after those of all together",
+    )
+    parser.add_argument(
+        "--pairs",
+        choices=("first", "all"),
+        default="first",
+        help="compare the first policy with each other one (default), or all",
+    )
 
-    _print(results.tables())
+
+def table_options(options: argparse.Namespace) -> dict[str, Any]:
+    """What `add_table_options` read, as `Results.tables` takes it."""
+    return {"settings": options.settings, "pairs": options.pairs}
+
+
+def show(results: Results, options: argparse.Namespace, **written: Any) -> None:
+    """Print the tables of a run and why episodes did not succeed, write its report.
+
+    Args:
+        results: of the run.
+        options: with those of `add_table_options`.
+        written: as for `Results.report`.
+    """
+    from pushplan.evaluation.endings import unsuccessful_lines
+    from pushplan.evaluation.tables import on_few_lines
+
+    _print(on_few_lines(results.tables(**table_options(options))))
     for line in unsuccessful_lines(results):
         say(line)
-    page = results.report(**options)
+    if len(results.titles) > 1 and not options.settings:
+        say(f"each of the {len(results.titles)} settings: --settings, and on the page")
+    page = results.report(pairs=options.pairs, **written)
     say(f"page:    {page}")
 
 
-def show_json(results: Results) -> None:
+def show_json(results: Results, pairs: str) -> None:
     """Write the report of a run, and print what its tables say as JSON."""
-    page = results.report()
-    summaries = [{**asdict(one), "title": results.titles[one.setting]} for one in results.summary()]
-    pairs = [{**asdict(one), "verdict": one.verdict} for one in results.compare()]
-    say_json({"page": str(page), "policies": summaries, "differences": pairs})
+    page = results.report(pairs=pairs)
+    runs = [results.pooled, results] if len(results.titles) > 1 else [results]
+    summaries = [
+        {**asdict(one), "title": run.titles[one.setting]} for run in runs for one in run.summary()
+    ]
+    compared = [one for run in runs for one in run.compare(pairs)]
+    differences = [{**asdict(one), "verdict": one.verdict} for one in compared]
+    say_json({"page": str(page), "policies": summaries, "differences": differences})
 
 
 def exit_code(results: Results) -> int:

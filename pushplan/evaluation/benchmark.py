@@ -48,11 +48,13 @@ def bench(
         2
 
     Args:
-        suite: name of a suite, or several with commas between them; a `pushplan.scenarios.Suite`;
-            or a list of scenarios.
+        suite: name of a suite or a folder of worlds with a slash in it, or several with commas
+            between them; a `pushplan.scenarios.Suite`; or a list of scenarios. A suite of your
+            own is one setting of the results.
         policies: names, ``"module:Class"``, ``"file.py:Class"``, each with ``label=`` in front
             if wanted, or callables that make a policy.
-        episodes: scenarios of a suite by name; the suite's own number if None.
+        episodes: scenarios of a suite by name, or of each file of a folder; the suite's own
+            number, and 1, if None.
         seed: seed of the first scenario of a suite by name.
         workers: processes, all cores by default; 0 runs in this process.
         out: run directory, continued if it holds this run already. If None only the rows are
@@ -115,7 +117,9 @@ def suites_of(given: Any, episodes: int | None, seed: int) -> tuple[Suite, ...]:
                     f"'pushplan run --task room --set world_file={name} --policy NAME'"
                 )
         return tuple(
-            (world_suite if "/" in name else suite)(name, episodes=episodes, first_seed=seed)
+            world_suite(name, episodes=episodes or 1, first_seed=seed)
+            if "/" in name
+            else suite(name, episodes=episodes, first_seed=seed)
             for name in names
         )
     return (given if isinstance(given, Suite) else Suite("scenarios", 1, tuple(given)),)

@@ -7,6 +7,8 @@ from collections import Counter
 from pushplan.evaluation.rows import ResultRow
 from pushplan.evaluation.run_record import RunRecord
 
+MOST_LINES = 6
+
 
 def failure_lines(run: RunRecord) -> list[str]:
     """A line for each policy with failed jobs: how many, the most frequent reason, a traceback."""
@@ -28,10 +30,13 @@ def failure_lines(run: RunRecord) -> list[str]:
 def unsuccessful_lines(run: RunRecord) -> list[str]:
     """A line for each policy with episodes that ended by the rules of their task without success.
 
-    It says how many ended for each reason.
+    It says how many ended for each reason. More than `MOST_LINES` policies have one together.
     """
     lines = []
-    for policy, rows in _by_policy(run).items():
+    groups = _by_policy(run)
+    if len(groups) > MOST_LINES:
+        groups = {f"all {len(groups)} policies": list(run.rows)}
+    for policy, rows in groups.items():
         reasons = Counter(row.reason for row in rows if not row.failed and not row.success)
         if reasons:
             listed = ", ".join(f"{count} {reason}" for reason, count in reasons.most_common())

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from pushplan.evaluation.batch import TRACES, Progress, run_batch
 from pushplan.evaluation.compatibility import is_wanted, misfits, read_policies
@@ -18,12 +18,10 @@ from pushplan.evaluation.policies import PolicySpec
 from pushplan.evaluation.rescoring import rescore
 from pushplan.evaluation.results import Results
 from pushplan.metrics import metric_function
+from pushplan.scenarios.suite import Suite, distinct
 from pushplan.world import InvalidInputError, UnknownNameError
 from pushplan.world.checks import choice, expect, integer
 from pushplan.world.safe_files import read_data
-
-if TYPE_CHECKING:
-    from pushplan.scenarios import Suite
 
 
 @dataclass(frozen=True)
@@ -71,6 +69,7 @@ class Experiment:
             raise InvalidInputError("metrics of one's own need traces: all")
         if not self.suites:
             raise InvalidInputError("an experiment needs at least one suite")
+        object.__setattr__(self, "suites", distinct(self.suites))
         for metric in self.metrics:
             metric_function(metric)
         object.__setattr__(self, "policies", tuple(read_policies(self.policies)))

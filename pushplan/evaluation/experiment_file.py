@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 from pushplan.evaluation.jobs import JobSettings
 from pushplan.evaluation.limits import MEMORY_MB
 from pushplan.evaluation.policies import PolicySpec, parse_policy, policy_names
+from pushplan.scenarios.suite import distinct
 from pushplan.world import Deadline, SchemaError
 from pushplan.world.checks import choice, expect, integer, known_keys, number
 from pushplan.world.errors import short
@@ -46,7 +47,8 @@ def fields_of(data: object, folder: Path) -> dict[str, Any]:
     names = ("timeout_s", "observation", "latency_factor")
     policies = [_policies(one, folder) for one in _list("policies", data["policies"])]
     given = _list("suites", data["suites"])
-    suites = [_suite(one, episodes, seed, folder) for one in given]
+    each = episodes if "episodes" in data else 1  # a file without a spread is one scene
+    suites = distinct([_suite(one, episodes, each, seed, folder) for one in given])
     only = {
         suite.name: _texts("policies of a suite", one["policies"])
         for suite, one in zip(suites, given, strict=True)
@@ -55,7 +57,7 @@ def fields_of(data: object, folder: Path) -> dict[str, Any]:
     metrics = _texts("metrics", data.get("metrics", ()))
     return {
         "name": str(data.get("name", "experiment")),
-        "suites": tuple(suites),
+        "suites": suites,
         "policies": tuple(itertools.chain.from_iterable(policies)),
         "only": only,
         "settings": JobSettings(**{name: data[name] for name in names if name in data}),
@@ -95,27 +97,37 @@ def _path(file: str, folder: Path) -> Path:
     return path if path.is_absolute() else (folder / path).resolve()
 
 
-def _suite(given: object, episodes: int, seed: int, folder: Path) -> Suite:
-    """Read an entry of ``suites``: a name, or a mapping."""
+def _suite(given: object, episodes: int, each: int, seed: int, folder: Path) -> Suite:
+    """Read an entry of ``suites``: a name, or a mapping.
+
+    Args:
+        given: the entry.
+        episodes: default for a suite of pushplan.
+        each: default for each world file.
+        seed: default.
+        folder: where paths begin.
+    """
     from pushplan.scenarios import Suite, load_scenarios, suite, world_suite
 
     entry = {"suite": given} if isinstance(given, str) else given
     here = isinstance(entry, Mapping) and "worlds" in entry
-    known_keys("suite", entry, (*_SUITE, *_WORLDS) if here else _SUITE, ())
+    known_keys("suite", entry, (*_SUITE, *_WORLDS, "label") if here else _SUITE, ())
     assert isinstance(entry, Mapping)
     if sum(kind in entry for kind in ("suite", "scenarios", "worlds")) != 1:
         raise SchemaError(
-            "an entry of suites has either 'suite', a name, 'scenarios', a file, or 'worlds', a "
-            f"folder: got {short(dict(entry))}"
+            "an entry of suites has either 'suite', a name, 'scenarios', a file, or 'worlds', "
+            f"folders and files: got {short(dict(entry))}"
         )
     first = integer("seed", entry.get("seed", seed), low=0)
     if "scenarios" in entry:
         path = _path(expect("scenarios", entry["scenarios"], str), folder)
         found = Suite(path.stem, 1, tuple(load_scenarios(path)))
     elif "worlds" in entry:
+        worlds = entry["worlds"]
+        names = [worlds] if isinstance(worlds, str) else _list("worlds", worlds)
         found = world_suite(
-            _path(expect("worlds", entry["worlds"], str), folder),
-            episodes=entry.get("episodes"),
+            [_path(expect("worlds", name, str), folder) for name in names],
+            episodes=entry.get("episodes", each),
             first_seed=first,
             **{key: expect(key, entry[key], str) for key in _WORLDS if key in entry},
         )
@@ -129,7 +141,8 @@ def _suite(given: object, episodes: int, seed: int, folder: Path) -> Suite:
         replace(one, variations={**one.variations, **changes}) for one in found.scenarios
     )
     words = ",".join(f"{key}={value}" for key, value in changes.items())
-    return Suite(f"{found.name}[{words}]" if words else found.name, found.version, scenarios)
+    name = expect("label", entry.get("label", found.name), str)
+    return Suite(f"{name}[{words}]" if words else name, found.version, scenarios)
 
 
 def _policies(given: object, folder: Path) -> Iterable[PolicySpec]:

@@ -36,7 +36,12 @@ def note_batch(
     store.extend("deadlines", {k: v for k, v in limits.items() if math.isfinite(v)})
     factor = settings.latency_factor
     mode = "" if factor is None else f", latency-aware x {factor:g}"
-    store.extend("settings", {setting_of(*job.key[1:]): job.title + mode for job in jobs})
+    titles = {}
+    for job in jobs:
+        setting = setting_of(*job.key[1:])
+        named = "/" in job.key[1]  # scenarios of a suite have different variations
+        titles[setting] = (setting if named else job.title) + mode
+    store.extend("settings", titles)
 
 
 def pending_jobs(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -27,6 +27,7 @@ from pushplan.evaluation.tables import (
     difference_tables,
     gap_tables,
     measured_tables,
+    on_few_lines,
     score_tables,
 )
 from pushplan.scenarios.known_bounds import known_bounds
@@ -54,13 +55,26 @@ class Results(RunRecord):
         """What the rows say about each policy in each setting."""
         return list(self.summaries)
 
-    def compare(self) -> list[PairedDifference]:
-        """Paired differences of all policies on the same scenarios."""
-        return list(self._differences)
+    def compare(self, pairs: str = "first") -> list[PairedDifference]:
+        """Paired differences of policies on the same scenarios.
+
+        Args:
+            pairs: ``"first"`` for the first policy with each other one, or ``"all"``.
+        """
+        if pairs not in self._differences:
+            self._differences[pairs] = paired_differences(self.rows, self.policies, pairs)
+        return list(self._differences[pairs])
 
     @functools.cached_property
-    def _differences(self) -> list[PairedDifference]:
-        return paired_differences(self.rows, self.policies)
+    def _differences(self) -> dict[str, list[PairedDifference]]:
+        return {}  # of the calls of `compare` so far
+
+    @functools.cached_property
+    def pooled(self) -> Results:
+        """The rows of all settings as one setting."""
+        title = f"All {len(self.titles)} settings together"
+        rows = tuple(replace(row, pool=title) for row in self.rows)
+        return replace(self, rows=rows, about={**self.about, "settings": {}})
 
     def measure(self, metrics: Sequence[str]) -> list[Table]:
         """Metrics that are no columns, from the stored episodes of jobs that did not fail.
@@ -96,21 +110,41 @@ class Results(RunRecord):
         estimates = {key: estimate(found) for key, found in values.items()}
         return measured_tables(estimates, self.policies, metrics, self.titles) if values else []
 
-    def tables(self, *, wide: bool = False) -> list[Table]:
-        """Scores of the policies, their gaps to what is known, then their paired differences."""
+    def tables(
+        self, *, wide: bool = False, settings: bool = False, pairs: str = "first"
+    ) -> list[Table]:
+        """Scores of the policies, their gaps to what is known, then their paired differences.
+
+        Of several settings, the tables of all together come first.
+
+        Args:
+            wide: with medians and further columns, for files and pages.
+            settings: whether each of several settings has its own tables too.
+            pairs: as for `compare`.
+        """
         titles = self.titles
+        found = self.pooled.tables(wide=wide, pairs=pairs) if len(titles) > 1 else []
+        if found and not settings:
+            return found
         together = aggregate_table(self.rows, self.policies) if wide else None
         return [
+            *found,
             *([together] if together else []),
             *score_tables(self.summary(), titles, wide=wide),
             *self._measured_tables(self.about.get("metrics", []), self.measured),
             *gap_tables(gaps(self.rows, self.policies, known_bounds()), titles),
-            *difference_tables(self.compare(), titles, wide=wide),
+            *difference_tables(self.compare(pairs), titles, wide=wide),
         ]
 
-    def table(self, width: int = 160) -> str:
-        """Scores and paired differences as text of at most ``width`` characters a line."""
-        return text(self.tables(), width)
+    def table(self, width: int = 160, *, settings: bool = False, pairs: str = "first") -> str:
+        """Scores and paired differences as text of at most ``width`` characters a line.
+
+        Args:
+            width: of a line.
+            settings: as for `tables`.
+            pairs: as for `compare`.
+        """
+        return text(on_few_lines(self.tables(settings=settings, pairs=pairs)), width)
 
     def figure(self, name: str) -> Any:
         """One figure of the report, to show or to save.
@@ -156,6 +190,7 @@ class Results(RunRecord):
         replays: str = "embed",
         most: int = 40,
         figures: Sequence[str] = (),
+        pairs: str = "first",
     ) -> Path:
         """Write ``report.html``, its figures, the summaries and ``results.csv``, all of these rows.
 
@@ -164,6 +199,7 @@ class Results(RunRecord):
             replays: ``"embed"`` in the page, ``"beside"`` it as files, or ``"none"``.
             most: how many episodes have a replay: whole scenarios, those with failures first.
             figures: formats to write the figures in beside SVG: ``"pdf"``, ``"png"``.
+            pairs: as for `compare`.
 
         Returns:
             The path of the page.
@@ -180,12 +216,13 @@ class Results(RunRecord):
         self._check_same_run(folder)
         folder.mkdir(parents=True, exist_ok=True)
         write_atomic(folder / "results.csv", rows_csv(self.rows).encode())
-        tables = self.tables(wide=True)
+        tables = self.tables(wide=True, settings=True, pairs=pairs)
         write_atomic(folder / "summary.md", markdown(tables).encode())
         write_atomic(folder / "summary.csv", summary_csv(self.summary(), self.titles).encode())
-        write_atomic(
-            folder / "differences.csv", differences_csv(self.compare(), self.titles).encode()
-        )
+        compared = self.compare(pairs)
+        if len(self.titles) > 1:
+            compared = [*self.pooled.compare(pairs), *compared]
+        write_atomic(folder / "differences.csv", differences_csv(compared, self.titles).encode())
         plots = need("pushplan.evaluation.plots").write_plots(self, folder, figures)
         return write_page(self, tables, plots, folder, replays=replays, most=most)
 

@@ -93,6 +93,7 @@ class ResultRow:
         host: name of the machine that ran it.
         job: content hash of everything that the result depends on, see `job_identity`.
         trace: content hash of the recorded episode, which names its file; empty if none was kept.
+        pool: setting that the row is counted in instead of its own; no column.
     """
 
     policy: str
@@ -116,6 +117,7 @@ class ResultRow:
     host: str = ""
     job: str = ""
     trace: str = ""
+    pool: str = ""
 
     def __getattr__(self, name: str) -> float | None:
         if name not in METRICS:
@@ -131,8 +133,8 @@ class ResultRow:
 
     @property
     def setting(self) -> str:
-        """The scenario without its seed: what episodes are averaged over."""
-        return setting_of(self.scenario, self.seed)
+        """What episodes are averaged over: the suite, or the scenario without its seed."""
+        return self.pool or setting_of(self.scenario, self.seed)
 
     @property
     def trace_file(self) -> str | None:
@@ -153,7 +155,7 @@ class ResultRow:
 _ROUNDING = 1e-6
 _TEXTS = ("policy", "task", "simulator", "scenario", "status", "reason", "host", "job", "trace")
 _INSTANT = re.compile(r"(\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d\.\d{3}Z)?")
-_OWN = tuple(item.name for item in fields(ResultRow))
+_OWN = tuple(item.name for item in fields(ResultRow) if item.name != "pool")
 _TIMES = tuple(
     name for name in _OWN if name.startswith(("wall_time", "plan_time", "decision_time"))
 )
@@ -187,8 +189,10 @@ def _cell(value: object) -> object:
 
 
 def setting_of(scenario: str, seed: int) -> str:
-    """The key of a scenario without its seed."""
-    return scenario.removesuffix(f"-{seed}")
+    """What a scenario is averaged in: ``SUITE`` of the key ``SUITE/NAME-SEED``, else ``NAME``."""
+    start = scenario.removesuffix(f"-{seed}")
+    suite, _, name = start.rpartition("/")
+    return suite or name
 
 
 def row_from_texts(texts: Mapping[str, str | None]) -> ResultRow:

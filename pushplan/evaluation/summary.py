@@ -18,8 +18,10 @@ from pushplan.evaluation.statistics_paired import (
     signed_rank_test,
 )
 from pushplan.metrics import METRICS, Role, metric_names
-from pushplan.world.checks import FloatArray
+from pushplan.world.checks import FloatArray, choice
 
+PAIRS = ("first", "all")
+"""Which policies are compared: the first one with each other one, or all."""
 TIMINGS = (
     "plan_time_median_s",
     "plan_time_max_s",
@@ -35,7 +37,7 @@ class PolicySummary:
     """One policy in one setting.
 
     Attributes:
-        setting: the scenarios without their seeds.
+        setting: the suite, or the scenarios without their seeds.
         policy: label.
         episodes: number of rows.
         failed: rows that did not end by the rules of the task.
@@ -56,7 +58,7 @@ class PairedDifference:
     """How much more of a metric the second policy has than the first, scenario by scenario.
 
     Attributes:
-        setting: the scenarios without their seeds.
+        setting: the suite, or the scenarios without their seeds.
         metric: column.
         first: label of one policy.
         second: label of the other.
@@ -64,7 +66,7 @@ class PairedDifference:
         better: scenarios in which the second has the better value, by the metric's direction.
         worse: scenarios in which it has the worse one.
         p_value: of `signed_rank_test`.
-        p_corrected: by `holm`, over all pairs and settings of the metric.
+        p_corrected: by `holm`, over the pairs and settings compared of the metric.
         effect: rank-biserial correlation in [-1, 1], 1 where the second is better every time.
         needed: scenarios with which the pair is separated, see `pairs_needed`; None if no number
             does.
@@ -114,15 +116,21 @@ def summarise(rows: Sequence[ResultRow], order: Sequence[str] = ()) -> list[Poli
 
 
 def paired_differences(
-    rows: Sequence[ResultRow], order: Sequence[str] = ()
+    rows: Sequence[ResultRow], order: Sequence[str] = (), pairs: str = "first"
 ) -> list[PairedDifference]:
-    """Every pair of policies on the scenarios that both ran, for success, scores and lengths.
+    """Pairs of policies on the scenarios that both ran, for success, scores and lengths.
 
     Metrics of which neither direction is better are left out. Path and work are compared where
     both succeed: who fails has driven and pushed less.
+
+    Args:
+        rows: of a run.
+        order: labels in the order of the policies; others follow by name.
+        pairs: ``"first"`` for the first policy with each other one, or ``"all"``.
     """
     labels = policies_of(rows, order)
-    pairs = [(a, b) for i, a in enumerate(labels) for b in labels[i + 1 :]]
+    firsts = labels if choice("pairs", pairs, PAIRS) == "all" else labels[:1]
+    compared = [(a, b) for i, a in enumerate(firsts) for b in labels[i + 1 :]]
     groups = grouped(rows)
     found: list[PairedDifference] = []
     for metric in ("success", *metric_names(Role.SCORE, Role.DETAIL)):
@@ -135,7 +143,7 @@ def paired_differences(
         }
         gaps: dict[tuple[str, str, str], FloatArray] = {}
         for setting in settings_of(rows):
-            for first, second in pairs:
+            for first, second in compared:
                 one, two = values.get((setting, first), {}), values.get((setting, second), {})
                 if common := sorted(one.keys() & two.keys()):
                     gaps[setting, first, second] = np.array([two[k] - one[k] for k in common])

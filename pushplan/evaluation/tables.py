@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -36,6 +36,12 @@ _TIMES = {
 }
 
 
+MANY_PAIRS = 12
+"""From more lines on, a table of differences has one for each pair of policies."""
+MANY_POLICIES = 6
+"""From more rows on, a table for a screen has each on one line."""
+
+
 @dataclass(frozen=True)
 class Table:
     """A table of texts. A line break in a cell separates a value from its interval."""
@@ -61,10 +67,14 @@ PAIR_NOTE = (
     "second policy minus first on the same scenarios, path and work only where both succeed: "
     "mean, 95 % bootstrap interval; better and worse count the scenarios in which the second "
     "policy has the better or worse value, by the metric's own direction; p is of the signed-rank"
-    " test (sign test for success), corrected by Holm over all pairs and settings of a metric; "
+    " test (sign test for success), corrected by Holm over the pairs and settings of a metric; "
     "effect is the rank-biserial correlation, 1 where the second is better every time; * where p "
     "< 0.05 with 10 scenarios at least; more is how many further scenarios would separate the "
     "pair, were the differences to go on like this (power 0.8)"
+)
+BRIEF_NOTE = (
+    "second policy minus first on the same scenarios: mean, 95 % bootstrap interval; * where p < "
+    "0.05, corrected by Holm, with 10 scenarios at least; 'differences.csv' has the rest"
 )
 GAP_NOTE = (
     "work of robot and objects, m₀ l₀ + Σ mᵢ lᵢ, of the successful episodes: mean of how much it "
@@ -186,8 +196,36 @@ def difference_tables(
             *("better / worse / of", "p", "effect", "more"),
         )
         title = f"Paired differences: {titles.get(setting, setting)}"
-        tables.append(Table(title, headings, cells, PAIR_NOTE))
+        if not wide and len(cells) > MANY_PAIRS:
+            tables.append(_brief(title, [pair for pair in pairs if pair.setting == setting]))
+        else:
+            tables.append(Table(title, headings, cells, PAIR_NOTE))
     return tables
+
+
+def _brief(title: str, pairs: Sequence[PairedDifference]) -> Table:
+    """A line for each pair of policies, a column for each metric."""
+    metrics = list(dict.fromkeys(pair.metric for pair in pairs))
+    lines: dict[str, list[str]] = {}
+    for pair in pairs:
+        digits = _digits(pair.metric)
+        star = " *" if pair.significant else ""
+        mean = _number(pair.difference.mean, digits, sign=True)
+        line = lines.setdefault(f"{pair.second} - {pair.first}", [""] * len(metrics))
+        interval = _interval(pair.difference, digits, sign=True)
+        line[metrics.index(pair.metric)] = f"{mean} {interval}{star}"
+    cells = tuple((name, *line) for name, line in lines.items())
+    return Table(title, ("pair", *map(heading, metrics)), cells, BRIEF_NOTE)
+
+
+def on_few_lines(tables: Sequence[Table]) -> list[Table]:
+    """The tables with a line for each row, where there are many."""
+    return [
+        replace(table, cells=tuple(tuple(c.replace("\n", " ") for c in row) for row in table.cells))
+        if len(table.cells) > MANY_POLICIES
+        else table
+        for table in tables
+    ]
 
 
 def _more(pair: PairedDifference) -> str:
@@ -240,7 +278,7 @@ def aggregate_table(rows: Sequence[ResultRow], policies: Sequence[str]) -> Table
             line.append(better)
         if any(line[1:]):
             cells.append(tuple(line))
-    title = f"All {len(settings)} settings together"
+    title = f"Interquartile means of all {len(settings)} settings"
     return Table(title, tuple(headings), tuple(cells), AGGREGATE_NOTE.format(first=first))
 
 

@@ -22,8 +22,9 @@ SCHEMA = "pushplan-scenarios/1"
 """Name and version of the file format; files of another version are refused."""
 
 Value = bool | int | float | str
-_KEYS = ("task", "simulator", "preset", "variations", "seed")
+_KEYS = ("task", "simulator", "preset", "variations", "seed", "name")
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]*")
+_OWN_NAME = re.compile(r"([^/\x00-\x1f\x7f]{1,200}/)?[^/\x00-\x1f\x7f]{1,200}")
 
 
 class Variations(Mapping[str, Value]):
@@ -58,6 +59,9 @@ class Scenario:
         preset: set of dimensions, ``"benchmark"`` or ``"testbed"``.
         variations: what departs from the preset, by name; each task lists its own.
         seed: of the layout, not negative.
+        name: what it is called in results: ``"corner"``, or ``"SUITE/corner"`` as one of the
+            scenarios that a suite counts as one setting (`Suite.as_one_setting`). By default
+            results name what it is made of.
 
     Raises:
         SchemaError: if a name is no plain word or a variation is no plain finite value. Whether
@@ -69,6 +73,7 @@ class Scenario:
     preset: str = "benchmark"
     variations: Mapping[str, Value] = field(default_factory=dict)
     seed: int = 0
+    name: str = ""
 
     def __post_init__(self) -> None:
         for key in ("task", "simulator", "preset"):
@@ -91,10 +96,16 @@ class Scenario:
                 )
         object.__setattr__(self, "variations", Variations(self.variations))
         object.__setattr__(self, "seed", integer("scenario.seed", self.seed, low=0))
+        if self.name and not (isinstance(self.name, str) and _OWN_NAME.fullmatch(self.name)):
+            raise SchemaError(
+                f"scenario.name must be NAME or SUITE/NAME, on one line, got {short(self.name)}"
+            )
 
     @property
     def key(self) -> str:
         """Short text that tells scenarios apart and is the same everywhere."""
+        if self.name:
+            return f"{self.name}-{self.seed}"
         text = json.dumps(dict(self.variations), sort_keys=True)
         digest = hashlib.sha256(text.encode()).hexdigest()[:8]
         return f"{self.task}-{self.simulator}-{self.preset}-{digest}-{self.seed}"
@@ -107,6 +118,7 @@ class Scenario:
             "preset": self.preset,
             "variations": dict(self.variations),
             "seed": self.seed,
+            **({"name": self.name} if self.name else {}),
         }
 
     @classmethod

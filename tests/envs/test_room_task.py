@@ -216,8 +216,8 @@ class TestSuites:
         found = world_suite(folder, episodes=3, first_seed=7)
         assert found.name == "rooms"
         files = [Path(str(one.variations["world_file"])).name for one in found.scenarios]
-        assert files == ["a.json", "b.yaml", "a.json"]
-        assert [one.seed for one in found.scenarios] == [7, 7, 8]
+        assert files == ["a.json", "b.yaml"] * 3
+        assert [one.seed for one in found.scenarios] == [7, 7, 8, 8, 9, 9]
         assert len(world_suite(folder)) == 2
 
     def test_folders_without_worlds(self, folder: Path) -> None:

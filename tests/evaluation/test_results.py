@@ -120,26 +120,60 @@ def test_less_work_is_better_and_nothing_is_starred_below_ten(results: Results) 
 
 
 def test_the_paired_table_says_what_its_rows_are(results: Results) -> None:
-    table = next(t for t in results.tables() if t.title.startswith("Paired"))
+    tables = results.tables(settings=True)
+    table = next(t for t in tables if t.title == "Paired differences: maze, 5 boxes")
     assert table.note.startswith("second policy minus first")
     line = next(cells for cells in table.cells if cells[0] == "E_nav")
     assert line[1] == "better - plain" and line[2] == "+0.061 *"
 
 
 def test_several_settings_have_one_aggregate(results: Results) -> None:
-    table = results.tables(wide=True)[0]
-    assert table.title == "All 2 settings together"
+    tables = results.tables(wide=True, settings=True)
+    table = next(t for t in tables if t.title == "Interquartile means of all 2 settings")
     assert [row[0] for row in table.cells] == ["plain", "better"]
     assert table.cells[0][2] == ""  # over itself
 
 
+def test_all_settings_together_come_first_and_each_on_request(results: Results) -> None:
+    first, *rest = [table.title for table in results.tables(settings=True)]
+    assert first == "All 2 settings together" and "maze, 5 boxes" in rest
+    pooled = results.tables()
+    assert [table.title for table in pooled] == [first, f"Paired differences: {first}"]
+    assert [row[1] for row in pooled[0].cells] == ["40", "39\n1 failed"]
+    assert {row[4].split(" / ")[2] for row in pooled[1].cells} == {"38", "39"}
+
+
+def test_policies_are_compared_with_the_first_one_unless_asked_for(tmp_path: Path) -> None:
+    rows = [row for place, name in enumerate("abc") for row in rows_of(name, 0.1 * place)]
+    results = Results(tuple(rows), {"policies": {name: name for name in "bac"}})
+    assert {(p.first, p.second) for p in results.compare()} == {("b", "a"), ("b", "c")}
+    every = {(p.first, p.second) for p in results.compare("all")}
+    assert every == {("b", "a"), ("b", "c"), ("a", "c")}
+    results.report(tmp_path, pairs="all")
+    assert ",a,c," in (tmp_path / "differences.csv").read_text()
+    with pytest.raises(InvalidInputError, match="all, first"):
+        results.compare("some")
+
+
+def test_a_sweep_fits_on_a_screen() -> None:
+    rows = [
+        row
+        for value in range(10)
+        for setting in ("maze-5", "maze-10")
+        for row in rows_of(f"pushes@push_weight-{value}", 0.01 * value, setting=setting)
+    ]
+    lines = Results(tuple(rows)).table().splitlines()
+    assert len(lines) <= 30
+    assert sum("pushes@push_weight-9 - pushes@push_weight-0" in line for line in lines) == 1
+
+
 def test_the_table_shows_means_spreads_and_intervals(results: Results) -> None:
-    table = results.table()
+    table = results.table(settings=True)
     better = next(s for s in results.summary() if s.policy == "better").metrics["E_nav"]
     assert f"{better.mean:.3f} ± {better.sd:.3f}" in table
     assert f"[{better.low:.3f}, {better.high:.3f}]" in table
     assert "better - plain" in table and "1 failed" in table
-    assert max(map(len, results.table(width=90).splitlines())) <= 90
+    assert max(map(len, results.table(width=90, settings=True).splitlines())) <= 90
 
 
 def test_report_files(results: Results) -> None:
@@ -191,12 +225,16 @@ def test_figures_for_a_paper(results: Results, capsys: pytest.CaptureFixture[str
 def test_tables_for_documents(results: Results, capsys: pytest.CaptureFixture[str]) -> None:
     folder = str(results.path)
     better = next(s for s in results.summary() if s.policy == "better").metrics["E_nav"]
-    assert main(["report", folder, "--format", "markdown"]) == 0
+    assert main(["report", folder, "--settings", "--format", "markdown"]) == 0
     assert f"{better.mean:.3f} ± {better.sd:.3f}<br>[" in capsys.readouterr().out
-    assert main(["report", folder, "--format", "latex"]) == 0
+    assert main(["report", folder, "--settings", "--format", "latex"]) == 0
     text = capsys.readouterr().out
     assert rf"{better.mean:.3f} $\pm$ {better.sd:.3f}\\{{}}[" in text
-    assert text.count(r"\begin{table}") == text.count(r"\end{table}") == len(results.tables())
+    assert (
+        text.count(r"\begin{table}")
+        == text.count(r"\end{table}")
+        == len(results.tables(settings=True))
+    )
     for line in text.splitlines():
         assert line.count("&") in (0, line.count(r"\&") + line.rstrip("\\").count(" & "))
     odd = Table("100 % of A_1 & B^2", ("policy", "x"), (("a\\b~c", "{1}"),), "50 #")
