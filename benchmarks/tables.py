@@ -208,7 +208,7 @@ def _difference_cells(
     names = {"success": ("success",), "E": SCORES["E"], "I": SCORES["I"]}
     metric = {name: title for title, metrics in names.items() for name in metrics}
     found: dict[tuple[str, str], dict[str, str]] = {}
-    for pair in paired_differences(rows, order):
+    for pair in paired_differences(rows, order, "all"):
         if pair.second == wanted.differences and pair.metric in metric:
             cells = found.setdefault((pair.setting, pair.first), {})
             cells[metric[pair.metric]] = _mean(pair.difference, pair.metric, "+")
