@@ -18,7 +18,7 @@ _EXAMPLES = """\
   pushplan serve my_planner.py:MyPlanner --socket unix:/tmp/mine.sock --clients 2
 
 The messages are described in docs/serve.md; examples/serve_client.py is a client in one file.
-Ctrl-C or SIGTERM ends the server.
+Ctrl-C, SIGTERM or SIGHUP ends the server.
 """
 
 
@@ -72,6 +72,7 @@ def _add_limits(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Serve until a signal comes."""
     import logging
+    import warnings
 
     from pushplan.evaluation.policies import parse_policy
     from pushplan.serving import PROTOCOL, PolicyServer, ServerLimits
@@ -100,6 +101,8 @@ def run(options: argparse.Namespace) -> int:
         format="%(message)s",
         level=logging.INFO if options.verbose else logging.WARNING,
     )
+    # of numbers in a client's world: they say nothing to whoever reads the log
+    warnings.filterwarnings("ignore", category=RuntimeWarning, module=r"pushplan\.")
 
     def ready() -> None:
         sys.stdout.write(f"{spec.label} is served at {server.address} ({PROTOCOL})\n")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import select
 import socket
 import time
@@ -13,7 +14,8 @@ from pushplan.world import PushplanError
 
 _PIECE = 65536  # most bytes that are read at once
 _LINGER_S = 0.5  # for how long a client that is sent away may still send, and read why [s]
-_GONE = getattr(select, "POLLRDHUP", 0) | select.POLLHUP | select.POLLERR
+_GONE = select.POLLHUP | select.POLLERR
+_SENDS_NO_MORE = getattr(select, "POLLRDHUP", 0)
 
 
 class LeftError(Exception):
@@ -35,21 +37,24 @@ class Connection:
     def __init__(self, client: socket.socket, limits: ServerLimits) -> None:
         self._socket, self._limits = client, limits
         self._buffer = bytearray()
+        self._hello_by = time.monotonic() + limits.message_s
         if client.family != socket.AF_UNIX:
             client.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
 
-    def read(self, patience: float) -> bytes:
-        """The body of the next message.
+    def greeted(self) -> None:
+        """Lift the limit of time that a client has until its hello is accepted."""
+        self._hello_by = math.inf
 
-        Args:
-            patience: how long its first byte may take [s]; the rest has a limit of its own.
+    def read(self) -> bytes:
+        """The body of the next message.
 
         Raises:
             LeftError: if the client has left.
-            RefusedError: if the message is too long or too slow, or none comes.
+            RefusedError: if the message is too long, too slow or cut off, or none comes.
         """
-        if not self._buffer and not self._receive(patience):
-            raise RefusedError(f"no message came for {patience:g} s, which is the limit")
+        idle = self._limits.idle_s
+        if not self._buffer:
+            self._wait(idle, f"no message came for {idle:g} s, which is the limit")
         end = time.monotonic() + self._limits.message_s
         self._fill(messages.LENGTH.size, end)
         (length,) = messages.LENGTH.unpack_from(self._buffer)
@@ -66,10 +71,19 @@ class Connection:
 
     def _fill(self, count: int, end: float) -> None:
         """Read until so many bytes are there; until a time of the monotonic clock [s]."""
+        limit = self._limits.message_s
         while len(self._buffer) < count:
-            if not self._receive(end - time.monotonic()):
-                limit = self._limits.message_s
-                raise RefusedError(f"a message must be whole {limit:g} s after its first byte")
+            left = end - time.monotonic()
+            self._wait(left, f"a message must be whole {limit:g} s after its first byte")
+
+    def _wait(self, seconds: float, late: str) -> None:
+        """Read what comes within a time [s], or refuse the client with these words."""
+        left = self._hello_by - time.monotonic()
+        if left < seconds:
+            seconds = left
+            late = f"no valid hello came within {self._limits.message_s:g} s of connecting"
+        if not self._receive(seconds):
+            raise RefusedError(late)
 
     def _receive(self, seconds: float) -> bool:
         """Read what comes within a time; whether anything did."""
@@ -82,6 +96,8 @@ class Connection:
             return False
         except OSError:
             raise LeftError from None
+        if not piece and self._buffer:
+            raise RefusedError("the connection was closed amid a message")
         if not piece:
             raise LeftError
         self._buffer += piece
@@ -102,6 +118,7 @@ class Connection:
     def refuse(self, message: str) -> None:
         """Send a last error, and give the client a moment to read it."""
         end = time.monotonic() + _LINGER_S
+        self._buffer.clear()
         with suppress(OSError, LeftError):
             self._socket.settimeout(_LINGER_S)
             self._socket.sendall(messages.error(message, closing=True))
@@ -110,10 +127,15 @@ class Connection:
                 self._buffer.clear()
 
     def has_left(self) -> bool:
-        """Whether the client has closed its side; from any thread, at once."""
+        """Whether the client has closed its side; from any thread, at once.
+
+        A client that only sends no more may still read. A Unix socket tells that from one that has
+        left; a TCP socket does not, and such a client counts as having left.
+        """
         poll = select.poll()
+        tcp = self._socket.family != socket.AF_UNIX
         try:
-            poll.register(self._socket, _GONE)
+            poll.register(self._socket, _GONE | _SENDS_NO_MORE if tcp else _GONE)
             return bool(poll.poll(0))
         except (OSError, ValueError):  # closed by ourselves
             return True

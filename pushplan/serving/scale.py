@@ -13,6 +13,11 @@ WIDEST = 1e5
 """How far bounds, robot and goal may be apart along x or y [circumscribed radii of the robot]."""
 FASTEST = 1e6
 """Greatest speed [m/s] and turn rate [rad/s] of anything."""
+HEAVIEST = 1e12
+"""Greatest mass of anything [kg]."""
+LEAST = 1e-9
+"""Least mass [kg], and least limit of the robot's motion [m/s, rad/s and their changes]: planners
+divide by them."""
 
 
 def check_scale(world: World) -> None:
@@ -31,19 +36,24 @@ def check_scale(world: World) -> None:
     _within("goal", _goal_points(world), FARTHEST, "m")
     if isinstance(goal, GoalDisc):
         _within("goal.radius", np.array(goal.radius), FARTHEST, "m")
-    _within("robot.max_speed", np.array([robot.max_speed, robot.min_speed]), FASTEST, "m/s")
-    _within("robot.max_turn_rate", np.array(robot.max_turn_rate), FASTEST, "rad/s")
+    _within("robot.max_speed", np.array(robot.max_speed), FASTEST, "m/s", LEAST)
+    _within("robot.min_speed", np.array(robot.min_speed), FASTEST, "m/s")
+    _within("robot.max_turn_rate", np.array(robot.max_turn_rate), FASTEST, "rad/s", LEAST)
+    _within("robot.mass", np.array(robot.mass), HEAVIEST, "kg", LEAST)
+    changes = np.array([robot.max_acceleration, robot.max_turn_acceleration])
+    _within("accelerations of the robot", changes, np.inf, "m/s², rad/s²", LEAST)
     check_shapes(world.movables)
     check_motion(world)
 
 
 def check_shapes(movables: Movables) -> None:
-    """Refuse objects whose outlines are too large.
+    """Refuse objects whose outlines are too large, or masses too large or small.
 
     Raises:
         InvalidInputError: as `check_scale`.
     """
     _within("the outline of an object", movables.vertices, FARTHEST, "m")
+    _within("masses of objects", movables.masses, HEAVIEST, "kg", LEAST)
 
 
 def check_motion(world: World) -> None:
@@ -74,7 +84,11 @@ def _goal_points(world: World) -> FloatArray:
     return goal.point if isinstance(goal, GoalLine) else goal.polygon
 
 
-def _within(name: str, values: FloatArray, most: float, unit: str) -> None:
-    if values.size and float(np.abs(values).max()) > most:
-        found = float(np.abs(values).max())
-        raise InvalidInputError(f"{name} must be at most {most:g} [{unit}], got {found:g}")
+def _within(name: str, values: FloatArray, most: float, unit: str, least: float = 0.0) -> None:
+    if not values.size:
+        return
+    sizes = np.abs(values)
+    if float(sizes.max()) > most:
+        raise InvalidInputError(f"{name} must be at most {most:g} [{unit}], got {sizes.max():g}")
+    if float(sizes.min()) < least:
+        raise InvalidInputError(f"{name} must be at least {least:g} [{unit}], got {sizes.min():g}")

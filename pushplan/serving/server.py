@@ -25,8 +25,8 @@ from pushplan.world.errors import short
 
 _GRACE_S = 5.0  # for how long planning calls may go on after the end of the server [s]
 _LOOK_S = 0.1  # how often it looks whether clients have left that wait for an answer [s]
-_SIGNALS = (signal.SIGINT, signal.SIGTERM)
-_MOST_REFUSED = 32  # clients that are told at the same time that there are too many
+_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+_MOST_REFUSED = 32  # clients that are told at the same time why they are sent away
 
 
 class PolicyServer:
@@ -165,7 +165,7 @@ class PolicyServer:
         return not self._present
 
     def serve_forever(self, ready: Callable[[], object] = lambda: None) -> bool:
-        """Load all kernels, and serve until SIGINT or SIGTERM; called by the main thread.
+        """Load all kernels, and serve until SIGINT, SIGTERM or SIGHUP; called by the main thread.
 
         Args:
             ready: called when clients can connect.
@@ -178,7 +178,11 @@ class PolicyServer:
         """
         over = threading.Event()
         self.warm_up()
-        before = {one: signal.signal(one, lambda *_: over.set()) for one in _SIGNALS}
+        before = {
+            one: signal.signal(one, lambda *_: over.set())
+            for one in _SIGNALS
+            if one is not signal.SIGHUP or signal.getsignal(one) is not signal.SIG_IGN  # nohup
+        }
         try:
             self.start()
             ready()
@@ -215,31 +219,34 @@ class PolicyServer:
         if over:
             return
         if full:
-            self._send_away(connection)
+            limit = self._limits.clients
+            self._send_away(connection, f"the server has {limit} clients, which is its limit")
             return
         client.thread.name = f"pushplan client {number}"
         LOG.info("client %d has come", number)
-        why = "closed"
+        why, refusal = "closed", ""
         try:
-            client.converse(self._limits)
+            client.converse()
         except LeftError:
             why = "left"
         except RefusedError as error:
-            why = str(error)
-            connection.refuse(why)
+            why = refusal = str(error)
         finally:
-            LOG.info("client %d has gone: %s", number, why)
-            connected.close()
             client.session.close()
             with self._lock:
                 del self._present[number]
+            LOG.info("client %d has gone: %s", number, why)
+            if refusal:
+                self._send_away(connection, refusal)
+            connected.close()
 
-    def _send_away(self, connection: Connection) -> None:
+    def _send_away(self, connection: Connection, why: str) -> None:
+        """Tell a client that holds no place (any more) why."""
         with self._lock:
             if self._refused >= _MOST_REFUSED:
                 return
             self._refused += 1
-        connection.refuse(f"the server has {self._limits.clients} clients, which is its limit")
+        connection.refuse(why)
         with self._lock:
             self._refused -= 1
 
@@ -252,14 +259,19 @@ class _Client:
         self.thread = threading.current_thread()
         self.busy = False
 
-    def converse(self, limits: ServerLimits) -> None:
+    def converse(self) -> None:
         """Answer message after message until the client says close."""
-        patience = limits.message_s  # until hello
         last = False
         while not last:
-            body = self.connection.read(patience)
+            body = self.connection.read()
             self.busy = True
             answer = self.session.answer(body)
             self.busy = False
+            if self.session.abandoned:  # cut short, planning gives an action that nobody asked for
+                raise RefusedError(
+                    "planning was ended: the client sends no more, or the server ends"
+                )
+            if self.session.greeted:
+                self.connection.greeted()
             self.connection.write(answer.data)
-            patience, last = limits.idle_s, answer.last
+            last = answer.last

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from copy import copy
 from dataclasses import dataclass
 from traceback import format_tb
 from typing import Any
@@ -36,6 +38,9 @@ class Answer:
 class Session:
     """A client's policy and episode. All but `abandon` is called by one thread.
 
+    Attributes:
+        abandoned: whether planning was ended from outside, so that what is answered is void.
+
     Args:
         make_policy: makes the client's own policy.
         label: what clients are told that the policy is called.
@@ -48,14 +53,21 @@ class Session:
         self._period: float | None = None
         self._settings: Fields = {}
         self._episode: StepEpisode | LoopEpisode | None = None
-        self._abandoned = False
+        self.abandoned = False
+
+    @property
+    def greeted(self) -> bool:
+        """Whether the client has said hello."""
+        return self._feed is not None
 
     def answer(self, body: bytes) -> Answer:
         """The reply to the body of a message: an error where the message is wrong.
 
-        Whatever a policy raises becomes an error for its client.
+        Whatever a policy raises becomes an error for its client. A request that gets an error
+        leaves the known world as it was.
         """
         kind: str | None = None
+        before = copy(self._feed)
         try:
             request = messages.decode(body)
             kind = request["type"]
@@ -64,15 +76,16 @@ class Session:
             reply = getattr(self, f"_{kind}")(request)
             return Answer(messages.encode(reply), kind == "close")
         except PushplanError as error:
-            return Answer(messages.error(f"{kind}: {error}" if kind else str(error), kind))
+            said = f"{kind}: {error}" if kind else str(error)
         except BaseException as error:  # of a policy, of any kind: its thread goes on
-            said = f"{self._label} failed: {describe(error)}"
-            LOG.warning("%s: %s\n%s", kind, said, "".join(format_tb(error.__traceback__)))
-            return Answer(messages.error(f"{kind}: {said}", kind))
+            said = f"{kind}: {self._label} failed: {describe(error)}"
+            LOG.warning("%s\n%s", said, "".join(format_tb(error.__traceback__)))
+        self._feed = before
+        return Answer(messages.error(said, kind))
 
     def abandon(self) -> None:
         """End the planning call that runs, because the client has left; from any thread."""
-        self._abandoned = True
+        self.abandoned = True
         if self._episode is not None:
             self._episode.abandon()
 
@@ -122,7 +135,8 @@ class Session:
         world = self._worlds.whole(request["world"])
         if not isinstance(self._episode, StepEpisode):
             self._begin(StepEpisode(self._make_policy(), limit_of(self._settings)))
-        self._steps.reset(world, seed)
+        with self._beginning():
+            self._steps.reset(world, seed)
         return {"type": "reset", "time": world.time}
 
     def _act(self, request: Fields) -> Fields:
@@ -135,7 +149,8 @@ class Session:
         with_plan, world = _with_plan(request), self._worlds.whole(request["world"])
         if not isinstance(self._episode, LoopEpisode):
             self._begin(LoopEpisode(self._make_policy(), self._period, self._settings))
-        return self._loop.start(world, with_plan)
+        with self._beginning():
+            return self._loop.start(world, with_plan)
 
     def _update(self, request: Fields) -> Fields:
         episode = self._loop
@@ -167,10 +182,19 @@ class Session:
             raise InvalidInputError("send 'start' first; after 'reset' only 'act' is answered")
         return self._episode
 
+    @contextmanager
+    def _beginning(self) -> Iterator[None]:
+        """Leave no episode behind that has begun by half."""
+        try:
+            yield
+        except BaseException:
+            self.close()
+            raise
+
     def _begin(self, episode: StepEpisode | LoopEpisode) -> None:
         self.close()
         self._episode = episode
-        if self._abandoned:  # meanwhile
+        if self.abandoned:  # meanwhile
             episode.abandon()
 
 

@@ -50,7 +50,7 @@ def served(policy: str | Callable[[], Any], folder: Path, **options: Any) -> Ite
     until(lambda: set(threading.enumerate()) <= before)
 
 
-def until(condition: Callable[[], object], seconds: float = 10.0) -> None:
+def until(condition: Callable[[], object], seconds: float = 60.0) -> None:
     """Wait for another thread."""
     end = time.monotonic() + seconds
     while not condition():
@@ -62,9 +62,11 @@ class Raw:
     """A connection of bytes."""
 
     def __init__(self, server: PolicyServer) -> None:
-        self.socket = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
-        self.socket.settimeout(10.0)
-        self.socket.connect(server.address.removeprefix("unix:"))
+        kind, _, where = server.address.partition(":")
+        tcp = kind == "tcp"
+        self.socket = socket.socket(socket.AF_INET if tcp else socket.AF_UNIX)
+        self.socket.settimeout(30.0)
+        self.socket.connect(("127.0.0.1", int(where.rpartition(":")[2])) if tcp else where)
 
     def __enter__(self) -> Raw:
         return self
@@ -72,9 +74,10 @@ class Raw:
     def __exit__(self, *_: object) -> None:
         self.socket.close()
 
-    def send(self, body: bytes | dict[str, Any]) -> None:
-        data = body if isinstance(body, bytes) else json.dumps(body).encode()
-        self.socket.sendall(struct.pack(">I", len(data)) + data)
+    def send(self, *bodies: bytes | dict[str, Any]) -> None:
+        """Send messages, in one go."""
+        data = [one if isinstance(one, bytes) else json.dumps(one).encode() for one in bodies]
+        self.socket.sendall(b"".join(struct.pack(">I", len(one)) + one for one in data))
 
     def receive(self) -> dict[str, Any] | None:
         """The next message; None at the end."""

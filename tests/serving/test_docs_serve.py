@@ -9,12 +9,15 @@ import subprocess
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
-from served import HELLO, Raw, served
+from served import HELLO, Raw, maze, served
 
+from pushplan.metrics import compute
 from pushplan.serving import ServerLimits, scale, world_feed
 from pushplan.serving.episodes import SETTINGS
 from pushplan.serving.messages import REQUESTS
+from pushplan.world import Episode, world_to_dict
 
 PAGE = (Path(__file__).parents[2] / "docs" / "serve.md").read_text("utf-8")
 (EXCHANGE,) = re.findall(r"```\n(> .*?)```", PAGE, re.DOTALL)
@@ -56,6 +59,29 @@ def test_the_client_in_another_language_compiles_and_talks(tmp_path):
     assert all(same(*pair) for pair in zip(replies, REPLIED, strict=True))
 
 
+@pytest.mark.parametrize("boxes", [(), ((4, 9, 0.3), (10, 12, 0.0))])
+def test_an_episode_that_a_client_writes_is_scored_as_one_of_ours(boxes, tmp_path):
+    world = maze(boxes)
+    times = [0.0, 0.5, 1.0, 1.5]
+    robot = [[*world.robot_pose[:2], 1.5 + 0.1 * k] for k in range(4)]
+    robot[-1][1] += 1.0
+    objects = np.repeat(world.movables.poses[None], 4, axis=0)
+    objects[2:, :, 0] += 0.3
+    (code,) = (one for one in re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL) if "savez" in one)
+    assert "pushplan." not in code and "import pushplan" not in code
+    names: dict[str, Any] = {}
+    exec(code, names)
+    file = tmp_path / "episode.npz"
+    given = json.loads(json.dumps(world_to_dict(world)))
+    names["save_episode"](file, given, times, robot, objects.tolist(), True, waits=[0.1, 0.2, 0.3])
+    found = Episode.load(file)
+    ours = Episode(world, np.array(times), np.array(robot), objects, True, "goal")
+    assert compute(found) == pytest.approx(compute(ours), nan_ok=True) and compute(found)
+    assert found.act_times_s.tolist() == [0.1, 0.2, 0.3] and found.completed.tolist() == [
+        False for _ in boxes
+    ]
+
+
 def test_the_page_names_every_request_key_setting_and_limit():
     for kind, (required, optional) in REQUESTS.items():
         assert f"| `{kind}` |" in PAGE
@@ -66,4 +92,5 @@ def test_the_page_names_every_request_key_setting_and_limit():
         *(8, 4_000_000, 10.0, 600.0),
     )
     assert f"{world_feed.MAX_OBJECTS:,}" in PAGE and f"{scale.WIDEST:,.0f} radii" in PAGE
+    assert (scale.LEAST, scale.HEAVIEST, scale.FASTEST) == (1e-9, 1e12, 1e6)
     assert scale.FARTHEST == 1e6 and HELLO["protocol"] in PAGE

@@ -17,7 +17,7 @@ import pytest
 from served import EXAMPLES, PolicyClient, ServeError, maze_dict
 
 from pushplan.cli import main
-from pushplan.serving import PROTOCOL, ServerLimits
+from pushplan.serving import PROTOCOL, PolicyServer, ServerLimits
 
 CLIENT = EXAMPLES / "serve_client.py"
 
@@ -65,14 +65,34 @@ def test_the_command_serves_the_client_that_is_shipped_until_a_signal(tmp_path):
     assert not path.exists()
 
 
-@pytest.mark.slow
-def test_the_keyboard_ends_it_as_well(tmp_path):
-    with command("random", "--socket", "tcp:127.0.0.1:0") as (process, said):
-        client = PolicyClient(said.split()[4])
-        process.send_signal(signal.SIGINT)
-        assert process.communicate(timeout=20) == ("", "") and process.returncode == 0
-        with pytest.raises(ConnectionError):
-            client.reset(maze_dict())
+@pytest.mark.parametrize("ends", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+def test_every_signal_that_ends_it_removes_the_socket(ends, tmp_path):
+    path = tmp_path / "s"
+    before = signal.getsignal(ends)
+    server = PolicyServer("straight", f"unix:{path}")
+    seen = []
+
+    def ready() -> None:
+        seen.append(path.exists())
+        os.kill(os.getpid(), ends)
+
+    assert server.serve_forever(ready) and seen == [True]
+    assert not path.exists() and signal.getsignal(ends) is before
+
+
+def test_a_server_under_nohup_outlives_its_terminal(tmp_path):
+    before = signal.signal(signal.SIGHUP, signal.SIG_IGN)
+    seen = []
+
+    def ready() -> None:
+        seen.append(signal.getsignal(signal.SIGHUP))
+        os.kill(os.getpid(), signal.SIGTERM)
+
+    try:
+        PolicyServer("straight", f"unix:{tmp_path / 's'}").serve_forever(ready)
+    finally:
+        signal.signal(signal.SIGHUP, before)
+    assert seen == [signal.SIG_IGN]
 
 
 @pytest.mark.parametrize(
