@@ -57,6 +57,8 @@ class HeldActions:
 
     def reset(self, world: World, rng: np.random.Generator) -> None:
         """Forget the last episode."""
+        if self._pending is not None:
+            self._pending.abandon()
         self._policy.reset(world, rng)
         self.plan_with(ImmediateExecutor())
 

@@ -6,6 +6,8 @@ import math
 import threading
 import time
 from collections.abc import Callable
+from dataclasses import replace
+from numbers import Real
 
 import numpy as np
 
@@ -46,6 +48,7 @@ PLAN_STOP = OwnBudget() | Deadline(1.0)
 _SMOOTHING = 0.3  # gain of the filter of noisy poses
 _RETRY = 0.25  # time after a failure in which the policy is not asked [s]
 _BLIND = 60.0  # for how long a robot that is to continue does so without a world [s]
+_WAITING = 99  # snapshots that are kept for the next command, besides the newest
 
 
 class Runner:
@@ -83,7 +86,8 @@ class Runner:
         policy: what is run.
         status: of the last command; None before the first.
         worlds: how many snapshots were taken.
-        ignored: how many were not, because a later one was there already.
+        ignored: how many were not, because a later one was there already, or because they were
+            ahead of the clock of the commands by more than ``max_age``.
         failures: how often planning or the policy has failed.
 
     Raises:
@@ -140,7 +144,7 @@ class Runner:
         self._estimator = StateEstimator(delay, gain, self._believed)
         self._delay, self._clock, self._log = delay, clock, QuietLog(log)
         self._executor = executor or ThreadExecutor(self.plan_stop, clock)
-        self._lock = threading.Lock()
+        self._lock = threading.Lock()  # of the snapshots that have come in, and their counts
         self._prompt = False
         self._forget()
 
@@ -148,12 +152,17 @@ class Runner:
         self.status: CommandStatus | None = None
         self.worlds = self.ignored = self.failures = 0
         self._newest: World | None = None
-        self._observed: World | None = None
+        self._inbox: list[World] = []
+        self._shift = self._at = 0.0
+        """What the clock of the commands is behind that of the episode, and the latter [s]."""
+        self._clock_read = False
+        self._stepped = self._refused = ""
         self._cancelled = ""
         self._last: Command | None = None
         self._plan: Plan | None = None
         self._planned_at = self._retry_at = -math.inf
         self._failure = ""
+        self._begun = False
 
     def __enter__(self) -> Runner:
         return self
@@ -179,24 +188,37 @@ class Runner:
         if not self.worlds:  # the first time
             warm_up_policy(self.policy)
         self._estimator.warm_up(world)
-        self._estimator.reset()
-        self._forget()
-        self._estimator.observe(world)
-        self._memory = ObjectMemory(self.keep_unseen)
+        with self._lock:
+            self._forget()
+            self._newest, self.worlds = world, 1
         self._guard.reset(world)
-        self._memory.complete(world, world)
-        self._begin(world)
+        self._restart(world)
+        if not self._running_s:  # else as soon as the call of the last episode has returned
+            self._begin(world)
         if not self._prompt:
             take_short_turns()
             self._prompt = True
-        self._newest = self._observed = world
-        self.worlds = 1
         self._log.note("world", world)
         return self.command(world.time)
+
+    def _restart(self, world: World) -> None:
+        """Begin anew with a snapshot: nothing that was seen, sent or planned before it counts."""
+        self._estimator.reset()
+        self._estimator.observe(world)
+        self._memory = ObjectMemory(self.keep_unseen)
+        self._memory.complete(world, world)
+        self._drop_plans()
+
+    def _drop_plans(self) -> None:
+        """Abandon all planning calls; the policy starts anew when none of them runs any more."""
+        self._begun = False
+        if isinstance(self._executor, ThreadExecutor):
+            self._executor.abandon()
 
     def _begin(self, world: World) -> None:
         self.policy.reset(world, np.random.default_rng(0))
         self.policy.plan_with(self._executor)
+        self._begun = True
 
     def update(self, world: World) -> bool:
         """Take a snapshot, from any thread.
@@ -209,19 +231,58 @@ class Runner:
         """
         world = self._allowance.planning_world(world)
         with self._lock:
-            if self._newest is not None and world.time <= self._newest.time:
-                self.ignored += 1
-                return False
-            self._newest = world
-            self.worlds += 1
-        self._log.note("world", world)
-        return True
+            newest = math.inf if self._newest is None else self._newest.time - self._shift
+            behind = [time - world.time for time in (newest, *(one.time for one in self._inbox))]
+            superseded = any(0.0 <= t <= self.max_age for t in behind)
+            news = world.time > newest and not superseded
+            self.worlds += news
+            self.ignored += not news
+            if not superseded:  # one that is far behind may be the first of a clock set back
+                self._inbox = [*self._inbox[-_WAITING:], world]
+        return news
+
+    def _take_up(self, now: float) -> World:
+        """The newest snapshot; `command` alone knows what time it is, and so which ones are sane.
+
+        One that is a little ahead of the commands is taken for one of now, so that it is in
+        nobody's way later; one that is far ahead is dropped.
+        """
+        fresh = []
+        with self._lock:
+            assert self._newest is not None
+            for world in self._inbox:
+                stamp = world.time + self._shift
+                if self._newest.time < stamp <= now + self.max_age:
+                    seen_at = min(stamp, now)
+                    fresh.append(world if seen_at == world.time else world.moved(time=seen_at))
+                    continue
+                side = "ahead of" if stamp > now else "behind"
+                off = f"{abs(stamp - now):.3g} s {side}"
+                self._refused = f"; another one is {off} the clock of the commands"
+                if stamp > now:
+                    self.worlds -= 1
+                    self.ignored += 1
+            self._inbox = []
+            if not fresh:
+                return self._newest
+            fresh.sort(key=lambda world: world.time)
+            self._newest, self._refused = fresh[-1], ""
+        for world in fresh:
+            self._log.note("world", world)
+        seen = self._guard.observe(fresh[-1])
+        if self._stepped:
+            self._restart(seen)
+            self._stepped = ""
+        else:
+            predicted = self._estimator.at(seen.time)
+            self._estimator.observe(self._memory.complete(seen, predicted))
+        return fresh[-1]
 
     def cancel(self, reason: str = "cancelled") -> None:
         """Bring the robot to a stop; `start` begins anew."""
         self._cancelled = reason or "cancelled"
-        if isinstance(self._executor, ThreadExecutor) and self._executor.latest is not None:
-            self._executor.latest.abandon()
+        if isinstance(self._executor, ThreadExecutor):
+            self._executor.abandon()
 
     def close(self, timeout: float = 1.0) -> bool:
         """End planning.
@@ -241,79 +302,104 @@ class Runner:
     def command(self, now: float) -> Command:
         """What to drive now; never plans, never waits.
 
+        A clock that steps, or says no time, brings the robot to a stop with a reason. After a step
+        back everything begins anew with the first world of the new clock.
+
         Args:
             now: by the clock of the worlds [s]. The time of the last call gets the same again.
 
         Raises:
-            InvalidInputError: if ``now`` is not a number, is before the last call, or nothing was
-                started.
+            InvalidInputError: if ``now`` is not a number, or nothing was started.
         """
-        now = number("now", now)
+        if not (isinstance(now, Real) and math.isnan(now)):
+            now = number("now", now, finite=False)
         if self._newest is None:
             raise InvalidInputError("call start(world) before command(now)")
         last = self._last
-        if last is not None and now <= last.time:
-            if now == last.time:
-                return last
-            raise InvalidInputError(
-                f"now went back from {last.time:g} s to {now:g} s: call start() for another episode"
-            )
-        with self._lock:
-            newest = self._newest
-        if newest is not self._observed:
-            predicted = self._estimator.at(newest.time)
-            seen = self._guard.observe(newest)
-            self._estimator.observe(self._memory.complete(seen, predicted))
-            self._observed = newest
-        held = self.period if last is None else now - last.time
-        world = self._estimator.at(now + self._delay)
-        chosen, status, reason = self._choose(world, now, now - newest.time)
+        if last is not None and now == last.time:
+            return last
+        at, clock = self._read_clock(now)
+        gap = self.period if last is None else at - self._at
+        # in a longer gap the clock has stepped, or nobody knows what the robot was told
+        held = gap if 0.0 < gap <= self.max_age else self.period
+        newest = self._take_up(at)
+        world = self._estimator.at(at + self._delay)
+        chosen, status, reason = self._choose(world, at, at - newest.time, clock)
         wanted = waiting_twist(world) if chosen is None else chosen
         before = driven_twist(newest) if last is None else last.twist
         twist, obstacle = self._guard.limited(world, before, wanted, held)
         if obstacle and status in (CommandStatus.DRIVING, CommandStatus.WAITING):
             status, reason = CommandStatus.BLOCKED, obstacle
-        self._estimator.sent(now, twist)
+        self._estimator.sent(at, twist)
         plan = self.policy.current_plan if isinstance(self.policy, ShowsPlan) else None
         if plan is not self._plan:
-            self._plan, self._planned_at = plan, now
+            self._plan, self._planned_at = plan, at
             if plan is not None:
-                self._log.note("plan", plan, now)
+                self._log.note("plan", plan, at)
         command = Command(
-            now,
+            at,
             twist,
             status,
             reason,
             plan,
-            0.0 if plan is None else now - self._planned_at,
-            now - newest.time,
-            last is not None and held > 1.5 * self.period,
+            0.0 if plan is None else at - self._planned_at,
+            at - newest.time,
+            gap > 1.5 * self.period,
         )
-        self._last, self.status = command, status
         self._log.note("command", command)
+        if math.isfinite(now) and now != at:
+            command = replace(command, time=now)
+        self._last, self.status, self._at = command, status, at
         return command
 
+    def _read_clock(self, now: float) -> tuple[float, str]:
+        """The time of the episode, which never goes back, and what is wrong with the clock."""
+        if not math.isfinite(now):
+            self._clock_read = False
+            return self._at + self.period, f"the clock of the commands says {now:g} s"
+        at, last = now + self._shift, self._last
+        if last is None:
+            return at, ""
+        first, self._clock_read = not self._clock_read, True
+        back = self._at - at
+        if back < 0.0:
+            return at, self._stepped
+        with self._lock:
+            self._shift += back + self.period
+        if not first or back > self.max_age:  # what was a guess may be a little ahead
+            self._stepped = (
+                f"the clock of the commands went back by {back:.3g} s, to {now:g} s: "
+                "waiting for a world of that time"
+            )
+        return self._at + self.period, self._stepped
+
     def _choose(
-        self, world: World, now: float, age: float
+        self, world: World, now: float, age: float, clock: str
     ) -> tuple[Twist | None, CommandStatus, str]:
         """The velocity that is wanted, before the limits of acceleration; None is to wait."""
         if self._cancelled:
             return None, CommandStatus.CANCELLED, self._cancelled
-        if abs(age) > self._believed:
-            why = "old" if age > 0.0 else "ahead of the clock of the commands"
-            return None, CommandStatus.STALE, f"the newest world is {abs(age):.3g} s {why}"
+        if clock:
+            return None, CommandStatus.STALE, clock
+        if age > self._believed:
+            old = f"the newest world is {age:.3g} s old{self._refused}"
+            return None, CommandStatus.STALE, old
         running, budget = self._running_s, self.plan_stop.seconds
         if running > 2.0 * budget + 0.5:
             reason = f"a planning call has run for {running:.2g} s, its rule allows {budget:g} s"
             return None, CommandStatus.FAILED, reason
         if now < self._retry_at:
             return None, CommandStatus.FAILED, self._failure
+        if running and not self._begun:  # no policy is in two threads at once
+            return None, CommandStatus.WAITING, "an abandoned planning call has not returned yet"
         try:
+            if not self._begun:
+                self._begin(world)
             wanted = expect("the action of the policy", self.policy.act(world, None), Twist)
         except Exception as error:
             self.failures += 1
             self._failure, self._retry_at = describe(error), now + _RETRY
-            self._begin(world)
+            self._drop_plans()
             return None, CommandStatus.FAILED, self._failure
         if is_done(world):
             return wanted, CommandStatus.DONE, ""

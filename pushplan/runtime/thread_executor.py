@@ -29,8 +29,6 @@ class ThreadExecutor:
         stop: rule that every call has to obey beside its own.
         clock: returns seconds; what calls take is measured by it.
 
-    Attributes:
-        latest: the call that was submitted last; None before the first.
     """
 
     takes_time = True
@@ -40,7 +38,7 @@ class ThreadExecutor:
         self._took = ExpectedTime()
         self._worker = _Worker()
         weakref.finalize(self, self._worker.calls.put, None)  # an executor that nobody closes
-        self.latest: ThreadCall[Any] | None = None
+        self._open: list[ThreadCall[Any]] = []
 
     def expected(self, stop: Stop | None) -> float:
         """What the slowest of the last calls took, or else the budget [s]."""
@@ -55,10 +53,12 @@ class ThreadExecutor:
         def run(rule: Stop) -> T:
             began = self._clock()
             result = call(rule)
-            self._took.add(self._clock() - began)
+            if not rule.cancelled:  # one that was cut short says nothing about the next
+                self._took.add(self._clock() - began)
             return result
 
-        self.latest = pending = ThreadCall(run, rule, self._clock())
+        pending = ThreadCall(run, rule, self._clock())
+        self._open = [*self._running(), pending]
         if not self._worker.is_alive:
             self._worker.start()
         self._worker.calls.put(pending)
@@ -66,9 +66,23 @@ class ThreadExecutor:
 
     @property
     def running_s(self) -> float:
-        """For how long the call that was submitted last has not ended [s]; 0 if it has."""
-        call = self.latest
-        return 0.0 if call is None or call.ended else self._clock() - call.began
+        """For how long the oldest call that has not ended has been there [s]; 0 without one."""
+        calls = self._running()
+        return self._clock() - calls[0].began if calls else 0.0
+
+    def _running(self) -> list[ThreadCall[Any]]:
+        """The calls that have not ended, the oldest first."""
+        calls = [call for call in self._open if not call.ended]
+        if calls and not self._worker.is_alive:  # it was ended between calls, from outside
+            for call in calls:
+                call.lose()
+            return []
+        return calls
+
+    def abandon(self) -> None:
+        """End the call that runs, and never begin those that wait."""
+        for call in self._open:
+            call.abandon()
 
     def close(self, timeout: float) -> bool:
         """End the call that runs, and the thread.
@@ -79,8 +93,7 @@ class ThreadExecutor:
         Returns:
             Whether no thread is left.
         """
-        if self.latest is not None:
-            self.latest.abandon()
+        self.abandon()
         return self._worker.end(timeout)
 
 
@@ -96,8 +109,9 @@ class _Worker:
         return self._thread is not None and self._thread.is_alive()
 
     def start(self) -> None:
-        self._thread = threading.Thread(target=self._work, name="pushplan planning", daemon=True)
-        self._thread.start()
+        thread = threading.Thread(target=self._work, name="pushplan planning", daemon=True)
+        thread.start()
+        self._thread = thread  # only now: until then the one before counts as alive
 
     def _work(self) -> None:
         while (call := self.calls.get()) is not None:
@@ -164,3 +178,9 @@ class ThreadCall(Generic[T]):
     def abandon(self) -> None:
         """Cancel it."""
         self._token.cancel()
+
+    def lose(self) -> None:
+        """Take it that its thread has died and that it will never end."""
+        self._error = RuntimeError("its thread has died")
+        self.ended = True
+        self.abandon()

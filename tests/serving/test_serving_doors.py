@@ -167,7 +167,8 @@ def test_what_comes_in_the_wrong_order():
     assert "give the 'period' of the robot's loop" in refused(HELLO, start)
     assert "send 'start' first" in refused(hello, reset, command)
     assert "send 'reset' first" in refused(hello, start, ACT)
-    assert "now went back from 0 s to -1 s" in refused(hello, start, {**command, "now": -1})
+    stopped = asked(hello, start, {**command, "now": -1})
+    assert stopped["status"] == "stale" and "went back by 1 s, to -1 s" in stopped["reason"]
     assert "now must be a number" in refused(hello, start, {**command, "now": [1]})
     assert "'robot_pose' lacks" in refused(HELLO, reset, {"type": "act", "time": 1.0})
     assert "reason must be a text" in refused(hello, start, {"type": "cancel", "reason": 1})

@@ -111,6 +111,7 @@ class PlanFollower:
     def reset(self, world: World, rng: np.random.Generator) -> None:
         """Forget the last episode; calls run at once until `plan_with` says otherwise."""
         world = world.with_fixed_as_static()
+        self._abandon()
         self._forget(rng)
         self.controller.reset(world)
         self._clock.command = driven_twist(world)
@@ -204,11 +205,16 @@ class PlanFollower:
         """The next velocity of a recovery, after which nothing is left of the old plan."""
         away = self._recovery.command(world, self._clock.held)
         if away is not None:
-            if self._pending is not None:
-                self._pending.call.abandon()
-            self.current_plan = self._pending = None
+            self._abandon()
+            self.current_plan = None
             self.controller.reset(world)
         return away
+
+    def _abandon(self) -> None:
+        """Wait no longer for a plan that was asked for."""
+        if self._pending is not None:
+            self._pending.call.abandon()
+        self._pending = None
 
     def _ask(self, world: World, reason: Reason) -> None:
         """Call the planner; its plan is there after the time that the call takes."""

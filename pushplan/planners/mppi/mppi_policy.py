@@ -75,6 +75,8 @@ class MppiPolicy:
 
     def reset(self, world: World, rng: np.random.Generator) -> None:
         """Forget the last episode; decisions are made at once until `plan_with` says otherwise."""
+        if self._pending is not None:
+            self._pending.abandon()
         self._forget(rng)
         self._clock.command = driven_twist(world)
         self._started = True

@@ -86,6 +86,9 @@ class GtspMpc:
 
     def reset(self, world: World, rng: np.random.Generator) -> None:
         """Forget the last episode; choices are made at once until `plan_with` says otherwise."""
+        self._forget_choice()
+        if self._execution is not None:
+            self._execution.abandon()
         self._forget()
 
     def plan_with(self, executor: PlanningExecutor) -> None:

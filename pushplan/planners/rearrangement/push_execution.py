@@ -119,6 +119,11 @@ class PushExecution:
             self._speed = pushed.linear
         return pushed
 
+    def abandon(self) -> None:
+        """Wait no longer for a prediction that was asked for."""
+        if self._prediction is not None:
+            self._prediction.abandon()
+
     def _is_obsolete(self, scene: PushScene) -> bool:
         """Whether the object to be pushed has gone, or is where it belongs already."""
         target = np.flatnonzero(scene.world.movables.ids == self.push.target)
