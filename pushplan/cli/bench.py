@@ -7,18 +7,17 @@ import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from pushplan.cli import paper
 from pushplan.cli.common import (
     add_command,
     add_latency,
     add_run_options,
     add_trust,
-    batch_options,
     complete,
     positive,
+    run_options,
     whole,
 )
-from pushplan.cli.outputs import check_directory, check_file
+from pushplan.cli.outputs import check_directory
 from pushplan.cli.progress import progress_of
 from pushplan.cli.report import add_table_options
 
@@ -30,9 +29,6 @@ _EXAMPLES = """\
   pushplan bench maze-2d-5 --policies straight,kinodynamic-rrt --episodes 20 --out runs/first
   pushplan bench maze-2d-5 --policies straight,my_planner.py:MyPlanner --out runs/mine
   pushplan bench maze-2d-10 --policies fast=my_planner.py:fast,slow=my_planner.py:slow
-  pushplan bench paper --only maze,ship_ice --episodes 20
-
-'paper' is every policy on the suites of the Bench-Push paper's tables, its numbers beside ours.
 
 A run that was interrupted or killed continues when the same command is given again.
 """
@@ -41,23 +37,21 @@ A run that was interrupted or killed continues when the same command is given ag
 def add(commands: Any) -> None:
     """Add the command."""
     parser = add_command(commands, "bench", "compare policies on a suite", _EXAMPLES, run)
-    suite = parser.add_argument(
-        "suite", metavar="SUITE,...", help="see 'pushplan list suites'; or 'paper'"
-    )
+    suite = parser.add_argument("suite", metavar="SUITE,...", help="see 'pushplan list suites'")
     complete(suite, "suites")
     policies = parser.add_argument(
         "--policies",
+        required=True,
         metavar="A,B",
         help="names ('pushplan list policies'), 'onnx:FILE', 'sb3:FILE', 'file.py:Class' or "
-        "'module:Class' of a policy or a planner, each with 'label=' in front if wanted "
-        "(paper: all that come with pushplan by default)",
+        "'module:Class' of a policy or a planner, each with 'label=' in front if wanted",
     )
     complete(policies, "policies")
     parser.add_argument(
         "--episodes",
         type=whole(1),
         metavar="N",
-        help="default: the suite's own, 1 for each file of a folder; paper: 100 each",
+        help="default: the suite's own, 1 for each file of a folder",
     )
     parser.add_argument("--out", metavar="DIR", help="run directory (default: runs/SUITE)")
     parser.add_argument(
@@ -88,30 +82,20 @@ def add(commands: Any) -> None:
     add_run_options(parser)
     add_table_options(parser)
     parser.add_argument("--json", action="store_true", help="print the end's tables as JSON")
-    paper.add_options(parser)
 
 
 def run(options: argparse.Namespace) -> int:
     """Run the batch, print the table, write plots and page."""
     from pushplan.cli.report import exit_code, show, show_json
 
-    paper.check(options)
-    check_file(options.markdown)
     out = options.out or _default_out(options.suite)
     check_directory(out)
-    comparison = None
-    with progress_of(*(options.policies or "").split(","), out=out) as progress:
-        if options.suite == paper.SUITE:
-            comparison = paper.compare(options, out, progress)
-            results = comparison.results
-        else:
-            results = _results(options, out, progress)
+    with progress_of(*options.policies.split(","), out=out) as progress:
+        results = _results(options, out, progress)
     if options.json:
         show_json(results, options.pairs)
-    elif comparison is None:
-        show(results, options)
     else:
-        paper.show(comparison, out, options.markdown)
+        show(results, options)
     return exit_code(results)
 
 
@@ -126,7 +110,10 @@ def _results(options: argparse.Namespace, out: str, progress: Progress) -> Resul
         observation=options.observation,
         latency_factor=options.latency,
         progress=progress,
-        **batch_options(options),
+        seed=options.seed,
+        timeout_s=options.timeout,
+        memory_limit_mb=options.memory,
+        **run_options(options),
     )
 
 

@@ -52,16 +52,6 @@ def complete(action: argparse.Action, kind: str) -> None:
     action.completer = names  # type: ignore[attr-defined]
 
 
-def batch_options(options: argparse.Namespace) -> dict[str, Any]:
-    """What ``bench`` and ``bench paper`` hand to the batch runner under the same names."""
-    return {
-        "seed": options.seed,
-        "timeout_s": options.timeout,
-        "memory_limit_mb": options.memory,
-        **run_options(options),
-    }
-
-
 def add_run_options(parser: argparse.ArgumentParser) -> None:
     """Add the options of commands that run jobs in a run directory."""
     parser.add_argument(

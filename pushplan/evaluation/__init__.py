@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     from pushplan.evaluation.experiment import Experiment
     from pushplan.evaluation.jobs import Job, JobResult, JobSettings
     from pushplan.evaluation.merging import Merged, merge
-    from pushplan.evaluation.paper import Comparison, bench_paper
     from pushplan.evaluation.policies import (
         PolicySpec,
         UnusablePolicyError,
@@ -39,7 +38,6 @@ if TYPE_CHECKING:
 __all__ = [
     "CONDITIONS",
     "TIMING_COLUMNS",
-    "Comparison",
     "Condition",
     "DamagedResultsError",
     "Estimate",
@@ -66,7 +64,6 @@ __all__ = [
     "UnusablePolicyError",
     "Verdict",
     "bench",
-    "bench_paper",
     "bootstrap_interval",
     "columns",
     "compare_runs",
@@ -95,7 +92,6 @@ __getattr__, __dir__ = lazy_names(
         "experiment": "Experiment",
         "jobs": "Job JobResult JobSettings",
         "merging": "Merged merge",
-        "paper": "Comparison bench_paper",
         "policies": "PolicySpec UnusablePolicyError parse_policies parse_policy parse_planner",
         "reproduction": "Reproduction reproduce",
         "rescoring": "Rescored rescore",

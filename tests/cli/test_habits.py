@@ -37,7 +37,7 @@ USERS_MISTAKES = {
     "bench": [
         ["maze-2d-3", "--policies", "nobody"],
         ["maze-2d-3", "--policies", "straight", "--out", "FILE/run"],
-        ["paper", "--markdown", "FOLDER"],
+        ["maze-2d-3"],
     ],
     "experiment": [["none.yaml"]],
     "stress": [["straight", "maze-2d-3", "--out", "FILE/run"]],

@@ -11,9 +11,6 @@ import yaml
 
 from pushplan.cli import main
 from pushplan.evaluation import Experiment, UnusablePolicyError, bench
-from pushplan.evaluation.paper import EPISODES
-from pushplan.evaluation.policies import policy_names
-from pushplan.evaluation.published import published_tables
 from pushplan.planners import make_planner, make_policy
 from pushplan.world import InvalidInputError, PushplanError, SchemaError, UnknownNameError
 
@@ -174,15 +171,6 @@ def test_only_what_was_asked_for_is_left_out() -> None:
     data["suites"].append({"suite": "maze-2d-5", "policies": ["gtsp"]})
     with pytest.raises(UnusablePolicyError, match="gtsp"):
         Experiment.from_dict(data)
-
-
-@pytest.mark.slow
-def test_the_papers_comparison_is_an_experiment_file() -> None:
-    shipped = Experiment.load(Path(__file__).parents[2] / "examples" / "paper.yaml")
-    assert [one.name for one in shipped.suites] == [table.suite for table in published_tables()]
-    assert {len(one.scenarios) for one in shipped.suites} == {EPISODES}
-    assert [one.label for one in shipped.policies] == list(policy_names())
-    assert shipped.skipped and shipped.jobs
 
 
 @pytest.mark.parametrize(("traces", "kept"), [("all", 4), ("failures", 2), ("none", 0)])

@@ -1,17 +1,17 @@
-"""The numbers of the Bench-Push paper, as data: ``data/bench_push.yaml``."""
+"""The numbers of the Bench-Push paper, as data: ``published.yaml``."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
-from importlib import resources
+from pathlib import Path
 from typing import Any
 
 import yaml
 
 from pushplan.metrics import Role, metric_names
-from pushplan.world import InvalidInputError, UnknownNameError
+from pushplan.scenarios import suite
 
 SETTINGS = {"paper": "paper", "robot": "paper, physical robot", "code": "the paper's code"}
 """Where a row comes from -> words."""
@@ -52,8 +52,6 @@ class PublishedTable:
     @property
     def task(self) -> str:
         """Name of the task."""
-        from pushplan.scenarios import suite
-
         return suite(self.suite, episodes=1).scenarios[0].task
 
     def best(self, name: str) -> float | None:
@@ -72,8 +70,7 @@ class PublishedTable:
 @cache
 def published_tables() -> tuple[PublishedTable, ...]:
     """All tables, in the order of the paper."""
-    file = resources.files("pushplan.evaluation").joinpath("data/bench_push.yaml")
-    data = yaml.safe_load(file.read_text("utf-8"))
+    data = yaml.safe_load(Path(__file__).with_name("published.yaml").read_text("utf-8"))
     return tuple(
         PublishedTable(
             **{key: entry[key] for key in ("suite", "title", "source", "statistic")},
@@ -82,27 +79,6 @@ def published_tables() -> tuple[PublishedTable, ...]:
         )
         for entry in data["tables"]
     )
-
-
-def chosen_tables(only: str | Sequence[str] | None = None) -> tuple[PublishedTable, ...]:
-    """The tables of some suites or tasks, as a list or with commas; all tables if None.
-
-    Raises:
-        UnknownNameError: if there is no table for a name.
-        InvalidInputError: if there is no name.
-    """
-    tables = published_tables()
-    if only is None:
-        return tables
-    given = only.split(",") if isinstance(only, str) else list(only)
-    names = [str(name).strip() for name in given if str(name).strip()]
-    if not names:
-        raise InvalidInputError("at least one suite or task is needed")
-    for name in names:
-        if all(name not in (t.suite, t.task) for t in tables):
-            valid = [word for table in tables for word in (table.suite, table.task)]
-            raise UnknownNameError("suite or task of the paper", name, dict.fromkeys(valid))
-    return tuple(t for t in tables if t.suite in names or t.task in names)
 
 
 def _row(data: Mapping[str, Any], episodes: Mapping[str, int]) -> PublishedRow:

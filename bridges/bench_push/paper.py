@@ -1,25 +1,41 @@
-"""Tables that set our results beside those of the Bench-Push paper."""
+"""Tables that set the results of a run beside those of the Bench-Push paper.
+
+    pushplan experiment examples/paper.yaml --out runs/paper
+    python bridges/bench_push/paper.py runs/paper [--markdown comparison.md]
+
+Any run will do that holds suites of that file: ``pushplan bench maze-2d-3 --policies ...`` too.
+"""
 
 from __future__ import annotations
 
+import argparse
 import os
 import platform
 import re
+import sys
 from collections.abc import Mapping, Sequence
 from datetime import date
 from pathlib import Path
 
+sys.path.insert(0, str(Path(__file__).parent))
+
+from published import ENOUGH, SETTINGS, PublishedRow, PublishedTable, Score, published_tables
+
 import pushplan
-from pushplan.evaluation.published import ENOUGH, SETTINGS, PublishedRow, PublishedTable, Score
-from pushplan.evaluation.results import Results
-from pushplan.evaluation.rows import ResultRow
+from pushplan.evaluation import Results
+from pushplan.evaluation.policies import parse_policy
+from pushplan.evaluation.rows import ResultRow, setting_of
 from pushplan.evaluation.statistics import Estimate, estimate, wilson
 from pushplan.evaluation.summary import policies_of, values_of
+from pushplan.evaluation.table_formats import markdown, text
 from pushplan.evaluation.tables import Table
 from pushplan.learned.onnx_policy import read_specification
-from pushplan.metrics import Role, metric_names
-from pushplan.world import InvalidInputError
+from pushplan.metrics import Role, compute, metric_names
+from pushplan.scenarios import suite
+from pushplan.world import InvalidInputError, PushplanError
+from pushplan.world.files import write_atomic
 
+TO_GOAL_POINT = "E_nav_to_goal_point"
 _POINT = "E_nav to goal point"
 _ABOVE = " ▲"
 
@@ -34,7 +50,7 @@ def preface(results: Results, command: str = "") -> str:
 # Beside the Bench-Push paper
 
 {made} {date.today().isoformat()} ({machine}, pushplan {pushplan.__version__}), {span} of \
-each suite. `pushplan/evaluation/data/bench_push.yaml` holds the numbers of the paper and where \
+each suite. `bridges/bench_push/published.yaml` holds the numbers of the paper and where \
 they stand in it.
 
 - **Rows**: the policies of the paper come first, in its simulator and by its metrics (mean ± \
@@ -63,7 +79,7 @@ no success in navigation; here E_nav is 0 without success.
 
 
 def overview(tables: Sequence[PublishedTable], rows: Sequence[Sequence[ResultRow]]) -> Table:
-    """Who of ours is above the best of the paper in every score at once."""
+    """Policies that beat the paper's best result in every score."""
     cells = []
     for table, ours in zip(tables, rows, strict=True):
         best = {
@@ -91,9 +107,8 @@ def paper_table(
     table: PublishedTable,
     rows: Sequence[ResultRow],
     policies: Sequence[str],
-    points: Mapping[str, Sequence[float]],
+    points: Mapping[tuple[str, str, int], float],
     training: Mapping[str, str],
-    incompatible: Mapping[str, str],
 ) -> Table:
     """One table.
 
@@ -101,32 +116,19 @@ def paper_table(
         table: what the paper says.
         rows: ours, of the suite that mirrors it.
         policies: labels in the order of the rows.
-        points: label -> E_nav of each episode with l0* to the goal's centre.
-        training: label of a network -> what its training took.
-        incompatible: label -> why a policy was not run here.
+        points: (policy, scenario, seed) -> E_nav with l0* to the goal's centre.
+        training: label -> what the training of a network took.
     """
     names = _columns(table, rows)
     headings = ("policy", "runs", "success", *names, "time a step [ms]", "training")
     cells = [_published_cells(row, names) for row in table.rows]
     for label in policies_of(rows, policies):
         mine = [row for row in rows if row.policy == label]
-        scores = _our_scores(table, mine, names, points.get(label, ()))
-        cells.append((*_counts(label, mine), *scores, _decision(mine), training.get(label, "none")))
-    # a network of this task and preset is looked for here; what is for others fits on a line
-    near = {
-        label: why
-        for label, why in incompatible.items()
-        if label in training and not why.startswith(("made for task", "made for preset"))
-    }
-    blank = [""] * (len(headings) - 2)
-    for label, why in near.items():
-        cells.append((label, f"not run: {why}", *blank))
-    return Table(
-        f"{table.title} (`{table.suite}`)",
-        headings,
-        tuple(cells),
-        _note(table, [label for label in incompatible if label not in near]),
-    )
+        to_point = [points[key] for row in mine if (key := _key(row)) in points]
+        scores = _our_scores(table, mine, names, to_point)
+        cells.append((*_counts(label, mine), *scores, _decision(mine), training[label]))
+    title = f"{table.title} (`{table.suite}`)"
+    return Table(title, headings, tuple(cells), _note(table))
 
 
 def _columns(table: PublishedTable, rows: Sequence[ResultRow]) -> list[str]:
@@ -136,10 +138,12 @@ def _columns(table: PublishedTable, rows: Sequence[ResultRow]) -> list[str]:
     return names
 
 
-def _note(table: PublishedTable, others: Sequence[str]) -> str:
+def _key(row: ResultRow) -> tuple[str, str, int]:
+    return row.policy, row.scenario, row.seed
+
+
+def _note(table: PublishedTable) -> str:
     parts = [f"source of the paper's rows: {table.source}", *table.notes]
-    if others:
-        parts.append(f"made for other tasks or presets: {', '.join(others)}")
     return ".\n".join(f"- {part[0].upper()}{part[1:]}" for part in parts)
 
 
@@ -243,3 +247,72 @@ def training_cost(network: Path) -> str:
     except InvalidInputError:  # no ONNX file
         steps = None
     return f"{steps:,} steps" if isinstance(steps, int) else "unknown"
+
+
+def beside(results: Results, command: str = "") -> list[Table]:
+    """An overview, then a table for each suite of the paper that a run holds.
+
+    Raises:
+        InvalidInputError: if the run holds none of them.
+    """
+    found = []
+    for table in published_tables():
+        first = suite(table.suite, episodes=1).scenarios[0]
+        setting = setting_of(first.key, first.seed)
+        rows = [row for row in results.rows if row.setting == setting]
+        if rows:
+            found.append((table, rows))
+    if not found:
+        valid = ", ".join(table.suite for table in published_tables())
+        raise InvalidInputError(f"the run holds no suite of the paper (valid: {valid})")
+    training = {label: training_of(label) for label in results.policies}
+    points = to_goal_point(results)
+    tables = [paper_table(table, rows, results.policies, points, training) for table, rows in found]
+    return [overview([table for table, _ in found], [rows for _, rows in found]), *tables]
+
+
+def to_goal_point(results: Results) -> dict[tuple[str, str, int], float]:
+    """E_nav in the paper's convention, from the stored episodes; 0 for a job that failed."""
+    values = {}
+    for row in results.rows:
+        if row.E_nav is None:
+            continue
+        episode = results.episode(row) if row.success else None
+        if not row.success:
+            values[_key(row)] = 0.0
+        elif episode is not None:
+            values[_key(row)] = compute(episode, [TO_GOAL_POINT])[TO_GOAL_POINT]
+    return values
+
+
+def training_of(label: str) -> str:
+    """What the training of a policy took; ``"none"`` where it is not a network."""
+    try:
+        network = parse_policy(label).network
+    except PushplanError:  # a label of the user's own
+        return "none"
+    return "none" if network is None else training_cost(network)
+
+
+def main() -> int:
+    """Print the tables of a run directory."""
+    parser = argparse.ArgumentParser(description="A run beside the tables of the Bench-Push paper.")
+    parser.add_argument("run", help="run directory")
+    parser.add_argument("--markdown", type=Path, metavar="FILE", help="write a document")
+    options = parser.parse_args()
+    try:
+        results = Results.load(options.run)
+        tables = beside(results)
+        if options.markdown is not None:
+            command = f"python bridges/bench_push/paper.py {options.run}"
+            document = f"{preface(results, command)}\n{markdown(tables)}"
+            write_atomic(options.markdown, document.encode())
+    except (PushplanError, OSError) as error:
+        print(error, file=sys.stderr)
+        return 2
+    print(text(tables, 160))
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
