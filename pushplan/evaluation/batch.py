@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from pushplan.evaluation.execute import execute
-from pushplan.evaluation.job_identity import IdentifiedJob
+from pushplan.evaluation.job_identity import identified
 from pushplan.evaluation.jobs import (
     DEFAULT_ENV,
     Job,
@@ -27,7 +27,7 @@ from pushplan.evaluation.pending import note_batch, pending_jobs
 from pushplan.evaluation.pool import WorkerPool
 from pushplan.evaluation.provenance import provenance
 from pushplan.evaluation.rows import ResultRow, instant
-from pushplan.evaluation.store import RunDirectory
+from pushplan.evaluation.store import RunDirectory, remove_report
 from pushplan.evaluation.worker import WORKER_VARIABLE
 from pushplan.world import InvalidInputError
 from pushplan.world.checks import choice, integer, number
@@ -99,14 +99,16 @@ def run_batch(
         number("memory_limit_mb", memory_limit_mb, low=1.0)
     choice("traces", traces, TRACES)
     _check(jobs)
+    jobs = identified(jobs, settings)
     with RunDirectory(out) as store:
         note_batch(store, jobs, settings, about)
         if retry_failed:
             store.forget_failures()
-        pending = pending_jobs(jobs, store, settings, any_version)
+        pending = pending_jobs(jobs, store, any_version)
         if pending:
             begun = {**provenance(workers), "jobs": len(jobs), "done": len(jobs) - len(pending)}
             store.append("runs", begun)
+            remove_report(store.path)
         if progress is not None:
             progress(len(jobs) - len(pending), len(jobs), None)
         batch = _Batch(pending, store, settings, memory_limit_mb, traces, len(jobs), progress)
@@ -137,7 +139,7 @@ class _Batch:
 
     def __init__(
         self,
-        jobs: Sequence[IdentifiedJob],
+        jobs: Sequence[Job],
         store: RunDirectory,
         settings: JobSettings,
         memory_limit_mb: float | None,
@@ -145,9 +147,8 @@ class _Batch:
         total: int,
         progress: Progress | None,
     ) -> None:
-        self._jobs = deque(one.job for one in jobs)
+        self._jobs = deque(jobs)
         self._began: dict[tuple[str, str, int], str] = {}
-        self._identities = {one.job.key: one for one in jobs}
         self._store = store
         self._settings = settings
         self._memory_limit_mb = memory_limit_mb
@@ -235,15 +236,14 @@ class _Batch:
 
     def _begin(self, job: Job) -> None:
         self._began[job.key] = instant()
-        self._store.begin(self._identities[job.key].id, " ".join(map(str, job.key[:2])))
+        self._store.begin(job.id, " ".join(map(str, job.key[:2])))
 
     def _keep(self, job: Job, outcome: JobResult) -> None:
-        identity = self._identities[job.key]
         began = self._began.pop(job.key)
-        row = replace(outcome.row, job=identity.id, trace="", began=outcome.row.began or began)
+        row = replace(outcome.row, job=job.id, trace="", began=outcome.row.began or began)
         kept = self._traces == "all" or (self._traces == "failures" and not row.success)
         trace = outcome.trace if kept else None
-        row = self._store.add(row, trace, outcome.detail, identity.spec)
+        row = self._store.add(row, trace, outcome.detail, job.spec)
         self._left -= 1
         if self._progress is not None:
             self._progress(self._total - self._left, self._total, row)

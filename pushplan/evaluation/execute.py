@@ -19,7 +19,9 @@ from pushplan.evaluation.episode import (
     Recording,
     plan_times,
 )
+from pushplan.evaluation.job_identity import check_unchanged
 from pushplan.evaluation.jobs import (
+    BatchStoppedError,
     Job,
     JobResult,
     JobSettings,
@@ -50,8 +52,11 @@ def execute(job: Job, settings: JobSettings, owner_pid: int | None = None) -> Jo
     """
     by_force = settings.force_after_s if owner_pid not in (None, os.getpid()) else None
     try:
+        check_unchanged(job, settings)
         with hard_limit(by_force), soft_limit(settings.timeout_s):
             return _execute(job, settings)
+    except BatchStoppedError:
+        raise
     except EpisodeTimeout:
         reason = timeout_reason(settings.timeout_s)
         return failed_result(job, Status.TIMEOUT, reason, traceback.format_exc())

@@ -1,4 +1,4 @@
-"""What a job's result depends on, as plain data with a content hash."""
+"""Everything that a job's result depends on, as plain data with a content hash."""
 
 from __future__ import annotations
 
@@ -6,43 +6,62 @@ import contextlib
 import functools
 import hashlib
 import importlib
-import json
-from collections.abc import Mapping
-from dataclasses import dataclass, fields, is_dataclass
+import platform
+import sys
+from collections.abc import Iterable, Mapping
+from dataclasses import fields, is_dataclass, replace
 from importlib import metadata
 from pathlib import Path
 from typing import Any
 
 import pushplan
-from pushplan.evaluation.jobs import Job, JobSettings
-from pushplan.evaluation.policies import PolicySpec, file_digest
+from pushplan.envs.registry import SIMULATORS, TASKS
+from pushplan.evaluation.jobs import BatchStoppedError, Job, JobSettings, job_id
+from pushplan.evaluation.policies import PolicySpec, described
+from pushplan.evaluation.provenance import PACKAGES, packages
+from pushplan.evaluation.source_digests import file_digest, source_digest
+from pushplan.metrics import METRICS
+from pushplan.planners.registry import PLANNERS, POLICIES
 from pushplan.world import InvalidInputError
 
-_ENGINES = {"pymunk": "pymunk", "mujoco": "mujoco"}
-_UNSEEN = ("cli", "drawing", "evaluation", "ros", "training")
-"""Rooms of the package that no episode depends on."""
+_ENGINES = ("mujoco", "pymunk")
+_REPORTS = (
+    *("bounding", "comparing", "data", "endings", "exporting", "gaps", "interval_plot", "merging"),
+    *("page", "page_files", "paper", "paper_tables", "plot_style", "plots", "published", "replays"),
+    *("reproduction", "rescoring", "results", "run_record", "salvaging", "statistics"),
+    *("statistics_aggregate", "statistics_paired", "status", "summary", "table_formats", "tables"),
+)
+UNSEEN = frozenset({"cli", "ros", "training", *(f"evaluation/{name}" for name in _REPORTS)})
+"""Rooms and files of the package that no episode runs through. All others count."""
+_MOST_DIFFERENCES = 4
 _OURS = "pushplan."
 
 
-@dataclass(frozen=True)
-class IdentifiedJob:
-    """A job and what its result depends on.
+def identified(jobs: Iterable[Job], settings: JobSettings) -> list[Job]:
+    """The jobs with their specifications."""
+    policies: dict[int, tuple[dict[str, Any], dict[str, str]]] = {}
+    found = []
+    for job in jobs:
+        if id(job.policy) not in policies:  # its files are read once for all of its jobs
+            policies[id(job.policy)] = _of_policy(job.policy)
+        found.append(replace(job, spec=_spec(job, settings, *policies[id(job.policy)])))
+    return found
 
-    Args:
-        job: the job.
-        spec: what `job_spec` says about it.
-        id: content hash of that.
+
+def check_unchanged(job: Job, settings: JobSettings) -> None:
+    """Refuse to run an identified job where code or files are no longer those that it names.
+
+    Raises:
+        BatchStoppedError: if they are others.
     """
-
-    job: Job
-    spec: Mapping[str, Any]
-    id: str
-
-    @classmethod
-    def of(cls, job: Job, settings: JobSettings) -> IdentifiedJob:
-        """The job with its specification."""
-        spec = job_spec(job, settings)
-        return cls(job, spec, job_id(spec))
+    if job.spec is None:
+        return
+    now = job_spec(job, settings)
+    if job_id(now) != job_id(job.spec):
+        raise BatchStoppedError(
+            f"{differences(job.spec, now)} while jobs of {job.policy.label!r} ran; what was stored "
+            "is kept, and the same command goes on"
+        )
 
 
 def job_spec(job: Job, settings: JobSettings) -> dict[str, Any]:
@@ -53,25 +72,62 @@ def job_spec(job: Job, settings: JobSettings) -> dict[str, Any]:
         them again), ``scenario``, ``settings``, ``versions``, and a hash of the content for each
         of the ``files`` that the scenario names, if it names any.
     """
-    spec = job.policy
+    return _spec(job, settings, *_of_policy(job.policy))
+
+
+def _of_policy(spec: PolicySpec) -> tuple[dict[str, Any], dict[str, str]]:
+    """What a specification says of a policy, and versions of the libraries of its own code."""
     policy: dict[str, Any] = {"label": spec.label, "identity": spec.identity}
     with contextlib.suppress(TypeError):
         if isinstance(spec.source, str):
             policy |= {"options": _plain(spec.options), "source": spec.source}
+    others = spec.libraries - {*PACKAGES, *sys.stdlib_module_names, "pushplan"}
+    return policy, dict(sorted(pair for module in others for pair in _versions_of(module)))
+
+
+def _spec(
+    job: Job, settings: JobSettings, policy: Mapping[str, Any], libraries: Mapping[str, str]
+) -> dict[str, Any]:
     return {
         "policy": policy,
         "scenario": job.scenario.to_dict(),
         "key": [job.scenario.key, job.scenario.seed],
         "settings": settings_dict(settings),
-        "versions": versions(str(job.scenario.simulator), spec.network is not None),
-        **({"files": files} if (files := _files(job.scenario)) else {}),
+        "versions": {**versions(str(job.scenario.simulator)), **libraries},
+        **({"files": files} if (files := _files(job, settings)) else {}),
     }
 
 
-def _files(scenario: Any) -> dict[str, str]:
-    """Hash of the content of each file that a variation names."""
+def _files(job: Job, settings: JobSettings) -> dict[str, str]:
+    """Hash of each file that a variation names, and of code that is registered and not ours."""
+    scenario = job.scenario
     named = getattr(scenario, "variations", {}).items()
-    return {name: file_digest(Path(path)).strip() for name, path in named if name.endswith("_file")}
+    files = {name: file_digest(path).strip() for name, path in named if name.endswith("_file")}
+    sources = {
+        "make_env": settings.make_env,
+        "observation": settings.observation,
+        "policy": {**PLANNERS, **POLICIES}.get(str(job.policy.source), ""),
+        "simulator": SIMULATORS.get(str(scenario.simulator), ""),
+        "task": TASKS.get(str(scenario.task), ""),
+        **{f"metric {name}": metric.function for name, metric in METRICS.items()},
+    }
+    for name, source in sources.items():
+        if isinstance(source, str):
+            digest = source_digest(source.rpartition(":")[0])
+        else:
+            digest = described(source)
+        if digest:
+            files[name] = digest.strip()
+    return files
+
+
+@functools.cache
+def _versions_of(module: str) -> list[tuple[str, str]]:
+    """Name and version of each installed package that brings a module."""
+    return [(name, metadata.version(name)) for name in _distributions().get(module, ())]
+
+
+_distributions = functools.cache(metadata.packages_distributions)
 
 
 def settings_dict(settings: JobSettings) -> dict[str, Any]:
@@ -85,16 +141,6 @@ def settings_dict(settings: JobSettings) -> dict[str, Any]:
     }
 
 
-def job_id(spec: Mapping[str, Any]) -> str:
-    """Content hash of what `job_spec` gave, 32 hexadecimal digits.
-
-    Where a policy's file lies does not count: its content does, in ``identity``.
-    """
-    policy = {name: spec["policy"][name] for name in ("label", "identity")}
-    text = json.dumps({**spec, "policy": policy}, sort_keys=True)
-    return hashlib.sha256(text.encode()).hexdigest()[:32]
-
-
 def same_but_versions(spec: Mapping[str, Any]) -> str:
     """`job_id` of a job whose result may come from any version of the code and its packages."""
     return job_id({**spec, "versions": {}})
@@ -102,14 +148,17 @@ def same_but_versions(spec: Mapping[str, Any]) -> str:
 
 def differences(before: Mapping[str, Any], now: Mapping[str, Any]) -> str:
     """What differs between two specifications, in words."""
-    parts = []
+    changed, noted = [], []
     for section in ("policy", "scenario", "files", "settings", "versions"):
         old, new = before.get(section, {}), now.get(section, {})
         names = [name for name in sorted({*old, *new}) if old.get(name) != new.get(name)]
         if section == "policy":  # its source may have moved, its options are in its identity
             names = [name for name in names if name == "identity"]
-        parts += [f"{section} {name} {old.get(name)!r} -> {new.get(name)!r}" for name in names]
-    return "; ".join(parts)
+        changed += [f"{section} {n} {old[n]!r} -> {new.get(n)!r}" for n in names if n in old]
+        noted += [f"{section} {n} was not noted before" for n in names if n not in old]
+    parts = [*changed, *noted]
+    more = len(parts) - _MOST_DIFFERENCES
+    return "; ".join([*parts[:_MOST_DIFFERENCES], *([f"{more} more"] if more > 0 else [])])
 
 
 def job_of(spec: Mapping[str, Any]) -> tuple[Job, JobSettings]:
@@ -142,33 +191,37 @@ def job_of(spec: Mapping[str, Any]) -> tuple[Job, JobSettings]:
 
 
 @functools.cache
-def versions(simulator: str, network: bool = False) -> dict[str, str]:
-    """Versions that an episode's bytes may depend on: of our code and of the packages below it.
+def versions(simulator: str) -> dict[str, str]:
+    """Versions that an episode's bytes may depend on: of our code and of what is below it.
 
     Args:
-        simulator: name of the simulator.
-        network: whether the policy is a network.
+        simulator: name of the simulator; versions of other ones do not count.
 
     Returns:
-        ``pushplan``, ``code`` (a hash of the source that episodes depend on) and package names.
+        ``python``, ``pushplan``, ``code`` (a hash of the package without `UNSEEN`) and installed
+        packages by name.
     """
-    names = ["numpy", "numba", *filter(None, [_ENGINES.get(simulator)])]
-    names += ["onnxruntime"] if network else []
+    others = {"torch", *_ENGINES} - {simulator}
     return {
+        "python": platform.python_version(),
         "pushplan": pushplan.__version__,
-        "code": _code_digest(),
-        **{name: metadata.version(name) for name in names},
+        "code": code_digest(),
+        **{name: version for name, version in packages().items() if name not in others},
     }
 
 
 @functools.cache
-def _code_digest() -> str:
+def code_digest() -> str:
+    """A hash of the files of the package that episodes may depend on: code, data and weights."""
     root = Path(pushplan.__file__).parent
     digest = hashlib.sha256()
     for path in sorted(root.rglob("*")):
         where = path.relative_to(root)
-        if where.parts[0] not in _UNSEEN and path.suffix in (".py", ".yaml", ".json", ".xml"):
-            digest.update(f"{where.as_posix()}\0".encode() + path.read_bytes() + b"\0")
+        name, rooms = where.as_posix(), {where.parts[0], "/".join(where.parts[:2])}
+        rooms |= {name.removesuffix(".py")}
+        left_out = rooms & UNSEEN or path.suffix == ".md" or name.startswith(".")
+        if path.is_file() and "__pycache__" not in where.parts and not left_out:
+            digest.update(f"{name}\0".encode() + path.read_bytes() + b"\0")
     return digest.hexdigest()[:12]
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import hashlib
+import json
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
 from typing import Any
@@ -9,12 +11,16 @@ from typing import Any
 from pushplan.evaluation.episode import wanted_observation
 from pushplan.evaluation.policies import PolicySpec
 from pushplan.evaluation.rows import ResultRow, Status, blank_row, checked_row, clean_reason
-from pushplan.world import ChecksEnvironment, ChoosesActions, Policy
+from pushplan.world import ChecksEnvironment, ChoosesActions, InvalidInputError, Policy
 from pushplan.world.checked_fields import CheckedFields, NonNegativeFloat, PositiveFloat
 from pushplan.world.named_objects import load_object
 
 DEFAULT_ENV = "pushplan.envs:make"
 DETAIL_HALF = 10_000  # characters of a traceback that are kept at its beginning and at its end
+
+
+class BatchStoppedError(InvalidInputError):
+    """Something is wrong that is no policy's fault: nothing is recorded, and the batch ends."""
 
 
 @dataclass(frozen=True)
@@ -25,15 +31,22 @@ class Job:
         policy: how to make the policy.
         scenario: a `pushplan.scenarios.Scenario`, or anything with ``task``, ``simulator``,
             ``key``, ``seed`` and ``to_dict``.
+        spec: what `job_spec` says about it, where a batch has asked.
     """
 
     policy: PolicySpec
     scenario: Any
+    spec: Mapping[str, Any] | None = None
 
     @property
     def key(self) -> tuple[str, str, int]:
         """What tells the job apart from others of a batch: policy, scenario key, seed."""
         return (self.policy.label, str(self.scenario.key), int(self.scenario.seed))
+
+    @property
+    def id(self) -> str:
+        """What the column ``job`` says; empty where nobody has asked for its specification."""
+        return "" if self.spec is None else job_id(self.spec)
 
     @property
     def title(self) -> str:
@@ -135,6 +148,16 @@ class JobResult:
         except (KeyError, TypeError, ValueError) as error:
             return failed_result(job, Status.POLICY_ERROR, f"impossible result: {error}")
         return JobResult(row, self.trace, clipped(self.detail))
+
+
+def job_id(spec: Mapping[str, Any]) -> str:
+    """Content hash of what `job_spec` gave, 32 hexadecimal digits.
+
+    Where a policy's file lies does not count: its content does, in ``identity``.
+    """
+    policy = {name: spec["policy"][name] for name in ("label", "identity")}
+    text = json.dumps({**spec, "policy": policy}, sort_keys=True)
+    return hashlib.sha256(text.encode()).hexdigest()[:32]
 
 
 def clipped(detail: str) -> str:

@@ -4,15 +4,21 @@ from __future__ import annotations
 
 import contextlib
 import functools
-import hashlib
-import importlib.util
 import re
-import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, is_dataclass
+from hashlib import sha256
 from pathlib import Path
 from typing import Any, cast
 
+import numpy as np
+
+from pushplan.evaluation.source_digests import (
+    code_digest,
+    file_digest,
+    libraries_of,
+    source_digest,
+)
 from pushplan.world import InvalidInputError, Planner, Policy, PushplanError, UnknownNameError
 from pushplan.world.errors import MOST_CHOICES, describe, place
 from pushplan.world.libraries import missing
@@ -51,25 +57,39 @@ class PolicySpec:
 
     @property
     def identity(self) -> str:
-        """A text that tells sources apart, with a hash of the file that holds them.
+        """A text that tells sources apart, with a hash of the files that hold them.
 
-        A file that has been edited is another policy, one that was moved is not; what it imports
-        does not count.
+        A file that has been edited is another policy, one that was moved is not. What it imports
+        counts where it is local; see `source_digest`.
         """
-        options = "".join(f" {key}={value!r}" for key, value in sorted(self.options.items()))
-        if isinstance(self.source, str):
-            if (file := _network_file(self.source)) is not None:
-                return f"{file.name}{file_digest(file)}{options}"
-            where, _, name = self.source.rpartition(":")
-            shown = Path(where).name if where.endswith(".py") else where
-            return f"{shown}{':' if where else ''}{name}{source_digest(where)}{options}"
+        options = "".join(
+            f" {key}={described(value)}" for key, value in sorted(self.options.items())
+        )
+        if not isinstance(self.source, str):
+            return f"{described(self.source)}{options}"
+        if (file := _network_file(self.source)) is not None:
+            from pushplan.learned.sb3_policy import beside
+
+            return f"{file.name}{file_digest(file)}{file_digest(beside(file))}{options}"
+        where, _, name = self.source.rpartition(":")
+        shown = Path(where).name if where.endswith(".py") else where
+        return f"{shown}{':' if where else ''}{name}{source_digest(where)}{options}"
+
+    @property
+    def libraries(self) -> set[str]:
+        """Modules that its own code imports, by the first part of their names."""
         source: Any = self.source
-        while isinstance(source, functools.partial):
-            options += f" {source.args!r} {sorted(source.keywords.items())!r}"
-            source = source.func
-        where = getattr(source, "__module__", type(source).__module__)
-        name = getattr(source, "__qualname__", type(source).__qualname__)
-        return re.sub(r"0x[0-9a-f]+", "0x", f"{where}:{name}{source_digest(where)}{options}")
+        if isinstance(source, functools.partial):
+            inner = [one for one in source.args if isinstance(one, PolicySpec)]
+            parts = inner or [PolicySpec(self.label, source.func)]
+            return set().union(*(one.libraries for one in parts))
+        if not isinstance(source, str):
+            return libraries_of(
+                _module_of(source if hasattr(source, "__module__") else type(source))
+            )
+        if source.startswith("sb3:"):
+            return {"stable_baselines3", "torch"}
+        return set() if self.is_ours else libraries_of(source.rpartition(":")[0])
 
     @property
     def is_ours(self) -> bool:
@@ -141,6 +161,51 @@ class PolicySpec:
         return source(**self.options)
 
 
+def described(value: Any, depth: int = 8) -> str:
+    """A text that tells values apart in whatever process: with the content of code and files."""
+    if isinstance(value, PolicySpec):
+        return value.identity
+    if isinstance(value, str):
+        return repr(value) + file_digest(value)
+    if isinstance(value, np.ndarray):
+        return f"{value.dtype}{value.shape} sha256:{sha256(value.tobytes()).hexdigest()[:12]}"
+    if depth == 0:
+        return type(value).__name__  # an object may hold itself
+    if isinstance(value, functools.partial):
+        value = {"partial": value.func, **value.keywords, "args": value.args}
+    if isinstance(value, Mapping):
+        parts = [f"{key!r}: {described(one, depth - 1)}" for key, one in value.items()]
+        return f"{{{', '.join(parts)}}}"
+    if isinstance(value, list | tuple | set | frozenset):
+        parts = [described(one, depth - 1) for one in value]
+        if isinstance(value, set | frozenset):
+            parts.sort()  # their order is not the same in every process
+        return f"{type(value).__name__}({', '.join(parts)})"
+    if is_dataclass(value) or callable(value) or " object at 0x" in repr(value):
+        return _code_in_words(value, depth)
+    return re.sub(r"0x[0-9a-f]+", "0x", repr(value))
+
+
+def _code_in_words(thing: Any, depth: int) -> str:
+    """A class, a function or another object: the name of its code, a hash, and what it holds."""
+    kind = thing if hasattr(thing, "__qualname__") else type(thing)
+    module = _module_of(kind)
+    held = [cell.cell_contents for cell in getattr(thing, "__closure__", None) or ()]
+    held += [getattr(thing, name, None) for name in ("__defaults__", "__kwdefaults__", "__self__")]
+    if kind is not thing:
+        held.append(getattr(thing, "__dict__", None))
+    text = f"{module}:{kind.__qualname__}{source_digest(module)}"
+    if module.partition(".")[0] not in ("pushplan", "builtins"):
+        text += code_digest(kind)
+    return text + "".join(f" {described(one, depth - 1)}" for one in held if one is not None)
+
+
+def _module_of(thing: Any) -> str:
+    """The module of a class or a function; that of a script is ``__main__`` in workers, too."""
+    module = str(thing.__module__)
+    return "__main__" if module == "__mp_main__" else module
+
+
 _NO_PLANNER = "{!r} is a policy, not a planner: give it to 'pushplan run' or 'pushplan bench'"
 
 
@@ -189,40 +254,6 @@ def policy_names() -> tuple[str, ...]:
     from pushplan.planners import policy_names as classical_names
 
     return (*classical_names(), *learned_names())
-
-
-def source_digest(where: str) -> str:
-    """A hash of what a ``file.py`` or a module holds, in words; nothing for modules of ours."""
-    return file_digest(Path(where) if where.endswith(".py") else _file_of(where))
-
-
-def file_digest(file: Path | None) -> str:
-    """A hash of a file's content, in words; nothing for none."""
-    if file is None or not file.is_file():
-        return ""
-    found = file.stat()
-    return _content_hash(file, found.st_mtime_ns, found.st_size, found.st_ino)
-
-
-@functools.lru_cache(maxsize=256)
-def _content_hash(file: Path, *_version: int) -> str:
-    """`file_digest` of a file as it is; jobs by the thousand ask for the same one."""
-    return f" sha256:{hashlib.sha256(file.read_bytes()).hexdigest()[:12]}"
-
-
-def _file_of(module: str) -> Path | None:
-    """The file of a module that is not ours; None if there is none."""
-    if not module or module.partition(".")[0] == "pushplan":
-        return None
-    try:
-        if module in sys.modules:
-            found = getattr(sys.modules[module], "__file__", None)
-        else:
-            spec = importlib.util.find_spec(module)
-            found = None if spec is None else spec.origin
-    except (ImportError, ValueError, AttributeError):
-        return None
-    return None if found is None else Path(found)
 
 
 def _network_file(source: str) -> Path | None:

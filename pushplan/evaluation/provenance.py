@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import platform
 import shlex
@@ -15,17 +16,8 @@ import pushplan
 from pushplan.evaluation.rows import instant
 
 PACKAGES = (
-    "gymnasium",
-    "mujoco",
-    "numba",
-    "numpy",
-    "ompl",
-    "onnxruntime",
-    "pymunk",
-    "ruckig",
-    "scipy",
-    "shapely",
-    "torch",
+    *("casadi", "gymnasium", "llvmlite", "mujoco", "numba", "numpy", "ompl", "onnxruntime"),
+    *("osqp", "pymunk", "ruckig", "scipy", "shapely", "torch"),
 )
 """Packages that results may depend on; those that are installed are named."""
 _GIT_S = 5.0
@@ -56,7 +48,7 @@ def provenance(workers: int) -> dict[str, Any]:
         "cores": os.cpu_count(),
         "load": round(os.getloadavg()[0], 2) if hasattr(os, "getloadavg") else None,
         "workers": workers,
-        "packages": {name: found for name in PACKAGES if (found := _version(name)) is not None},
+        "packages": packages(),
     }
 
 
@@ -77,11 +69,13 @@ def code_in_words(run: dict[str, Any]) -> str:
     return f"{run['pushplan']}{commit}{' with changes' if run['changed'] else ''}"
 
 
-def _version(name: str) -> str | None:
-    try:
-        return metadata.version(name)
-    except metadata.PackageNotFoundError:
-        return None
+def packages() -> dict[str, str]:
+    """Versions of those of `PACKAGES` that are installed."""
+    found = {}
+    for name in PACKAGES:
+        with contextlib.suppress(metadata.PackageNotFoundError):
+            found[name] = metadata.version(name)
+    return found
 
 
 def _checkout(root: Path) -> tuple[str | None, bool | None]:

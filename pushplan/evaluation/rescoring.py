@@ -6,10 +6,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-import pushplan
-from pushplan.evaluation.policies import source_digest
+from pushplan.evaluation.job_identity import code_digest
 from pushplan.evaluation.rows import scored_row
-from pushplan.evaluation.store import RunDirectory
+from pushplan.evaluation.source_digests import source_digest
+from pushplan.evaluation.store import RunDirectory, remove_report
 from pushplan.metrics import compute, metric_function
 from pushplan.world import Episode, SchemaError
 
@@ -61,6 +61,8 @@ def rescore(path: str | Path, metrics: Sequence[str] = (), *, columns: bool = Tr
                 unreadable.append(row.job)
                 continue
             scored += 1
+            if missing:
+                remove_report(store.path)
             new = scored_row(row, episode, row.plan_calls) if columns else row
             if new != row:
                 changed.append(row.job)
@@ -81,7 +83,7 @@ def metric_label(metric: str) -> str:
 
 
 def _source(metric: str) -> str:
-    """What tells versions of a metric apart: a hash of its file, or our version."""
+    """What tells versions of a metric apart: a hash of its file, or of our code."""
     metric_function(metric)
     where, _, _ = metric.rpartition(":")
-    return source_digest(where) or pushplan.__version__
+    return source_digest(where) or code_digest()

@@ -14,7 +14,7 @@ from pushplan.evaluation.rescoring import metric_label, rescore
 from pushplan.evaluation.rows import rows_csv
 from pushplan.evaluation.run_record import RunRecord
 from pushplan.evaluation.statistics import estimate
-from pushplan.evaluation.store import open_results
+from pushplan.evaluation.store import open_results, remove_report
 from pushplan.evaluation.summary import (
     PairedDifference,
     PolicySummary,
@@ -215,6 +215,8 @@ class Results(RunRecord):
         folder = Path(out) if out is not None else self.path or Path()
         self._check_same_run(folder)
         folder.mkdir(parents=True, exist_ok=True)
+        if (folder / DATABASE).is_file() or (folder / "report.html").is_file():
+            remove_report(folder)
         write_atomic(folder / "results.csv", rows_csv(self.rows).encode())
         tables = self.tables(wide=True, settings=True, pairs=pairs)
         write_atomic(folder / "summary.md", markdown(tables).encode())

@@ -6,6 +6,7 @@ import contextlib
 import fcntl
 import hashlib
 import json
+import re
 import sqlite3
 import time
 from collections.abc import Iterable, Iterator, Mapping
@@ -32,11 +33,20 @@ from pushplan.evaluation.rows import ResultRow, Status, rows_csv
 from pushplan.world import InvalidInputError
 from pushplan.world.files import write_atomic
 
-REPORT = (
-    *("report.html", "summary.md", "summary.csv", "differences.csv"),
-    *("tradeoff.svg", "scores.svg", "profiles.svg", "planning_time.svg"),
+REPORT = re.compile(
+    r"report\.html|summary\.(md|csv)|differences\.csv|(paper|stress)\.md"
+    r"|(intervals|tradeoff|scores|profiles|planning_time)\.(svg|pdf|png)"
 )
-"""Files that `Results.report` derives from the rows, beside ``results.csv``."""
+"""Files that are derived from the rows, beside ``results.csv`` and those in ``replays``."""
+_REPLAY = re.compile(r"[\w-]{1,64}\.js", re.ASCII)
+
+
+def remove_report(folder: Path) -> None:
+    """Remove what `Results.report` has written into a folder, so that it is not beside new rows."""
+    for names, place in ((REPORT, folder), (_REPLAY, folder / "replays")):
+        for file in [*place.glob("*")]:
+            if names.fullmatch(file.name):
+                file.unlink()
 
 
 class RunDirectory:
@@ -125,17 +135,30 @@ class RunDirectory:
         with self._use() as db:
             return set(db.execute("SELECT DISTINCT policy, scenario, seed FROM results"))
 
-    def specs(self, key: tuple[str, str, int] | None = None) -> dict[str, dict[str, Any]]:
-        """Job -> what `job_spec` said, of all results or those of a policy, scenario and seed."""
-        where = "" if key is None else " WHERE (policy, scenario, seed) = (?, ?, ?)"
+    def specs(
+        self, key: tuple[str, str, int] | None = None, *, current: bool = False
+    ) -> dict[str, dict[str, Any]]:
+        """Job -> what `job_spec` said, of all results or those of a policy, scenario and seed.
+
+        Args:
+            key: policy, scenario and seed.
+            current: leave out results that do not count now.
+        """
+        where = "1" if key is None else "(policy, scenario, seed) = (?, ?, ?)"
+        least = int(current)
         with self._use() as db:
-            found = db.execute(f"SELECT job, spec FROM results{where}", key or ())
-            return {job: json.loads(spec) for job, spec in found}
+            query = f"SELECT job, spec FROM results WHERE {where} AND current >= {least}"
+            return {job: json.loads(spec) for job, spec in db.execute(query, key or ())}
 
     def show(self, jobs: Iterable[str]) -> None:
         """Let these results be the ones that count for their policies and scenarios."""
         with self._use() as db:
             db.executemany(HIDE_OTHERS, ((job, job) for job in jobs))
+
+    def hide(self, jobs: Iterable[str]) -> None:
+        """Let these results count no more, until they are shown again."""
+        with self._use() as db:
+            db.executemany("UPDATE results SET current = 0 WHERE job = ?", ((j,) for j in jobs))
 
     def begin(self, job: str, title: str) -> None:
         """Note that a job is being run."""
@@ -222,8 +245,7 @@ class RunDirectory:
         with self._use() as db:
             text = rows_csv(read_rows(db)).encode()
             if not path.is_file() or path.read_bytes() != text:
-                for name in REPORT:
-                    (self.path / name).unlink(missing_ok=True)
+                remove_report(self.path)
                 write_atomic(path, text)
         return path
 

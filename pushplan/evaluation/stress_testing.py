@@ -192,9 +192,10 @@ def stress(
         period = 1.0 / (condition.rate or rate)
         make = partial(_disturbed, spec, condition.disturbances, period, planning_time)
         changes = {**condition.variations, "control_step": period}
+        tried = PolicySpec(label, make)
         for scenario in scenarios:
             varied = replace(scenario, variations=Variations({**scenario.variations, **changes}))
-            jobs.append(Job(PolicySpec(label, make), varied))
+            jobs.append(Job(tried, varied))
     jobs.sort(key=lambda job: job.key[2])  # a test that is cut short still compares conditions
     options: dict[str, Any] = {"settings": JobSettings(timeout_s=timeout_s), "progress": progress}
     if out is not None:
@@ -202,7 +203,9 @@ def stress(
     else:
         with tempfile.TemporaryDirectory(prefix="pushplan-") as folder:
             rows = run_batch(jobs, out=folder, workers=workers, **options)
-    return ScoreSheet(spec.label, name, tuple(_rows(wanted, rows)))
+    asked = {job.key for job in jobs}  # the folder may hold other tests
+    mine = [row for row in rows if (row.policy, row.scenario, row.seed) in asked]
+    return ScoreSheet(spec.label, name, tuple(_rows(wanted, mine)))
 
 
 def _disturbed(

@@ -19,6 +19,7 @@ from pushplan.evaluation.channel import Channel, ChannelError
 from pushplan.evaluation.jobs import JobResult
 from pushplan.evaluation.worker import THREAD_VARIABLES, WORKER_VARIABLE, WorkerSetup
 from pushplan.world import InvalidInputError, PushplanError
+from pushplan.world.named_objects import import_path
 
 _LOG_TAIL = 6000
 _LOG_MOST = 1_000_000
@@ -67,7 +68,7 @@ class WorkerProcess:
         environment = {**os.environ, WORKER_VARIABLE: "1", "PYTHONUNBUFFERED": "1"}
         environment.update(dict.fromkeys(THREAD_VARIABLES, "1"))
         code = (
-            f"import sys; sys.path[:] = {sys.path!r}\n"
+            f"import sys; sys.path[:] = {import_path()!r}\n"
             f"from pushplan.evaluation.worker import main; main({theirs.fileno()})"
         )
         with theirs, open(log or os.devnull, "ab") as output:

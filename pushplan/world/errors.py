@@ -92,10 +92,15 @@ def place(error: BaseException) -> str:
     frame, found = error.__traceback__, ""
     while frame is not None and not isinstance(error, SyntaxError):
         file = frame.tb_frame.f_code.co_filename
-        if not file.startswith(_NOT_A_USERS) and not _INSTALLED & {*file.split(os.sep)}:
+        if is_a_users(file):
             found = f"{os.path.basename(file)}:{frame.tb_lineno}"
         frame = frame.tb_next
     return found
+
+
+def is_a_users(file: str) -> bool:
+    """Whether a file of code belongs neither to pushplan nor to Python nor to a library."""
+    return not file.startswith(_NOT_A_USERS) and not _INSTALLED & {*file.split(os.sep)}
 
 
 def one_line(text: str) -> str:

@@ -2,24 +2,32 @@
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import importlib
 import importlib.util
+import os
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from pushplan.world.errors import InvalidInputError, unknown_name_message
+from pushplan.world.errors import InvalidInputError, is_a_users, unknown_name_message
 
+_imported: dict[str, tuple[str, tuple[int, int]]] = {}
+"""Modules of users that `load_object` has brought along: their files, and versions of these."""
+_folders: list[str] = []
+"""Folders of files that were loaded, the latest first: the end of the import path."""
 _DEEPEST = 32  # parts of a module's name: Python imports each within the one before it
 
 
 def load_object(spec: str) -> Any:
     """Import what a text names.
 
-    A file is imported once a process, and again when its content has changed, with its folder on
-    the import path, so that it may import its neighbours. Whatever the file raises passes through.
+    A file is imported once a process, and again when its content has changed or that of a local
+    module that it imports, with its folder on the import path, so that it may import its
+    neighbours. Whatever the file raises passes through.
 
     Raises:
         InvalidInputError: if the text has no such form, or there is no such file or name.
@@ -30,7 +38,8 @@ def load_object(spec: str) -> Any:
         raise InvalidInputError(f"expected 'module:Name' or 'path/to/file.py:Name', got {spec!r}")
     if where.count(".") >= _DEEPEST:
         raise InvalidInputError(f"a module has at most {_DEEPEST} parts in its name, got {spec!r}")
-    module = _load_file(Path(where)) if where.endswith(".py") else _load_module(where, spec)
+    with _fresh_modules():
+        module = _load_file(Path(where)) if where.endswith(".py") else _load_module(where, spec)
     if not hasattr(module, name):
         shown = Path(where).name if where.endswith(".py") else where
         raise InvalidInputError(
@@ -45,7 +54,52 @@ def objects_of_file(path: str | Path) -> dict[str, Any]:
     What it imports from elsewhere, and what begins with an underscore, is left out. Errors are
     those of `load_object`.
     """
-    return _callables_of(_load_file(Path(path)))
+    with _fresh_modules():
+        return _callables_of(_load_file(Path(path)))
+
+
+def import_path(folder: str | None = None) -> list[str]:
+    """The import path without folders of loaded files, and with this one at its end."""
+    own = [] if folder is None else [folder]
+    return [*(one for one in sys.path if one not in _folders), *own]
+
+
+def _use_folder(folder: str) -> None:
+    """Let modules be found in this folder, before those of the same name beside another file."""
+    if folder not in import_path() and _folders[:1] != [folder]:
+        _forget_imported()
+        sys.path[:] = import_path()
+        _folders[:] = [folder, *(one for one in _folders if one != folder)]
+        sys.path += _folders
+
+
+def _forget_imported() -> None:
+    for name in _imported:
+        sys.modules.pop(name, None)
+    _imported.clear()
+
+
+@contextlib.contextmanager
+def _fresh_modules() -> Iterator[None]:
+    """Forget what was imported here before and has been edited since; note what is imported."""
+    if any(_version(file) != version for file, version in _imported.values()):
+        _forget_imported()
+    before = dict(sys.modules)
+    try:
+        yield
+    finally:
+        for name, module in [*sys.modules.items()]:
+            file = getattr(module, "__file__", None) if module is not before.get(name) else None
+            if isinstance(file, str) and is_a_users(file):
+                _imported[name] = file, _version(file)
+
+
+def _version(file: str) -> tuple[int, int]:
+    try:
+        found = os.stat(file)
+    except OSError:
+        return 0, 0
+    return found.st_mtime_ns, found.st_size
 
 
 def _callables_of(module: ModuleType) -> dict[str, Any]:
@@ -73,6 +127,7 @@ def _load_file(path: Path) -> ModuleType:
     path = path.expanduser().resolve()
     if not path.is_file():
         raise InvalidInputError(f"there is no file {path}")
+    _use_folder(str(path.parent))
     source = path.read_bytes()
     digest = hashlib.sha256(str(path).encode() + b"\0" + source).hexdigest()[:8]
     name = f"pushplan_user_{path.stem}_{digest}"
@@ -81,8 +136,6 @@ def _load_file(path: Path) -> ModuleType:
     spec = importlib.util.spec_from_file_location(name, path)
     assert spec is not None and spec.loader is not None
     module = importlib.util.module_from_spec(spec)
-    if str(path.parent) not in sys.path:
-        sys.path.append(str(path.parent))
     sys.modules[name] = module
     try:
         exec(compile(source, path, "exec"), module.__dict__)

@@ -1,0 +1,166 @@
+"""Hashes of code and files that results depend on and that are not pushplan's own."""
+
+from __future__ import annotations
+
+import ast
+import contextlib
+import functools
+import hashlib
+import importlib.util
+import os
+import sys
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from importlib.machinery import PathFinder
+from pathlib import Path
+from types import CodeType
+from typing import Any
+
+from pushplan.world.errors import PushplanError, is_a_users
+from pushplan.world.named_objects import import_path
+from pushplan.world.safe_files import read_data
+
+_DATA = (".yaml", ".yml", ".json")
+_IMPORTERS = ("import_module", "__import__")
+
+
+def source_digest(where: str) -> str:
+    """A hash of a ``file.py`` or module and of the local modules that it imports, in words.
+
+    Local is what belongs neither to pushplan nor to Python nor to an installed library. Imports
+    are read from the source, wherever in it they stand. Nothing for modules of ours.
+    """
+    return _joined(_sources(where))
+
+
+def libraries_of(where: str) -> set[str]:
+    """First parts of the names of all modules that a source and its local modules import."""
+    files = _sources(where)
+    return {name.partition(".")[0] for file in files for _, name in _imports(file, *_version(file))}
+
+
+def file_digest(path: str | Path) -> str:
+    """A hash of a file's content, in words; nothing if there is none.
+
+    The files that a file of data names count with it: a world names a map, and the map a picture.
+    """
+    return _joined(_named_files(Path(path)))
+
+
+def code_digest(thing: Any) -> str:
+    """A hash of the compiled code of a function or of the methods of a class, in words.
+
+    It tells objects apart that have no file, or whose file has changed since it was loaded.
+    """
+    kinds = thing.__mro__[:-1] if isinstance(thing, type) else ()
+    members = [getattr(one, "__func__", one) for kind in kinds for one in vars(kind).values()]
+    codes = [getattr(one, "__code__", None) for one in (thing, *members)]
+    text = "".join(_code_text(code) for code in codes if code is not None)
+    return f" code:{hashlib.sha256(text.encode()).hexdigest()[:12]}" if text else ""
+
+
+def _code_text(code: CodeType) -> str:
+    consts = (
+        _code_text(one) if isinstance(one, CodeType) else repr(one)
+        for one in code.co_consts
+        if not isinstance(one, frozenset)  # their order is not the same in every process
+    )
+    return f"{code.co_code.hex()} {code.co_names} {list(consts)}"
+
+
+def _joined(files: Iterable[Path]) -> str:
+    """The hash of one file, or of several with their names."""
+    hashes = {file: _content_hash(file, *_version(file)) for file in files if file.is_file()}
+    if len(hashes) > 1:
+        text = "".join(f"{file.name} {one}\n" for file, one in hashes.items())
+        return f" sha256:{hashlib.sha256(text.encode()).hexdigest()[:12]}"
+    return "".join(f" sha256:{one}" for one in hashes.values())
+
+
+def _version(file: Path) -> tuple[int, ...]:
+    """What changes where a file is written again; jobs by the thousand ask for the same one."""
+    found = file.stat()
+    return found.st_mtime_ns, found.st_size, found.st_ino
+
+
+@functools.lru_cache(maxsize=1024)
+def _content_hash(file: Path, *_version: int) -> str:
+    return hashlib.sha256(file.read_bytes()).hexdigest()[:12]
+
+
+def _sources(where: str) -> list[Path]:
+    """The file of a ``file.py`` or module that is not ours, then the local ones it imports."""
+    first = Path(where).resolve() if where.endswith(".py") else _file_of(where)
+    found = [] if first is None or not first.is_file() else [first]
+    path = import_path(str(found[0].parent) if found else None)
+    for file in found:  # which grows meanwhile
+        for level, name in _imports(file, *_version(file)):
+            folders = [str(file.parents[level - 1])] if level else path
+            found += [one for one in _modules(name, folders) if one not in found]
+    return found
+
+
+def _file_of(module: str) -> Path | None:
+    """The file of a module that is not ours; None if there is none."""
+    if not module or module.partition(".")[0] == "pushplan":
+        return None
+    try:
+        if module in sys.modules:
+            found = getattr(sys.modules[module], "__file__", None)
+        else:
+            spec = importlib.util.find_spec(module)
+            found = None if spec is None else spec.origin
+    except (ImportError, ValueError, AttributeError):
+        return None
+    return None if found is None else Path(found).resolve()
+
+
+@functools.lru_cache(maxsize=1024)
+def _imports(file: Path, *_version: int) -> tuple[tuple[int, str], ...]:
+    """Dots before and name of each module that a file of source may import."""
+    found: dict[tuple[int, str], None] = {}
+    with contextlib.suppress(SyntaxError, ValueError):  # no source: an extension, for one
+        for node in ast.walk(ast.parse(file.read_bytes())):
+            if isinstance(node, ast.Import):
+                found |= dict.fromkeys((0, one.name) for one in node.names)
+            elif isinstance(node, ast.ImportFrom):
+                start = f"{node.module}." if node.module else ""
+                found |= dict.fromkeys((node.level, start + one.name) for one in node.names)
+            elif isinstance(node, ast.Call) and ast.unparse(node.func).endswith(_IMPORTERS):
+                named = [one.value for one in node.args[:1] if isinstance(one, ast.Constant)]
+                found |= dict.fromkeys((0, str(name)) for name in named)
+    return tuple(found)
+
+
+def _modules(name: str, folders: Sequence[str] | None) -> Iterator[Path]:
+    """Local files of a module, and of the packages around it."""
+    for part in name.split("."):
+        spec = PathFinder.find_spec(part, folders) if folders else None
+        if spec is None:
+            return
+        if spec.has_location and spec.origin is not None:
+            if not is_a_users(spec.origin):
+                return
+            yield Path(spec.origin).resolve()
+        folders = spec.submodule_search_locations
+
+
+@functools.lru_cache(maxsize=1024)
+def _named(file: Path, *_version: int) -> tuple[str, ...]:
+    """Every text in a file of data."""
+    texts: list[str] = []
+    with contextlib.suppress(PushplanError):
+        waiting = [read_data(file)] if file.suffix in _DATA else []
+        for one in waiting:  # which grows meanwhile
+            if isinstance(one, str):
+                texts.append(one)
+            elif isinstance(one, Mapping | list):
+                waiting += one.values() if isinstance(one, Mapping) else one
+    return tuple(texts)
+
+
+def _named_files(path: Path) -> list[Path]:
+    found = [path] if os.path.isfile(path) else []
+    for file in found:  # which grows meanwhile
+        paths = [file.parent / text for text in _named(file, *_version(file))]
+        found += [one for one in paths if os.path.isfile(one) and one not in found]
+    return found
