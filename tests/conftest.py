@@ -2,20 +2,16 @@
 
 from __future__ import annotations
 
-import contextlib
 import gc
 import os
-import shutil
-import tempfile
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from importlib.util import find_spec
 from pathlib import Path
 
 import hypothesis
 import numpy as np
 import pytest
-from turnstile import Turnstile
 
 import pushplan
 from pushplan.world import Drive, GoalDisc, Movables, PlanStatus, RobotModel, StaticMap, World
@@ -25,7 +21,6 @@ hypothesis.settings.load_profile("busy")
 
 LEARN = ("torch", "stable_baselines3", "onnx", "minari", "h5py", "tensorboard")
 MISSING = [name for name in LEARN if find_spec(name) is None]
-TURNSTILE = pytest.StashKey[Turnstile]()
 
 SQUARE = np.array([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]])
 OCTAGON = np.array(
@@ -105,13 +100,11 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Share a folder of locks and one kernel cache with the workers and the tests' processes."""
+    """Share one kernel cache with the workers and the tests' processes."""
     if not hasattr(config, "workerinput"):  # of xdist
-        os.environ["PUSHPLAN_TEST_LOCKS"] = tempfile.mkdtemp(prefix="pushplan-tests-")
         os.environ["PYTHONSAFEPATH"] = "1"  # else a checkout is found, and compiled, once more
         first = [str(Path(pushplan.__file__).parents[1]), os.environ.get("PYTHONPATH", "")]
         os.environ["PYTHONPATH"] = os.pathsep.join(filter(None, first))
-    config.stash[TURNSTILE] = Turnstile(Path(os.environ["PUSHPLAN_TEST_LOCKS"]))
 
 
 def pytest_collection_finish() -> None:
@@ -120,46 +113,30 @@ def pytest_collection_finish() -> None:
     gc.set_threshold(50_000, 20, 20)
 
 
-def pytest_unconfigure(config: pytest.Config) -> None:
-    if not hasattr(config, "workerinput"):
-        shutil.rmtree(os.environ.pop("PUSHPLAN_TEST_LOCKS"), ignore_errors=True)
-
-
-@pytest.hookimpl(wrapper=True)
-def pytest_runtest_protocol(item: pytest.Item) -> Iterator[object]:
-    """Keep the other workers out of a test of clocks, but not while its kernels are compiled."""
-    clock = "clock" in item.keywords
-    if clock:
-        with contextlib.suppress(Exception):  # the setup meets it again
-            load_planners(item)
-    with item.config.stash[TURNSTILE].passed(alone=clock):
-        return (yield)
-
-
 def pytest_runtest_setup(item: pytest.Item) -> None:
     """Skip what needs the extra 'learn' where it is missing; load the planners of `warm`."""
     if "learn" in item.keywords and MISSING:
         pytest.skip(f"needs the extra 'learn' ({', '.join(MISSING)})")
-    load_planners(item)
-
-
-def load_planners(item: pytest.Item) -> None:
     for mark in item.iter_markers("warm"):
         from pushplan.planners import warm_up
 
         warm_up(*mark.args)
 
 
-def quickest(
-    call: Callable[[], object], tries: int = 3, clock: Callable[[], float] = time.perf_counter
-) -> float:
-    """Least time of some calls [s]: what the machine's other work leaves of it."""
+def quickest(call: Callable[[], object], tries: int = 3) -> float:
+    """Least processor time of some calls [s]."""
     times = []
     for _ in range(tries):
-        began = clock()
+        began = time.process_time()
         call()
-        times.append(clock() - began)
+        times.append(time.process_time() - began)
     return min(times)
+
+
+@pytest.fixture
+def cpu_time(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let the clock of deadlines count this process's work, so that other work changes nothing."""
+    monkeypatch.setattr(time, "perf_counter", time.process_time)
 
 
 @pytest.fixture

@@ -105,7 +105,7 @@ def test_a_room_is_planned_in(folder) -> None:
     assert run_script(block("load_world"), folder).startswith("solved")
 
 
-@pytest.mark.clock
+@pytest.mark.usefixtures("cpu_time")
 @pytest.mark.warm("push-aware")
 def test_its_deadline_holds() -> None:
     (seconds,) = re.findall(r"Deadline\((.*?)\)", block("load_world"))

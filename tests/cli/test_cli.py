@@ -6,7 +6,6 @@ import json
 import os
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import numpy as np
@@ -57,16 +56,13 @@ def test_help_has_examples(command: str, capsys: pytest.CaptureFixture[str]) -> 
     assert f"examples:\n  pushplan {command}" in capsys.readouterr().out
 
 
-@pytest.mark.clock
-def test_help_is_fast_and_loads_nothing_heavy() -> None:
+def test_help_loads_nothing_heavy() -> None:
     code = (
         "import sys; from pushplan.cli import main; main(['--help']);"
         "print([m for m in ('numpy', 'numba', 'scipy', 'rich') if m in sys.modules])"
     )
-    begin = time.perf_counter()
     out = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert out.stdout.splitlines()[-1] == "[]"
-    assert time.perf_counter() - begin < 3.0  # alone it is 0.1 s; tests may share a busy machine
 
 
 @pytest.mark.parametrize(

@@ -187,7 +187,6 @@ def test_a_plan_of_no_length(poses):
     assert MpcTracker().command(start(robot=wheels), plan) == Twist(0.0, 0.0)
 
 
-@pytest.mark.clock
 def test_a_command_is_quick():
     world = start()
     plan = arc_plan(world, S_CURVE)

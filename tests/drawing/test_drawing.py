@@ -219,7 +219,6 @@ def test_open_edges_are_told_from_closed_ones() -> None:
     assert green[0] > 50 and green[1] == 0
 
 
-@pytest.mark.clock
 def test_a_picture_of_many_floes_is_drawn_in_time() -> None:
     rng = np.random.default_rng(0)
     angles = np.arange(7) * 2 * np.pi / 7

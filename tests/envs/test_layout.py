@@ -30,7 +30,6 @@ def test_placed_squares_overlap_nothing(random_yaw):
             assert min(s.distance(shapely.LineString(line.reshape(2, 2))) for s in shapes) >= 0.51
 
 
-@pytest.mark.clock
 @pytest.mark.parametrize("random_yaw", [False, True])
 def test_dense_requests_are_met_and_impossible_ones_refused(random_yaw):
     free_space = FreeSpace(room(9.0))  # 8 x 8 m of free floor

@@ -85,7 +85,6 @@ def test_dimensions_of_the_testbed():
     np.testing.assert_allclose(np.ptp(world.movables.outline(0), axis=0), 0.08)
 
 
-@pytest.mark.clock
 def test_twenty_big_boxes_come_fast_and_impossible_requests_are_refused():
     maze = task(boxes=20, random_start=True)
     times = []

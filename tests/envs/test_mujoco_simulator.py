@@ -127,7 +127,6 @@ def test_another_process_gives_the_same_bytes():
     assert found.stdout.strip() == digest()
 
 
-@pytest.mark.clock
 def test_a_scene_of_the_same_shapes_is_placed_without_compiling():
     first, second = cluttered(0), cluttered(1)
     simulator = built(first)

@@ -92,7 +92,6 @@ def test_dimensions_at_full_scale():
     assert np.degrees(world.robot.max_turn_rate) * 60.0 == pytest.approx(45.0)
 
 
-@pytest.mark.clock
 def test_starts_depend_on_the_seed_alone_and_are_quick():
     ship = task(concentration=0.5)
     one = ship.start(stream(3, "layout"))

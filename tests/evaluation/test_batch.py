@@ -276,7 +276,7 @@ def start(out: Path) -> subprocess.Popen[bytes]:
 
 
 def wait_for_traces(out: Path, count: int, process: subprocess.Popen[bytes]) -> None:
-    deadline = time.monotonic() + 30.0
+    deadline = time.monotonic() + 120.0
     while len(list((out / "episodes").glob("*.npz"))) < count:
         assert process.poll() is None and time.monotonic() < deadline
         time.sleep(0.005)
@@ -285,7 +285,7 @@ def wait_for_traces(out: Path, count: int, process: subprocess.Popen[bytes]) -> 
 @pytest.mark.slow
 def test_a_run_killed_fifty_times_ends_with_the_same_bytes(tmp_path: Path) -> None:
     undisturbed, disturbed = tmp_path / "whole", tmp_path / "killed"
-    assert start(undisturbed).wait(60) == 0
+    assert start(undisturbed).wait(300) == 0
     rng = np.random.default_rng(0)
     stored: set[ResultRow] = set()
     for _ in range(50):
@@ -299,7 +299,7 @@ def test_a_run_killed_fifty_times_ends_with_the_same_bytes(tmp_path: Path) -> No
             now = set(Results.load(disturbed).rows)
             assert stored <= now
             stored = now
-    assert start(disturbed).wait(60) == 0
+    assert start(disturbed).wait(300) == 0
     assert stored <= set(Results.load(disturbed).rows)
     assert without_timings(disturbed) == without_timings(undisturbed)
     assert len(without_timings(disturbed)) == 1 + 18
@@ -315,10 +315,10 @@ def test_workers_end_with_their_owner_and_ctrl_c_is_clean(tmp_path: Path) -> Non
     ]
     os.killpg(process.pid, signal.SIGINT)
     assert process.stderr is not None
-    assert b"KeyboardInterrupt" in process.communicate(timeout=10)[1]
+    assert b"KeyboardInterrupt" in process.communicate(timeout=120)[1]
     assert children
     assert not any(Path(f"/proc/{pid}").exists() for pid in children)
-    assert start(tmp_path).wait(60) == 0
+    assert start(tmp_path).wait(300) == 0
     assert len(without_timings(tmp_path)) == 1 + 18
 
 

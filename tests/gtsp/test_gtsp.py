@@ -214,6 +214,7 @@ def test_dynamic_programming_that_is_too_slow_leaves_time_to_search() -> None:
     check_tour(tour, costs, [list(nodes) for nodes in clusters])
 
 
+@pytest.mark.usefixtures("cpu_time")
 @pytest.mark.parametrize("config", [SEARCH, PROOF, GtspConfig(method="exact")])
 def test_cancellation_from_another_thread(config: GtspConfig) -> None:
     costs, clusters = pushes(17, 16, 0)
@@ -402,7 +403,7 @@ def test_iterations_are_counted_and_other_seeds_differ() -> None:
     assert tours[0].nodes != tours[1].nodes
 
 
-@pytest.mark.clock
+@pytest.mark.usefixtures("cpu_time")
 @pytest.mark.parametrize("config", [GtspConfig(), SEARCH, PROOF])
 def test_deadline_holds(config: GtspConfig) -> None:
     costs, clusters = pushes(16, 16, 0)

@@ -128,7 +128,7 @@ class TestGood:
         ):
             OnnxPolicy(path)
 
-    @pytest.mark.clock
+    @pytest.mark.usefixtures("cpu_time")
     def test_it_takes_little_time(self, tmp_path):
         import time
 

@@ -158,7 +158,6 @@ def test_same_world_same_bytes_and_a_new_array() -> None:
     assert first.tobytes() == second.tobytes()
 
 
-@pytest.mark.clock
 def test_the_field_is_computed_once_for_equal_maps() -> None:
     view = ImageObservation()
     view.observe(scene())

@@ -108,7 +108,7 @@ def test_ships_that_hardly_turn(name):
             assert make_planner(name).plan(world, stop=SOON).status.has_plan
 
 
-@pytest.mark.clock
+@pytest.mark.usefixtures("cpu_time")
 def test_a_heap_of_boxes_does_not_stop_the_clock():
     rng = np.random.default_rng(7)
     heap = np.column_stack([rng.uniform(0, 10, (200, 2)), rng.uniform(-3, 3, 200)])
@@ -117,7 +117,7 @@ def test_a_heap_of_boxes_does_not_stop_the_clock():
     world = World(world.robot, world.robot_pose, world.static, boxes, world.goal)
     for name in ("kinodynamic-rrt", "push-aware"):
         planner = make_planner(name)
-        assert quickest(lambda planner=planner: planner.plan(world, stop=Deadline(0.05))) < 0.12
+        assert quickest(lambda planner=planner: planner.plan(world, stop=Deadline(0.05))) < 0.2
 
 
 @pytest.mark.parametrize("door", [0.8, 1.3])
@@ -139,7 +139,7 @@ def test_masses_of_any_ratio(box_mass, robot_mass):
     assert result.plan.interaction_cost > box_mass
 
 
-@pytest.mark.clock
+@pytest.mark.usefixtures("cpu_time")
 def test_a_speck_does_not_stop_the_clock():
     speck = Movables.from_outlines([SQUARE, 1e-5 * SQUARE], [[10, 9, 0.0], [9, 9, 0]])
     world = make_u_maze(movables=speck)
@@ -148,7 +148,7 @@ def test_a_speck_does_not_stop_the_clock():
     assert quickest(lambda: planner.plan(world, stop=Deadline(0.3))) < 0.5
 
 
-@pytest.mark.clock
+@pytest.mark.usefixtures("cpu_time")
 def test_many_columns_do_not_stop_the_clock():
     columns = [
         SQUARE + np.array([x, y])
@@ -167,7 +167,7 @@ def test_many_columns_do_not_stop_the_clock():
     assert time.perf_counter() - began < 0.8
 
 
-@pytest.mark.clock
+@pytest.mark.usefixtures("cpu_time")
 def test_a_busy_thread_does_not_break_anothers_deadline():
     sealed = make_u_maze(
         static=StaticMap.build(

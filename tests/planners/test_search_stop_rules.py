@@ -78,16 +78,15 @@ class TestEveryPlanner:
         assert found == sorted(found)
         assert found[-1]
 
-    @pytest.mark.clock
-    @pytest.mark.clock
+    @pytest.mark.usefixtures("cpu_time")
     def test_a_deadline_ends_the_call(self, name):
-        busy = time.thread_time()
+        began = time.perf_counter()
         result = make_planner(name).plan(start(name), stop=Deadline(0.05))
-        used = time.thread_time() - busy  # of the machine; the wall clock counts others' work too
+        took = time.perf_counter() - began
         others = (PlanStatus.APPROXIMATE, PlanStatus.TIMED_OUT)
         assert result.status in (*solved_by(name), *others)
         if name not in ONE_SHOT:
-            assert used < 0.15
+            assert took < 0.15
 
     def test_no_time_is_no_crash(self, name):
         result = make_planner(name).plan(start(name), stop=Deadline(0.0))

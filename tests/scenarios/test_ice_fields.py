@@ -167,7 +167,6 @@ def test_the_same_seed_gives_the_same_bytes_in_every_process():
     assert ice(0.4, 7) == ice(0.4, 7) != ice(0.4, 8)
 
 
-@pytest.mark.clock
 def test_full_scale_and_speed():
     field = ice(0.5, **FULL_SCALE)
     assert field.concentration == pytest.approx(0.5, rel=1e-9)

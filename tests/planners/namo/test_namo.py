@@ -186,7 +186,7 @@ def test_a_robot_that_cannot_turn_does_not_get_free_through_a_wall() -> None:
     assert ends.run() is None and ends.exhausted
 
 
-@pytest.mark.clock
+@pytest.mark.usefixtures("cpu_time")
 def test_an_open_way_is_found_within_the_deadline() -> None:
     places = np.random.default_rng(0).uniform(2.0, 40.0, (2, 40)).T
     world = World(
@@ -201,7 +201,7 @@ def test_an_open_way_is_found_within_the_deadline() -> None:
     plan(world, MaxIterations(10))  # of this size for the first time
     began = time.perf_counter()
     found = plan(world, Deadline(0.5))
-    assert found.status is PlanStatus.SOLVED and time.perf_counter() - began < 0.75
+    assert found.status is PlanStatus.SOLVED and time.perf_counter() - began < 1.0
 
 
 def episode_succeeds(name: str, number: int) -> bool:

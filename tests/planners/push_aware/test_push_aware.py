@@ -328,7 +328,7 @@ def test_it_clears_the_only_door_and_drives_through():
     assert driven.work == pytest.approx(result.plan.interaction_cost, rel=0.5)
 
 
-@pytest.mark.clock
+@pytest.mark.usefixtures("cpu_time")
 def test_a_deadline_is_kept_among_many_columns_that_were_never_seen():
     planner, took = PushAware(), []
     for shift in (0.0, 0.01, 0.02):
@@ -394,6 +394,7 @@ def test_lines_and_differential_drives():
     assert result.plan.length < 8.25 + 0.6
 
 
+@pytest.mark.usefixtures("cpu_time")
 def test_two_hundred_boxes_and_a_deadline():
     spots = [[x, y, 0.1] for x in np.arange(1, 14.2, 0.75) for y in np.arange(5.5, 14.2, 0.75)]
     small = np.array([spot for spot in spots if abs(spot[0] - 7.5) > 1.0 or spot[1] > 11])[:200]
@@ -404,7 +405,7 @@ def test_two_hundred_boxes_and_a_deadline():
     assert quickest(lambda: planner.plan(world, stop=Deadline(0.3))) < 0.3 + 1.0
 
 
-@pytest.mark.clock
+@pytest.mark.usefixtures("cpu_time")
 def test_a_deadline_is_kept_on_a_map_that_was_never_seen():
     planner = PushAware()
     took = []

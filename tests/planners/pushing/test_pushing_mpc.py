@@ -208,7 +208,6 @@ def test_steps_are_shared_out_among_commands():
         assert len(np.unique(groups_of(32, moves))) == moves
 
 
-@pytest.mark.clock
 def test_it_is_quick():
     warm_up()
     config = PushingConfig(period=0.2)
