@@ -13,7 +13,7 @@ import shapely
 from given_path import GivenPath
 from scene import NavigationError, Scene
 
-from pushplan.control import ImmediateExecutor, PoseProgressChecker, PurePursuit
+from pushplan.control import ImmediateExecutor, PoseProgressChecker, Progress, PurePursuit
 from pushplan.planners import PlanFollower, make_planner, planner_names, warm_up
 from pushplan.planners.following.replanning import Replanning
 from pushplan.planners.kernel_warmup import warm_up_policy
@@ -37,6 +37,9 @@ PLANNERS = planner_names(open_water=False)
 """What plans, and what drives on plans of its own."""
 PATH = "path"
 """Controller that drives the path as it was given."""
+_DEFAULT = {"planner": ("", "GridBased"), "controller": ("", "FollowPath")}
+"""Names that stand for the configured one; Nav2's own files use them."""
+_FAR_AWAY = 1e6  # of the goal of a path [m]
 _CODES = {
     PlanStatus.TIMED_OUT: "TIMEOUT",
     PlanStatus.CANCELLED: "CANCELED",
@@ -109,11 +112,47 @@ class Navigator:
         self._driven = ""
         self._goal: GoalDisc | None = None
         self._outcome = ("", "")
+        self._loading: dict[str, threading.Thread] = {}
+
+    def is_loaded(self, kind: str, name: str) -> bool:
+        """Tell whether a goal can be served at once; else begin to load what it needs.
+
+        Args:
+            kind: ``planner`` or ``controller``.
+            name: as in the goal.
+
+        Raises:
+            NavigationError: if there is no such planner or controller.
+        """
+        name = self._named(kind, name)
+        key = f"{kind} {name}"
+        if key not in self._loading:
+            load = self._load_planner if kind == "planner" else self._load_controller
+            self._loading[key] = threading.Thread(target=load, args=(name,), daemon=True)
+            self._loading[key].start()
+        return not self._loading[key].is_alive()
+
+    def _named(self, kind: str, name: str) -> str:
+        if name in _DEFAULT[kind]:
+            name = self.planner if kind == "planner" else self.controller
+        names = PLANNERS if kind == "planner" else (PATH, *PLANNERS)
+        if name not in names:
+            reason = str(UnknownNameError(kind, name, names))
+            raise NavigationError(f"INVALID_{kind.upper()}", reason)
+        return name
+
+    def _load_planner(self, name: str) -> None:
+        warm_up(name)
+
+    def _load_controller(self, name: str) -> None:
+        warm_up_policy(self._runner(name).policy)
 
     def warm_up(self) -> None:
         """Load the kernels of planner and controller: seconds, minutes after an installation."""
-        warm_up(self.planner)
-        warm_up_policy(self._runner(self.controller).policy)
+        for kind in _DEFAULT:
+            self.is_loaded(kind, "")
+        for thread in list(self._loading.values()):
+            thread.join()
 
     def close(self) -> None:
         """End planning."""
@@ -128,7 +167,7 @@ class Navigator:
         Args:
             goal: ``geometry_msgs/PoseStamped``; its heading is not asked for.
             start: the same, or None for where the robot is.
-            planner_id: one of `PLANNERS`; the default one if empty.
+            planner_id: one of `PLANNERS`; the default one if empty or ``GridBased``.
             stop: a token that cancels the call.
 
         Returns:
@@ -137,8 +176,7 @@ class Navigator:
         Raises:
             NavigationError: if there is none.
         """
-        name = planner_id or self.planner
-        _expect("INVALID_PLANNER", "planner", name, PLANNERS)
+        name = self._named("planner", planner_id)
         warm_up(name)  # does nothing from the second time on
         disc = self._disc(self._pose(goal))
         world = self.scene.world(disc)
@@ -166,19 +204,21 @@ class Navigator:
 
         Args:
             path: ``nav_msgs/Path``.
-            controller_id: ``path`` or one of `PLANNERS`; the default one if empty.
+            controller_id: ``path`` or one of `PLANNERS`; the default one if empty or
+                ``FollowPath``.
 
         Raises:
             NavigationError: if it cannot be driven; what was driven before goes on.
         """
-        name = controller_id or self.controller
-        _expect("INVALID_CONTROLLER", "controller", name, (PATH, *PLANNERS))
+        name = self._named("controller", controller_id)
         frame, robot = self.scene.frame, self.scene.robot
         try:
             plan = plan_from(path, robot, frame)
         except InvalidInputError as error:
             raise NavigationError("INVALID_PATH", str(error)) from error
-        goal = self._disc(plan.poses[-1])
+        end = self._disc(plan.poses[-1])
+        # a path may pass its own end, so that the runner is not told of it: see `_has_arrived`
+        goal = GoalDisc(end.center + _FAR_AWAY, end.radius) if name == PATH else end
         world = self.scene.world(goal)
         before = self._runners.get(self._driven)
         if name == self._driven != PATH and self._is_on_its_way_to(goal):
@@ -192,10 +232,13 @@ class Navigator:
             except InvalidInputError as error:  # not a policy for such a robot or goal
                 raise NavigationError("INVALID_CONTROLLER", str(error)) from error
             self._driven, self._goal, self._outcome = name, goal, ("", "")
+        self._end_of_path = end
         if before is not None and before is not runner:
             before.cancel()
         self._checker = PoseProgressChecker(robot)
-        self._began, self._driveable_at = world.time, -math.inf
+        self._progress = Progress(2.0 * robot.circumscribed_radius)
+        self._began = self._planned_at = world.time
+        self._driveable_at = -math.inf
         self.see()
 
     @property
@@ -225,15 +268,16 @@ class Navigator:
         goal, now = self._goal, max(now, self._began)  # odometry may be ahead of the clock
         assert goal is not None, "call follow(path) first"
         command, world = self._runners[self._driven].command(now), self.scene.world(goal)
+        left = self._distance_left(command.plan, world)
         if not self._outcome[0]:
-            self._judge(command, world, now)
+            self._judge(command, world, now, left)
         stands = command.twist.linear == 0.0 == command.twist.angular
         outcome = self._outcome if stands else ("", "")
         if outcome[0]:
             self._goal = None
-        return Step(command.twist, _distance_left(command.plan, world), *outcome)
+        return Step(command.twist, left, *outcome)
 
-    def _judge(self, command: Command, world: World, now: float) -> None:
+    def _judge(self, command: Command, world: World, now: float, left: float) -> None:
         """End driving where the robot has arrived, or gets nowhere."""
         getting_on, driveable = self.patience
         stale = command.status is CommandStatus.STALE
@@ -241,18 +285,34 @@ class Navigator:
         if not failed or self._driveable_at == -math.inf:
             self._driveable_at = now
         self._checker.update(world.robot_pose, now)
-        if command.status is CommandStatus.DONE:
+        if command.plan is not None:
+            self._planned_at = now
+        if command.status is CommandStatus.DONE or self._has_arrived(world, left):
             self._end("SUCCEEDED", "")
         elif now - self._driveable_at > driveable:
             self._end("TF_ERROR" if stale else "NO_VALID_CONTROL", command.reason)
-        elif self._checker.idle > getting_on:
-            why = f"the robot has not got on for {getting_on:g} s"
-            self._end("FAILED_TO_MAKE_PROGRESS", why)
+        elif max(self._checker.idle, now - self._planned_at) > getting_on:
+            why = self._path.blocked if self._driven == PATH else ""
+            why = why or command.reason or "the robot does not move"
+            self._end("FAILED_TO_MAKE_PROGRESS", f"no progress for {getting_on:g} s: {why}")
+
+    def _has_arrived(self, world: World, left: float) -> bool:
+        """Whether the robot has driven the given path, and is at its end."""
+        x, y = world.robot_pose[:2].tolist()
+        there = self._end_of_path.distance(x, y) == 0.0
+        return self._driven == PATH and there and left <= self.tolerance
 
     def _end(self, code: str, reason: str) -> None:
         if self._goal is not None and not self._outcome[0]:
             self._outcome = code, reason
             self._runners[self._driven].cancel(reason)
+
+    def _distance_left(self, plan: Plan | None, world: World) -> float:
+        """Along the plan, or straight to the goal where there is none [m]."""
+        if plan is None:
+            return self._end_of_path.distance(*world.robot_pose[:2].tolist())
+        along = self._progress.update(plan, world.robot_pose)
+        return self._progress.total - along
 
     def _is_on_its_way_to(self, goal: GoalDisc) -> bool:
         if self._goal is None or self._outcome[0]:
@@ -281,11 +341,6 @@ class Navigator:
         return GoalDisc(pose[:2], 0.5 * self.tolerance)
 
 
-def _expect(code: str, kind: str, name: str, names: tuple[str, ...]) -> None:
-    if name not in names:
-        raise NavigationError(code, str(UnknownNameError(kind, name, names)))
-
-
 def _check_inside(world: World, which: str, point: FloatArray) -> None:
     x0, y0, x1, y1 = world.static.bounds.tolist()
     x, y = point.tolist()
@@ -300,12 +355,3 @@ def _is_occupied(world: World, point: FloatArray) -> bool:
     """Whether the robot cannot be at a point, whatever its heading."""
     place, clear = shapely.Point(point), world.robot.inscribed_radius
     return any(shapely.Polygon(part).distance(place) < clear for part in world.static.convex_parts)
-
-
-def _distance_left(plan: Plan | None, world: World) -> float:
-    """Along the plan, or straight to the goal where there is none [m]."""
-    x, y = world.robot_pose[:2].tolist()
-    if plan is None:
-        return float(world.navigation_goal.distance(x, y))
-    nearest = int(np.hypot(plan.poses[:, 0] - x, plan.poses[:, 1] - y).argmin())
-    return float(plan.arc_lengths[-1] - plan.arc_lengths[nearest])

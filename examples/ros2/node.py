@@ -23,7 +23,7 @@ from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.duration import Duration
 from rclpy.executors import ExternalShutdownException, MultiThreadedExecutor
 from rclpy.node import Node
-from rclpy.qos import DurabilityPolicy, QoSProfile
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from scene import Scene
 from visualization_msgs.msg import MarkerArray
 
@@ -83,10 +83,13 @@ class PushplanNode(Node):  # type: ignore[misc]
         velocity = TwistStamped if self._stamped else TwistMessage
         self._cmd_vel = self.create_publisher(velocity, "cmd_vel", 1)
         self._plan = self.create_publisher(Path, "plan", kept)
+        # each takes what any publisher offers: best effort, and maps of before or of later on
+        sensor = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
         for kind, topic, take, qos in (
             (OccupancyGrid, "map", self._scene.take_map, kept),
-            (Odometry, "odom", self._take_odometry, 1),
-            (MarkerArray, "objects", self._take_objects, 1),
+            (OccupancyGrid, "map", self._scene.take_map, sensor),
+            (Odometry, "odom", self._take_odometry, sensor),
+            (MarkerArray, "objects", self._take_objects, sensor),
         ):
             self.create_subscription(
                 kind, topic, self._checked(topic, take), qos, callback_group=group
@@ -141,6 +144,7 @@ class PushplanNode(Node):  # type: ignore[misc]
     def _compute_path(self, handle: Any) -> Any:
         goal, result = handle.request, ComputePathToPose.Result()
         try:
+            self._load(handle, "planner", goal.planner_id)
             result.path, seconds = self.navigator.compute_path(
                 goal.goal,
                 goal.start if goal.use_start else None,
@@ -162,12 +166,32 @@ class PushplanNode(Node):  # type: ignore[misc]
         goal, result = handle.request, FollowPath.Result()
         with self._driving:  # the goal before this one ends first
             try:
+                self._load(handle, "controller", goal.controller_id)
                 self.navigator.follow(goal.path, goal.controller_id)
             except NavigationError as error:
                 self.navigator.cancel()  # nobody asks for what was driven before
                 self._drive(handle)
                 return self._ended(handle, result, error.code, str(error))
             return self._ended(handle, result, *self._drive(handle))
+
+    def _load(self, handle: Any, kind: str, name: str) -> None:
+        """Wait until a planner or controller can be used; the client may cancel, and is told.
+
+        Raises:
+            NavigationError: if there is none of that name, or the client has canceled.
+        """
+        drives = kind == "controller"
+        if drives and not self.navigator.is_loaded(kind, name):
+            self.navigator.cancel()
+            self._drive(handle)  # until the robot stands
+        while not self.navigator.is_loaded(kind, name):
+            if handle.is_cancel_requested:
+                raise NavigationError("CANCELED", f"the {kind} was being loaded")
+            if drives and handle is not self._newest:
+                raise NavigationError("UNKNOWN", "another path has come in")
+            if drives:
+                handle.publish_feedback(FollowPath.Feedback())
+            self.get_clock().sleep_for(Duration(seconds=0.2))
 
     def _drive(self, handle: Any) -> tuple[str, str]:
         """The control loop, until the robot stands or another path has come in."""

@@ -56,8 +56,10 @@ class Scene:
         self._robot: tuple[FloatArray, FloatArray, float] | None = None
 
     def take_map(self, message: Any) -> None:
-        """Take a ``nav_msgs/OccupancyGrid``."""
-        self._static = static_map_from(message, self.frame)
+        """Take a ``nav_msgs/OccupancyGrid``; the same map again changes nothing."""
+        static = static_map_from(message, self.frame)
+        if static != self._static:
+            self._static = static
 
     def take_odometry(self, message: Any) -> None:
         """Take a ``nav_msgs/Odometry``: pose in the world frame, velocity in the body frame."""

@@ -8,11 +8,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pushplan.world import InvalidInputError, Plan, RobotModel, StaticMap, Twist
+from pushplan.world import Drive, InvalidInputError, Plan, RobotModel, StaticMap, Twist
 from pushplan.world.checks import FloatArray, array
 from pushplan.world.polyline import arc_lengths, goes_back, path_length
 
 _TILT = math.cos(math.radians(15.0))  # steepest floor that still counts as a plane
+_ROUNDED = 0.999  # of the least time of a step: stamps and poses of a path are rounded
+_STAMP = 1e-6  # error of the time between two stamps [s]
 _LATERAL = 1e-6  # speed that counts as none [m/s, rad/s]
 
 
@@ -73,8 +75,9 @@ def path_from(message: Any, frame: str | None = None) -> tuple[FloatArray, Float
 def plan_from(message: Any, robot: RobotModel, frame: str | None = None) -> Plan:
     """A plan to follow from a ``nav_msgs/Path``.
 
-    Where the stamps of the poses increase they are the times; else, as in the paths of Nav2, the
-    robot drives as fast as it can and turns no faster than it can.
+    The stamps of the poses are the times if the robot can drive from pose to pose in them. In the
+    paths of Nav2 they are not: each pose has the time at which its leg was planned. The robot then
+    drives as fast as it can and turns no faster than it can.
 
     Args:
         message: the path.
@@ -85,15 +88,16 @@ def plan_from(message: Any, robot: RobotModel, frame: str | None = None) -> Plan
         InvalidInputError: as `path_from`.
     """
     times, poses = path_from(message, frame)
-    lengths = np.diff(arc_lengths(poses))
-    turns = (np.diff(poses[:, 2]) + np.pi) % (2.0 * np.pi) - np.pi
-    steps = np.diff(times)
-    if len(steps) == 0 or (steps < 0.0).any() or not steps.any():
-        steps = np.maximum(lengths / robot.max_speed, np.abs(turns) / robot.max_turn_rate)
-    elif robot.min_speed < 0.0:  # a path with times says where it goes back
-        back = goes_back(poses, robot.circumscribed_radius)[:-1]
-        lengths *= np.where(back, -1.0, 1.0)
-    moving = steps > 0.0
+    steps, lengths, turns = _driven(poses, robot, backs_up=True)
+    moving = steps > 0.0  # legs may be joined at a pose that is there twice
+    stamped = np.diff(times)
+    if (stamped[moving] >= _ROUNDED * steps[moving] - _STAMP).all():
+        steps = np.maximum(stamped, steps)
+    else:
+        if robot.drive is Drive.DIFFERENTIAL:
+            poses = _with_turns(poses)
+        steps, lengths, turns = _driven(poses, robot, backs_up=False)
+        moving = steps > 0.0
     rates = np.zeros((2, len(poses)))
     rates[:, :-1][:, moving] = np.stack([lengths, turns])[:, moving] / steps[moving]
     return Plan(
@@ -103,6 +107,41 @@ def plan_from(message: Any, robot: RobotModel, frame: str | None = None) -> Plan
         turn_rates=rates[1],
         travel_cost=robot.mass * path_length(poses),
     )
+
+
+def _driven(
+    poses: FloatArray, robot: RobotModel, *, backs_up: bool
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Least time [s], length, negative for back [m], and turn [rad] of each step of a path.
+
+    Args:
+        poses: (N, 3) of the path.
+        robot: who drives it.
+        backs_up: whether steps against the heading are driven back; without times the headings of
+            a path may say nothing of that.
+    """
+    lengths = np.diff(arc_lengths(poses))
+    turns = (np.diff(poses[:, 2]) + np.pi) % (2.0 * np.pi) - np.pi
+    if robot.drive is Drive.CAR:
+        turns[lengths == 0.0] = 0.0  # where legs are joined: it cannot turn on the spot
+    fastest = np.full(len(lengths), robot.max_speed)
+    if backs_up and robot.min_speed < 0.0:
+        fastest[goes_back(poses, robot.circumscribed_radius)[:-1]] = robot.min_speed
+    steps = np.maximum(lengths / np.abs(fastest), np.abs(turns) / robot.max_turn_rate)
+    return steps, np.copysign(lengths, fastest), turns
+
+
+def _with_turns(poses: FloatArray) -> FloatArray:
+    """A path with a turn on the spot where it goes back by more than a right angle."""
+    moves = np.diff(poses[:, :2], axis=0)
+    driven = np.flatnonzero(moves.any(axis=1))
+    headings = np.arctan2(moves[driven, 1], moves[driven, 0])
+    sharp = (moves[driven][:-1] * moves[driven][1:]).sum(axis=1) < 0.0
+    at = driven[1:][sharp]
+    before = np.column_stack([poses[at, :2], headings[:-1][sharp]])
+    turned = np.array(poses)
+    turned[at, 2] = headings[1:][sharp]
+    return np.insert(turned, at, before, axis=0)
 
 
 def twist_from(message: Any) -> Twist:

@@ -150,7 +150,8 @@ def main():
     # errors
     computed("outside", 9.0, 0.0)
     computed("occupied", 2.0, 0.75)
-    computed("unknown planner", 1.0, 0.75, planner_id="GridBased")
+    computed("unknown planner", 1.0, 0.75, planner_id="NavFn")
+    computed("planner of Nav2", 3.0, 2.2, planner_id="GridBased")
     _, future = sent(Path(header=MESSAGES.header(0.0)))
     report["empty path"] = told(wait(future))
     robot.drives = False

@@ -92,6 +92,7 @@ def test_a_robot_is_driven_through_navs_actions(python: Path, tmp_path: Path) ->
         "outside": ("aborted", 204),  # GOAL_OUTSIDE_MAP
         "occupied": ("aborted", 206),  # GOAL_OCCUPIED
         "unknown planner": ("aborted", 201),  # INVALID_PLANNER
+        "planner of Nav2": ("succeeded", 0),
         "empty path": ("aborted", 103),  # INVALID_PATH
         "stuck plan": ("succeeded", 0),
         "stuck": ("aborted", 105),  # FAILED_TO_MAKE_PROGRESS
@@ -102,6 +103,6 @@ def test_a_robot_is_driven_through_navs_actions(python: Path, tmp_path: Path) ->
     assert driven["feedback"] > 100 and driven["fastest"] == pytest.approx(0.22, abs=1e-6)
     assert driven["distances"][0] > 2.0 and driven["distances"][1] < 0.1
     assert canceled["before"] > 0.15 and canceled["last"] == [0.0, 0.0]
-    assert told["robot"] == {"commands": told["robot"]["commands"], "plans": 4}
+    assert told["robot"] == {"commands": told["robot"]["commands"], "plans": 5}
     episode = load_episode(log)
     assert len(episode.times) > 500 and episode.world.movables.ids.tolist() == [4]

@@ -79,14 +79,14 @@ def test_a_plan_comes_back_as_a_path():
     times, poses = path_from(read, "map")
     np.testing.assert_allclose(times, 12.5 + plan.times, atol=1e-9)
     np.testing.assert_allclose(poses, plan.poses, atol=1e-12)
-    again = plan_from(read, make_robot())
+    again = plan_from(read, make_robot(max_speed=1.0, max_turn_rate=4.0))
     np.testing.assert_allclose(again.times, plan.times, atol=1e-9)
     assert again.travel_cost == pytest.approx(plan.length)
     assert again.turn_rates[2] == pytest.approx((6.2 - 2 * math.pi) / 0.75)  # the short way round
 
 
 def test_a_path_with_times_turns_on_the_spot_and_goes_back_as_the_plan_does():
-    robot = make_robot(drive="differential", min_speed=-0.5)
+    robot = make_robot(drive="differential", max_speed=1.0, min_speed=-1.0, max_turn_rate=2.0)
     poses = np.array([[0.0, 0, 0], [0, 0, 1.5], [0, 1, 1.5], [0, 0.2, 1.6]])
     times, rates = np.array([0.0, 1, 2, 3]), np.array([[0.0, 1.5], [1, 0], [-0.8, 0.1], [0, 0]])
     plan = Plan(times, poses, rates[:, 0], rates[:, 1], travel_cost=1.8)
@@ -102,6 +102,39 @@ def test_a_path_without_times_is_driven_at_the_robots_speed():
     assert plan.times.tolist() == pytest.approx([0.0, 2.0, 3.5])
     assert plan.speeds.tolist() == pytest.approx([0.5, 0.0, 0.0])
     assert plan.turn_rates.tolist() == pytest.approx([0.0, 1.0, 0.0])
+
+
+@given(
+    st.lists(st.tuples(st.integers(2, 12), st.floats(-3, 3)), min_size=1, max_size=5),
+    st.sampled_from(["equal", "later", "earlier", "micro", "driven"]),
+    st.sampled_from([0.0, 1.8e9]),
+    st.sampled_from(["differential", "car"]),
+)
+def test_stamps_of_joined_legs_are_times_only_where_the_robot_can_drive_in_them(
+    legs, stamps, begin, drive
+):
+    car = {"min_turning_radius": 0.3} if drive == "car" else {}
+    robot = make_robot(drive=drive, max_speed=0.22, min_speed=0.0, max_turn_rate=2.84, **car)
+    points, times, at, now = [], [], np.zeros(2), begin
+    for count, heading in legs:
+        step = 0.05 * np.array([math.cos(heading), math.sin(heading)])
+        points += [(*(at + k * step), heading) for k in range(count + 1)]
+        at = at + count * step
+        each = {"micro": 1e-6, "driven": 3.0}.get(stamps, 0.0)
+        times += [now + k * each for k in range(count + 1)]
+        now += {"later": 0.08, "earlier": -0.08, "equal": 0.0}.get(stamps, each * (count + 1))
+        now = max(now, 0.0)
+    poses = [MESSAGES.pose_stamped(p, time) for p, time in zip(points, times, strict=True)]
+    header = MESSAGES.header(begin)
+    plan = plan_from(MESSAGES.make("nav_msgs/Path", header=header, poses=poses), robot)
+    length = 0.05 * sum(count for count, _ in legs)
+    assert plan.duration >= length / robot.max_speed - 1e-6
+    assert np.abs(plan.speeds).max() <= robot.max_speed * (1 + 1e-9)
+    assert np.abs(plan.turn_rates).max() <= robot.max_turn_rate * (1 + 1e-9)
+    driven = np.abs(plan.speeds[:-1]) * np.diff(plan.times)
+    np.testing.assert_allclose(driven, np.hypot(*np.diff(plan.poses[:, :2], axis=0).T), atol=1e-9)
+    if stamps == "driven":
+        assert plan.duration == pytest.approx(times[-1] - times[0], abs=1e-5)
 
 
 def test_outlines_come_back_in_single_precision():

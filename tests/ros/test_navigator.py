@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 import sys
+import threading
 import time
 from pathlib import Path
 from types import SimpleNamespace as Some
@@ -245,6 +247,119 @@ def test_a_path_that_is_refused_leaves_the_old_one():
     robot.drive(steps=100)
     assert code_of(lambda: robot.navigator.follow(path, "gtsp-mpc")) == "INVALID_CONTROLLER"
     assert robot.navigator.is_driving and robot.drive()[-1].outcome == "SUCCEEDED"
+
+
+CIRCLE = [
+    (2 + math.cos(a), 1.5 + math.sin(a)) for a in np.linspace(-math.pi / 2, 3 * math.pi / 2, 40)
+]
+SHAPES = {
+    "a loop": [(1, 1), (3, 1), (3, 2), (1, 2), (1, 1)],
+    "passes its end": [(0.5, 1), (3, 1), (3, 2.5), (1.5, 2.5), (1.5, 1)],
+    "a lollipop": [(0.6, 0.5), *CIRCLE, (0.6, 0.5)],
+    "a figure eight": [(2, 1.5), (3, 2.5), (3, 0.5), (1, 2.5), (1, 0.5), (2, 1.5)],
+    "there and back": [(1, 1), (3, 1), (1, 1)],
+}
+
+
+def given_path(corners, stamp=100.0):
+    corners = np.array(corners, dtype=float)
+    points = [a + (b - a) * k / 20 for a, b in itertools.pairwise(corners) for k in range(20)]
+    points = np.array([*points, corners[-1]])
+    steps = np.diff(points, axis=0)
+    headings = np.arctan2(steps[:, 1], steps[:, 0])
+    poses = np.column_stack([points, np.append(headings, headings[-1])])
+    header = MESSAGES.header(stamp)
+    poses = [MESSAGES.pose_stamped(pose, stamp) for pose in poses]
+    length = float(np.hypot(*steps.T).sum())
+    return MESSAGES.make("nav_msgs/Path", header=header, poses=poses), length
+
+
+def empty_room(*blocks):
+    """4 m by 3 m; what is static beside the walls as boxes of cells."""
+    grid = np.zeros((60, 80), dtype=int)
+    grid[[0, -1]] = 100
+    grid[:, [0, -1]] = 100
+    for rows, columns in blocks:
+        grid[rows, columns] = 100
+    return MESSAGES.occupancy(grid, 0.05)
+
+
+@pytest.mark.parametrize("shape", SHAPES)
+@pytest.mark.parametrize("stamp", [100.0, 3.0])
+def test_a_path_that_passes_its_own_end_is_driven_to_its_end(shape, stamp):
+    corners = SHAPES[shape]
+    path, length = given_path(corners, stamp)
+    robot = Robot((*corners[0], 0.0))
+    robot.scene.take_map(empty_room())
+    robot.navigator.follow(path)
+    said = robot.drive(steps=2000)
+    driven = PERIOD * sum(abs(step.twist.linear) for step in said)
+    assert said[-1].outcome == "SUCCEEDED" and driven > length - 0.3
+    assert math.dist(robot.pose[:2], corners[-1]) <= 0.1
+    assert said[0].distance == pytest.approx(length, abs=0.1)
+
+
+BLOCK = (slice(24, 37), slice(40, 44))  # x 2 to 2.2 m, y 1.2 to 1.85 m
+
+
+@pytest.mark.warm("straight")
+@pytest.mark.parametrize("controller", ["", "straight"])
+def test_a_robot_stops_or_drives_around_what_comes_into_its_path(controller):
+    path, _ = given_path([(0.5, 1.5), (3.5, 1.5)])
+    robot = Robot((0.5, 1.5, 0.0), patience=(3.0, 1.0))
+    robot.scene.take_map(empty_room())
+    robot.navigator.follow(path, controller)
+    robot.drive(until=lambda step: robot.pose[0] > 1.6, pause=0.002)
+    assert robot.twist.linear > 0.2
+    robot.scene.take_map(empty_room(BLOCK))
+    places = []
+    said = robot.drive(steps=1500, until=lambda step: places.append(robot.pose.copy()), pause=0.002)
+    hull = robot.scene.robot.circumscribed_radius
+    for x, y, _ in places:
+        away = np.maximum([2.0 - x, x - 2.2, 1.2 - y], [0.0, 0.0, y - 1.85])
+        assert np.hypot(max(away[0], away[1], 0.0), max(away[2], 0.0)) > 0.5 * hull
+    if controller:
+        assert said[-1].outcome == "SUCCEEDED"
+    else:
+        assert said[-1].outcome == "FAILED_TO_MAKE_PROGRESS"
+        assert "static" in said[-1].reason
+
+
+def test_a_blocked_path_is_aborted_with_a_reason_and_driven_when_it_is_free_again():
+    path, _ = given_path([(0.5, 1.5), (3.5, 1.5)])
+    robot = Robot((0.5, 1.5, 0.0), patience=(3.0, 1.0))
+    robot.scene.take_map(empty_room(BLOCK))
+    robot.navigator.follow(path)
+    robot.drive(steps=40)
+    assert robot.navigator.is_driving and robot.twist == Twist(0.0, 0.0)
+    robot.scene.take_map(empty_room())
+    robot.drive(steps=100)
+    assert robot.twist.linear > 0.15
+    robot.scene.take_map(empty_room(BLOCK))
+    said = robot.drive()
+    assert said[-1].outcome == "FAILED_TO_MAKE_PROGRESS"
+    assert "the path leads through something static near (2." in said[-1].reason
+
+
+def test_names_of_nav2s_own_files_stand_for_what_is_configured():
+    robot = Robot()
+    assert path_from(robot.path(3.0, 0.75, planner_id="GridBased"))
+    path, _ = given_path([(1, 0.75), (1, 2)])
+    robot.navigator.follow(path, "FollowPath")
+    assert robot.drive()[-1].outcome == "SUCCEEDED"
+
+
+@pytest.mark.warm("straight")
+def test_a_controller_is_loaded_beside_the_robots_loop():
+    robot, held = Robot(), threading.Event()
+    load = robot.navigator._load_controller
+    robot.navigator._load_controller = lambda name: held.wait(20.0) and load(name)
+    assert not robot.navigator.is_loaded("controller", "straight")
+    assert not robot.navigator.is_loaded("controller", "straight")
+    held.set()
+    robot.navigator._loading["controller straight"].join(20.0)
+    assert robot.navigator.is_loaded("controller", "straight")
+    assert code_of(lambda: robot.navigator.is_loaded("controller", "paht")) == "INVALID_CONTROLLER"
 
 
 def test_markers_become_objects_that_keep_their_ids():
