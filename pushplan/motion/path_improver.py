@@ -18,6 +18,7 @@ from pushplan.motion.goal_region import goal_numbers
 from pushplan.motion.keep_out import keep_out
 from pushplan.motion.path_problem import PathProblem, SweptPath, make_swept_path
 from pushplan.motion.path_search_config import PathSearchConfig
+from pushplan.motion.room_ahead import Room
 from pushplan.motion.shortcutting import shortcut
 from pushplan.motion.speed_profile import TIGHTEST, goal_is_outside, start_margin, timed_plan
 from pushplan.motion.time_slicing import Pace
@@ -28,7 +29,8 @@ from pushplan.world.planning_call import PlanningCall
 _THIN_MARGIN = 0.05
 """Margin below which a post could hide between two poses of the usual spacing [R]."""
 _LEAST_SPACING = 0.02  # least spacing for that reason [R]
-_ENDLESS = 2**62
+ENDLESS = 2**62
+"""A limit of the tests of a sweep that is none."""
 
 
 @dataclass
@@ -149,6 +151,12 @@ class PathImprover:
         return 1e4 * (extent + self.size) * (1.0 + load)
 
     @property
+    def room(self) -> Room:
+        """Where the robot may go."""
+        problem = self.problem
+        return Room(problem.footprint, problem.walls, problem.goal, problem.spacing)
+
+    @property
     def jam_cost(self) -> float:
         """A cost [kg m] that no path without a jam comes near."""
         return self.problem.jam_length * self.problem.robot_mass
@@ -177,13 +185,8 @@ class PathImprover:
         free: bool = True,  # whether it is known to touch no wall and to reach the goal
     ) -> Candidate | None:
         """The path along some arcs with its cost; None if it is not one that could be a plan."""
-        problem, count = self.problem, len(self.world.movables)
-        arcs = np.concatenate([self.lead.pieces, arcs])
-        steps = [abs(arc) / step_along(turn, problem.spacing) for arc, turn in arcs.tolist()]
-        capacity = 3 * int(sum(steps) + len(arcs)) + 200
-        path = make_swept_path(capacity, count)
-        used = lay_out(owned(self.world.robot_pose), arcs, path, problem)
-        assert used > 0  # there is room for three times as many poses
+        problem = self.problem
+        path, used = self.laid_out(np.concatenate([self.lead.pieces, arcs]))
         if not free:
             shape = problem.footprint
             corners = np.empty_like(shape.vertices)
@@ -195,18 +198,28 @@ class PathImprover:
         if cost is None:
             return None
         self._keep(path, used, cost)
-        return Candidate(path, make_swept_path(capacity, count), used, cost)
+        trial = make_swept_path(len(path.poses), len(self.world.movables))
+        return Candidate(path, trial, used, cost)
+
+    def laid_out(self, arcs: FloatArray) -> tuple[SweptPath, int]:
+        """The poses along arcs (E, 2) from the robot to the goal, not swept, and their number."""
+        steps = [abs(arc) / step_along(turn, self.problem.spacing) for arc, turn in arcs.tolist()]
+        capacity = 3 * int(sum(steps) + len(arcs)) + 200
+        path = make_swept_path(capacity, len(self.world.movables))
+        used = lay_out(owned(self.world.robot_pose), arcs, path, self.problem)
+        assert used > 0  # there is room for three times as many poses
+        path.objects[0] = self.world.movables.poses
+        return path, used
 
     def _cost_of(self, path: SweptPath, count: int, limit: float) -> float | None:
         """Sweep the objects along a path; its cost [kg m], None where it passes the limit.
 
         Sweeping through a crowd takes its time: None too where the stop rule fires meanwhile.
         """
-        path.objects[0] = self.world.movables.poses
         cost, swept = 0.0, 1
         for first, last in self._sweep_pace.pieces(count - 1, self.stopped):
             swept = last + 1
-            cost = sweep_cost(path, first, swept, limit, _ENDLESS, self.problem)
+            cost = sweep_cost(path, first, swept, limit, ENDLESS, self.problem)
             if not cost < limit:
                 return None
         return cost if swept == count else None

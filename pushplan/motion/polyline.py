@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from itertools import pairwise
 
 import numpy as np
@@ -54,9 +55,11 @@ def polyline_status(world: World, plan: Plan) -> PlanStatus:
     """
     robot, poses = world.robot, plan.poses
     moves, off = np.diff(poses, axis=0), poses[0] - world.robot_pose
-    fast = np.abs(wrap_angle(moves[:, 2])) > robot.max_turn_rate * np.diff(plan.times) + 1e-9
+    turns, lasts = np.abs(wrap_angle(moves[:, 2])), np.diff(plan.times)
+    fast = turns > robot.max_turn_rate * lasts + 1e-9
     lengths = np.hypot(moves[:, 0], moves[:, 1])
-    fast |= np.abs(wrap_angle(moves[:, 2])) * robot.min_turning_radius > lengths + 1e-9
+    fast |= turns * robot.min_turning_radius > lengths + 1e-9
+    fast |= (turns > 1e-9) & math.isfinite(robot.max_turn_acceleration)  # all at once, at a corner
     near = 1e-9 * robot.circumscribed_radius
     if np.abs(off[:2]).max() > near or abs(wrap_angle(off[2])) > 1e-9 or fast.any():
         return PlanStatus.PATH_ONLY

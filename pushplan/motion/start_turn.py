@@ -1,4 +1,4 @@
-"""A turn on the spot towards the shortest path, for a robot from whose heading no arc leads on."""
+"""What a differential drive begins with where no arc leads on: a way out, and a turn."""
 
 from __future__ import annotations
 
@@ -10,13 +10,16 @@ import numpy as np
 from pushplan.compiled import copy_into, kernel, owned
 from pushplan.geometry import VisibilityGraph
 from pushplan.interaction.advance import advance_objects
-from pushplan.motion.collision import is_free
+from pushplan.motion.arc_rollout import sweep_cost
+from pushplan.motion.collision import footprint, is_free, obstacles
 from pushplan.motion.dubins import MAX_TURN
 from pushplan.motion.keep_out import keep_out
-from pushplan.motion.path_improver import Lead, PathImprover
+from pushplan.motion.path_improver import ENDLESS, Lead, PathImprover
 from pushplan.motion.path_problem import PathProblem
+from pushplan.motion.room_ahead import way_to_turn
 from pushplan.world import Drive
 from pushplan.world.checks import FloatArray
+from pushplan.world.outline import unflatten
 from pushplan.world.polyline import arc_lengths
 
 _LEAST = 0.1
@@ -31,7 +34,7 @@ class _Turn(NamedTuple):
     objects: FloatArray  # (K, 3) where the objects are after it
 
 
-def start_turn(improver: PathImprover) -> Lead | None:
+def start_turn(improver: PathImprover, before: Lead | None = None) -> Lead | None:
     """The turn of a differential drive towards the first leg of the shortest path around the walls.
 
     It goes the shorter way or, where something static blocks that, the longer one; where both are
@@ -39,36 +42,66 @@ def start_turn(improver: PathImprover) -> Lead | None:
 
     Args:
         improver: of this planning call.
+        before: what the robot does first.
 
     Returns:
-        The turn; None for other drives, and where a turn brings nothing.
+        The turn, after what comes before; None for other drives, and where a turn brings nothing.
     """
     world = improver.world
     if world.robot.drive is not Drive.DIFFERENTIAL:
         return None
-    heading = _first_heading(improver)
+    if before is None:
+        before = Lead(np.empty((0, 2)), owned(world.robot_pose), owned(world.movables.poses))
+    start = before.pose
+    heading = _first_heading(improver, start[:2])
     if heading is None:
         return None
-    left = math.remainder(heading - float(world.robot_pose[2]), math.tau)
+    left = math.remainder(heading - float(start[2]), math.tau)
     if abs(left) < _LEAST:
         return None
-    start, objects = owned(world.robot_pose), owned(world.movables.poses)
     best: _Turn | None = None
     for angle in (left, left - math.copysign(math.tau, left)):
-        turn = _Turn(*_turn_freely(improver.problem, start, objects, angle))
+        turn = _Turn(*_turn_freely(improver.problem, start, before.objects, angle))
         if best is None or turn.error < best.error - _LEAST:
             best = turn
     assert best is not None
     if best.error > abs(left) - _LEAST:
         return None
     pose = start + np.array([0.0, 0.0, best.angle])
-    pieces = np.array([[abs(best.angle), math.copysign(math.inf, best.angle)]])
-    return Lead(pieces, pose, best.objects)
+    piece = np.array([[abs(best.angle), math.copysign(math.inf, best.angle)]])
+    return Lead(np.concatenate([before.pieces, piece]), pose, best.objects)
 
 
-def _first_heading(improver: PathImprover) -> float | None:
+def way_out(improver: PathImprover) -> Lead | None:
+    """The drive of a differential drive that may reverse to where it can turn about, and the turn.
+
+    It moves no object and keeps the margin from walls if it can.
+
+    Args:
+        improver: of this planning call.
+
+    Returns:
+        The drive; None where there is none, or the robot can turn about where it is.
+    """
+    world, problem = improver.world, improver.problem
+    start = owned(world.robot_pose)
+    boxes = unflatten(world.movables.vertices_world, world.movables.offsets)
+    among = obstacles(keep_out(world), boxes)
+    for walls in (among, problem.walls) if boxes else (problem.walls,):
+        for shape in (problem.footprint, footprint(world.robot)):
+            room = improver.room._replace(footprint=shape, walls=walls)
+            arcs = way_to_turn(world.robot, room, start, improver.stopped)
+            if arcs is not None:
+                path, count = improver.laid_out(arcs)
+                sweep_cost(path, 0, count, np.inf, ENDLESS, problem)
+                driven = Lead(arcs, owned(path.poses[count - 1]), owned(path.objects[count - 1]))
+                return start_turn(improver, driven) or driven
+    return None
+
+
+def _first_heading(improver: PathImprover, start: FloatArray) -> float | None:
     """The bearing [rad] of the shortest path around the walls where it is R away; None without."""
-    static, start = keep_out(improver.world), improver.world.robot_pose[:2]
+    static = keep_out(improver.world)
     for clearance in (1.1 * improver.size, improver.world.robot.inscribed_radius):
         graph = VisibilityGraph(static, clearance)
         corners = graph.to_goal(start, improver.goal, improver.stopped).points

@@ -29,9 +29,9 @@ class PlanStatus(enum.Enum):
     )
     PATH_ONLY = (
         "path_only",
-        "The plan is a path for a point: the robot stands at another heading, turns slower than "
-        "the path, or touches something static on it. Let a controller follow it, or plan with "
-        "kinodynamic-rrt or push-aware.",
+        "The plan is a path only: the robot stands at another heading, turns slower than the path "
+        "or changes its turn rate slower, or touches something static on it. Let a controller "
+        "follow it, or plan with kinodynamic-rrt or push-aware.",
     )
     TIMED_OUT = (
         "timed_out",
@@ -41,8 +41,8 @@ class PlanStatus(enum.Enum):
     CANCELLED = ("cancelled", "The call was cancelled before there was a plan: call again.")
     START_BLOCKED = (
         "start_blocked",
-        "The robot starts in collision with something static, or cannot reverse and has no room "
-        "ahead: check the pose and the footprint, or drive clear first.",
+        "The robot starts in collision with something static, or has no room ahead, nor behind if "
+        "it can reverse, to get away: check the pose and the footprint, or drive clear first.",
     )
     GOAL_UNREACHABLE = (
         "goal_unreachable",

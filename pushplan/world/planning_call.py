@@ -9,6 +9,7 @@ import numpy as np
 
 from pushplan.world.checks import expect
 from pushplan.world.plan import Plan, PlanResult, PlanStats, PlanStatus
+from pushplan.world.polyline import turn_acceleration
 from pushplan.world.scene import World
 from pushplan.world.stop import AnyOf, Stop, StopCheck, check_rules, wants_own_budget
 
@@ -69,7 +70,16 @@ class PlanningCall:
         nodes: int = 0,
         **detail: float,
     ) -> PlanResult:
-        """The result of the call, which has taken the time up to now; see `PlanStats`."""
+        """The result of the call, which has taken the time up to now; see `PlanStats`.
+
+        A robot that cannot slow down may be unable to change its turn rate as fast as a plan does:
+        then that is a path only.
+        """
+        robot = self.world.robot
+        if plan is not None and not robot.can_stop:
+            fastest = turn_acceleration(plan.turn_rates[:-1], np.diff(plan.times))
+            if fastest > robot.max_turn_acceleration * (1.0 + 1e-6):
+                status = PlanStatus.PATH_ONLY
         stats = PlanStats(self.elapsed, first_solution_s, iterations, nodes, detail)
         return PlanResult(status, plan, stats)
 

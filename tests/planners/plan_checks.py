@@ -27,7 +27,7 @@ def check_plan(world: World, plan: Plan, status: PlanStatus) -> None:
 
 
 def _check_motion(world: World, plan: Plan, rounding: float) -> None:
-    """Starts at the robot's heading, drives forward, and keeps speed and turn rate."""
+    """Starts at the robot's heading, drives as it can, and keeps every limit of the robot."""
     robot, moved, steps = world.robot, np.diff(plan.poses, axis=0), np.diff(plan.times)
     size = robot.circumscribed_radius
     off = np.remainder(plan.poses[0, 2] - world.robot_pose[2] + np.pi, 2.0 * np.pi) - np.pi
@@ -36,15 +36,33 @@ def _check_motion(world: World, plan: Plan, rounding: float) -> None:
     most = 1e-6 + rounding / size
     assert np.all(turns <= robot.max_turn_rate * steps * (1.0 + 1e-6) + most), "turn rate"
     lengths = np.hypot(moved[:, 0], moved[:, 1])
-    assert np.all(lengths <= robot.max_speed * steps * (1.0 + 1e-6) + 2.0 * rounding), "speed"
+    back = plan.speeds[:-1] < 0.0
+    speed = np.where(back, -robot.min_speed, robot.max_speed)
+    assert np.all(lengths <= speed * steps * (1.0 + 1e-6) + 2.0 * rounding), "speed"
     assert np.all(np.abs(plan.turn_rates) <= robot.max_turn_rate * (1.0 + 1e-6)), "turn rates"
     assert np.all(plan.speeds <= robot.max_speed * (1.0 + 1e-6)), "speeds"
+    assert np.all(plan.speeds >= robot.min_speed * (1.0 + 1e-6) - 1e-12), "reverse speeds"
     if robot.drive is Drive.CONSTANT_SPEED:
         assert np.all(plan.speeds >= robot.max_speed * (1.0 - 1e-6)), "constant speed"
+    radius = robot.min_turning_radius
+    assert np.all(turns * radius <= lengths * 1.001 + radius * most), "turning radius"
+    slowest = np.abs(plan.speeds) * (1.0 + 1e-6)
+    assert np.all(np.abs(plan.turn_rates) * radius <= slowest), "turning radius of rates"
+    between = 0.5 * (steps[1:] + steps[:-1])
+    for values, acceleration in (
+        (plan.speeds, robot.max_acceleration),
+        (plan.turn_rates, robot.max_turn_acceleration),
+    ):
+        changes = np.abs(np.diff(values[:-1]))
+        slack = 1e-6 * np.abs(values).max() + 1e-12
+        if np.isfinite(acceleration) and (robot.can_stop or values is plan.turn_rates):
+            assert np.all(changes <= acceleration * between * (1.0 + 1e-6) + slack), "acceleration"
     far = lengths > 1e-3 * size + 1e3 * rounding
     ahead = np.arctan2(moved[far, 1], moved[far, 0]) - plan.poses[:-1][far, 2]
-    aside = np.abs(np.sin(ahead - 0.5 * moved[far, 2]))
-    assert aside.max(initial=0.0) <= 0.01, f"drives aside by {aside.max()} rad"
+    aside = np.sin(ahead - 0.5 * moved[far, 2])
+    assert np.abs(aside).max(initial=0.0) <= 0.01, f"drives aside by {aside} rad"
+    against = (np.cos(ahead - 0.5 * moved[far, 2]) < 0.0) != back[far]
+    assert not against.any(), "drives against the sign of its speed"
 
 
 def _check_walls(world: World, plan: Plan, rounding: float) -> None:

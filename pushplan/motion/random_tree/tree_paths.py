@@ -6,18 +6,18 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from pushplan.compiled import owned
 from pushplan.geometry import VisibilityGraph
 from pushplan.motion.coarse_path import coarse_path, reachable
 from pushplan.motion.collision import footprint, is_free, obstacles
 from pushplan.motion.keep_out import keep_out
 from pushplan.motion.path_improver import Candidate, PathImprover
-from pushplan.motion.path_problem import PathProblem
 from pushplan.motion.polyline import polyline_plan
 from pushplan.motion.random_tree.kinodynamic_tree import TreeGrowth, TreeLimits
 from pushplan.motion.random_tree.targets import Targets
-from pushplan.motion.room_ahead import gets_away
+from pushplan.motion.room_ahead import gets_away, is_boxed_in
 from pushplan.motion.speed_profile import TIGHTEST
-from pushplan.motion.start_turn import start_turn
+from pushplan.motion.start_turn import start_turn, way_out
 from pushplan.world import Drive
 from pushplan.world.checks import FloatArray
 from pushplan.world.outline import unflatten
@@ -51,31 +51,36 @@ class TreePaths:
     def look_ahead(self) -> None:
         """Change the start at once where no forward arc leads away from it."""
         improver = self._improver
-        if improver.world.robot.can_stop and not self._gets_away(improver.problem):
+        if improver.world.robot.can_stop and not self._gets_away():
             self.change_start()
 
-    def _gets_away(self, problem: PathProblem) -> bool:
-        return bool(gets_away(problem, self._improver.lead.pose, self._improver.size))
+    def _gets_away(self) -> bool:
+        improver = self._improver
+        radius = improver.problem.turning_radius
+        return gets_away(improver.room, improver.lead.pose, improver.size, radius)
 
     def change_start(self) -> None:
         """Begin in another way, after what was tried has failed.
 
-        A differential drive begins with a turn on the spot and without it, in turns. A car that can
-        reverse may do so, by two turning radii and twice as far each time; of one that cannot it is
-        found out whether it is `boxed_in`.
+        A differential drive begins with a turn on the spot and without it, in turns; where neither
+        leads on and it can reverse, with a drive to where it can turn about. A car that can reverse
+        may do so, by two turning radii and twice as far each time. The first time it is found out
+        whether the robot is `boxed_in`.
         """
         improver, robot = self._improver, self._improver.world.robot
         turned = len(improver.lead.pieces) > 0
         improver.begin_with(None if turned else start_turn(improver))
-        if robot.drive is Drive.CAR:
-            if robot.min_speed < 0.0:
-                improver.backward = max(2.0 * improver.backward, _BACKWARD * robot.turning_radius)
-            elif not improver.relaxed:
-                tightest = max(robot.turning_radius, TIGHTEST * improver.size)
-                bare = improver.problem._replace(
-                    footprint=footprint(robot), turning_radius=tightest
-                )
-                self.boxed_in = not self._gets_away(bare)
+        if not robot.can_stop:
+            return
+        if robot.min_speed < 0.0 and robot.drive is Drive.CAR:
+            improver.backward = max(2.0 * improver.backward, _BACKWARD * robot.turning_radius)
+        elif robot.min_speed < 0.0 and not self._gets_away():
+            improver.begin_with(way_out(improver) or improver.lead)
+        if not improver.relaxed:
+            tightest = max(robot.turning_radius, TIGHTEST * improver.size)
+            bare = improver.room._replace(footprint=footprint(robot))
+            pose = owned(improver.world.robot_pose)
+            self.boxed_in = is_boxed_in(robot, bare, pose, tightest, improver.stopped)
 
     def grow_two(self, push_weight: float) -> Iterator[Candidate]:
         """Paths of two trees, around the objects and among them, until the stop rule fires."""

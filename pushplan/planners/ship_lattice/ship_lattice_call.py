@@ -13,8 +13,10 @@ from pushplan.interaction import InteractionModel
 from pushplan.interaction.path_sweepers import path_sweeper
 from pushplan.motion.coarse_path import reachable
 from pushplan.motion.collision import first_blocked, footprint, is_free, obstacles
+from pushplan.motion.goal_region import goal_numbers
 from pushplan.motion.keep_out import keep_out
 from pushplan.motion.path_problem import SweptPath
+from pushplan.motion.room_ahead import Room, gets_away
 from pushplan.motion.speed_profile import check_turns, goal_is_outside, timed_plan, turning_radius
 from pushplan.motion.state_lattice.built_lattice import BuiltLattice
 from pushplan.motion.state_lattice.lattice_builder import LatticeBuilder
@@ -102,8 +104,13 @@ class ShipLatticeCall:
                         self._improve(builder)
                 assert self.built is not None
                 return PlanStatus.SOLVED if self.built.arrives else PlanStatus.APPROXIMATE
+        if self.stopped():
+            return None
+        room = Room(shape, walls, goal_numbers(self.goal, 0.0), 0.0)
+        if not gets_away(room, owned(world.robot_pose), self.size, world.robot.turning_radius):
+            return PlanStatus.START_BLOCKED
         # the lattice is coarse: where it leads nowhere there may be a path nevertheless
-        return None if self.stopped() or reachable(world) else PlanStatus.GOAL_UNREACHABLE
+        return None if reachable(world) else PlanStatus.GOAL_UNREACHABLE
 
     def _limits(self) -> list[tuple[float, float]]:
         """Fractions of the turn rate and distances from the bounds [m] to try in turn."""

@@ -11,6 +11,8 @@ from typing import Any
 import numpy as np
 
 from pushplan.interaction.ice import IceInteraction
+from pushplan.motion.speed_profile import along_arcs, timed_plan
+from pushplan.motion.state_lattice.lattice_path import bare_path
 from pushplan.planners.ship_predictive.beam_node import BeamNode, StatePropagator
 from pushplan.planners.ship_predictive.beam_search import BeamSearch
 from pushplan.planners.ship_predictive.channel_view import ChannelView, channel_view
@@ -113,30 +115,24 @@ class PredictiveCall:
             self.first = time.perf_counter()
 
     def plan(self) -> Plan | None:
-        """The best path at full speed, with what it does to the floes."""
+        """The best path, as fast as the robot can, with what it does to the floes."""
         if self._best is None:
             return None
         view, path = self.beam.view, self._best.path()
         world = view.world
-        robot = world.robot
         poses = view.to_world(path[:, :3])
         headings = np.unwrap(poses[:, 2])
         poses[:, 2] = headings + (world.robot_pose[2] - headings[0])  # whole turns
         poses[0] = world.robot_pose
-        chords = step_lengths(path)
-        half = np.clip(0.5 * np.abs(path[1:, 3]) * chords, 1e-9, 1.0)
-        arcs = chords * np.arcsin(half) / half
         work, objects = self._best.work, None
         if self._objects is not None:
             work = float((step_lengths(self._objects) @ view.bodies.masses).sum())
             objects = np.repeat(world.movables.poses[None], len(path), axis=0)
             objects[:, view.near] = view.to_world(self._objects)
-        return Plan(
-            times=np.concatenate([[0.0], np.cumsum(arcs / robot.max_speed)]),
-            poses=poses,
-            speeds=np.full(len(path), robot.max_speed),
-            turn_rates=robot.max_speed * np.append(path[1:, 3], 0.0),
-            travel_cost=robot.mass * float(arcs.sum()),
+        chords, swept = step_lengths(path), bare_path(poses, path[:, 3])
+        return replace(
+            timed_plan(world, swept, self.beam.config.turn_fraction, chords),
+            travel_cost=world.robot.mass * float(along_arcs(chords, path[1:, 3]).sum()),
             interaction_cost=work,
             object_poses=objects,
         )
