@@ -18,7 +18,7 @@ class CommandStatus(enum.StrEnum):
     BLOCKED = "blocked"
     """Slowed down or stopped, because something new is in the way, or closes it."""
     DONE = "done"
-    """The robot, or every object, is where the goal wants it."""
+    """The robot, or every object, is surely where the goal wants it; final until `start`."""
     STALE = "stale"
     """A controlled stop, because the newest world is too old."""
     FAILED = "failed"

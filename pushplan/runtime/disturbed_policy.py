@@ -52,7 +52,7 @@ class DisturbedPolicy:
             self._options.setdefault("position_noise", self.disturbances.position_noise)
             self._options.setdefault("heading_noise", self.disturbances.heading_noise)
             if self.disturbances.vanish > 0.0:
-                self._options.setdefault("keep_unseen", 3.0 * self.disturbances.vanish_time)
+                self._options.setdefault("keep_unseen", 6.0 * self.disturbances.vanish_time)
         self._policy, self._period, self._planning_time = policy, period, planning_time
         driven = self._make().policy
         given = driven.actions if isinstance(driven, ChoosesActions) else ()

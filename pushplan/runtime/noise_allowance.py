@@ -2,10 +2,29 @@
 
 from __future__ import annotations
 
+import functools
+import math
 from dataclasses import dataclass, replace
 
-from pushplan.world import GoalDisc, RobotModel, World
-from pushplan.world.checks import expect
+import numpy as np
+import shapely
+
+from pushplan.world import (
+    ClearanceArea,
+    GoalDisc,
+    GoalLine,
+    InvalidInputError,
+    Receptacle,
+    RobotModel,
+    StaticMap,
+    World,
+)
+from pushplan.world.checks import FloatArray, expect
+from pushplan.world.goals import ManipulationGoal
+
+_SURE = 3.0  # standard deviations by which the robot, or an object, has to be within its goal
+_NARROWEST = 0.25  # part of a receptacle's width that is taken off each of its sides at most
+_CORNER = 0.05  # sine of a turn below which two edges are one
 
 
 @dataclass(frozen=True)
@@ -25,6 +44,11 @@ class NoiseAllowance:
     period: float
     margin: float | None
 
+    @property
+    def is_noisy(self) -> bool:
+        """Whether there is any noise."""
+        return self.place + self.heading > 0.0
+
     def noise_margin(self, robot: RobotModel) -> float:
         """Twice what noise leaves at the robot's farthest point [m]."""
         return 2.0 * (self.place + self.heading * robot.circumscribed_radius)
@@ -33,12 +57,53 @@ class NoiseAllowance:
         """The world with the margin, and with a goal in which the robot is sure to be."""
         world = expect("world", world, World)
         goal = world.goal
-        inset = 3.0 * self.place + world.robot.max_speed * self.period  # the last command acts
+        inset = _SURE * self.place
         if isinstance(goal, GoalDisc):
+            inset += world.robot.max_speed * self.period  # the last command acts
             world = replace(
                 world, goal=GoalDisc(goal.center, max(goal.radius - inset, 0.5 * goal.radius))
             )
+        elif isinstance(goal, GoalLine):
+            if inset > 0.0:
+                world = replace(world, goal=replace(goal, point=goal.point + inset * goal.normal))
+        elif self.is_noisy:
+            farthest = float(world.movables.radii.max(initial=0.0))
+            inset = _SURE * math.hypot(self.place, self.heading * farthest)
+            world = replace(world, goal=_surer_goal(goal, world.static, inset))
         margin = self.margin
         if margin is None:
             margin = max(world.margin, self.noise_margin(world.robot))
         return world if margin == world.margin else replace(world, margin=margin)
+
+
+@functools.lru_cache(maxsize=8)
+def _surer_goal(goal: ManipulationGoal, static: StaticMap, inset: float) -> ManipulationGoal:
+    """The goal for objects, farther out, or farther in except where a wall is behind it [m]."""
+    corners = goal.polygon
+    along = np.roll(corners, -1, axis=0) - corners
+    normals = np.stack([along[:, 1], -along[:, 0]], axis=1) / np.hypot(*along.T)[:, None]
+    if isinstance(goal, ClearanceArea):
+        by = np.full(len(corners), inset)
+        return ClearanceArea(_with_edges_moved(corners, normals, by), goal.open_edges)
+    widths = (corners * normals).sum(axis=1) - (corners @ normals.T).min(axis=0)
+    inset = min(inset, _NARROWEST * float(widths.min()))
+    middles = corners + 0.5 * along
+    probes = shapely.linestrings(np.stack([middles, middles + inset * normals], axis=1))
+    by = np.where(shapely.covers(shapely.box(*static.bounds), probes), -inset, 0.0)
+    for part in static.convex_parts:
+        by[shapely.intersects(shapely.Polygon(part), probes)] = 0.0
+    try:
+        return Receptacle(_with_edges_moved(corners, normals, by))
+    except InvalidInputError:  # an edge is too short for it
+        return goal
+
+
+def _with_edges_moved(corners: FloatArray, normals: FloatArray, by: FloatArray) -> FloatArray:
+    """(N, 2) corners of a convex outline after each edge has moved along its normal by (N,) [m]."""
+    before, moved = np.roll(normals, 1, axis=0), np.roll(by, 1)
+    turn = before[:, 0] * normals[:, 1] - before[:, 1] * normals[:, 0]
+    x = moved * normals[:, 1] - by * before[:, 1]
+    y = by * before[:, 0] - moved * normals[:, 0]
+    corner = np.stack([x, y], axis=1) / np.maximum(turn, _CORNER)[:, None]
+    shifted: FloatArray = corners + np.where(turn[:, None] > _CORNER, corner, by[:, None] * normals)
+    return shifted

@@ -48,6 +48,7 @@ PLAN_STOP = OwnBudget() | Deadline(1.0)
 _SMOOTHING = 0.3  # gain of the filter of noisy poses
 _RETRY = 0.25  # time after a failure in which the policy is not asked [s]
 _BLIND = 60.0  # for how long a robot that is to continue does so without a world [s]
+_SURE = 5  # snapshots in which the goal has to be reached where one of them may err
 _WAITING = 99  # snapshots that are kept for the next command, besides the newest
 
 
@@ -158,6 +159,7 @@ class Runner:
         self._clock_read = False
         self._stepped = self._refused = ""
         self._cancelled = ""
+        self._done, self._surely_done = 0, False
         self._last: Command | None = None
         self._plan: Plan | None = None
         self._planned_at = self._retry_at = -math.inf
@@ -204,10 +206,17 @@ class Runner:
     def _restart(self, world: World) -> None:
         """Begin anew with a snapshot: nothing that was seen, sent or planned before it counts."""
         self._estimator.reset()
-        self._estimator.observe(world)
         self._memory = ObjectMemory(self.keep_unseen)
-        self._memory.complete(world, world)
+        self._observe(self._memory.complete(world, world))
         self._drop_plans()
+
+    def _observe(self, world: World) -> None:
+        """Take a snapshot, and see whether it is sure by now that the goal is reached."""
+        seen = self._estimator.observe(world)
+        self._done = self._done + 1 if is_done(seen) else max(0, self._done - 1)
+        exact = isinstance(world.goal, GoalDisc | GoalLine) and not self._allowance.is_noisy
+        once = exact or not world.robot.can_stop  # one that drives on may be out soon
+        self._surely_done = self._surely_done or self._done >= (1 if once else _SURE)
 
     def _drop_plans(self) -> None:
         """Abandon all planning calls; the policy starts anew when none of them runs any more."""
@@ -275,7 +284,7 @@ class Runner:
             self._stepped = ""
         else:
             predicted = self._estimator.at(seen.time)
-            self._estimator.observe(self._memory.complete(seen, predicted))
+            self._observe(self._memory.complete(seen, predicted))
         return fresh[-1]
 
     def cancel(self, reason: str = "cancelled") -> None:
@@ -379,6 +388,8 @@ class Runner:
         """The velocity that is wanted, before the limits of acceleration; None is to wait."""
         if self._cancelled:
             return None, CommandStatus.CANCELLED, self._cancelled
+        if self._surely_done:
+            return None, CommandStatus.DONE, ""
         if clock:
             return None, CommandStatus.STALE, clock
         if age > self._believed:
@@ -401,8 +412,6 @@ class Runner:
             self._failure, self._retry_at = describe(error), now + _RETRY
             self._drop_plans()
             return None, CommandStatus.FAILED, self._failure
-        if is_done(world):
-            return wanted, CommandStatus.DONE, ""
         if wanted.linear == 0.0 == wanted.angular:
             why = "a plan is on its way" if self._running_s else _missing_plan(self.policy)
             if why:

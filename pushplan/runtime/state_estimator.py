@@ -54,12 +54,13 @@ class StateEstimator:
         self._sent.append((time + self._delay, twist))
         self._drop_before(time - self._horizon)
 
-    def observe(self, world: World) -> None:
-        """Take a snapshot, later than the one before."""
+    def observe(self, world: World) -> World:
+        """Take a snapshot, later than the one before; returns what is believed of it."""
         if self._gain < 1.0 and self._world is not None:
             world = self._blend(self._advanced(self._world, world.time), world)
         self._world = self._ahead = world
         self._drop_before(world.time)
+        return world
 
     def _drop_before(self, time: float) -> None:
         """Forget the commands that were over by then [s]."""
