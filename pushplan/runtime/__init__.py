@@ -3,6 +3,7 @@
 from pushplan.runtime.command import Command, CommandStatus
 from pushplan.runtime.disturbances import Disturbances
 from pushplan.runtime.disturbed_policy import DisturbedPolicy
+from pushplan.runtime.motors import Motors
 from pushplan.runtime.run_log import RunLog
 from pushplan.runtime.runner import PLAN_STOP, Runner
 from pushplan.runtime.state_estimator import StateEstimator
@@ -14,6 +15,7 @@ __all__ = [
     "CommandStatus",
     "Disturbances",
     "DisturbedPolicy",
+    "Motors",
     "PlanningError",
     "RunLog",
     "Runner",
