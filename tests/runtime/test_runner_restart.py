@@ -53,7 +53,7 @@ def test_a_second_start_waits_with_the_policy_until_no_thread_is_in_it():
         runner.start(world)
         until(policy.entered.is_set)
         resets = policy.resets
-        command = runner.start(world.moved(robot_pose=[3.0, 3.0, 0.0]))
+        command = runner.start(world.moved(robot_pose=world.robot_pose + 0.1))
         assert command.status is CommandStatus.WAITING and "abandoned" in command.reason
         assert policy.rules[-1].cancelled  # it was told to end
         world, commands = drive(runner, later(world, STILL), 5, wait=False)
