@@ -11,12 +11,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-import yaml
-
 from pushplan.world import SchemaError
 from pushplan.world.checks import integer, known_keys
 from pushplan.world.errors import short
 from pushplan.world.safe_files import read_data
+from pushplan.world.safe_yaml import dump
 
 SCHEMA = "pushplan-scenarios/1"
 """Name and version of the file format; files of another version are refused."""
@@ -136,7 +135,7 @@ class Scenario:
 def save_scenarios(scenarios: Iterable[Scenario], path: str | Path) -> None:
     """Write scenarios to a YAML file; `load_scenarios` gives them back equal."""
     data = {"schema": SCHEMA, "scenarios": [scenario.to_dict() for scenario in scenarios]}
-    Path(path).write_text(yaml.safe_dump(data, sort_keys=False), encoding="utf-8")
+    Path(path).write_text(dump(data), encoding="utf-8")
 
 
 def load_scenarios(path: str | Path) -> tuple[Scenario, ...]:

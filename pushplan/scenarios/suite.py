@@ -11,13 +11,11 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
-import yaml
-
 from pushplan.scenarios.scenario import Scenario
 from pushplan.world import SchemaError, UnknownNameError
 from pushplan.world.checks import integer
 from pushplan.world.files import SCHEMA
-from pushplan.world.safe_files import read_data
+from pushplan.world.safe_files import parse_yaml, read_data
 
 
 @dataclass(frozen=True)
@@ -183,5 +181,5 @@ def _is_world(path: Path) -> bool:
 @cache
 def _table() -> Mapping[str, Any]:
     text = resources.files("pushplan.scenarios").joinpath("data/suites.yaml").read_text("utf-8")
-    table: Mapping[str, Any] = yaml.safe_load(text)
+    table: Mapping[str, Any] = parse_yaml(text)
     return table

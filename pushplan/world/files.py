@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import yaml
 
 from pushplan.world.checks import array, boolean, integer, known_keys, number, word
 from pushplan.world.errors import InvalidInputError, SchemaError, short, unknown_name_message
@@ -20,6 +19,7 @@ from pushplan.world.nav2_map import load_nav2_map
 from pushplan.world.outline import convex_outline, signed_area
 from pushplan.world.robot import Drive, RobotModel
 from pushplan.world.safe_files import read_data
+from pushplan.world.safe_yaml import dump
 from pushplan.world.scene import World
 from pushplan.world.static_map import StaticMap
 
@@ -160,7 +160,7 @@ def save_world(world: World, path: str | Path) -> None:
     if path.suffix == ".json":
         text = json.dumps(data, indent=1)
     elif path.suffix in (".yaml", ".yml"):
-        text = yaml.safe_dump(data, sort_keys=False, default_flow_style=None)
+        text = dump(data, default_flow_style=None)
     else:
         raise SchemaError(f"a world file ends in .json, .yaml or .yml, got {path.name!r}")
     path.write_text(text, encoding="utf-8")

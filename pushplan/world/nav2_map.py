@@ -3,17 +3,29 @@
 from __future__ import annotations
 
 import io
+import re
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from pushplan.world.checks import FloatArray, IntArray, array, choice, known_keys, number, word
-from pushplan.world.errors import InvalidInputError, SchemaError, describe
+from pushplan.world.checks import (
+    BoolArray,
+    FloatArray,
+    IntArray,
+    array,
+    choice,
+    known_keys,
+    number,
+    word,
+)
+from pushplan.world.errors import InvalidInputError, SchemaError, describe, short
 from pushplan.world.libraries import need
 from pushplan.world.safe_files import read_bytes, read_data
 from pushplan.world.static_map import StaticMap
 
+_DEPTH = re.compile(rb"P[25](?:\s+(?:#.*\s+)*\d+){2}\s+(?:#.*\s+)*(\d+)")
+"""Greatest value of a grey map in PGM."""
 _MODES = ("trinary", "scale", "raw")
 _FORMATS = ("PPM", "PNG", "BMP")
 _MAX_PIXELS = 4096**2
@@ -41,8 +53,8 @@ def load_nav2_map(path: str | Path, *, unknown: str = "obstacle", occupied: int 
 def read_nav2_grid(path: str | Path) -> tuple[IntArray, float, FloatArray]:
     """The occupancy grid of a map: what ``nav2_map_server`` would publish for it.
 
-    Its thresholds, modes and treatment of transparency are those of ``nav2_map_server``'s
-    ``map_io.cpp``.
+    Thresholds, modes and opacity have the meaning of ``map_io.cpp`` from Nav2 Jazzy on. Keys that
+    it does not know are ignored.
 
     Returns:
         (rows, columns) -1 or 0 to 100, row 0 at the least y; the side of a cell [m]; (3,) x, y
@@ -53,64 +65,72 @@ def read_nav2_grid(path: str | Path) -> tuple[IntArray, float, FloatArray]:
     """
     data, path = read_data(path, "map file"), Path(path)
     try:
-        known_keys("map file", data, (*_REQUIRED, "mode"), _REQUIRED)
-        mode = choice("map mode", data.get("mode", "trinary"), _MODES)
+        known_keys("map file", data, None, _REQUIRED)
+        mode = choice("map mode", word("mode", data.get("mode", "trinary")).lower(), _MODES)
         negate = data["negate"]
         if negate not in (0, 1):
-            raise InvalidInputError(f"negate must be 0 or 1, got {negate!r}")
+            raise InvalidInputError(f"negate must be 0 or 1, got {short(negate)}")
         high = number("occupied_thresh", data["occupied_thresh"], low=0.0, high=1.0)
         low = number("free_thresh", data["free_thresh"], low=0.0, high=1.0)
-        if low >= high:
-            raise InvalidInputError(f"free_thresh must be below occupied_thresh, got {low}, {high}")
+        if low > high:
+            rule = f"must not be above occupied_thresh, got {low:g} and {high:g}"
+            raise InvalidInputError(f"free_thresh {rule}")
         side = number("resolution", data["resolution"], low=0.0, open_low=True)
         origin: FloatArray = array("origin", data["origin"], (3,))
-        shade, alpha = _picture(path.parent / word("image", data["image"]))
+        grey, opaque = _picture(path.parent / word("image", data["image"]))
     except SchemaError as error:
         raise SchemaError(f"{path}: {error}") from error
     except InvalidInputError as error:
         raise InvalidInputError(f"{path}: {error}") from error
     if mode == "raw":
-        percent = np.floor(255.0 * shade + 0.5)
-        cells = np.where(percent <= 100.0, percent, -1.0)
+        cells = np.where(grey <= 100, grey, -1)
     else:
-        if mode == "trinary" and alpha is not None:
-            shade = (3.0 * shade + alpha) / 4.0  # as it always did
-        taken = shade if negate else 1.0 - shade
-        between = np.full(taken.shape, -1.0)
-        if mode == "scale":
-            between = np.rint((taken - low) / (high - low) * 100.0)
-        cells = np.where(taken > high, 100.0, np.where(taken < low, 0.0, between))
-        if mode == "scale" and alpha is not None:
-            cells[alpha < 1.0] = -1.0
+        cells = _compared(grey, bool(negate), low, high, mode == "scale")
+        cells[~opaque] = -1
     return np.ascontiguousarray(cells[::-1].astype(np.int64)), side, origin
 
 
-def _picture(path: Path) -> tuple[FloatArray, FloatArray | None]:
-    """Mean of the colours (rows, columns) in [0, 1], top row first, and opacity where there is."""
+def _compared(grey: IntArray, negate: bool, low: float, high: float, scale: bool) -> IntArray:
+    """Cells by two thresholds that belong to the values they bound, in float32 as Nav2 does."""
+    shade = grey.astype(np.float32) / np.float32(255.0)
+    taken = shade if negate else np.float32(1.0) - shade
+    least, most, width = np.float32(low), np.float32(high), np.float32(high - low)
+    cells = np.full(grey.shape, -1)
+    if scale and width > 0.0:
+        between = (taken - least) / width * np.float32(100.0)
+        cells = np.floor(between.astype(np.float64) + 0.5).astype(np.int64)
+    cells[taken >= most] = 100
+    cells[taken <= least] = 0  # wins where the thresholds are equal
+    return cells
+
+
+def _picture(path: Path) -> tuple[IntArray, BoolArray]:
+    """Grey values 0 to 255 and the opaque pixels, (rows, columns) each, top row first."""
     Image = need("PIL.Image")
     data = read_bytes(path, "the picture of the map,")
     try:
         with Image.open(io.BytesIO(data), formats=_FORMATS) as image:
             if image.width * image.height > _MAX_PIXELS:
                 raise ValueError(f"{image.width} x {image.height} pixels, {_MAX_PIXELS:,} are most")
-            pixels: Any = _pixels(image)
+            grey, opaque = _pixels(image)
     except Exception as error:  # a decoder of pictures raises errors of many kinds
         raise SchemaError(
             f"cannot read the picture of the map, {path}: {describe(error)}"
         ) from error
-    if pixels.ndim == 2:
-        return pixels, None
-    opaque = pixels[..., -1] if pixels.shape[2] in (2, 4) else None
-    colours = pixels if opaque is None else pixels[..., :-1]
-    return colours.mean(axis=2), opaque
+    depth = _DEPTH.match(data)
+    if depth is not None and 0 < int(depth[1]) < 255:  # Pillow rounds to the nearest
+        most = int(depth[1])
+        grey = np.rint(grey * (most / 255.0)).astype(np.int64) * (65535 // most) // 257
+    return grey, opaque
 
 
-def _pixels(image: Any) -> FloatArray:
-    """Channels of a picture in [0, 1]: (rows, columns), or (rows, columns, channels)."""
+def _pixels(image: Any) -> tuple[IntArray, BoolArray]:
+    """What `_picture` returns, as GraphicsMagick makes it: in 16 bits, then rounded down to 8."""
+    hidden = image.info.get("transparency")
     if image.mode.startswith("I"):  # 16 bits of grey
-        return np.asarray(image, dtype=np.float64) / 65535.0
-    if image.mode == "1":
-        image = image.convert("L")
-    elif image.mode not in ("L", "LA", "RGB", "RGBA"):
-        image = image.convert("RGBA" if "transparency" in image.info else "RGB")
-    return np.asarray(image, dtype=np.float64) / 255.0
+        deep = np.asarray(image, dtype=np.int64)
+        return deep // 257, np.full(deep.shape, True) if hidden is None else deep != hidden
+    wanted = "RGB" if hidden is None and image.mode not in ("LA", "RGBA", "PA") else "RGBA"
+    pixels = np.asarray(image.convert(wanted), dtype=np.int64)
+    grey = (257 * pixels[..., :3] @ np.array([299, 587, 114]) + 500) // 1000 // 257
+    return grey, pixels[..., 3:].min(axis=2, initial=255) == 255

@@ -5,6 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from pushplan.world.checks import BoolArray, IntArray
+from pushplan.world.errors import InvalidInputError
+
+MOST_RECTANGLES = 100_000
+"""Greatest number: some seconds and 100 MB. Maps of robots need up to some thousands."""
 
 
 def rectangle_cover(occupied: BoolArray) -> IntArray:
@@ -19,6 +23,9 @@ def rectangle_cover(occupied: BoolArray) -> IntArray:
 
     Returns:
         (N, 4) first row, first column, row and column after the last, of each rectangle.
+
+    Raises:
+        InvalidInputError: if there are more than `MOST_RECTANGLES`.
     """
     full = np.pad(occupied, 1)  # free cells all round end every run
     by_row, by_column = _counts(full), _counts(full.T)
@@ -42,6 +49,11 @@ def rectangle_cover(occupied: BoolArray) -> IntArray:
                 best = r0, c0, r1, c1
         left[best[0] : best[2], best[1] : best[3]] = False
         found.append(best)
+        if len(found) > MOST_RECTANGLES:
+            raise InvalidInputError(
+                f"the occupied cells need more than {MOST_RECTANGLES:,} rectangles, the most that "
+                "a map may have: remove single cells from the grid, or make the cells larger"
+            )
     return np.array(found, dtype=np.int64).reshape(-1, 4) - 1
 
 

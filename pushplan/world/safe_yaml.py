@@ -1,8 +1,14 @@
-"""YAML of plain values, bounded: PyYAML's safe loader on libyaml's parser, where it is built in."""
+"""YAML of plain values, bounded: PyYAML's safe loader on libyaml's parser, where it is built in.
+
+Numbers are those of YAML 1.2 (core schema), as in JSON: ``1e3``, ``5e-2``, ``+.5``, ``0o17``, and
+``012`` is twelve. ``1:30`` and dates are texts. Of YAML 1.1, whose files are many, ``1_000`` is a
+number still, and ``yes`` and ``on`` are truth values, as yaml-cpp reads them too.
+"""
 
 from __future__ import annotations
 
-from typing import Any
+import re
+from typing import Any, ClassVar
 
 import yaml
 from yaml.composer import Composer
@@ -11,7 +17,17 @@ from pushplan.world.safe_files import LONGEST_NUMBER, MAX_DEPTH
 
 MAX_NODES = 60_000
 """Most values in a file, each counted as often as aliases repeat it."""
-_NUMBERS = ("tag:yaml.org,2002:int", "tag:yaml.org,2002:float")
+_WHOLE, _REAL = "tag:yaml.org,2002:int", "tag:yaml.org,2002:float"
+_TEXTS = ("tag:yaml.org,2002:timestamp", "tag:yaml.org,2002:value")
+"""What YAML 1.1 takes for more than a text: dates and ``=``."""
+_NUMBERS = {
+    _WHOLE: re.compile(r"(?:[-+]?[0-9]+(?:_[0-9]+)*|0o[0-7]+|0x[0-9a-fA-F]+)\Z"),
+    _REAL: re.compile(
+        r"(?:[-+]?(?:\.[0-9]+|[0-9]+(?:_[0-9]+)*(?:\.[0-9]*)?)(?:[eE][-+]?[0-9]+)?"
+        r"|[-+]?\.(?:inf|Inf|INF)|\.(?:nan|NaN|NAN))\Z"
+    ),
+}
+"""YAML 1.2.2, section 10.3.2; what both take is a whole number."""
 if hasattr(yaml, "CSafeLoader"):
 
     class _Safe(Composer, yaml.CSafeLoader):
@@ -26,6 +42,11 @@ else:
 
 
 class _Loader(_Safe):
+    yaml_implicit_resolvers: ClassVar[dict[str, Any]] = {
+        first: [(tag, rule) for tag, rule in rules if tag not in (*_NUMBERS, *_TEXTS)]
+        for first, rules in _Safe.yaml_implicit_resolvers.items()
+    }
+
     def __init__(self, text: str) -> None:
         super().__init__(text)
         self._nodes = 0
@@ -66,6 +87,23 @@ class _Loader(_Safe):
         return node
 
 
+class _Dumper(yaml.SafeDumper):
+    """Quotes the texts that readers of either version would take for a number."""
+
+
+for _kind in (_Loader, _Dumper):
+    for _tag, _rule in _NUMBERS.items():
+        _kind.add_implicit_resolver(_tag, _rule, list("-+.0123456789"))
+
+
+def _whole(loader: _Loader, node: Any) -> int:
+    text = loader.construct_scalar(node)
+    return int(text, {"0o": 8, "0x": 16}.get(text[:2], 10))
+
+
+_Loader.add_constructor(_WHOLE, _whole)
+
+
 def _refusal(problem: str, at: Any) -> yaml.MarkedYAMLError:
     return yaml.MarkedYAMLError(problem=problem, problem_mark=at.start_mark)
 
@@ -77,3 +115,8 @@ def load(text: str) -> Any:
         return loader.get_single_data()
     finally:
         loader.dispose()
+
+
+def dump(data: Any, **style: Any) -> str:
+    """A text that `load` reads back equal, with the keys in their order."""
+    return yaml.dump(data, Dumper=_Dumper, sort_keys=False, **style)

@@ -15,11 +15,17 @@ from pathlib import Path
 import doors
 import numpy as np
 import pytest
+import yaml
 from doors import DOORS, check_message, feed
 
+from pushplan.cli.scenario_options import variation
+from pushplan.evaluation import Experiment
+from pushplan.scenarios import load_scenarios
 from pushplan.world import Episode, PushplanError, SchemaError, load_nav2_map, load_world
 from pushplan.world.errors import LONGEST_MESSAGE, InvalidInputError, UnknownNameError, one_line
+from pushplan.world.nav2_map import read_nav2_grid
 from pushplan.world.safe_files import parse_json, parse_yaml, read_bytes, read_npz
+from pushplan.world.safe_yaml import dump
 
 FILES = [name for name in DOORS if name not in ("policy-name", "variation")]
 
@@ -96,7 +102,7 @@ YAMLS = {
     "dashes": ("- " * 100_000, "64 deep"),
     "long": ("time: " + "9" * 5000, "400 digits"),
     "hexadecimal": ("time: 0x" + "f" * 5000, "400 digits"),
-    "sexagesimal": ("time: " + "1:" * 500_000 + "1", "400 digits"),
+    "exponent": ("time: 1e" + "1" * 5000, "400 digits"),
     "many": ("[" + "1," * 1_000_000 + "1]", "60,000 values"),
     "escapes": ('"\\e[2J\\e[31m": 1', r"\x1b[2J"),
     "tag": ("!!bool maybe", "not valid YAML"),
@@ -110,6 +116,48 @@ def test_yaml_is_bounded(attack: str, tmp_path: Path) -> None:
     text, words = YAMLS[attack]
     for name in ("world-yaml", "scenarios", "map-yaml", "training"):
         assert words in refusal(name, tmp_path, text.encode())
+
+
+NUMBERS = {
+    "1e3": 1000.0, "1E3": 1000.0, "1.0e3": 1000.0, "5e-2": 0.05, "-1e1": -10.0, "1e-09": 1e-9,
+    "+.5": 0.5, ".5": 0.5, "1.": 1.0, "-.5e+3": -500.0, "12": 12, "+12": 12, "012": 12, "0o17": 15,
+    "0x1F": 31, "1_000": 1000, "1_000.5": 1000.5, ".inf": float("inf"), "1e400": float("inf"),
+    "1e3abc": "1e3abc", "1e": "1e", "e5": "e5", "1:30": "1:30", "0b1": "0b1", "1.2.3": "1.2.3",
+    ".": ".", "2001-02-03": "2001-02-03", "=": "=", "'1e3'": "1e3", "yes": True, "Off": False,
+    "~": None,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("written", NUMBERS)
+def test_numbers_are_those_of_yaml_1_2(written: str) -> None:
+    (found,) = parse_yaml(f"[{written}]")
+    assert found == NUMBERS[written] and type(found) is type(NUMBERS[written])
+    assert parse_yaml(dump([found, written])) == [found, written]
+    assert yaml.safe_load(dump([written])) == [written]  # for readers of YAML 1.1 too
+
+
+def test_every_door_reads_exponents(tmp_path: Path) -> None:
+    path, good = DOORS["world-yaml"].make(tmp_path)
+    path.write_bytes(
+        good.replace(b"mass: 1.0", b"mass: 1e3").replace(b"radius: 1.0", b"radius: +5e-1")
+    )
+    world = load_world(path)
+    assert world.robot.mass == 1000.0 == world.movables.masses[0] and world.goal.radius == 0.5
+    path, good = DOORS["map-yaml"].make(tmp_path)
+    path.write_bytes(good.replace(b"0.05", b"5e-2").replace(b"[0.0, 0.0", b"[-1e1, 1E-09"))
+    _, side, origin = read_nav2_grid(path)
+    assert side == 0.05 and origin.tolist() == [-10.0, 1e-9, 0.0]
+    path, good = DOORS["scenarios"].make(tmp_path)
+    path.write_bytes(good.replace(b"boxes: 3", b"time_limit: 1e3"))
+    assert load_scenarios(path)[0].variations == {"time_limit": 1000.0}
+    assert variation("time_limit=1e3") == ("time_limit", 1000.0)
+    study = tmp_path / "study.yaml"
+    study.write_text(
+        "schema: pushplan-experiment/1\nsuites: [smoke]\npolicies:\n"
+        "- {policy: straight, parameters: {spacing: 2e-1}}\n"
+    )
+    (policy,) = Experiment.load(study).policies
+    assert policy.make().planner.spacing == 0.2
 
 
 def test_what_yaml_may_hold() -> None:

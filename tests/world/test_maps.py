@@ -11,7 +11,14 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from PIL import Image
 
-from pushplan.world import InvalidInputError, SchemaError, StaticMap, load_nav2_map, load_world
+from pushplan.world import (
+    InvalidInputError,
+    SchemaError,
+    StaticMap,
+    load_nav2_map,
+    load_world,
+    rectangles,
+)
 from pushplan.world.nav2_map import read_nav2_grid
 from pushplan.world.rectangles import rectangle_cover
 
@@ -139,13 +146,81 @@ def test_scale_and_raw_maps(tmp_path):
     assert read_nav2_grid(path)[0].tolist() == [[0, -1, -1, 100]]
 
 
-def test_transparent_pixels(tmp_path):
-    pixels = [[[0, 0, 0, 255], [0, 0, 0, 0], [255, 255, 255, 255], [255, 255, 255, 0]]]
-    path = write(tmp_path, pixels, name="map.png")
-    # an average over four channels, opacity among them: 0.75, 1, 0, 0.25
-    assert read_nav2_grid(path)[0].tolist() == [[100, 100, 0, -1]]
-    path = write(tmp_path, pixels, name="map.png", mode="scale")
-    assert read_nav2_grid(path)[0].tolist() == [[100, -1, 0, -1]]
+@pytest.mark.parametrize(("mode", "ends"), [("trinary", (100, 0)), ("scale", (100, 0))])
+def test_what_is_not_opaque_is_unknown(tmp_path, mode, ends):
+    pixels = np.array([[[0, 0, 0, 255], [0, 0, 0, 254], [255, 255, 255, 255], [255, 255, 255, 0]]])
+    path = write(tmp_path, pixels, name="map.png", mode=mode)
+    assert read_nav2_grid(path)[0].tolist() == [[ends[0], -1, ends[1], -1]]
+    Image.fromarray(pixels[..., 2:].astype(np.uint8)).save(tmp_path / "map.png")  # grey, opacity
+    assert read_nav2_grid(path)[0].tolist() == [[ends[0], -1, ends[1], -1]]
+    palette = Image.fromarray(pixels[..., 0].astype(np.uint8)).quantize(4)
+    dark, light = palette.getpixel((0, 0)), palette.getpixel((2, 0))
+    palette.save(tmp_path / "map.png", transparency=dark)
+    assert read_nav2_grid(path)[0].tolist() == [[-1, -1, 0, 0]]
+    palette.save(tmp_path / "map.png", transparency=light)
+    assert read_nav2_grid(path)[0].tolist() == [[100, 100, -1, -1]]
+    write(tmp_path, pixels, name="map.png", mode="raw")  # which knows no opacity
+    assert read_nav2_grid(path)[0].tolist() == [[0, 0, -1, -1]]
+
+
+def test_thresholds_belong_to_the_values_they_bound(tmp_path):
+    shades = [[0, 255, 205, 102, 153]]  # occupancy 1, 0, 0.196, 0.6, 0.4
+    for occupied, free, cells in (
+        (1.0, 0.0, [100, 0, -1, -1, -1]),
+        (0.6, 0.4, [100, 0, 0, 100, 0]),
+        (0.5, 0.5, [100, 0, 0, 100, 0]),
+    ):
+        path = write(tmp_path, shades, occupied_thresh=occupied, free_thresh=free)
+        assert read_nav2_grid(path)[0].tolist() == [cells]
+        path = write(
+            tmp_path,
+            [[255 - s for s in shades[0]]],
+            negate=True,
+            mode="SCALE",
+            occupied_thresh=occupied,
+            free_thresh=free,
+        )
+        found = read_nav2_grid(path)[0].tolist()[0]
+        between = [round(100 * c) for c in (0.196, 0.6, 0.4)] if free == 0.0 else cells[2:]
+        assert found == [*cells[:2], *between]
+
+
+def test_pictures_of_every_kind_have_the_grey_values_of_graphicsmagick(tmp_path):
+    def read(picture, name="map.png"):
+        if isinstance(picture, bytes):
+            (tmp_path / name).write_bytes(picture)
+        else:
+            picture.save(tmp_path / name)
+        data = {**META, "image": name, "mode": "Raw"}
+        (tmp_path / "map.yaml").write_text(yaml.safe_dump(data))
+        return read_nav2_grid(tmp_path / "map.yaml")[0].tolist()
+
+    pure = np.array([[[255, 0, 0], [0, 90, 0], [0, 0, 255], [7, 7, 7]]], dtype=np.uint8)
+    assert read(Image.fromarray(pure)) == [[76, 52, 29, 7]]
+    assert read(Image.fromarray(pure), "map.bmp") == [[76, 52, 29, 7]]
+    deep = np.array([[0, 0x00FF, 0x0101, 0x63FF]], dtype=np.uint16)
+    assert read(Image.fromarray(deep)) == [[0, 0, 1, 99]]
+    assert read(Image.fromarray(np.array([[False, True]]))) == [[0, -1]]
+    plain = b"P2 # by hand\n# and more\n3 1\n# of\n100\n0 20 1\n"
+    assert read(plain, "map.pgm") == [[0, 50, 2]]
+    assert read(b"P5\n# CREATOR: map_saver\n3 1\n100\n\0\x14\1", "map.pgm") == [[0, 50, 2]]
+    assert read(b"P5 3 1 1000\n\0\0\0\xff\0\1", "map.pgm") == [[0, 65, 0]]
+    assert read(b"P1 3 1\n0 1 1\n", "map.pgm") == [[-1, 0, 0]]
+
+
+def test_keys_that_nav2_does_not_know_are_ignored(tmp_path):
+    path = write(tmp_path, [[0, 254]], map_type="occupancy", note="hall 3")
+    assert read_nav2_grid(path)[0].tolist() == [[100, 0]]
+
+
+def test_a_map_of_single_cells_is_refused_in_one_line(monkeypatch):
+    board = np.indices((60, 60)).sum(axis=0) % 2 == 1
+    monkeypatch.setattr(rectangles, "MOST_RECTANGLES", 1800)
+    assert len(StaticMap.from_occupancy(board, 0.05).polygons) == 1800
+    board[0, 0] = True  # still one rectangle with its neighbours
+    monkeypatch.setattr(rectangles, "MOST_RECTANGLES", 1700)
+    with pytest.raises(InvalidInputError, match="more than 1,700 rectangles"):
+        StaticMap.from_occupancy(board, 0.05)
 
 
 def test_a_world_file_may_name_a_map(tmp_path):
@@ -175,12 +250,12 @@ goal: {kind: disc, center: [2.2, -1.8], radius: 0.1}
     [
         ({"image": "no.pgm"}, r"cannot read the picture of the map, .*no\.pgm"),
         ({"mode": "trinry"}, "did you mean 'trinary'"),
-        ({"free_thresh": 0.7}, "free_thresh must be below occupied_thresh"),
+        ({"free_thresh": 0.7}, "free_thresh must not be above occupied_thresh"),
         ({"occupied_thresh": 65}, r"occupied_thresh must lie in \[0, 1\]"),
         ({"negate": "no"}, "negate must be 0 or 1"),
         ({"origin": [0, 0]}, r"origin must have shape \(3,\)"),
         ({"resolution": -0.05}, "resolution must lie in"),
-        ({"imge": "map.pgm"}, "did you mean 'image'"),
+        ({"mode": 3}, "mode must be a text"),
     ],
 )
 def test_bad_map_files_get_one_clear_error(tmp_path, changes, message):

@@ -15,13 +15,13 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-import yaml
 
 from pushplan.training.policies.config import TrainingConfig, read_config
 from pushplan.training.policies.environment import TrainingEnv
 from pushplan.world import InvalidInputError
 from pushplan.world.files import write_atomic
 from pushplan.world.libraries import need
+from pushplan.world.safe_yaml import dump
 
 CONFIG, CURVE, PICTURE = "config.yaml", "curve.csv", "curve.png"
 CHECKPOINT, BEST, POLICY, RECORD = "checkpoint.pt", "best.pt", "policy.onnx", "training.json"
@@ -77,7 +77,7 @@ class TrainingRun:
                 )
             _same(read_config(there), config, self.folder)
         self.folder.mkdir(parents=True, exist_ok=True)
-        write_atomic(there, yaml.safe_dump(config.to_dict(), sort_keys=False).encode())
+        write_atomic(there, dump(config.to_dict()).encode())
         if resume and self.path(CURVE).is_file():
             self.curve = _read_curve(self.path(CURVE))
 
