@@ -8,7 +8,7 @@ number still, and ``yes`` and ``on`` are truth values, as yaml-cpp reads them to
 from __future__ import annotations
 
 import re
-from typing import Any, ClassVar
+from typing import Any
 
 import yaml
 from yaml.composer import Composer
@@ -42,11 +42,6 @@ else:
 
 
 class _Loader(_Safe):
-    yaml_implicit_resolvers: ClassVar[dict[str, Any]] = {
-        first: [(tag, rule) for tag, rule in rules if tag not in (*_NUMBERS, *_TEXTS)]
-        for first, rules in _Safe.yaml_implicit_resolvers.items()
-    }
-
     def __init__(self, text: str) -> None:
         super().__init__(text)
         self._nodes = 0
@@ -91,6 +86,10 @@ class _Dumper(yaml.SafeDumper):
     """Quotes the texts that readers of either version would take for a number."""
 
 
+_Loader.yaml_implicit_resolvers = {
+    first: [(tag, rule) for tag, rule in rules if tag not in (*_NUMBERS, *_TEXTS)]
+    for first, rules in _Safe.yaml_implicit_resolvers.items()
+}
 for _kind in (_Loader, _Dumper):
     for _tag, _rule in _NUMBERS.items():
         _kind.add_implicit_resolver(_tag, _rule, list("-+.0123456789"))
@@ -119,4 +118,4 @@ def load(text: str) -> Any:
 
 def dump(data: Any, **style: Any) -> str:
     """A text that `load` reads back equal, with the keys in their order."""
-    return yaml.dump(data, Dumper=_Dumper, sort_keys=False, **style)
+    return str(yaml.dump(data, Dumper=_Dumper, sort_keys=False, **style))
