@@ -67,6 +67,7 @@ class ObstacleGuard:
             parts = {part.tobytes(): part for part in world.static.convex_parts}
             self._known &= parts.keys()
             self._new = [part for key, part in parts.items() if key not in self._known]
+            self._boxes = _boxes(self._new)
         clearance = self._clearance(world)
         fixed = _fixed(world)
         self._known_fixed = {
@@ -127,15 +128,13 @@ class ObstacleGuard:
             return []
         objects = world.movables
         chosen = np.flatnonzero(np.isin(objects.ids, list(self._new_fixed))).tolist()
-        solid = [*self._new, *(objects.outline_world(k) for k in chosen)]
+        held = [objects.outline_world(k) for k in chosen]
+        boxes = np.concatenate([self._boxes, _boxes(held)])
         path = self._path(world, twist)
         reach = world.robot.circumscribed_radius + 2.0 * _RESUMED * self._clearance(world)
         low, high = path[:, :2].min(axis=0) - reach, path[:, :2].max(axis=0) + reach
-        return [
-            part
-            for part in solid
-            if (part.max(axis=0) >= low).all() and (part.min(axis=0) <= high).all()
-        ]
+        near = ((boxes[:, 1] >= low) & (boxes[:, 0] <= high)).all(axis=1)
+        return [part for part, is_near in zip([*self._new, *held], near, strict=True) if is_near]
 
     def _clearance(self, world: World) -> float:
         reach = world.robot.circumscribed_radius
@@ -175,6 +174,12 @@ class _Closeness:
 
     def _depth(self, pose: FloatArray, one: ConvexObstacles) -> float:
         return float(static_depth(pose, self._shape, one, self._scratch))
+
+
+def _boxes(outlines: list[FloatArray]) -> FloatArray:
+    """(S, 2, 2) lower and upper corners of the boxes around outlines [m]."""
+    corners = [[part.min(axis=0), part.max(axis=0)] for part in outlines]
+    return np.array(corners).reshape(-1, 2, 2)
 
 
 def _fixed(world: World) -> dict[int, FloatArray]:

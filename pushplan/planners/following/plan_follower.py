@@ -71,9 +71,10 @@ class PlanFollower:
 
     At every step the rest of the plan is swept again from where everything is now; where that
     costs more than was predicted, or jams, or the robot has left the path, or the plan is used
-    up, a new plan is made. If none is found the old one is kept, but a robot that can stop stands
-    where it would jam next. A differential drive that does not get on, with a plan or without,
-    recovers (`pushplan.control.Recovery`) and plans anew.
+    up, a new plan is made. Where the map changes, or an object turns out fixed, the whole rest is
+    checked; a robot that would be there before a new plan stops. If none is found the old one is
+    kept, but a robot that can stop stands where it would jam next. A differential drive that does
+    not get on, with a plan or without, recovers (`pushplan.control.Recovery`) and plans anew.
 
     With an executor that takes time (`plan_with`) planning goes on beside driving: a call plans
     from where the robot will be when it is done, and the old plan is driven until then.
