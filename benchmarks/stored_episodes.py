@@ -20,7 +20,7 @@ from pushplan.evaluation.rows import columns, csv_text, row_from_texts
 from pushplan.metrics import METRICS, Role, metric_names
 from pushplan.scenarios import Suite
 from pushplan.world import InvalidInputError
-from pushplan.world.files import write_atomic
+from pushplan.world.output_files import write_atomic
 from pushplan.world.safe_files import read_data
 
 WHO = ("suite", "policy", "seed")

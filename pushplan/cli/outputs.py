@@ -27,6 +27,8 @@ def check_file(path: str | None, endings: Sequence[str] = ()) -> None:
         raise InvalidInputError(f"a file to write ends in {' or '.join(endings)}, got {path!r}")
     if file.is_dir():
         raise InvalidInputError(f"cannot write {path!r}: it is a folder")
+    if file.is_symlink() and not path.startswith("/dev/"):  # /dev/stdout is one
+        raise InvalidInputError(f"cannot write {path!r}: it is a link, which is not followed")
     if not file.absolute().parent.is_dir():
         raise InvalidInputError(f"there is no folder {file.parent} for {path!r}")
     if file.exists():
@@ -67,8 +69,15 @@ def check_figure(path: str | None, films: Sequence[str] = ()) -> None:
             need("matplotlib")
 
 
-def check_directory(path: str | None) -> None:
-    """Refuse a folder that can neither be made nor written to; it may be there or not.
+def check_directory(
+    path: str | None, kind: str = "run directory", mark: str = "results.db"
+) -> None:
+    """Refuse a folder that cannot be written to, or holds files of the user's own.
+
+    Args:
+        path: the folder, there or not; None is none.
+        kind: as for `check_folder`.
+        mark: the same.
 
     Raises:
         InvalidInputError: naming the path and what is wrong with it.
@@ -76,6 +85,7 @@ def check_directory(path: str | None) -> None:
     if path is None:
         return
     from pushplan.world.errors import InvalidInputError
+    from pushplan.world.output_files import check_folder
 
     folder = Path(path).absolute()
     there = next(one for one in (folder, *folder.parents) if one.exists())
@@ -83,6 +93,7 @@ def check_directory(path: str | None) -> None:
         raise InvalidInputError(f"cannot use {path!r} as a folder: {there} is a file")
     if not _takes_files(there):
         raise InvalidInputError(f"cannot use {path!r} as a folder: {there} takes no new files")
+    check_folder(path, kind, mark)
 
 
 def _takes_files(folder: Path) -> bool:

@@ -56,7 +56,8 @@ def _status(options: argparse.Namespace) -> int:
     from pushplan.evaluation import run_status
 
     now = run_status(options.directory)
-    say(f"{'running' if now.active else 'at rest'}: {now.done} of {now.jobs} jobs done")
+    states = {True: "running", False: "at rest", None: "running or not, there are no file locks"}
+    say(f"{states[now.active]}: {now.done} of {now.jobs} jobs done")
     if now.per_minute:
         left = "" if now.left_s is None else f", about {duration(now.left_s)} left"
         say(f"{now.per_minute:.3g} a minute{left}")

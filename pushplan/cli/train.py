@@ -84,7 +84,7 @@ def run(options: argparse.Namespace) -> int:
 
     from pushplan.training.policies.training import train_policy
 
-    check_directory(options.out)
+    check_directory(options.out, "training", "config.yaml")
     config = _config(options)
     _show_progress(logging.getLogger("pushplan.training"))
     try:

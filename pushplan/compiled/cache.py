@@ -18,12 +18,7 @@ from numba.core.serialize import dumps
 from pushplan.compiled.cache_files import Folders, find_folders, read, remove, warn_once, write
 from pushplan.compiled.fingerprint import fingerprint, source_digest
 from pushplan.compiled.pipeline import rebuilt, reduced
-from pushplan.world.file_locks import is_locked
-
-try:
-    import fcntl
-except ImportError:  # on Windows two processes may compile the same kernel, and both are right
-    fcntl = None  # type: ignore[assignment]
+from pushplan.world.file_locks import is_locked, take_lock
 
 _PATIENCE = 300.0  # how long a process waits for another that compiles the same kernel [s]
 _POLL = 0.05  # [s]
@@ -103,7 +98,7 @@ class KernelCache(_Cache):
     def is_locked(self) -> bool:
         """Whether a process holds its place, to compile it."""
         folder = self._folders.write
-        return folder is not None and is_locked(folder / f"{self._stem}.lock")
+        return folder is not None and is_locked(folder / f"{self._stem}.lock") is True
 
     @property
     def _folders(self) -> Folders:
@@ -132,19 +127,15 @@ class KernelCache(_Cache):
     def _wait(self) -> bool:
         """Lock the kernel, and say whether another process held it until now."""
         folder = self._folders.write
-        if fcntl is None or folder is None or self._lock is not None:
+        if folder is None or self._lock is not None:
             return False
         try:
             self._lock = (folder / f"{self._stem}.lock").open("a")
         except OSError:
             return False
+        # on a disk without locks two processes may compile the same kernel, and both are right
         waited, until = False, time.monotonic() + _PATIENCE
-        while time.monotonic() < until:
-            try:
-                fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            except OSError:
-                waited = True
-                time.sleep(_POLL)
-            else:
-                break
+        while take_lock(self._lock) is False and time.monotonic() < until:
+            waited = True
+            time.sleep(_POLL)
         return waited

@@ -17,8 +17,8 @@ from pushplan.drawing.pen import Color, Pen
 from pushplan.drawing.scene import draw_scene, view_bounds
 from pushplan.world import InvalidInputError, Plan, World
 from pushplan.world.checks import FloatArray, array, number
-from pushplan.world.files import write_atomic
 from pushplan.world.libraries import need
+from pushplan.world.output_files import write_atomic
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -31,6 +31,7 @@ from pushplan.evaluation.store import RunDirectory, remove_report
 from pushplan.evaluation.worker import WORKER_VARIABLE
 from pushplan.world import InvalidInputError
 from pushplan.world.checks import choice, integer, number
+from pushplan.world.output_files import make_folder
 
 Progress = Callable[[int, int, ResultRow | None], None]
 """Called with jobs done, jobs in all, and the row just stored (None at the beginning)."""
@@ -184,7 +185,7 @@ class _Batch:
 
     def _pool(self, workers: int) -> WorkerPool:
         logs = self._store.path / "logs"
-        logs.mkdir(exist_ok=True)
+        make_folder(logs)
         return WorkerPool(
             workers,
             limit_s=self._settings.force_after_s,

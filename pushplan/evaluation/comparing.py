@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from pushplan.evaluation.rows import ResultRow, columns, row_from_texts
+from pushplan.evaluation.rows import ResultRow, columns, csv_lines, row_from_texts
 from pushplan.evaluation.statistics import estimate
 from pushplan.evaluation.statistics_paired import ENOUGH, pairs_needed
 from pushplan.evaluation.store import open_results
@@ -114,10 +114,13 @@ def read_rules(text: str) -> list[Rule]:
         if metric not in numbers:
             raise UnknownNameError("column", name, [*numbers, *SHORT])
         try:
-            value = float(bound) / (100.0 if percent else 1.0)
-        except ValueError as error:
-            raise InvalidInputError(f"{bound!r} in rule {short(part)} is no number") from error
-        rules.append(Rule(metric, direction == ">", value, bool(percent)))
+            value = float(bound)
+        except ValueError:
+            value = math.nan
+        if not math.isfinite(value):
+            raise InvalidInputError(f"{bound!r} in rule {short(part)} is no finite number")
+        unit = 100.0 if percent else 1.0
+        rules.append(Rule(metric, direction == ">", value / unit, bool(percent)))
     return rules
 
 
@@ -229,10 +232,9 @@ def _read(path: str | Path) -> list[ResultRow]:
     path = Path(path)
     if path.suffix != ".csv":
         return open_results(path)[0]
-    if not path.is_file():
-        raise InvalidInputError(f"there is no file {path}")
-    with path.open(newline="", encoding="utf-8", errors="replace") as lines:
-        try:
-            return [row_from_texts(line) for line in csv.DictReader(lines)]
-        except (csv.Error, KeyError, TypeError, ValueError, AttributeError) as error:
-            raise SchemaError(f"{path} is no results.csv: {describe(error)}") from error
+    try:
+        return [row_from_texts(line) for line in csv_lines(path)]
+    except SchemaError:
+        raise
+    except (csv.Error, KeyError, TypeError, ValueError) as error:
+        raise SchemaError(f"{path} is no results.csv: {describe(error)}") from error

@@ -3,20 +3,29 @@
 from __future__ import annotations
 
 import json
+import math
+import os
+import re
 import sqlite3
+import stat
 from collections.abc import Iterator, Mapping
 from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from pushplan.evaluation.provenance import in_words
 from pushplan.evaluation.rows import ResultRow, checked_row, columns
 from pushplan.metrics import METRICS
 from pushplan.world import InvalidInputError, PushplanError, SchemaError
-from pushplan.world.errors import describe
+from pushplan.world.errors import describe, short
+from pushplan.world.file_locks import is_locked
+from pushplan.world.safe_files import MAX_TEXT, parse_json
 
 SCHEMA = "pushplan-run/2"
 DATABASE = "results.db"
+LOCK = ".lock"
+"""File in a run directory that its writer holds."""
 WAIT_S = 30.0
 """How long a writer waits for another program that holds the database [s]."""
 HIDE_OTHERS = (
@@ -28,12 +37,31 @@ _TEXTS = "policy task simulator scenario status reason began host job trace"
 _TYPES = dict.fromkeys(_TEXTS.split(), "TEXT")
 _TYPES |= dict.fromkeys(("seed", "success", "plan_calls"), "INTEGER")
 _TABLES = """
+CREATE TABLE IF NOT EXISTS about (key TEXT PRIMARY KEY, value TEXT);
 CREATE TABLE IF NOT EXISTS results ({columns}, spec TEXT, current INTEGER, PRIMARY KEY (job));
 CREATE INDEX IF NOT EXISTS shown ON results (policy, scenario, seed);
 CREATE TABLE IF NOT EXISTS measured
     (job TEXT, metric TEXT, source TEXT, value REAL, PRIMARY KEY (job, metric)) WITHOUT ROWID;
 CREATE TABLE IF NOT EXISTS running (job TEXT PRIMARY KEY, title TEXT, began REAL);
 """
+_KEY = r"PRIMARY KEY \((?:\w+, )*\w+\)"
+_COLUMN = r'(?:"\w+"|\w+) (?:TEXT|INTEGER|REAL)(?: PRIMARY KEY)?'
+_TABLE = r'CREATE TABLE "?(?:about|results|measured|running)"? ?'
+_PLAIN = re.compile(
+    rf"{_TABLE}\((?:{_COLUMN}, )*(?:{_COLUMN}|{_KEY})\)(?: WITHOUT ROWID)?|"
+    r"CREATE INDEX shown ON results \(policy, scenario, seed\)|sqlite_autoindex_\w+"
+)
+"""What our tables are made with: plain columns, nothing that SQLite would compute."""
+_STEPS = 10_000
+_LEAST_STEPS = 5_000_000
+_STEPS_PER_BYTE = 50
+"""Instructions of SQLite for each byte on the disk: reading all rows takes fewer than ten."""
+_NOT_NOW = ("BUSY", "LOCKED", "FULL", "IOERR", "READONLY", "CANTOPEN", "PERM", "PROTOCOL", "AUTH")
+_NOTES = {
+    **dict.fromkeys(("policies", "settings", "deadlines", "configuration"), dict),
+    **dict.fromkeys(("runs", "metrics"), list),
+}
+"""Notes on a run that are read, and their types."""
 
 
 def database_of(path: str | Path) -> Path:
@@ -41,10 +69,18 @@ def database_of(path: str | Path) -> Path:
 
     Raises:
         InvalidInputError: if there is none.
+        DamagedResultsError: if it, or a file that SQLite would use with it, is none of ours.
     """
     file = Path(path) / DATABASE
-    if not file.is_file():
+    if not os.path.lexists(file):
         raise InvalidInputError(f"{path} holds no results: there is no {DATABASE} in it")
+    for ending in ("", "-wal", "-shm"):
+        part = file.with_name(DATABASE + ending)
+        if os.path.lexists(part) and not stat.S_ISREG(part.lstat().st_mode):
+            raise _damaged(file, f"{part.name} is no regular file")
+    # a journal can make SQLite remove any file, and we never write one
+    if os.path.lexists(file.with_name(f"{DATABASE}-journal")):
+        raise _damaged(file, f"there is a {DATABASE}-journal")
     return file
 
 
@@ -64,44 +100,50 @@ def clear_errors(path: Path) -> Iterator[None]:
         yield
     except PushplanError:
         raise
-    except (sqlite3.OperationalError, OSError) as error:
-        if "malformed" in str(error):
-            raise _damaged(path, error) from error
-        raise InvalidInputError(
-            f"cannot use {path}: {error}; what was stored is kept, and the same command goes on"
-        ) from error
-    except (sqlite3.Error, KeyError, TypeError, ValueError, OverflowError) as error:
-        raise _damaged(path, error) from error
+    except (sqlite3.Error, OSError, KeyError, TypeError, ValueError, OverflowError) as error:
+        name = getattr(error, "sqlite_errorname", "").removeprefix("SQLITE_")
+        if isinstance(error, OSError) or name.startswith(_NOT_NOW):
+            raise InvalidInputError(
+                f"cannot use {path}: {error}; what was stored is kept, and the same command goes on"
+            ) from error
+        raise _damaged(path, describe(error)) from error
 
 
-def _damaged(path: Path, error: BaseException) -> DamagedResultsError:
+def _damaged(path: Path, why: str) -> DamagedResultsError:
     return DamagedResultsError(
-        f"{path} is damaged ({describe(error)}): 'pushplan salvage {path.parent} NEW' saves what "
-        "can be read"
+        f"{path} is damaged ({why}): 'pushplan salvage {path.parent} NEW' saves what can be read"
     )
 
 
+def new_database() -> bytes:
+    """The file of a database without results, to be put in place whole."""
+    with closing(sqlite3.connect(":memory:")) as db:
+        _create(db)
+        data = bytearray(db.serialize())
+    data[18:20] = b"\2\2"  # it has a write-ahead log: section 1.3.3 of SQLite's file format
+    return bytes(data)
+
+
 def connect(path: Path) -> sqlite3.Connection:
-    """Open the database of a run directory, make its tables where they are missing, check it.
+    """Open the database of a run directory to write, check it, add the columns that it lacks.
 
     Raises:
         SchemaError: if it is damaged or of another version.
         InvalidInputError: if it cannot be written.
     """
-    db = None
     with clear_errors(path):
+        db = open_checked(path, "rw")
         try:
-            db = sqlite3.connect(path, timeout=WAIT_S)
-            db.execute("PRAGMA journal_mode=WAL")
+            read_about(db)
             db.execute("PRAGMA synchronous=NORMAL")
             ((verdict,),) = db.execute("PRAGMA quick_check(1)")
             if verdict != "ok":
                 raise sqlite3.DatabaseError(verdict)
             _create(db)
+            db.set_progress_handler(None, 0)
             return db
         except BaseException:
-            if db is not None:
-                db.close()
+            db.close()
             raise
     raise AssertionError("unreachable")
 
@@ -115,33 +157,61 @@ def reading(path: str | Path) -> Iterator[sqlite3.Connection]:
         SchemaError: if it is damaged or of another version.
     """
     file = database_of(path)
-    with clear_errors(file), closing(_connect_to_read(file)) as db:
+    with clear_errors(file), closing(open_checked(file)) as db:
         read_about(db)
         yield db
 
 
-def _connect_to_read(path: Path) -> sqlite3.Connection:
-    uri = path.absolute().as_uri()
-    db = sqlite3.connect(f"{uri}?mode=ro", uri=True, timeout=WAIT_S)
+def open_checked(path: Path, mode: str = "ro") -> sqlite3.Connection:
+    """Open a database that a stranger may have written, with bounds on its values and its work.
+
+    Args:
+        path: the database.
+        mode: ``"ro"`` to read, ``"rw"`` to write, too.
+
+    Raises:
+        sqlite3.Error: if it cannot be read.
+        SchemaError: if it holds other tables than a run makes, or anything that is no table.
+    """
+    uri = f"{path.absolute().as_uri()}?mode={mode}"
+    has_locks = is_locked(path.with_name(LOCK), posix=True) is not None
     try:
-        db.execute("SELECT name FROM sqlite_master").fetchall()
-        return db
-    except sqlite3.OperationalError:  # the log beside it needs a file that cannot be made here
+        if has_locks:
+            return _checked(sqlite3.connect(uri, uri=True, timeout=WAIT_S), path)
+    except sqlite3.OperationalError:
+        if mode != "ro":
+            raise
+    # without locks, or the file beside the log that readers share: it cannot be made everywhere
+    db = sqlite3.connect(f"{uri}&vfs=unix-none", uri=True)
+    db.execute("PRAGMA locking_mode=EXCLUSIVE")
+    return _checked(db, path)
+
+
+def _checked(db: sqlite3.Connection, path: Path) -> sqlite3.Connection:
+    try:
+        db.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, MAX_TEXT)
+        room = _LEAST_STEPS + _STEPS_PER_BYTE * 512 * path.stat().st_blocks
+        steps = iter(range(room // _STEPS))
+        db.set_progress_handler(lambda: next(steps, None) is None, _STEPS)
+        db.execute("PRAGMA trusted_schema=OFF")
+        # an index that SQLite makes itself has no text
+        for name, sql in db.execute("SELECT name, coalesce(sql, name) FROM sqlite_master"):
+            if not _PLAIN.fullmatch(" ".join(str(sql).split())):
+                raise _damaged(path, f"it holds what no run makes: {short(name)}")
+    except BaseException:
         db.close()
-        return sqlite3.connect(f"{uri}?immutable=1", uri=True)
+        raise
+    return db
 
 
 def _create(db: sqlite3.Connection) -> None:
     """Make the tables, or add the columns of metrics that have come since they were made."""
     names = columns()
     kinds = ", ".join(f'"{name}" {_type(name)}' for name in names)
-    with db:
-        db.execute("CREATE TABLE IF NOT EXISTS about (key TEXT PRIMARY KEY, value TEXT)")
-        read_about(db)
     db.executescript(_TABLES.format(columns=kinds))
     with db:
         for name in names:
-            if name not in _columns(db):
+            if name not in columns_of(db):
                 db.execute(f'ALTER TABLE results ADD COLUMN "{name}" {_type(name)}')
         db.execute("INSERT OR REPLACE INTO about VALUES ('schema', ?)", (json.dumps(SCHEMA),))
 
@@ -177,13 +247,23 @@ class StoredResult:
 
 def read_results(db: sqlite3.Connection) -> list[StoredResult]:
     """Every result, also those that do not count now."""
-    measured: dict[str, list[tuple[str, str, float | None]]] = {}
-    for job, *value in db.execute("SELECT job, metric, source, value FROM measured"):
-        measured.setdefault(job, []).append((value[0], value[1], value[2]))
+    measured = _measured(db)
     return [
-        StoredResult(row, json.loads(spec), bool(current), tuple(measured.get(row.job, ())))
+        StoredResult(row, read_spec(spec), bool(current), tuple(measured.get(row.job, ())))
         for row, spec, current in _rows(db, "spec, current", "ORDER BY job")
     ]
+
+
+def read_spec(text: object) -> dict[str, Any]:
+    """What `job_spec` said about a job.
+
+    Raises:
+        TypeError, ValueError: if it is no mapping in JSON.
+    """
+    spec = _json(text)
+    if not isinstance(spec, dict):
+        raise TypeError(f"spec is {short(spec)}")
+    return spec
 
 
 def read_rows(db: sqlite3.Connection) -> list[ResultRow]:
@@ -194,20 +274,36 @@ def read_rows(db: sqlite3.Connection) -> list[ResultRow]:
 
 def read_measured(db: sqlite3.Connection) -> dict[str, dict[str, float]]:
     """Job -> its metrics that are no columns."""
-    found: dict[str, dict[str, float]] = {}
-    for job, metric, value in db.execute("SELECT job, metric, value FROM measured"):
-        if value is not None:
-            found.setdefault(job, {})[metric] = value
+    return {
+        job: {metric: value for metric, _, value in values if value is not None}
+        for job, values in _measured(db).items()
+    }
+
+
+def _measured(db: sqlite3.Connection) -> dict[str, list[tuple[str, str, float | None]]]:
+    found: dict[str, list[tuple[str, str, float | None]]] = {}
+    for job, metric, source, value in db.execute("SELECT job, metric, source, value FROM measured"):
+        if not isinstance(metric, str) or not isinstance(value, int | float | None):
+            raise TypeError(f"metric {short(metric)} is {short(value)}")
+        found.setdefault(job, []).append((metric, source, value))
     return found
 
 
 def _rows(db: sqlite3.Connection, more: str, rest: str) -> Iterator[tuple[Any, ...]]:
-    there = [name for name in columns() if name in _columns(db)]
+    there = [name for name in columns() if name in columns_of(db)]
     names = ", ".join(f'"{name}"' for name in there)
     for values in db.execute(f"SELECT {names}, {more} FROM results {rest}"):
-        data = dict(zip(there, values, strict=False))
-        data["success"] = bool(data["success"])
-        yield checked_row(ResultRow.from_columns(data)), *values[len(there) :]
+        yield row_of(dict(zip(there, values, strict=False))), *values[len(there) :]
+
+
+def row_of(values: Mapping[str, Any]) -> ResultRow:
+    """The row that the database holds, by column.
+
+    Raises:
+        KeyError, TypeError, ValueError: if it can be none.
+    """
+    success = {0: False, 1: True}[values["success"]]
+    return checked_row(ResultRow.from_columns({**values, "success": success}))
 
 
 def _type(column: str) -> str:
@@ -215,16 +311,55 @@ def _type(column: str) -> str:
     return _TYPES.get(column, "INTEGER" if whole else "REAL")
 
 
-def _columns(db: sqlite3.Connection) -> set[str]:
+def columns_of(db: sqlite3.Connection) -> set[str]:
+    """Names of the columns of the results."""
     return {row[1] for row in db.execute("PRAGMA table_info(results)")}
 
 
 def read_about(db: sqlite3.Connection) -> dict[str, Any]:
-    """What was noted about a run."""
-    about = {key: json.loads(value) for key, value in db.execute("SELECT key, value FROM about")}
-    if about.get("schema", SCHEMA) != SCHEMA:
+    """What was noted about a run.
+
+    Raises:
+        SchemaError: if it is of another version, or a note is none that can be read.
+    """
+    found = db.execute("SELECT key, value FROM about")
+    about = {key: _json(value) for key, value in found}
+    if about.get("schema") != SCHEMA:
         raise SchemaError(
-            f"this pushplan reads runs of schema {SCHEMA!r}, got {about['schema']!r}: read its "
-            "results.csv, or run it again in another directory"
+            f"this pushplan reads runs of schema {SCHEMA!r}, got {short(about.get('schema'))}: "
+            "read its results.csv, or run it again in another directory"
         )
+    for key, kind in _NOTES.items():
+        values = about.get(key, kind())
+        if not isinstance(values, kind):
+            raise TypeError(f"the note {key!r} is {short(values)}")
+        for value in values.values() if isinstance(values, dict) else values:
+            _check_note(key, value)
     return about
+
+
+def _check_note(key: str, value: Any) -> None:
+    known = True
+    if key == "runs":
+        known = isinstance(value, dict) and isinstance(value["packages"], dict)
+        in_words(value)  # it reads all that others read
+    elif key == "deadlines":
+        known = type(value) in (int, float) and math.isfinite(value)
+    elif key != "configuration":
+        known = isinstance(value, str)
+    if not known:
+        raise TypeError(f"the note {key!r} holds {short(value)}")
+
+
+def _json(text: object) -> Any:
+    """The values of a text in JSON.
+
+    Raises:
+        TypeError, ValueError: if it is none, or over a limit of `parse_json`.
+    """
+    if not isinstance(text, str):
+        raise TypeError(f"{short(text)} is no JSON")
+    try:
+        return parse_json(text)
+    except SchemaError as error:
+        raise ValueError(f"{error}") from error

@@ -9,8 +9,8 @@ from typing import Any
 from pushplan.evaluation.rows import columns, rows_csv
 from pushplan.evaluation.run_record import RunRecord
 from pushplan.world import InvalidInputError
-from pushplan.world.files import write_atomic
 from pushplan.world.libraries import need
+from pushplan.world.output_files import write_atomic
 
 
 def export(run: RunRecord, path: Path) -> None:

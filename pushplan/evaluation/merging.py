@@ -15,7 +15,7 @@ from pushplan.evaluation.database import (
     reading,
 )
 from pushplan.evaluation.rows import TIMING_COLUMNS, ResultRow, columns
-from pushplan.evaluation.store import RunDirectory, trace_digest
+from pushplan.evaluation.store import RunDirectory, files_of
 from pushplan.world import InvalidInputError
 
 
@@ -81,14 +81,9 @@ def merge(out: str | Path, sources: Sequence[str | Path]) -> Merged:
 
 def _copy(one: StoredResult, folder: Path, store: RunDirectory) -> bool:
     """Take over a result; False if its episode is not what its name says."""
-    trace = None
-    if one.row.trace_file is not None:
-        path = folder / one.row.trace_file
-        trace = path.read_bytes() if path.is_file() else b""
-        if trace_digest(trace) != one.row.trace:
-            return False
-    note = folder / one.row.detail_file
-    detail = note.read_text(errors="replace") if note.is_file() else ""
+    trace, detail = files_of(folder, one.row)
+    if one.row.trace and trace is None:
+        return False
     store.add(one.row, trace, detail, one.spec, show=one.current)
     store.measure((one.row.job, *value) for value in one.measured)
     return True

@@ -16,9 +16,12 @@ from pushplan.evaluation.rows import ResultRow
 from pushplan.evaluation.run_record import RunRecord
 from pushplan.evaluation.tables import Table, heading
 from pushplan.metrics import Role, metric_names
-from pushplan.world.files import write_atomic
+from pushplan.world import SchemaError
 from pushplan.world.libraries import need
+from pushplan.world.output_files import write_atomic
+from pushplan.world.safe_files import read_bytes
 
+PAGE = "report.html"
 REPLAYS = ("embed", "beside", "none")
 _FILES = files("pushplan.evaluation") / "page_files"
 _TIMES = ("plan_time_median_s", "decision_time_median_s", "wall_time_s")
@@ -72,9 +75,17 @@ def write_page(
         data=Markup(_script_json(page_data(run, there))),
         replays=[Markup(_escaped(one)) for one in texts],
     )
-    path = folder / "report.html"
+    path = folder / PAGE
     write_atomic(path, text.encode())
     return path
+
+
+def is_page(path: Path) -> bool:
+    """True if a file is a page that `write_page` wrote."""
+    try:
+        return b'name="generator" content="pushplan ' in read_bytes(path)[:400]
+    except SchemaError:
+        return False
 
 
 def page_data(run: RunRecord, replays: Mapping[str, int]) -> dict[str, Any]:

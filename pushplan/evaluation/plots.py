@@ -217,7 +217,7 @@ def _planning_time(run: RunRecord) -> Figure | None:
 
     def panel(axes: Any, rows: Sequence[ResultRow]) -> None:
         for i, label in enumerate(run.policies):
-            mine = [r for r in rows if r.policy == label and r.plan_time_max_s is not None]
+            mine = [r for r in rows if r.policy == label and r.plan_time_median_s is not None]
             times = np.sort(np.concatenate([_calls(run, row, read) for row in mine] or [[]]))
             if len(times) == 0:
                 continue
@@ -240,7 +240,8 @@ def _calls(run: RunRecord, row: ResultRow, read: bool) -> Any:
     """Times of all planning calls of an episode [s], from its trace where there is one."""
     if read and (episode := run.episode(row)) is not None:
         return np.maximum(episode.plan_times_s, 1e-6)
-    return np.array([row.plan_time_median_s, row.plan_time_max_s])
+    times = (row.plan_time_median_s, row.plan_time_max_s)
+    return np.array([time for time in times if time is not None])
 
 
 def _panels(

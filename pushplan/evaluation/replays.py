@@ -15,7 +15,7 @@ from pushplan.evaluation.rows import ResultRow
 from pushplan.evaluation.run_record import RunRecord
 from pushplan.world import Episode, GoalDisc, GoalLine, SchemaError
 from pushplan.world.checks import FloatArray
-from pushplan.world.files import write_atomic
+from pushplan.world.output_files import make_folder, write_atomic
 from pushplan.world.recorded_plans import thinned
 
 FRAMES = 400
@@ -71,7 +71,7 @@ def write_beside(run: RunRecord, rows: Sequence[ResultRow], folder: Path) -> set
         The jobs of which there is one.
     """
     there = folder / "replays"
-    there.mkdir(parents=True, exist_ok=True)
+    make_folder(there)
     written = set()
     for row in rows:
         if (text := packed(run, row)) is not None:

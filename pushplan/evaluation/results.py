@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -33,8 +34,8 @@ from pushplan.evaluation.tables import (
 from pushplan.scenarios.known_bounds import known_bounds
 from pushplan.world import InvalidInputError, UnknownNameError
 from pushplan.world.checks import choice, integer
-from pushplan.world.files import write_atomic
 from pushplan.world.libraries import need
+from pushplan.world.output_files import check_folder, write_atomic
 
 
 @dataclass(frozen=True)
@@ -208,11 +209,13 @@ class Results(RunRecord):
             InvalidInputError: if the folder is the directory of a run with other rows.
             MissingDependencyError: without Matplotlib and Jinja.
         """
-        from pushplan.evaluation.page import REPLAYS, write_page
+        from pushplan.evaluation.page import PAGE, REPLAYS, is_page, write_page
 
         choice("replays", replays, REPLAYS)
         integer("most", most, low=0)
         folder = Path(out) if out is not None else self.path or Path()
+        if not is_page(folder / PAGE):
+            check_folder(folder, "run directory", DATABASE)
         self._check_same_run(folder)
         folder.mkdir(parents=True, exist_ok=True)
         if (folder / DATABASE).is_file() or (folder / "report.html").is_file():
@@ -229,7 +232,7 @@ class Results(RunRecord):
         return write_page(self, tables, plots, folder, replays=replays, most=most)
 
     def _check_same_run(self, folder: Path) -> None:
-        if not (folder / DATABASE).is_file():
+        if not os.path.lexists(folder / DATABASE):
             return
         there, _, _ = open_results(folder)
         if set(there) != set(self.rows):

@@ -7,9 +7,10 @@ import enum
 import io
 import math
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from datetime import UTC, datetime
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -17,7 +18,8 @@ import numpy as np
 from pushplan.envs.registry import goal_kind
 from pushplan.metrics import METRICS, Role, compute, metric_names
 from pushplan.world import Episode
-from pushplan.world.errors import one_line
+from pushplan.world.errors import one_line, short
+from pushplan.world.safe_files import read_bytes
 
 REASON_LENGTH = 300
 """A reason in the results is cut to this many characters; the detail file has all of it."""
@@ -155,6 +157,10 @@ class ResultRow:
 _ROUNDING = 1e-6
 _TEXTS = ("policy", "task", "simulator", "scenario", "status", "reason", "host", "job", "trace")
 _INSTANT = re.compile(r"(\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d\.\d{3}Z)?")
+_TEXT = re.compile(r"[^\x00-\x1f\x7f-\x9f\ud800-\udfff]{0,1000}")
+"""Texts that may be shown on a terminal."""
+_FILE_NAMES = {"job": re.compile(r"[\w-]{0,64}", re.ASCII), "trace": re.compile("([0-9a-f]{32})?")}
+"""Hashes that name files in a run directory."""
 _OWN = tuple(item.name for item in fields(ResultRow) if item.name != "pool")
 _TIMES = tuple(
     name for name in _OWN if name.startswith(("wall_time", "plan_time", "decision_time"))
@@ -195,6 +201,17 @@ def setting_of(scenario: str, seed: int) -> str:
     return suite or name
 
 
+def csv_lines(path: Path) -> Iterator[dict[str, str]]:
+    """The lines of a ``results.csv``, by column.
+
+    Raises:
+        SchemaError: if the file cannot be read.
+        csv.Error: if it is no CSV.
+    """
+    text = read_bytes(path, "results").decode("utf-8", errors="replace")
+    return csv.DictReader(io.StringIO(text, newline=""))
+
+
 def row_from_texts(texts: Mapping[str, str | None]) -> ResultRow:
     """The row that a line of ``results.csv`` holds, by column.
 
@@ -225,10 +242,15 @@ def checked_row(row: ResultRow) -> ResultRow:
     for name in _TEXTS:
         if type(getattr(row, name)) is not str and not isinstance(getattr(row, name), Status):
             raise TypeError(f"{name} is {getattr(row, name)!r:.60}")
+        if not _TEXT.fullmatch(getattr(row, name)):
+            raise ValueError(f"{name} is {getattr(row, name)!r:.60}")
+    for name, form in _FILE_NAMES.items():
+        if not form.fullmatch(getattr(row, name)):
+            raise ValueError(f"{name} is {getattr(row, name)!r:.60}")
     Status(row.status)
     if not _INSTANT.fullmatch(row.began):
         raise ValueError(f"began is {row.began!r:.60}")
-    if type(row.success) is not bool or type(row.seed) is not int:
+    if type(row.success) is not bool or type(row.seed) is not int or abs(row.seed) >= 2**63:
         raise TypeError(f"success is {row.success!r:.60} and seed {row.seed!r:.60}")
     for name in (*_TIMES, "plan_calls"):
         value = getattr(row, name)
@@ -242,8 +264,9 @@ def checked_row(row: ResultRow) -> ResultRow:
 
 
 def _number(name: str, value: object) -> float:
-    if type(value) not in (int, float):
-        raise TypeError(f"{name} is {value!r:.60}")
+    # the database keeps whole numbers of 64 bits
+    if type(value) not in (int, float) or (type(value) is int and abs(value) >= 2**63):
+        raise TypeError(f"{name} is {short(value)}")
     return value  # type: ignore[return-value]
 
 

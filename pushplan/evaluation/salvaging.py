@@ -4,17 +4,25 @@ from __future__ import annotations
 
 import contextlib
 import csv
-import json
+import os
 import sqlite3
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from pushplan.evaluation.database import DATABASE, read_about
-from pushplan.evaluation.rows import ResultRow, checked_row, columns, row_from_texts
-from pushplan.evaluation.store import RunDirectory, trace_digest
-from pushplan.world import InvalidInputError
+from pushplan.evaluation.database import (
+    DATABASE,
+    columns_of,
+    database_of,
+    open_checked,
+    read_about,
+    read_spec,
+    row_of,
+)
+from pushplan.evaluation.rows import ResultRow, columns, csv_lines, row_from_texts
+from pushplan.evaluation.store import RunDirectory, files_of
+from pushplan.world import InvalidInputError, SchemaError
 
 _MISSES = 2000  # so many row numbers without a row in turn: there are no more
 _BAD = (sqlite3.Error, KeyError, TypeError, ValueError, OverflowError)
@@ -48,7 +56,7 @@ def salvage(path: str | Path, out: str | Path) -> Salvaged:
     path = Path(path)
     if not (path / DATABASE).is_file() and not (path / "results.csv").is_file():
         raise InvalidInputError(f"{path} holds neither {DATABASE} nor results.csv")
-    if (Path(out) / DATABASE).exists():
+    if os.path.lexists(Path(out) / DATABASE):
         raise InvalidInputError(f"{out} holds a run already: choose another folder")
     found = {row.job: (row, spec, shown) for row, spec, shown in _from_database(path / DATABASE)}
     of_database = len(found)
@@ -59,11 +67,9 @@ def salvage(path: str | Path, out: str | Path) -> Salvaged:
         for key, value in _notes(path / DATABASE).items():
             store.note(key, value)
         for row, spec, shown in found.values():
-            trace = _trace(path, row)
+            trace, detail = files_of(path, row)
             if row.trace and trace is None:
                 without.append(row.job)
-            note = path / row.detail_file
-            detail = note.read_text(errors="replace") if note.is_file() else ""
             store.add(replace(row, trace=""), trace, detail, spec, show=shown)
         store.write_csv()
     return Salvaged(len(found), len(found) - of_database, tuple(without))
@@ -71,12 +77,8 @@ def salvage(path: str | Path, out: str | Path) -> Salvaged:
 
 def _from_database(file: Path) -> Iterator[tuple[ResultRow, dict[str, Any], bool]]:
     """Each row by its number: one that cannot be read costs no other."""
-    if not file.is_file():
-        return
-    uri = f"{file.absolute().as_uri()}?mode=ro"
-    with contextlib.suppress(*_BAD), contextlib.closing(sqlite3.connect(uri, uri=True)) as db:
-        there = {name for _, name, *_ in db.execute("PRAGMA table_info(results)")}
-        names = [name for name in columns() if name in there]
+    with contextlib.suppress(*_BAD), contextlib.closing(_opened(file)) as db:
+        names = [name for name in columns() if name in columns_of(db)]
         listed = ", ".join(f'"{name}"' for name in names)
         query = f"SELECT {listed}, spec, current FROM results WHERE rowid = ?"
         misses = number = 0
@@ -84,33 +86,23 @@ def _from_database(file: Path) -> Iterator[tuple[ResultRow, dict[str, Any], bool
             number, misses = number + 1, misses + 1
             with contextlib.suppress(*_BAD):
                 for *values, spec, current in db.execute(query, (number,)):
-                    data = dict(zip(names, values, strict=True))
-                    data["success"] = bool(data["success"])
                     misses = 0
-                    yield checked_row(ResultRow.from_columns(data)), json.loads(spec), bool(current)
+                    row = row_of(dict(zip(names, values, strict=True)))
+                    yield row, read_spec(spec), bool(current)
+
+
+def _opened(file: Path) -> sqlite3.Connection:
+    return open_checked(database_of(file.parent))
 
 
 def _from_csv(file: Path) -> Iterator[ResultRow]:
-    if not file.is_file():
-        return
-    with file.open(newline="", errors="replace") as lines, contextlib.suppress(csv.Error):
-        for line in csv.DictReader(lines):
-            with contextlib.suppress(*_BAD, AttributeError):
+    with contextlib.suppress(csv.Error, SchemaError):
+        for line in csv_lines(file):
+            with contextlib.suppress(*_BAD):
                 yield row_from_texts(line)
 
 
 def _notes(file: Path) -> dict[str, Any]:
-    with contextlib.suppress(*_BAD):
-        uri = f"{file.absolute().as_uri()}?mode=ro"
-        with contextlib.closing(sqlite3.connect(uri, uri=True)) as db:
-            return {key: value for key, value in read_about(db).items() if key != "schema"}
+    with contextlib.suppress(*_BAD), contextlib.closing(_opened(file)) as db:
+        return {key: value for key, value in read_about(db).items() if key != "schema"}
     return {}
-
-
-def _trace(path: Path, row: ResultRow) -> bytes | None:
-    """The recorded episode of a row, if it is whole."""
-    file = None if row.trace_file is None else path / row.trace_file
-    if file is None or not file.is_file():
-        return None
-    trace = file.read_bytes()
-    return trace if trace_digest(trace) == row.trace else None

@@ -8,8 +8,9 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 
-from pushplan.evaluation.database import read_about, reading
+from pushplan.evaluation.database import LOCK, read_about, reading
 from pushplan.evaluation.rows import Status
+from pushplan.world.errors import one_line
 from pushplan.world.file_locks import is_locked
 
 
@@ -18,7 +19,8 @@ class RunStatus:
     """How far a run is.
 
     Attributes:
-        active: whether a process writes into the directory now.
+        active: True if a process writes into the directory now; None on a disk without file locks,
+            where nothing tells.
         jobs: jobs of the last call that ran any.
         done: of these, how many have a result.
         failed: results in the directory, of whatever call, that are failures.
@@ -28,7 +30,7 @@ class RunStatus:
         slowest: results of the directory that took longest: title, seconds.
     """
 
-    active: bool
+    active: bool | None
     jobs: int
     done: int
     failed: int
@@ -49,12 +51,12 @@ def run_status(path: str | Path, slowest: int = 3) -> RunStatus:
         InvalidInputError: if it holds no results.
         SchemaError: if they cannot be read.
     """
-    active = is_locked(Path(path) / ".lock")
+    active = is_locked(Path(path) / LOCK)
     with reading(path) as db:
         return _look(db, active, slowest)
 
 
-def _look(db: sqlite3.Connection, active: bool, slowest: int) -> RunStatus:
+def _look(db: sqlite3.Connection, active: bool | None, slowest: int) -> RunStatus:
     *_, call = read_about(db).get("runs", []) or [{}]
     began = str(call.get("began", ""))
     ((failed,),) = db.execute("SELECT count(*) FROM results WHERE status != ?", (str(Status.DONE),))
@@ -66,7 +68,8 @@ def _look(db: sqlite3.Connection, active: bool, slowest: int) -> RunStatus:
     jobs = int(call.get("jobs", 0))
     done = min(jobs, int(call.get("done", 0)) + new)
     rate = new / elapsed if elapsed > 0.0 else 0.0
-    flying = db.execute("SELECT title, began FROM running ORDER BY began").fetchall()
+    flying = db.execute("SELECT title, began FROM running ORDER BY began")
+    running = tuple((one_line(title), time.time() - start) for title, start in flying)
     took = db.execute(
         "SELECT policy || ' ' || scenario, wall_time_s FROM results WHERE wall_time_s IS NOT NULL "
         "ORDER BY wall_time_s DESC LIMIT ?",
@@ -79,6 +82,6 @@ def _look(db: sqlite3.Connection, active: bool, slowest: int) -> RunStatus:
         failed=failed,
         per_minute=60.0 * rate,
         left_s=(jobs - done) / rate if rate and done < jobs else None,
-        running=tuple((title, time.time() - at) for title, at in flying) if active else (),
-        slowest=tuple((title, seconds) for title, seconds in took),
+        running=running if active else (),
+        slowest=tuple((one_line(title), float(seconds)) for title, seconds in took),
     )

@@ -3,35 +3,46 @@
 from __future__ import annotations
 
 import contextlib
-import fcntl
 import hashlib
 import json
+import logging
+import os
 import re
 import sqlite3
 import time
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Container, Iterable, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 from types import TracebackType
-from typing import IO, Any
+from typing import Any
 
 from pushplan.evaluation.database import (
     DATABASE,
     HIDE_OTHERS,
+    LOCK,
     StoredResult,
     clear_errors,
     connect,
     database_of,
     insert,
+    new_database,
     read_about,
     read_measured,
     read_results,
     read_rows,
+    read_spec,
     reading,
 )
 from pushplan.evaluation.rows import ResultRow, Status, rows_csv
-from pushplan.world import InvalidInputError
-from pushplan.world.files import write_atomic
+from pushplan.world import InvalidInputError, SchemaError
+from pushplan.world.file_locks import NO_FOLLOW, take_lock
+from pushplan.world.output_files import TEMPORARY, check_folder, make_folder, write_atomic
+from pushplan.world.safe_files import MAX_BYTES, read_bytes
+
+_log = logging.getLogger(__name__)
+_MAX_DETAIL = 1_000_000  # bytes of a traceback
+_EPISODE = re.compile(r"[0-9a-f]{32}\.npz(\.tmp)?")
+"""Names of recorded episodes, and of those that version 0.2 left half written."""
 
 REPORT = re.compile(
     r"report\.html|summary\.(md|csv)|differences\.csv|(paper|stress)\.md"
@@ -43,10 +54,8 @@ _REPLAY = re.compile(r"[\w-]{1,64}\.js", re.ASCII)
 
 def remove_report(folder: Path) -> None:
     """Remove what `Results.report` has written into a folder, so that it is not beside new rows."""
-    for names, place in ((REPORT, folder), (_REPLAY, folder / "replays")):
-        for file in [*place.glob("*")]:
-            if names.fullmatch(file.name):
-                file.unlink()
+    _remove(folder, REPORT)
+    _remove(folder / "replays", _REPLAY)
 
 
 class RunDirectory:
@@ -65,22 +74,29 @@ class RunDirectory:
         self.path = Path(path)
         if not new:
             database_of(path)
+        check_folder(path, "run directory", DATABASE)
+        file = self.path / DATABASE
+        if os.path.lexists(file):
+            with reading(path):  # nothing is made beside a database that no run wrote
+                pass
         try:
-            self.episodes.mkdir(parents=True, exist_ok=True)
-            self.failures.mkdir(exist_ok=True)
+            self.path.mkdir(parents=True, exist_ok=True)
+            flags = os.O_RDWR | os.O_CREAT | os.O_NONBLOCK | NO_FOLLOW
+            self._lock = os.open(self.path / LOCK, flags, 0o644)
         except OSError as error:
             raise InvalidInputError(f"cannot use {path} as a run directory: {error}") from error
-        with clear_errors(self.path):
-            self._lock = (self.path / ".lock").open("w")
-        if not _locked(self._lock):
-            self._lock.close()
-            raise InvalidInputError(f"another process is writing into {path}")
-        for leftover in [*self.path.glob("*.tmp"), *self.episodes.glob("*.tmp")]:
-            leftover.unlink()
         try:
-            self._db = connect(self.path / DATABASE)
+            _lock(self._lock, self.path)
+            with clear_errors(self.path):
+                if not os.path.lexists(file):  # the mark of a run directory comes first
+                    write_atomic(file, new_database())
+                make_folder(self.episodes)
+                make_folder(self.failures)
+                for folder in (self.path, self.episodes, self.failures):
+                    _remove(folder, TEMPORARY)
+            self._db = connect(file)
         except BaseException:
-            self._lock.close()
+            os.close(self._lock)
             raise
         with self._use() as db:
             db.execute("DELETE FROM running")
@@ -148,7 +164,8 @@ class RunDirectory:
         least = int(current)
         with self._use() as db:
             query = f"SELECT job, spec FROM results WHERE {where} AND current >= {least}"
-            return {job: json.loads(spec) for job, spec in db.execute(query, key or ())}
+            found = db.execute(query, key or ())
+            return {job: read_spec(spec) for job, spec in found}
 
     def show(self, jobs: Iterable[str]) -> None:
         """Let these results be the ones that count for their policies and scenarios."""
@@ -208,9 +225,7 @@ class RunDirectory:
         """Remove recorded episodes that no result names: of calls that were killed or forgotten."""
         with self._use() as db:
             named = {f"{trace}.npz" for (trace,) in db.execute("SELECT trace FROM results")}
-            for path in self.episodes.iterdir():
-                if path.name not in named:
-                    path.unlink()
+            _remove(self.episodes, _EPISODE, named)
 
     def rescore(self, row: ResultRow) -> None:
         """Replace a row by one of the same job."""
@@ -254,7 +269,29 @@ class RunDirectory:
         with contextlib.suppress(sqlite3.Error):
             self._db.execute("PRAGMA wal_checkpoint(TRUNCATE)")
         self._db.close()
-        self._lock.close()
+        os.close(self._lock)
+
+
+def files_of(folder: Path, row: ResultRow) -> tuple[bytes | None, str]:
+    """What is kept beside a row in the run directory of a stranger.
+
+    Returns:
+        The recorded episode, None if it is missing or is not what its name says, and the traceback.
+    """
+    trace = _own_file(folder, row.trace_file or "", MAX_BYTES)
+    detail = _own_file(folder, row.detail_file, _MAX_DETAIL)
+    whole = bool(row.trace) and trace_digest(trace) == row.trace
+    return trace if whole else None, detail.decode(errors="replace")
+
+
+def _own_file(folder: Path, name: str, limit: int) -> bytes:
+    """The content of a file that is in a folder indeed, not where a link leads; else nothing."""
+    path = (folder / name).resolve()
+    if not path.is_relative_to(folder.resolve()) or not path.is_file():
+        return b""
+    with contextlib.suppress(SchemaError):
+        return read_bytes(path, limit=limit)
+    return b""
 
 
 def trace_digest(trace: bytes) -> str:
@@ -262,15 +299,30 @@ def trace_digest(trace: bytes) -> str:
     return hashlib.sha256(trace).hexdigest()[:32]
 
 
-def _locked(file: IO[str]) -> bool:
-    """Take the lock of a run directory; a process that only looks at it holds it for a moment."""
+def _remove(folder: Path, names: re.Pattern[str], kept: Container[str] = ()) -> None:
+    """Remove files of ours from a folder that is there, and nothing that has another name."""
+    if folder.is_symlink() or not folder.is_dir():
+        return
+    for entry in [*os.scandir(folder)]:
+        ours = names.fullmatch(entry.name) and entry.name not in kept
+        if ours and not entry.is_dir(follow_symlinks=False):
+            os.unlink(entry)
+
+
+def _lock(handle: int, path: Path) -> None:
+    """Lock a run directory; a process that only looks at it holds it for a moment.
+
+    Raises:
+        InvalidInputError: if another process holds it.
+    """
     for _ in range(5):
-        try:
-            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            return True
-        except OSError:
-            time.sleep(0.05)
-    return False
+        taken = take_lock(handle)
+        if taken is None:
+            _log.warning("%s is on a disk without file locks: let only one process write", path)
+        if taken is not False:
+            return
+        time.sleep(0.05)
+    raise InvalidInputError(f"another process is writing into {path}")
 
 
 def open_results(

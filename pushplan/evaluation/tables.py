@@ -302,8 +302,9 @@ def _policy_cells(summary: PolicySummary, metrics: Sequence[str], wide: bool) ->
         if value is None:
             cells.append("")
         elif name in _TIMES:
-            worst = summary.metrics[_TIMES[name]].highest
-            cells.append(f"{milliseconds(value.median)}\nmax {milliseconds(worst)}")
+            worst = summary.metrics.get(_TIMES[name])
+            greatest = "" if worst is None else f"\nmax {milliseconds(worst.highest)}"
+            cells.append(milliseconds(value.median) + greatest)
         else:
             cells.append(_estimate(value, _digits(name), wide=wide))
     return tuple(cells)

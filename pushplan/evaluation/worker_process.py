@@ -19,12 +19,17 @@ from pushplan.evaluation.channel import Channel, ChannelError
 from pushplan.evaluation.jobs import JobResult
 from pushplan.evaluation.worker import THREAD_VARIABLES, WORKER_VARIABLE, WorkerSetup
 from pushplan.world import InvalidInputError, PushplanError
+from pushplan.world.file_locks import NO_FOLLOW
 from pushplan.world.named_objects import import_path
 
 _LOG_TAIL = 6000
 _LOG_MOST = 1_000_000
 _TRACE_S = 0.2  # time that a worker has to write where it hangs before it is ended
 _FAREWELL_S = 1.0
+
+
+def _no_link(path: str, flags: int) -> int:
+    return os.open(path, flags | NO_FOLLOW, 0o666)
 
 
 class WorkerDiedError(PushplanError):
@@ -71,7 +76,7 @@ class WorkerProcess:
             f"import sys; sys.path[:] = {import_path()!r}\n"
             f"from pushplan.evaluation.worker import main; main({theirs.fileno()})"
         )
-        with theirs, open(log or os.devnull, "ab") as output:
+        with theirs, open(log or os.devnull, "ab", opener=_no_link) as output:
             self._process = subprocess.Popen(
                 [sys.executable, "-c", code],
                 stdin=subprocess.DEVNULL,

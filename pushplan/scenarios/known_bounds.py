@@ -13,7 +13,7 @@ from types import MappingProxyType
 
 from pushplan.world import InvalidInputError, SchemaError
 from pushplan.world.checks import number
-from pushplan.world.files import write_atomic
+from pushplan.world.output_files import write_atomic
 
 BOUNDS_FILE = "data/bounds.csv"
 """Where the package keeps them."""

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import errno
-import fcntl
 import ipaddress
 import os
 import re
@@ -16,6 +15,7 @@ from dataclasses import dataclass
 
 from pushplan.world.checks import word
 from pushplan.world.errors import InvalidInputError, short
+from pushplan.world.file_locks import take_lock
 
 _TCP = re.compile(r"tcp:(\[[^\]]+\]|[^:\[\]]+):(\d{1,5})")
 _LOCK_S = 5.0  # for how long another server may be starting in the same folder [s]
@@ -138,14 +138,10 @@ def _alone(folder: str) -> Iterator[None]:
     handle = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
     try:
         end = time.monotonic() + _LOCK_S
-        while True:
-            try:
-                fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-                break
-            except BlockingIOError:
-                if time.monotonic() > end:
-                    raise OSError(errno.EBUSY, f"the folder {folder} is locked") from None
-                time.sleep(0.02)
+        while take_lock(handle) is False:  # on a disk without locks there is nothing to wait for
+            if time.monotonic() > end:
+                raise OSError(errno.EBUSY, f"the folder {folder} is locked")
+            time.sleep(0.02)
         yield
     finally:
         os.close(handle)

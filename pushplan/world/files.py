@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -164,13 +163,6 @@ def save_world(world: World, path: str | Path) -> None:
     else:
         raise SchemaError(f"a world file ends in .json, .yaml or .yml, got {path.name!r}")
     path.write_text(text, encoding="utf-8")
-
-
-def write_atomic(path: Path, data: bytes) -> None:
-    """Write a file so that it is never seen half written."""
-    temporary = path.with_name(path.name + ".tmp")
-    temporary.write_bytes(data)
-    os.replace(temporary, path)
 
 
 def robot_from_dict(data: object) -> tuple[RobotModel, Any, Any]:

@@ -53,6 +53,19 @@ def test_a_second_process_loads_what_the_first_compiled(module: Path, tmp_path: 
     assert _run(module, tmp_path / "cache") == (_LOADED, "")
 
 
+def test_on_a_disk_without_locks_nobody_waits(module: Path, tmp_path: Path) -> None:
+    module.write_text(
+        "import errno, fcntl, time\n"
+        "def refuse(*arguments):\n"
+        "    raise OSError(errno.ENOLCK, 'no locks')\n"
+        "def wait(seconds):\n"
+        "    raise AssertionError('it waits')\n"
+        "fcntl.flock, time.sleep = refuse, wait\n" + _TWICE
+    )
+    assert _run(module, tmp_path / "cache") == (_COMPILED, "")
+    assert _run(module, tmp_path / "cache") == (_LOADED, "")
+
+
 @pytest.mark.slow
 def test_a_kernel_is_compiled_anew_when_one_that_it_calls_changes(
     module: Path, tmp_path: Path

@@ -7,7 +7,6 @@ import dataclasses
 import io
 import json
 import math
-import os
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -19,8 +18,8 @@ import numpy as np
 from pushplan.training.policies.config import TrainingConfig, read_config
 from pushplan.training.policies.environment import TrainingEnv
 from pushplan.world import InvalidInputError
-from pushplan.world.files import write_atomic
 from pushplan.world.libraries import need
+from pushplan.world.output_files import check_folder, replacing, write_atomic
 from pushplan.world.safe_yaml import dump
 
 CONFIG, CURVE, PICTURE = "config.yaml", "curve.csv", "curve.png"
@@ -76,6 +75,7 @@ class TrainingRun:
                     f"{self.folder} holds a training: go on with --resume, or take another folder"
                 )
             _same(read_config(there), config, self.folder)
+        check_folder(folder, "training", CONFIG)
         self.folder.mkdir(parents=True, exist_ok=True)
         write_atomic(there, dump(config.to_dict()).encode())
         if resume and self.path(CURVE).is_file():
@@ -117,12 +117,11 @@ class TrainingRun:
         self.curve.append(point)
         state = {**state, "chunks": len(self.curve)}
         self._write_curve()  # rows beyond the checkpoint are dropped when it is loaded
-        partial = self.path(CHECKPOINT + ".part")
         if best:
-            torch.save({"weights": state["weights"]}, partial)
-            os.replace(partial, self.path(BEST))
-        torch.save(state, partial)
-        os.replace(partial, self.path(CHECKPOINT))
+            with replacing(self.path(BEST)) as file:
+                torch.save({"weights": state["weights"]}, file)
+        with replacing(self.path(CHECKPOINT)) as file:
+            torch.save(state, file)
 
     def load(self) -> Any:
         """The last checkpoint, None if there is none. Loads numbers only, never pickled code."""
