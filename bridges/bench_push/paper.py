@@ -33,7 +33,7 @@ from pushplan.learned.onnx_policy import read_specification
 from pushplan.metrics import Role, compute, metric_names
 from pushplan.scenarios import suite
 from pushplan.world import InvalidInputError, PushplanError
-from pushplan.world.files import write_atomic
+from pushplan.world.output_files import write_atomic
 
 TO_GOAL_POINT = "E_nav_to_goal_point"
 _POINT = "E_nav to goal point"
