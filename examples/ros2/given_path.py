@@ -22,6 +22,8 @@ class GivenPath:
     def __init__(self) -> None:
         self.given: Plan | None = None
         self.made = 0.0
+        self.left: float | None = None
+        """What was left of the path when the robot was last on it [m]; None at its beginning."""
         self.blocked = ""
         """Why the last call returned no plan."""
 
@@ -31,8 +33,13 @@ class GivenPath:
         """The rest of the path."""
         if self.given is None:
             return PlanResult(PlanStatus.TIMED_OUT, None, PlanStats(0.0))
-        driven = min(max(0.0, world.time - self.made), _LONGEST_WAY)
-        rest = rest_of(self.given, passed(world, self.given, driven), None)
+        if self.left is None:
+            driven = min(max(0.0, world.time - self.made), _LONGEST_WAY)
+            index = passed(world, self.given, driven)
+        else:  # the robot was stopped on its way, as by a clock that stepped back
+            lengths = self.given.arc_lengths
+            index = max(0, int(np.searchsorted(lengths, lengths[-1] - self.left)) - 1)
+        rest = rest_of(self.given, index, None)
         self.blocked = _obstacle(world, rest)
         if self.blocked:
             return PlanResult(PlanStatus.GOAL_UNREACHABLE, None, PlanStats(0.0))

@@ -106,6 +106,7 @@ class Navigator:
         self.planner, self.controller = planner, controller
         self.budget, self.tolerance, self.patience = budget, tolerance, patience
         self._runner_options: dict[str, Any] = {"period": period, "max_age": max_age, "log": log}
+        self._max_age = max_age
         self._runners: dict[str, Runner] = {}
         self._path = GivenPath()
         self._handing_over = threading.Lock()
@@ -224,7 +225,7 @@ class Navigator:
         if name == self._driven != PATH and self._is_on_its_way_to(goal):
             return
         if name == PATH:
-            self._path.given, self._path.made = plan, time_from(path)
+            self._path.given, self._path.made, self._path.left = plan, time_from(path), None
         with self._handing_over:  # what comes in meanwhile has the goal of before
             try:
                 runner = self._runner(name)
@@ -237,7 +238,7 @@ class Navigator:
             before.cancel()
         self._checker = PoseProgressChecker(robot)
         self._progress = Progress(2.0 * robot.circumscribed_radius)
-        self._began = self._planned_at = world.time
+        self._clock, self._time, self._planned_at = world.time, 0.0, 0.0
         self._driveable_at = -math.inf
         self.see()
 
@@ -265,12 +266,14 @@ class Navigator:
         Args:
             now: by the clock of the messages [s].
         """
-        goal, now = self._goal, max(now, self._began)  # odometry may be ahead of the clock
+        goal, passed = self._goal, now - self._clock
         assert goal is not None, "call follow(path) first"
         command, world = self._runners[self._driven].command(now), self.scene.world(goal)
         left = self._distance_left(command.plan, world)
+        # a clock that steps takes away, and adds, no patience
+        self._clock, self._time = now, self._time + min(max(passed, 0.0), self._max_age)
         if not self._outcome[0]:
-            self._judge(command, world, now, left)
+            self._judge(command, world, self._time, left)
         stands = command.twist.linear == 0.0 == command.twist.angular
         outcome = self._outcome if stands else ("", "")
         if outcome[0]:
@@ -312,7 +315,10 @@ class Navigator:
         if plan is None:
             return self._end_of_path.distance(*world.robot_pose[:2].tolist())
         along = self._progress.update(plan, world.robot_pose)
-        return self._progress.total - along
+        left = self._progress.total - along
+        if self._driven == PATH:
+            self._path.left = left
+        return left
 
     def _is_on_its_way_to(self, goal: GoalDisc) -> bool:
         if self._goal is None or self._outcome[0]:

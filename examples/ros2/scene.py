@@ -10,10 +10,11 @@ import numpy as np
 
 from pushplan.perception import ObjectTracker
 from pushplan.ros import pose_from, static_map_from, time_from
-from pushplan.world import GoalDisc, Movables, RobotModel, StaticMap, World
+from pushplan.world import GoalDisc, InvalidInputError, Movables, RobotModel, StaticMap, World
 from pushplan.world.checks import FloatArray, expect
 from pushplan.world.outline import transform
 
+_AHEAD = 0.5  # by which stamps of objects may be ahead of the clock [s]
 _CUBE = 1  # type of a visualization_msgs/Marker whose outline is its scale
 
 
@@ -53,6 +54,7 @@ class Scene:
         self._lock = threading.Lock()
         self._static: StaticMap | None = None
         self._movables = Movables.empty()
+        self._objects_at = -math.inf
         self._robot: tuple[FloatArray, FloatArray, float] | None = None
 
     def take_map(self, message: Any) -> None:
@@ -75,12 +77,22 @@ class Scene:
         Args:
             message: a marker an object, by its ``id``: a cube, or the corners of an outline in
                 order.
-            now: when an array without markers was seen [s].
+            now: when an array without markers was seen, and before which all others were [s].
+
+        Raises:
+            InvalidInputError: if it cannot be read, or was seen later than now.
         """
         outlines = [self._outline(marker) for marker in message.markers]
         stamp = max((time_from(marker) for marker in message.markers), default=now)
         ids = [int(marker.id) for marker in message.markers]
+        if stamp > now + _AHEAD:
+            raise InvalidInputError(
+                f"objects must not be seen later than now, got {stamp - now:.3g} s later"
+            )
         with self._lock:
+            if now < self._objects_at:  # the clock has stepped back: the tracker begins anew
+                self._tracker.reset()
+            self._objects_at = now
             self._movables = self._tracker.update(outlines, stamp, ids)
 
     def _outline(self, marker: Any) -> FloatArray:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import atexit
 import contextlib
+import math
 import signal
 import sys
 import threading
@@ -97,6 +98,11 @@ class Motors:
                 self._braked = near != twist
                 twist = near
             self._put(twist)
+
+    def brake(self) -> None:
+        """Brake until the next velocity, as if the loop were silent."""
+        with self._lock:
+            self._told_at = -math.inf
 
     def close(self) -> None:
         """Brake the robot to a stand, and send nothing more."""

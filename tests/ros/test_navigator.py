@@ -362,13 +362,58 @@ def test_a_controller_is_loaded_beside_the_robots_loop():
     assert code_of(lambda: robot.navigator.is_loaded("controller", "paht")) == "INVALID_CONTROLLER"
 
 
+@pytest.mark.parametrize("back", [0.3, 50.0])
+def test_a_clock_that_steps_back_stops_the_robot_and_the_path_is_driven_on(back):
+    path, length = given_path(SHAPES["passes its end"])
+    robot = Robot((0.5, 1.0, 0.0), patience=(3.0, 1.0))
+    robot.scene.take_map(empty_room())
+    robot.navigator.follow(path)
+    said = robot.drive(until=lambda step: robot.pose[1] > 1.8)
+    before = robot.twist.linear
+    robot.now -= back
+    robot.see()
+    said += robot.drive(steps=1)
+    assert robot.twist.linear < before
+    said += robot.drive()
+    driven = PERIOD * sum(abs(step.twist.linear) for step in said)
+    assert said[-1].outcome == "SUCCEEDED" and driven == pytest.approx(length, abs=0.3)
+
+
+def test_a_clock_that_stands_at_another_time_ends_the_goal():
+    path, _ = given_path([(0.5, 1.5), (3.5, 1.5)])
+    robot = Robot((0.5, 1.5, 0.0), patience=(3.0, 1.0))
+    robot.scene.take_map(empty_room())
+    robot.navigator.follow(path)
+    robot.drive(steps=60)
+    robot.now -= 50.0  # of the node; odometry is as before
+    said = robot.drive(sees=False)
+    assert said[-1].outcome == "TF_ERROR" and "went back by" in said[-1].reason
+
+
+def test_objects_of_the_future_are_refused_and_those_of_a_clock_set_back_are_taken():
+    scene = Scene(turtlebot3_burger())
+
+    def seen(stamp, now):
+        header = MESSAGES.header(stamp)
+        one = marker(7, (1.5, 1.0, 0.3), cube=0.2)
+        one.header = header
+        scene.take_objects(MESSAGES.make("visualization_msgs/MarkerArray", markers=[one]), now)
+        return scene._movables.poses[:, 0].tolist()
+
+    assert seen(100.0, 100.0) == [1.5]
+    with pytest.raises(InvalidInputError, match="60 s later"):
+        seen(160.0, 100.0)
+    assert scene._tracker.time == 100.0
+    assert seen(20.0, 20.1) == [1.5] and scene._tracker.time == 20.0
+
+
 def test_markers_become_objects_that_keep_their_ids():
     robot = Robot()
     corners = [(-0.1, -0.1), (0.1, -0.1), (0.0, 0.2)]
     for x in (1.5, 1.5, 1.52):
         markers = [marker(7, (x, 1.0, 0.3), cube=0.2), marker(3, (1.0, 2.0, 0.0), corners)]
         array = MESSAGES.make("visualization_msgs/MarkerArray", markers=markers)
-        robot.scene.take_objects(array, 0.0)
+        robot.scene.take_objects(array, 1e3)
     world = robot.scene.world(robot.navigator._disc(np.array([3.0, 1.0])))
     by_id = dict(zip(world.movables.ids.tolist(), range(2), strict=True))
     assert sorted(by_id) == [3, 7]
