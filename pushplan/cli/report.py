@@ -38,7 +38,7 @@ def add(commands: Any) -> None:
     parser.add_argument(
         "--format",
         choices=("text", "markdown", "latex"),
-        help="only print the tables, as a document (LaTeX needs booktabs and makecell)",
+        help="only print the tables, as a document (LaTeX needs booktabs)",
     )
     add_table_options(parser)
     parser.add_argument(

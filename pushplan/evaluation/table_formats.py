@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import io
-import re
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+from pushplan.evaluation.latex_tables import latex as latex
 from pushplan.evaluation.rows import csv_text
 from pushplan.evaluation.statistics import Estimate
 from pushplan.evaluation.summary import PairedDifference, PolicySummary
@@ -14,12 +14,6 @@ from pushplan.evaluation.tables import Table
 
 if TYPE_CHECKING:
     from rich.table import Table as RichTable
-
-_LATEX = {
-    **{character: "\\" + character for character in "&%$#_{}"},
-    **{"\\": r"\textbackslash{}", "~": r"\textasciitilde{}", "^": r"\textasciicircum{}"},
-    **{"±": r"$\pm$", "<": "$<$", ">": "$>$"},
-}
 
 
 def markdown(tables: Sequence[Table]) -> str:
@@ -33,36 +27,6 @@ def markdown(tables: Sequence[Table]) -> str:
             lines += ["", f"{table.note[0].upper()}{table.note[1:]}."]
         blocks.append("\n".join(lines))
     return "\n\n".join(blocks) + "\n"
-
-
-def latex(tables: Sequence[Table]) -> str:
-    """The tables for a LaTeX document that loads ``booktabs`` and ``makecell``."""
-    blocks = []
-    for table in tables:
-        columns = "l" + "r" * (len(table.headings) - 1)
-        lines = [r"\begin{table}", r"\centering", rf"\caption{{{_latex(table.title)}}}"]
-        lines += [rf"\begin{{tabular}}{{{columns}}}", r"\toprule", _latex_line(table.headings)]
-        lines += [r"\midrule", *(_latex_line(row) for row in table.cells), r"\bottomrule"]
-        lines += [r"\end{tabular}"]
-        if table.note:
-            lines.append(rf"\par\smallskip\footnotesize {_latex(table.note)}.")
-        blocks.append("\n".join([*lines, r"\end{table}"]))
-    return "\n\n".join(blocks) + "\n"
-
-
-def _latex(text: str) -> str:
-    return re.sub(f"[{re.escape(''.join(_LATEX))}]", lambda found: _LATEX[found[0]], text)
-
-
-def _latex_line(cells: Sequence[str]) -> str:
-    return " & ".join(map(_latex_cell, cells)) + r" \\"
-
-
-def _latex_cell(cell: str) -> str:
-    lines = [_latex(line) for line in cell.split("\n")]
-    # a line that begins with a bracket would be an argument of the line break before it
-    joined = r"\\".join([lines[0], *(f"{{}}{line}" for line in lines[1:])])
-    return joined if len(lines) == 1 else rf"\makecell[r]{{{joined}}}"
 
 
 def summary_csv(summaries: Sequence[PolicySummary], titles: dict[str, str]) -> str:
