@@ -5,18 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from matplotlib import rcParams
 from matplotlib.figure import Figure
-from matplotlib.transforms import blended_transform_factory
 
 from pushplan.drawing.figure import COLUMN
-from pushplan.evaluation.plot_style import dots, interval, tidy
+from pushplan.evaluation.plot_style import LINE, dots, interval, tidy, unclipped, wrapped
 from pushplan.evaluation.run_record import RunRecord
 from pushplan.evaluation.summary import PolicySummary
 from pushplan.metrics import Role, metric_names
-
-_LINE = 0.16  # height of a line [inch]
-_LETTERS = 46  # of the common size, in the width of the figure
 
 
 def draw_intervals(run: RunRecord) -> Figure:
@@ -29,42 +24,43 @@ def draw_intervals(run: RunRecord) -> Figure:
         if any(name in summary.metrics for summary in run.summaries):
             columns.setdefault(name[0], []).append(name)
     found = {(one.setting, one.policy): one for one in run.summaries}
-    titled = len(run.titles) > 1
-    lines = sum(len(run.policies_in(setting)) + titled for setting in run.titles)
-    figure = Figure(figsize=(COLUMN, _LINE * lines + 0.5), layout="constrained")
+    figure = Figure(figsize=(COLUMN, 1.0), layout="constrained")
     panels = figure.subplots(1, 1 + len(columns), squeeze=False, sharey=True)[0]
-    where = blended_transform_factory(figure.transFigure, panels[0].transData)
-    panels[0].set_zorder(1.0)
-    panels[0].patch.set_visible(False)
-    ticks: dict[int, str] = {}
+    ticks: dict[float, str] = {}
+    below = 0.0  # lines of text
+
+    def place(text: str) -> float:
+        nonlocal below
+        middle = below + 0.5 * (text.count("\n") + 1)
+        below = 2.0 * middle - below + 0.15
+        ticks[middle] = text
+        return middle
+
     for setting, title in run.titles.items():
-        if titled:
-            place = len(ticks)
-            ticks[place] = ""
-            box = {"facecolor": "white", "edgecolor": "none", "pad": 1.0}
-            size = rcParams["font.size"] * min(1.0, _LETTERS / len(title))
-            text = panels[0].text(
-                0.02, place, title, transform=where, va="center", bbox=box, fontsize=size
-            )
-            text.set_in_layout(False)  # it reaches over all panels
+        if len(run.titles) > 1:
+            place(wrapped(title))
         for policy, index in run.policies_in(setting).items():
+            height = place(wrapped(policy))
             for axes, names in zip(panels, [[], *columns.values()], strict=True):
-                _bar(axes, found[setting, policy], names, len(ticks), index)
-            ticks[len(ticks)] = policy
+                _bar(axes, found[setting, policy], names, height, index)
+    figure.set_figheight(LINE * below + 0.5)
     for axes, names in zip(panels, [["success"], *columns.values()], strict=True):
         axes.set_xlabel(names[0] if len(names) == 1 else names[0][0])
-        axes.locator_params(axis="x", nbins=2, steps=[1, 2, 5, 10])
+        axes.locator_params(axis="x", nbins=1, min_n_ticks=1)
+        axes.xaxis.set_major_formatter("{x:g}")
         axes.margins(x=0.08)
         tidy(axes)
-    panels[0].set_xlim(-0.06, 1.06)
-    panels[0].set_yticks(list(ticks), list(ticks.values()))
-    panels[0].set_ylim(lines - 0.4, -0.6)
-    for axes in panels:
         axes.tick_params(axis="y", length=0)
+    panels[0].set_xlim(-0.06, 1.06)
+    panels[0].set_yticks(list(ticks), list(ticks.values()), fontsize=7.0)
+    panels[0].set_ylim(below, 0.0)
+    shown = {wrapped(title) for title in run.titles.values()}
+    for label in panels[0].get_yticklabels():
+        label.set_fontweight("bold" if label.get_text() in shown else "normal")
     return figure
 
 
-def _bar(axes: Any, summary: PolicySummary, names: Sequence[str], place: int, index: int) -> None:
+def _bar(axes: Any, summary: PolicySummary, names: Sequence[str], place: float, index: int) -> None:
     """Success, or the one of these scores that the policy has in the setting."""
     share = summary.success
     mean, low, high = share.fraction, share.low, share.high
@@ -73,7 +69,7 @@ def _bar(axes: Any, summary: PolicySummary, names: Sequence[str], place: int, in
         if not scores:
             return
         mean, low, high = scores[0].mean, scores[0].low, scores[0].high
-    axes.errorbar(
+    bar = axes.errorbar(
         mean,
         place,
         xerr=interval(mean, low, high),
@@ -83,3 +79,4 @@ def _bar(axes: Any, summary: PolicySummary, names: Sequence[str], place: int, in
         linestyle="none",
         **dots(index),
     )
+    unclipped(bar.lines[0])

@@ -162,7 +162,7 @@ def _character(character: str) -> str:
         name = word.replace("LAMDA", "LAMBDA").lower()
         return f"$\\{name if character.islower() else name.capitalize()}$"
     kind, *codes = unicodedata.decomposition(character).split() or [""]
-    base, *marks = unicodedata.normalize("NFKD", character)
+    base, *marks = list(unicodedata.normalize("NFKD", character))
     inner = "".join(map(_character, [base, *marks])) if codes else ""
     if kind in ("<sub>", "<super>"):
         return f"${'_' if kind == '<sub>' else '^'}{{{inner.replace('$', '')}}}$"

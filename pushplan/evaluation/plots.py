@@ -11,10 +11,22 @@ from typing import Any
 import numpy as np
 from matplotlib import rc_context
 from matplotlib.figure import Figure
+from matplotlib.ticker import LogLocator
 
 from pushplan.drawing.figure import FORMATS, STYLE, save_figure
 from pushplan.evaluation.interval_plot import draw_intervals
-from pushplan.evaluation.plot_style import PANEL, abreast, dots, interval, line, tidy
+from pushplan.evaluation.plot_style import (
+    LINE,
+    PANEL,
+    TITLE_LETTERS,
+    add_legend,
+    dots,
+    interval,
+    line,
+    tidy,
+    unclipped,
+    wrapped,
+)
 from pushplan.evaluation.rows import ResultRow
 from pushplan.evaluation.run_record import RunRecord
 from pushplan.evaluation.statistics import estimate
@@ -25,7 +37,7 @@ from pushplan.metrics import Role, metric_names
 from pushplan.world.checks import choice
 
 _MANY = 300  # so many dots of a policy in a panel are drawn as an image
-_ABREAST = 36  # letters of all names of a panel that fit side by side
+_SETTINGS = 6  # of more, figures with a panel for each show all together
 _TRACES = 300  # of so many episodes every planning call is read from the trace
 
 
@@ -63,7 +75,8 @@ def write_plots(run: RunRecord, folder: Path, formats: Sequence[str] = ()) -> di
 def draw(run: RunRecord, name: str) -> Figure | None:
     """One of `FIGURES`; None if the rows have nothing for it."""
     with rc_context(STYLE):
-        figure: Figure | None = FIGURES[name][1](run)
+        many = len(run.titles) > _SETTINGS and name in ("tradeoff", "scores", "planning_time")
+        figure: Figure | None = FIGURES[name][1](run.pooled if many else run)
     return figure
 
 
@@ -85,9 +98,9 @@ def _tradeoff(run: RunRecord) -> Figure | None:
                 continue
             xy = np.array(points, dtype=float)
             many = len(xy) > _MANY
-            axes.scatter(*xy.T, s=10, alpha=0.35, linewidths=0, rasterized=many, **dots(i))
+            cloud = axes.scatter(*xy.T, s=10, alpha=0.35, linewidths=0, rasterized=many, **dots(i))
             across, up = estimate(xy[:, 0]), estimate(xy[:, 1])
-            axes.errorbar(
+            bar = axes.errorbar(
                 across.mean,
                 up.mean,
                 xerr=interval(across.mean, across.low, across.high),
@@ -102,17 +115,20 @@ def _tradeoff(run: RunRecord) -> Figure | None:
                 zorder=5,
                 **dots(i),
             )
-        axes.set_xlabel("effort I (1 = pushed nothing)")
-        axes.set_ylabel("efficiency E (1 = shortest path)")
+            unclipped(cloud, bar.lines[0])
         axes.margins(0.08)
-        axes.set_xlim(right=1.02)
-        axes.set_ylim(top=max(1.03, axes.get_ylim()[1]))
+        axes.locator_params(nbins=4)
 
-    return _panels(run, ("I_nav", "I_manip"), panel)
+    labels = ("effort I (1 = pushed nothing)", "efficiency E (1 = shortest path)")
+    figure = _panels(run, ("I_nav", "I_manip"), panel, labels)
+    if figure is not None:  # after all panels, which share their limits
+        figure.axes[0].set_xlim(right=1.02)
+        figure.axes[0].set_ylim(top=max(1.03, figure.axes[0].get_ylim()[1]))
+    return figure
 
 
 def _spread(run: RunRecord) -> Figure | None:
-    """A box and all dots for each policy: a row of panels a metric, a column a setting."""
+    """A box and all dots for each policy: a panel a metric, the settings below each other."""
     metrics = [name for name in metric_names(Role.SCORE, Role.DETAIL) if values_of(run.rows, name)]
     if not metrics:
         return None
@@ -120,21 +136,32 @@ def _spread(run: RunRecord) -> Figure | None:
         setting: [name for name in metrics if values_of(run.rows_of(setting), name)]
         for setting in run.titles
     }
-    lines = max(map(len, columns.values()))
-    figure = Figure(figsize=(PANEL[0] * len(columns), 1.7 * lines + 0.6))
-    grid = figure.subplots(lines, len(columns), squeeze=False)
+    heights = []
+    for setting, names in columns.items():
+        lines = sum(wrapped(label).count("\n") + 1.3 for label in run.policies_in(setting))
+        heights.append(math.ceil(len(names) / 2) * (LINE * lines + 0.5) + 0.4)
+    figure = Figure(figsize=(2.0 * PANEL[0], sum(heights)), layout="constrained")
+    parts = figure.subfigures(len(columns), 1, squeeze=False, height_ratios=heights)[:, 0]
     rng = np.random.default_rng(0)
-    for column, (setting, names) in enumerate(columns.items()):
-        rows = run.rows_of(setting)
-        grid[0][column].set_title(run.titles[setting])
-        for axes, name in zip(grid[:, column], names, strict=False):
-            _boxes(axes, run.policies_in(setting), rows, name, rng)
-            axes.set_ylabel(heading(name))
-            axes.tick_params(labelbottom=name == names[-1])
-        for axes in grid[len(names) :, column]:
-            axes.set_axis_off()
-    figure.tight_layout()
+    for part, (setting, names) in zip(parts, columns.items(), strict=True):
+        part.suptitle(wrapped(run.titles[setting], 2 * TITLE_LETTERS), fontsize=8.0)
+        grid = _grid(part, len(names), sharex=False)
+        for axes, name in zip(grid, names, strict=False):
+            _boxes(axes, run.policies_in(setting), run.rows_of(setting), name, rng)
+            axes.set_xlabel(wrapped(heading(name), TITLE_LETTERS))
     return figure
+
+
+def _grid(figure: Any, count: int, *, sharex: bool = True) -> Any:
+    """So many axes, two beside each other, with shared scores."""
+    columns = min(2, count)
+    grid = figure.subplots(
+        math.ceil(count / columns), columns, squeeze=False, sharex=sharex, sharey=True
+    ).ravel()
+    for axes in grid[count:]:
+        axes.set_visible(False)
+        grid[count - columns].tick_params(labelbottom=True)  # it has nothing below it
+    return grid
 
 
 def _boxes(
@@ -150,6 +177,7 @@ def _boxes(
             [values],
             positions=[i],
             widths=0.55,
+            orientation="horizontal",
             showfliers=False,
             patch_artist=True,
             boxprops={"facecolor": colour + "30", "edgecolor": colour},
@@ -159,8 +187,8 @@ def _boxes(
         )
         places = i + rng.uniform(-0.18, 0.18, len(values))
         many = len(values) > _MANY
-        axes.scatter(
-            *(places, values),
+        cloud = axes.scatter(
+            *(values, places),
             s=6,
             **dots(place),
             alpha=0.55,
@@ -168,14 +196,10 @@ def _boxes(
             zorder=3,
             rasterized=many,
         )
-    steep = sum(map(len, policies)) > _ABREAST
-    axes.set_xticks(
-        range(len(policies)),
-        list(policies),
-        rotation=25 if steep else 0,
-        ha="right" if steep else "center",
-    )
-    axes.set_xlim(-0.6, len(policies) - 0.4)
+        unclipped(cloud)
+    axes.set_yticks(range(len(policies)), list(map(wrapped, policies)), fontsize=7.0)
+    axes.set_ylim(len(policies) - 0.4, -0.6)
+    axes.locator_params(axis="x", nbins=3)
     tidy(axes)
 
 
@@ -184,9 +208,9 @@ def _profiles(run: RunRecord) -> Figure | None:
     kinds = [name for name in metric_names(Role.SCORE) if values_of(run.rows, name)]
     if not kinds:
         return None
-    figure = Figure(figsize=(PANEL[0] * len(kinds), PANEL[1]))
+    figure = _sheet(len(kinds))
     thresholds = np.linspace(0.0, 1.0, 101)
-    for axes, name in zip(figure.subplots(1, len(kinds), squeeze=False)[0], kinds, strict=True):
+    for axes, name in zip(_grid(figure, len(kinds), sharex=False), kinds, strict=False):
         for i, label in enumerate(run.policies):
             strata = [
                 np.array(values)
@@ -201,10 +225,10 @@ def _profiles(run: RunRecord) -> Figure | None:
             axes.fill_between(thresholds, found.low, found.high, **band)
         axes.set_xlabel(f"{heading(name)} above")
         axes.set_ylim(0.0, 1.02)
+        axes.locator_params(axis="x", nbins=3)
         tidy(axes)
-    figure.axes[0].set_ylabel("share of episodes")
-    figure.axes[0].legend(frameon=False, loc="lower left")
-    figure.set_layout_engine("constrained")
+    figure.supylabel("fraction of episodes", fontsize=8.0)
+    add_legend(figure)
     return figure
 
 
@@ -223,17 +247,17 @@ def _planning_time(run: RunRecord) -> Figure | None:
                 continue
             fractions = np.arange(1, len(times) + 1) / len(times)
             shown = np.unique(np.linspace(0, len(times) - 1, 500).round().astype(int))
-            text = f"{label} ({len(times)} calls)"
-            axes.step(1e3 * times[shown], fractions[shown], where="post", label=text, **line(i))
+            axes.step(1e3 * times[shown], fractions[shown], where="post", label=label, **line(i))
             if (deadline := run.about.get("deadlines", {}).get(label)) is not None:
                 axes.axvline(1e3 * deadline, color=line(i)["color"], linestyle=":", linewidth=1.0)
         axes.set_xscale("log")
+        axes.xaxis.set_major_locator(LogLocator(numticks=4))
+        axes.xaxis.set_minor_formatter("")
         axes.xaxis.set_major_formatter("{x:g}")
         axes.set_ylim(0.0, 1.02)
-        axes.set_xlabel("time of a planning call [ms]")
-        axes.set_ylabel("fraction of calls")
 
-    return _panels(run, ("plan_time_median_s",), panel)
+    labels = ("time of a planning call [ms]", "fraction of calls")
+    return _panels(run, ("plan_time_median_s",), panel, labels)
 
 
 def _calls(run: RunRecord, row: ResultRow, read: bool) -> Any:
@@ -245,7 +269,10 @@ def _calls(run: RunRecord, row: ResultRow, read: bool) -> Any:
 
 
 def _panels(
-    run: RunRecord, names: Sequence[str], draw: Callable[[Any, Sequence[ResultRow]], None]
+    run: RunRecord,
+    names: Sequence[str],
+    draw: Callable[[Any, Sequence[ResultRow]], None],
+    labels: tuple[str, str],
 ) -> Figure | None:
     """One panel for each setting that has values of one of these columns, and a legend."""
     settings = [
@@ -255,33 +282,24 @@ def _panels(
     ]
     if not settings:
         return None
-    columns = min(2, len(settings))
-    lines = math.ceil(len(settings) / columns)
-    figure = Figure(figsize=(PANEL[0] * columns, PANEL[1] * lines + 0.4))
-    grid = figure.subplots(lines, columns, squeeze=False, sharex=True, sharey=True).ravel()
-    for axes in grid[len(settings) :]:
-        axes.set_visible(False)
-    for n, (axes, setting) in enumerate(zip(grid, settings, strict=False)):
+    figure = _sheet(len(settings))
+    panels = _grid(figure, len(settings))[: len(settings)]
+    for axes, setting in zip(panels, settings, strict=True):
         draw(axes, run.rows_of(setting))
-        axes.set_title(run.titles[setting])
+        axes.set_title(wrapped(run.titles[setting], TITLE_LETTERS))
         tidy(axes)
-        lowest = n + columns >= len(settings)
-        axes.tick_params(labelbottom=lowest)
-        axes.set_xlabel(axes.get_xlabel() if lowest else "")
-        axes.set_ylabel("" if n % columns else axes.get_ylabel())
-    found = dict[str, Any]()
-    for axes in grid:
-        for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
-            found.setdefault(label if len(settings) == 1 else label.split(" (")[0], handle)
-    figure.legend(
-        found.values(),
-        found.keys(),
-        loc="outside lower center",
-        ncols=abreast(PANEL[0] * columns, found),
-        frameon=False,
-    )
-    figure.set_layout_engine("constrained")
+    for axes in panels[-2:]:
+        axes.set_xlabel(wrapped(labels[0], TITLE_LETTERS))
+    figure.supylabel(labels[1], fontsize=8.0)
+    add_legend(figure)
     return figure
+
+
+def _sheet(panels: int) -> Figure:
+    """An empty figure for so many panels, two beside each other."""
+    columns = min(2, panels)
+    size = (PANEL[0] * columns, PANEL[1] * math.ceil(panels / columns))
+    return Figure(figsize=size, layout="constrained")
 
 
 FIGURES = {

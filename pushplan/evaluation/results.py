@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -69,13 +69,6 @@ class Results(RunRecord):
     @functools.cached_property
     def _differences(self) -> dict[str, list[PairedDifference]]:
         return {}  # of the calls of `compare` so far
-
-    @functools.cached_property
-    def pooled(self) -> Results:
-        """The rows of all settings as one setting."""
-        title = f"All {len(self.titles)} settings together"
-        rows = tuple(replace(row, pool=title) for row in self.rows)
-        return replace(self, rows=rows, about={**self.about, "settings": {}})
 
     def measure(self, metrics: Sequence[str]) -> list[Table]:
         """Metrics that are no columns, from the stored episodes of jobs that did not fail.

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 from pushplan.evaluation.rows import ResultRow
 from pushplan.evaluation.summary import PolicySummary, natural, policies_of, settings_of, summarise
@@ -34,6 +34,13 @@ class RunRecord:
     def policies(self) -> list[str]:
         """Labels, in the order in which they were given."""
         return policies_of(self.rows, list(self.about.get("policies", {})))
+
+    @functools.cached_property
+    def pooled(self) -> Self:
+        """The rows of all settings as one setting."""
+        title = f"All {len(self.titles)} settings together"
+        rows = tuple(replace(row, pool=title) for row in self.rows)
+        return replace(self, rows=rows, about={**self.about, "settings": {}})
 
     @property
     def titles(self) -> dict[str, str]:

@@ -164,6 +164,20 @@ def test_nothing_is_cut_off(browser: Any, folder: Path, width: int, scheme: str)
     assert one.state("isDark()") == (scheme == "dark")
 
 
+def test_printed_tables_keep_their_columns(browser: Any, tmp_path: Path) -> None:
+    results = many_rows(60, 3)
+    long = [replace(row, policy=f"{'a_very_long_name@' * 3}{row.policy}") for row in results.rows]
+    page = Results(tuple(long)).report(tmp_path, replays="none", pairs="all")
+    one = Opened(browser, page, viewport={"width": 1040, "height": 720})  # A4, landscape
+    one.page.emulate_media(media="print")
+    for table in one.page.locator(".scroll table").all():
+        box = table.bounding_box()
+        assert box is not None and box["x"] + box["width"] <= 1040
+    assert one.page.locator(".scroll").first.evaluate("e => getComputedStyle(e).overflowX") == (
+        "visible"
+    )
+
+
 def test_single_episodes_of_several_tasks(browser: Any, tmp_path: Path) -> None:
     tasks = {"maze-2d-3": "straight", "ship-ice-2d-10": "random"}
     jobs = [
