@@ -63,15 +63,12 @@ def main() -> int:
             raise ValueError
     except ValueError as error:
         parser.error(str(error) or "--seeds are FIRST-LAST, such as 0-29")
-    there = subprocess.run(
-        [options.python, "-c", "import benchnpin"], capture_output=True, env=without_python()
-    )
-    if there.returncode:
-        parser.error(_REMEDY.format(python=options.python))
+    original = original_of(options, parser)
+    say(f"original: {original}")
     options.out.mkdir(parents=True, exist_ok=True)
     seeds = range(first, last + 1)
     wanted = [
-        Run(scene, variation, policy, seeds, options.most_steps)
+        Run(original, scene, variation, policy, seeds, options.most_steps)
         for scene, variation in scenes
         for policy in policies_for(scene, options)
     ]
@@ -94,6 +91,27 @@ def main() -> int:
     for run in lacking:
         say(f"{run.name}: {len(run.episodes)} of {len(run.seeds)} episodes; again to go on")
     return 1 if lacking else 0
+
+
+def original_of(options: argparse.Namespace, parser: argparse.ArgumentParser) -> str:
+    """Name and version of the installed package, of which the checkout has to be, too."""
+
+    def ask(*arguments: str) -> subprocess.CompletedProcess[str]:
+        command = [options.python, *arguments]
+        return subprocess.run(command, capture_output=True, env=without_python(), text=True)
+
+    try:
+        there = ask("-c", "import benchnpin").returncode == 0
+    except OSError:
+        there = False
+    if not there:
+        parser.error(_REMEDY.format(python=options.python))
+    checkout = [str(options.original)] if options.original else []
+    asked = ask(str(HERE / "versions.py"), *checkout)
+    if asked.returncode:
+        said = asked.stderr.strip().splitlines() or ["versions.py failed"]
+        parser.exit(2, f"bench.py: {said[-1]}\n")
+    return asked.stdout.strip()
 
 
 def parser_of() -> argparse.ArgumentParser:
@@ -152,7 +170,7 @@ def policies_for(scene: str, options: argparse.Namespace) -> Sequence[str]:
 def finished(run: Run, options: argparse.Namespace) -> Run:
     """A run with all of its episodes, as far as they can be had."""
     out = file_of(options.out, run.scene, run.variation, run.policy)
-    lines = whole(out, options.most_steps)
+    lines = whole(out, run)
     missing = [seed for seed in run.missing if seed not in lines]
     if missing and not options.only_report:
         say(f"{run.name}: {len(missing)} episodes")
@@ -165,6 +183,7 @@ def drive(run: Run, seeds: Sequence[int], out: Path, options: argparse.Namespace
     """Drive these seeds, and say what failed; each episode is in the file once it is over."""
     arguments = ["--scene", run.scene, "--variation", run.variation, "--out", str(out.resolve())]
     arguments += ["--seeds", ",".join(map(str, seeds)), "--most-steps", str(options.most_steps)]
+    arguments += ["--named", run.original]
     if options.original:
         arguments += ["--original", str(options.original.resolve())]
     if options.glns:

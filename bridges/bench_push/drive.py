@@ -37,6 +37,7 @@ def main() -> int:
     parser.add_argument("--seeds", required=True, metavar="0,3-29")
     parser.add_argument("--out", type=Path, required=True)
     parser.add_argument("--most-steps", type=int, default=20_000)
+    parser.add_argument("--named", required=True, help="what the original is called")
     parser.add_argument("--original", type=Path, help="checkout of the original's repository")
     parser.add_argument("--glns", metavar="COMMAND", help="the solver that theirs:gtsp calls")
     options = parser.parse_args()
@@ -47,7 +48,7 @@ def main() -> int:
     failed = 0
     for seed in seeds_of(options.seeds):
         try:
-            episode = drive(scene, driver, seed, options.most_steps)
+            episode = drive(scene, driver, seed, options.most_steps, options.named)
         except PolicyFailure as error:
             failed += 1
             complain(f"seed {seed}: the policy failed: {error}")
@@ -83,7 +84,7 @@ def complain(text: str) -> None:
     sys.stderr.flush()
 
 
-def drive(scene: Scene, driver: Served | Theirs, seed: int, most_steps: int) -> dict:
+def drive(scene: Scene, driver: Served | Theirs, seed: int, most_steps: int, original: str) -> dict:
     """One episode: the start, everything's poses, and the scores of their code."""
     seen, info = scene.reset(seed)
     metric = metric_of(scene)
@@ -111,6 +112,7 @@ def drive(scene: Scene, driver: Served | Theirs, seed: int, most_steps: int) -> 
     return {
         "seed": seed,
         "most_steps": most_steps,
+        "original": original,
         "world": world,
         "idle_limit": scene.idle_limit,
         "times": times,
@@ -133,7 +135,10 @@ def metric_of(scene: Scene) -> object:
     module, _, name = scene.metric.partition(":")
     kind = getattr(importlib.import_module(f"benchnpin.common.metrics.{module}"), name)
     goal = {"goal": scene.inner.goal} if scene.name == "ship-ice-v0" else {}
-    return kind("pushplan", scene.robot_mass(), **goal)
+    metric = kind("pushplan", scene.robot_mass(), **goal)
+    if not hasattr(metric, "box_mass"):
+        metric.box_mass = None  # the code of 2026 reads it, and nothing there sets it
+    return metric
 
 
 def quick_roll(values: np.ndarray, shift: int, axis: int | None = None) -> np.ndarray:

@@ -27,7 +27,7 @@ from typing import Any
 sys.path.insert(0, str(Path(__file__).parent))
 
 import numpy as np
-from bench import POLICIES, chosen, finished, parser_of, say
+from bench import POLICIES, chosen, finished, original_of, parser_of, say
 from episodes import Run, file_of, mend, ours, whole
 from tables import ranges, write
 
@@ -75,13 +75,14 @@ def main() -> int:
         first, last = (int(seed) for seed in options.seeds.split("-"))
     except ValueError as error:
         parser.error(str(error))
+    original = original_of(options, parser)
     options.out.mkdir(parents=True, exist_ok=True)
     found = []
     for scene, variation in scenes:
         names = options.policies.split(",") if options.policies else POLICIES[scene]
         for policy in names:
             seeds = range(first, last + 1)
-            run = Run(scene, variation, policy, seeds, options.most_steps)
+            run = Run(original, scene, variation, policy, seeds, options.most_steps)
             found.append(pairs(finished(run, options), options))
     text = report(found)
     say(text)
@@ -92,19 +93,19 @@ def main() -> int:
 
 def pairs(run: Run, options: argparse.Namespace) -> Pairs:
     """The scores of the engines, start by start; starts that ours has not run yet are run."""
-    starts = whole(file_of(options.out, run.scene, run.variation, run.policy), options.most_steps)
+    starts = whole(file_of(options.out, run.scene, run.variation, run.policy), run)
     ours = {}
     for engine, alike in ENGINES.items():
         name = f"{run.policy}-own-engine{'-its-settings' if alike else ''}"
         path = file_of(options.out, run.scene, run.variation, name)
-        done = whole(path, options.most_steps)
+        done = whole(path, run)
         missing = [seed for seed in run.episodes if seed not in done]
         if missing and not options.only_report:
             say(f"{run.name}, {engine}: {len(missing)} episodes")
             mend(path, done)
             for seed in missing:
                 repeat(run, json.loads(starts[seed]), path, options.most_steps, alike)
-            done = whole(path, options.most_steps)
+            done = whole(path, run)
         ours[engine] = {seed: json.loads(line) for seed, line in done.items()}
     both = [seed for seed in run.episodes if all(seed in done for done in ours.values())]
     theirs = {name: [run.episodes[seed][f"ours_{name}"] for seed in both] for name in SCORES}
@@ -116,6 +117,7 @@ def repeat(run: Run, start: dict[str, Any], path: Path, most_steps: int, alike: 
     """Run one start in our engine and add its scores to a file."""
     episode = in_own_engine(start, run.scene, run.policy, most_steps, alike)
     line = {"seed": start["seed"], "most_steps": most_steps, "reason": episode.reason}
+    line["original"] = run.original
     with path.open("a", encoding="utf-8") as file:
         file.write(json.dumps({**line, **ours(episode)}) + "\n")
 

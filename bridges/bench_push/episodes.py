@@ -16,14 +16,17 @@ from pushplan.world import Episode, world_from_dict
 
 SCORES = {"theirs": ("S", "E", "I"), "ours": ("S", "E", "I", "work")}
 WAITS = ("median_ms", "longest_ms")
-_KEYS = ("scene", "variation", "policy", "most_steps", "seed")
+_KEYS = ("original", "scene", "variation", "policy", "most_steps", "seed")
+FIRST = "benchnpin 0.1.1"
+"""The only original until episodes said which one they are of."""
 _VALUES = (*(f"{by}_{name}" for by, names in SCORES.items() for name in names), *WAITS)
 
 
 @dataclass(frozen=True)
 class Run:
-    """What one policy did in one scene, by seed."""
+    """What one policy did in one scene of one version of the original, by seed."""
 
+    original: str
     scene: str
     variation: str
     policy: str
@@ -51,15 +54,21 @@ def file_of(folder: Path, scene: str, variation: str, policy: str) -> Path:
     return folder / f"{scene}-{variation}-{re.sub(r'[^A-Za-z0-9.-]+', '_', policy)}.jsonl"
 
 
-def whole(path: Path, most_steps: int) -> dict[int, str]:
-    """The lines of a file by seed, without one that was cut off and those of other limits."""
+def whole(path: Path, run: Run) -> dict[int, str]:
+    """The lines of a file by seed, without one that was cut off and those of other limits.
+
+    Raises:
+        SystemExit: if they are of another version of the original.
+    """
     lines = {}
     for line in path.read_text(encoding="utf-8").splitlines() if path.is_file() else []:
         try:
             one = json.loads(line)
         except json.JSONDecodeError:
             continue
-        if one["most_steps"] == most_steps:
+        if (original := one.get("original", FIRST)) != run.original:
+            raise SystemExit(f"{path} has episodes of {original}, not of {run.original}")
+        if one["most_steps"] == run.most_steps:
             lines[int(one["seed"])] = line
     return lines
 
@@ -75,7 +84,7 @@ def mend(path: Path, lines: dict[int, str]) -> None:
 def read(run: Run, path: Path) -> Run:
     """A run with the scores of the episodes of a file, beside those that it has."""
     episodes = dict(run.episodes)
-    lines = whole(path, run.most_steps)
+    lines = whole(path, run)
     for seed in lines.keys() & set(run.seeds):
         one = json.loads(lines[seed])
         one["ours"] = ours(scored(one))
@@ -95,10 +104,10 @@ def recalled(run: Run, path: Path) -> Run:
     Raises:
         ValueError: if the file is not one of `keep`.
     """
-    of_run = (run.scene, run.variation, run.policy, run.most_steps)
+    of_run = (run.original, run.scene, run.variation, run.policy, run.most_steps)
     kept = _kept(path)
     return replace(
-        run, episodes={k[4]: kept[k] for k in kept if k[:4] == of_run and k[4] in run.seeds}
+        run, episodes={k[-1]: kept[k] for k in kept if k[:-1] == of_run and k[-1] in run.seeds}
     )
 
 
@@ -106,7 +115,7 @@ def keep(run: Run, path: Path) -> None:
     """Write its scores down, so that tables can be made and extended without the episodes."""
     kept = _kept(path)
     for seed, one in run.episodes.items():
-        kept[run.scene, run.variation, run.policy, run.most_steps, seed] = one
+        kept[run.original, run.scene, run.variation, run.policy, run.most_steps, seed] = one
     partial = path.with_suffix(".part")
     with partial.open("w", encoding="utf-8", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
@@ -116,8 +125,8 @@ def keep(run: Run, path: Path) -> None:
     partial.replace(path)
 
 
-def _kept(path: Path) -> dict[tuple[str, str, str, int, int], dict[str, float]]:
-    """Scores by scene, variation, policy, limit of steps and seed."""
+def _kept(path: Path) -> dict[tuple[str, str, str, str, int, int], dict[str, float]]:
+    """Scores by original, scene, variation, policy, limit of steps and seed."""
     if not path.is_file():
         return {}
     with path.open(encoding="utf-8", newline="") as file:
@@ -126,6 +135,7 @@ def _kept(path: Path) -> dict[tuple[str, str, str, int, int], dict[str, float]]:
             raise ValueError(f"{path} must have the columns {', '.join([*_KEYS, *_VALUES])}")
         return {
             (
+                one["original"],
                 one["scene"],
                 one["variation"],
                 one["policy"],

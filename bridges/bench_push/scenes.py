@@ -112,7 +112,8 @@ class Scene:
 
     def parts(self) -> list:
         """The robot's shapes that count, wheels last."""
-        raise NotImplementedError
+        shapes = [one for one in self.body.shapes if label_of(one) != "wheel"]
+        return sorted(shapes, key=label_of)
 
     wheels = 0  # how many of the parts do not count at walls
 
@@ -151,6 +152,7 @@ class Scene:
         low, high = self.speeds()
         polygons, segments = statics(self.inner.space)
         parts = self.parts()
+        refuse_unknown(self.name, self.body, parts)
         radius = max(float(part.radius) for part in parts)
         robot = {
             "name": self.name,
@@ -324,10 +326,6 @@ class AreaScene(Scene):
     def _shapes(self) -> list:
         return self.inner.box_shapes
 
-    def parts(self) -> list:
-        shapes = [one for one in self.body.shapes if one.label != "wheel"]
-        return sorted(shapes, key=lambda one: one.label)
-
     def robot_mass(self) -> float:
         return float(self.inner.cfg.agent.mass)
 
@@ -381,9 +379,6 @@ class DeliveryScene(Scene):
     def _shapes(self) -> list:
         return self.inner.boxes
 
-    def parts(self) -> list:
-        return [self.inner.robot]
-
     def robot_mass(self) -> float:
         return float(self.inner.cfg.agent.mass)
 
@@ -407,6 +402,22 @@ SCENES = {
     ),
     "box_delivery": (DeliveryScene, ("small_empty", "small_columns")),
 }
+
+
+def label_of(shape: pymunk.Shape) -> str:
+    """What their code calls a shape."""
+    return getattr(shape, "label", None) or ""
+
+
+def refuse_unknown(name: str, body: pymunk.Body, parts: list) -> None:
+    """End where the robot touches with more than planners are told."""
+    for shape in body.shapes:
+        known = shape in parts and isinstance(shape, pymunk.Poly)
+        if not (known or shape.sensor or label_of(shape) == "wheel"):
+            raise SystemExit(
+                f"the robot of {name} has a {type(shape).__name__} {label_of(shape)!r}, which this "
+                "bridge does not know: planners would not heed it"
+            )
 
 
 def without_images(inner: object) -> None:

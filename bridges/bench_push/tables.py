@@ -33,11 +33,14 @@ def report(runs: Sequence[Run]) -> str:
     lines = [
         f"### {TITLES[runs[0].scene]}",
         "",
-        f"Measured until {today} ({os.cpu_count()}-core {platform.machine()}), every policy on the "
-        "same starts; `seeds` are those that ran. Means with 95 % bootstrap intervals. Δ is the "
-        "mean paired difference, on the seeds that both have, to the original's own planner where "
-        "it ran, else to the first row of the variation. Rows `theirs:` are planners of the "
-        "original, in its process, with its actions clipped to their limits.",
+        f"{runs[0].original}, measured until {today} ({os.cpu_count()}-core {platform.machine()}), "
+        "every policy on the same starts; `seeds` are those that ran. Means with 95 % bootstrap "
+        "intervals. Δ is the mean paired difference, on the seeds that both have, to the "
+        "original's own planner where it ran, else to the first row of the variation. Rows "
+        "`theirs:` are planners of the original, in its process, with its actions clipped to "
+        "their limits. Of decisions the first two columns are medians over episodes, of the "
+        "median and of the longest decision of each; where a policy plans once, the longest is "
+        "its first plan.",
     ]
     for by in SCORES:
         lines += ["", f"{HEADINGS[by]}:", "", *table(runs, by)]
@@ -49,7 +52,10 @@ def table(runs: Sequence[Run], by: str) -> list[str]:
     names = SCORES[by]
     heads = ["variation", "policy", "seeds", *(_head(name) for name in names)]
     heads += [f"Δ{name}" for name in names if name != "S"]
-    heads += ["decision: median of medians, longest [ms]"] if by == "theirs" else []
+    if by == "theirs":
+        heads += [
+            f"decision [ms]: {name}" for name in ("median", "longest of an episode", "longest")
+        ]
     lines = ["| " + " | ".join(heads) + " |", "|" + "---|" * len(heads)]
     for variation in dict.fromkeys(run.variation for run in runs):
         group = [run for run in runs if run.variation == variation]
@@ -71,7 +77,7 @@ def row(run: Run, base: Run, by: str) -> str:
             cells.append("" if run is base or not gaps else shown(estimate(gaps), name, "+"))
     if by == "theirs":
         medians, longest = (list(run.values(name).values()) for name in WAITS)
-        cells.append(f"{np.median(medians):.2g}, {max(longest):.0f}")
+        cells += [f"{np.median(medians):.2g}", f"{np.median(longest):.0f}", f"{max(longest):.0f}"]
     return "| " + " | ".join(cells) + " |"
 
 

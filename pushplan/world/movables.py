@@ -23,6 +23,7 @@ from pushplan.world.checks import (
 )
 from pushplan.world.errors import InvalidInputError
 from pushplan.world.outline import (
+    LARGEST_M,
     areas_and_centroids,
     convex_outline,
     convex_outlines,
@@ -90,6 +91,11 @@ class Movables(ArrayRecord, CheckedFields):
         if (self.contact_radii < 0.0).any():
             least = self.contact_radii.min()
             raise InvalidInputError(f"movables.contact_radii must not be negative, got {least}")
+        if (self.contact_radii > LARGEST_M).any():
+            most = self.contact_radii.max()
+            raise InvalidInputError(
+                f"movables.contact_radii must be at most {LARGEST_M:g} m, got {most:g}"
+            )
         ends = self.drawn_offsets[[0, -1]].tolist()
         if ends != [0, len(self.drawn_vertices)] or (np.diff(self.drawn_offsets) < 0).any():
             raise InvalidInputError(

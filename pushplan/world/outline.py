@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from pushplan.world.checks import BoolArray, FloatArray, IntArray, array, frozen
 from pushplan.world.errors import InvalidInputError, short
 
-_LARGEST_M = 1e70
+LARGEST_M = 1e70
 """Greatest coordinate [m]: its fourth power is finite still."""
 
 
@@ -64,8 +64,8 @@ def convex_outline(name: str, corners: ArrayLike) -> FloatArray:
     """
     points: FloatArray = array(name, corners, (None, 2))
     largest = float(np.abs(points).max(initial=0.0))
-    if largest > _LARGEST_M:
-        raise InvalidInputError(f"{name} must lie within {_LARGEST_M:g} m, got {largest:g} m")
+    if largest > LARGEST_M:
+        raise InvalidInputError(f"{name} must lie within {LARGEST_M:g} m, got {largest:g} m")
     if len(points) < 3:
         raise InvalidInputError(f"{name} must have at least 3 corners, got {len(points)}")
     ring = _counter_clockwise(points)
@@ -196,8 +196,8 @@ def well_formed(vertices: FloatArray, offsets: IntArray) -> BoolArray:
     """
     counts = np.diff(offsets)
     good: BoolArray = counts >= 3
-    if np.abs(vertices).max(initial=0.0) > _LARGEST_M:
-        good &= [np.abs(corners).max() <= _LARGEST_M for corners in unflatten(vertices, offsets)]
+    if np.abs(vertices).max(initial=0.0) > LARGEST_M:
+        good &= [np.abs(corners).max() <= LARGEST_M for corners in unflatten(vertices, offsets)]
     if not good.all():
         outlines = unflatten(vertices, offsets)
         good[good] = well_formed(*flatten([outlines[k] for k in np.flatnonzero(good)]))

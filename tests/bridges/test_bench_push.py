@@ -6,12 +6,15 @@ import importlib
 import importlib.util
 import json
 import os
+import re
 import subprocess
 import sys
 import venv
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
+import pymunk
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -57,6 +60,7 @@ def test_a_short_episode_is_scored_by_both(python: str, scene: str, tmp_path: Pa
             *arguments, "--policies", policy, "--out", str(out), "--page", str(out) + ".md"
         )
         assert done.returncode == 0, done.stderr
+        assert "original: benchnpin 0.1.1" in done.stdout
         lines = [line for line in done.stdout.splitlines() if f"| `{policy}` | 3 |" in line]
         assert len(lines) == 2  # by their code, and by ours
         success, efficiency = (cell.split() for cell in lines[0].split("|")[4:6])
@@ -156,17 +160,31 @@ def test_scores_are_kept_and_gone_on_with(tmp_path: Path, monkeypatch: pytest.Mo
     episodes = importlib.import_module("episodes")
     names = ["theirs_S", "theirs_E", "theirs_I", "ours_S", "ours_E", "ours_I", "ours_work"]
     one = dict.fromkeys([*names, "median_ms", "longest_ms"], 0.5)
-    run = episodes.Run("maze", "5", "straight", range(4), 20_000, {1: one})
+    run = episodes.Run("benchnpin 0.1.1", "maze", "5", "straight", range(4), 20_000, {1: one})
     file = tmp_path / "scores.csv"
     episodes.keep(run, file)
-    more = episodes.Run("maze", "5", "straight", range(4), 20_000, {3: {**one, "ours_E": 0.25}})
+    more = episodes.Run(
+        "benchnpin 0.1.1", "maze", "5", "straight", range(4), 20_000, {3: {**one, "ours_E": 0.25}}
+    )
     episodes.keep(more, file)
-    found = episodes.recalled(episodes.Run("maze", "5", "straight", range(4), 20_000), file)
+    found = episodes.recalled(
+        episodes.Run("benchnpin 0.1.1", "maze", "5", "straight", range(4), 20_000), file
+    )
     assert found.missing == [0, 2] and found.values("ours_E") == {1: 0.5, 3: 0.25}
-    other = episodes.recalled(episodes.Run("maze", "5", "straight", range(4), 10), file)
+    newer = episodes.Run("benchnpin 0.2.0", "maze", "5", "straight", range(4), 20_000)
+    assert not episodes.recalled(newer, file).episodes
+    (tmp_path / "a.jsonl").write_text(json.dumps({"seed": 1, "most_steps": 20_000}) + "\n")
+    assert list(episodes.whole(tmp_path / "a.jsonl", run)) == [1]
+    with pytest.raises(
+        SystemExit, match=r"has episodes of benchnpin 0\.1\.1, not of benchnpin 0\.2"
+    ):
+        episodes.whole(tmp_path / "a.jsonl", newer)
+    other = episodes.recalled(
+        episodes.Run("benchnpin 0.1.1", "maze", "5", "straight", range(4), 10), file
+    )
     assert not other.episodes
     file.write_text("seed\n1\n", encoding="utf-8")
-    with pytest.raises(ValueError, match="must have the columns scene"):
+    with pytest.raises(ValueError, match="must have the columns original, scene"):
         episodes.recalled(run, file)
 
 
@@ -188,6 +206,88 @@ def test_modules_of_a_checkout_are_read_under_the_name_that_is_installed(
         checkout.take_from(tmp_path)
     checkout.take_from(tmp_path / "checkout")
     assert importlib.import_module("benchnpin.planners.tree").ANSWER == 42
+
+
+CONFIG = """
+robot:
+  min_r: {radius}
+sim:
+  gravity: !!python/tuple [0, 0]
+goal_radius: 1
+render:
+  show: {show}
+"""
+
+
+@pytest.mark.parametrize(
+    ("version", "radius", "says"),
+    [
+        ("0.1.1", 0.6, None),
+        ("", 0.6, None),
+        ("0.2.0", 0.6, "is version 0.2.0, installed is benchnpin 0.1.1"),
+        ("0.1.1", 0.86, "config.yaml has robot.min_r 0.86 in"),
+        ("", 0.86, "0.6 in the installed benchnpin 0.1.1"),
+    ],
+)
+def test_planners_and_environments_of_two_versions_are_not_mixed(
+    version: str,
+    radius: float,
+    says: str | None,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.syspath_prepend(str(BRIDGE))
+    versions = importlib.import_module("versions")
+    checkout, package = tmp_path / "checkout", tmp_path / "benchnpin"
+    place = Path("environments", "maze", "config.yaml")
+    for root, own, show in ((package, 0.6, "true"), (checkout / "benchpush", radius, "false")):
+        (root / place).parent.mkdir(parents=True)
+        (root / place).write_text(CONFIG.format(radius=own, show=show), encoding="utf-8")
+    if version:
+        setup = f'setup(\n    name="benchpush",\n    version="{version}",\n)\n'
+        (checkout / "setup.py").write_text(setup, encoding="utf-8")
+    if says is None:
+        versions.refuse_mixture(checkout, package, "benchnpin 0.1.1")
+    else:
+        with pytest.raises(SystemExit, match=re.escape(says)) as error:
+            versions.refuse_mixture(checkout, package, "benchnpin 0.1.1")
+        assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize("scene", ["DeliveryScene", "AreaScene"])
+def test_planners_are_told_of_every_shape_of_a_robot(
+    scene: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.syspath_prepend(str(BRIDGE))
+    scenes = importlib.import_module("scenes")
+    body = pymunk.Body(1.0, 1.0)
+    shapes = {
+        "robot": pymunk.Poly.create_box(body, (0.8, 0.7)),
+        "front_bumper": pymunk.Poly(body, [(0.4, -0.53), (0.5, -0.53), (0.5, 0.53), (0.4, 0.53)]),
+        "wheel": pymunk.Poly.create_box(body, (0.1, 0.1)),
+    }
+    for label, shape in shapes.items():
+        shape.label = label
+    held = SimpleNamespace(body=body)
+    its = scenes.__dict__[scene].__new__(scenes.__dict__[scene])
+    its.inner = SimpleNamespace(robot=held, agent=held)
+    parts = its.parts()
+    assert parts == [shapes["front_bumper"], shapes["robot"]]
+    scenes.refuse_unknown("area", body, parts)
+    for other in (pymunk.Circle(body, 0.3), pymunk.Poly.create_box(body, (2.0, 2.0))):
+        with pytest.raises(SystemExit, match="which this bridge does not know"):
+            scenes.refuse_unknown("area", SimpleNamespace(shapes={other}), parts)
+
+
+def test_a_metric_that_reads_the_mass_of_boxes_finds_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.syspath_prepend(str(BRIDGE))
+    drive = importlib.import_module("drive")
+    for kept in (None, 3.0):
+        made = SimpleNamespace() if kept is None else SimpleNamespace(box_mass=kept)
+        module = SimpleNamespace(Kind=lambda name, mass, made=made: made)
+        monkeypatch.setattr(drive.importlib, "import_module", lambda name, module=module: module)
+        scene = SimpleNamespace(metric="task:Kind", name="area", robot_mass=lambda: 1.0)
+        assert drive.metric_of(scene).box_mass == kept
 
 
 @given(
