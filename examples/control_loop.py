@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from pushplan.envs import PushEnv
-from pushplan.runtime import CommandStatus, Runner
+from pushplan.runtime import CommandStatus, Motors, Runner
 from pushplan.world import Deadline, OwnBudget, Twist
 
 PERIOD = 0.05  # of commands [s]; perception comes with every second one
@@ -49,11 +49,13 @@ class Robot:
 
     def drive(self, twist):
         """Send a velocity to the motors."""
+        if self.ended:
+            return  # `Motors` brakes what is left of its speed
         *_, info = self.env.step(self.env.encode(twist))
         self.ended = info["reason"]  # "goal", "wall" or "time_limit" at the end
 
 
-def loop(robot, runner):
+def loop(robot, runner, motors):
     """Drive until the goal is reached; why it ended."""
     runner.start(robot.sense())  # loads and compiles what is needed, before the clock matters
     last, beat, due = None, 0, time.monotonic()
@@ -74,7 +76,7 @@ def loop(robot, runner):
                 return "cancelled"  # it stands; start() would begin anew
             case _:  # driving, waiting for a plan, or stopped until the camera sees again:
                 pass  # the command is right as it is, and the runner goes on by itself
-        robot.drive(command.twist)
+        motors.drive(command.twist)
         beat, due = beat + 1, due + PERIOD
         time.sleep(max(0.0, due - time.monotonic()))
     return robot.ended
@@ -85,6 +87,10 @@ if __name__ == "__main__":
     stop = OwnBudget() | Deadline(DEADLINE)
     options = {"max_age": 0.3, "position_noise": NOISE[0], "heading_noise": NOISE[2]}
     policy = sys.argv[2] if sys.argv[2:] else "namo"
-    with Runner(policy, period=PERIOD, plan_stop=stop, **options) as runner:
-        outcome = loop(Robot(world_file), runner)
+    robot = Robot(world_file)
+    with (
+        Runner(policy, period=PERIOD, plan_stop=stop, **options) as runner,
+        Motors(robot.drive, robot.env.world.robot, period=PERIOD) as motors,  # zero is sent last
+    ):
+        outcome = loop(robot, runner, motors)
     sys.exit(0 if outcome == "goal" else outcome)
