@@ -195,7 +195,7 @@ class Runner:
             self._newest, self.worlds = world, 1
         self._guard.reset(world)
         self._restart(world)
-        if not self._running_s:  # else as soon as the call of the last episode has returned
+        if not self._is_planning:  # else as soon as the call of the last episode has returned
             self._begin(world)
         if not self._prompt:
             take_short_turns()
@@ -401,7 +401,7 @@ class Runner:
             return None, CommandStatus.FAILED, reason
         if now < self._retry_at:
             return None, CommandStatus.FAILED, self._failure
-        if running and not self._begun:  # no policy is in two threads at once
+        if self._is_planning and not self._begun:  # no policy is in two threads at once
             return None, CommandStatus.WAITING, "an abandoned planning call has not returned yet"
         try:
             if not self._begun:
@@ -417,6 +417,11 @@ class Runner:
             if why:
                 return wanted, CommandStatus.WAITING, why
         return wanted, CommandStatus.DRIVING, ""
+
+    @property
+    def _is_planning(self) -> bool:
+        """Whether a planning call has not returned yet."""
+        return isinstance(self._executor, ThreadExecutor) and self._executor.is_busy
 
     @property
     def _running_s(self) -> float:

@@ -65,6 +65,11 @@ class ThreadExecutor:
         return pending
 
     @property
+    def is_busy(self) -> bool:
+        """Whether a call has not ended yet."""
+        return bool(self._running())
+
+    @property
     def running_s(self) -> float:
         """For how long the oldest call that has not ended has been there [s]; 0 without one."""
         calls = self._running()

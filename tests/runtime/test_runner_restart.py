@@ -94,6 +94,7 @@ def test_a_planner_that_hangs_stops_the_robot_in_the_next_episode_too():
         world, commands = drive(runner, later(world, STILL), 3, wait=False)
         assert {one.status for one in commands} == {CommandStatus.FAILED}
         assert commands[-1].twist == STILL and "0.8 s" in commands[-1].reason
+        assert policy.clashes == 0
         policy.hold.set()
         drive(runner, world, 5)
 
