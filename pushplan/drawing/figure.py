@@ -130,11 +130,11 @@ def save_figure(path: str | Path, figure: Figure, *, title: str = "", source: st
     }
     more = undated.get(ending, {"CreationDate": None, "Subject": source})
     buffer = io.BytesIO()
-    with need("matplotlib").rc_context({**STYLE, "svg.hashsalt": title}):
-        figure.savefig(buffer, format=ending[1:], dpi=DPI, metadata={**known, **more})
     try:
+        with need("matplotlib").rc_context({**STYLE, "svg.hashsalt": title}):
+            figure.savefig(buffer, format=ending[1:], dpi=DPI, metadata={**known, **more})
         write_atomic(path, buffer.getvalue())
-    except OSError as error:
+    except (OSError, ValueError) as error:  # a text with two $ may be no mathematics
         raise InvalidInputError(f"cannot write {path}: {error}") from error
 
 

@@ -342,7 +342,7 @@ def _check_note(key: str, value: Any) -> None:
     known = True
     if key == "runs":
         known = isinstance(value, dict) and isinstance(value["packages"], dict)
-        in_words(value)  # it reads all that others read
+        known = known and bool(in_words(value))  # it reads all that others read
     elif key == "deadlines":
         known = type(value) in (int, float) and math.isfinite(value)
     elif key != "configuration":

@@ -12,7 +12,8 @@ from pushplan.evaluation.batch import run_batch
 from pushplan.evaluation.database import StoredResult, read_results, reading
 from pushplan.evaluation.job_identity import differences, job_of, job_spec
 from pushplan.evaluation.rows import TIMING_COLUMNS, ResultRow, columns
-from pushplan.world import Episode, InvalidInputError
+from pushplan.world import Episode, InvalidInputError, PushplanError, SchemaError
+from pushplan.world.errors import describe
 
 _TIMES = ("act_times_s", "plan_times_s")
 _ARRAYS = ("times", "robot_poses", "object_poses", "completed", "actions", "rewards")
@@ -54,7 +55,12 @@ def reproduce(path: str | Path, job: str) -> Reproduction:
         UnknownNameError: if there is no such policy any more.
     """
     stored = _find(Path(path), job)
-    again, settings = job_of(stored.spec)
+    try:
+        again, settings = job_of(stored.spec)
+    except PushplanError:
+        raise
+    except Exception as error:  # a stranger may have written it
+        raise SchemaError(f"job {job} of {path} is none: {describe(error)}") from error
     with tempfile.TemporaryDirectory(prefix="pushplan-") as folder:
         (row,) = run_batch([again], out=folder, workers=1, settings=settings)
         names = [name for name in columns() if name not in (*TIMING_COLUMNS, "job")]

@@ -10,6 +10,7 @@ from pathlib import Path
 
 from pushplan.evaluation.database import LOCK, read_about, reading
 from pushplan.evaluation.rows import Status
+from pushplan.world.checks import number
 from pushplan.world.errors import one_line
 from pushplan.world.file_locks import is_locked
 
@@ -69,7 +70,9 @@ def _look(db: sqlite3.Connection, active: bool | None, slowest: int) -> RunStatu
     done = min(jobs, int(call.get("done", 0)) + new)
     rate = new / elapsed if elapsed > 0.0 else 0.0
     flying = db.execute("SELECT title, began FROM running ORDER BY began")
-    running = tuple((one_line(title), time.time() - start) for title, start in flying)
+    running = tuple(
+        (one_line(str(title)), time.time() - number("began", start)) for title, start in flying
+    )
     took = db.execute(
         "SELECT policy || ' ' || scenario, wall_time_s FROM results WHERE wall_time_s IS NOT NULL "
         "ORDER BY wall_time_s DESC LIMIT ?",
@@ -83,5 +86,7 @@ def _look(db: sqlite3.Connection, active: bool | None, slowest: int) -> RunStatu
         per_minute=60.0 * rate,
         left_s=(jobs - done) / rate if rate and done < jobs else None,
         running=running if active else (),
-        slowest=tuple((one_line(title), float(seconds)) for title, seconds in took),
+        slowest=tuple(
+            (one_line(str(title)), number("wall_time_s", seconds)) for title, seconds in took
+        ),
     )
