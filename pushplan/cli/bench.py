@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import os
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from pushplan.cli.common import (
     add_command,
@@ -14,16 +14,11 @@ from pushplan.cli.common import (
     add_trust,
     complete,
     positive,
-    run_options,
     whole,
 )
 from pushplan.cli.outputs import check_directory
-from pushplan.cli.progress import progress_of
+from pushplan.cli.progress import run_jobs
 from pushplan.cli.report import add_table_options
-
-if TYPE_CHECKING:
-    from pushplan.cli.progress import Progress
-    from pushplan.evaluation import Results
 
 _EXAMPLES = """\
   pushplan bench maze-2d-5 --policies straight,kinodynamic-rrt --episodes 20 --out runs/first
@@ -87,34 +82,28 @@ def add(commands: Any) -> None:
 def run(options: argparse.Namespace) -> int:
     """Run the batch, print the table, write plots and page."""
     from pushplan.cli.report import exit_code, show, show_json
+    from pushplan.evaluation.benchmark import bench_experiment
 
     out = options.out or _default_out(options.suite)
     check_directory(out)
-    with progress_of(*options.policies.split(","), out=out) as progress:
-        results = _results(options, out, progress)
+    experiment = bench_experiment(
+        options.suite,
+        options.policies,
+        episodes=options.episodes,
+        observation=options.observation,
+        latency_factor=options.latency,
+        seed=options.seed,
+        timeout_s=options.timeout,
+        memory_limit_mb=options.memory,
+    )
+    results = run_jobs(experiment, out, options)
+    if results is None:
+        return 0
     if options.json:
         show_json(results, options.pairs)
     else:
         show(results, options)
     return exit_code(results)
-
-
-def _results(options: argparse.Namespace, out: str, progress: Progress) -> Results:
-    from pushplan.evaluation import bench
-
-    return bench(
-        options.suite,
-        options.policies,
-        episodes=options.episodes,
-        out=out,
-        observation=options.observation,
-        latency_factor=options.latency,
-        progress=progress,
-        seed=options.seed,
-        timeout_s=options.timeout,
-        memory_limit_mb=options.memory,
-        **run_options(options),
-    )
 
 
 def _default_out(suites: str) -> str:

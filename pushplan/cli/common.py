@@ -62,6 +62,9 @@ def add_run_options(parser: argparse.ArgumentParser) -> None:
         help="processes (default: one a core; 0: this process)",
     )
     parser.add_argument(
+        "--check", action="store_true", help="say what would be run and what it costs, and end"
+    )
+    parser.add_argument(
         "--retry-failed", action="store_true", help="run jobs again that raised, hung or crashed"
     )
     parser.add_argument(

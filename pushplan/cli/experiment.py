@@ -7,9 +7,9 @@ import os
 from pathlib import Path
 from typing import Any
 
-from pushplan.cli.common import add_command, add_run_options, add_trust, run_options, say
+from pushplan.cli.common import add_command, add_run_options, add_trust, say
 from pushplan.cli.outputs import check_directory
-from pushplan.cli.progress import progress_of
+from pushplan.cli.progress import run_jobs
 from pushplan.cli.report import add_table_options
 
 _EXAMPLES = """\
@@ -27,7 +27,6 @@ def add(commands: Any) -> None:
     parser = add_command(commands, "experiment", "run an experiment file", _EXAMPLES, run)
     parser.add_argument("file", metavar="FILE.yaml", help="suites, policies, parameters, metrics")
     parser.add_argument("--out", metavar="DIR", help="run directory (default: runs/NAME of FILE)")
-    parser.add_argument("--check", action="store_true", help="say what would be run, and end")
     add_run_options(parser)
     add_table_options(parser)
     add_trust(parser)
@@ -47,11 +46,10 @@ def run(options: argparse.Namespace) -> int:
             scenario = suite.scenarios[0]
             labels = [job.policy.label for job in jobs if job.scenario == scenario]
             say(f"{suite.name}: {len(suite.scenarios)} scenarios, {', '.join(labels)}")
-        say(f"{len(jobs)} jobs")
-        return 0
     out = options.out or os.path.join("runs", Path(options.file).stem)
     check_directory(out)
-    with progress_of(*(one.label for one in experiment.policies), out=out) as progress:
-        results = experiment.run(out, progress=progress, **run_options(options))
+    results = run_jobs(experiment, out, options)
+    if results is None:
+        return 0
     show(results, options)
     return exit_code(results)

@@ -74,18 +74,15 @@ def bench(
         UnusablePolicyError: if a policy cannot be made, or for none of the scenarios.
         InvalidInputError: as `run_batch`.
     """
-    suites = suites_of(suite, episodes, seed)
-    versions = [one.version for one in suites]
-    experiment = Experiment(
-        ",".join(one.name for one in suites),
-        suites,
-        tuple(read_policies(policies)),
-        JobSettings(observation=observation, timeout_s=timeout_s, latency_factor=latency_factor),
+    experiment = bench_experiment(
+        suite,
+        policies,
+        episodes=episodes,
+        seed=seed,
+        timeout_s=timeout_s,
+        observation=observation,
         memory_limit_mb=memory_limit_mb,
-        about={
-            "suite_version": suites[0].version if len(suites) == 1 else versions,
-            "first_seed": seed,
-        },
+        latency_factor=latency_factor,
     )
     return experiment.run(
         out,
@@ -95,6 +92,33 @@ def bench(
         shard=shard,
         dask=dask,
         progress=progress,
+    )
+
+
+def bench_experiment(
+    suite: Any,
+    policies: str | Sequence[Given],
+    *,
+    episodes: int | None = None,
+    seed: int = 0,
+    timeout_s: float | None = 300.0,
+    observation: str = "auto",
+    memory_limit_mb: float | None = MEMORY_MB,
+    latency_factor: float | None = None,
+) -> Experiment:
+    """What `bench` runs; arguments and errors as there."""
+    suites = suites_of(suite, episodes, seed)
+    versions = [one.version for one in suites]
+    return Experiment(
+        ",".join(one.name for one in suites),
+        suites,
+        tuple(read_policies(policies)),
+        JobSettings(observation=observation, timeout_s=timeout_s, latency_factor=latency_factor),
+        memory_limit_mb=memory_limit_mb,
+        about={
+            "suite_version": suites[0].version if len(suites) == 1 else versions,
+            "first_seed": seed,
+        },
     )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import tempfile
 import zlib
 from collections.abc import Mapping, Sequence
@@ -12,6 +13,8 @@ from typing import Any
 
 from pushplan.evaluation.batch import TRACES, Progress, run_batch
 from pushplan.evaluation.compatibility import is_wanted, misfits, read_policies
+from pushplan.evaluation.cost import Cost, cost_of
+from pushplan.evaluation.job_identity import identified
 from pushplan.evaluation.jobs import Job, JobSettings
 from pushplan.evaluation.limits import MEMORY_MB
 from pushplan.evaluation.policies import PolicySpec
@@ -118,6 +121,26 @@ class Experiment:
             for spec in self.policies
             if (suite.name, spec.label) not in self.skipped and is_wanted(spec, suite, self.only)
         ]
+
+    def cost(
+        self,
+        out: str | Path,
+        *,
+        workers: int | None = None,
+        retry_failed: bool = False,
+        any_version: bool = False,
+        shard: tuple[int, int] | None = None,
+    ) -> Cost:
+        """How many jobs `run` has, about how long they take, and about what they store."""
+        return cost_of(
+            identified(self.jobs if shard is None else part_of(self.jobs, *shard), self.settings),
+            Path(out),
+            workers=os.cpu_count() or 1 if workers is None else workers,
+            limit_s=self.settings.timeout_s,
+            traced=self.traces == "all",
+            retry_failed=retry_failed,
+            any_version=any_version,
+        )
 
     def run(
         self,
