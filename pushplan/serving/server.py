@@ -232,13 +232,15 @@ class PolicyServer:
         except RefusedError as error:
             why = refusal = str(error)
         finally:
+            if not refusal:
+                connected.close()
             client.session.close()
             with self._lock:
                 del self._present[number]
             LOG.info("client %d has gone: %s", number, why)
-            if refusal:
+            if refusal:  # its place is free already
                 self._send_away(connection, refusal)
-            connected.close()
+                connected.close()
 
     def _send_away(self, connection: Connection, why: str) -> None:
         """Tell a client that holds no place (any more) why."""

@@ -58,7 +58,7 @@ def test_the_command_serves_the_client_that_is_shipped_until_a_signal(tmp_path):
         client = PolicyClient(address)
         client.reset(maze_dict())
         process.send_signal(signal.SIGTERM)
-        _, errors = process.communicate(timeout=20)
+        _, errors = process.communicate(timeout=120)
         assert process.returncode == 0 and "client 1 has come" in errors, errors
         with pytest.raises((ConnectionError, ServeError)):
             client.act(time=1.0, robot_pose=[1, 1, 0])
