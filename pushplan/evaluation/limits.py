@@ -21,6 +21,9 @@ class EpisodeTimeout(BaseException):
     """
 
 
+_LONGEST_S = 1e8  # years; a timer takes no more than a C integer holds
+
+
 @contextlib.contextmanager
 def soft_limit(seconds: float | None) -> Iterator[None]:
     """Raise `EpisodeTimeout` in the body after this much wall-clock time.
@@ -36,7 +39,7 @@ def soft_limit(seconds: float | None) -> Iterator[None]:
         raise EpisodeTimeout
 
     previous = signal.signal(signal.SIGALRM, expire)
-    signal.setitimer(signal.ITIMER_REAL, seconds)
+    signal.setitimer(signal.ITIMER_REAL, min(seconds, _LONGEST_S))
     try:
         yield
     finally:

@@ -98,8 +98,8 @@ ARCS_PER_SECOND = 1.5e9
 
 
 def table_mb(problem: Problem) -> float:
-    """Memory of the table [MB]."""
-    free = problem.count - 1
+    """Memory of the table [MB], of up to a thousand clusters: more need no smaller one."""
+    free = min(problem.count - 1, 1000)  # a float holds no power of two beyond 1023
     return 2.0**free * free * problem.width * 8.0 / 1e6
 
 

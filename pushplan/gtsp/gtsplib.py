@@ -1,23 +1,26 @@
 """Reading GTSPLIB files: TSPLIB 95 (Reinelt 1995) with a section for the clusters.
 
-Keywords stand before the data; a colon after them is optional. Every complaint names the file, the
-line and the rule that it breaks.
+Keywords stand before the data; a colon after them is optional. Lines that begin with ``#`` and
+keywords that say nothing about the problem are left out, and so is the author after a type. The
+short form of the solver GLNS is read too. Every complaint names the file, the line and the rule
+that it breaks.
 """
 
 from __future__ import annotations
 
+import difflib
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 
-from pushplan.gtsp.distances import COORDINATE_TYPES
+from pushplan.gtsp.distances import COORDINATE_TYPES, LARGEST_DIMENSION
 from pushplan.gtsp.instance import GtspInstance
 from pushplan.world import safe_files
 from pushplan.world.checks import FloatArray
 from pushplan.world.errors import InvalidInputError, SchemaError, unknown_name_message
 
-TYPES = ("GTSP", "AGTSP")
+TYPES = ("GTSP", "AGTSP", "TSP", "ATSP")
 FORMATS = (
     "FULL_MATRIX",
     "LOWER_COL",
@@ -29,10 +32,13 @@ FORMATS = (
     "UPPER_DIAG_ROW",
     "UPPER_ROW",
 )
-LARGEST_DIMENSION = 20_000
 _SECTIONS = (
+    "DEMAND_SECTION",
+    "DEPOT_SECTION",
     "DISPLAY_DATA_SECTION",
+    "EDGE_DATA_SECTION",
     "EDGE_WEIGHT_SECTION",
+    "FIXED_EDGES_SECTION",
     "GTSP_SET_SECTION",
     "NODE_COORD_SECTION",
     "TOUR_SECTION",
@@ -44,6 +50,8 @@ _KEYWORDS = (
     "EDGE_WEIGHT_FORMAT",
     "EDGE_WEIGHT_TYPE",
     "GTSP_SETS",
+    "M",
+    "N",
     "NAME",
     "NODE_COORD_TYPE",
     "TYPE",
@@ -74,7 +82,7 @@ class TsplibText:
 
     def choice(self, key: str, valid: tuple[str, ...]) -> str:
         """The value of a keyword, which must be one of these."""
-        value = self.value(key).upper()
+        value = self.value(key).partition("(")[0].strip().upper()  # an author may follow
         if value not in valid:
             raise self.wrong(self.keywords[key][1], unknown_name_message(key, value, valid))
         return value
@@ -119,13 +127,14 @@ def read_text(path: str | Path) -> TsplibText:
         SchemaError: if the file cannot be read, or a line is neither.
     """
     text = TsplibText(Path(path))
-    lines = safe_files.read_text(path, "instance").splitlines()
+    data = safe_files.read_bytes(path, "instance", safe_files.MAX_TEXT)
+    lines = data.decode("utf-8-sig", "replace").splitlines()  # names may be in any code
     rows: list[tuple[int, list[str]]] | None = None
     for number, line in enumerate(lines, start=1):
         words = line.split()
-        if not words:
+        if not words or words[0].startswith("#"):
             continue
-        head = words[0].rstrip(":").upper() or ":"
+        head = words[0].partition(":")[0].upper() or ":"
         if head == "EOF":
             break
         if head in _SECTIONS:
@@ -136,16 +145,41 @@ def read_text(path: str | Path) -> TsplibText:
         elif head in _KEYWORDS:
             if head in text.keywords and head != "COMMENT":
                 raise text.wrong(number, f"{head} stands here a second time")
-            rest = line.strip()[len(words[0].rstrip(":")) :].strip()
+            rest = line.strip()[len(head) :].strip()
             text.keywords[head] = (rest.removeprefix(":").strip(), number)
             rows = None
         elif head[0].isalpha() and head not in ("INF", "INFINITY", "NAN"):
-            raise text.wrong(number, unknown_name_message("keyword", head, _KEYWORDS + _SECTIONS))
+            meant = difflib.get_close_matches(head[:80], _KEYWORDS + _SECTIONS, n=1, cutoff=0.8)
+            if meant or ":" not in line:
+                rule = unknown_name_message("keyword", head, _KEYWORDS + _SECTIONS)
+                raise text.wrong(number, rule)
+            rows = None  # it says nothing about the problem
+        elif rows is None and {"N", "M"} <= text.keywords.keys():
+            rows = [(number, words)]
+            text.sections["N"] = (number, rows)
         elif rows is None:
             raise text.wrong(number, f"data outside of a section: {line.strip()[:40]!r}")
         else:
             rows.append((number, words))
     return text
+
+
+def _unfold(text: TsplibText) -> None:
+    """Turn the short form of GLNS, a line for each set and then the matrix, into that of TSPLIB."""
+    begin, rows = text.section("N")
+    line = text.keywords["N"][1]
+    for name, value in (
+        ("TYPE", "AGTSP"),
+        ("DIMENSION", text.value("N")),
+        ("GTSP_SETS", text.value("M")),
+        ("EDGE_WEIGHT_TYPE", "EXPLICIT"),
+        ("EDGE_WEIGHT_FORMAT", "FULL_MATRIX"),
+    ):
+        text.keywords[name] = value, line
+    count = text.count("M", LARGEST_DIMENSION)
+    sets = [(number, [*words, "-1"]) for number, words in rows[:count]]
+    text.sections["GTSP_SET_SECTION"] = begin, sets
+    text.sections["EDGE_WEIGHT_SECTION"] = begin, rows[count:]
 
 
 def read_gtsp(path: str | Path) -> GtspInstance:
@@ -160,6 +194,8 @@ def read_gtsp(path: str | Path) -> GtspInstance:
             are named.
     """
     text = read_text(path)
+    if {"N", "M"} <= text.keywords.keys():
+        _unfold(text)
     text.choice("TYPE", TYPES)
     size = text.count("DIMENSION", LARGEST_DIMENSION)
     kind = text.choice("EDGE_WEIGHT_TYPE", ("EXPLICIT", *COORDINATE_TYPES))
@@ -179,25 +215,26 @@ def _clusters(text: TsplibText, size: int) -> tuple[tuple[int, ...], ...]:
     """Node lists, each a line or more: its number, its nodes, -1."""
     count = text.count("GTSP_SETS", size)
     begin, rows = text.section("GTSP_SET_SECTION")
-    found: list[list[int]] = []
+    found: dict[int, list[int]] = {}  # sets are numbered: their order carries nothing
     current: list[int] | None = None
     owner: dict[int, int] = {}
-    line = begin
+    line, name = begin, 0
     for line, words in rows:
         for word in words:
             value = text.whole(line, word)
             if current is None:
                 if value == -1 and len(found) == count:  # some writers close the section so
                     continue
-                if value != len(found) + 1:
-                    raise text.wrong(line, f"expected set {len(found) + 1}, got {value}")
-                if value > count:
-                    raise text.wrong(line, f"set {value} of GTSP_SETS {count}")
+                if not 1 <= value <= count:
+                    raise text.wrong(line, f"sets are 1 to {count} (GTSP_SETS), got {value}")
+                if value in found:
+                    raise text.wrong(line, f"set {value} stands here a second time")
+                name = value
                 current = []
             elif value == -1:
                 if not current:
-                    raise text.wrong(line, f"set {len(found) + 1} has no node")
-                found.append(current)
+                    raise text.wrong(line, f"set {name} has no node")
+                found[name] = current
                 current = None
             elif not 1 <= value <= size:
                 raise text.wrong(line, f"nodes are 1 to {size}, got {value}")
@@ -205,16 +242,16 @@ def _clusters(text: TsplibText, size: int) -> tuple[tuple[int, ...], ...]:
                 rule = f"node {value} is in set {owner[value]} already: sets must not overlap"
                 raise text.wrong(line, rule)
             else:
-                owner[value] = len(found) + 1
+                owner[value] = name
                 current.append(value - 1)
     if current is not None:
-        raise text.wrong(line, f"set {len(found) + 1} does not end with -1")
+        raise text.wrong(line, f"set {name} does not end with -1")
     if len(found) != count:
         raise text.wrong(line, f"expected {count} sets, got {len(found)}")
     missing = [node for node in range(1, size + 1) if node not in owner]
     if missing:
         raise text.wrong(line, f"every node must be in a set, but node {missing[0]} is in none")
-    return tuple(tuple(nodes) for nodes in found)
+    return tuple(tuple(found[number]) for number in sorted(found))
 
 
 def _points(text: TsplibText, size: int) -> FloatArray:

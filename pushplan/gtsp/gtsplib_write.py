@@ -7,7 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from pushplan.gtsp.gtsplib import LARGEST_DIMENSION, read_text
+from pushplan.gtsp.distances import LARGEST_DIMENSION
+from pushplan.gtsp.gtsplib import read_text
 from pushplan.gtsp.instance import GtspInstance
 from pushplan.world.checks import integer
 from pushplan.world.errors import InvalidInputError

@@ -60,10 +60,12 @@ def builder_from_dict(data: Mapping[str, Any]) -> ObservationBuilder:
     builder: ObservationBuilder = builder_class(**options)
     if float(np.prod([float(n) for n in builder.shape])) > GREATEST_SIZE:
         raise InvalidInputError(f"an observation of shape {builder.shape} is too large")
-    stated = {"shape": tuple(data.get("shape", builder.shape)), "dtype": data.get("dtype")}
-    if stated["shape"] != builder.shape or stated["dtype"] not in (None, builder.dtype.name):
+    shape, dtype = data.get("shape", builder.shape), data.get("dtype")
+    if isinstance(shape, list):
+        shape = tuple(shape)
+    if shape != builder.shape or dtype not in (None, builder.dtype.name):
         raise SchemaError(
-            f"observation says {stated['dtype']} of shape {stated['shape']}, but {data['kind']} "
+            f"observation says {dtype!s:.40} of shape {shape!s:.60}, but {data['kind']} "
             f"with these options is {builder.dtype.name} of shape {builder.shape}"
         )
     return builder

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import logging
 import os
 import zipfile
@@ -14,15 +15,15 @@ from numpy.typing import NDArray
 from pushplan.learned.network_policy import NetworkPolicy
 from pushplan.learned.specification import METADATA_KEY, Specification
 from pushplan.world import InvalidInputError
+from pushplan.world.errors import describe
 from pushplan.world.libraries import need
-from pushplan.world.safe_files import read_text
+from pushplan.world.safe_files import read_bytes, read_text
 
 TRUST_VARIABLE = "PUSHPLAN_TRUST_PICKLES"
 """Set to 1 in the environment of the process, it says that pickles may be loaded."""
 MEMBER = f"{METADATA_KEY}.json"
 """Member of the zip, or ending of the file beside it, that holds the specification."""
 ALGORITHMS = ("PPO", "SAC", "A2C", "TD3", "DDPG")
-_UNREADABLE = (OSError, zipfile.BadZipFile, KeyError, UnicodeDecodeError, NotImplementedError)
 
 log = logging.getLogger(__name__)
 
@@ -77,18 +78,19 @@ def trusted() -> bool:
 
 def _look(path: Path) -> tuple[Specification, str]:
     """Specification and algorithm, read as text only."""
-    if not path.is_file():
-        raise InvalidInputError(f"there is no file {path}")
+    data = read_bytes(path, "policy file")
     try:
-        with zipfile.ZipFile(path) as archive:
+        with zipfile.ZipFile(io.BytesIO(data)) as archive:
             names = archive.namelist()
             if "data" not in names:
                 raise InvalidInputError(f"{path} is no Stable-Baselines3 file: it has no 'data'")
             text = None
             if MEMBER in names and archive.getinfo(MEMBER).file_size < 2**20:
                 text = archive.read(MEMBER).decode()
-    except _UNREADABLE as error:
-        raise InvalidInputError(f"{path} is no readable zip: {error}") from error
+    except InvalidInputError:
+        raise
+    except Exception as error:  # a zip file can be broken in many ways
+        raise InvalidInputError(f"{path} is no readable zip: {describe(error)}") from error
     if text is None and beside(path).is_file():
         text = read_text(beside(path), "specification")
     if text is None:
@@ -111,8 +113,7 @@ def _load(path: Path, algorithm: str) -> Any:
     try:
         return getattr(library, algorithm).load(path, device="cpu")
     except Exception as error:  # whatever unpickling raises
-        reason = " ".join(str(error).split())[:200]
-        raise InvalidInputError(f"{path} cannot be loaded: {reason}") from error
+        raise InvalidInputError(f"{path} cannot be loaded: {describe(error)}") from error
 
 
 def beside(path: Path) -> Path:

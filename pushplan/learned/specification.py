@@ -85,8 +85,8 @@ class Specification:
     def __post_init__(self) -> None:
         for name in ("tasks", "presets"):
             given = getattr(self, name)
-            texts = not isinstance(given, str) and all(isinstance(text, str) for text in given)
-            if not texts:
+            listed = isinstance(given, list | tuple)
+            if not listed or not all(isinstance(text, str) for text in given):
                 raise InvalidInputError(f"{name} must be a list of names, got {given!r:.80}")
             object.__setattr__(self, name, tuple(given))
         step = number("control_step", self.control_step, low=0.0)

@@ -27,6 +27,7 @@ from pushplan.world.files import world_from_dict
 from pushplan.world.libraries import need
 from pushplan.world.safe_files import MAX_BYTES, parse_json, read_bytes
 
+_READ = (WORLD, STATE, COMMAND, EPISODE)
 _KEPT = ("completed", "actions", "rewards", "act_times_s", "plan_times_s")
 
 
@@ -75,36 +76,60 @@ def load_episode(path: str | Path) -> Episode:
 
 def _messages(path: Path) -> Iterator[tuple[str, Any]]:
     """The messages of our own topics, in the order of their times, and what was lost."""
-    library, types = need("mcap.reader"), RosbagsTypes()
-    with io.BytesIO(read_bytes(path, "log")) as file:
-        try:
-            reader = library.make_reader(file, validate_crcs=True)
-            summary = reader.get_summary()
-            chunks = [] if summary is None else summary.chunk_indexes
-            if sum(chunk.uncompressed_size for chunk in chunks) > MAX_BYTES:
-                raise ValueError(f"its chunks hold more than {MAX_BYTES:,} bytes")
-            found = {} if summary is None else {c.topic: c for c in summary.channels.values()}
-        except Exception as error:  # of many kinds, by where the bytes are wrong
-            raise _unreadable(path, error) from error
-        if WORLD not in found or found[WORLD].metadata.get("schema") != SCHEMA:
-            raise SchemaError(
-                f"{path} is no log of this version of pushplan: it needs topic {WORLD} with schema "
-                f"{SCHEMA!r}, found {', '.join(sorted(found)) or 'no topic'}"
-            )
-        try:
-            for _, channel, message in reader.iter_messages([WORLD, STATE, COMMAND, EPISODE]):
-                yield channel.topic, types.deserialize(message.data, TOPICS[channel.topic])
-            for record in reader.iter_metadata():
-                yield record.name, record.metadata["notes"]
-        except Exception as error:
-            raise _unreadable(path, error) from error
+    types, data = RosbagsTypes(), read_bytes(path, "log")
+    channels: dict[int, Any] = {}
+    messages, notes = [], []
+    try:
+        for record in _records(data):
+            kind = type(record).__name__
+            if kind == "Channel":
+                channels[record.id] = record
+            elif kind == "Message" and channels[record.channel_id].topic in _READ:
+                messages.append(record)
+            elif kind == "Metadata":
+                notes.append(record)
+    except SchemaError:
+        raise
+    except Exception as error:  # of many kinds, by where the bytes are wrong
+        raise _unreadable(path, error) from error
+    found = {channel.topic: channel for channel in channels.values()}
+    if WORLD not in found or found[WORLD].metadata.get("schema") != SCHEMA:
+        raise SchemaError(
+            f"{path} is no log of this version of pushplan: it needs topic {WORLD} with schema "
+            f"{SCHEMA!r}, found {', '.join(sorted(found)) or 'no topic'}"
+        )
+    try:
+        for message in sorted(messages, key=lambda message: message.log_time):
+            topic = channels[message.channel_id].topic
+            yield topic, types.deserialize(message.data, TOPICS[topic])
+        for record in notes:
+            yield record.name, record.metadata["notes"]
+    except Exception as error:
+        raise _unreadable(path, error) from error
+
+
+def _records(data: bytes) -> Iterator[Any]:
+    """All records of a file, one after the other: the summary at its end may be missing."""
+    library = need("mcap.stream_reader")
+    left = MAX_BYTES
+    reader = library.StreamReader(
+        io.BytesIO(data), emit_chunks=True, validate_crcs=True, record_size_limit=MAX_BYTES
+    )
+    for record in reader.records:
+        if type(record).__name__ != "Chunk":
+            yield record
+            continue
+        left -= record.uncompressed_size
+        if left < 0:
+            raise ValueError(f"its chunks hold more than {MAX_BYTES:,} bytes")
+        yield from library.breakup_chunk(record, validate_crc=True)
 
 
 def _unreadable(path: Path, error: Exception) -> SchemaError:
     why = " ".join(str(error).split()) or type(error).__name__
     return SchemaError(
-        f"{path} is not a whole MCAP file ({why}); 'mcap recover' of the MCAP tools saves the "
-        "part of a truncated one that is there"
+        f"{path} is not a whole MCAP file ({why}): it is damaged, or its recorder was stopped "
+        "before it could close it; 'mcap recover' of the MCAP tools saves the part that is there"
     )
 
 

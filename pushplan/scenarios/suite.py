@@ -116,7 +116,11 @@ def suite(name: str, *, episodes: int | None = None, first_seed: int = 0) -> Sui
     if not isinstance(name, str) or name not in table:
         raise UnknownNameError("suite", name, table)
     entry = table[name]
-    count = entry["episodes"] if episodes is None else integer("episodes", episodes, low=1)
+    count = (
+        entry["episodes"]
+        if episodes is None
+        else integer("episodes", episodes, low=1, high=MOST_EPISODES)
+    )
     first = integer("first_seed", first_seed, low=0)
     starts = [Scenario.from_dict(start) for start in entry["starts"]]
     scenarios = tuple(
@@ -152,7 +156,7 @@ def world_suite(
     first = integer("first_seed", first_seed, low=0)
     scenarios = tuple(
         Scenario("room", simulator, preset, {_FILE: file}, seed)
-        for seed in range(first, first + integer("episodes", episodes, low=1))
+        for seed in range(first, first + integer("episodes", episodes, low=1, high=MOST_EPISODES))
         for file in files
     )
     name = given[0].resolve().stem if len(given) == 1 else "worlds"
@@ -176,6 +180,10 @@ def _world_files(given: Path) -> list[Path]:
 def _is_world(path: Path) -> bool:
     data = read_data(path, "world file")
     return isinstance(data, Mapping) and data.get("schema") == SCHEMA
+
+
+MOST_EPISODES = 100_000
+"""Of a suite in one study: more scenarios would take minutes to list."""
 
 
 @cache

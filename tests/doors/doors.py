@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import io
 import json
 import re
@@ -13,9 +14,10 @@ import sys
 import tempfile
 import time
 import zipfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from importlib import import_module
+from operator import attrgetter
 from pathlib import Path
 from typing import Any
 
@@ -155,10 +157,33 @@ def _specification(folder: Path) -> tuple[Path, bytes]:
     return folder / "model.pushplan.json", read_specification(path).to_json().encode()
 
 
+def _sb3(folder: Path) -> tuple[Path, bytes]:
+    _, text = _specification(folder)
+    packed = io.BytesIO()
+    with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("data", "{}")
+        archive.writestr("pushplan.json", text)
+    return folder / "model.zip", packed.getvalue()
+
+
+_STUDY = b"""schema: pushplan-experiment/1
+suites:
+- maze-2d-3
+- {suite: maze-2d-5, episodes: 2, seed: 40, variations: {time_limit: 5.0}}
+policies:
+- straight
+- {policy: straight, label: wide, parameters: {spacing: 0.3}, sweep: {spacing: [0.1, 0.5]}}
+episodes: 2
+seed: 7
+metrics: [E_nav, steps]
+timeout_s: 60.0
+"""
+
+
 def _load(where: str) -> Callable[[Path], Any]:
     def read(path: Path) -> Any:
         module, _, name = where.partition(":")
-        return getattr(import_module(module), name)(path)
+        return attrgetter(name)(import_module(module))(path)
 
     return read
 
@@ -176,6 +201,13 @@ def _read_specification(path: Path) -> Any:
     from pushplan.world.safe_files import read_text
 
     return Specification.from_json(read_text(path, "specification"))
+
+
+def _read_sb3(path: Path) -> Any:
+    from pushplan.learned.sb3_policy import Sb3Policy, UntrustedError
+
+    with contextlib.suppress(UntrustedError):  # what a good file says: it is not trusted
+        Sb3Policy(path, trust=False)
 
 
 def _read_name(path: Path) -> Any:
@@ -219,6 +251,10 @@ DOORS: dict[str, Door] = {
     ),
     "training": Door(_training, _load("pushplan.training.policies.config:read_config")),
     "specification": Door(_specification, _read_specification),
+    "experiment": Door(
+        lambda f: (f / "study.yaml", _STUDY), _load("pushplan.evaluation:Experiment.load")
+    ),
+    "sb3-zip": Door(_sb3, _read_sb3),
     "policy-name": Door(lambda f: (f / "name", b"pushplan.planners.rrt:GeometricRRT"), _read_name),
     "variation": Door(lambda f: (f / "variation", b"[1, {a: 0.5}]"), _read_variation),
 }
@@ -282,6 +318,23 @@ def _changed(data: bytes, rng: np.random.Generator) -> bytes:
             lines = data.splitlines(keepends=True) or [b""]
             data = data[:at] + lines[int(rng.integers(len(lines)))] + data[at:]
     return data
+
+
+WRONG = (
+    *("x", "", [], {}, None, float("nan"), float("inf"), 10**30, -1, 0, True, 0.5, [True]),
+    *([[1], [2, 3]], [None] * 3, {"a": [1]}, [[[[[[0]]]]]], "1e999", [10**30] * 3, [1e308] * 4),
+)  # fmt: skip
+
+
+def swapped(data: Any) -> Iterator[Any]:
+    """The data with one value of it, at any depth, in place of which stands a wrong one."""
+    if isinstance(data, dict | list):
+        for key, value in list(data.items() if isinstance(data, dict) else enumerate(data)):
+            for other in (*WRONG, *swapped(value)):
+                changed = data.copy()
+                changed[key] = other
+                yield changed
+    yield from ([*data, data[-1]] if isinstance(data, list) and data else data,)
 
 
 @dataclass

@@ -16,7 +16,7 @@ import doors
 import numpy as np
 import pytest
 import yaml
-from doors import DOORS, check_message, feed
+from doors import DOORS, check_message, feed, swapped
 
 from pushplan.cli.scenario_options import variation
 from pushplan.evaluation import Experiment
@@ -33,15 +33,47 @@ FILES = [name for name in DOORS if name not in ("policy-name", "variation")]
 @pytest.mark.filterwarnings("ignore")  # of NumPy, of strange headers and values
 @pytest.mark.parametrize("name", DOORS)
 def test_mutations_give_a_value_or_one_line(name: str, tmp_path: Path) -> None:
-    cost = feed(name, 300, tmp_path)
+    cost = feed(name, 10 if name == "experiment" else 300, tmp_path)
     assert cost.worst < 2.0 and cost.grown < 500.0
+
+
+STRUCTURED = ("world-json", "scenarios", "ice-json", "map-yaml", "training", "specification")
+
+
+@pytest.mark.filterwarnings("error")  # nothing is said beside the one line
+@pytest.mark.parametrize("name", STRUCTURED)
+def test_any_value_of_any_key_may_be_wrong(name: str, tmp_path: Path) -> None:
+    path, good = DOORS[name].make(tmp_path)
+    write = json.dumps if path.suffix == ".json" else dump
+    data = list(swapped(parse_yaml(good.decode())))
+    picked = np.random.default_rng(1).permutation(len(data))[:400]
+    for changed in (data[k] for k in picked.tolist()):
+        path.write_text(write(changed))
+        try:
+            DOORS[name].read(path)
+        except PushplanError as error:
+            check_message(error)
+        except BaseException as error:
+            error.add_note(str(changed)[:2000])
+            raise
+
+
+def test_a_study_of_endless_episodes_is_one_line(tmp_path: Path) -> None:
+    path, good = DOORS["experiment"].make(tmp_path)
+    for wrong in (b"episodes: 2, seed", b"episodes: 2\n"):
+        path.write_bytes(good.replace(wrong, wrong.replace(b"2", b"1" + b"0" * 30)))
+        with pytest.raises(PushplanError, match=r"episodes must be in \[1, 100000\]"):
+            DOORS["experiment"].read(path)
+    path.write_bytes(good.replace(b"timeout_s: 60.0", b"timeout_s: 1e300"))
+    assert DOORS["experiment"].read(path).jobs
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", DOORS)
 def test_ten_thousand_mutations_in_a_process_of_their_own(name: str) -> None:
+    command = [sys.executable, "-W", "ignore", doors.__file__]
     done = subprocess.run(
-        [sys.executable, "-W", "ignore", doors.__file__, name, "10000"],
+        [*command, name, "1000" if name == "experiment" else "10000"],
         capture_output=True,
         text=True,
     )

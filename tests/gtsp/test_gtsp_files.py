@@ -9,13 +9,16 @@ import pytest
 
 from pushplan.cli import main
 from pushplan.gtsp import (
+    GtspConfig,
     GtspInstance,
+    distances,
     read_gtsp,
     read_tour,
+    solve_gtsp,
     write_gtsp,
     write_tour,
 )
-from pushplan.world import InvalidInputError, SchemaError
+from pushplan.world import InvalidInputError, MaxIterations, SchemaError
 
 CLUSTERS = ((0, 2), (1,), (3,))
 HEAD = "NAME: small\nTYPE: AGTSP\nDIMENSION: 4\nGTSP_SETS: 3\n"
@@ -108,9 +111,9 @@ def test_round_trip_of_tours(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("old", "new", "rule"),
     [
-        ("AGTSP", "TSP", "line 2: unknown TYPE 'TSP'"),
+        ("AGTSP", "CVRP", "line 2: unknown TYPE 'CVRP'"),
         ("DIMENSION: 4", "DIMENSION: x", "line 3: DIMENSION must be a whole number from 1"),
-        ("DIMENSION: 4", "DIMENSION: 999999999999", "from 1 to 20000, got '999999999999'"),
+        ("DIMENSION: 4", "DIMENSION: 999999999999", "from 1 to 12000, got '999999999999'"),
         ("DIMENSION: 4", "DIMENSION: 5", "DIMENSION|FULL_MATRIX of 5|node 5 is in none"),
         ("SETS: 3", "SETS: " + "9" * 5000, "line 4: GTSP_SETS must be a whole number from 1 to 4"),
         ("1 1 3 -1", "1 1 " + "9" * 5000, "line 11: '9{39}.* is not a whole number"),
@@ -126,7 +129,7 @@ def test_round_trip_of_tours(tmp_path: Path) -> None:
         ("1 1 3 -1", "1 1 9 -1", "line 11: nodes are 1 to 4, got 9"),
         ("2 2 -1", "2 3 -1", "line 12: node 3 is in set 1 already"),
         ("1 1 3 -1", "1 1 -1", "node 3 is in none"),
-        ("2 2 -1", "3 2 -1", "line 12: expected set 2, got 3"),
+        ("2 2 -1", "3 2 -1", "line 13: set 3 stands here a second time"),
         ("2 2 -1", "2 -1", "line 12: set 2 has no node"),
         ("3 4 -1\n", "", "expected 3 sets, got 2"),
         ("NAME: small", "5 6 7", "line 1: data outside of a section"),
@@ -165,7 +168,7 @@ def test_files_that_are_not_there(tmp_path: Path) -> None:
     with pytest.raises(InvalidInputError, match="cannot write"):
         write_tour(tmp_path / "none" / "tour", (0,))
     (tmp_path / "bytes.gtsp").write_bytes(b"\xff\xfe\x00")
-    with pytest.raises(InvalidInputError, match="cannot read"):
+    with pytest.raises(InvalidInputError, match="line 1: data outside of a section"):
         read_gtsp(tmp_path / "bytes.gtsp")
 
 
@@ -186,3 +189,83 @@ def test_command_says_why_there_is_no_tour(
     path = written(tmp_path, explicit("FULL_MATRIX", data))
     assert main(["gtsp", str(path)]) == 1
     assert "infeasible: No tour visits every cluster" in capsys.readouterr().out
+
+
+AS_OTHERS_WRITE = {
+    "an author after the type": ("TYPE: AGTSP", "TYPE : TSP (M.~Hofmeister)"),
+    "sets in any order": ("1 1 3 -1\n2 2 -1\n3 4 -1\n", "3 4 -1\n1 1 3 -1\n2 2 -1\n"),
+    "comment lines": ("DIMENSION: 4", "# by hand: 4 nodes\n#CAPACITY 3\nDIMENSION: 4"),
+    "keywords that do not matter": (
+        "DIMENSION: 4",
+        "CAPACITY: 3\nEDGE_DATA_FORMAT : EDGE_LIST\nBEST_KNOWN: 12\nDIMENSION:4",
+    ),
+    "sections that do not matter": ("GTSP_SET_SECTION", "DEPOT_SECTION\n1\n-1\nGTSP_SET_SECTION"),
+}
+
+
+@pytest.mark.parametrize("how", AS_OTHERS_WRITE)
+def test_files_as_others_write_them(tmp_path: Path, how: str) -> None:
+    text = explicit("FULL_MATRIX", LAYOUTS["FULL_MATRIX"])
+    assert AS_OTHERS_WRITE[how][0] in text
+    instance = read_gtsp(written(tmp_path, text.replace(*AS_OTHERS_WRITE[how], 1)))
+    assert instance.costs.tolist() == FULL and instance.clusters == CLUSTERS
+
+
+def test_a_name_in_another_code_is_read(tmp_path: Path) -> None:
+    path = tmp_path / "old.gtsp"
+    text = explicit("FULL_MATRIX", LAYOUTS["FULL_MATRIX"]).replace("small", "Zürich")
+    path.write_bytes(text.encode("latin-1"))
+    assert read_gtsp(path).name == "Z\ufffdrich"
+
+
+def test_the_short_form_of_glns(tmp_path: Path) -> None:
+    text = "N: 4\nM: 3\nSymmetric: true\nTriangle: false\n2 2\n1 1 3\n3 4\n"
+    matrix = "\n".join(" ".join(map(str, row)) for row in FULL)
+    instance = read_gtsp(written(tmp_path, text + matrix + "\n"))
+    assert instance.costs.tolist() == FULL and instance.clusters == CLUSTERS
+    for broken, rule in (
+        (text, "FULL_MATRIX of 4 nodes has 16 numbers, got 0"),
+        (text.replace("M: 3", "M: 2") + matrix, "sets|numbers|node 4 is in none"),
+        (text.replace("N: 4", "N: x") + matrix, "DIMENSION must be a whole number"),
+        ("N: 4\nM: 3\n", "the section N is missing"),
+    ):
+        with pytest.raises(SchemaError, match=rule):
+            read_gtsp(written(tmp_path, broken))
+
+
+def test_keywords_that_are_nearly_right_are_named(tmp_path: Path) -> None:
+    text = explicit("FULL_MATRIX", LAYOUTS["FULL_MATRIX"]).replace("DIMENSION", "DIMENSON")
+    with pytest.raises(SchemaError, match="line 3: unknown keyword 'DIMENSON'; did you mean"):
+        read_gtsp(written(tmp_path, text))
+
+
+def test_more_nodes_than_memory_holds_are_refused_before_it_is_taken(tmp_path: Path) -> None:
+    points = "\n".join(f"{i} {i} 0" for i in range(1, 20_001))
+    text = HEAD.replace("4", "20000") + f"EDGE_WEIGHT_TYPE: EUC_2D\nNODE_COORD_SECTION\n{points}\n"
+    with pytest.raises(SchemaError, match="DIMENSION must be a whole number from 1 to 12000"):
+        read_gtsp(written(tmp_path, text + SETS))
+    with pytest.raises(InvalidInputError, match="the number of nodes must be in"):
+        GtspInstance.from_coordinates("many", np.zeros((20_000, 2)), [range(20_000)])
+
+
+def test_distances_are_made_in_pieces(monkeypatch: pytest.MonkeyPatch) -> None:
+    points = np.random.default_rng(0).uniform(-90.0, 90.0, (50, 2))
+    for kind in distances.COORDINATE_TYPES:
+        monkeypatch.setattr(distances, "_ROWS", 1000)
+        whole = distances.distances(points, kind)
+        monkeypatch.setattr(distances, "_ROWS", 7)
+        assert distances.distances(points, kind).tobytes() == whole.tobytes()
+
+
+@pytest.mark.parametrize("method", ["auto", "exact"])
+def test_a_thousand_clusters_and_more(method: str) -> None:
+    count = 1100
+    at = np.arange(count)
+    costs = np.abs(at[:, None] - at).astype(float)
+    config, stop = GtspConfig(method=method), MaxIterations(1)
+    if method == "exact":
+        with pytest.raises(InvalidInputError, match=r"table of .* MB for 1100 clusters"):
+            solve_gtsp(costs, at[:, None], stop=stop, config=config)
+    else:
+        tour = solve_gtsp(costs, at[:, None], stop=stop, config=config)
+        assert sorted(tour.nodes) == at.tolist()

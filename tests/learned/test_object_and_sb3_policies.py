@@ -110,13 +110,22 @@ class TestSb3:
             Sb3Policy(model.path, trust=True)
 
     def test_files_that_are_none(self, model, tmp_path):
-        with pytest.raises(InvalidInputError, match="no file"):
+        with pytest.raises(InvalidInputError, match="No such file"):
             Sb3Policy(tmp_path / "no.zip", trust=True)
         path = tmp_path / "bad.zip"
         for data in (b"", b"no zip", model.path.read_bytes()[:-30]):
             path.write_bytes(data)
             with pytest.raises(InvalidInputError, match="no readable zip"):
                 Sb3Policy(path, trust=True)
+        with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
+            archive.writestr("data", "{}")
+            archive.writestr(MEMBER, "{" + "x" * 1000)
+            at = archive.getinfo(MEMBER).header_offset + 30 + len(MEMBER)
+        damaged = bytearray(path.read_bytes())
+        damaged[at] ^= 0xFF  # the first byte of the compressed stream
+        path.write_bytes(bytes(damaged))
+        with pytest.raises(InvalidInputError, match="no readable zip: error: Error -3"):
+            Sb3Policy(path, trust=True)
         with zipfile.ZipFile(path, "w") as archive:
             archive.writestr("other", "")
         with pytest.raises(InvalidInputError, match="no Stable-Baselines3 file"):

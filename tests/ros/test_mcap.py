@@ -12,7 +12,7 @@ import pytest
 from conftest import make_boxes, make_u_maze
 from mcap.reader import make_reader
 from mcap.well_known import MessageEncoding, Profile, SchemaEncoding
-from mcap.writer import Writer
+from mcap.writer import CompressionType, IndexType, Writer
 from mcap_ros2.decoder import DecoderFactory
 from rosbags.highlevel import AnyReader
 
@@ -252,6 +252,48 @@ def test_a_truncated_file_is_one_clear_error(tmp_path: Path, maze: Episode, cut:
     with pytest.raises(SchemaError, match=r"cut\.mcap is not a whole MCAP file") as caught:
         load_episode(path)
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("compression", [*CompressionType, None])
+def test_a_file_without_a_summary_is_read(
+    tmp_path: Path, maze: Episode, compression: CompressionType | None
+) -> None:
+    path, again = tmp_path / "closed.mcap", tmp_path / "plain.mcap"
+    save_episode(maze, path)
+    writer = Writer(
+        str(again),
+        compression=compression or CompressionType.NONE,
+        use_chunking=compression is not None,
+        chunk_size=20_000,
+        index_types=IndexType.NONE,
+        use_summary_offsets=False,
+        use_statistics=False,
+        repeat_channels=False,
+        repeat_schemas=False,
+    )
+    writer.start(profile="ros2", library="another")
+    with path.open("rb") as file:
+        reader = make_reader(file)
+        summary = reader.get_summary()
+        schemas = {
+            one.id: writer.register_schema(one.name, one.encoding, one.data)
+            for one in summary.schemas.values()
+        }
+        channels = {
+            one.id: writer.register_channel(
+                one.topic, one.message_encoding, schemas[one.schema_id], one.metadata
+            )
+            for one in summary.channels.values()
+        }
+        for _, channel, one in reader.iter_messages():
+            writer.add_message(channels[channel.id], one.log_time, one.data, one.publish_time)
+    writer.finish()
+    same(maze, load_episode(again))
+    data = again.read_bytes()
+    for cut in (len(data) // 2, len(data) - 20):
+        again.write_bytes(data[:cut])  # as a recorder leaves it that was killed
+        with pytest.raises(SchemaError, match="its recorder was stopped before it could close it"):
+            load_episode(again)
 
 
 def test_a_damaged_file_is_one_clear_error(tmp_path: Path, maze: Episode) -> None:
