@@ -24,10 +24,12 @@ from rclpy.duration import Duration
 from rclpy.executors import ExternalShutdownException, MultiThreadedExecutor
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.signals import SignalHandlerOptions
 from scene import Scene
 from visualization_msgs.msg import MarkerArray
 
 from pushplan.ros import McapLog, Messages, RclpyTypes
+from pushplan.runtime import Motors
 from pushplan.world import InvalidInputError, Stop, StopCheck, Twist
 from pushplan.world.files import load_world
 
@@ -58,7 +60,7 @@ class PushplanNode(Node):  # type: ignore[misc]
         self._scene = Scene(robot, frame=frame, margin=self._value("margin", 0.0))
         self._messages = Messages(RclpyTypes(), frame_id=frame)
         self._log = McapLog(log, frame_id=frame) if log else None
-        self._period = self._value("period", 0.05)
+        self._period, max_age = self._value("period", 0.05), self._value("max_age", 0.5)
         self.navigator = Navigator(
             self._scene,
             self._messages,
@@ -71,7 +73,7 @@ class PushplanNode(Node):  # type: ignore[misc]
                 self._value("movement_time_allowance", 10.0),
                 self._value("failure_tolerance", 1.0),
             ),
-            max_age=self._value("max_age", 0.5),
+            max_age=max_age,
             log=self._log,
         )
         self.navigator.warm_up()
@@ -82,6 +84,7 @@ class PushplanNode(Node):  # type: ignore[misc]
         self._stamped = self._value("stamped_cmd_vel", False)
         velocity = TwistStamped if self._stamped else TwistMessage
         self._cmd_vel = self.create_publisher(velocity, "cmd_vel", 1)
+        self.motors = Motors(self._publish, robot, period=self._period, timeout=max_age)
         self._plan = self.create_publisher(Path, "plan", kept)
         # each takes what any publisher offers: best effort, and maps of before or of later on
         sensor = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
@@ -112,7 +115,8 @@ class PushplanNode(Node):  # type: ignore[misc]
         self.get_logger().info("ready")
 
     def close(self) -> None:
-        """End planning and logging."""
+        """End driving, planning and logging."""
+        self.navigator.cancel()  # so that its loop ends
         self.navigator.close()
         if self._log is not None:
             self._log.close()
@@ -202,19 +206,20 @@ class PushplanNode(Node):  # type: ignore[misc]
                 if handle.is_cancel_requested:
                     self.navigator.cancel()
                 step = self.navigator.step(self._now())
-                self._send(step.twist)
+                self.motors.drive(step.twist)
                 handle.publish_feedback(
                     FollowPath.Feedback(distance_to_goal=step.distance, speed=step.twist.linear)
                 )
                 outcome = (step.outcome, step.reason) if step.outcome else outcome
-                due = max(due + period, clock.now())
+                now = clock.now()  # which may have stepped back
+                due = min(max(due + period, now), now + period)
                 clock.sleep_until(due)
         except Exception:
-            self._send(Twist(0.0, 0.0))
+            self.motors.brake()
             raise
         return outcome
 
-    def _send(self, twist: Twist) -> None:
+    def _publish(self, twist: Twist) -> None:
         messages = self._messages
         stamped = self._stamped
         self._cmd_vel.publish(
@@ -241,13 +246,15 @@ def _execute(handle: Any) -> None:
 
 
 def main() -> None:
-    """Serve until interrupted."""
-    rclpy.init()
+    """Serve until interrupted or terminated; the robot brakes before anything else ends."""
+    rclpy.init(signal_handler_options=SignalHandlerOptions.NO)  # after its own nothing is sent
     node = PushplanNode()
     executor = MultiThreadedExecutor(8)
     executor.add_node(node)
     try:
-        executor.spin()
+        with node.motors:
+            while rclpy.ok():
+                executor.spin_once(timeout_sec=0.1)  # signals are heard in between
     except (KeyboardInterrupt, ExternalShutdownException):
         pass
     finally:

@@ -7,6 +7,9 @@ from __future__ import annotations
 
 import json
 import math
+import os
+import signal
+import sys
 import threading
 import time
 
@@ -36,6 +39,7 @@ class Robot(Node):
         kept = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
         self.pose, self.twist, self.told = np.array([1.0, 0.75, 0.0]), (0.0, 0.0), 0
         self.slowest, self.drives, self.paths = math.inf, True, 0
+        self.speeds = []
         self.create_subscription(Twist, "cmd_vel", self.take, 1)
         self.create_subscription(Path, "plan", self.count, kept)
         self.odometry = self.create_publisher(Odometry, "odom", 1)
@@ -55,6 +59,7 @@ class Robot(Node):
         twist = twist_from(message)
         self.slowest = min(self.slowest, twist.linear)
         self.twist, self.told = (twist.linear, twist.angular), self.told + 1
+        self.speeds.append(twist.linear)
 
     def count(self, message):
         self.paths += 1
@@ -158,6 +163,17 @@ def main():
     _, future = sent(computed("stuck plan", 1.0, 0.75))
     report["stuck"] = told(wait(future), last=robot.twist)
     report["robot"] = {"commands": robot.told, "plans": robot.paths}
+    # the node is terminated while the robot drives
+    robot.drives = True
+    sent(computed("last", 3.0, 2.2))
+    under_way(0.3)
+    robot.speeds.clear()
+    os.kill(int(sys.argv[1]), signal.SIGTERM)
+    end = time.monotonic() + 20.0
+    while robot.twist != (0.0, 0.0) and time.monotonic() < end:
+        time.sleep(0.005)
+    time.sleep(1.0)
+    report["terminated"] = {"speeds": robot.speeds}
     print(json.dumps(report), flush=True)
     executor.shutdown()
     spinning.join()

@@ -13,6 +13,7 @@ import signal
 import subprocess
 import sys
 import tomllib
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
@@ -73,12 +74,14 @@ def test_a_robot_is_driven_through_navs_actions(python: Path, tmp_path: Path) ->
     with (tmp_path / "node.txt").open("w") as said:
         node = subprocess.Popen(words, env=ENVIRONMENT, stdout=said, stderr=said)
         try:
-            client = run(python, Path(__file__).parent / "loopback.py")
+            client = run(python, Path(__file__).parent / "loopback.py", node.pid)
+            if client.returncode:
+                node.terminate()  # what the client does at its end
+            ended = node.wait(timeout=60.0)
         finally:
-            node.send_signal(signal.SIGINT)
-            ended = node.wait(timeout=30.0)
+            node.kill()
     assert client.returncode == 0, client.stderr + (tmp_path / "node.txt").read_text()
-    assert ended == 0, (tmp_path / "node.txt").read_text()
+    assert ended == 128 + signal.SIGTERM, (tmp_path / "node.txt").read_text()
     told = json.loads(client.stdout.splitlines()[-1])
 
     ends = {name: (one["status"], one["code"]) for name, one in told.items() if "code" in one}
@@ -96,7 +99,11 @@ def test_a_robot_is_driven_through_navs_actions(python: Path, tmp_path: Path) ->
         "empty path": ("aborted", 103),  # INVALID_PATH
         "stuck plan": ("succeeded", 0),
         "stuck": ("aborted", 105),  # FAILED_TO_MAKE_PROGRESS
+        "last": ("succeeded", 0),
     }
+    speeds = told["terminated"]["speeds"]
+    assert speeds[-1] == 0.0 < speeds[0] and len(speeds) < 100
+    assert max(abs(a - b) for a, b in pairwise(speeds)) < 3 * 0.5 * 0.05  # two may be lost
     driven, canceled = told["driven"], told["canceled"]
     assert driven["off"] <= 0.1 and driven["last"] == [0.0, 0.0] == told["stuck"]["last"]
     assert told["displaced"]["before"] > 0.15 and driven["slowest"] > 0.15
