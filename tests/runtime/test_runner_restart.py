@@ -45,13 +45,18 @@ class Watched(PlanFollower):
             self.inside.release()
 
 
+def start_planning(runner, policy, world):
+    """Begin an episode, and return when the planning thread is held in the policy."""
+    policy.hold.clear()
+    policy.entered.clear()
+    runner.start(world)
+    until(policy.entered.is_set)
+
+
 def test_a_second_start_waits_with_the_policy_until_no_thread_is_in_it():
     policy, world = Watched(), maze()
     with Runner(policy, period=PERIOD, plan_stop=Deadline(5.0)) as runner:
-        policy.hold.clear()
-        policy.entered.clear()
-        runner.start(world)
-        until(policy.entered.is_set)
+        start_planning(runner, policy, world)
         resets = policy.resets
         command = runner.start(world.moved(robot_pose=world.robot_pose + 0.1))
         assert command.status is CommandStatus.WAITING and "abandoned" in command.reason
@@ -68,10 +73,7 @@ def test_the_first_plan_of_an_episode_does_not_queue_behind_those_of_the_last():
     """What waits in the queue of the last episode never begins."""
     policy, world = Watched(), maze()
     with Runner(policy, period=PERIOD, plan_stop=Deadline(5.0)) as runner:
-        policy.hold.clear()
-        policy.entered.clear()
-        runner.start(world)
-        until(policy.entered.is_set)
+        start_planning(runner, policy, world)
         never = runner._executor.submit(lambda stop: pytest.fail("it has begun"), 0.0)
         runner.start(world)
         policy.hold.set()
@@ -85,10 +87,7 @@ def test_the_first_plan_of_an_episode_does_not_queue_behind_those_of_the_last():
 def test_a_planner_that_hangs_stops_the_robot_in_the_next_episode_too():
     policy, world, now = Watched(), maze(), [0.0]
     with Runner(policy, period=PERIOD, plan_stop=Deadline(0.1), clock=lambda: now[0]) as runner:
-        policy.hold.clear()
-        policy.entered.clear()
-        runner.start(world)
-        until(policy.entered.is_set)
+        start_planning(runner, policy, world)
         runner.start(world)
         now[0] = 0.8
         world, commands = drive(runner, later(world, STILL), 3, wait=False)
