@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+import threading
+from collections.abc import Callable
 from functools import lru_cache
 from typing import NamedTuple
 
@@ -19,6 +21,7 @@ SMALL_RADIUS = 1e-3
 """Arcs below this fraction of the map's diagonal get fewer corners: the same error in metres."""
 GAP = 1e-7
 """Fraction of the map's diagonal by which paths stay off obstacles, so that touching ones close."""
+_PIECE = 300  # obstacles between two looks at a stop rule: about 5 ms
 
 
 class Contours(NamedTuple):
@@ -48,34 +51,71 @@ def _diagonal(static: StaticMap) -> float:
     return float(np.hypot(*(static.bounds[2:] - static.bounds[:2])))
 
 
-@lru_cache(maxsize=64)
+class _ContourMaker:
+    """Makes the contours of one map and clearance in small steps; what is done is kept."""
+
+    def __init__(self, static: StaticMap, clearance: float) -> None:
+        self._shapes, diagonal = obstacles_of(static, clearance), _diagonal(static)
+        small = SMALL_RADIUS * diagonal / np.maximum(self._shapes.radii, 1e-300)
+        self._steps = np.minimum(math.pi / 2.0, ARC_STEP * np.sqrt(np.maximum(1.0, small)))
+        self._radii = self._shapes.radii + 2.0 * gap_of(static)
+        self._parts: list[Contours] = []
+        self._done = self._corners = 0
+        self._whole: Contours | None = None
+        self._lock = threading.Lock()
+
+    def make(self, stopped: Callable[[], bool]) -> Contours | None:
+        """Go on until all is done, or ``stopped``, asked every few milliseconds, says so: None."""
+        count = len(self._radii)
+        while self._done < count or not self._parts:
+            if stopped():
+                return None
+            with self._lock:
+                if self._done < count or not self._parts:
+                    self._make_some(self._done, min(self._done + _PIECE, count))
+        with self._lock:
+            if self._whole is None:
+                columns = zip(*self._parts, strict=True)
+                self._whole = Contours(*(frozen(np.concatenate(column)) for column in columns))
+        return self._whole
+
+    def _make_some(self, first: int, last: int) -> None:
+        """Add the contours of the obstacles from ``first`` to ``last`` (exclusive)."""
+        vertices, offsets, _, _ = self._shapes
+        cores = vertices[offsets[first] : offsets[last]], offsets[first : last + 1] - offsets[first]
+        points, owner = _outlines(*cores, self._radii[first:last], self._steps[first:last])
+        ends = np.flatnonzero(np.diff(owner, append=-1)) + 1
+        after = np.arange(1, len(owner) + 1)
+        after[ends - 1] = np.concatenate([[0], ends[:-1]]) if len(ends) else ends
+        outgoing = points[after] - points
+        outgoing /= np.hypot(outgoing[:, 0], outgoing[:, 1])[:, None]
+        incoming = np.empty_like(outgoing)
+        incoming[after] = outgoing
+        owner, after = owner.astype(np.int64) + first, after.astype(np.int64) + self._corners
+        self._parts.append(Contours(points, incoming, outgoing, owner, after))
+        self._corners += len(points)
+        self._done = last
+
+
+_maker_of = lru_cache(maxsize=64)(_ContourMaker)
+
+
 def contours_of(static: StaticMap, clearance: float = 0.0) -> Contours:
     """Polygons around the obstacles grown by ``clearance`` [m]: nowhere inside, tangent to arcs."""
-    shapes, diagonal = obstacles_of(static, clearance), _diagonal(static)
-    small = SMALL_RADIUS * diagonal / np.maximum(shapes.radii, 1e-300)
-    steps = np.minimum(math.pi / 2.0, ARC_STEP * np.sqrt(np.maximum(1.0, small)))
-    points, owner = _outlines(shapes, shapes.radii + 2.0 * gap_of(static), steps)
-    ends = np.flatnonzero(np.diff(owner, append=-1)) + 1
-    after = np.arange(1, len(owner) + 1)
-    after[ends - 1] = np.concatenate([[0], ends[:-1]]) if len(ends) else ends
-    outgoing = points[after] - points
-    outgoing /= np.hypot(outgoing[:, 0], outgoing[:, 1])[:, None]
-    incoming = np.empty_like(outgoing)
-    incoming[after] = outgoing
-    return Contours(
-        frozen(points),
-        frozen(incoming),
-        frozen(outgoing),
-        frozen(owner.astype(np.int64)),
-        frozen(after.astype(np.int64)),
-    )
+    made = _maker_of(static, clearance).make(lambda: False)
+    assert made is not None
+    return made
+
+
+def prepare_contours(static: StaticMap, clearance: float, stopped: Callable[[], bool]) -> bool:
+    """Make what `contours_of` returns unless ``stopped`` says so before; whether it is there."""
+    return _maker_of(static, clearance).make(stopped) is not None
 
 
 def _outlines(
-    shapes: Obstacles, radii: FloatArray, steps: FloatArray
+    cores: FloatArray, offsets: IntArray, radii: FloatArray, steps: FloatArray
 ) -> tuple[FloatArray, IntArray]:
     """Corners (V, 2) [m] of polygons tangent to the outlines at ``radii`` around convex cores."""
-    cores, offsets = shapes.vertices, shapes.offsets
     sizes = np.diff(offsets)
     core = np.repeat(np.arange(len(sizes)), sizes)  # of each corner of the cores
     after, before = np.arange(1, len(cores) + 1), np.arange(-1, len(cores) - 1)

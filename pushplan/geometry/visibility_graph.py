@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pushplan.compiled import owned
-from pushplan.geometry.contours import contours_of, gap_of, standoff_of
+from pushplan.geometry.contours import contours_of, gap_of, prepare_contours, standoff_of
 from pushplan.geometry.obstacle_grid import obstacle_grid
 from pushplan.geometry.obstacles import obstacles_of
 from pushplan.geometry.regions import Target, as_target, outside_area, regions_of
@@ -80,8 +80,12 @@ class VisibilityGraph:
         target = as_target(goal)
         if outside_area(target, origin):
             return Path(0.0, origin[None])
+        if not prepare_contours(self.static, self.clearance, stopped):
+            return Path(math.inf)
         free = leave_inflation(self.static, self.clearance, origin)
-        return Path(math.inf) if free is None else self._search(origin, free, target, stopped)
+        if free is None or stopped():
+            return Path(math.inf)
+        return self._search(origin, free, target, stopped)
 
     def _search(
         self, origin: FloatArray, free: FloatArray, target: Target, stopped: Callable[[], bool]

@@ -31,7 +31,7 @@ from pushplan.world.checked_fields import (
     PositiveInt,
 )
 from pushplan.world.checks import FloatArray, IntArray
-from pushplan.world.outline import flatten, unflatten
+from pushplan.world.outline import flatten, outline_boxes, unflatten
 
 
 class QuasiStaticContacts(NamedTuple):
@@ -173,9 +173,7 @@ def _width(outlines: FloatArray) -> float:
 def _bodies(robot: RobotModel, shapes: _Shapes, static: StaticMap, gyration: float) -> Bodies:
     movables = shapes.movables
     squares = [polygon_inertia(movables.drawn_outline(k)) for k in range(len(movables))]
-    parts = static.convex_parts
-    vertices, offsets = flatten(parts)
-    boxes = [np.concatenate([part.min(axis=0), part.max(axis=0)]) for part in parts]
+    vertices, offsets = flatten(static.convex_parts)
     return Bodies(
         robot_vertices=owned(robot.vertices),
         robot_offsets=owned(robot.offsets),
@@ -188,5 +186,5 @@ def _bodies(robot: RobotModel, shapes: _Shapes, static: StaticMap, gyration: flo
         inverse_gyration=1.0 / (np.array(squares) * gyration**2) if squares else np.zeros(0),
         static_vertices=owned(vertices),
         static_offsets=owned(offsets),
-        static_boxes=np.array(boxes).reshape(-1, 4),
+        static_boxes=outline_boxes(vertices, offsets),
     )

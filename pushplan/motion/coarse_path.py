@@ -3,20 +3,22 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
 from pushplan.compiled import kernel
 from pushplan.geometry import core_distance
 from pushplan.motion.keep_out import keep_out
-from pushplan.search.grid_dijkstra import grid_dijkstra
+from pushplan.motion.time_slicing import never
+from pushplan.search.grid_dijkstra import new_grid_search, settle_cells
 from pushplan.world import GoalDisc, StaticMap, World
 from pushplan.world.checks import FloatArray, IntArray, frozen
 from pushplan.world.outline import flatten, unflatten
 
 _SIDE = 96  # cells along the longer side of the workspace, if that resolves the robot's own width
 _MOST = 400  # cells along the longer side at most
+_PIECE = 8_000  # cells between two looks at the stop rule: about 2 ms
 
 
 @kernel(allocates=True)
@@ -57,13 +59,16 @@ def _cell(world: World) -> float:
     return max(min(extent / _SIDE, world.robot.inscribed_radius or np.inf), extent / _MOST)
 
 
-def coarse_path(world: World, push_weight: float) -> FloatArray:
+def coarse_path(
+    world: World, push_weight: float, stopped: Callable[[], bool] = never
+) -> FloatArray:
     """A path of the robot's centre from its pose to the goal, coarse and cheap.
 
     Args:
         world: the snapshot, with a goal for the robot.
         push_weight: weight of a unit of pushing work against a unit of travel; infinite treats
             objects as obstacles.
+        stopped: ends the search, asked every few milliseconds.
 
     Returns:
         (N, 2) points about one cell apart [m]; empty where there is no such path.
@@ -78,13 +83,13 @@ def coarse_path(world: World, push_weight: float) -> FloatArray:
     boxes = unflatten(objects.vertices_world, objects.offsets)
     reach = np.full(len(boxes), outer)
     extra = walls + _grid_weights(world.static.bounds, cell, boxes, reach, per_metre)
-    return _cheapest(world, extra, cell)
+    return _cheapest(world, extra, cell, stopped)
 
 
-def reachable(world: World) -> bool:
+def reachable(world: World, stopped: Callable[[], bool] = never) -> bool:
     """Whether the robot's inscribed disc may get from the start to the goal around the walls.
 
-    False only where it certainly does not.
+    False only where it certainly does not, or ``stopped`` ends the search.
     """
     cell = _cell(world)
     inner = world.robot.inscribed_radius
@@ -92,7 +97,7 @@ def reachable(world: World) -> bool:
         return True  # too coarse to tell
     # a cell less than the disc: a narrow gap is left for the search to find out about
     extra = _wall_weights(keep_out(world), cell, ((inner - cell, np.inf),))
-    return len(_cheapest(world, extra, cell)) > 0
+    return len(_cheapest(world, extra, cell, stopped)) > 0
 
 
 @functools.lru_cache(maxsize=16)
@@ -120,7 +125,9 @@ def _grid_weights(
     return _cell_weights(bounds[:2], cell, rows, cols, *flatten(shapes), reach, weight)
 
 
-def _cheapest(world: World, extra: FloatArray, cell: float) -> FloatArray:
+def _cheapest(
+    world: World, extra: FloatArray, cell: float, stopped: Callable[[], bool]
+) -> FloatArray:
     """The cheapest path from the robot to the goal over a grid of weights."""
     bounds, goal = world.static.bounds, world.navigation_goal
     rows, cols = extra.shape
@@ -131,14 +138,18 @@ def _cheapest(world: World, extra: FloatArray, cell: float) -> FloatArray:
     if isinstance(goal, GoalDisc):  # it may be smaller than a cell
         reached[_cell_of(goal.center, bounds, cell, rows, cols)] = True
     start = np.array([row * cols + col])
-    _, parents, order = grid_dijkstra(1.0 + extra, start, reached, cell)
-    at = int(order[-1])
+    search, weights, upto = new_grid_search(rows, cols, start), 1.0 + extra, _PIECE
+    while settle_cells(search, weights, reached, cell, upto):
+        if stopped():
+            return np.empty((0, 2))
+        upto += _PIECE
+    at = int(search.order[search.counters[1] - 1])
     if not reached[divmod(at, cols)]:
         return np.empty((0, 2))
     chain = []
     while at >= 0:
         chain.append(at)
-        at = int(parents[at])
+        at = int(search.parents[at])
     cells = np.array(chain[::-1])
     return bounds[:2] + (np.column_stack([cells % cols, cells // cols]) + 0.5) * cell
 

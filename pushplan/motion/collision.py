@@ -14,7 +14,7 @@ from pushplan.geometry import convex_overlap, convex_penetration
 from pushplan.geometry.transforms import transform_points
 from pushplan.world import RobotModel, StaticMap
 from pushplan.world.checks import FloatArray, IntArray
-from pushplan.world.outline import convex_outline, flatten
+from pushplan.world.outline import convex_outline, flatten, outline_boxes
 
 GROUP = 16
 """Polygons whose boxes are looked at together."""
@@ -64,7 +64,7 @@ def _obstacles(static: StaticMap, parts: Sequence[FloatArray]) -> ConvexObstacle
     if len(parts) > GROUP:
         parts = [parts[k] for k in _packed(np.array([part[0] for part in parts]))]
     vertices, offsets = flatten(parts)
-    boxes = _boxes(vertices, offsets[:-1])
+    boxes = outline_boxes(vertices, offsets)
     groups = np.zeros((0, 4))
     if len(parts):
         first = np.arange(0, len(parts), GROUP)
@@ -74,14 +74,6 @@ def _obstacles(static: StaticMap, parts: Sequence[FloatArray]) -> ConvexObstacle
     return ConvexObstacles(
         owned(vertices), owned(offsets), boxes, np.ascontiguousarray(groups), owned(static.bounds)
     )
-
-
-def _boxes(vertices: FloatArray, first: IntArray) -> FloatArray:
-    """(S, 4) boxes around the points from each first one to the next."""
-    if not len(first):
-        return np.zeros((0, 4))
-    low, high = np.minimum.reduceat(vertices, first), np.maximum.reduceat(vertices, first)
-    return np.ascontiguousarray(np.hstack([low, high]))
 
 
 def _packed(places: FloatArray) -> list[int]:

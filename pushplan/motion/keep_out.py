@@ -8,7 +8,7 @@ import numpy as np
 
 from pushplan.world import StaticMap, World
 from pushplan.world.checks import FloatArray
-from pushplan.world.outline import grown_outline, transform
+from pushplan.world.outline import flatten, grown_outline, outline_boxes, transform
 
 _LEVELS = 4  # fractions of the margin that an obstacle near the robot may keep
 
@@ -26,9 +26,8 @@ def keep_out(world: World) -> StaticMap:
         return static
     outlines = [transform(world.robot_pose, part) for part in world.robot.wall_parts]
     reach = world.robot.circumscribed_radius + 2.0 * margin
-    low, high = _boxes(static)
-    at = world.robot_pose[:2]
-    near = ((low < at + reach) & (high > at - reach)).all(axis=1)
+    boxes, at = _boxes(static), world.robot_pose[:2]
+    near = ((boxes[:, :2] < at + reach) & (boxes[:, 2:] > at - reach)).all(axis=1)
     fractions = []
     for k in np.flatnonzero(near).tolist():
         for level in range(_LEVELS, -1, -1):
@@ -59,13 +58,9 @@ def _grown(static: StaticMap, margin: float, fractions: tuple[tuple[int, int], .
 
 
 @functools.lru_cache(maxsize=32)
-def _boxes(static: StaticMap) -> tuple[FloatArray, FloatArray]:
-    """(S, 2) lower and (S, 2) upper corners of the boxes around all obstacles [m]."""
-    parts = static.convex_parts
-    return (
-        np.array([part.min(axis=0) for part in parts]).reshape(-1, 2),
-        np.array([part.max(axis=0) for part in parts]).reshape(-1, 2),
-    )
+def _boxes(static: StaticMap) -> FloatArray:
+    """(S, 4) boxes around all obstacles [m]."""
+    return outline_boxes(*flatten(static.convex_parts))
 
 
 def _grown_part(static: StaticMap, k: int, margin: float) -> FloatArray:

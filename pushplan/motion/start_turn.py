@@ -110,6 +110,8 @@ def _first_heading(improver: PathImprover, start: FloatArray) -> float | None:
             ahead = min(improver.size, float(along[-1]))
             dx, dy = (float(np.interp(ahead, along, c - c[0])) for c in corners.T)
             return math.atan2(dy, dx)
+        if improver.stopped():
+            break
     return None
 
 

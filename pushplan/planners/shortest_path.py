@@ -44,6 +44,7 @@ class ShortestPath:
         robot cannot drive the path as it stands.
         """
         call = PlanningCall(world, stop, rng)
+        world = call.world
         robot, goal = world.robot, world.navigation_goal
         start, looks, late = world.robot_pose[:2], 0, False
 

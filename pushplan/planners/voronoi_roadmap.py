@@ -3,19 +3,23 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-import shapely
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import connected_components, dijkstra
 from scipy.spatial import Delaunay, QhullError, cKDTree
 
+from pushplan.compiled import kernel
 from pushplan.control import PurePursuit
 from pushplan.geometry import VisibilityGraph
+from pushplan.geometry.obstacle_grid import ObstacleGrid, obstacle_grid, sees
+from pushplan.geometry.obstacles import Obstacles, obstacles_of
 from pushplan.motion.keep_out import keep_out
 from pushplan.motion.polyline import polyline_plan, polyline_status
 from pushplan.motion.speed_profile import start_margin
+from pushplan.motion.time_slicing import Stopped, go_on
 from pushplan.planners.following.plan_follower import PlanFollower
 from pushplan.planners.following.replanning import Replanning
 from pushplan.world import (
@@ -24,14 +28,16 @@ from pushplan.world import (
     PlanResult,
     PlanStatus,
     Stop,
-    StopCheck,
     World,
 )
 from pushplan.world.checks import BoolArray, FloatArray, IntArray, number
 from pushplan.world.planning_call import PlanningCall
 
 _MOST_SITES = 2000
-"""Points on outlines at most, but for three on each: the time of a call grows with them."""
+"""Points on outlines at most, but for three on each, or one of more outlines than this.
+
+Time and what cannot be interrupted, Qhull, grow with them."""
+_LINES = 2000  # lines that are looked along between two looks at the stop rule
 _SAME = 1e-6  # distance of corners of the diagram that differ by rounding only [R]
 
 
@@ -62,9 +68,8 @@ class Skeleton:
     ) -> PlanResult:
         """Plan from ``world``; exact and without chance, so ``rng`` is not needed.
 
-        The stop rule is looked at before the diagram is made, which cannot be interrupted: 5 to
-        30 ms in open water. Where the diagram leads nowhere, the shortest path around the walls is
-        taken, with looks at it.
+        The stop rule is looked at between the steps of the diagram, the longest of which takes 5
+        to 20 ms. Where the diagram leads nowhere, the shortest path around the walls is taken.
 
         The status is `PATH_ONLY` where the robot cannot drive the path as it stands.
 
@@ -72,39 +77,45 @@ class Skeleton:
             InvalidInputError: if the world's goal is not one for the robot.
         """
         call = PlanningCall(world, stop, rng)
-        status, points = self._path(world, call.check)
-        if call.cancelled:
-            status, points = PlanStatus.CANCELLED, None
+        world = call.world
+        try:
+            status, points = self._path(world, call)
+        except Stopped:
+            status, points = call.stopped_status, None
         if points is None:
             return call.result(status, iterations=1)
         plan = polyline_plan(world, points, self.spacing * world.robot.circumscribed_radius)
         return call.result(polyline_status(world, plan), plan, call.elapsed, 1)
 
-    def _path(self, world: World, check: StopCheck) -> tuple[PlanStatus, FloatArray | None]:
-        """Corners of the path (N, 2) [m] from the robot to the goal."""
+    def _path(self, world: World, call: PlanningCall) -> tuple[PlanStatus, FloatArray | None]:
+        """Corners of the path (N, 2) [m] from the robot to the goal.
+
+        Raises:
+            Stopped: if the stop rule fires.
+        """
         if start_margin(world, 0.0) is None:
             return PlanStatus.START_BLOCKED, None
         start = world.robot_pose[:2]
         goal = world.navigation_goal
         if goal.distance(float(start[0]), float(start[1])) <= 0.0:
             return PlanStatus.SOLVED, start[None]
-        if check(0, math.inf):
-            return PlanStatus.TIMED_OUT, None
-        sites, owners = self._sites(world)
-        points = self._along(world, sites, owners) if len(set(owners.tolist())) > 1 else None
-        if points is not None:
-            return PlanStatus.SOLVED, points
-        late = False
 
         def stopped() -> bool:
-            nonlocal late
-            late = check(1, math.inf)
-            return late
+            return call.check(looks, math.inf)
 
+        looks = 0
+        go_on(stopped)
+        looks = 1
+        sites, owners = self._sites(world)
+        if len(set(owners.tolist())) > 1:
+            points = self._along(world, sites, owners, stopped)
+            if points is not None:
+                return PlanStatus.SOLVED, points
         graph = VisibilityGraph(keep_out(world), world.robot.inscribed_radius)
         direct = graph.to_goal(start, goal, stopped)
         if not np.isfinite(direct.length):
-            return PlanStatus.TIMED_OUT if late else PlanStatus.GOAL_UNREACHABLE, None
+            go_on(stopped)
+            return PlanStatus.GOAL_UNREACHABLE, None
         return PlanStatus.SOLVED, direct.points
 
     def _sites(self, world: World) -> tuple[FloatArray, IntArray]:
@@ -119,7 +130,8 @@ class Skeleton:
         reached = np.cumsum(np.hypot(edges[:, 0], edges[:, 1]))
         around = np.diff(reached[ends - 1], prepend=0.0)
         spacing = max(self.spacing * world.robot.circumscribed_radius, around.sum() / _MOST_SITES)
-        samples = np.maximum(np.ceil(around / spacing), 3.0).astype(np.int64)
+        least = 3.0 if len(counts) <= _MOST_SITES else 1.0
+        samples = np.maximum(np.ceil(around / spacing), least).astype(np.int64)
         owners = np.repeat(np.arange(len(counts)), samples)
         first = np.cumsum(samples) - samples
         fraction = (np.arange(len(owners)) - first[owners] + 0.5) / samples[owners]
@@ -128,8 +140,11 @@ class Skeleton:
         left = (reached[at] - along) / np.maximum(np.hypot(edges[at, 0], edges[at, 1]), 1e-12)
         return corners[after[at]] - edges[at] * left[:, None], owners
 
-    def _along(self, world: World, sites: FloatArray, owners: IntArray) -> FloatArray | None:
+    def _along(
+        self, world: World, sites: FloatArray, owners: IntArray, stopped: Callable[[], bool]
+    ) -> FloatArray | None:
         """The cheapest path along the diagram, None where it does not lead to the goal."""
+        go_on(stopped)
         # about the robot, in units of its size: the same diagram wherever the world is
         start, size = world.robot_pose[:2], world.robot.circumscribed_radius
         sites = (sites - start) / size
@@ -137,6 +152,7 @@ class Skeleton:
             triangles = Delaunay(sites)
         except QhullError:
             return None  # all points on one line
+        go_on(stopped)
         # its dual: corners of the diagram are circumcentres, and neighbours share a ridge
         corners = _circumcentres(sites[triangles.simplices])
         first, opposite = np.nonzero(triangles.neighbors > np.arange(len(corners))[:, None])
@@ -147,9 +163,11 @@ class Skeleton:
         inside: BoolArray = np.all((corners >= low) & (corners <= high), axis=1)
         corners[~inside] = low  # some are infinitely far; no ridge that stays leads to them
         ridges = ridges[(between[:, 0] != between[:, 1]) & inside[ridges].all(axis=1)]
+        go_on(stopped)
         ridges = _merged(corners, ridges)
         if len(ridges) == 0:
             return None
+        go_on(stopped)
         goal = world.navigation_goal
         vertices = np.concatenate([corners, np.zeros((1, 2))])
         # the robot enters the diagram by the nearest vertices
@@ -158,14 +176,15 @@ class Skeleton:
         entry = known[np.atleast_1d(nearest)]
         ways = np.column_stack([np.full(len(entry), len(vertices) - 1), entry])
         edges = np.concatenate([ridges, ways])
-        walls, places = _walls(world), start + size * vertices
-        edges = edges[_is_clear(walls, places[edges[:, 0]], places[edges[:, 1]])]
+        walls, places = _Walls(world, stopped), start + size * vertices
+        edges = edges[walls.are_clear(places[edges[:, 0]], places[edges[:, 1]])]
         half = max(world.robot.inscribed_radius / size, 0.1)
         clear = np.asarray(cKDTree(sites).query(vertices)[0])
         a, b = edges[:, 0], edges[:, 1]
         lengths = np.hypot(*(vertices[a] - vertices[b]).T)
         missing = np.maximum(1.0 - np.minimum(clear[a], clear[b]) / half, 0)
         costs = lengths * (1.0 + self.narrow * missing) + 1e-12
+        go_on(stopped)
         graph = csr_matrix((costs, (a, b)), shape=(len(vertices), len(vertices)))
         table, previous = dijkstra(
             graph, directed=False, indices=[len(vertices) - 1], return_predecessors=True
@@ -182,9 +201,10 @@ class Skeleton:
         else:
             gap = (goal.point - places) @ goal.normal
             towards = np.broadcast_to(goal.normal, places.shape)
+        go_on(stopped)
         gap = np.maximum(gap, 0.0)
         ends = places + (gap + depth)[:, None] * towards
-        best = np.where(np.isfinite(best) & _is_clear(walls, places, ends), best, np.inf)
+        best = np.where(np.isfinite(best) & walls.are_clear(places, ends), best, np.inf)
         total = best + gap / size * (1.0 + self.narrow * (gap > size))
         end = int(np.argmin(total))
         if not np.isfinite(total[end]):
@@ -196,22 +216,41 @@ class Skeleton:
         return np.concatenate([path, ends[end][None]])
 
 
-def _walls(world: World) -> shapely.Geometry | None:
-    """Where the robot's inscribed disc touches something static; None in open water."""
-    parts = [shapely.Polygon(part) for part in keep_out(world).convex_parts]
-    if not parts:
-        return None
-    walls = shapely.buffer(shapely.union_all(parts), (1.0 - 1e-6) * world.robot.inscribed_radius)
-    shapely.prepare(walls)
-    return walls
+class _Walls:
+    """What the robot's inscribed disc may not touch."""
+
+    def __init__(self, world: World, stopped: Callable[[], bool]) -> None:
+        static, clearance = keep_out(world), (1.0 - 1e-6) * world.robot.inscribed_radius
+        self._obstacles = obstacles_of(static, clearance)
+        self._grid = obstacle_grid(static, clearance, 0.0)
+        self._seen = np.zeros(len(self._obstacles.radii) + 1, dtype=np.int64)
+        self._stopped = stopped
+
+    def are_clear(self, a: FloatArray, b: FloatArray) -> BoolArray:
+        """Whether the lines from (N, 2) ``a`` to (N, 2) ``b`` keep clear of them.
+
+        Raises:
+            Stopped: if the stop rule fires.
+        """
+        clear = np.ones(len(a), dtype=np.bool_)
+        for i in range(0, len(a) if len(self._seen) > 1 else 0, _LINES):
+            go_on(self._stopped)
+            part = slice(i, i + _LINES)
+            _see(a[part], b[part], self._obstacles, self._grid, self._seen, clear[part])
+        return clear
 
 
-def _is_clear(walls: shapely.Geometry | None, a: FloatArray, b: FloatArray) -> BoolArray:
-    """Whether the lines from (N, 2) ``a`` to (N, 2) ``b`` keep clear of walls."""
-    if walls is None:
-        return np.ones(len(a), dtype=np.bool_)
-    lines = shapely.linestrings(np.stack([a, b], axis=1))
-    return np.asarray(~shapely.intersects(walls, lines), dtype=np.bool_)
+@kernel
+def _see(
+    a: FloatArray,
+    b: FloatArray,
+    obstacles: Obstacles,
+    grid: ObstacleGrid,
+    seen: IntArray,  # memory of `sees`
+    clear: BoolArray,  # (N,) receives which lines keep clear
+) -> None:
+    for i in range(a.shape[0]):
+        clear[i] = sees(a[i, 0], a[i, 1], b[i, 0], b[i, 1], obstacles, 0.0, grid, seen)
 
 
 def _merged(corners: FloatArray, ridges: IntArray) -> IntArray:

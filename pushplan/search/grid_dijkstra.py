@@ -9,6 +9,8 @@ depend on both ends of a move, and so many poses that buckets take the place of 
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from pushplan.compiled import kernel
@@ -16,31 +18,49 @@ from pushplan.search.heap import pop_least, push_or_lift
 from pushplan.world.checks import BoolArray, FloatArray, IntArray
 
 
+class GridSearch(NamedTuple):
+    """A search that has settled some cells, and its memory."""
+
+    costs: FloatArray  # (rows, columns)
+    parents: IntArray  # (cells,) as the next four; -1: none
+    order: IntArray  # settled cells
+    keys: FloatArray
+    heap: IntArray
+    places: IntArray
+    counters: IntArray  # (2,) size of the heap, cells settled
+
+
 @kernel(allocates=True)
-def grid_dijkstra(
-    weights: FloatArray,  # (rows, columns) cost per metre of a move into each cell, inf: closed
-    starts: IntArray,  # cells, counted row by row
-    goals: BoolArray,  # (rows, columns)
-    cell: float,  # side of a cell [m]
-) -> tuple[FloatArray, IntArray, IntArray]:
-    """Costs (rows, columns), parents, and settled cells in order, the first goal last; -1: none."""
-    rows, cols = weights.shape
-    costs = np.full((rows, cols), np.inf)
-    parents = np.full(rows * cols, -1, np.int64)
-    order = np.empty(rows * cols, np.int64)
-    keys, heap = np.empty(rows * cols), np.empty(rows * cols, np.int64)
-    places, size = np.full(rows * cols, -1, np.int64), np.zeros(1, np.int64)
+def new_grid_search(rows: int, cols: int, starts: IntArray) -> GridSearch:
+    """A search that begins at cells ``starts`` (S,), counted row by row."""
+    costs, counters = np.full((rows, cols), np.inf), np.zeros(2, np.int64)
+    parents, places = np.full(rows * cols, -1, np.int64), np.full(rows * cols, -1, np.int64)
+    order, heap = np.empty(rows * cols, np.int64), np.empty(rows * cols, np.int64)
+    keys = np.empty(rows * cols)
     for at in starts:
         costs[at // cols, at % cols] = 0.0
-        push_or_lift(keys, heap, places, size, at, 0.0)
-    settled = 0
-    while size[0] > 0:
-        at = pop_least(keys, heap, places, size)
+        push_or_lift(keys, heap, places, counters, at, 0.0)
+    return GridSearch(costs, parents, order, keys, heap, places, counters)
+
+
+@kernel
+def settle_cells(
+    search: GridSearch,  # changed in place
+    weights: FloatArray,  # as in `grid_dijkstra`
+    goals: BoolArray,
+    cell: float,
+    upto: int,  # cells settled in all
+) -> bool:
+    """Go on; False when a goal or all cells are settled."""
+    costs, parents, order, keys, heap, places, counters = search
+    rows, cols = weights.shape
+    while counters[0] > 0 and counters[1] < upto:
+        at = pop_least(keys, heap, places, counters)
         r, c = at // cols, at % cols
-        order[settled] = at
-        settled += 1
+        order[counters[1]] = at
+        counters[1] += 1
         if goals[r, c]:
-            break
+            return False
         for dr in range(-1, 2):
             for dc in range(-1, 2):
                 nr, nc = r + dr, c + dc
@@ -51,5 +71,18 @@ def grid_dijkstra(
                 if cost < costs[nr, nc]:
                     costs[nr, nc] = cost
                     parents[nr * cols + nc] = at
-                    push_or_lift(keys, heap, places, size, nr * cols + nc, cost)
-    return costs, parents, order[:settled]
+                    push_or_lift(keys, heap, places, counters, nr * cols + nc, cost)
+    return bool(counters[0] > 0)
+
+
+@kernel(allocates=True)
+def grid_dijkstra(
+    weights: FloatArray,  # (rows, columns) cost per metre of a move into each cell, inf: closed
+    starts: IntArray,  # cells, counted row by row
+    goals: BoolArray,  # (rows, columns)
+    cell: float,  # side of a cell [m]
+) -> tuple[FloatArray, IntArray, IntArray]:
+    """Costs (rows, columns), parents, and settled cells in order, the first goal last; -1: none."""
+    search = new_grid_search(weights.shape[0], weights.shape[1], starts)
+    settle_cells(search, weights, goals, cell, weights.size)
+    return search.costs, search.parents, search.order[: search.counters[1]]

@@ -248,6 +248,15 @@ def flatten(outlines: Sequence[FloatArray]) -> tuple[FloatArray, IntArray]:
     return frozen(np.ascontiguousarray(vertices)), frozen(offsets)
 
 
+def outline_boxes(vertices: FloatArray, offsets: IntArray) -> FloatArray:
+    """(K, 4) x_min, y_min, x_max, y_max [m] of packed outlines."""
+    if len(offsets) < 2:
+        return np.zeros((0, 4))
+    first = offsets[:-1]
+    low, high = np.minimum.reduceat(vertices, first), np.maximum.reduceat(vertices, first)
+    return np.ascontiguousarray(np.hstack([low, high]))
+
+
 def unflatten(vertices: FloatArray, offsets: IntArray) -> tuple[FloatArray, ...]:
     """The inverse of `flatten`; the outlines are views."""
     return tuple(vertices[a:b] for a, b in pairwise(offsets.tolist()))

@@ -41,13 +41,14 @@ def _check_motion(world: World, plan: Plan, rounding: float) -> None:
     assert np.all(lengths <= speed * steps * (1.0 + 1e-6) + 2.0 * rounding), "speed"
     assert np.all(np.abs(plan.turn_rates) <= robot.max_turn_rate * (1.0 + 1e-6)), "turn rates"
     assert np.all(plan.speeds <= robot.max_speed * (1.0 + 1e-6)), "speeds"
-    assert np.all(plan.speeds >= robot.min_speed * (1.0 + 1e-6) - 1e-12), "reverse speeds"
+    slowest = robot.min_speed - 1e-6 * robot.max_speed
+    assert np.all(plan.speeds >= slowest), "least speed"
     if robot.drive is Drive.CONSTANT_SPEED:
         assert np.all(plan.speeds >= robot.max_speed * (1.0 - 1e-6)), "constant speed"
     radius = robot.min_turning_radius
     assert np.all(turns * radius <= lengths * 1.001 + radius * most), "turning radius"
-    slowest = np.abs(plan.speeds) * (1.0 + 1e-6)
-    assert np.all(np.abs(plan.turn_rates) * radius <= slowest), "turning radius of rates"
+    fast = np.abs(plan.speeds) * (1.0 + 1e-6)
+    assert np.all(np.abs(plan.turn_rates) * radius <= fast), "turning radius of rates"
     between = 0.5 * (steps[1:] + steps[:-1])
     for values, acceleration in (
         (plan.speeds, robot.max_acceleration),

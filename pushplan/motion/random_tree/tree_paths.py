@@ -111,13 +111,16 @@ class TreePaths:
             among = obstacles(keep_out(world), boxes)
             if not is_free(improver.lead.pose, shape, among, np.empty_like(shape.vertices)):
                 return None  # the robot touches an object already: only pushing helps
-        coarse = coarse_path(world, push_weight)
+        coarse = coarse_path(world, push_weight, improver.stopped)
         if improver.stopped():
             return None
         if len(coarse) == 0:
             if self._exact is None:
-                self.sealed = not reachable(world)
-                if self.sealed or improver.stopped():
+                sealed = not reachable(world, improver.stopped)
+                if improver.stopped():
+                    return None
+                self.sealed = sealed
+                if sealed:
                     return None
                 self._exact = self._around_walls()
             coarse = self._exact

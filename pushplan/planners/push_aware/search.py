@@ -115,6 +115,8 @@ class PushAwareSearch:
     def _turn_first(self, table: CostToGo | None) -> None:
         """Try paths that begin with a turn on the spot, and go on with them if they cost less."""
         improver = self.improver
+        if improver.stopped():
+            return
         lead = None if len(improver.lead.pieces) else start_turn(improver)
         if lead is None or lead.pieces[0, 0] < _LARGE_TURN or improver.stopped():
             return

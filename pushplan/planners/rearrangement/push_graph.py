@@ -21,6 +21,9 @@ from pushplan.planners.rearrangement.push_simulator import PushSimulator
 from pushplan.planners.rearrangement.relocation import relocating_pushes
 from pushplan.world.checks import FloatArray
 
+_MOST_APPROACHES = 150
+"""Ends of pushes from which approaches are searched for; up to 50 objects have no more."""
+
 
 @dataclass(frozen=True, eq=False)
 class PushGraph:
@@ -144,7 +147,7 @@ def _between(scene: PushScene, pushes: Sequence[Push]) -> FloatArray:
             *np.round(push.end[:2] / step).tolist(),
             round(float(push.end[2]) / 0.8),
         )
-        if key not in known and scene.budget.is_over:
+        if key not in known and (len(known) == _MOST_APPROACHES or scene.budget.is_over):
             out[n] = far
             continue
         if key not in known:

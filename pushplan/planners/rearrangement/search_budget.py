@@ -6,13 +6,16 @@ import math
 
 from pushplan.world import Stop
 
+_HARDEST = 10
+
 
 class SearchBudget:
     """Counts simulated pushes; ends the search between two of them.
 
     Args:
         stop: the stop rule; None for no end.
-        most: after so many simulated pushes no further ones are looked for.
+        most: after so many simulated pushes no further ones are looked for; after `_HARDEST` times
+            as many the search is over, which only searches for relocations come to.
 
     Attributes:
         used: simulated pushes so far.
@@ -29,6 +32,8 @@ class SearchBudget:
     def is_over(self) -> bool:
         """Whether the search has to return."""
         if self._check is not None and self._check(self.used, self.cost):
+            self._over = self.interrupted = True
+        if self.used >= _HARDEST * self._most:
             self._over = self.interrupted = True
         return self._over
 

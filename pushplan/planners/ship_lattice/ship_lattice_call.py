@@ -110,7 +110,8 @@ class ShipLatticeCall:
         if not gets_away(room, owned(world.robot_pose), self.size, world.robot.turning_radius):
             return PlanStatus.START_BLOCKED
         # the lattice is coarse: where it leads nowhere there may be a path nevertheless
-        return None if reachable(world) else PlanStatus.GOAL_UNREACHABLE
+        leads_on = reachable(world, self.stopped)
+        return None if leads_on or self.stopped() else PlanStatus.GOAL_UNREACHABLE
 
     def _limits(self) -> list[tuple[float, float]]:
         """Fractions of the turn rate and distances from the bounds [m] to try in turn."""
