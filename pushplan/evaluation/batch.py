@@ -17,11 +17,13 @@ from pushplan.evaluation.execute import execute
 from pushplan.evaluation.job_identity import identified
 from pushplan.evaluation.jobs import (
     DEFAULT_ENV,
+    BatchStoppedError,
     Job,
     JobResult,
     JobSettings,
+    batch_stopped,
 )
-from pushplan.evaluation.limits import MEMORY_MB
+from pushplan.evaluation.limits import MEMORY_MB, check_limits
 from pushplan.evaluation.outcome import PRELOAD, outcome_of
 from pushplan.evaluation.pending import note_batch, pending_jobs
 from pushplan.evaluation.pool import WorkerPool
@@ -116,6 +118,7 @@ def run_batch(
         if executor is None and workers == 0:
             batch.run_here()
         elif pending:
+            check_limits(workers, memory_limit_mb)
             batch.run(executor, max(1, min(workers, len(pending))))
         store.tidy()
         store.write_csv()
@@ -273,6 +276,10 @@ def _sent(submit: Submit, job: Job) -> Future[JobResult]:
             f"policy {job.policy.label!r} cannot be sent to a worker process ({error}): define it "
             "at the top level of a file, name it as 'file.py:Class', or use workers=0"
         ) from error
+    except BrokenExecutor:
+        raise
+    except (OSError, MemoryError, RuntimeError) as error:  # no thread can be started
+        raise BatchStoppedError(batch_stopped(error)) from error
 
 
 def _in_turns(jobs: Iterable[Job]) -> deque[Job]:

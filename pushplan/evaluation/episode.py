@@ -11,6 +11,7 @@ import numpy as np
 
 import pushplan
 from pushplan.control.executors import SimulatedExecutor
+from pushplan.evaluation.limits import EpisodeTimeout, is_ctrl_c
 from pushplan.world import (
     ChoosesActions,
     ChoosesObservation,
@@ -122,6 +123,8 @@ class Recording:
         self._rewards: list[float] = []
         self._act_times: list[float] = []
         self._plans: PlanRecorder | None = None
+        self._shown: dict[int, Any] = {}
+        self._told: list[Any] = []
 
     def run(self, env: Any, observer: Observer | None = None, *, limit: int | None = None) -> None:
         """Reset and step until the episode ends, or for ``limit`` steps.
@@ -131,8 +134,9 @@ class Recording:
         observation, _ = env.reset(seed=self.scenario.seed)
         world = env.world
         self._begin(getattr(env, "true_world", world))
+        shown = self._copy(world)
         rng = stream(self.scenario.seed, "policy")
-        self._ask(self.policy.reset, world, rng)
+        asked(self.policy.reset, shown, rng)
         self._simulate_latency(env)
         if observer is not None:
             observer(0, world, self.policy)
@@ -141,7 +145,7 @@ class Recording:
             seeing = observation_time(env, self.policy, len(self._actions))
             beside = self._executor.spent
             begin = self._clock()
-            action = self._ask(self.policy.act, world, observation)
+            action = asked(self.policy.act, shown, observation)
             elapsed = self._clock() - begin
             self._note_plan(world)
             if not self._actions and self._changes_mode(env, action):
@@ -156,6 +160,7 @@ class Recording:
                 observation, reward, terminated, truncated, info = env.step_late(command, lag)
             elapsed += seeing
             world = env.world
+            shown = self._copy(world)
             self._step(env.trace, command, float(reward), elapsed)
             self._completed = info.get("completed", self._completed)
             ended = bool(terminated or truncated) or len(self._actions) == limit
@@ -215,16 +220,28 @@ class Recording:
                 f"{type(env).__name__} has none"
             )
         if isinstance(self.policy, PlansBesideDriving):
-            self._ask(self.policy.plan_with, self._executor)
+            asked(self.policy.plan_with, self._executor)
 
     def _begin(self, world: World) -> None:
         self.started = True
-        self._world = copy.deepcopy(world)  # the one that a policy is shown is the policy's
+        self._world = copy.deepcopy(world)
         shows = isinstance(self.policy, ShowsPlan)
         self._plans = PlanRecorder(self._world.movables.ids) if shows else None
         self._times = [np.array([world.time])]
         self._robot = [np.array(world.robot_pose)[None]]
         self._objects = [np.array(world.movables.poses)[None]]
+
+    def _copy(self, world: World) -> World:
+        """The world for the policy: what it does to its copy changes nothing that is scored.
+
+        Parts that are the same object from step to step are the same copy, too: policies keep
+        what they have made of them.
+        """
+        memo = dict(self._shown)
+        shown = copy.deepcopy(world, memo)
+        self._told = [world.robot, world.static, world.goal]
+        self._shown = {id(part): memo[id(part)] for part in self._told}
+        return shown
 
     def _step(self, trace: Any, command: FloatArray, reward: float, elapsed_s: float) -> None:
         self._times.append(np.array(trace.times))
@@ -236,17 +253,25 @@ class Recording:
 
     def _note_plan(self, world: World) -> None:
         if self._plans is not None:
-            plan = self._ask(lambda: self.policy.current_plan)  # type: ignore[attr-defined]
+            plan = asked(lambda: self.policy.current_plan)  # type: ignore[attr-defined]
             if plan is None or isinstance(plan, Plan):
                 self._plans.note(world.time, world.movables.ids, plan)
 
-    def _ask(self, method: Callable[..., Any], *arguments: Any) -> Any:
-        try:
-            return method(*arguments)
-        except MemoryError:
+
+def asked(method: Callable[..., Any], *arguments: Any) -> Any:
+    """What a policy answers.
+
+    Raises:
+        PolicyError: if it raises.
+    """
+    try:
+        return method(*arguments)
+    except (MemoryError, EpisodeTimeout):
+        raise
+    except BaseException as error:
+        if is_ctrl_c(error):
             raise
-        except (Exception, SystemExit) as error:
-            raise PolicyError(describe(error)) from error
+        raise PolicyError(describe(error)) from error
 
 
 def held_for(policy: Policy) -> int:

@@ -9,6 +9,7 @@ import platform
 import random
 import time
 import traceback
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -17,6 +18,7 @@ from pushplan.evaluation.episode import (
     InvalidActionError,
     PolicyError,
     Recording,
+    asked,
     plan_times,
 )
 from pushplan.evaluation.job_identity import check_unchanged
@@ -29,14 +31,27 @@ from pushplan.evaluation.jobs import (
     failed_result,
     timeout_reason,
 )
-from pushplan.evaluation.limits import EpisodeTimeout, hard_limit, soft_limit
+from pushplan.evaluation.limits import EpisodeTimeout, hard_limit, is_ctrl_c, soft_limit
 from pushplan.evaluation.policies import UnusablePolicyError
 from pushplan.evaluation.rows import Status, blank_row, clean_reason, instant, scored_row
-from pushplan.world import InvalidInputError
+from pushplan.world import InvalidInputError, MissingDependencyError
 from pushplan.world.errors import describe
-from pushplan.world.policy_abilities import WarmsUp
+from pushplan.world.policy_abilities import (
+    ChecksEnvironment,
+    ChoosesActions,
+    ChoosesObservation,
+    HoldsDecisions,
+    LogsPlans,
+    PlansBesideDriving,
+    ShowsPlan,
+    WarmsUp,
+)
 
 DRY_RUN_STEPS = 2
+_ABILITIES = (
+    *(ChecksEnvironment, ChoosesActions, ChoosesObservation, HoldsDecisions, LogsPlans),
+    *(PlansBesideDriving, ShowsPlan),
+)
 _log = logging.getLogger(__name__)
 _dry_runs: set[tuple[str, str, str]] = set()
 
@@ -53,7 +68,7 @@ def execute(job: Job, settings: JobSettings, owner_pid: int | None = None) -> Jo
     by_force = settings.force_after_s if owner_pid not in (None, os.getpid()) else None
     try:
         check_unchanged(job, settings)
-        with hard_limit(by_force), soft_limit(settings.timeout_s):
+        with _folder_kept(), hard_limit(by_force), soft_limit(settings.timeout_s):
             return _execute(job, settings)
     except BatchStoppedError:
         raise
@@ -63,8 +78,20 @@ def execute(job: Job, settings: JobSettings, owner_pid: int | None = None) -> Jo
     except MemoryError as error:
         error.__traceback__ = None  # its frames hold what took the memory
         return failed_result(job, Status.OUT_OF_MEMORY, "an allocation failed", "MemoryError")
-    except (Exception, SystemExit) as error:  # what a policy left behind trips whoever reads it
+    except BaseException as error:  # what a policy left behind trips whoever reads it
+        if is_ctrl_c(error):
+            raise
         return failed_result(job, Status.POLICY_ERROR, describe(error), traceback.format_exc())
+
+
+@contextlib.contextmanager
+def _folder_kept() -> Iterator[None]:
+    """Go back to the working folder, in which the files of the next job are looked for."""
+    folder = os.getcwd()
+    try:
+        yield
+    finally:
+        os.chdir(folder)
 
 
 def _execute(job: Job, settings: JobSettings) -> JobResult:
@@ -83,13 +110,18 @@ def _execute(job: Job, settings: JobSettings) -> JobResult:
     begin, began = time.perf_counter(), instant()
     status, reason, detail = Status.DONE, None, ""
     try:
-        env = settings.environment(job.scenario, policy)
+        # whoever looks at a policy later may look at what raises
+        asked(lambda: [isinstance(policy, one) for one in _ABILITIES])
+        try:
+            env = settings.environment(job.scenario, policy)
+        except MissingDependencyError as error:
+            raise BatchStoppedError(str(error)) from error
         begin = time.perf_counter()
         try:
             recording.run(env)
         finally:
             getattr(env, "close", _nothing)()
-    except MemoryError:
+    except (BatchStoppedError, MemoryError):
         raise
     except Exception as error:
         status, reason = _failure(error)

@@ -13,6 +13,7 @@ from pushplan.evaluation.policies import PolicySpec
 from pushplan.evaluation.rows import ResultRow, Status, blank_row, checked_row, clean_reason
 from pushplan.world import ChecksEnvironment, ChoosesActions, InvalidInputError, Policy
 from pushplan.world.checked_fields import CheckedFields, NonNegativeFloat, PositiveFloat
+from pushplan.world.errors import describe
 from pushplan.world.named_objects import load_object
 
 DEFAULT_ENV = "pushplan.envs:make"
@@ -21,6 +22,14 @@ DETAIL_HALF = 10_000  # characters of a traceback that are kept at its beginning
 
 class BatchStoppedError(InvalidInputError):
     """Something is wrong that is no policy's fault: nothing is recorded, and the batch ends."""
+
+
+def batch_stopped(error: BaseException) -> str:
+    """What to say where files, processes or memory of a batch itself fail."""
+    return (
+        f"no job can be run now ({describe(error)}); what was stored is kept, and the same command "
+        "goes on"
+    )
 
 
 @dataclass(frozen=True)

@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import contextlib
 import faulthandler
+import os
 import resource
 import signal
 import threading
 from collections.abc import Iterator
 from types import FrameType
+
+from pushplan.evaluation.worker import WORKER_VARIABLE
+from pushplan.world import InvalidInputError
 
 MEMORY_MB = 4000.0
 """Memory of a worker beyond which a job fails, unless something else is asked for [MB]."""
@@ -62,6 +66,33 @@ def hard_limit(seconds: float | None) -> Iterator[None]:
         yield
     finally:
         faulthandler.cancel_dump_traceback_later()
+
+
+def check_limits(workers: int, memory_mb: float | None) -> None:
+    """Refuse to start workers under limits of the shell that would make policies fail.
+
+    Raises:
+        InvalidInputError: if there are too few file descriptors, or less memory than a worker may
+            use.
+    """
+    files, needed = resource.getrlimit(resource.RLIMIT_NOFILE)[0], 64 + 4 * workers
+    if files != resource.RLIM_INFINITY and files < needed:
+        raise InvalidInputError(
+            f"{workers} workers need {needed} file descriptors and the limit is {files}: raise it "
+            f"with 'ulimit -n {needed}', or give fewer workers"
+        )
+    for option, limit in (("v", resource.RLIMIT_AS), ("d", resource.RLIMIT_DATA)):
+        most = resource.getrlimit(limit)[0]
+        if memory_mb is not None and most != resource.RLIM_INFINITY and most < memory_mb * 1e6:
+            raise InvalidInputError(
+                f"a worker may use {memory_mb:g} MB and 'ulimit -{option}' allows "
+                f"{most / 1e6:.0f} MB: raise that limit, or give --memory {most / 1e6:.0f} or less"
+            )
+
+
+def is_ctrl_c(error: BaseException) -> bool:
+    """True for a KeyboardInterrupt that is no policy's: workers ignore that signal."""
+    return isinstance(error, KeyboardInterrupt) and not os.environ.get(WORKER_VARIABLE)
 
 
 def limit_memory(megabytes: float | None) -> None:

@@ -5,9 +5,11 @@ from __future__ import annotations
 from concurrent.futures import BrokenExecutor, Future
 
 from pushplan.evaluation.jobs import (
+    BatchStoppedError,
     Job,
     JobResult,
     JobSettings,
+    batch_stopped,
     failed_result,
     timeout_reason,
 )
@@ -50,5 +52,7 @@ def outcome_of(job: Job, future: Future[JobResult], settings: JobSettings) -> Jo
         return failed_result(job, status, str(error), f"{error}\n{error.log}")
     except (BrokenExecutor, InvalidInputError):
         raise
+    except (OSError, MemoryError, RuntimeError) as error:
+        raise BatchStoppedError(batch_stopped(error)) from error
     except Exception as error:
         return failed_result(job, Status.CRASHED, describe(error))

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from pushplan.evaluation.jobs import JobResult
+from pushplan.evaluation.jobs import BatchStoppedError, JobResult, batch_stopped
 from pushplan.evaluation.worker import WorkerSetup
 from pushplan.evaluation.worker_process import WorkerDiedError, WorkerProcess
 from pushplan.world import InvalidInputError
@@ -91,8 +91,9 @@ class WorkerPool:
                 raise RuntimeError("cannot submit to a pool that has been shut down")
             self._calls.append(call)
             if len(self._threads) < self._most:
-                self._threads.append(threading.Thread(target=self._serve, daemon=True))
-                self._threads[-1].start()
+                thread = threading.Thread(target=self._serve, daemon=True)
+                thread.start()
+                self._threads.append(thread)
             self._changed.notify()
         return call.future
 
@@ -129,17 +130,21 @@ class WorkerPool:
                     worker = self._start(log)
                     worker.group = call.group
                 result = worker.ask(call.payload, self._limit_s)
-            except InvalidInputError as error:
+            except (BrokenExecutor, InvalidInputError) as error:
                 call.future.set_exception(error)
-            except BaseException as error:
+            except WorkerDiedError as error:
                 worker = None
                 call.tries -= 1
-                again = isinstance(error, WorkerDiedError) and error.from_outside and call.tries
                 with self._changed:
-                    if again and not self._killed:
+                    if error.from_outside and call.tries and not self._killed:
                         self._calls.appendleft(call)
                         continue
                 call.future.set_exception(error)
+            except BaseException as error:  # of files, processes or memory of ours
+                if worker is not None:
+                    worker.kill()
+                    worker = None
+                call.future.set_exception(BatchStoppedError(batch_stopped(error)))
             else:
                 if result.tainted:
                     worker.end()

@@ -258,7 +258,7 @@ def checked_row(row: ResultRow) -> ResultRow:
             raise ValueError(f"{name} is {value!r:.60}")
     for name, value in row.metrics.items():
         low, high = METRICS[name].low, METRICS[name].high
-        if not low - _ROUNDING <= _number(name, value) <= high + _ROUNDING:
+        if not low - _ROUNDING <= _number(name, value) <= high + _ROUNDING or math.isinf(value):
             raise ValueError(f"{name} is {value:.6g}, not between {low:g} and {high:g}")
     return replace(row, reason=clean_reason(row.reason), host=clean_reason(row.host)[:64])
 

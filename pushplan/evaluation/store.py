@@ -98,6 +98,7 @@ class RunDirectory:
         except BaseException:
             os.close(self._lock)
             raise
+        self._inode = _inode(self.path / DATABASE)
         with self._use() as db:
             db.execute("DELETE FROM running")
 
@@ -125,6 +126,11 @@ class RunDirectory:
     @contextlib.contextmanager
     def _use(self) -> Iterator[sqlite3.Connection]:
         """The database, in a transaction; what goes wrong there, or on the disk, is one line."""
+        if _inode(self.path / DATABASE) != self._inode:
+            raise InvalidInputError(
+                f"{self.path / DATABASE} was removed or replaced while it was written to: put it "
+                "back and run the same command again, or begin anew in another folder"
+            )
         with clear_errors(self.path / DATABASE), self._db:
             yield self._db
 
@@ -292,6 +298,15 @@ def _own_file(folder: Path, name: str, limit: int) -> bytes:
     with contextlib.suppress(SchemaError):
         return read_bytes(path, limit=limit)
     return b""
+
+
+def _inode(path: Path) -> tuple[int, int] | None:
+    """What tells a file from another one of its name; None if there is none."""
+    try:
+        found = path.stat()
+    except OSError:
+        return None
+    return found.st_dev, found.st_ino
 
 
 def trace_digest(trace: bytes) -> str:

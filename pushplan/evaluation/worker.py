@@ -93,9 +93,11 @@ def _answer(channel: Channel, payload: bytes, setup: WorkerSetup) -> bool:
         header, body = result.to_message()
         channel.send({"kind": "result", **header}, body)
         return result.tainted
+    except InvalidInputError as error:  # `execute` lets through what is no policy's fault
+        channel.send({"kind": "refused", "text": str(error)})
     except MemoryError:
         channel.send({"kind": "out of memory"})
-    except (Exception, SystemExit) as error:
+    except BaseException as error:
         channel.send({"kind": "error", "text": describe(error)})
     finally:
         faulthandler.cancel_dump_traceback_later()

@@ -6,19 +6,20 @@ import contextlib
 import math
 import os
 import pickle
+import secrets
 import signal
 import socket
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
 from pushplan.evaluation.channel import Channel, ChannelError
-from pushplan.evaluation.jobs import JobResult
+from pushplan.evaluation.jobs import BatchStoppedError, JobResult
 from pushplan.evaluation.worker import THREAD_VARIABLES, WORKER_VARIABLE, WorkerSetup
-from pushplan.world import InvalidInputError, PushplanError
+from pushplan.world import PushplanError
 from pushplan.world.file_locks import NO_FOLLOW
 from pushplan.world.named_objects import import_path
 
@@ -26,6 +27,7 @@ _LOG_TAIL = 6000
 _LOG_MOST = 1_000_000
 _TRACE_S = 0.2  # time that a worker has to write where it hangs before it is ended
 _FAREWELL_S = 1.0
+_ROUNDS = 100  # so often what a worker has started is looked for, while it starts others
 
 
 def _no_link(path: str, flags: int) -> int:
@@ -70,7 +72,8 @@ class WorkerProcess:
         self._log, self._log_start = log, 0
         ours, theirs = socket.socketpair()
         self._channel = Channel(ours)
-        environment = {**os.environ, WORKER_VARIABLE: "1", "PYTHONUNBUFFERED": "1"}
+        self._mark = secrets.token_hex(16)
+        environment = {**os.environ, WORKER_VARIABLE: self._mark, "PYTHONUNBUFFERED": "1"}
         environment.update(dict.fromkeys(THREAD_VARIABLES, "1"))
         code = (
             f"import sys; sys.path[:] = {import_path()!r}\n"
@@ -109,14 +112,14 @@ class WorkerProcess:
         with contextlib.suppress(OSError):
             self._channel.send({}, payload)
         header, body = self._receive(limit_s)
-        if header.get("kind") == "refused":
-            raise InvalidInputError(str(header.get("text")))
         if header.get("kind") == "running":
             header, body = self._receive(limit_s + begin - time.monotonic(), limit_s)
-            if header.get("kind") == "error":
-                raise self._died(WorkerDiedError, str(header.get("text")))
-            if header.get("kind") == "out of memory":
-                raise self._died(WorkerOutOfMemoryError, "an allocation failed")
+        if header.get("kind") == "refused":
+            raise BatchStoppedError(str(header.get("text")))
+        if header.get("kind") == "error":
+            raise self._died(WorkerDiedError, str(header.get("text")))
+        if header.get("kind") == "out of memory":
+            raise self._died(WorkerOutOfMemoryError, "an allocation failed")
         try:
             return JobResult.from_message(header, body)
         except (KeyError, TypeError) as error:
@@ -163,18 +166,35 @@ class WorkerProcess:
         """
         self._channel.close()
         deadline = time.monotonic() + (0.0 if force else _FAREWELL_S)
-        children = _descendants(self._process.pid)
         while not self._has_ended() and time.monotonic() < deadline:
             time.sleep(0.005)
+        self._end_others()
         self.kill()
-        for child in children:
-            with contextlib.suppress(OSError):
-                os.kill(child, signal.SIGKILL)
+        self._end_others()
         code = self._process.wait()
         self._trimmed_log()
         if self._log is not None and self._log.exists() and self._log.stat().st_size == 0:
             self._log.unlink()
         return code
+
+    def _end_others(self) -> None:
+        """End what it started: until nothing is left, for such a process may start another one.
+
+        While it lives it adopts what its children leave behind. What was left behind when it
+        ended by itself bears its mark in the environment.
+        """
+        if not self._has_ended():
+            with contextlib.suppress(OSError):
+                os.kill(self._process.pid, signal.SIGSTOP)
+        for _ in range(_ROUNDS):
+            found = {*_descendants(self._process.pid), *_marked(self._mark)}
+            groups = {group for pid in found if (group := _group(pid)) is not None}
+            others = groups - {self._process.pid, os.getpgrp()}  # its own group ends with it
+            if not others:
+                return
+            for group in others:
+                with contextlib.suppress(OSError):
+                    os.killpg(group, signal.SIGKILL)  # before it can grow
 
     def kill(self) -> None:
         """End its process group at once, from any thread."""
@@ -192,7 +212,7 @@ class WorkerProcess:
 
     def _memory_mb(self) -> float:
         pids = (self._process.pid, *_descendants(self._process.pid))
-        return sum(map(_resident_kb, pids)) * 1024 / 1e6
+        return _memory_kb(pids) * 1024 / 1e6
 
     def _trimmed_log(self) -> int:
         """Bytes in the log, of which the beginning is dropped when they are too many."""
@@ -229,12 +249,40 @@ def _below(pid: int) -> Iterator[int]:
                 yield from _below(child)
 
 
-def _resident_kb(pid: int) -> int:
-    """Memory of a process that is no file, shared or not [KiB]."""
+def _marked(mark: str) -> Iterator[int]:
+    """Processes in whose environment a worker has begun (Linux)."""
+    entry = f"{WORKER_VARIABLE}={mark}".encode()
+    for file in Path("/proc").glob("[0-9]*/environ"):
+        with contextlib.suppress(OSError):
+            if entry in file.read_bytes():
+                yield int(file.parent.name)
+
+
+def _group(pid: int) -> int | None:
+    """The process group of a process that runs; None if it has ended."""
     with contextlib.suppress(OSError):
-        lines = Path(f"/proc/{pid}/status").read_text().splitlines()
-        return sum(int(line.split()[1]) for line in lines if line.startswith(("RssA", "RssS")))
-    return 0
+        state, _, group = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[:3]
+        return None if state in "ZX" else int(group)
+    return None
+
+
+def _memory_kb(pids: Iterable[int]) -> float:
+    """Memory of processes that is no file on a disk, shared or not [KiB].
+
+    Files in memory that they hold open count where they are more than what is mapped of such.
+    """
+    private = shared = 0
+    files: dict[tuple[int, int], float] = {}
+    for pid in pids:
+        with contextlib.suppress(OSError):
+            for line in Path(f"/proc/{pid}/status").read_text().splitlines():
+                private += int(line.split()[1]) if line.startswith("RssAnon") else 0
+                shared += int(line.split()[1]) if line.startswith("RssShmem") else 0
+            for handle in Path(f"/proc/{pid}/fd").iterdir():
+                if os.readlink(handle).startswith(("/memfd:", "/dev/shm/")):
+                    found = handle.stat()
+                    files[found.st_dev, found.st_ino] = found.st_blocks / 2
+    return private + max(shared, sum(files.values()))
 
 
 def _describe_exit(code: int) -> str:

@@ -133,9 +133,9 @@ def compute(episode: Episode, names: Iterable[str] | None = None) -> Mapping[str
             continue
         try:
             values[name] = float(value)
-        except (TypeError, ValueError) as error:
+        except (TypeError, ValueError, OverflowError) as error:
             raise InvalidInputError(
-                f"metric {name!r} must return a number or None, got {value!r:.60}"
+                f"metric {name!r} must return a number or None, got {short(value)}"
             ) from error
         if math.isnan(values[name]):
             del values[name]

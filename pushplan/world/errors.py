@@ -77,7 +77,7 @@ def describe(error: BaseException) -> str:
     """One line for an exception: its type, its message, and its `place` in a user's code."""
     try:
         text = one_line(str(error))
-    except Exception:  # its text may be code of a stranger
+    except BaseException:  # its text may be code of a stranger
         text = ""
     name, where = type(error).__name__, place(error)
     return one_line(f"{name}{': ' if text else ''}{text}{f' ({where})' if where else ''}")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import mmap
 import os
 import pickle
@@ -12,7 +13,10 @@ import struct
 import subprocess
 import sys
 import tempfile
+import threading
+import time
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -126,6 +130,173 @@ class Reweighs(Ahead):
     def reset(self, world: World, rng: np.random.Generator) -> None:
         super().reset(world, rng)
         object.__setattr__(world.movables, "masses", world.movables.masses * 1e-9)
+
+
+class MovesTheGoal(Ahead):
+    """Puts the goal where the robot is, in whatever it is given, in every step."""
+
+    def move(self, world: World) -> None:
+        goal = world.navigation_goal
+        for array in (goal.center, world.movables.poses, world.robot_pose):  # type: ignore[union-attr]
+            array.flags.writeable = True
+        goal.center[:] = world.robot_pose[:2]  # type: ignore[union-attr]
+        object.__setattr__(goal, "radius", 100.0)
+        object.__setattr__(world, "goal", goal)
+        world.movables.poses[:] = 0.0
+        world.robot_pose[:] = 1e3
+
+    def reset(self, world: World, rng: np.random.Generator) -> None:
+        super().reset(world, rng)
+        self.move(world)
+
+    def act(self, world: World, observation: Any) -> Any:
+        self.move(world)
+        return super().act(world, observation)
+
+
+class Interrupts(Ahead):
+    def misbehave(self) -> None:
+        raise KeyboardInterrupt
+
+
+class Base(BaseException):
+    def __str__(self) -> str:
+        raise SystemExit(5)
+
+
+class RaisesBase(Ahead):
+    def misbehave(self) -> None:
+        raise Base
+
+
+class Recurses(Ahead):
+    def misbehave(self) -> None:
+        self.misbehave()
+
+
+class BadProperties(Ahead):
+    """Raises wherever one asks what it can do."""
+
+    def __getattr__(self, name: str) -> Any:
+        raise ValueError(f"no {name}")
+
+
+class HugeNumbers(Ahead):
+    """Says numbers that no database keeps."""
+
+    steps_per_decision = 2**70
+
+    def misbehave(self) -> None:
+        class Endless(list):  # type: ignore[type-arg]
+            def __len__(self) -> int:
+                return 2**62
+
+        self.plan_log = Endless()
+
+
+class HugeTimes(Ahead):
+    def misbehave(self) -> None:
+        self.plan_log = [SimpleNamespace(stats=SimpleNamespace(wall_time_s=2**2000))]
+
+
+class NanTimes(Ahead):
+    def misbehave(self) -> None:
+        self.plan_log = [SimpleNamespace(stats=SimpleNamespace(wall_time_s=float("nan")))]
+
+
+class Counts(Ahead):
+    """Patches a number of its row."""
+
+    value: Any = 2**70
+
+    def misbehave(self) -> None:
+        from pushplan.metrics import lengths
+
+        lengths.steps = lambda episode: self.value  # type: ignore[assignment]
+
+
+class CountsForEver(Counts):
+    value = float("inf")
+
+
+class LeavesFolder(Ahead):
+    def misbehave(self) -> None:
+        os.chdir("/")
+
+
+class ClosesAll(Ahead):
+    def misbehave(self) -> None:
+        os.closerange(0, 64)
+
+
+class ExitsQuietly(Ahead):
+    def misbehave(self) -> None:
+        os._exit(0)
+
+
+class Deaf(Ahead):
+    """Ignores every signal that can be ignored, and waits."""
+
+    def misbehave(self) -> None:
+        for number in range(1, signal.NSIG):
+            with contextlib.suppress(OSError, ValueError):
+                signal.signal(number, signal.SIG_IGN)
+        signal.pthread_sigmask(signal.SIG_BLOCK, range(1, signal.NSIG))
+        while True:
+            time.sleep(0.01)
+
+
+class LeavesThread(Ahead):
+    def misbehave(self) -> None:
+        threading.Thread(target=time.sleep, args=(600,)).start()
+
+
+class RaisesAtTheEnd(Ahead):
+    def close(self) -> None:
+        raise ValueError("at close")
+
+    def __del__(self) -> None:
+        raise ValueError("at the end")
+
+
+class RaisesAtReset(Ahead):
+    def reset(self, world: World, rng: np.random.Generator) -> None:
+        raise GeneratorExit
+
+
+class HoldsFiles(Ahead):
+    """Holds 900 MB in files of memory that it does not map."""
+
+    def misbehave(self) -> None:
+        self.file = os.memfd_create("hoard")
+        for _ in range(900):
+            os.write(self.file, bytes(1_000_000))
+        while True:
+            pass
+
+
+class ForksOn(Ahead):
+    """Starts a process that goes on as another one again and again, in groups of their own."""
+
+    dies = False
+
+    def misbehave(self) -> None:
+        if os.fork() == 0:
+            for _ in range(2000):  # it ends by itself after a while
+                if os.fork() > 0:
+                    os._exit(0)
+                os.setsid()
+                with open(os.environ[NOTE], "a") as file:
+                    file.write(f"{os.getpid()}\n")
+                time.sleep(0.02)
+            os._exit(0)
+        time.sleep(0.2)
+        if self.dies:
+            os._exit(0)
+
+
+class ForksOnAndDies(ForksOn):
+    dies = True
 
 
 class Boasts(Ahead):

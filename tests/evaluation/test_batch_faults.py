@@ -11,10 +11,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 from evaluation_doubles import HERE as DOUBLES
-from evaluation_doubles import LineScenario
+from evaluation_doubles import Ahead, LineScenario
 from fault_doubles import HERE, NOTE
 
 from pushplan.evaluation import Job, JobSettings, ResultRow, parse_policies, run_batch
+from pushplan.metrics import lengths
+from pushplan.world import GoalDisc, World
 
 SETTINGS = JobSettings(make_env=f"{DOUBLES}:make_env", timeout_s=5.0, grace_s=0.5, dry_run=False)
 
@@ -83,8 +85,85 @@ def test_one_policy_does_not_change_the_next_ones_results(tmp_path: Path) -> Non
 
 @pytest.mark.parametrize("workers", [0, 1])
 def test_scores_are_of_the_owners_world(tmp_path: Path, workers: int) -> None:
-    rows = run(tmp_path, "Ahead Reweighs", workers=workers)
-    assert rows["Reweighs"].metrics == rows["Ahead"].metrics
+    rows = run(tmp_path, "Ahead Reweighs MovesTheGoal", workers=workers)
+    for name in ("Reweighs", "MovesTheGoal"):
+        assert rows[name].metrics == rows["Ahead"].metrics
+        assert (rows[name].success, rows[name].reason) == (rows["Ahead"].success, "goal")
+
+
+def test_arrays_of_a_world_that_a_policy_is_shown_are_read_only(tmp_path: Path) -> None:
+    seen: list[bool] = []
+
+    class Looks(Ahead):
+        def act(self, world: World, observation: object) -> object:
+            goal = world.navigation_goal
+            assert isinstance(goal, GoalDisc)
+            arrays = (world.robot_pose, world.movables.poses, world.movables.masses, goal.center)
+            seen.extend(array.flags.writeable for array in arrays)
+            assert world.static is self.world.static  # what was made of it may be kept
+            return super().act(world, observation)
+
+    job = Job(parse_policies([Looks])[0], LineScenario(0))
+    (row,) = run_batch([job], out=tmp_path, workers=0, settings=SETTINGS)
+    assert row.status == "done" and seen and not any(seen)
+
+
+HERE_TOO = "RaisesBase Recurses BadProperties HugeTimes NanTimes RaisesAtReset Counts CountsForEver"
+STATUSES = {
+    **dict.fromkeys(HERE_TOO.split(), "policy_error"),
+    "Interrupts": "policy_error",
+    **dict.fromkeys("HugeNumbers LeavesFolder LeavesThread RaisesAtTheEnd".split(), "done"),
+    **dict.fromkeys("ClosesAll ExitsQuietly".split(), "crashed"),
+    "Deaf": "timeout",
+    "Ahead": "done",
+}
+
+
+@pytest.mark.slow
+def test_every_kind_of_fault_becomes_a_row_with_a_reason(tmp_path: Path) -> None:
+    rows = run(tmp_path / "pool", " ".join(STATUSES), workers=2, timeout_s=8.0)
+    assert {name: row.status for name, row in rows.items()} == STATUSES
+    assert all(row.reason for row in rows.values())
+    assert not any(row.success for row in rows.values() if row.failed)
+
+
+@pytest.mark.parametrize("name", HERE_TOO.split())
+def test_a_fault_in_the_process_of_the_batch_is_a_row_too(
+    tmp_path: Path, name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(lengths, "steps", lengths.steps)  # which two of them patch
+    row = run(tmp_path, name, workers=0, timeout_s=60.0)[name]
+    assert row.status == STATUSES[name] and row.reason
+
+
+def test_a_policy_that_changes_the_working_folder_changes_it_for_nobody_else(
+    tmp_path: Path,
+) -> None:
+    before = os.getcwd()
+    for workers in (0, 1):
+        spec = parse_policies(f"{HERE}:LeavesFolder")[0]
+        jobs = [Job(spec, LineScenario(seed)) for seed in range(2)]
+        out = tmp_path / str(workers)
+        rows = run_batch(jobs, out=out, workers=workers, settings=SETTINGS)
+        assert [row.status for row in rows] == ["done", "done"] and os.getcwd() == before
+
+
+@pytest.mark.slow
+def test_files_of_memory_count(tmp_path: Path) -> None:
+    rows = run(tmp_path, "HoldsFiles Ahead", memory_limit_mb=600.0, timeout_s=60.0)
+    assert rows["HoldsFiles"].status == "out_of_memory"
+    assert rows["Ahead"].status == "done"
+
+
+@pytest.mark.parametrize("name", ["ForksOn", "ForksOnAndDies"])
+@pytest.mark.slow
+def test_processes_that_start_each_other_end_with_the_batch(
+    tmp_path: Path, name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv(NOTE, str(tmp_path / "children"))
+    run(tmp_path / "run", name)
+    pids = [int(pid) for pid in (tmp_path / "children").read_text().split()]
+    assert pids and all(map(_gone, pids))
 
 
 def test_a_score_outside_its_range_is_refused(tmp_path: Path) -> None:
@@ -111,10 +190,7 @@ def test_children_of_a_policy_end_with_its_worker(
     while not _gone(same_group) and time.monotonic() < deadline:
         time.sleep(0.01)
     assert _gone(same_group)
-    if name == "HasChildren":
-        assert _gone(apart)
-    elif not _gone(apart):  # nobody is left who knew of it
-        os.kill(apart, 9)
+    assert _gone(apart)
 
 
 def test_logs_and_notes_are_bounded(tmp_path: Path) -> None:
