@@ -26,8 +26,8 @@ from pushplan.world import InvalidInputError
 
 _ENGINES = ("mujoco", "pymunk")
 _REPORTS = (
-    *("bounding", "comparing", "data", "endings", "exporting", "gaps", "interval_plot", "merging"),
-    *("page", "page_files", "paper", "paper_tables", "plot_style", "plots", "published", "replays"),
+    *("bounding", "comparing", "endings", "exporting", "gaps", "interval_plot", "merging"),
+    *("page", "page_files", "plot_style", "plots", "replays"),
     *("reproduction", "rescoring", "results", "run_record", "salvaging", "statistics"),
     *("statistics_aggregate", "statistics_paired", "status", "summary", "table_formats", "tables"),
 )

@@ -94,7 +94,6 @@ def test_reports_commands_and_caches_do_not_count(package: Path) -> None:
         "evaluation/tables.py",
         "evaluation/plots.py",
         "evaluation/page_files/page.css",
-        "evaluation/data/bench_push.yaml",
         "cli/bench.py",
         "learned/weights/maze-ppo.md",
         "world/__pycache__/plan.nbc",
