@@ -27,7 +27,9 @@ _LOG_TAIL = 6000
 _LOG_MOST = 1_000_000
 _TRACE_S = 0.2  # time that a worker has to write where it hangs before it is ended
 _FAREWELL_S = 1.0
-_ROUNDS = 100  # so often what a worker has started is looked for, while it starts others
+_LOOKS = 3
+_BETWEEN_LOOKS_S = 0.002
+_ROUNDS = 200  # so often what a worker has started is looked for, while it starts others
 
 
 def _no_link(path: str, flags: int) -> int:
@@ -186,15 +188,18 @@ class WorkerProcess:
         if not self._has_ended():
             with contextlib.suppress(OSError):
                 os.kill(self._process.pid, signal.SIGSTOP)
+        empty = 0  # looks in a row that found none: one may miss what is just being started
         for _ in range(_ROUNDS):
             found = {*_descendants(self._process.pid), *_marked(self._mark)}
             groups = {group for pid in found if (group := _group(pid)) is not None}
             others = groups - {self._process.pid, os.getpgrp()}  # its own group ends with it
-            if not others:
+            empty = 0 if others else empty + 1
+            if empty == _LOOKS:
                 return
             for group in others:
                 with contextlib.suppress(OSError):
                     os.killpg(group, signal.SIGKILL)  # before it can grow
+            time.sleep(_BETWEEN_LOOKS_S)
 
     def kill(self) -> None:
         """End its process group at once, from any thread."""
