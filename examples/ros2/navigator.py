@@ -16,16 +16,17 @@ from scene import NavigationError, Scene
 from pushplan.control import ImmediateExecutor, PoseProgressChecker, Progress, PurePursuit
 from pushplan.planners import PlanFollower, make_planner, planner_names, warm_up
 from pushplan.planners.following.replanning import Replanning
-from pushplan.planners.kernel_warmup import warm_up_policy
 from pushplan.ros import Messages, plan_from, pose_from, time_from
 from pushplan.runtime import Command, CommandStatus, RunLog, Runner
 from pushplan.world import (
     Deadline,
     GoalDisc,
     InvalidInputError,
+    Movables,
     OwnBudget,
     Plan,
     PlanStatus,
+    StaticMap,
     Stop,
     Twist,
     UnknownNameError,
@@ -105,7 +106,8 @@ class Navigator:
         self.scene, self.messages = scene, messages
         self.planner, self.controller = planner, controller
         self.budget, self.tolerance, self.patience = budget, tolerance, patience
-        self._runner_options: dict[str, Any] = {"period": period, "max_age": max_age, "log": log}
+        self._log = log
+        self._runner_options: dict[str, Any] = {"period": period, "max_age": max_age}
         self._max_age = max_age
         self._runners: dict[str, Runner] = {}
         self._path = GivenPath()
@@ -146,7 +148,27 @@ class Navigator:
         warm_up(name)
 
     def _load_controller(self, name: str) -> None:
-        warm_up_policy(self._runner(name).policy)
+        """Drive a moment in a small room, by a runner that nobody sees."""
+        robot = self.scene.robot
+        size = robot.circumscribed_radius
+        square = size * np.array([[1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0], [1.0, -1.0]])
+        pillar, far = square + np.array([6.0, 6.0]) * size, np.array([5.0, 0.0]) * size
+        bounds = size * np.array([-9.0, -9.0, 9.0, 9.0])
+        world = World(
+            robot=robot,
+            robot_pose=np.zeros(3),
+            static=StaticMap.build(polygons=[pillar], bounds=bounds),
+            movables=Movables.from_outlines([square], [[3.5 * size, 0.5 * size, 0.0]]),
+            goal=GoalDisc(far, size),
+        )
+        way = np.array([[0.0, 0.0, 0.0], [far[0], 0.0, 0.0]])
+        path = GivenPath()
+        path.given = Plan(np.array([0.0, 1.0]), way, np.ones(2), np.zeros(2), travel_cost=1.0)
+        try:
+            with self._new_runner(name, path, log=None) as runner:
+                runner.start(world)
+        except InvalidInputError:
+            return  # it does not suit the robot, which a goal is told
 
     def warm_up(self) -> None:
         """Load the kernels of planner and controller: seconds, minutes after an installation."""
@@ -327,15 +349,15 @@ class Navigator:
 
     def _runner(self, name: str) -> Runner:
         if name not in self._runners:
-            if name == PATH:
-                follower = PlanFollower(
-                    self._path, PurePursuit(), replanning=Replanning(never=True)
-                )
-                runner = Runner(follower, executor=ImmediateExecutor(), **self._runner_options)
-            else:
-                runner = Runner(name, **self._runner_options)
-            self._runners[name] = runner
+            self._runners[name] = self._new_runner(name, self._path, self._log)
         return self._runners[name]
+
+    def _new_runner(self, name: str, path: GivenPath, log: RunLog | None) -> Runner:
+        options = {**self._runner_options, "log": log}
+        if name != PATH:
+            return Runner(name, **options)
+        follower = PlanFollower(path, PurePursuit(), replanning=Replanning(never=True))
+        return Runner(follower, executor=ImmediateExecutor(), **options)
 
     def _pose(self, message: Any) -> FloatArray:
         try:
