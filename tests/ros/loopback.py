@@ -91,7 +91,6 @@ def main():
     spinning = threading.Thread(target=executor.spin, daemon=True)
     spinning.start()
     assert plan.wait_for_server(600.0) and drive.wait_for_server(10.0)
-    time.sleep(1.0)  # map and odometry
     report = {}
 
     def told(result, **more):
@@ -122,6 +121,13 @@ def main():
             time.sleep(0.005)
         return future.result()
 
+    def last_twist():
+        """The last command, which may come in after the result of its goal."""
+        end = time.monotonic() + 5.0
+        while robot.twist != (0.0, 0.0) and time.monotonic() < end:
+            time.sleep(0.005)
+        return robot.twist
+
     def under_way(left, seconds=60.0):
         """Wait until the robot drives, and is some way from where it stood."""
         end, begun = time.monotonic() + seconds, robot.pose[:2].copy()
@@ -131,7 +137,11 @@ def main():
         return robot.twist[0]
 
     # through the door, on the path as it was planned, until another path displaces it
-    _, first = sent(computed("first", 3.0, 2.2))
+    end = time.monotonic() + 60.0
+    while not (path := computed("first", 3.0, 2.2)).poses:  # map and odometry are to come in
+        assert time.monotonic() < end, report["first"]
+        time.sleep(0.2)
+    _, first = sent(path)
     before = under_way(0.5)
     path = computed("second", 3.0, 0.75)
     robot.slowest, heard = math.inf, []
@@ -145,13 +155,13 @@ def main():
         feedback=len(heard),
         distances=[heard[0].distance_to_goal, heard[-1].distance_to_goal],
         fastest=max(one.speed for one in heard),
-        last=robot.twist,
+        last=last_twist(),
     )
     # back, on plans of the controller's own; canceled on the way
     handle, future = sent(computed("back", 1.0, 0.75), "straight")
     before = under_way(0.2)
     assert wait(handle.cancel_goal_async()).goals_canceling
-    report["canceled"] = told(wait(future), before=before, last=robot.twist)
+    report["canceled"] = told(wait(future), before=before, last=last_twist())
     # errors
     computed("outside", 9.0, 0.0)
     computed("occupied", 2.0, 0.75)
@@ -161,7 +171,7 @@ def main():
     report["empty path"] = told(wait(future))
     robot.drives = False
     _, future = sent(computed("stuck plan", 1.0, 0.75))
-    report["stuck"] = told(wait(future), last=robot.twist)
+    report["stuck"] = told(wait(future), last=last_twist())
     report["robot"] = {"commands": robot.told, "plans": robot.paths}
     # the node is terminated while the robot drives
     robot.drives = True
