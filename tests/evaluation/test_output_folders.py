@@ -216,3 +216,12 @@ def test_a_file_to_write_is_no_link(
     assert main([*words, "out.csv"]) == 2
     assert "is a link" in capsys.readouterr().err
     assert (tmp_path / "mine").read_text() == "mine"
+
+
+def test_an_error_names_the_file_that_was_to_be_written(tmp_path: Path) -> None:
+    for place in (tmp_path / "folder", tmp_path / "none" / "file"):
+        (tmp_path / "folder").mkdir(exist_ok=True)
+        with pytest.raises(OSError) as caught:
+            write_atomic(place, b"ours")
+        assert caught.value.filename == str(place)
+    assert os.listdir(tmp_path) == ["folder"]
