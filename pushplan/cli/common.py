@@ -34,13 +34,6 @@ def see_help(message: str, program: str) -> str:
     return f"{message}; see '{program} --help'"
 
 
-def usage_error(command: str, message: str) -> Exception:
-    """An error for words of a command that the parser alone cannot refuse."""
-    from pushplan.world import InvalidInputError
-
-    return InvalidInputError(see_help(message, f"pushplan {command}"))
-
-
 def complete(action: argparse.Action, kind: str) -> None:
     """Let the shell complete an argument with the names of a kind of `pushplan list`."""
 
