@@ -2,6 +2,7 @@
 
     python benchmarks/deadlines.py [CALLS] [--planners NAME ...]
     python benchmarks/deadlines.py --worlds [CALLS] [--planners NAME ...]
+    python benchmarks/deadlines.py --posts POSTS [CALLS] [--planners NAME ...]
     python benchmarks/deadlines.py --growth [CALLS] [--planners NAME ...] [--controllers]
 
 The first calls every planner CALLS times with a deadline of 50 ms on ten starts of its task and
@@ -14,7 +15,9 @@ The second calls every planner once in each of CALLS random worlds, each with an
 another map of which nothing is prepared, and writes the CPU time of the calls. The deadline is one
 of CPU time too, so that what else the machine does changes nothing.
 
-The third calls every planner CALLS times on a small start with a budget of a few iterations, and
+The third does the same in halls of so many posts.
+
+The fourth calls every planner CALLS times on a small start with a budget of a few iterations, and
 the controllers as often along a path, and writes how memory grows after the first tenth of the
 calls: the pages of the process, and what is in use of the heap of the C library, which compiled
 code and libraries allocate from (where that can be asked, as in glibc); then a hundredth of the
@@ -54,11 +57,11 @@ from pushplan.world import (
 from pushplan.world.checks import FloatArray
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "planners"))
-from random_worlds import random_world
+from random_worlds import posts, random_world
 
 BUDGET_S = 0.05
 _FIRST = 30  # worlds before those that are measured, for what a process does once
-MAZE = ("straight", "geometric-rrt", "kinodynamic-rrt", "push-aware")
+MAZE = ("straight", "geometric-rrt", "kinodynamic-rrt", "push-aware", "namo")
 SHIP = (
     "skeleton",
     "ship-lattice",
@@ -188,15 +191,23 @@ def deadlines(names: list[str], calls: int) -> None:
         write(f"| `{name}` | " + " | ".join(f"{value:.1f}" for value in numbers) + " |")
 
 
-def any_world(names: list[str], calls: int) -> None:
-    """One row for each planner: CPU time of calls in worlds that were never seen."""
-    write(f"CPU time with a deadline of {1e3 * BUDGET_S:.0f} ms, {calls} random worlds [ms]", "")
+def any_world(names: list[str], calls: int, count: int) -> None:
+    """One row for each planner: CPU time of calls in worlds that were never seen.
+
+    Args:
+        names: the planners.
+        calls: number of worlds.
+        count: posts in each hall; random worlds if 0.
+    """
+    worlds = f"halls of {count} posts" if count else "random worlds"
+    write(f"CPU time with a deadline of {1e3 * BUDGET_S:.0f} ms, {calls} {worlds} [ms]", "")
     write("| planner | p50 | p99 | p99.9 | worst | over 65 ms |", "|---|---|---|---|---|---|")
     for name in names:
         warm_up(name)
         planner, took = make_planner(name), np.empty(calls)
-        for seed in range(-_FIRST, calls):
-            world, rng = random_world(seed % 2**32, name), np.random.default_rng(abs(seed))
+        for seed in range(-min(_FIRST, calls), calls):
+            rng = np.random.default_rng(abs(seed))
+            world = posts(count, seed % 2**32, name) if count else random_world(seed % 2**32, name)
             began = time.thread_time()
             planner.plan(world, stop=CpuDeadline(BUDGET_S), rng=rng)
             if seed >= 0:
@@ -317,14 +328,15 @@ def main() -> None:
     known = (*MAZE, *SHIP)
     parser.add_argument("calls", nargs="?", type=int, help="default: 10000, with --growth 100000")
     parser.add_argument("--worlds", action="store_true", help="random worlds instead of tasks")
+    parser.add_argument("--posts", type=int, default=0, help="halls of so many posts instead")
     parser.add_argument("--planners", nargs="*", choices=known, default=list(known))
     parser.add_argument("--growth", action="store_true", help="memory instead of deadlines")
     parser.add_argument("--controllers", action="store_true", help="with --growth: them as well")
     options = parser.parse_args()
     if options.calls is not None and options.calls < 10:
         parser.error(f"calls must be at least 10, got {options.calls}")
-    if options.worlds:
-        any_world(options.planners, options.calls or 10_000)
+    if options.worlds or options.posts:
+        any_world(options.planners, options.calls or 10_000, options.posts)
     elif options.growth:
         memory(options.planners, options.calls or 100_000, options.controllers)
     else:

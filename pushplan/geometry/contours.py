@@ -14,6 +14,7 @@ from pushplan.compiled import copy_into, kernel
 from pushplan.geometry.obstacles import Obstacles, obstacle_distance, obstacles_of
 from pushplan.world import StaticMap
 from pushplan.world.checks import BoolArray, FloatArray, IntArray, frozen
+from pushplan.world.outline import next_corner
 
 ARC_STEP = math.pi / 36.0
 """Turn per corner where a round outline becomes a polygon [rad]; an arc gets 0.06 % longer."""
@@ -85,8 +86,7 @@ class _ContourMaker:
         cores = vertices[offsets[first] : offsets[last]], offsets[first : last + 1] - offsets[first]
         points, owner = _outlines(*cores, self._radii[first:last], self._steps[first:last])
         ends = np.flatnonzero(np.diff(owner, append=-1)) + 1
-        after = np.arange(1, len(owner) + 1)
-        after[ends - 1] = np.concatenate([[0], ends[:-1]]) if len(ends) else ends
+        after = next_corner(np.concatenate([[0], ends]))
         outgoing = points[after] - points
         outgoing /= np.hypot(outgoing[:, 0], outgoing[:, 1])[:, None]
         incoming = np.empty_like(outgoing)
@@ -118,8 +118,8 @@ def _outlines(
     """Corners (V, 2) [m] of polygons tangent to the outlines at ``radii`` around convex cores."""
     sizes = np.diff(offsets)
     core = np.repeat(np.arange(len(sizes)), sizes)  # of each corner of the cores
-    after, before = np.arange(1, len(cores) + 1), np.arange(-1, len(cores) - 1)
-    after[offsets[1:] - 1], before[offsets[:-1]] = offsets[:-1], offsets[1:] - 1
+    after, before = next_corner(offsets), np.arange(-1, len(cores) - 1)
+    before[offsets[:-1]] = offsets[1:] - 1
     edges = cores[after] - cores
     normals = np.arctan2(-edges[:, 0], edges[:, 1])  # outward, of the edge that leaves
     turns = (normals - normals[before]) % (2.0 * math.pi)

@@ -17,7 +17,7 @@ from pushplan.compiled import kernel
 from pushplan.geometry.convex import point_segment_distance_sq
 from pushplan.world import StaticMap
 from pushplan.world.checks import FloatArray, IntArray, frozen
-from pushplan.world.outline import flatten
+from pushplan.world.outline import flatten, outline_boxes
 
 
 class Obstacles(NamedTuple):
@@ -36,10 +36,7 @@ def obstacles_of(static: StaticMap, clearance: float = 0.0) -> Obstacles:
     cores = [*static.polygons, *(line.reshape(2, 2) for line in static.segments)]
     vertices, offsets = flatten(cores)
     radii = np.concatenate([np.zeros(len(static.polygons)), static.radii]) + clearance
-    boxes = np.zeros((len(cores), 4))
-    if len(cores):
-        boxes[:, :2] = np.minimum.reduceat(vertices, offsets[:-1]) - radii[:, None]
-        boxes[:, 2:] = np.maximum.reduceat(vertices, offsets[:-1]) + radii[:, None]
+    boxes = outline_boxes(vertices, offsets) + radii[:, None] * [-1.0, -1.0, 1.0, 1.0]
     return Obstacles(vertices, offsets, frozen(radii), frozen(boxes))
 
 

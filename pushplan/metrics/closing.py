@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from functools import lru_cache
 
 from pushplan.interaction import QuasiStatic
@@ -11,6 +12,7 @@ from pushplan.motion.keyholes import (
     nearest_free_pose,
     suits_keyholes,
 )
+from pushplan.motion.time_slicing import Stopped
 from pushplan.world import Episode, GoalDisc, GoalLine, World
 
 _CONFIG = KeyholeConfig()
@@ -49,4 +51,6 @@ def _solvable(world: World) -> bool:
         QuasiStatic(friction=0.1, static_friction=0.5),
         lambda pushes: pushes >= PUSHES,
     )
-    return search.run() is not None
+    with suppress(Stopped):
+        return search.run() is not None
+    return False

@@ -11,14 +11,13 @@ from pushplan.compiled import kernel
 from pushplan.geometry import core_distance
 from pushplan.motion.keep_out import keep_out
 from pushplan.motion.time_slicing import never
-from pushplan.search.grid_dijkstra import new_grid_search, settle_cells
+from pushplan.search.grid_dijkstra import grid_dijkstra
 from pushplan.world import GoalDisc, StaticMap, World
 from pushplan.world.checks import FloatArray, IntArray, frozen
 from pushplan.world.outline import flatten, unflatten
 
 _SIDE = 96  # cells along the longer side of the workspace, if that resolves the robot's own width
 _MOST = 400  # cells along the longer side at most
-_PIECE = 8_000  # cells between two looks at the stop rule: about 2 ms
 
 
 @kernel(allocates=True)
@@ -138,18 +137,14 @@ def _cheapest(
     if isinstance(goal, GoalDisc):  # it may be smaller than a cell
         reached[_cell_of(goal.center, bounds, cell, rows, cols)] = True
     start = np.array([row * cols + col])
-    search, weights, upto = new_grid_search(rows, cols, start), 1.0 + extra, _PIECE
-    while settle_cells(search, weights, reached, cell, upto):
-        if stopped():
-            return np.empty((0, 2))
-        upto += _PIECE
-    at = int(search.order[search.counters[1] - 1])
+    _, parents, order = grid_dijkstra(1.0 + extra, start, reached, cell, stopped)
+    at = int(order[-1])
     if not reached[divmod(at, cols)]:
         return np.empty((0, 2))
     chain = []
     while at >= 0:
         chain.append(at)
-        at = int(search.parents[at])
+        at = int(parents[at])
     cells = np.array(chain[::-1])
     return bounds[:2] + (np.column_stack([cells % cols, cells // cols]) + 0.5) * cell
 

@@ -8,7 +8,15 @@ import numpy as np
 
 from pushplan.world import StaticMap, World
 from pushplan.world.checks import FloatArray
-from pushplan.world.outline import flatten, grown_outline, outline_boxes, transform
+from pushplan.world.outline import (
+    flatten,
+    grown_outline,
+    grown_outlines,
+    outline_boxes,
+    transform,
+    unflatten,
+)
+from pushplan.world.static_map import capsule
 
 _LEVELS = 4  # fractions of the margin that an obstacle near the robot may keep
 
@@ -42,19 +50,13 @@ def keep_out(world: World) -> StaticMap:
 @functools.lru_cache(maxsize=32)
 def _grown(static: StaticMap, margin: float, fractions: tuple[tuple[int, int], ...]) -> StaticMap:
     """The map with all obstacles grown by the margin, but some by so many quarters of it."""
-    if fractions:
-        whole = _grown(static, margin, ())
-        polygons, radii = list(whole.polygons), np.array(whole.radii)
-    else:
-        polygons = [grown_outline(polygon, margin) for polygon in static.polygons]
-        radii = static.radii + margin
+    count = len(static.polygons)
+    margins = np.full(count + len(static.radii), margin)
     for k, level in fractions:
-        part, segment = margin * level / _LEVELS, k - len(polygons)
-        if segment < 0:
-            polygons[k] = grown_outline(static.polygons[k], part) if level else static.polygons[k]
-        else:
-            radii[segment] = static.radii[segment] + part
-    return StaticMap(tuple(polygons), static.segments, radii, static.bounds)
+        margins[k] = margin * level / _LEVELS
+    outlines = grown_outlines(*flatten(static.polygons), margins[:count])
+    radii = static.radii + margins[count:]
+    return StaticMap(unflatten(*outlines), static.segments, radii, static.bounds)
 
 
 @functools.lru_cache(maxsize=32)
@@ -68,8 +70,8 @@ def _grown_part(static: StaticMap, k: int, margin: float) -> FloatArray:
     if k < len(static.polygons):
         return grown_outline(static.polygons[k], margin)
     j = k - len(static.polygons)
-    one = StaticMap((), static.segments[j : j + 1], static.radii[j : j + 1] + margin, static.bounds)
-    return one.convex_parts[0]
+    start, end = static.segments[j].reshape(2, 2)
+    return capsule(start, end, float(static.radii[j]) + margin)
 
 
 def _overlap(one: FloatArray, other: FloatArray) -> bool:

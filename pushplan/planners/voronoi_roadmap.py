@@ -31,6 +31,7 @@ from pushplan.world import (
     World,
 )
 from pushplan.world.checks import BoolArray, FloatArray, IntArray, number
+from pushplan.world.outline import flatten, next_corner
 from pushplan.world.planning_call import PlanningCall
 
 _MOST_SITES = 2000
@@ -124,8 +125,7 @@ class Skeleton:
         if len(counts) == 0:
             return np.zeros((0, 2)), np.zeros(0, dtype=np.int64)
         ends = np.cumsum(counts)
-        after = np.arange(1, len(corners) + 1)
-        after[ends - 1] = ends - counts
+        after = next_corner(np.concatenate([[0], ends]))
         edges = corners[after] - corners
         reached = np.cumsum(np.hypot(edges[:, 0], edges[:, 1]))
         around = np.diff(reached[ends - 1], prepend=0.0)
@@ -278,10 +278,9 @@ def _circumcentres(triangles: FloatArray) -> FloatArray:
 
 def _outlines(world: World) -> tuple[FloatArray, IntArray]:
     """(V, 2) corners of all objects, then of all obstacles [m], and how many each has."""
-    floes, parts = world.movables, keep_out(world).convex_parts
-    sizes = np.array([len(part) for part in parts], dtype=np.int64)
-    counts = np.concatenate([np.diff(floes.offsets), sizes])
-    return np.concatenate([floes.vertices_world, *parts]), counts
+    floes, (vertices, offsets) = world.movables, flatten(keep_out(world).convex_parts)
+    counts = np.concatenate([np.diff(floes.offsets), np.diff(offsets)])
+    return np.concatenate([floes.vertices_world, vertices]), counts
 
 
 def skeleton(planner: Planner | None = None, stop: Stop | None = None) -> PlanFollower:

@@ -9,6 +9,7 @@ depend on both ends of a move, and so many poses that buckets take the place of 
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -16,6 +17,8 @@ import numpy as np
 from pushplan.compiled import kernel
 from pushplan.search.heap import pop_least, push_or_lift
 from pushplan.world.checks import BoolArray, FloatArray, IntArray
+
+_PIECE = 8_000  # cells between two looks at the stop rule: about 2 ms
 
 
 class GridSearch(NamedTuple):
@@ -75,14 +78,15 @@ def settle_cells(
     return bool(counters[0] > 0)
 
 
-@kernel(allocates=True)
 def grid_dijkstra(
     weights: FloatArray,  # (rows, columns) cost per metre of a move into each cell, inf: closed
     starts: IntArray,  # cells, counted row by row
     goals: BoolArray,  # (rows, columns)
     cell: float,  # side of a cell [m]
+    stopped: Callable[[], bool] = lambda: False,  # ends the search, asked every few milliseconds
 ) -> tuple[FloatArray, IntArray, IntArray]:
     """Costs (rows, columns), parents, and settled cells in order, the first goal last; -1: none."""
-    search = new_grid_search(weights.shape[0], weights.shape[1], starts)
-    settle_cells(search, weights, goals, cell, weights.size)
+    search, upto = new_grid_search(weights.shape[0], weights.shape[1], starts), _PIECE
+    while settle_cells(search, weights, goals, cell, upto) and not stopped():
+        upto += _PIECE
     return search.costs, search.parents, search.order[: search.counters[1]]

@@ -6,6 +6,7 @@ import dataclasses
 import math
 import numbers
 from collections.abc import Mapping, Sequence
+from functools import cached_property
 from typing import Any, TypeVar
 
 import numpy as np
@@ -209,7 +210,9 @@ class ArrayRecord:
     Fields declared with ``compare=False`` are left out, as in an ordinary dataclass.
     """
 
+    @cached_property
     def _content(self) -> tuple[object, ...]:
+        # kept, as a cache compares it whenever the same map is made again
         assert dataclasses.is_dataclass(self)
         return tuple(
             _hashable(getattr(self, field.name))
@@ -223,14 +226,14 @@ class ArrayRecord:
         if type(self) is not type(other):
             return NotImplemented
         assert isinstance(other, ArrayRecord)
-        return self._content() == other._content()
+        return self._content == other._content
 
     def __hash__(self) -> int:
-        cached = self.__dict__.get("_hash")
-        if cached is None:
-            cached = hash((type(self).__name__, self._content()))
-            object.__setattr__(self, "_hash", cached)
-        return int(cached)
+        return self._hash
+
+    @cached_property
+    def _hash(self) -> int:
+        return hash((type(self).__name__, self._content))
 
     def __getstate__(self) -> dict[str, object]:
         """Leave caches behind: string hashes differ between processes."""
@@ -250,5 +253,8 @@ def _hashable(value: object) -> object:
         clean = value + 0.0 if value.dtype.kind == "f" else value
         return value.shape, clean.tobytes()
     if isinstance(value, tuple):
+        if value and all(isinstance(item, np.ndarray) and item.shape[1:] == (2,) for item in value):
+            # outlines: thousands of small objects would take long, and wake the garbage collector
+            return tuple(map(len, value)), _hashable(np.concatenate(value))
         return tuple(_hashable(item) for item in value)
     return value

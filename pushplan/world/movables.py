@@ -309,7 +309,7 @@ class Movables(ArrayRecord, CheckedFields):
     @staticmethod
     def _unchecked(values: Mapping[str, Any]) -> Movables:
         clone = object.__new__(Movables)
-        clone.__dict__.update({key: value for key, value in values.items() if key != "_hash"})
+        clone.__dict__.update({key: value for key, value in values.items() if key[0] != "_"})
         return clone
 
     def _gathered(self, index: IntArray) -> Movables:

@@ -172,13 +172,21 @@ def convex_outlines(name: str, outlines: Sequence[ArrayLike]) -> list[FloatArray
     """`convex_outline` of each of many outlines, called ``name`` and its index; much quicker."""
     if isinstance(outlines, str) or not isinstance(outlines, Sequence | np.ndarray):
         raise InvalidInputError(f"{name} must be a list of outlines, got {short(outlines)}")
-    points: list[FloatArray] = [
-        array(f"{name} {i}", outline, (None, 2)) for i, outline in enumerate(outlines)
-    ]
-    good = well_formed(*flatten(points))
+    points: list[FloatArray] = []
+    for i, outline in enumerate(outlines):
+        if (
+            type(outline) is np.ndarray
+            and outline.dtype == np.float64
+            and outline.shape[1:] == (2,)
+        ):
+            points.append(outline)
+        else:
+            points.append(array(f"{name} {i}", outline, (None, 2)))
+    vertices, offsets = flatten(points)
+    good = well_formed(vertices, offsets)  # no if not finite
     return [
         corners if good[i] else convex_outline(f"{name} {i}", corners)
-        for i, corners in enumerate(points)
+        for i, corners in enumerate(unflatten(vertices, offsets))
     ]
 
 
@@ -196,7 +204,7 @@ def well_formed(vertices: FloatArray, offsets: IntArray) -> BoolArray:
     """
     counts = np.diff(offsets)
     good: BoolArray = counts >= 3
-    if np.abs(vertices).max(initial=0.0) > LARGEST_M:
+    if not np.abs(vertices).max(initial=0.0) <= LARGEST_M:  # or not a number
         good &= [np.abs(corners).max() <= LARGEST_M for corners in unflatten(vertices, offsets)]
     if not good.all():
         outlines = unflatten(vertices, offsets)

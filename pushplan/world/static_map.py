@@ -130,13 +130,13 @@ class StaticMap(ArrayRecord, CheckedFields):
         """
         thin = 5e-7 * float((self.bounds[2:] - self.bounds[:2]).max())
         ends = [
-            _capsule(line[:2], line[2:], max(float(radius), thin))
+            capsule(line[:2], line[2:], max(float(radius), thin))
             for line, radius in zip(self.segments, self.radii, strict=True)
         ]
         return (*self.polygons, *ends)
 
 
-def _capsule(a: FloatArray, b: FloatArray, radius: float) -> FloatArray:
+def capsule(a: FloatArray, b: FloatArray, radius: float) -> FloatArray:
     """Circumscribed convex polygon of the points within ``radius`` of the segment a-b."""
     along = b - a
     heading = float(np.arctan2(along[1], along[0])) if along.any() else 0.0

@@ -8,7 +8,15 @@ from dataclasses import replace
 import numpy as np
 
 from pushplan.planners.registry import OPEN_WATER
-from pushplan.world import GoalDisc, GoalLine, Movables, RobotModel, StaticMap, World
+from pushplan.world import (
+    GoalDisc,
+    GoalLine,
+    Movables,
+    RobotModel,
+    StaticMap,
+    World,
+    turtlebot3_burger,
+)
 from pushplan.world.outline import transform
 
 SQUARE = np.array([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]])
@@ -21,7 +29,8 @@ HULLS = {
     "cart": 0.5 * SQUARE + [0.25, 0.0],  # turns about the middle of its rear edge
     "tractor": 0.5 * SQUARE + [0.6, 0.0],  # turns about a point outside of it
 }
-SIDE = 10.0  # of every world before it is scaled [m]
+SIDE = 10.0  # of every random world before it is scaled [m]
+HALL = 40.0  # side of a hall of posts [m]
 Rng = np.random.Generator
 
 
@@ -118,6 +127,8 @@ def random_world(seed: int, planner: str = "") -> World:
         max_speed=0.15,
         max_turn_rate=10 ** rng.uniform(-1.5, 0.5),
     )
+    if planner == "namo":  # elsewhere it drives as its navigator
+        robot = replace(robot, drive="differential", min_speed=-robot.max_speed)
     boxes = _boxes(rng, int(rng.integers(0, 10)))
     goal: GoalDisc | GoalLine = GoalLine([5.0, 8.5], [0.0, 1.0])
     if rng.random() < 0.7:
@@ -132,6 +143,24 @@ def random_world(seed: int, planner: str = "") -> World:
         angle = rng.choice([0.0, 0.5 * np.pi, np.pi, rng.uniform(-3, 3)])
         world = replace(world, goal=GoalLine(world.goal.center, [np.cos(angle), np.sin(angle)]))
     return replace(world, static=_static([]))
+
+
+def posts(count: int, seed: int, planner: str = "") -> World:
+    """A robot in one corner of a hall of posts, its goal in the other one."""
+    rng = np.random.default_rng(seed)
+    spots = rng.uniform(1.0, HALL - 1.0, (count, 2))
+    for free in ([2.0, 2.0], [HALL - 2.0, HALL - 2.0]):
+        spots = spots[np.hypot(*(spots - free).T) > 1.5]
+    static = StaticMap.build([0.2 * SQUARE + spot for spot in spots], bounds=[0, 0, HALL, HALL])
+    goal = GoalDisc([HALL - 2.0, HALL - 2.0], 0.5)
+    world = World(turtlebot3_burger(), [2.0, 2.0, 0.5], static, Movables.empty(), goal)
+    if planner != "namo":
+        return world
+    robot = RobotModel.from_outline(
+        SQUARE, mass=2.0, drive="differential", max_speed=0.3, min_speed=-0.3, max_turn_rate=1.0
+    )  # large enough for a grid of `namo`
+    box = Movables.from_outlines([0.5 * SQUARE], [[3.0, 3.5, 0.0]])
+    return replace(world, robot=robot, movables=box)
 
 
 def similar(

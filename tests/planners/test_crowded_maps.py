@@ -2,36 +2,22 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from conftest import quickest
+from random_worlds import posts
 
 from pushplan.geometry.contours import prepare_contours
 from pushplan.motion.coarse_path import coarse_path
+from pushplan.motion.keep_out import keep_out
+from pushplan.motion.keyholes import KeyholeConfig, suits_keyholes
 from pushplan.planners import make_planner
-from pushplan.world import (
-    GoalDisc,
-    Movables,
-    PlanStatus,
-    StaticMap,
-    Stop,
-    World,
-    turtlebot3_burger,
-)
+from pushplan.world import PlanStatus, StaticMap, Stop, checks
+from pushplan.world.outline import grown_outline
 
-SIDE = 40.0
 PLANNERS = ("straight", "skeleton", "kinodynamic-rrt", "push-aware")
-
-
-def posts(count: int, seed: int) -> World:
-    """A robot in one corner of a hall of posts, its goal in the other one."""
-    rng = np.random.default_rng(seed)
-    spots = rng.uniform(1.0, SIDE - 1.0, (count, 2))
-    for free in ([2.0, 2.0], [SIDE - 2.0, SIDE - 2.0]):
-        spots = spots[np.hypot(*(spots - free).T) > 1.5]
-    corners = 0.1 * np.array([[1, 1], [-1, 1], [-1, -1], [1, -1]])
-    static = StaticMap.build([corners + spot for spot in spots], bounds=[0, 0, SIDE, SIDE])
-    goal = GoalDisc([SIDE - 2.0, SIDE - 2.0], 0.5)
-    return World(turtlebot3_burger(), [2.0, 2.0, 0.5], static, Movables.empty(), goal)
 
 
 class Looks(Stop):
@@ -85,3 +71,34 @@ def test_what_was_made_before_a_stop_is_kept_for_the_next_call():
     for _ in range(10):
         planner.plan(world, stop=Looks(last=4))
     assert prepare_contours(world.static, clearance, lambda: True)
+
+
+@pytest.mark.warm("namo")
+def test_namo_looks_while_it_makes_its_grid():
+    world = posts(150, seed=3, planner="namo")
+    assert suits_keyholes(world, KeyholeConfig())
+    for last in (1, 2, 5, 20, 60):
+        looks = Looks(last)
+        result = make_planner("namo").plan(world, stop=looks)
+        assert result.status is PlanStatus.TIMED_OUT
+        assert looks.count <= last + 8
+
+
+def test_thousands_of_obstacles_grow_together_as_each_would_alone():
+    world = replace(posts(3000, seed=5), margin=0.03)
+    others = [replace(world, margin=0.01 * k) for k in (4, 5, 6)]  # none of them is kept
+    assert quickest(lambda: keep_out(others.pop())) < 0.25  # alone they take 0.5 s and more
+    for grown, polygon in zip(keep_out(world).polygons, world.static.polygons, strict=True):
+        np.testing.assert_array_equal(grown, grown_outline(polygon, 0.03))
+
+
+def test_a_map_that_is_made_again_is_known_without_reading_it_again(monkeypatch):
+    first = posts(200, seed=6).static
+    again = remade(first)
+    assert len({first, again}) == 1
+    monkeypatch.setattr(checks, "_hashable", None)  # raises where it is called
+    assert len({first, again}) == 1
+
+
+def remade(static: StaticMap) -> StaticMap:
+    return StaticMap(static.polygons, static.segments, static.radii, static.bounds)

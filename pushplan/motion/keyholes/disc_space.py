@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections import OrderedDict
+from collections.abc import Callable
 from functools import cached_property
 
 import numpy as np
 
 from pushplan.geometry import Grid, clearance_field
 from pushplan.geometry.free_components import FreeComponents, object_clearance
+from pushplan.motion.time_slicing import go_on, never
 from pushplan.search.grid_dijkstra import grid_dijkstra
 from pushplan.world import World
 from pushplan.world.checks import BoolArray, FloatArray, IntArray
@@ -24,15 +26,30 @@ class DiscSpace:
         radius: of the disc [m].
         cell: side of a cell [m].
         closed_cost: extra cost per metre of floor that objects close, of `DiscState.relaxed`.
+        stopped: ends work here, and in each `DiscState`, with `Stopped`.
     """
 
-    def __init__(self, world: World, radius: float, cell: float, closed_cost: float) -> None:
+    def __init__(
+        self,
+        world: World,
+        radius: float,
+        cell: float,
+        closed_cost: float,
+        stopped: Callable[[], bool] = never,
+    ) -> None:
         self.world, self.radius, self.cell, self.closed_cost = world, radius, cell, closed_cost
+        self.stopped = stopped
         self.grid = Grid.cover(world.static.bounds, cell)
-        self.static = clearance_field(world.static, self.grid)
         x, y = np.meshgrid(self.grid.x, self.grid.y)
         self.goal: BoolArray = world.navigation_goal.contains(np.stack([x, y], axis=-1))
         self._objects: OrderedDict[tuple[int, bytes], FloatArray] = OrderedDict()
+
+    @cached_property
+    def static(self) -> FloatArray:
+        """(rows, columns) distance of each cell to what is static [m]."""
+        field = clearance_field(self.world.static, self.grid, self.stopped)
+        go_on(self.stopped)
+        return field
 
     def object_clearance(self, k: int, pose: FloatArray) -> FloatArray:
         """(rows, columns) distance of each cell to object ``k`` at a pose (3,) [m].
@@ -79,6 +96,7 @@ class DiscState:
         self.space, self.poses = space, poses
         self.clearance: FloatArray = space.static.copy()
         for k, pose in enumerate(poses):
+            go_on(space.stopped)
             np.minimum(self.clearance, space.object_clearance(k, pose), out=self.clearance)
         self.free = FreeComponents.of(space.grid, self.clearance, space.radius)
 
@@ -123,7 +141,9 @@ class DiscState:
         space = self.space
         row, col = space.cell_of(self.robot)
         start = np.array([row * space.grid.shape[1] + col])
-        return grid_dijkstra(weights, start, goals, space.cell)
+        found = grid_dijkstra(weights, start, goals, space.cell, space.stopped)
+        go_on(space.stopped)
+        return found
 
     def length_to(self, point: FloatArray) -> float:
         """Length of the path to a point (2,) [m], infinite where the robot does not get."""

@@ -16,6 +16,7 @@ from pushplan.motion.collision import first_blocked, footprint, obstacles, stati
 from pushplan.motion.keyholes.disc_space import DiscSpace, DiscState
 from pushplan.motion.keyholes.keyhole_config import KeyholeConfig
 from pushplan.motion.keyholes.line_push import CONTACT, SPACING, LinePush, line_pushes, straight
+from pushplan.motion.time_slicing import go_on, never
 from pushplan.world import Drive, World
 from pushplan.world.checks import FloatArray
 from pushplan.world.polyline import path_length, path_lengths
@@ -89,9 +90,12 @@ def nearest_free_pose(world: World, config: KeyholeConfig) -> FloatArray:
     return DiscState(space, world.movables.poses).nearest_free(world.robot_pose)
 
 
-def _disc_space(world: World, config: KeyholeConfig) -> DiscSpace:
+def _disc_space(
+    world: World, config: KeyholeConfig, stopped: Callable[[], bool] = never
+) -> DiscSpace:
     size = world.robot.circumscribed_radius
-    return DiscSpace(world, config.clearance * size, config.cell * size, config.closed_cost)
+    radius, cell = config.clearance * size, config.cell * size
+    return DiscSpace(world, radius, cell, config.closed_cost, stopped)
 
 
 class KeyholeSearch:
@@ -109,7 +113,8 @@ class KeyholeSearch:
         world: the scene; objects that are fixed are among what is static.
         config: parameters.
         interaction: predicts the pushes.
-        stopped: asked after each push with their number.
+        stopped: ends the search, asked with the number of pushes after each and every few
+            milliseconds.
     """
 
     def __init__(
@@ -121,12 +126,9 @@ class KeyholeSearch:
     ) -> None:
         self.world, self.config, self.interaction = world, config, interaction
         self.pushes = self.expansions = 0
-        self.exhausted = False
-        """Whether the search has ended because nothing was left to try."""
-        self._stopped = stopped
         size = world.robot.circumscribed_radius
         self._size = size
-        self._space = _disc_space(world, config)
+        self._space = _disc_space(world, config, lambda: stopped(self.pushes))
         self._shape = footprint(world.robot, config.margin * size)
         self._bare = footprint(world.robot)
         self._walls = obstacles(world.static)
@@ -135,10 +137,13 @@ class KeyholeSearch:
         self._seen: set[bytes] = set()
 
     def run(self) -> KeyholeEnd | None:
-        """The cheapest scene found from which the goal is reached; None if there is none."""
+        """The cheapest scene found from which the goal is reached; None if there is none.
+
+        Raises:
+            Stopped: if the stop rule fires before.
+        """
         start = self._start()
         if start is None:
-            self.exhausted = True
             return None
         self._put(start)
         while self._open:
@@ -148,14 +153,12 @@ class KeyholeSearch:
             self.expansions += 1
             for end in self._expand(entry.end, entry.rank):
                 self._put(end)
-            if self._stopped(self.pushes):
-                return None
+            go_on(self._space.stopped)
             if entry.rank < 2:
                 later = entry.priority + self.config.rank_cost * self._size
                 heapq.heappush(
                     self._open, _Entry(later, next(self._numbers), entry.rank + 1, entry.end)
                 )
-        self.exhausted = True
         return None
 
     def _start(self) -> KeyholeEnd | None:
@@ -164,6 +167,7 @@ class KeyholeSearch:
         state = DiscState(self._space, self.world.movables.poses)
         steps = np.arange(0.0, _LEAVING, self.config.cell)
         for length in sorted([*steps, *-steps[1:]], key=abs):
+            go_on(self._space.stopped)
             along = np.linspace(0.0, length * self._size, 2 + int(abs(length) / SPACING))
             path = straight(robot, along)
             if not state.is_free(path[-1]) or self._hits_wall(path):
@@ -206,8 +210,7 @@ class KeyholeSearch:
             for push in line_pushes(self.world, k, pose, clearance, self.config.offsets):
                 if end.state.gets_to(push.start):
                     yield from self._push(end, push, rank)
-                    if self._stopped(self.pushes):
-                        return
+                    go_on(self._space.stopped)
 
     def _is_near(self, end: KeyholeEnd, k: int, on_path: list[int]) -> bool:
         """Whether object ``k`` is in the way of pushes of the first object on the path."""
@@ -232,8 +235,7 @@ class KeyholeSearch:
         ends = list(range(CONTACT + step, last + 1, step))
         left = 2  # the first place that is open, and one beyond
         for n in ends:
-            if self._stopped(self.pushes):
-                return
+            go_on(self._space.stopped)
             new = self._after(end, push, path[: n + 1], swept.object_poses[: n + 1])
             if new is None:
                 continue

@@ -9,6 +9,7 @@ import numpy as np
 from pushplan.interaction import InteractionModel, QuasiStatic
 from pushplan.motion.keyholes import KeyholeConfig, KeyholeSearch, suits_keyholes
 from pushplan.motion.keyholes.keyhole_plan import keyhole_plan
+from pushplan.motion.time_slicing import Stopped
 from pushplan.planners.registry import make_planner
 from pushplan.world import MaxIterations, Plan, Planner, PlanResult, PlanStatus, Stop, World
 from pushplan.world.checked_fields import Fraction, NonNegativeInt, PositiveFraction
@@ -82,8 +83,12 @@ class Namo:
         search = KeyholeSearch(
             world, self.config, self.interaction, lambda pushes: call.check(pushes, np.inf)
         )
-        end = search.run()
-        if end is None and not search.exhausted:
+        plan = None
+        try:
+            end = search.run()
+            if end is not None and end.before is not None:
+                plan = keyhole_plan(world, end, self.interaction, self.config.turn_fraction)
+        except Stopped:
             return call.result(call.stopped_status, iterations=search.pushes)
         if end is not None and end.before is None:
             rest = _Rest(call, search.pushes) if call.has_rule else stop
@@ -94,7 +99,6 @@ class Namo:
             if other.status is not PlanStatus.TIMED_OUT:
                 return other
             return call.result(PlanStatus.WAY_CLOSED, iterations=search.pushes)
-        plan = keyhole_plan(world, end, self.interaction, self.config.turn_fraction)
         weight = self.config.push_weight
         if other is not None and other.status is PlanStatus.SOLVED:
             if _cost(other.plan, weight) < _cost(plan, weight):

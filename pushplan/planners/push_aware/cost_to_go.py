@@ -17,7 +17,7 @@ import numpy as np
 from pushplan.compiled import kernel
 from pushplan.motion.collision import ConvexObstacles, Footprint, is_free
 from pushplan.motion.goal_region import in_goal
-from pushplan.search.grid_dijkstra import grid_dijkstra
+from pushplan.search.grid_dijkstra import new_grid_search, settle_cells
 from pushplan.world.checks import BoolArray, FloatArray, IntArray
 
 
@@ -76,8 +76,9 @@ def flood(
             starts[count] = at
             count += 1
     none = np.zeros((rows, cols), np.bool_)
-    lengths, _, order = grid_dijkstra(weights, starts[:count], none, cell)
-    return lengths, order
+    search = new_grid_search(rows, cols, starts[:count])
+    settle_cells(search, weights, none, cell, rows * cols)
+    return search.costs, search.order[: search.counters[1]]
 
 
 @kernel
