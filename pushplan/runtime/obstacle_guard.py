@@ -28,6 +28,8 @@ _DEEPER = 1e-6  # by how much the robot may get nearer to what it is too near to
 _SLOWER = (1.0, 0.75, 0.5, 0.25, 0.1)
 """Fractions of the wanted velocity that are tried in turn; then the robot brakes."""
 _HELD = 2.0  # for how long each command may be driven before the next one comes [periods]
+_TURNING_STEPS = 25  # in which a turn begins at most
+_FINE = 0.25  # distance between poses of circles, in that of other paths
 _MOVED = 4.0  # how far something fixed may be seen from where it was [clearances]
 _ANYWHERE = StaticMap.build(bounds=(-1e9, -1e9, 1e9, 1e9))
 
@@ -54,6 +56,7 @@ class ObstacleGuard:
         self._known_fixed = _fixed(world)
         self._new: list[FloatArray] = []
         self._stands = False
+        self._side = 0  # where a robot that cannot stop has room: 1 left, -1 right, 0 unknown
         self.observe(world)
 
     def observe(self, world: World) -> World:
@@ -94,6 +97,7 @@ class ObstacleGuard:
         near = self._near(world, twist)
         if not near:
             self._stands = False
+            self._side = 0
             return twist, ""
         grown = self._clearance(world) * (_RESUMED if self._stands else 1.0)
         closeness = _Closeness(footprint(robot, grown), world.robot_pose, near)
@@ -101,25 +105,36 @@ class ObstacleGuard:
             slower = ramp_twist(
                 robot, before, fraction * wanted.linear, fraction * wanted.angular, held
             )
-            if closeness.allows(self._path(world, slower)):
-                self._stands = False
-                reason = "" if fraction == 1.0 else _reason(world, near, "slows down")
-                return slower, reason
+            for side, path in self._paths(world, slower):
+                if closeness.allows(path):
+                    self._stands = False
+                    self._side = side
+                    reason = "" if fraction == 1.0 else _reason(world, near, "slows down")
+                    return slower, reason
         rest = waiting_twist(world.with_fixed_as_static())
-        twist = ramp_twist(robot, before, rest.linear, rest.angular, held)
+        turn = self._side * robot.max_turn_rate or rest.angular
         self._stands = robot.can_stop
-        return twist, _reason(world, near, "stops" if robot.can_stop else "turns away")
+        reason = _reason(world, near, "stops" if robot.can_stop else "turns away")
+        return ramp_twist(robot, before, rest.linear, turn, held), reason
 
-    def _path(self, world: World, twist: Twist) -> FloatArray:
-        """(N, 3) where a command leads to, at the latest."""
+    def _paths(self, world: World, twist: Twist) -> list[tuple[int, FloatArray]]:
+        """Where a command may lead to: (N, 3) to a stand, or around the circle of either side."""
         robot, held = world.robot, _HELD * self._period
         if robot.can_stop:
-            return stopping_path(robot, world.robot_pose, twist, held, self._period)
+            return [(0, stopping_path(robot, world.robot_pose, twist, held, self._period))]
+        return [(side, self._circle(world, twist, side)) for side in (1, -1)]
+
+    def _circle(self, world: World, twist: Twist, side: int) -> FloatArray:
+        """(N, 3) poses of a command, and of the tightest circle to the left (1) or right (-1)."""
+        robot, held, rate = world.robot, _HELD * self._period, side * world.robot.max_turn_rate
+        step = max(self._period, abs(rate) / robot.max_turn_acceleration / _TURNING_STEPS)
+        fine = _FINE * robot.circumscribed_radius
         poses = [np.array(world.robot_pose)]
-        add_arc(poses, twist.linear * held, twist.angular * held, robot.circumscribed_radius)
-        last = waiting_twist(world.moved(robot_pose=poses[-1]).with_fixed_as_static())
-        circle = math.tau * robot.turning_radius / robot.max_speed
-        add_arc(poses, last.linear * circle, last.angular * circle, robot.circumscribed_radius)
+        while twist.angular != rate:
+            add_arc(poses, twist.linear * held, twist.angular * held, fine)
+            held = step
+            twist = ramp_twist(robot, twist, robot.max_speed, rate, held)
+        add_arc(poses, robot.turning_radius * math.tau, side * math.tau, fine)
         return np.array(poses)
 
     def _near(self, world: World, twist: Twist) -> list[FloatArray]:
@@ -130,7 +145,7 @@ class ObstacleGuard:
         chosen = np.flatnonzero(np.isin(objects.ids, list(self._new_fixed))).tolist()
         held = [objects.outline_world(k) for k in chosen]
         boxes = np.concatenate([self._boxes, _boxes(held)])
-        path = self._path(world, twist)
+        path = np.concatenate([path for _, path in self._paths(world, twist)])
         reach = world.robot.circumscribed_radius + 2.0 * _RESUMED * self._clearance(world)
         low, high = path[:, :2].min(axis=0) - reach, path[:, :2].max(axis=0) + reach
         near = ((boxes[:, 1] >= low) & (boxes[:, 0] <= high)).all(axis=1)

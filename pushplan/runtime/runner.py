@@ -414,8 +414,7 @@ class Runner:
             return None, CommandStatus.FAILED, self._failure
         if wanted.linear == 0.0 == wanted.angular:
             why = "a plan is on its way" if self._running_s else _missing_plan(self.policy)
-            if why:
-                return wanted, CommandStatus.WAITING, why
+            return wanted, CommandStatus.WAITING, why or "the policy asks for no motion"
         return wanted, CommandStatus.DRIVING, ""
 
     @property

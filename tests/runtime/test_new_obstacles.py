@@ -16,8 +16,19 @@ from hypothesis import strategies as st
 
 from pushplan.control import SimulatedExecutor
 from pushplan.geometry.transforms import arc_step
+from pushplan.interaction import QuasiStatic
 from pushplan.runtime import Command, CommandStatus, Runner
-from pushplan.world import Drive, GoalDisc, Movables, RobotModel, StaticMap, Twist, World
+from pushplan.world import (
+    ClearanceArea,
+    Drive,
+    GoalDisc,
+    GoalLine,
+    Movables,
+    RobotModel,
+    StaticMap,
+    Twist,
+    World,
+)
 
 PERIOD = 0.05
 START, GOAL = (1.5, 3.0), (8.0, 3.0)
@@ -73,6 +84,14 @@ def square_at(x: float, y: float) -> np.ndarray:
 
 def wall(x: float, low: float = 0.0, high: float = 6.0) -> np.ndarray:
     return np.array([[x, low], [x + 0.1, low], [x + 0.1, high], [x, high]])
+
+
+def perceived_anew(world: World, rng: np.random.Generator) -> World:
+    """The world with each outline a little off."""
+    static = world.static
+    polygons = [part + 1e-3 * rng.normal(size=2) for part in static.polygons]
+    segments = static.segments + 1e-3 * rng.normal(size=static.segments.shape)
+    return replace(world, static=StaticMap(polygons, segments, static.radii, static.bounds))
 
 
 class DrivenRobot:
@@ -139,6 +158,19 @@ class DrivenRobot:
         return most
 
 
+class PushingRobot(DrivenRobot):
+    """One that carries the objects before it along."""
+
+    def step(self, twist: Twist) -> None:
+        before, begin = self.world, len(self.poses) - 1
+        super().step(twist)
+        free, solid = ~before.movables.fixed, before.with_fixed_as_static()
+        poses = np.array(before.movables.poses)
+        path = np.array(self.poses[begin:])
+        poses[free] = QuasiStatic().sweep(solid, path).object_poses[-1]
+        self.world = self.world.moved(movable_poses=poses)
+
+
 def when_at(x: float, change: Callable[[World], World]) -> Change:
     """Change the world once, when the robot has come to a place."""
     done = []
@@ -152,11 +184,11 @@ def when_at(x: float, change: Callable[[World], World]) -> Change:
     return changed
 
 
-def random_robot(rng: np.random.Generator) -> RobotModel:
-    fast, car = rng.uniform(0.3, 1.2), rng.random() < 0.4
+def random_robot(rng: np.random.Generator, drive: Drive) -> RobotModel:
+    fast, car = rng.uniform(0.3, 1.2), drive is Drive.CAR
     return replace(
         ROBOT,
-        drive=Drive.CAR if car else Drive.DIFFERENTIAL,
+        drive=drive,
         min_turning_radius=rng.uniform(0.4, 0.8) if car else 0.0,
         max_speed=fast,
         min_speed=-0.5 * fast,
@@ -167,12 +199,15 @@ def random_robot(rng: np.random.Generator) -> RobotModel:
 
 
 def comes_into_the_way(rng: np.random.Generator, room_to_brake: float) -> Change:
-    """A pillar that stands before the robot, where it can brake in time."""
+    """A pillar that stands before the robot, where it can brake, or turn, in time."""
     at, further, side = rng.uniform(1.8, 5.0), rng.uniform(0.0, 1.5), rng.uniform(-0.3, 0.3)
 
     def change(world: World) -> World:
-        speed = float(np.hypot(*world.robot_twist[:2]))
-        brake = 0.5 * speed * speed / world.robot.max_acceleration
+        robot, speed = world.robot, float(np.hypot(*world.robot_twist[:2]))
+        brake = 0.5 * speed * speed / robot.max_acceleration
+        if not robot.can_stop:
+            turned = 2.0 * robot.max_turn_rate / robot.max_turn_acceleration
+            brake = 0.4 + robot.turning_radius + turned * speed
         ahead = 0.55 + brake + room_to_brake * speed + further
         x, y, theta = world.robot_pose.tolist()
         c, s = math.cos(theta), math.sin(theta)
@@ -181,13 +216,29 @@ def comes_into_the_way(rng: np.random.Generator, room_to_brake: float) -> Change
     return when_at(at, change)
 
 
-@pytest.mark.warm("straight")
+@pytest.mark.parametrize("drive", Drive)
+def test_a_robot_that_looks_at_nothing_keeps_off_what_comes_into_its_way(drive: Drive) -> None:
+    rng = np.random.default_rng(3)
+    driven = DrivenRobot(Ahead(), room(random_robot(rng, drive)), noise=0.02)
+    driven.drive(200, comes_into_the_way(rng, 2.0 * PERIOD))
+    assert driven.overlap(driven.world.static.polygons[0]) == 0.0
+    assert CommandStatus.BLOCKED in {command.status for command in driven.commands}
+
+
+@pytest.mark.slow
 @settings(max_examples=12)
-@given(st.integers(0, 10**6), st.booleans(), st.sampled_from([0.0, 0.1, 0.2]))
-def test_no_robot_touches_what_comes_into_its_way_where_it_could_brake(seed, noisy, delay) -> None:
+@given(
+    st.integers(0, 10**6),
+    st.booleans(),
+    st.sampled_from([0.0, 0.1, 0.2]),
+    st.sampled_from(Drive),
+)
+def test_no_robot_touches_what_comes_into_its_way_where_it_could_brake(
+    seed, noisy, delay, drive
+) -> None:
     for policy in (Ahead(), "straight"):
         rng = np.random.default_rng(seed)
-        robot = random_robot(rng)
+        robot = random_robot(rng, drive)
         noise = 0.02 if noisy else 0.0
         driven = DrivenRobot(policy, room(robot), delay=delay, noise=noise, seed=seed)
         driven.drive(400, comes_into_the_way(rng, delay + 2.0 * PERIOD))
@@ -254,3 +305,56 @@ def test_what_was_there_at_the_start_is_left_to_the_policy() -> None:
     driven = DrivenRobot(Ahead(), adding(room(), block))
     assert driven.drive(60).status is CommandStatus.DRIVING
     assert driven.overlap(block) > 0.0
+
+
+@pytest.mark.warm("straight")
+def test_a_map_that_is_perceived_anew_each_time_costs_no_plan(monkeypatch) -> None:
+    rng = np.random.default_rng(0)
+    exact = DrivenRobot.seen
+    monkeypatch.setattr(DrivenRobot, "seen", lambda one: perceived_anew(exact(one), rng))
+    driven = DrivenRobot("straight", adding(room(), wall(5.0, 0.0, 2.7), wall(5.0, 3.3, 6.0)))
+    assert driven.drive(400).status is CommandStatus.DONE
+    assert len(driven.runner.policy.plan_log) == 1
+    assert {command.status for command in driven.commands[5:-1]} == {CommandStatus.DRIVING}
+
+
+def test_a_robot_whose_policy_asks_for_no_motion_waits() -> None:
+    policy = Ahead()
+    policy.speed = 0.0
+    last = DrivenRobot(policy, room()).drive(3)
+    assert last.status is CommandStatus.WAITING and last.reason
+
+
+def test_a_ship_plans_on_where_open_water_gets_its_first_obstacle() -> None:
+    ship = replace(ROBOT, drive=Drive.CONSTANT_SPEED, max_speed=0.4, max_turn_rate=0.8)
+    objects = Movables.from_outlines([SQUARE], [[4.0, 3.0, 0.0]], masses=[0.3])
+    sea, line = StaticMap.build(bounds=[0, 0, 10, 6]), GoalLine([6.0, 3.0], [1.0, 0.0])
+    world = replace(room(ship, objects), static=sea, goal=line)
+    driven = DrivenRobot("ship-lattice-quick", world)
+    hold = when_at(2.0, lambda world: world.believing([True]))
+    assert driven.drive(400, hold).status is CommandStatus.DONE
+    assert driven.overlap(square_at(4.0, 3.0)) == 0.0 and driven.runner.failures == 0
+
+
+@pytest.mark.slow
+def test_gtsp_mpc_pushes_what_can_be_pushed_and_waits_with_what_turned_out_fixed() -> None:
+    objects = Movables.from_outlines([SQUARE] * 2, [[4.0, 3.0, 0.0], [5.0, 3.7, 0.3]])
+    corners = np.array([[3.0, 2.0], [6.0, 2.0], [6.0, 5.0], [3.0, 5.0]])
+    area = ClearanceArea(corners, np.ones(4, dtype=bool))
+    driven = PushingRobot("gtsp-mpc", replace(room(objects=objects), goal=area))
+    held = []
+
+    def change(world: World, command: Command) -> World | None:
+        moved = world.movables.poses[:, :2] - objects.poses[:, :2]
+        pushed = np.hypot(*moved.T) > 0.1
+        if held or not pushed.any():
+            return None
+        held.extend(pushed.tolist())
+        return world.believing(held)
+
+    last = driven.drive(1200, change)
+    k = held.index(True)
+    driven.poses = driven.poses[-1:]  # it was at the object when that turned out fixed
+    assert driven.overlap(driven.world.movables.outline_world(k)) == 0.0
+    assert driven.world.completed.tolist() == [n != k for n in range(2)]
+    assert last.status is CommandStatus.WAITING and last.reason and not driven.runner.failures

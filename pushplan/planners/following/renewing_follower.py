@@ -10,7 +10,7 @@ import numpy as np
 from pushplan.interaction.path_sweepers import default_interaction
 from pushplan.planners.following.plan_follower import PlanFollower
 from pushplan.planners.following.replanning import Replanning
-from pushplan.world import Planner, Stop, World
+from pushplan.world import Planner, Stop, Twist, World
 
 
 @runtime_checkable
@@ -51,3 +51,7 @@ class RenewingFollower(PlanFollower):
         if isinstance(self.planner, PreparedPlanner):
             self.planner.prepare(world)
         super().reset(world, rng)
+
+    def _act(self, world: World) -> Twist:
+        self.interaction = default_interaction(world)  # open water may get its first obstacle
+        return super()._act(world)
