@@ -125,16 +125,22 @@ class KeyholeSearch:
         stopped: Callable[[int], bool],
     ) -> None:
         self.world, self.config, self.interaction = world, config, interaction
-        self.pushes = self.expansions = 0
+        self.expansions = 0
+        count = self._count = [0]  # apart, so that the space does not hold the search
         size = world.robot.circumscribed_radius
         self._size = size
-        self._space = _disc_space(world, config, lambda: stopped(self.pushes))
+        self._space = _disc_space(world, config, lambda: stopped(count[0]))
         self._shape = footprint(world.robot, config.margin * size)
         self._bare = footprint(world.robot)
         self._walls = obstacles(world.static)
         self._numbers = itertools.count()
         self._open: list[_Entry] = []
         self._seen: set[bytes] = set()
+
+    @property
+    def pushes(self) -> int:
+        """Number of pushes simulated."""
+        return self._count[0]
 
     def run(self) -> KeyholeEnd | None:
         """The cheapest scene found from which the goal is reached; None if there is none.
@@ -222,7 +228,7 @@ class KeyholeSearch:
 
     def _push(self, end: KeyholeEnd, push: LinePush, rank: int) -> Iterator[KeyholeEnd]:
         """The scenes after a push, each ended where it opens something, or in a later rank."""
-        self.pushes += 1
+        self._count[0] += 1
         config, size = self.config, self._size
         path = push.path(config.longest * size, size)
         free = first_blocked(

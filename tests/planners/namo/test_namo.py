@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import time
+import weakref
 
 import numpy as np
 import pytest
@@ -184,6 +185,9 @@ def test_a_robot_that_cannot_turn_does_not_get_free_through_a_wall() -> None:
     )
     ends = KeyholeSearch(world, KeyholeConfig(), QuasiStatic(), lambda pushes: pushes > 50)
     assert ends.run() is None
+    search = weakref.ref(ends)
+    del ends
+    assert search() is None  # its distances are large: they do not wait for the garbage collector
 
 
 @pytest.mark.usefixtures("cpu_time")
