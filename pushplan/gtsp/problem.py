@@ -10,6 +10,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from pushplan.compiled import owned
 from pushplan.gtsp.dominance_kernels import needed_nodes
 from pushplan.gtsp.node_choice_kernels import SPARE
 from pushplan.world.checks import FloatArray, IntArray
@@ -26,11 +27,11 @@ class Problem:
 
     @staticmethod
     def build(costs: NDArray[np.number], members: Sequence[IntArray]) -> Problem:
-        """Gather the members of each cluster; copies nothing where the order is right already."""
+        """Gather the members of each cluster; what is in order and writable is not copied."""
         names = np.concatenate(members)
         offsets = np.concatenate(([0], np.cumsum([len(nodes) for nodes in members])))
         if len(names) == len(costs) and (names == np.arange(len(names))).all():
-            gathered = np.ascontiguousarray(costs, dtype=np.float64)
+            gathered = owned(costs.astype(np.float64, copy=False))
         else:
             gathered = costs[np.ix_(names, names)].astype(np.float64)
         return Problem(gathered, offsets.astype(np.int64), names.astype(np.int64))

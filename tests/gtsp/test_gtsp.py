@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from pushplan.compiled.cache import KernelCache
 from pushplan.gtsp import (
     GtspConfig,
     Tour,
@@ -45,6 +46,19 @@ PROOF = GtspConfig(method="search", lower_bound=True)
 @pytest.fixture(scope="module", autouse=True)
 def _compiled() -> None:
     warm_up_solver()
+
+
+@pytest.mark.parametrize("method", ["auto", "search"])
+def test_nothing_is_compiled_after_the_warm_up(
+    method: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A deadline would run out meanwhile: read-only costs, as of a file, are of another type."""
+    asked = []
+    monkeypatch.setattr(KernelCache, "load_overload", lambda self, *_: asked.append(self))
+    costs = np.random.default_rng(0).random((6, 6))
+    costs.flags.writeable = False
+    tour = solve_gtsp(costs, [[0], [1, 2], [3, 4, 5]], config=GtspConfig(method=method))
+    assert tour.status.has_tour and not asked
 
 
 def brute_force(costs: np.ndarray, clusters: list[list[int]]) -> float:
