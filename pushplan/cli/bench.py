@@ -36,7 +36,6 @@ def add(commands: Any) -> None:
     complete(suite, "suites")
     policies = parser.add_argument(
         "--policies",
-        required=True,
         metavar="A,B",
         help="names ('pushplan list policies'), 'onnx:FILE', 'sb3:FILE', 'file.py:Class' or "
         "'module:Class' of a policy or a planner, each with 'label=' in front if wanted",
@@ -83,7 +82,12 @@ def run(options: argparse.Namespace) -> int:
     """Run the batch, print the table, write plots and page."""
     from pushplan.cli.report import exit_code, show, show_json
     from pushplan.evaluation.benchmark import bench_experiment
+    from pushplan.world import InvalidInputError
 
+    if options.policies is None:  # the parser would say so before it names a misspelt option
+        raise InvalidInputError(
+            "the following arguments are required: --policies; see 'pushplan bench --help'"
+        )
     out = options.out or _default_out(options.suite)
     check_directory(out)
     experiment = bench_experiment(

@@ -171,5 +171,5 @@ def test_a_folder_that_goes_away_is_one_line(tmp_path: Path) -> None:
         if done == 5:
             shutil.rmtree(tmp_path / "run")
 
-    with pytest.raises(InvalidInputError, match="cannot use"):
+    with pytest.raises(InvalidInputError, match="was removed or replaced"):
         run_batch(JOBS, out=tmp_path / "run", workers=0, settings=SETTINGS, progress=remove)

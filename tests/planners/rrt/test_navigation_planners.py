@@ -38,7 +38,7 @@ from pushplan.world.outline import transform
 pytestmark = pytest.mark.warm("geometric-rrt", "kinodynamic-rrt")
 
 BUDGET = MaxIterations(1200)
-QUICK = MaxIterations(20_000) | FirstSolution()
+QUICK = MaxIterations(80_000) | FirstSolution()
 
 
 def generator(seed: int) -> np.random.Generator:
