@@ -76,11 +76,12 @@ def load_episode(path: str | Path) -> Episode:
 
 def _messages(path: Path) -> Iterator[tuple[str, Any]]:
     """The messages of our own topics, in the order of their times, and what was lost."""
+    library = need("mcap.stream_reader")
     types, data = RosbagsTypes(), read_bytes(path, "log")
     channels: dict[int, Any] = {}
     messages, notes = [], []
     try:
-        for record in _records(data):
+        for record in _records(library, data):
             kind = type(record).__name__
             if kind == "Channel":
                 channels[record.id] = record
@@ -108,9 +109,8 @@ def _messages(path: Path) -> Iterator[tuple[str, Any]]:
         raise _unreadable(path, error) from error
 
 
-def _records(data: bytes) -> Iterator[Any]:
+def _records(library: Any, data: bytes) -> Iterator[Any]:
     """All records of a file, one after the other: the summary at its end may be missing."""
-    library = need("mcap.stream_reader")
     left = MAX_BYTES
     reader = library.StreamReader(
         io.BytesIO(data), emit_chunks=True, validate_crcs=True, record_size_limit=MAX_BYTES
