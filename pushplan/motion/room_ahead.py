@@ -206,7 +206,11 @@ def _search(
     """Explore from ``start`` until the outcome is known, or as long as is allowed."""
     moves = np.abs(rules.moves).tolist()
     cell = _CELL * moves[-1][0]
-    turns = [length if math.isinf(bend) else length * bend for length, bend in moves if bend]
+    turns = [
+        length if math.isinf(curvature) else length * curvature
+        for length, curvature in moves
+        if curvature
+    ]
     turn = min(max(_CELL * min(turns), _LEAST_TURN), math.pi)
     half, headings = int(rules.reach / cell) + 2, math.ceil(math.tau / turn)
     capacity = len(rules.moves) * most + 1

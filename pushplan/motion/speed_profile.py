@@ -69,9 +69,9 @@ def goal_is_outside(world: World) -> bool:
     return goal.distance(float(nearest[0]), float(nearest[1])) > 0.0
 
 
-def along_arcs(chords: FloatArray, bends: FloatArray) -> FloatArray:
+def along_arcs(chords: FloatArray, curvatures: FloatArray) -> FloatArray:
     """(N,) lengths [m] of arcs with some chords (N,) [m] and curvatures (N,) [1/m]."""
-    half = np.clip(0.5 * np.abs(bends) * chords, 1e-9, 1.0)
+    half = np.clip(0.5 * np.abs(curvatures) * chords, 1e-9, 1.0)
     return chords * np.arcsin(half) / half
 
 
@@ -122,7 +122,7 @@ def timed_plan(
 
 
 def _eased(
-    world: World, rates: FloatArray, extents: FloatArray, bends: FloatArray, spot: BoolArray
+    world: World, rates: FloatArray, extents: FloatArray, curvatures: FloatArray, spot: BoolArray
 ) -> FloatArray:
     """Slow down where a step would change speed or turn rate faster than the robot can.
 
@@ -133,7 +133,7 @@ def _eased(
         world: gives the robot.
         rates: (N,) speed of each step [m/s], or turn rate on the spot [rad/s].
         extents: (N,) length [m], or angle [rad].
-        bends: (N,) curvature [1/m].
+        curvatures: (N,) curvature [1/m].
         spot: (N,) which steps turn on the spot.
 
     Returns:
@@ -144,10 +144,10 @@ def _eased(
     if (math.isinf(robot.max_acceleration) and math.isinf(turning)) or not len(rates):
         return rates
     # half of the turn acceleration is for changes of speed on an arc, half for changes of curvature
-    most = np.minimum(robot.max_acceleration, 0.5 * turning / np.maximum(np.abs(bends), 1e-12))
+    most = np.minimum(robot.max_acceleration, 0.5 * turning / np.maximum(np.abs(curvatures), 1e-12))
     most[spot] = turning
     limits, between = np.abs(rates), 0.5 * (extents[1:] + extents[:-1])
-    changes = np.maximum(np.abs(np.diff(bends)), 1e-12)
+    changes = np.maximum(np.abs(np.diff(curvatures)), 1e-12)
     allowed = np.sqrt(0.5 * turning * between / changes)
     limits[1:] = np.minimum(limits[1:], allowed)
     limits[:-1] = np.minimum(limits[:-1], allowed)

@@ -72,7 +72,7 @@ def start_turn(improver: PathImprover, before: Lead | None = None) -> Lead | Non
     return Lead(np.concatenate([before.pieces, piece]), pose, best.objects)
 
 
-def way_out(improver: PathImprover) -> Lead | None:
+def drive_to_turn(improver: PathImprover) -> Lead | None:
     """The drive of a differential drive that may reverse to where it can turn about, and the turn.
 
     It moves no object and keeps the margin from walls if it can.

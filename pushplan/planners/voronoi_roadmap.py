@@ -227,7 +227,7 @@ class _Walls:
         self._stopped = stopped
 
     def are_clear(self, a: FloatArray, b: FloatArray) -> BoolArray:
-        """Whether the lines from (N, 2) ``a`` to (N, 2) ``b`` keep clear of them.
+        """True if the lines from (N, 2) ``a`` to (N, 2) ``b`` keep clear of them.
 
         Raises:
             Stopped: if the stop rule fires.

@@ -46,7 +46,7 @@ class NoiseAllowance:
 
     @property
     def is_noisy(self) -> bool:
-        """Whether there is any noise."""
+        """True if there is any noise."""
         return self.place + self.heading > 0.0
 
     def noise_margin(self, robot: RobotModel) -> float:

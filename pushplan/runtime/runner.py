@@ -213,7 +213,7 @@ class Runner:
     def _observe(self, world: World) -> None:
         """Take a snapshot, and see whether it is sure by now that the goal is reached."""
         seen = self._estimator.observe(world)
-        self._done = self._done + 1 if is_done(seen) else max(0, self._done - 1)
+        self._done = self._done + 1 if seen.goal_reached else max(0, self._done - 1)
         exact = isinstance(world.goal, GoalDisc | GoalLine) and not self._allowance.is_noisy
         once = exact or not world.robot.can_stop  # one that drives on may be out soon
         self._surely_done = self._surely_done or self._done >= (1 if once else _SURE)
@@ -419,7 +419,7 @@ class Runner:
 
     @property
     def _is_planning(self) -> bool:
-        """Whether a planning call has not returned yet."""
+        """True if a planning call has not returned yet."""
         return isinstance(self._executor, ThreadExecutor) and self._executor.is_busy
 
     @property
@@ -437,11 +437,3 @@ def _missing_plan(policy: Policy) -> str:
         return ""
     status = policy.plan_log[-1].status
     return "" if status.has_plan else f"{status.label}: {status.remedy}"
-
-
-def is_done(world: World) -> bool:
-    """Whether the robot, or every object, is where the goal wants it."""
-    goal = world.goal
-    if isinstance(goal, GoalDisc | GoalLine):
-        return goal.distance(float(world.robot_pose[0]), float(world.robot_pose[1])) == 0.0
-    return bool(world.completed.all())

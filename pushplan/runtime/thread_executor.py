@@ -66,7 +66,7 @@ class ThreadExecutor:
 
     @property
     def is_busy(self) -> bool:
-        """Whether a call has not ended yet."""
+        """True if a call has not ended yet."""
         return bool(self._running())
 
     @property

@@ -127,7 +127,7 @@ class Connection:
                 self._buffer.clear()
 
     def has_left(self) -> bool:
-        """Whether the client has closed its side; from any thread, at once.
+        """True if the client has closed its side; from any thread, at once.
 
         A client that only sends no more may still read. A Unix socket tells that from one that has
         left; a TCP socket does not, and such a client counts as having left.

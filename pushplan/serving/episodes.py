@@ -9,7 +9,6 @@ from typing import Any
 from pushplan.control import ImmediateExecutor
 from pushplan.runtime import PLAN_STOP, Command, Runner
 from pushplan.runtime.held_actions import twist_of
-from pushplan.runtime.runner import is_done
 from pushplan.serving.messages import plan_fields, twist_fields
 from pushplan.world import (
     Cancellation,
@@ -92,7 +91,7 @@ class StepEpisode:
             fields["twist"] = twist_fields(twist_of(world, action))
         plan = None if self._shows is None else self._shows.current_plan
         plans = self._plans.fields(plan, world.time, with_plan)
-        return {**fields, "done": is_done(world), **plans}
+        return {**fields, "done": world.goal_reached, **plans}
 
     def abandon(self) -> None:
         """End the planning call that runs, from any thread."""

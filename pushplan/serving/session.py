@@ -57,7 +57,7 @@ class Session:
 
     @property
     def greeted(self) -> bool:
-        """Whether the client has said hello."""
+        """True if the client has said hello."""
         return self._feed is not None
 
     def answer(self, body: bytes) -> Answer:

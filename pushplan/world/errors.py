@@ -99,7 +99,7 @@ def place(error: BaseException) -> str:
 
 
 def is_a_users(file: str) -> bool:
-    """Whether a file of code belongs neither to pushplan nor to Python nor to a library."""
+    """True if a file of code belongs neither to pushplan nor to Python nor to a library."""
     return not file.startswith(_NOT_A_USERS) and not _INSTALLED & {*file.split(os.sep)}
 
 

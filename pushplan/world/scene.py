@@ -122,6 +122,14 @@ class World(ArrayRecord, CheckedFields):
         solid = _with_objects(self.static, self.movables.select(fixed))
         return replace(self, static=solid, movables=self.movables.select(~fixed))
 
+    @property
+    def goal_reached(self) -> bool:
+        """True if the robot, or every object, is where the goal wants it."""
+        if isinstance(self.goal, GoalDisc | GoalLine):
+            x, y, _ = self.robot_pose.tolist()
+            return self.goal.distance(x, y) == 0.0
+        return bool(self.completed.all())
+
     def robot_outline_world(self) -> tuple[FloatArray, ...]:
         """Footprint parts, each (N, 2) corners in the world frame [m]."""
         return tuple(transform(self.robot_pose, part) for part in self.robot.contact_parts)

@@ -17,7 +17,7 @@ from pushplan.motion.random_tree.kinodynamic_tree import TreeGrowth, TreeLimits
 from pushplan.motion.random_tree.targets import Targets
 from pushplan.motion.room_ahead import gets_away, is_boxed_in
 from pushplan.motion.speed_profile import TIGHTEST
-from pushplan.motion.start_turn import start_turn, way_out
+from pushplan.motion.start_turn import drive_to_turn, start_turn
 from pushplan.world import Drive
 from pushplan.world.checks import FloatArray
 from pushplan.world.outline import unflatten
@@ -75,7 +75,7 @@ class TreePaths:
         if robot.min_speed < 0.0 and robot.drive is Drive.CAR:
             improver.backward = max(2.0 * improver.backward, _BACKWARD * robot.turning_radius)
         elif robot.min_speed < 0.0 and not self._gets_away():
-            improver.begin_with(way_out(improver) or improver.lead)
+            improver.begin_with(drive_to_turn(improver) or improver.lead)
         if not improver.relaxed:
             tightest = max(robot.turning_radius, TIGHTEST * improver.size)
             bare = improver.room._replace(footprint=footprint(robot))

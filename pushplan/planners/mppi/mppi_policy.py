@@ -110,7 +110,7 @@ class MppiPolicy:
 
     def _wanted(self, world: World, held: float) -> Twist:
         """The newest controls at the middle of the next step."""
-        if _is_done(world):
+        if world.goal_reached:
             return waiting_twist(world)
         self._receive(world)
         due = self._decided_at + self.config.period * step_length(world, self.config)
@@ -150,11 +150,3 @@ def _objective(world: World, config: MppiConfig, targets: TargetChoice) -> Objec
     if isinstance(world.goal, GoalDisc | GoalLine):
         return navigation_objective(world, config)
     return manipulation_objective(world, config, targets.approach(world))
-
-
-def _is_done(world: World) -> bool:
-    """Whether there is nothing left to do."""
-    if isinstance(world.goal, GoalDisc | GoalLine):
-        x, y, _ = world.robot_pose.tolist()
-        return world.goal.distance(x, y) == 0.0
-    return bool(world.completed.all())
