@@ -9,7 +9,7 @@ import re
 import sqlite3
 import stat
 from collections.abc import Iterator, Mapping
-from contextlib import closing, contextmanager
+from contextlib import closing, contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -28,6 +28,8 @@ LOCK = ".lock"
 """File in a run directory that its writer holds."""
 WAIT_S = 30.0
 """How long a writer waits for another program that holds the database [s]."""
+_UNLOCKED = "&vfs=unix-none"
+"""Option of SQLite for a disk without locks, or without the file that readers of a log share."""
 HIDE_OTHERS = (
     "UPDATE results SET current = (job = ?) WHERE (policy, scenario, seed) = "
     "(SELECT policy, scenario, seed FROM results WHERE job = ?)"
@@ -173,22 +175,23 @@ def open_checked(path: Path, mode: str = "ro") -> sqlite3.Connection:
         sqlite3.Error: if it cannot be read.
         SchemaError: if it holds other tables than a run makes, or anything that is no table.
     """
-    uri = f"{path.absolute().as_uri()}?mode={mode}"
-    has_locks = is_locked(path.with_name(LOCK), posix=True) is not None
-    try:
-        if has_locks:
-            return _checked(sqlite3.connect(uri, uri=True, timeout=WAIT_S), path)
-    except sqlite3.OperationalError:
-        if mode != "ro":
-            raise
-    # without locks, or the file beside the log that readers share: it cannot be made everywhere
-    db = sqlite3.connect(f"{uri}&vfs=unix-none", uri=True)
-    db.execute("PRAGMA locking_mode=EXCLUSIVE")
-    return _checked(db, path)
+    ways = [_UNLOCKED]
+    if is_locked(path.with_name(LOCK), posix=True) is not None:
+        ways = ["", *ways] if mode == "ro" else [""]
+    if mode == "ro" and not path.with_name(f"{path.name}-wal").exists():
+        ways.append("&immutable=1")  # on a disk that cannot be written
+    for way in ways[:-1]:
+        with suppress(sqlite3.OperationalError):
+            return _checked(path, mode, way)
+    return _checked(path, mode, ways[-1])
 
 
-def _checked(db: sqlite3.Connection, path: Path) -> sqlite3.Connection:
+def _checked(path: Path, mode: str, way: str) -> sqlite3.Connection:
+    uri = f"{path.absolute().as_uri()}?mode={mode}{way}"
+    db = sqlite3.connect(uri, uri=True, timeout=WAIT_S)
     try:
+        if way:
+            db.execute("PRAGMA locking_mode=EXCLUSIVE")
         db.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, MAX_TEXT)
         room = _LEAST_STEPS + _STEPS_PER_BYTE * 512 * path.stat().st_blocks
         steps = iter(range(room // _STEPS))

@@ -13,7 +13,7 @@ from matplotlib import rc_context
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator
 
-from pushplan.drawing.figure import FORMATS, STYLE, save_figure
+from pushplan.drawing.figure import STYLE, save_figure
 from pushplan.evaluation.interval_plot import draw_intervals
 from pushplan.evaluation.plot_style import (
     LINE,
@@ -34,7 +34,6 @@ from pushplan.evaluation.statistics_aggregate import performance_profile
 from pushplan.evaluation.summary import grouped, values_of
 from pushplan.evaluation.tables import heading
 from pushplan.metrics import Role, metric_names
-from pushplan.world.checks import choice
 
 _MANY = 300  # so many dots of a policy in a panel are drawn as an image
 _SETTINGS = 6  # of more, figures with a panel for each show all together
@@ -53,11 +52,8 @@ def write_plots(run: RunRecord, folder: Path, formats: Sequence[str] = ()) -> di
 
     Returns:
         Caption -> path of an SVG file.
-
-    Raises:
-        InvalidInputError: if there is no such format.
     """
-    endings = [choice("figures", f".{one}", FORMATS) for one in formats]
+    endings = [f".{one}" for one in formats]
     source = json.dumps({"runs": run.about.get("runs", []), "policies": run.about.get("policies")})
     plots: dict[str, Path] = {}
     if max(map(len, grouped(run.rows).values()), default=0) < 2:

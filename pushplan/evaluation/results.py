@@ -204,8 +204,12 @@ class Results(RunRecord):
         """
         from pushplan.evaluation.page import PAGE, REPLAYS, is_page, write_page
 
+        plots = need("pushplan.evaluation.plots")
         choice("replays", replays, REPLAYS)
         integer("most", most, low=0)
+        for ending in figures:
+            choice("figures", f".{ending}", need("pushplan.drawing.figure").FORMATS)
+        compared = self.compare(pairs)
         folder = Path(out) if out is not None else self.path or Path()
         if not is_page(folder / PAGE):
             check_folder(folder, "run directory", DATABASE)
@@ -217,12 +221,11 @@ class Results(RunRecord):
         tables = self.tables(wide=True, settings=True, pairs=pairs)
         write_atomic(folder / "summary.md", markdown(tables).encode())
         write_atomic(folder / "summary.csv", summary_csv(self.summary(), self.titles).encode())
-        compared = self.compare(pairs)
         if len(self.titles) > 1:
             compared = [*self.pooled.compare(pairs), *compared]
         write_atomic(folder / "differences.csv", differences_csv(compared, self.titles).encode())
-        plots = need("pushplan.evaluation.plots").write_plots(self, folder, figures)
-        return write_page(self, tables, plots, folder, replays=replays, most=most)
+        drawn = plots.write_plots(self, folder, figures)
+        return write_page(self, tables, drawn, folder, replays=replays, most=most)
 
     def _check_same_run(self, folder: Path) -> None:
         if not os.path.lexists(folder / DATABASE):

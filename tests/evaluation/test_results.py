@@ -269,9 +269,12 @@ def test_page_csv_and_database_of_a_folder_say_the_same(tmp_path: Path) -> None:
 
     few.report(tmp_path / "few")
     assert len((tmp_path / "few" / "results.csv").read_text().splitlines()) == len(few.rows) + 1
-    longer = bench("smoke", ["straight"], episodes=3, workers=0, out=tmp_path / "few")
-    assert not (tmp_path / "few" / "report.html").exists()  # it was about other rows
+    with pytest.raises(InvalidInputError, match="is no run directory"):
+        bench("smoke", ["straight"], episodes=3, workers=0, out=tmp_path / "few")
+    folder = tmp_path / "longer"
+    bench("smoke", ["straight"], episodes=2, workers=0, out=folder).report()
+    bench("smoke", ["straight"], episodes=3, workers=0, out=folder)
+    assert not (folder / "report.html").exists()  # it was about other rows
     with pytest.raises(InvalidInputError, match="another folder"):
-        few.report(tmp_path / "few")
-    longer.report()
-    Results.load(tmp_path / "few").report()
+        few.report(folder)
+    Results.load(folder).report()
