@@ -9,7 +9,7 @@ from functools import partial
 from pushplan.envs.tasks.manipulation import ManipulationPreset
 from pushplan.envs.tasks.materials import BENCHMARK_MATERIALS, TESTBED_MATERIALS
 from pushplan.world import area_clearing_robot, turtlebot3_burger
-from pushplan.world.original_robots import CONTACT_RADIUS, original_area_clearing_robot
+from pushplan.world.robots import CONTACT_RADIUS, original_area_clearing_robot
 
 
 @dataclass(frozen=True)

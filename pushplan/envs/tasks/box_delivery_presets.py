@@ -13,8 +13,8 @@ from pushplan.envs.tasks.manipulation import ManipulationPreset
 from pushplan.envs.tasks.materials import BENCHMARK_MATERIALS, TESTBED_MATERIALS
 from pushplan.world import box_delivery_robot, jackal, turtlebot3_burger
 from pushplan.world.checks import FloatArray
-from pushplan.world.original_robots import CONTACT_RADIUS, original_box_delivery_robot
 from pushplan.world.outline import grown_outline
+from pushplan.world.robots import CONTACT_RADIUS, original_box_delivery_robot
 
 LAYOUTS = ("small_empty", "small_columns", "large_columns", "large_divider")
 

@@ -20,7 +20,7 @@ from pushplan.world import (
     turtlebot3_burger,
 )
 from pushplan.world.checks import choice
-from pushplan.world.original_robots import CONTACT_RADIUS, original_maze_robot
+from pushplan.world.robots import CONTACT_RADIUS, original_maze_robot
 
 
 @dataclass(frozen=True)

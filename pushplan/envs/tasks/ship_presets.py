@@ -13,8 +13,8 @@ from pushplan.envs.simulators.water import Water
 from pushplan.scenarios.ice import FloeSizes
 from pushplan.world import Drive, RobotModel
 from pushplan.world.checks import FloatArray
-from pushplan.world.original_robots import CONTACT_RADIUS
 from pushplan.world.outline import centroid
+from pushplan.world.robots import CONTACT_RADIUS
 
 ICE_DENSITY = 900.0
 """[kg/m³], full scale."""
