@@ -15,7 +15,7 @@ from pushplan.world.errors import InvalidInputError, SchemaError, short, unknown
 from pushplan.world.goals import ClearanceArea, Goal, GoalDisc, GoalLine, Receptacle
 from pushplan.world.movables import Movables
 from pushplan.world.nav2_map import load_nav2_map
-from pushplan.world.outline import convex_outline, signed_area
+from pushplan.world.outline import convex_outline, signed_area, unflatten
 from pushplan.world.robot import Drive, RobotModel
 from pushplan.world.safe_files import read_data
 from pushplan.world.safe_yaml import dump
@@ -25,17 +25,21 @@ from pushplan.world.static_map import StaticMap
 SCHEMA = "pushplan-world/1"
 """Name and version of the file format; files of another version are refused."""
 
-_ROBOT_LIMITS = (
-    "min_speed",
-    "max_acceleration",
-    "max_turn_acceleration",
-    "min_turning_radius",
-    "wheel_separation",
-    "contact_radius",
-    "wheel_parts",
+_ROBOT_NEEDS = ("parts", "mass", "drive", "max_speed", "max_turn_rate", "pose")
+_ROBOT_KEYS = (
+    *("name", "drive", "parts", "mass", "max_speed", "max_turn_rate"),
+    *("min_speed", "max_acceleration", "max_turn_acceleration", "min_turning_radius"),
+    *("wheel_separation", "contact_radius", "wheel_parts"),
 )
-_IF_THERE = ("contact_radius", "wheel_parts")
-"""Written only where they are not 0."""
+_LEFT_OUT = {
+    "max_acceleration": math.inf,
+    "max_turn_acceleration": math.inf,
+    "contact_radius": 0.0,
+    "wheel_parts": 0,
+    "fixed": False,
+    "margin": 0.0,
+}
+"""Values that are not written."""
 _GOALS: dict[str, tuple[type[Any], tuple[str, ...]]] = {
     "disc": (GoalDisc, ("center", "radius")),
     "line": (GoalLine, ("point", "normal")),
@@ -46,59 +50,54 @@ _GOALS: dict[str, tuple[type[Any], tuple[str, ...]]] = {
 
 def world_to_dict(world: World) -> dict[str, Any]:
     """The world as plain lists, numbers and texts, ready for JSON or YAML."""
-    robot: dict[str, Any] = {
-        "name": world.robot.name,
-        "drive": world.robot.drive.value,
-        "parts": [part.tolist() for part in world.robot.parts],
-        "mass": world.robot.mass,
-        "max_speed": world.robot.max_speed,
-        "max_turn_rate": world.robot.max_turn_rate,
-    }
-    for key in _ROBOT_LIMITS:
-        value = getattr(world.robot, key)
-        if math.isfinite(value) and (value or key not in _IF_THERE):
-            robot[key] = value
-    assert world.robot_twist is not None
-    robot["pose"] = world.robot_pose.tolist()
-    robot["twist"] = world.robot_twist.tolist()
+    robot = {key: _plain(getattr(world.robot, key)) for key in _ROBOT_KEYS}
+    robot["drive"] = world.robot.drive.value
+    robot["pose"] = _plain(world.robot_pose)
+    robot["twist"] = _plain(world.robot_twist)
     objects = world.movables
-    movables = [
-        {
-            "id": int(objects.ids[k]),
-            "pose": objects.poses[k].tolist(),
-            "twist": objects.twists[k].tolist(),
-            "outline": objects.drawn_outline(k).tolist(),
-            **({"contact_radius": float(radius)} if (radius := objects.contact_radii[k]) else {}),
-            "mass": float(objects.masses[k]),
-            "wheeled": bool(objects.wheeled[k]),
-            **({"fixed": True} if objects.fixed[k] else {}),
-        }
-        for k in range(len(objects))
-    ]
+    columns = {
+        "id": objects.ids,
+        "pose": objects.poses,
+        "twist": objects.twists,
+        "outline": unflatten(objects.drawn_vertices, objects.drawn_offsets),
+        "contact_radius": objects.contact_radii,
+        "mass": objects.masses,
+        "wheeled": objects.wheeled,
+        "fixed": objects.fixed,
+    }
+    rows = zip(*map(_plain, columns.values()), strict=True)
     static = {
-        "bounds": world.static.bounds.tolist(),
-        "polygons": [polygon.tolist() for polygon in world.static.polygons],
+        "bounds": _plain(world.static.bounds),
+        "polygons": _plain(world.static.polygons),
         "segments": [
             {"from": line[:2].tolist(), "to": line[2:].tolist(), "radius": float(radius)}
             for line, radius in zip(world.static.segments, world.static.radii, strict=True)
         ],
     }
-    kind, keys = next(
-        (kind, keys) for kind, (cls, keys) in _GOALS.items() if isinstance(world.goal, cls)
+    goal = world.goal
+    kind, keys = next((kind, keys) for kind, (cls, keys) in _GOALS.items() if isinstance(goal, cls))
+    return _written(
+        {
+            "schema": SCHEMA,
+            "time": world.time,
+            "margin": world.margin,
+            "robot": _written(robot),
+            "static": static,
+            "movables": [_written(dict(zip(columns, row, strict=True))) for row in rows],
+            "goal": {"kind": kind, **{key: _plain(getattr(goal, key)) for key in keys}},
+        }
     )
-    goal: dict[str, Any] = {"kind": kind}
-    for key in keys:
-        value = getattr(world.goal, key)
-        goal[key] = value.tolist() if isinstance(value, np.ndarray) else value
-    return {
-        "schema": SCHEMA,
-        "time": world.time,
-        **({"margin": world.margin} if world.margin else {}),
-        "robot": robot,
-        "static": static,
-        "movables": movables,
-        "goal": goal,
-    }
+
+
+def _plain(value: Any) -> Any:
+    """Arrays, and tuples of them, as lists."""
+    if isinstance(value, tuple):
+        return [part.tolist() for part in value]
+    return value.tolist() if isinstance(value, np.ndarray) else value
+
+
+def _written(values: dict[str, Any]) -> dict[str, Any]:
+    return {key: value for key, value in values.items() if value != _LEFT_OUT.get(key)}
 
 
 def world_from_dict(data: object, folder: str | Path = ".") -> World:
@@ -171,8 +170,7 @@ def robot_from_dict(data: object) -> tuple[RobotModel, Any, Any]:
     Raises:
         SchemaError, InvalidInputError: as `world_from_dict`.
     """
-    needed = ("parts", "mass", "drive", "max_speed", "max_turn_rate", "pose")
-    known_keys("robot", data, (*needed, *_ROBOT_LIMITS, "name", "twist"), needed)
+    known_keys("robot", data, (*_ROBOT_KEYS, "pose", "twist"), _ROBOT_NEEDS)
     assert isinstance(data, Mapping)
     fields = {key: value for key, value in data.items() if key not in ("pose", "twist")}
     if not isinstance(fields["parts"], list):
@@ -223,8 +221,7 @@ def movables_from_list(data: object) -> Movables:
     Raises:
         SchemaError, InvalidInputError: as `world_from_dict`.
     """
-    outlines, poses, twists, masses, wheeled, ids, radii = [], [], [], [], [], [], []
-    fixed: list[bool] = []
+    rows = []
     for i, item in enumerate(_list("movables", data)):
         name = f"movables[{i}]"
         known_keys(name, item, _MOVABLE_KEYS, ())
@@ -239,25 +236,35 @@ def movables_from_list(data: object) -> Movables:
         else:
             outline = convex_outline(f"{name}.outline", item["outline"])
             pose = array(f"{name}.pose", item["pose"], (3,))
-        outlines.append(outline)
-        poses.append(pose)
-        twists.append(array(f"{name}.twist", item.get("twist", [0.0, 0.0, 0.0]), (3,)))
         mass = item.get("mass")
-        if mass is None:
-            mass = signed_area(outline)
-        masses.append(number(f"{name}.mass", mass, low=0.0, open_low=True))
-        wheeled.append(boolean(f"{name}.wheeled", item.get("wheeled", False)))
-        fixed.append(boolean(f"{name}.fixed", item.get("fixed", False)))
-        radii.append(number(f"{name}.contact_radius", item.get("contact_radius", 0.0), low=0.0))
-        ids.append(integer(f"{name}.id", item.get("id", i), high=2**63 - 1))
+        rows.append(
+            (
+                outline,
+                pose,
+                array(f"{name}.twist", item.get("twist", [0.0, 0.0, 0.0]), (3,)),
+                number(
+                    f"{name}.mass",
+                    signed_area(outline) if mass is None else mass,
+                    low=0.0,
+                    open_low=True,
+                ),
+                boolean(f"{name}.wheeled", item.get("wheeled", False)),
+                boolean(f"{name}.fixed", item.get("fixed", False)),
+                number(f"{name}.contact_radius", item.get("contact_radius", 0.0), low=0.0),
+                integer(f"{name}.id", item.get("id", i), high=2**63 - 1),
+            )
+        )
+    if not rows:
+        return Movables.empty()
+    outlines, poses, twists, masses, wheeled, fixed, radii, ids = zip(*rows, strict=True)
     return Movables.from_outlines(
         outlines,
-        np.asarray(poses) if poses else np.zeros((0, 3)),
+        poses,
         masses=masses,
         wheeled=wheeled,
-        twists=np.asarray(twists) if twists else np.zeros((0, 3)),
+        twists=twists,
         ids=ids,
-        contact_radii=radii or 0.0,
+        contact_radii=radii,
         fixed=fixed,
     )
 
