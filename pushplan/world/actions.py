@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from pushplan.world.checks import FloatArray, number
+from pushplan.world.checked_fields import CheckedFields
+from pushplan.world.checks import FloatArray
 
 
 @dataclass(frozen=True)
-class Twist:
+class Twist(CheckedFields):
     """Velocity command in the body frame, as ROS's ``cmd_vel``.
 
     Args:
@@ -16,24 +17,20 @@ class Twist:
         angular: turn rate, counter-clockwise positive [rad/s].
     """
 
+    field_prefix = "twist."
+
     linear: float
     angular: float
 
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "linear", number("twist.linear", self.linear))
-        object.__setattr__(self, "angular", number("twist.angular", self.angular))
-
 
 @dataclass(frozen=True)
-class WheelSpeeds:
+class WheelSpeeds(CheckedFields):
     """Rim speeds of the driven wheels of a differential drive [m/s]."""
+
+    field_prefix = "wheel_speeds."
 
     left: float
     right: float
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "left", number("wheel_speeds.left", self.left))
-        object.__setattr__(self, "right", number("wheel_speeds.right", self.right))
 
 
 Action = Twist | WheelSpeeds | FloatArray

@@ -17,8 +17,8 @@ from pushplan.world.checks import array, boolean, choice, expect, integer, numbe
 class Limits:
     """Range of a number, in ``Annotated[float, Limits(...)]``; ``open_low`` leaves ``low`` out."""
 
-    low: Any = None
-    high: Any = None
+    low: float = -math.inf
+    high: float = math.inf
     open_low: bool = False
     finite: bool = True
 
@@ -82,41 +82,40 @@ class CheckedFields:
 
 @cache
 def _checks(kind: Any) -> tuple[tuple[str, str, Callable[..., Any], bool, Shape | None], ...]:
-    """Each checked field: name, the same in errors, check, whether it may be None, lettered shape.
+    """Each checked field: name, the same in errors, check, whether it may be None, shape.
 
-    A check is a function of what errors call the value, the value, and a shape if it has letters.
+    A check is a function of what errors call the value, the value, and of arrays a shape.
     """
     hints = get_type_hints(kind, include_extras=True)
     found = []
     for field in fields(kind):
         hint = hints[field.name]
         optional = type(None) in get_args(hint)
-        kinds = [one for one in get_args(hint) if one is not type(None)] if optional else [hint]
-        check, shape = _check(kinds[0]) if len(kinds) == 1 else (None, None)
+        if optional:
+            hint, *others = [one for one in get_args(hint) if one is not type(None)]
+            if others:
+                continue
+        base, *notes = get_args(hint) if get_origin(hint) is Annotated else (hint,)
+        note = notes[0] if notes else Limits()
+        check = _check(base, note)
         if check is not None:
+            shape = note if isinstance(note, Shape) else None
             found.append((field.name, kind.field_prefix + field.name, check, optional, shape))
     return tuple(found)
 
 
-def _check(hint: Any) -> tuple[Callable[..., Any] | None, Shape | None]:
-    base, *notes = get_args(hint) if get_origin(hint) is Annotated else (hint,)
-    note = notes[0] if notes else Limits()
+def _check(base: Any, note: Any) -> Callable[..., Any] | None:
     if isinstance(note, OneOf):
-        return partial(choice, valid=note.valid), None
+        return partial(choice, valid=note.valid)
     if isinstance(note, Shape):
         kind = get_args(base)[-1]  # of an NDArray: a dtype, and since NumPy 2.5 its scalar
-        dtype = np.dtype((get_args(kind) or (kind,))[0])
-        if any(isinstance(side, str) for side in note):
-            return partial(array, dtype=dtype), note
-        plain = tuple(side for side in note if not isinstance(side, str))
-        return partial(array, shape=plain, dtype=dtype), None
-    if base is int:
-        return partial(integer, low=note.low, high=note.high), None
-    if base is float:
-        low = -math.inf if note.low is None else note.low
-        high = math.inf if note.high is None else note.high
-        own = partial(number, open_low=note.open_low, finite=note.finite)
-        return partial(own, low=low, high=high), None
+        return partial(array, dtype=np.dtype((get_args(kind) or (kind,))[0]))
     if isinstance(base, type) and is_dataclass(base):
-        return partial(expect, kind=base), None
-    return {bool: boolean, str: word}.get(base), None
+        return partial(expect, kind=base)
+    plain: dict[Any, Callable[..., Any]] = {
+        bool: boolean,
+        str: word,
+        int: partial(integer, low=note.low, high=note.high),
+        float: partial(number, **vars(note)),
+    }
+    return plain.get(base)

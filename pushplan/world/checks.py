@@ -64,7 +64,7 @@ def number(
     raise InvalidInputError(f"{name} must lie in {rule}, got {result:g}")
 
 
-def integer(name: str, value: object, *, low: int | None = None, high: int | None = None) -> int:
+def integer(name: str, value: object, *, low: float = -math.inf, high: float = math.inf) -> int:
     """Check that ``value`` is a whole number in the stated range and return it as an int.
 
     Raises:
@@ -73,8 +73,8 @@ def integer(name: str, value: object, *, low: int | None = None, high: int | Non
     if isinstance(value, bool) or not isinstance(value, numbers.Integral):
         raise InvalidInputError(f"{name} must be a whole number, got {short(value)}")
     result = int(value)
-    if (low is not None and result < low) or (high is not None and result > high):
-        limits = f"at least {low}" if high is None else f"in [{low}, {high}]"
+    if not low <= result <= high:
+        limits = f"at least {low}" if high == math.inf else f"in [{low}, {high}]"
         raise InvalidInputError(f"{name} must be {limits}, got {short(result)}")
     return result
 

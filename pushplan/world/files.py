@@ -251,7 +251,7 @@ def movables_from_list(data: object) -> Movables:
                 boolean(f"{name}.wheeled", item.get("wheeled", False)),
                 boolean(f"{name}.fixed", item.get("fixed", False)),
                 number(f"{name}.contact_radius", item.get("contact_radius", 0.0), low=0.0),
-                integer(f"{name}.id", item.get("id", i), high=2**63 - 1),
+                integer(f"{name}.id", item.get("id", i), low=-(2**63), high=2**63 - 1),
             )
         )
     if not rows:

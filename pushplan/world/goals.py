@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import Annotated
 
@@ -74,8 +75,25 @@ class GoalLine(ArrayRecord, CheckedFields):
         return beyond
 
 
+class _ObjectGoal(ArrayRecord, ABC):
+    """A goal for objects."""
+
+    def contains(self, outline: FloatArray) -> bool:
+        """Whether an object with this convex outline, (N, 2) corners [m], is where it should be."""
+        return bool(self.contains_each(outline, np.array([0, len(outline)]))[0])
+
+    @abstractmethod
+    def contains_each(self, vertices: FloatArray, offsets: IntArray) -> BoolArray:
+        """(K,) which of several objects are where they should be.
+
+        Args:
+            vertices: (V, 2) convex counter-clockwise outlines [m], world frame, flattened.
+            offsets: (K + 1,) where each outline starts.
+        """
+
+
 @dataclass(frozen=True, eq=False)
-class Receptacle(ArrayRecord):
+class Receptacle(_ObjectGoal):
     """An object is delivered when all its corners are inside ``polygon``.
 
     Args:
@@ -87,17 +105,8 @@ class Receptacle(ArrayRecord):
     def __post_init__(self) -> None:
         object.__setattr__(self, "polygon", convex_outline("goal.polygon", self.polygon))
 
-    def contains(self, outline: FloatArray) -> bool:
-        """Whether an object with this outline, (N, 2) corners [m], is delivered."""
-        return bool(self.contains_each(outline, np.array([0, len(outline)]))[0])
-
     def contains_each(self, vertices: FloatArray, offsets: IntArray) -> BoolArray:
-        """(K,) which of several objects are delivered; a corner on the polygon's edge is inside.
-
-        Args:
-            vertices: (V, 2) outlines [m], world frame, flattened.
-            offsets: (K + 1,) where each outline starts.
-        """
+        """(K,) which of several objects are delivered; a corner on the polygon's edge is inside."""
         if len(offsets) == 1:
             return np.zeros(0, dtype=bool)
         edge = np.roll(self.polygon, -1, axis=0) - self.polygon  # (N, 2)
@@ -108,7 +117,7 @@ class Receptacle(ArrayRecord):
 
 
 @dataclass(frozen=True, eq=False)
-class ClearanceArea(ArrayRecord):
+class ClearanceArea(_ObjectGoal):
     """An object is cleared when its outline no longer touches ``polygon``.
 
     Args:
@@ -134,17 +143,8 @@ class ClearanceArea(ArrayRecord):
         object.__setattr__(self, "polygon", polygon)
         object.__setattr__(self, "open_edges", edges)
 
-    def contains(self, outline: FloatArray) -> bool:
-        """Whether an object with this convex outline, (N, 2) corners [m], is cleared."""
-        return bool(self.contains_each(outline, np.array([0, len(outline)]))[0])
-
     def contains_each(self, vertices: FloatArray, offsets: IntArray) -> BoolArray:
-        """(K,) which of several objects are cleared: some edge's line separates them strictly.
-
-        Args:
-            vertices: (V, 2) convex counter-clockwise outlines [m], world frame, flattened.
-            offsets: (K + 1,) where each outline starts.
-        """
+        """(K,) which of several objects are cleared: some edge's line separates them strictly."""
         if len(offsets) == 1:
             return np.zeros(0, dtype=bool)
         starts, after = offsets[:-1], next_corner(offsets)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Annotated, Any
+from typing import Annotated
 
 import numpy as np
 
@@ -85,10 +85,8 @@ class PlanRecorder:
         self._places = {int(one): k for k, one in enumerate(ids)}
         self._last: Plan | None = None
         self._seen, self._stride = 0, 1
-        self._times: list[float] = []
-        self._paths: list[FloatArray] = []
-        self._moved: list[IntArray] = []
-        self._moved_poses: list[FloatArray] = []
+        self._kept: list[tuple[float, FloatArray, IntArray, FloatArray]] = []
+        """When each plan was taken up, its path, the objects that move, and their poses."""
 
     def note(self, time: float, ids: IntArray, plan: Plan | None) -> None:
         """Note the plan that is driven now; the same one as before, or none, adds nothing.
@@ -107,17 +105,10 @@ class PlanRecorder:
         if (self._seen - 1) % self._stride:
             return
         kept = thinned(len(plan.poses), _POSES)
-        moved, poses = self._prediction(ids, plan)
-        self._times.append(time)
-        self._paths.append(plan.poses[kept])
-        self._moved.append(moved)
-        self._moved_poses.append(poses)
-        if len(self._times) > _PLANS:
+        self._kept.append((time, plan.poses[kept], *self._prediction(ids, plan)))
+        if len(self._kept) > _PLANS:
             self._stride *= 2
-            columns: tuple[list[Any], ...]
-            columns = self._times, self._paths, self._moved, self._moved_poses
-            for column in columns:
-                del column[1::2]
+            del self._kept[1::2]
 
     def _prediction(self, ids: IntArray, plan: Plan) -> tuple[IntArray, FloatArray]:
         predicted = plan.object_poses
@@ -130,11 +121,14 @@ class PlanRecorder:
 
     def recorded(self) -> RecordedPlans:
         """What was noted so far."""
+        none = np.zeros((0, 3))
+        start = 0.0, none, np.zeros(0, dtype=np.int64), none  # so that there is one to join
+        times, paths, moved, poses = zip(start, *self._kept, strict=True)
         return RecordedPlans(
-            times=np.array(self._times),
-            offsets=np.cumsum([0, *map(len, self._paths)]),
-            paths=np.concatenate([np.zeros((0, 3)), *self._paths]),
-            moved_offsets=np.cumsum([0, *map(len, self._moved)]),
-            moved=np.concatenate([np.zeros(0, dtype=np.int64), *self._moved]),
-            moved_poses=np.concatenate([np.zeros((0, 3)), *self._moved_poses]),
+            times=np.array(times[1:]),
+            offsets=np.cumsum([*map(len, paths)]),
+            paths=np.concatenate(paths),
+            moved_offsets=np.cumsum([*map(len, moved)]),
+            moved=np.concatenate(moved),
+            moved_poses=np.concatenate(poses),
         )

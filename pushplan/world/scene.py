@@ -150,16 +150,13 @@ class World(ArrayRecord, CheckedFields):
             movable_poses: (K, 3) of the objects, which are at rest there; where they are if None.
             time: [s]; as it is if None.
         """
-        changes: dict[str, Any] = {}
-        if robot_pose is not None:
-            changes["robot_pose"] = robot_pose
-        if robot_twist is not None:
-            changes["robot_twist"] = robot_twist
-        if movable_poses is not None:
-            changes["movables"] = self.movables.moved_to(movable_poses)
-        if time is not None:
-            changes["time"] = time
-        return replace(self, **changes)
+        changes: dict[str, Any] = {
+            "robot_pose": robot_pose,
+            "robot_twist": robot_twist,
+            "movables": None if movable_poses is None else self.movables.moved_to(movable_poses),
+            "time": time,
+        }
+        return replace(self, **{key: value for key, value in changes.items() if value is not None})
 
     def updated(
         self,

@@ -5,13 +5,15 @@ from __future__ import annotations
 import enum
 import math
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
 from pushplan.interaction import Interaction, InteractionModel
 from pushplan.motion.collision import first_blocked, footprint, obstacles
-from pushplan.world import GoalDisc, GoalLine, InvalidInputError, Plan, World
-from pushplan.world.checks import FloatArray, number
+from pushplan.world import GoalDisc, GoalLine, Plan, World
+from pushplan.world.checked_fields import CheckedFields, Limits, NonNegativeFloat
+from pushplan.world.checks import FloatArray
 from pushplan.world.polyline import arc_lengths, path_length
 
 _SPACING = 0.15  # distance between the poses of a path that are looked at [R]
@@ -35,8 +37,11 @@ class Reason(enum.Enum):
         self.urgent = urgent
 
 
+_Endless = Annotated[float, Limits(0.0, open_low=True, finite=False)]
+
+
 @dataclass(frozen=True)
-class Replanning:
+class Replanning(CheckedFields):
     """When a plan no longer fits the world. Lengths in units of the circumscribed radius R.
 
     Args:
@@ -60,28 +65,16 @@ class Replanning:
             simulation.
     """
 
-    offset: float = 0.3
-    surprise: float = 0.1
-    interval: float = 0.5
+    offset: NonNegativeFloat = 0.3
+    surprise: Annotated[float, Limits(0.0, finite=False)] = 0.1
+    interval: NonNegativeFloat = 0.5
     never: bool = False
-    look_ahead: float = math.inf
-    margin: float | None = 0.1
-    push_weight: float | None = None
-    every_seconds: float = math.inf
-    every_metres: float = math.inf
-    latency: float | None = None
-
-    def __post_init__(self) -> None:
-        for name in ("offset", "interval"):
-            number(name, getattr(self, name), low=0.0)
-        number("surprise", self.surprise, low=0.0, finite=False)
-        for name in ("margin", "push_weight", "latency"):
-            if getattr(self, name) is not None:
-                number(name, getattr(self, name), low=0.0)
-        for name in ("every_seconds", "every_metres", "look_ahead"):
-            number(name, getattr(self, name), low=0.0, open_low=True, finite=False)
-        if not isinstance(self.never, bool):
-            raise InvalidInputError(f"never must be True or False, got {self.never!r}")
+    look_ahead: _Endless = math.inf
+    margin: NonNegativeFloat | None = 0.1
+    push_weight: NonNegativeFloat | None = None
+    every_seconds: _Endless = math.inf
+    every_metres: _Endless = math.inf
+    latency: NonNegativeFloat | None = None
 
     def weight(self, planner: object) -> float:
         """The weight w of interaction in comparisons of this planner's plans."""
