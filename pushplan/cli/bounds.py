@@ -4,36 +4,9 @@ from __future__ import annotations
 
 import argparse
 from dataclasses import asdict
-from typing import Any
 
-from pushplan.cli.common import add_command, say, say_json, whole
+from pushplan.cli.common import say, say_json
 from pushplan.cli.outputs import check_file
-
-_EXAMPLES = """\
-  pushplan bounds maze-2d-10 --episodes 5
-  pushplan bounds maze-2d-5,maze-2d-10 --runs runs/first,runs/second --out bounds.csv
-
-What is bounded is the work of robot and objects, m0 l0 + sum of mi li [kg m], of a successful
-episode. Best known solutions are those of stored runs, and those that ship with pushplan. A file
-that exists is gone on with: its best solutions are kept, its scenarios are not bounded again.
-"""
-
-
-def add(commands: Any) -> None:
-    """Add the command."""
-    parser = add_command(commands, "bounds", "how good solutions can be", _EXAMPLES, run)
-    parser.add_argument("suites", metavar="SUITE,...", help="see 'pushplan list suites'")
-    parser.add_argument("--episodes", type=whole(1), metavar="N", help="default: the suite's own")
-    parser.add_argument(
-        "--seed", type=whole(0), default=0, metavar="FIRST", help="seed of the first scenario"
-    )
-    parser.add_argument("--runs", metavar="DIR,...", help="run directories with solutions")
-    parser.add_argument(
-        "--nodes", type=whole(1), default=400, metavar="N", help="of a proof (default %(default)s)"
-    )
-    parser.add_argument("--anew", action="store_true", help="prove those again that are known")
-    parser.add_argument("--out", metavar="FILE.csv", help="write, or go on with, this file")
-    parser.add_argument("--json", action="store_true", help="print them as JSON")
 
 
 def run(options: argparse.Namespace) -> int:

@@ -4,29 +4,10 @@ from __future__ import annotations
 
 import argparse
 from dataclasses import asdict
-from typing import Any
 
-from pushplan.cli.common import add_command, say, say_json
+from pushplan.cli.common import say, say_json
 
-_EXAMPLES = """\
-  pushplan compare runs/main runs/branch
-  pushplan compare main.csv runs/branch --fail-on "E_nav<-0.02,plan_time>+20%"
-
-A rule names a column, a direction and the change that is too much, in the column's unit or in
-percent of the old mean. Exit code 1: a rule says "regressed", or results are missing; with --strict
-also "unclear".
-"""
 _DEFAULT = "success<-0.0,E_nav<-0.0,I_nav<-0.0,S_manip<-0.0,E_manip<-0.0,I_manip<-0.0"
-
-
-def add(commands: Any) -> None:
-    """Add the command."""
-    parser = add_command(commands, "compare", "two runs beside each other", _EXAMPLES, run)
-    parser.add_argument("old", metavar="OLD", help="run directory or results.csv")
-    parser.add_argument("new", metavar="NEW", help="the same")
-    parser.add_argument("--fail-on", metavar="RULES", help="rules with commas between them")
-    parser.add_argument("--strict", action="store_true", help="also fail where it is unclear")
-    parser.add_argument("--json", action="store_true", help="print the verdicts as JSON")
 
 
 def run(options: argparse.Namespace) -> int:

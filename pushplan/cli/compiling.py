@@ -4,31 +4,9 @@ from __future__ import annotations
 
 import argparse
 import time
-from typing import Any
 
-from pushplan.cli.common import add_command, say
+from pushplan.cli.common import say
 from pushplan.cli.kernel_progress import kernel_progress
-
-_EXAMPLES = """\
-  pushplan compile
-  pushplan compile kinodynamic-rrt push-aware
-  pushplan compile --planners push-aware gtsp-mpc
-"""
-
-
-def add(commands: Any) -> None:
-    """Add the command."""
-    parser = add_command(
-        commands, "compile", "compile kernels now, so that first runs are fast", _EXAMPLES, run
-    )
-    parser.add_argument(
-        "names", nargs="*", metavar="NAME", help="policies, observations, metrics (default: all)"
-    )
-    parser.add_argument(
-        "--planners",
-        action="store_true",
-        help="only what planners and policies run themselves, as on a robot: needs no simulator",
-    )
 
 
 def run(options: argparse.Namespace) -> int:

@@ -5,21 +5,15 @@ from __future__ import annotations
 import argparse
 import os
 import sys
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from pushplan.cli.common import add_command, has_screen, say
+from pushplan.cli.common import has_screen, say
 from pushplan.cli.outputs import check_directory
 from pushplan.cli.progress import progress_of
 
 if TYPE_CHECKING:
     from pushplan.evaluation import Job
 
-_EXAMPLES = """\
-  pushplan demo
-  pushplan demo --no-open --out runs/first-look
-
-It asks nothing and installs nothing. From the first run on, kernels are in the cache.
-"""
 EPISODES = {
     "maze-2d-3": "kinodynamic-rrt",
     "ship-ice-2d-10": "skeleton",
@@ -27,17 +21,6 @@ EPISODES = {
 }
 """Suite -> the policy that is shown in its first start: those whose kernels compile fast."""
 _MOST_WORKERS = 3
-
-
-def add(commands: Any) -> None:
-    """Add the command."""
-    parser = add_command(
-        commands, "demo", "show a maze, a ship in ice and a clearing, in a minute", _EXAMPLES, run
-    )
-    parser.add_argument(
-        "--out", default=os.path.join("runs", "demo"), metavar="DIR", help="default %(default)s"
-    )
-    parser.add_argument("--no-open", action="store_true", help="do not open the page in a browser")
 
 
 def run(options: argparse.Namespace) -> int:

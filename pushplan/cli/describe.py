@@ -4,43 +4,10 @@ from __future__ import annotations
 
 import argparse
 import json
-from typing import Any
 
-from pushplan.cli.common import add_command, say, whole
+from pushplan.cli.common import say
 from pushplan.cli.outputs import check_file
-from pushplan.cli.scenario_options import add_scenario_options, scenario_of
-
-_EXAMPLES = """\
-  pushplan describe maze-2d-3 --observation state
-  pushplan describe --task maze --set shape=z --observation features --action velocity
-  pushplan describe maze-2d-3 --observation features --algorithm ppo --for model.zip
-"""
-
-
-def add(commands: Any) -> None:
-    """Add the command."""
-    parser = add_command(
-        commands, "describe", "print the specification of a network", _EXAMPLES, run
-    )
-    add_scenario_options(parser)
-    parser.add_argument(
-        "--observation",
-        metavar="NAME",
-        help="of the task, such as image or state, or features; the task's first by default",
-    )
-    parser.add_argument("--action", metavar="NAME", help="action mode; the task's first by default")
-    parser.add_argument(
-        "--repeat", type=whole(1), default=1, metavar="N", help="steps of a decision (default 1)"
-    )
-    parser.add_argument(
-        "--algorithm", metavar="NAME", help="what has trained it: ppo, sac, a2c, td3 or ddpg"
-    )
-    parser.add_argument(
-        "--for",
-        dest="model",
-        metavar="MODEL.zip",
-        help="write MODEL.pushplan.json, so that sb3:MODEL.zip runs; needs --algorithm",
-    )
+from pushplan.cli.scenario_options import scenario_of
 
 
 def run(options: argparse.Namespace) -> int:

@@ -10,24 +10,12 @@ from importlib.metadata import PackageNotFoundError, packages_distributions, ver
 from importlib.util import find_spec
 from typing import Any
 
-from pushplan.cli.common import add_command, has_screen, say, say_json
+from pushplan.cli.common import has_screen, say, say_json
 
-_EXAMPLES = """\
-  pushplan doctor
-  pushplan doctor --json > machine.json
-"""
 BASE = ("numba", "numpy", "ompl", "yaml", "ruckig", "scipy", "shapely")
 """Libraries that come with pushplan itself; Ruckig where it has a wheel."""
 _DISPLAYS = {"EGL": "EGL", "OSMesa": "OSMesa"}
 """What MuJoCo draws with where there is no screen -> the name of its library."""
-
-
-def add(commands: Any) -> None:
-    """Add the command."""
-    parser = add_command(
-        commands, "doctor", "say what is installed, missing and compiled", _EXAMPLES, run
-    )
-    parser.add_argument("--json", action="store_true", help="the same as one object, for scripts")
 
 
 def run(options: argparse.Namespace) -> int:

@@ -3,45 +3,10 @@
 from __future__ import annotations
 
 import argparse
-from typing import Any
 
-from pushplan.cli.common import add_command, milliseconds, positive, say, whole
+from pushplan.cli.common import milliseconds, say
 from pushplan.cli.kernel_progress import kernel_progress
 from pushplan.cli.outputs import check_file
-
-_EXAMPLES = """\
-  pushplan gtsp boxes.gtsp --seconds 1
-  pushplan gtsp boxes.gtsp --seconds 10 --bound --out boxes.gtsp-tour
-  pushplan gtsp boxes.gtsp --iterations 20000 --seed 3
-"""
-
-
-def add(commands: Any) -> None:
-    """Add the command."""
-    parser = add_command(
-        commands, "gtsp", "find a tour through one node of every cluster", _EXAMPLES, run
-    )
-    parser.add_argument("file", metavar="FILE.gtsp", help="instance in GTSPLIB format")
-    parser.add_argument(
-        "--seconds", type=positive, default=1.0, metavar="S", help="time budget (default 1)"
-    )
-    parser.add_argument(
-        "--iterations",
-        type=whole(1),
-        metavar="N",
-        help="rounds of the search instead of a time budget: the same tour on every machine",
-    )
-    parser.add_argument("--seed", type=whole(0), default=0, help="of the search (default 0)")
-    parser.add_argument(
-        "--method",
-        choices=("auto", "exact", "search"),
-        default="auto",
-        help="exact: dynamic programming; auto: exact where that is fast (default auto)",
-    )
-    parser.add_argument(
-        "--bound", action="store_true", help="spend 70 %% of the time on a lower bound and a proof"
-    )
-    parser.add_argument("--out", metavar="FILE.gtsp-tour", help="write the tour")
 
 
 def run(options: argparse.Namespace) -> int:

@@ -8,28 +8,7 @@ from dataclasses import dataclass
 from itertools import zip_longest
 from typing import Any
 
-from pushplan.cli.common import add_command, say, say_json
-
-_EXAMPLES = """\
-  pushplan list
-  pushplan list policies
-  pushplan list suites --names
-  pushplan list all --json
-"""
-_ALL = "all"
-
-
-def add(commands: Any) -> None:
-    """Add the command."""
-    parser = add_command(commands, "list", "list what there is, by name", _EXAMPLES, run)
-    parser.add_argument(
-        "kind",
-        nargs="?",
-        choices=[*sorted(_KINDS), _ALL],
-        help="what to list (default: the kinds, with how many there are of each)",
-    )
-    parser.add_argument("--names", action="store_true", help="names alone, one a line")
-    parser.add_argument("--json", action="store_true", help="a list of objects, for scripts")
+from pushplan.cli.common import say, say_json
 
 
 def run(options: argparse.Namespace) -> int:
@@ -37,7 +16,7 @@ def run(options: argparse.Namespace) -> int:
     if options.kind is None:
         _say_kinds(options)
         return 0
-    kinds = list(_KINDS) if options.kind == _ALL else [options.kind]
+    kinds = list(_KINDS) if options.kind == "all" else [options.kind]
     if options.json:
         say_json([{"kind": kind, **one} for kind in kinds for one in _described(kind)])
         return 0
@@ -251,3 +230,5 @@ _KINDS: dict[str, _Kind] = {
     "channels": _Kind("of image observations", "pushplan.observation:CHANNELS", _ONE, _channel),
 }
 """What there is."""
+CHOICES = (*sorted(_KINDS), "all")
+"""Words of `pushplan list`."""

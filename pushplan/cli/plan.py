@@ -7,7 +7,7 @@ import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from pushplan.cli.common import add_command, complete, milliseconds, positive, say, say_json, whole
+from pushplan.cli.common import milliseconds, say, say_json
 from pushplan.cli.kernel_progress import kernel_progress
 from pushplan.cli.outputs import check_figure, check_file
 
@@ -15,40 +15,6 @@ if TYPE_CHECKING:
     from pushplan.world import PlanResult, Stop
 
 SCHEMA = "pushplan-plan/1"
-_EXAMPLES = """\
-  pushplan plan room.yaml --planner kinodynamic-rrt
-  pushplan plan room.yaml --planner kinodynamic-rrt --deadline 0.5 --out plan.json
-  pushplan plan room.yaml --planner my_planner.py:MyPlanner
-  pushplan plan room.yaml --planner geometric-rrt --iterations 2000 --seed 7 --render plan.svg
-"""
-
-
-def add(commands: Any) -> None:
-    """Add the command."""
-    parser = add_command(
-        commands, "plan", "plan in a world from a file, without a simulator", _EXAMPLES, run
-    )
-    parser.add_argument("world", metavar="WORLD.yaml", help="world file (.yaml, .yml or .json)")
-    planner = parser.add_argument(
-        "--planner",
-        required=True,
-        metavar="NAME",
-        help="name ('pushplan list planners'), 'file.py:Class' or 'module:Class'",
-    )
-    complete(planner, "planners")
-    budget = parser.add_mutually_exclusive_group()
-    budget.add_argument("--deadline", type=positive, metavar="S", help="wall-clock limit [s]")
-    budget.add_argument(
-        "--iterations", type=whole(1), metavar="N", help="limit that repeats on every machine"
-    )
-    parser.add_argument("--seed", type=whole(0), default=0, help="of the planner (default 0)")
-    parser.add_argument("--out", metavar="plan.json", help="write the plan and its statistics")
-    parser.add_argument("--json", action="store_true", help="print what --out writes, alone")
-    parser.add_argument(
-        "--render",
-        metavar="FILE",
-        help="picture of the plan with a scale and a legend: .png, .svg or .pdf",
-    )
 
 
 def run(options: argparse.Namespace) -> int:

@@ -8,57 +8,11 @@ from collections.abc import Sequence
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
-from pushplan.cli.common import add_command, say, say_json, whole
+from pushplan.cli.common import say, say_json
 
 if TYPE_CHECKING:
     from pushplan.evaluation import Results
     from pushplan.evaluation.tables import Table
-
-_EXAMPLES = """\
-  pushplan report runs/first
-  pushplan report runs/first --metrics E_nav_to_goal_point,my_metrics:jerk
-  pushplan report runs/first --format latex > tables.tex
-  pushplan report runs/first --figures pdf,png
-  pushplan report runs/first --replays beside --replay-most 1000
-"""
-
-
-def add(commands: Any) -> None:
-    """Add the command."""
-    parser = add_command(
-        commands, "report", "table, plots and page again from stored results", _EXAMPLES, run
-    )
-    parser.add_argument("directory", metavar="DIR", help="run directory of 'pushplan bench'")
-    parser.add_argument(
-        "--metrics",
-        metavar="A,B",
-        help="only print these, computed from the stored episodes: names ('pushplan list "
-        "metrics') or 'module:function'",
-    )
-    parser.add_argument(
-        "--format",
-        choices=("text", "markdown", "latex"),
-        help="only print the tables, as a document (LaTeX needs booktabs)",
-    )
-    add_table_options(parser)
-    parser.add_argument(
-        "--replays",
-        choices=("embed", "beside", "none"),
-        default="embed",
-        help="recorded episodes in the page (default), as files beside it, or not at all",
-    )
-    parser.add_argument(
-        "--replay-most",
-        type=whole(0),
-        default=40,
-        metavar="N",
-        help="replays of at most N episodes, scenarios with failures first (default %(default)s)",
-    )
-    parser.add_argument(
-        "--figures",
-        metavar="A,B",
-        help="write the figures in these formats too, for a paper: pdf, png; always in svg",
-    )
 
 
 def run(options: argparse.Namespace) -> int:
@@ -79,21 +33,6 @@ def run(options: argparse.Namespace) -> int:
     else:
         say(getattr(table_formats, options.format)(tables).rstrip())
     return 0
-
-
-def add_table_options(parser: argparse.ArgumentParser) -> None:
-    """Add what says which tables are shown."""
-    parser.add_argument(
-        "--settings",
-        action="store_true",
-        help="print the tables of each setting too, after those of all together",
-    )
-    parser.add_argument(
-        "--pairs",
-        choices=("first", "all"),
-        default="first",
-        help="compare the first policy with each other one (default), or all",
-    )
 
 
 def table_options(options: argparse.Namespace) -> dict[str, Any]:

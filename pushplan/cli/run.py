@@ -3,57 +3,20 @@
 from __future__ import annotations
 
 import argparse
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from pushplan.cli.common import (
-    add_command,
-    add_latency,
-    add_trust,
     check_episode_file,
-    complete,
     milliseconds,
     save_episode,
     say,
 )
 from pushplan.cli.kernel_progress import kernel_progress
-from pushplan.cli.scenario_options import add_scenario_options, scenario_of
+from pushplan.cli.scenario_options import scenario_of
 
 if TYPE_CHECKING:
     from pushplan.scenarios import Scenario
     from pushplan.world import Episode
-
-_EXAMPLES = """\
-  pushplan run maze-2d-5 --policy kinodynamic-rrt --seed 3 --render episode.gif
-  pushplan run --task maze --boxes 8 --shape z --policy straight --out episode.npz
-  pushplan run maze-2d-5 --policy my_planner.py:MyPlanner --render path.png
-  pushplan run --task area_clearing --simulator mujoco --policy greedy --render clear.mp4
-  pushplan run --task maze --set wheeled=0.5 --set random_start=true --policy straight --live
-"""
-
-
-def add(commands: Any) -> None:
-    """Add the command."""
-    parser = add_command(commands, "run", "run one policy on one scenario", _EXAMPLES, run)
-    add_scenario_options(parser)
-    policy = parser.add_argument(
-        "--policy", required=True, metavar="NAME", help="as in 'pushplan bench'"
-    )
-    complete(policy, "policies")
-    parser.add_argument(
-        "--observation",
-        metavar="NAME",
-        default="auto",
-        help="of the task, such as image or state; by default what the policy asks for",
-    )
-    add_latency(parser)
-    add_trust(parser)
-    parser.add_argument(
-        "--render",
-        metavar="FILE",
-        help="picture of the end (.png, .svg, .pdf) or film (.gif, .mp4)",
-    )
-    parser.add_argument("--live", action="store_true", help="show the episode in a window")
-    parser.add_argument("--out", metavar="FILE", help="write the episode: .npz or .mcap")
 
 
 def run(options: argparse.Namespace) -> int:

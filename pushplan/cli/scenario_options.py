@@ -7,41 +7,11 @@ import os
 import re
 from typing import TYPE_CHECKING, Any
 
-from pushplan.cli.common import complete, whole
-
 if TYPE_CHECKING:
     from pushplan.scenarios import Scenario
 
 _SCIENTIFIC = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)[eE][-+]?\d+")
 """Numbers that YAML 1.1 takes for text, such as 1e-3."""
-
-
-def add_scenario_options(parser: argparse.ArgumentParser) -> None:
-    """Add what `scenario_of` reads."""
-    suite = parser.add_argument(
-        "suite", nargs="?", metavar="SUITE", help="take its scenario of --seed"
-    )
-    task = parser.add_argument(
-        "--task", metavar="NAME", help="a task instead of a suite, such as maze"
-    )
-    simulator = parser.add_argument(
-        "--simulator", default="pymunk", metavar="NAME", help="default pymunk"
-    )
-    complete(suite, "suites")
-    complete(task, "tasks")
-    complete(simulator, "simulators")
-    parser.add_argument("--preset", metavar="NAME", help="default: the first for the simulator")
-    parser.add_argument("--boxes", type=whole(0), metavar="N", help="number of boxes")
-    parser.add_argument("--shape", metavar="NAME", help="shape of the maze: u or z")
-    parser.add_argument(
-        "--set",
-        action="append",
-        default=[],
-        metavar="NAME=VALUE",
-        dest="variations",
-        help="any other variation of the task; may be repeated",
-    )
-    parser.add_argument("--seed", type=whole(0), default=0, help="of the scenario (default 0)")
 
 
 def scenario_of(options: argparse.Namespace) -> Scenario:

@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from pushplan.cli.common import (
-    add_command,
     check_episode_file,
     load_episode,
     save_episode,
@@ -18,31 +17,6 @@ from pushplan.cli.common import (
 
 if TYPE_CHECKING:
     from pushplan.world import Episode
-
-_EXAMPLES = """\
-  pushplan score episode.npz
-  pushplan score runs/first/episodes/*.npz
-  pushplan score episode.npz --metrics E_nav,my_metrics:jerk
-  pushplan score robot.mcap
-  pushplan score episode.npz --out episode.mcap
-"""
-
-
-def add(commands: Any) -> None:
-    """Add the command."""
-    parser = add_command(
-        commands, "score", "compute the metrics of stored episodes", _EXAMPLES, run
-    )
-    parser.add_argument(
-        "episodes", nargs="+", metavar="EPISODE", help=".npz, or .mcap as robots log"
-    )
-    parser.add_argument(
-        "--metrics", metavar="A,B", help="names or 'module:function'; all registered by default"
-    )
-    parser.add_argument(
-        "--out", metavar="FILE", help="write the one episode in another format: .mcap or .npz"
-    )
-    parser.add_argument("--json", action="store_true", help="a list of objects, for scripts")
 
 
 def run(options: argparse.Namespace) -> int:

@@ -4,55 +4,13 @@ from __future__ import annotations
 
 import argparse
 import sys
-from typing import Any
 
-from pushplan.cli.common import add_command, duration, say
+from pushplan.cli.common import duration, say
 from pushplan.cli.outputs import check_directory, check_file
 
-_RUN = "run directory of 'pushplan bench' or 'pushplan experiment'"
 
-
-def add(commands: Any) -> None:
-    """Add the commands."""
-    parser = add_command(
-        commands, "status", "how far a run is", "  pushplan status runs/study\n", _status
-    )
-    parser.add_argument("directory", metavar="DIR", help=_RUN)
-    examples = "  pushplan merge runs/study runs/part1 runs/part2\n"
-    parser = add_command(commands, "merge", "join run directories", examples, _merge)
-    parser.add_argument("out", metavar="OUT", help="run directory, new or not")
-    parser.add_argument("directories", metavar="DIR", nargs="+", help="what is taken into it")
-    examples = "  pushplan rescore runs/study\n  pushplan rescore runs/study --metrics my.py:jerk\n"
-    parser = add_command(
-        commands, "rescore", "metrics again from the stored episodes", examples, _rescore
-    )
-    parser.add_argument("directory", metavar="DIR", help=_RUN)
-    parser.add_argument(
-        "--metrics",
-        metavar="A,B",
-        default="",
-        help="further ones: names ('pushplan list metrics'), 'module:function' or "
-        "'file.py:function'",
-    )
-    examples = "  pushplan reproduce runs/study --job 3f2a91\n"
-    parser = add_command(
-        commands, "reproduce", "run a stored job again and compare", examples, _reproduce
-    )
-    parser.add_argument("directory", metavar="DIR", help=_RUN)
-    parser.add_argument(
-        "--job", metavar="ID", required=True, help="column 'job' of results.csv, or its beginning"
-    )
-    examples = "  pushplan salvage runs/torn runs/saved\n"
-    parser = add_command(commands, "salvage", "save what a damaged run holds", examples, _salvage)
-    parser.add_argument("directory", metavar="DIR", help="the damaged run directory")
-    parser.add_argument("out", metavar="NEW", help="a folder without a run")
-    examples = "  pushplan export runs/study study.parquet\n"
-    parser = add_command(commands, "export", "all rows as CSV or Parquet", examples, _export)
-    parser.add_argument("directory", metavar="DIR", help=_RUN)
-    parser.add_argument("file", metavar="FILE", help="ends in .csv or .parquet")
-
-
-def _status(options: argparse.Namespace) -> int:
+def say_status(options: argparse.Namespace) -> int:
+    """Say how far a run is, and what takes long."""
     from pushplan.evaluation import run_status
 
     now = run_status(options.directory)
@@ -70,7 +28,8 @@ def _status(options: argparse.Namespace) -> int:
     return 0
 
 
-def _merge(options: argparse.Namespace) -> int:
+def merge_runs(options: argparse.Namespace) -> int:
+    """Take the results of run directories into one."""
     from pushplan.evaluation import merge
 
     check_directory(options.out)
@@ -85,7 +44,8 @@ def _merge(options: argparse.Namespace) -> int:
     return 1 if found.incomplete else 0
 
 
-def _rescore(options: argparse.Namespace) -> int:
+def rescore_run(options: argparse.Namespace) -> int:
+    """Compute the metrics of stored episodes again."""
     from pushplan.evaluation import Results, rescore
     from pushplan.evaluation.table_formats import text
 
@@ -99,7 +59,8 @@ def _rescore(options: argparse.Namespace) -> int:
     return 1 if done.unreadable else 0
 
 
-def _reproduce(options: argparse.Namespace) -> int:
+def reproduce_job(options: argparse.Namespace) -> int:
+    """Run a stored job again; 1 if it ends differently."""
     from pushplan.evaluation import reproduce
 
     found = reproduce(options.directory, options.job)
@@ -114,7 +75,8 @@ def _reproduce(options: argparse.Namespace) -> int:
     return 1
 
 
-def _salvage(options: argparse.Namespace) -> int:
+def salvage_run(options: argparse.Namespace) -> int:
+    """Save what a damaged run directory holds."""
     from pushplan.evaluation import salvage
 
     check_directory(options.out)
@@ -125,7 +87,8 @@ def _salvage(options: argparse.Namespace) -> int:
     return 0
 
 
-def _export(options: argparse.Namespace) -> int:
+def export_rows(options: argparse.Namespace) -> int:
+    """Write all rows of a run into one file."""
     from pushplan.evaluation import Results
 
     check_file(options.file, (".csv", ".parquet"))

@@ -5,46 +5,15 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING, Any
 
-from pushplan.cli.common import add_command, positive, say, say_scores
+from pushplan.cli.common import say, say_scores
 from pushplan.cli.outputs import check_file
-from pushplan.cli.scenario_options import add_scenario_options, scenario_of
+from pushplan.cli.scenario_options import scenario_of
 
 if TYPE_CHECKING:
     from pushplan.scenarios import Scenario
 
-_EXAMPLES = """\
-  pushplan teleop maze-2d-5 --seed 3 --out episode.npz
-  pushplan teleop --task area_clearing --speed 3
-  pushplan score episode.npz
-
-keys:
-  up, W      forward              left, A    turn left
-  down, S    back                 right, D   turn right
-  space      stop                 r          start again
-  q, Esc     end; closing the window does the same
-  A robot with one constant speed only steers.
-"""
 ACTIONS = ("turn_rate", "velocity")
 """Action modes that a person with keys can use."""
-
-
-def add(commands: Any) -> None:
-    """Add the command."""
-    parser = add_command(
-        commands, "teleop", "drive with the keyboard and record the episode", _EXAMPLES, run
-    )
-    add_scenario_options(parser)
-    parser.add_argument(
-        "--action", choices=ACTIONS, help="how the robot is driven (default: as the task has it)"
-    )
-    parser.add_argument(
-        "--speed",
-        type=positive,
-        default=1.0,
-        metavar="X",
-        help="simulated seconds per second (default 1)",
-    )
-    parser.add_argument("--out", metavar="episode.npz", help="write the recorded episode")
 
 
 def run(options: argparse.Namespace) -> int:

@@ -8,74 +8,13 @@ import shlex
 import sys
 from typing import TYPE_CHECKING, Any
 
-from pushplan.cli.common import add_command, say, whole
+from pushplan.cli.common import say
 from pushplan.cli.outputs import check_directory
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     from pushplan.training.policies.config import TrainingConfig
-
-_EXAMPLES = """\
-  pushplan train ppo --task maze --out runs/maze-ppo
-  pushplan train sac --task ship_ice --steps 50000 --seed 1 --out runs/ship-sac
-  pushplan train sam --task box_delivery --device cuda --out runs/box-sam
-  pushplan train ppo --config mine.yaml --out runs/mine
-  pushplan train ppo --task maze --out runs/maze-ppo --resume
-  pushplan train bc --task maze --data runs/maze-data --out runs/maze-bc
-  pushplan train flow --task maze --data runs/maze-data runs/maze-driven --out runs/maze-flow
-
-The folder then holds policy.onnx, its model card, the learning curve and a checkpoint.
-"""
-_DATASET_EXAMPLES = """\
-  pushplan dataset export --policy push-aware-constant-speed --task maze --episodes 200 \\
-      --noise 0.02 --out runs/maze-data
-  pushplan dataset export --policy push-aware-constant-speed --task maze --episodes 200 \\
-      --noise 0.05 --hold 20 --driver maze-bc --out runs/maze-dagger
-  pushplan dataset export --policy ship-predictive --task ship_ice --episodes 100 --out runs/ice
-  pushplan dataset export --policy push-aware-constant-speed --task maze --episodes 5 \\
-      --out runs/few --minari pushplan/maze/push-aware-v0
-"""
-
-
-def add(commands: Any) -> None:
-    """Add the commands."""
-    parser = add_command(commands, "train", "train a policy", _EXAMPLES, run)
-    parser.add_argument("algorithm", choices=("ppo", "sac", "sam", "bc", "flow"))
-    parser.add_argument("--task", metavar="NAME", help="take the configuration that ships for it")
-    parser.add_argument(
-        "--variant", metavar="NAME", help="with --task: another one that ships, such as image"
-    )
-    parser.add_argument("--config", metavar="FILE.yaml", help="a configuration of one's own")
-    parser.add_argument("--steps", type=whole(1), metavar="N", help="decisions to learn from")
-    parser.add_argument("--seed", type=whole(0), metavar="S", help="default: the configuration's")
-    parser.add_argument("--out", required=True, metavar="DIR", help="folder of the training")
-    parser.add_argument("--resume", action="store_true", help="go on with what is in the folder")
-    parser.add_argument(
-        "--data",
-        nargs="+",
-        default=(),
-        metavar="DIR",
-        help="with bc and flow: data sets, see pushplan dataset",
-    )
-    parser.add_argument(
-        "--device", default="auto", metavar="NAME", help="auto (default), cpu or cuda"
-    )
-    parser.add_argument(
-        "--processes", action="store_true", help="ppo, sac: a process for each environment"
-    )
-    parser.add_argument("--threads", type=whole(1), default=1, help="of PyTorch (default 1)")
-    parser.add_argument(
-        "--episodes",
-        type=whole(0),
-        default=100,
-        metavar="N",
-        help="score the result on N scenarios of each suite (default %(default)s, 0: not at all)",
-    )
-    parser.add_argument(
-        "--workers", type=whole(0), default=1, help="processes for the scores (default 1)"
-    )
-    _add_dataset(commands)
 
 
 def run(options: argparse.Namespace) -> int:
@@ -194,47 +133,7 @@ def _show_progress(logger: Any) -> None:
     logger.setLevel(logging.INFO)
 
 
-def _add_dataset(commands: Any) -> None:
-    parser = add_command(
-        commands, "dataset", "export episodes as a data set", _DATASET_EXAMPLES, _export
-    )
-    parser.add_argument("action", choices=("export",))
-    parser.add_argument("--policy", required=True, metavar="NAME", help="as in 'pushplan run'")
-    parser.add_argument(
-        "--task", required=True, metavar="NAME", help="scenarios of its configuration for bc"
-    )
-    parser.add_argument("--config", metavar="FILE.yaml", help="take scenarios and observation here")
-    parser.add_argument("--episodes", required=True, type=whole(1), metavar="N")
-    parser.add_argument("--out", required=True, metavar="DIR", help="a new folder")
-    parser.add_argument(
-        "--noise",
-        type=float,
-        default=0.0,
-        metavar="P",
-        help="probability that a random action is carried out instead (default 0)",
-    )
-    parser.add_argument(
-        "--hold",
-        type=whole(1),
-        default=4,
-        metavar="N",
-        help="for how many steps it is (default %(default)s)",
-    )
-    parser.add_argument(
-        "--driver",
-        metavar="NAME",
-        help="with --noise: a policy that drives then, instead of random actions",
-    )
-    parser.add_argument(
-        "--first-seed",
-        type=whole(0),
-        metavar="S",
-        help="of the layouts (default: the first of training)",
-    )
-    parser.add_argument("--minari", metavar="NAME", help="also make a data set of Minari's own")
-
-
-def _export(options: argparse.Namespace) -> int:
+def export(options: argparse.Namespace) -> int:
     """Run the policy and write its episodes."""
     from pushplan.evaluation import parse_policy
     from pushplan.training.policies.config import config_named, read_config

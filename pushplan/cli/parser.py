@@ -1,0 +1,195 @@
+"""The parser of the command line. The commands and their options stand in ``commands.toml``."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+import tomllib
+from collections.abc import Callable, Mapping
+from importlib import import_module
+from importlib.resources import files
+from typing import Any, NoReturn
+
+from pushplan import __version__
+
+_DESCRIPTION = "Plan, push, score and compare: baselines for robots that push things."
+_EXAMPLES = """\
+examples:
+  pushplan demo
+  pushplan bench maze-2d-5 --policies straight,kinodynamic-rrt --episodes 20 --out runs/first
+  pushplan run maze-2d-5 --policy kinodynamic-rrt --seed 3 --render episode.gif
+  pushplan plan room.yaml --planner kinodynamic-rrt --deadline 1.0 --render plan.png
+  pushplan list policies
+
+'pushplan COMMAND --help' explains a command.
+
+exit codes:
+  0    done
+  1    something that was run failed, or a gate says no: a job, a plan, an episode, 'compare'
+  2    the command cannot be carried out as it was given: an option, a name, a file, an extra
+  130  interrupted by Ctrl-C
+"""
+
+
+class CommandParser(argparse.ArgumentParser):
+    """Says in one line what is wrong, with the nearest choices, as all of pushplan does."""
+
+    def error(self, message: str) -> NoReturn:
+        """Say it without the usage, and end."""
+        sys.exit(fail(f"{message}; see '{self.prog} --help'", 2))
+
+    def parse_known_args(self, args: Any = None, namespace: Any = None) -> tuple[Any, list[str]]:
+        """Refuse what is not known here, where it is known which options are."""
+        found, unknown = super().parse_known_args(args, namespace)
+        if unknown and unknown[0].startswith("-"):
+            from pushplan.world.errors import unknown_name_message
+
+            options = [name for name in self._option_string_actions if name.startswith("--")]
+            self.error(unknown_name_message("option", unknown[0].partition("=")[0], options))
+        if unknown:
+            self.error(f"unrecognized arguments: {' '.join(unknown)}")
+        return found, unknown
+
+    def _check_value(self, action: argparse.Action, value: Any) -> None:
+        if action.choices is not None and value not in action.choices:
+            from pushplan.world.errors import unknown_name_message
+
+            kind = "command" if action.metavar == "COMMAND" else "choice"
+            text = unknown_name_message(kind, value, map(str, action.choices))
+            raise argparse.ArgumentError(None if kind == "command" else action, text)
+
+
+def fail(message: str, code: int) -> int:
+    """Say on one line why a command ends, and give its exit code."""
+    from pushplan.world.errors import one_line
+
+    sys.stderr.write(f"pushplan: {one_line(message)}\n")
+    return code
+
+
+def build_parser() -> argparse.ArgumentParser:
+    """The parser of the whole command line."""
+    parser = CommandParser(
+        prog="pushplan",
+        description=_DESCRIPTION,
+        epilog=_EXAMPLES,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("--version", action="version", version=f"pushplan {__version__}")
+    commands = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
+    text = files("pushplan.cli").joinpath("commands.toml").read_text(encoding="utf-8")
+    described = tomllib.loads(text)
+    shared = described.pop("shared")
+    for name, about in described.items():
+        summary = about["summary"]
+        command = commands.add_parser(
+            name,
+            help=summary,
+            description=summary[0].upper() + summary[1:] + ".",
+            epilog=f"examples:\n{about['examples']}",
+            formatter_class=argparse.RawDescriptionHelpFormatter,
+        )
+        command.set_defaults(run=about["run"])
+        for option in about["options"]:
+            if "one_of" in option:
+                group = command.add_mutually_exclusive_group()
+                for one in option["one_of"]:
+                    _add_option(group, **one)
+            else:
+                for one in shared[option["shared"]] if "shared" in option else [option]:
+                    _add_option(command, **one)
+    return parser
+
+
+def named(name: str) -> Any:
+    """Import what ``"module:name"`` stands for, of a module of this package."""
+    module, _, attribute = name.partition(":")
+    return getattr(import_module(f"pushplan.cli.{module}"), attribute)
+
+
+def _add_option(
+    parser: argparse._ActionsContainer, name: str, complete: str | None = None, **given: Any
+) -> None:
+    """Add one entry of ``commands.toml``."""
+    if "type" in given:
+        given["type"] = OPTION_TYPES[given["type"]]
+    if isinstance(given.get("choices"), str):
+        given["choices"] = named(given["choices"])
+    if given.get("default") == "cores":
+        given["default"] = os.cpu_count() or 1
+    action = parser.add_argument(*name.split(), **given)
+    if complete is not None:
+
+        def names(**_: Any) -> list[str]:
+            from pushplan.cli.listing import names_of
+
+            return names_of(complete)
+
+        action.completer = names  # type: ignore[attr-defined]
+
+
+def whole(low: int) -> Callable[[str], int]:
+    """An option type: a whole number that is at least ``low``."""
+
+    def read(text: str) -> int:
+        try:
+            value = int(text)
+        except ValueError:
+            raise argparse.ArgumentTypeError(f"{text!r} is not a whole number") from None
+        if value < low:
+            raise argparse.ArgumentTypeError(f"must be at least {low}, got {value}")
+        return value
+
+    return read
+
+
+def positive(text: str) -> float:
+    """An option type: a number greater than 0."""
+    try:
+        value = float(text)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a number") from None
+    if not 0.0 < value < float("inf"):
+        raise argparse.ArgumentTypeError(f"must be positive and finite, got {text}")
+    return value
+
+
+def _shard(text: str) -> tuple[int, int]:
+    part, _, parts = text.partition("/")
+    if not (part.isascii() and part.isdigit() and parts.isascii() and parts.isdigit()):
+        raise argparse.ArgumentTypeError(f"a part is given as K/N, such as 3/16, got {text!r}")
+    if not 1 <= int(part) <= int(parts):
+        raise argparse.ArgumentTypeError(f"K must be between 1 and N, got {text}")
+    return int(part), int(parts)
+
+
+def _numbers(separator: str, count: int) -> Callable[[str], tuple[float, ...]]:
+    """An option type: so many numbers between separators."""
+
+    def read(text: str) -> tuple[float, ...]:
+        try:
+            values = tuple(float(part) for part in text.split(separator))
+        except ValueError:
+            values = ()
+        if len(values) != count:
+            example = separator.join("12345"[:count])
+            raise argparse.ArgumentTypeError(
+                f"must be {count} numbers like {example}, got {text!r}"
+            )
+        return values
+
+    return read
+
+
+OPTION_TYPES: Mapping[str, Callable[[str], Any]] = {
+    "whole": whole(0),
+    "count": whole(1),
+    "number": float,
+    "positive": positive,
+    "shard": _shard,
+    "size": _numbers("x", 2),
+    "range": _numbers(",", 2),
+    "corners": _numbers(",", 4),
+}
+"""Names in ``commands.toml`` for what reads an option's value."""
