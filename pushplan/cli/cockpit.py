@@ -41,16 +41,14 @@ class Display(Protocol):
         """Take in what was typed."""
 
 
-class Clock:
-    """Wall-clock time; tests put another one in its place."""
+class Clock(Protocol):
+    """Wall-clock time as the module `time` has it; tests put another one in its place."""
 
-    def now(self) -> float:
+    def perf_counter(self) -> float:
         """[s]."""
-        return time.perf_counter()
 
-    def sleep(self, seconds: float) -> None:
+    def sleep(self, seconds: float, /) -> None:
         """Wait."""
-        time.sleep(seconds)
 
 
 class _Left(Exception):
@@ -118,7 +116,7 @@ class Cockpit:
         self._trail.append(trace.robot_poses[:, :2])
         self._last = (trace.robot_poses[-1], trace.object_poses[-1])
         self._time = world.time
-        self._due = max(begin + seconds, self._clock.now() - LATE)
+        self._due = max(begin + seconds, self._clock.perf_counter() - LATE)
 
     def _between(self, trace: Trace, at: float) -> tuple[FloatArray, FloatArray]:
         """Poses of the robot (3,) and of the objects (K, 3) at a time [s] within the last step.
@@ -144,13 +142,12 @@ class Cockpit:
         """
         self._display.keyboard.clear()
         self._show(self._env.world, [*closing_lines(episode), "r starts again   q ends"])
-        while True:
-            self._display.update()
-            if self._display.closed or self._display.keyboard.take("quit"):
-                return False
-            if self._display.keyboard.take("restart"):
-                return True
-            self._clock.sleep(TICK)
+        try:
+            while True:
+                self._look()
+                self._clock.sleep(TICK)
+        except _Left as left:
+            return left.restart
 
     def _begin(self, world: World) -> None:
         """Wait for the first key: nobody is ready in the first instant."""
@@ -163,7 +160,7 @@ class Cockpit:
         while not self._display.keyboard.touched:
             self._look()
             self._clock.sleep(TICK)
-        self._due = self._clock.now()
+        self._due = self._clock.perf_counter()
 
     def _show(self, world: World, text: list[str], *newest: FloatArray) -> None:
         trail = np.concatenate([*self._trail, *newest])
@@ -171,7 +168,7 @@ class Cockpit:
 
     def _wait(self, due: float) -> None:
         self._look()
-        while (left := due - self._clock.now()) > 0.0:
+        while (left := due - self._clock.perf_counter()) > 0.0:
             self._clock.sleep(min(left, TICK))
             self._look()
 
@@ -191,7 +188,7 @@ def _mix(a: FloatArray, b: FloatArray, fraction: float) -> FloatArray:
 
 
 def drive(
-    env: Any, scenario: Any, display: Display, *, speed: float = 1.0, clock: Clock | None = None
+    env: Any, scenario: Any, display: Display, *, speed: float = 1.0, clock: Clock = time
 ) -> Episode:
     """Let a person drive until they have had enough; the last episode is returned.
 
@@ -204,9 +201,8 @@ def drive(
         speed: simulated seconds per second.
         clock: wall-clock time.
     """
-    clock = clock or Clock()
     while True:
-        recording = Recording(Pilot(display.keyboard, clock.now), scenario, "teleop")
+        recording = Recording(Pilot(display.keyboard, clock.perf_counter), scenario, "teleop")
         cockpit = Cockpit(env, display, speed, clock)
         try:
             recording.run(env, cockpit)

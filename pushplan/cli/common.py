@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import argparse
 import json
 import math
 import os
@@ -12,12 +11,6 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from pushplan.world import Episode
-
-
-def run_options(options: argparse.Namespace) -> dict[str, Any]:
-    """What `add_run_options` read, as `Experiment.run` takes it."""
-    names = ("workers", "retry_failed", "any_version", "shard", "dask")
-    return {name: getattr(options, name) for name in names}
 
 
 def check_episode_file(path: str | None) -> None:

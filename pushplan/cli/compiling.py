@@ -12,27 +12,19 @@ from pushplan.cli.kernel_progress import kernel_progress
 def run(options: argparse.Namespace) -> int:
     """One line for each thing that was run to compile it."""
     if options.planners:
-        from pushplan.planners import policy_names
-
-        wanted, warm_up = options.names or policy_names(), _warm_up_planner
+        from pushplan.planners import policy_names as known
+        from pushplan.planners import warm_up
     else:
-        from pushplan.evaluation import warmup
-
-        wanted, warm_up = options.names or warmup.names(), warmup.warm_up
+        from pushplan.evaluation.warmup import names as known
+        from pushplan.evaluation.warmup import warm_up
+    wanted = options.names or known()
     with kernel_progress(*wanted) as progress:
         for name in wanted:
             compiled, loaded = progress.compiled, progress.loaded
-            took = warm_up(name)
+            begin = time.perf_counter()
+            warm_up(name)
+            took = time.perf_counter() - begin
             progress.clear()
             compiled, loaded = progress.compiled - compiled, progress.loaded - loaded
             say(f"{name}: {took:.1f} s, {compiled} kernels compiled, {loaded} loaded")
     return 0
-
-
-def _warm_up_planner(name: str) -> float:
-    """Run a planner in small worlds; how long that took [s]."""
-    from pushplan.planners import warm_up
-
-    begin = time.perf_counter()
-    warm_up(name)
-    return time.perf_counter() - begin

@@ -14,8 +14,8 @@ from pushplan.cli.common import has_screen, say, say_json
 
 BASE = ("numba", "numpy", "ompl", "yaml", "ruckig", "scipy", "shapely")
 """Libraries that come with pushplan itself; Ruckig where it has a wheel."""
-_DISPLAYS = {"EGL": "EGL", "OSMesa": "OSMesa"}
-"""What MuJoCo draws with where there is no screen -> the name of its library."""
+_DISPLAYS = ("EGL", "OSMesa")
+"""Libraries with which MuJoCo draws where there is no screen."""
 
 
 def run(options: argparse.Namespace) -> int:
@@ -54,7 +54,7 @@ def examine() -> dict[str, Any]:
         },
         "kernels": _kernels() if libraries["numba"] is not None else None,
         "drawing": {
-            **{name: ctypes.util.find_library(lib) is not None for name, lib in _DISPLAYS.items()},
+            **{name: ctypes.util.find_library(name) is not None for name in _DISPLAYS},
             "screen": has_screen(),
             "MUJOCO_GL": os.environ.get("MUJOCO_GL"),
         },

@@ -38,10 +38,10 @@ def _field(options: argparse.Namespace) -> IceField:
     from pushplan.scenarios import FloeSizes, generate_ice, load_ice
     from pushplan.world import InvalidInputError, stream
 
-    if options.check:
+    if path := options.field or options.check:
         if options.concentration is not None:
             raise InvalidInputError("--check reads a field: leave out --concentration")
-        return load_ice(options.check, hull=options.hull, overlaps=options.overlaps)
+        return load_ice(path, hull=options.hull, overlaps=options.overlaps)
     if options.hull or options.overlaps:
         raise InvalidInputError("--hull and --overlaps go with a field to read: give its file")
     if options.concentration is None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from itertools import zip_longest
 from typing import Any
 
@@ -18,14 +19,22 @@ def run(options: argparse.Namespace) -> int:
         return 0
     kinds = list(_KINDS) if options.kind == "all" else [options.kind]
     if options.json:
-        say_json([{"kind": kind, **one} for kind in kinds for one in _described(kind)])
+        say_json(
+            [
+                {"kind": kind, "name": name, **_facts(kind, name)}
+                for kind in kinds
+                for name in names_of(kind)
+            ]
+        )
         return 0
     for kind in kinds:
-        if len(kinds) > 1 and not options.names:
+        if options.names:
+            say("\n".join(names_of(kind)))
+            continue
+        if len(kinds) > 1:
             say(f"{kind}:")
-        facts = None if options.names else _KINDS[kind].facts
-        rows = [(name, *_facts(facts, name)) for name in names_of(kind)]
-        _say_rows(rows, indented=len(kinds) > 1 and not options.names)
+        rows = [(name, *_facts(kind, name).values()) for name in names_of(kind)]
+        _say_rows(rows, indent="  " if len(kinds) > 1 else "")
     return 0
 
 
@@ -41,58 +50,66 @@ def _say_kinds(options: argparse.Namespace) -> None:
         say("'pushplan list KIND' lists one kind, 'pushplan list all' everything")
 
 
-def _say_rows(rows: Sequence[tuple[str, ...]], indented: bool = False) -> None:
+def _say_rows(rows: Sequence[tuple[str, ...]], indent: str = "") -> None:
     columns = zip_longest(*rows, fillvalue="")
     widths = [max(map(len, column)) for column in columns]
     for row in rows:
         line = "  ".join(text.ljust(width) for text, width in zip(row, widths, strict=False))
-        say(("  " if indented else "") + line.rstrip())
+        say(indent + line.rstrip())
 
 
-def _described(kind: str) -> list[dict[str, str]]:
-    """Each name of a kind with the columns beside it, by their headings."""
-    about = _KINDS[kind]
-    described = []
-    for name in names_of(kind):
-        facts = _facts(about.facts, name)
-        headings = about.headings if len(facts) == len(about.headings) else ("missing",)
-        described.append({"name": name, **dict(zip(headings, facts, strict=False))})
-    return described
-
-
-def _facts(facts: Callable[[str], tuple[str, ...]] | None, name: str) -> tuple[str, ...]:
+def _facts(kind: str, name: str) -> dict[str, str]:
     """The columns beside a name; one that says what to install, where something is missing."""
     from pushplan.world import MissingDependencyError
 
     try:
-        return () if facts is None else facts(name)
+        return _KINDS[kind].facts(name)
     except MissingDependencyError as error:
-        return (str(error),)
+        return {"missing": str(error)}
 
 
 def names_of(kind: str) -> list[str]:
     """The names of one kind."""
-    from pushplan.world.lazy_names import look_up
-
-    names: Any = look_up("kind", {one: about.home for one, about in _KINDS.items()}, kind)
+    names = _at(_KINDS[kind].home)
     return list(names() if callable(names) else names)
 
 
-def _policy(name: str) -> tuple[str, ...]:
+def _at(place: str) -> Any:
+    """What is at a place ``"module:name"``."""
+    from pushplan.world.lazy_names import look_up
+
+    return look_up("place", {place: place}, place)
+
+
+def _documented(table: str, name: str) -> dict[str, str]:
+    """The first line of the documentation of what a table, at a place, names."""
+    return _first_line(_at(_at(table)[name]))
+
+
+def _first_line(thing: object) -> dict[str, str]:
+    return {"description": (thing.__doc__ or "").partition("\n")[0]}
+
+
+def _policy(name: str) -> dict[str, str]:
     """Tasks, action modes in order of preference, description."""
     from pushplan.learned.loading import learned_names, weights_of
-    from pushplan.planners.registry import OPEN_WATER, POLICIES, make_policy
+    from pushplan.planners.registry import OPEN_WATER, make_policy
 
     if name in learned_names():
         from pushplan.learned.onnx_policy import read_specification
 
-        specification = read_specification(weights_of(name))
-        algorithm = specification.training.get("algorithm", "network")
-        what = f"A network trained by {str(algorithm).upper()}."
-        return ",".join(specification.tasks) or "any", specification.action.mode, what
+        network = read_specification(weights_of(name))
+        algorithm = str(network.training.get("algorithm", "network")).upper()
+        return {
+            "tasks": ",".join(network.tasks) or "any",
+            "actions": network.action.mode,
+            "description": f"A network trained by {algorithm}.",
+        }
     policy = make_policy(name)
     tasks = "ship_ice" if name in OPEN_WATER else _tasks_of(getattr(policy, "goal_kind", None))
-    return tasks, ",".join(getattr(policy, "actions", ())), _said(POLICIES, name)
+    actions = ",".join(getattr(policy, "actions", ()))
+    described = _documented("pushplan.planners.registry:POLICIES", name)
+    return {"tasks": tasks, "actions": actions, **described}
 
 
 def _tasks_of(goal_kind: str | None) -> str:
@@ -103,61 +120,41 @@ def _tasks_of(goal_kind: str | None) -> str:
     return "any" if len(chosen) == len(TASKS) else ",".join(chosen)
 
 
-def _suite(name: str) -> tuple[str, ...]:
-    """Task, simulator, default action mode, episodes and variations of the first start."""
+def _actions_of(task: str) -> list[str]:
+    """Action modes of a task, its default first."""
     from pushplan.envs.registry import TASKS
+
+    return list(_at(TASKS[task]).actions)
+
+
+def _suite(name: str) -> dict[str, str]:
+    """Task, simulator, default action mode, episodes and variations of the first start."""
     from pushplan.scenarios import suite
-    from pushplan.world.lazy_names import look_up
 
     scenarios = suite(name).scenarios
     first = scenarios[0]
-    modes = look_up("task", TASKS, first.task).actions
     varied = ", ".join(f"{key}={value}" for key, value in first.variations.items())
     episodes = f"{len(scenarios)} episodes, {first.preset}"
-    return first.task, first.simulator, modes[0], f"{episodes}{varied and ': '}{varied}"
+    return {
+        "task": first.task,
+        "simulator": first.simulator,
+        "action": _actions_of(first.task)[0],
+        "episodes": f"{episodes}{varied and ': '}{varied}",
+    }
 
 
-def _planner(name: str) -> tuple[str, ...]:
-    from pushplan.planners.registry import PLANNERS
-
-    return (_said(PLANNERS, name),)
-
-
-def _task(name: str) -> tuple[str, ...]:
-    from pushplan.envs.registry import TASKS
-    from pushplan.world.lazy_names import look_up
-
-    return ",".join(look_up("task", TASKS, name).actions), _said(TASKS, name)
+def _task(name: str) -> dict[str, str]:
+    described = _documented("pushplan.envs.registry:TASKS", name)
+    return {"actions": ",".join(_actions_of(name)), **described}
 
 
-def _metric(name: str) -> tuple[str, ...]:
-    from pushplan.metrics.registry import METRICS
-
-    return (_said({name: METRICS[name].function}, name),)
-
-
-def _simulator(name: str) -> tuple[str, ...]:
-    from pushplan.envs.registry import SIMULATORS
-
-    return (_said(SIMULATORS, name),)
-
-
-def _action(name: str) -> tuple[str, ...]:
+def _action(name: str) -> dict[str, str]:
     """Tasks that have it, description."""
-    from pushplan.envs.registry import ACTIONS, TASKS
-    from pushplan.world.lazy_names import look_up
-
-    tasks = [task for task in TASKS if name in look_up("task", TASKS, task).actions]
-    return ",".join(tasks), _said(ACTIONS, name)
+    tasks = [task for task in names_of("tasks") if name in _actions_of(task)]
+    return {"tasks": ",".join(tasks), **_documented("pushplan.envs.registry:ACTIONS", name)}
 
 
-def _channel(name: str) -> tuple[str, ...]:
-    from pushplan.observation import CHANNELS
-
-    return ((CHANNELS[name].__doc__ or "").partition("\n")[0],)
-
-
-def _condition(name: str) -> tuple[str, ...]:
+def _condition(name: str) -> dict[str, str]:
     """What it disturbs, and what is asked of a policy."""
     from dataclasses import fields
 
@@ -173,14 +170,7 @@ def _condition(name: str) -> tuple[str, ...]:
     disturbed += [f"rate={one.rate:g}"] if one.rate is not None else []
     disturbed += [f"{key}={value}" for key, value in one.variations.items()]
     asked = "no success asked for" if one.success is None else f"success {one.success:g}"
-    return " ".join(disturbed) or "nothing", asked
-
-
-def _said(table: Any, name: str) -> str:
-    """The first line of the documentation of what a table names."""
-    from pushplan.world.lazy_names import look_up
-
-    return (look_up("name", table, name).__doc__ or "").partition("\n")[0]
+    return {"disturbance": " ".join(disturbed) or "nothing", "asked": asked}
 
 
 @dataclass(frozen=True)
@@ -189,45 +179,43 @@ class _Kind:
 
     what: str
     home: str  # "module:name" of the names, or of a function that gives them
-    headings: tuple[str, ...]  # of the columns beside a name
-    facts: Callable[[str], tuple[str, ...]]  # the columns beside a name
+    facts: Callable[[str], dict[str, str]]  # heading -> what stands in that column beside a name
 
 
-_ONE = ("description",)
 _KINDS: dict[str, _Kind] = {
-    "planners": _Kind("find a plan for a World", "pushplan.planners:planner_names", _ONE, _planner),
+    "planners": _Kind(
+        "find a plan for a World",
+        "pushplan.planners:planner_names",
+        partial(_documented, "pushplan.planners.registry:PLANNERS"),
+    ),
     "policies": _Kind(
         "drive a robot: planners that are followed, controllers, trained networks",
         "pushplan.evaluation.policies:policy_names",
-        ("tasks", "actions", "description"),
         _policy,
     ),
-    "tasks": _Kind(
-        "what the robot has to do", "pushplan.envs.registry:TASKS", ("actions", *_ONE), _task
-    ),
-    "suites": _Kind(
-        "lists of starts to run policies on",
-        "pushplan.scenarios:suite_names",
-        ("task", "simulator", "action", "episodes"),
-        _suite,
-    ),
+    "tasks": _Kind("what the robot has to do", "pushplan.envs.registry:TASKS", _task),
+    "suites": _Kind("lists of starts to run policies on", "pushplan.scenarios:suite_names", _suite),
     "conditions": _Kind(
         "disturbances of 'pushplan stress'",
         "pushplan.evaluation.stress_testing:CONDITIONS",
-        ("disturbance", "asked"),
         _condition,
     ),
-    "metrics": _Kind("scores of an episode", "pushplan.metrics:metric_names", _ONE, _metric),
+    "metrics": _Kind(
+        "scores of an episode",
+        "pushplan.metrics:metric_names",
+        lambda name: _first_line(_at("pushplan.metrics:metric_function")(name)),
+    ),
     "simulators": _Kind(
-        "what moves the bodies", "pushplan.envs.registry:SIMULATORS", _ONE, _simulator
+        "what moves the bodies",
+        "pushplan.envs.registry:SIMULATORS",
+        partial(_documented, "pushplan.envs.registry:SIMULATORS"),
     ),
-    "actions": _Kind(
-        "how a policy commands the robot",
-        "pushplan.envs.registry:ACTIONS",
-        ("tasks", *_ONE),
-        _action,
+    "actions": _Kind("how a policy commands the robot", "pushplan.envs.registry:ACTIONS", _action),
+    "channels": _Kind(
+        "of image observations",
+        "pushplan.observation:CHANNELS",
+        lambda name: _first_line(_at("pushplan.observation:CHANNELS")[name]),
     ),
-    "channels": _Kind("of image observations", "pushplan.observation:CHANNELS", _ONE, _channel),
 }
 """What there is."""
 CHOICES = (*sorted(_KINDS), "all")

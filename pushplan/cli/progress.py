@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterable, Iterator
 from contextlib import ExitStack, contextmanager
 from typing import TYPE_CHECKING
 
-from pushplan.cli.common import duration, run_options
+from pushplan.cli.common import duration
 from pushplan.cli.kernel_progress import PendingKernels, kernel_progress
 
 if TYPE_CHECKING:
@@ -57,10 +57,11 @@ def run_jobs(experiment: Experiment, out: str, options: argparse.Namespace) -> R
     Args:
         experiment: what to run.
         out: run directory.
-        options: with those of `add_run_options`.
+        options: with the shared options "jobs".
     """
-    chosen = run_options(options)
-    dask = chosen.pop("dask")
+    names = ("workers", "retry_failed", "any_version", "shard")
+    chosen = {name: getattr(options, name) for name in names}
+    dask = options.dask
     cost = experiment.cost(out, **chosen)
     lines = _cost_lines(cost, "a cluster" if dask else f"{options.workers or 1} workers", out)
     for line in lines:

@@ -22,12 +22,12 @@ def run(options: argparse.Namespace) -> int:
     results = Results.load(options.directory)
     if options.metrics is None and options.format is None:
         figures = options.figures.split(",") if options.figures else ()
-        written = {"replays": options.replays, "most": options.replay_most, "figures": figures}
-        show(results, options, **written)
+        show(results, options, replays=options.replays, most=options.replay_most, figures=figures)
         return 0
-    wanted = options.metrics
-    chosen = table_options(options)
-    tables = results.measure(wanted.split(",")) if wanted else results.tables(**chosen)
+    if options.metrics:
+        tables = results.measure(options.metrics.split(","))
+    else:
+        tables = results.tables(settings=options.settings, pairs=options.pairs)
     if options.format is None:
         _print(tables)
     else:
@@ -35,23 +35,19 @@ def run(options: argparse.Namespace) -> int:
     return 0
 
 
-def table_options(options: argparse.Namespace) -> dict[str, Any]:
-    """What `add_table_options` read, as `Results.tables` takes it."""
-    return {"settings": options.settings, "pairs": options.pairs}
-
-
 def show(results: Results, options: argparse.Namespace, **written: Any) -> None:
     """Print the tables of a run and why episodes did not succeed, write its report.
 
     Args:
         results: of the run.
-        options: with those of `add_table_options`.
+        options: with the shared options "tables".
         written: as for `Results.report`.
     """
     from pushplan.evaluation.endings import unsuccessful_lines
     from pushplan.evaluation.tables import on_few_lines
 
-    _print(on_few_lines(results.tables(**table_options(options))))
+    tables = results.tables(settings=options.settings, pairs=options.pairs)
+    _print(on_few_lines(tables))
     for line in unsuccessful_lines(results):
         say(line)
     if len(results.titles) > 1 and not options.settings:

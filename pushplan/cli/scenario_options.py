@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import os
 import re
+from collections.abc import Collection, Sequence
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -25,11 +26,8 @@ def scenario_of(options: argparse.Namespace) -> Scenario:
     from pushplan.world import InvalidInputError
 
     shown = {"boxes": options.boxes, "shape": options.shape}
-    given: dict[str, Any] = {key: value for key, value in shown.items() if value is not None}
-    for name, value in map(variation, options.variations):
-        if name in given:
-            raise InvalidInputError(f"variation {name!r} is given twice")
-        given[name] = value
+    chosen = {key: value for key, value in shown.items() if value is not None}
+    given = chosen | variations("variation", options.variations, chosen)
     if (options.suite is None) == (options.task is None):
         raise InvalidInputError("give either a SUITE or --task NAME, see --help")
     if options.suite is None:
@@ -45,6 +43,27 @@ def scenario_of(options: argparse.Namespace) -> Scenario:
             "--task room --set world_file=FILE"
         )
     return suite(options.suite, episodes=1, first_seed=options.seed).scenarios[0]
+
+
+def variations(kind: str, texts: Sequence[str], chosen: Collection[str] = ()) -> dict[str, Any]:
+    """Values by name of texts of the form ``NAME=VALUE``.
+
+    Args:
+        kind: what errors call one of them.
+        texts: what was given.
+        chosen: names that have a value already.
+
+    Raises:
+        InvalidInputError: as `variation`, or if a name is given twice.
+    """
+    from pushplan.world import InvalidInputError
+
+    values: dict[str, Any] = {}
+    for name, value in map(variation, texts):
+        if name in values or name in chosen:
+            raise InvalidInputError(f"{kind} {name!r} is given twice")
+        values[name] = value
+    return values
 
 
 def variation(text: str) -> tuple[str, Any]:

@@ -5,10 +5,9 @@ from __future__ import annotations
 import argparse
 import sys
 from dataclasses import replace
-from typing import Any
 
 from pushplan.cli.kernel_progress import kernel_progress
-from pushplan.cli.scenario_options import variation
+from pushplan.cli.scenario_options import variations
 
 
 def run(options: argparse.Namespace) -> int:
@@ -18,16 +17,10 @@ def run(options: argparse.Namespace) -> int:
 
     from pushplan.evaluation.policies import parse_policy
     from pushplan.serving import PROTOCOL, PolicyServer, ServerLimits
-    from pushplan.world import InvalidInputError
 
     spec = parse_policy(options.policy)
-    given: dict[str, Any] = {}
-    for name, value in map(variation, options.options):
-        if name in given:
-            raise InvalidInputError(f"option {name!r} is given twice")
-        given[name] = value
     server = PolicyServer(
-        replace(spec, options=given).make,
+        replace(spec, options=variations("option", options.options)).make,
         options.socket,
         allow_remote=options.allow_remote,
         limits=ServerLimits(

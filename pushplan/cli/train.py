@@ -97,29 +97,22 @@ def score_on(suite: str, path: Path, episodes: int, workers: int) -> dict[str, A
     """A suite's row of the model card."""
     from collections import Counter
 
-    import numpy as np
-
-    from pushplan.evaluation import bench, wilson
-    from pushplan.evaluation.statistics import estimate
+    from pushplan.evaluation import bench
 
     results = bench(suite, [f"policy=onnx:{path}"], episodes=episodes, workers=workers)
-    rows = results.rows
-    success = wilson(sum(bool(row.success) for row in rows), len(rows))
-    scores = {}
-    for name in ("S_manip", "E_manip", "I_manip", "E_nav", "I_nav"):
-        values = [float(v) for row in rows if (v := getattr(row, name)) is not None]
-        values = [value for value in values if np.isfinite(value)]
-        if values:
-            found = estimate(values)
-            scores[name] = (found.mean, found.low, found.high)
+    (found,) = results.pooled.summary()
     return {
         "suite": suite,
-        "episodes": len(rows),
-        "success": success.fraction,
-        "success_low": success.low,
-        "success_high": success.high,
-        "scores": scores,
-        "failures": dict(Counter(row.reason for row in rows if not row.success)),
+        "episodes": found.episodes,
+        "success": found.success.fraction,
+        "success_low": found.success.low,
+        "success_high": found.success.high,
+        "scores": {
+            name: (one.mean, one.low, one.high)
+            for name in ("S_manip", "E_manip", "I_manip", "E_nav", "I_nav")
+            if (one := found.metrics.get(name)) is not None
+        },
+        "failures": dict(Counter(row.reason for row in results.rows if not row.success)),
     }
 
 

@@ -15,7 +15,7 @@ import pytest
 from conftest import make_robot
 
 from pushplan.cli import main
-from pushplan.cli.cockpit import Clock, drive
+from pushplan.cli.cockpit import drive
 from pushplan.cli.keyboard import GRACE, Keyboard, twist_of
 from pushplan.envs import make
 from pushplan.metrics import compute
@@ -98,7 +98,7 @@ def test_other_keys_are_nothing_and_wishes_are_taken_once() -> None:
     assert not keys.take("restart") and not keys.held(1.0)
 
 
-class Script(Clock):
+class Script:
     """A clock that only moves when somebody sleeps, and a display with things that happen."""
 
     def __init__(self, *events: tuple[float, str]) -> None:
@@ -108,7 +108,7 @@ class Script(Clock):
         self.closed = False
         self.frames: list[tuple[float, np.ndarray]] = []
 
-    def now(self) -> float:
+    def perf_counter(self) -> float:
         return self.time
 
     def sleep(self, seconds: float) -> None:
