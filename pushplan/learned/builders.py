@@ -1,10 +1,10 @@
-"""Observation builders as plain data, so that they can travel with a network."""
+"""Dataclasses and observation builders as plain data, so that they can travel with a network."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
-from dataclasses import asdict, fields
+from collections.abc import Mapping, Sequence
+from dataclasses import MISSING, asdict, fields
 from typing import Any
 
 import numpy as np
@@ -21,6 +21,34 @@ KINDS: dict[str, type[Any]] = {
 }
 GREATEST_SIZE = 2**24
 """Elements of an observation that a file may ask for."""
+
+
+def from_mapping(kind: type[Any], name: str, data: Any, *, beside: Sequence[str] = ()) -> Any:
+    """A dataclass from a mapping of its fields, in which lists stand for tuples.
+
+    Args:
+        kind: the dataclass.
+        name: what errors call the mapping.
+        data: the mapping.
+        beside: keys that may be there too; they are not used.
+
+    Raises:
+        SchemaError, InvalidInputError: if a key or a value is wrong.
+    """
+    own = [field.name for field in fields(kind)]
+    needed = [
+        field.name
+        for field in fields(kind)
+        if field.default is MISSING and field.default_factory is MISSING
+    ]
+    known_keys(name, data, (*beside, *own), needed)
+    return kind(
+        **{
+            key: tuple(value) if isinstance(value, list) else value
+            for key, value in data.items()
+            if key in own
+        }
+    )
 
 
 def builder_to_dict(builder: ObservationBuilder) -> dict[str, Any]:
@@ -49,15 +77,10 @@ def builder_from_dict(data: Mapping[str, Any]) -> ObservationBuilder:
     """
     if not isinstance(data, Mapping) or "kind" not in data:
         raise SchemaError(f"observation must be a mapping with a kind, got {data!r:.80}")
-    builder_class = KINDS[choice("observation kind", data["kind"], tuple(KINDS))]
-    own = [field.name for field in fields(builder_class)]
-    known_keys("observation", data, ("kind", "shape", "dtype", *own), ("kind",))
-    options = {
-        key: tuple(value) if isinstance(value, list) else value
-        for key, value in data.items()
-        if key in own
-    }
-    builder: ObservationBuilder = builder_class(**options)
+    kind = KINDS[choice("observation kind", data["kind"], tuple(KINDS))]
+    builder: ObservationBuilder = from_mapping(
+        kind, "observation", data, beside=("kind", "shape", "dtype")
+    )
     if float(np.prod([float(n) for n in builder.shape])) > GREATEST_SIZE:
         raise InvalidInputError(f"an observation of shape {builder.shape} is too large")
     shape, dtype = data.get("shape", builder.shape), data.get("dtype")

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from pushplan.compiled import kernel
 from pushplan.geometry import GoalDistances, goal_distances
-from pushplan.geometry.transforms import transform_points
+from pushplan.geometry.transforms import transform_outlines
 from pushplan.observation.builder import LimitedVector
 from pushplan.world import Goal, GoalDisc, GoalLine, StaticMap, World
 from pushplan.world.checked_fields import CheckedFields, Limits, PositiveFloat
@@ -31,6 +31,7 @@ def cast_rays(
 ) -> None:
     """Shorten rays to where they first cross an outline."""
     count = out.shape[0]
+    reach = np.max(out)
     step = 2.0 * np.pi / count
     for k in range(offsets.shape[0] - 1):
         first, end = offsets[k], offsets[k + 1]
@@ -38,12 +39,15 @@ def cast_rays(
             j = i + 1 if i + 1 < end else first
             ax, ay = vertices[i, 0] - x, vertices[i, 1] - y
             bx, by = vertices[j, 0] - x, vertices[j, 1] - y
+            ex, ey = bx - ax, by - ay
+            # most edges are out of reach: (reach + edge)² is at most 2 (reach² + edge²)
+            if ax * ax + ay * ay > 2.0 * (reach * reach + ex * ex + ey * ey):
+                continue
             # only the rays between the bearings of the two ends can cross the edge
             turn = np.arctan2(ax * by - ay * bx, ax * bx + ay * by)
             low = np.arctan2(ay, ax) if turn >= 0.0 else np.arctan2(by, bx)
             start = int(np.ceil((low - heading) / step - 1e-9))
             last = int(np.floor((low + abs(turn) - heading) / step + 1e-9))
-            ex, ey = bx - ax, by - ay
             for n in range(start, last + 1):
                 c, s = np.cos(heading + n * step), np.sin(heading + n * step)
                 across = c * ey - s * ex
@@ -52,36 +56,6 @@ def cast_rays(
                 away = (ax * ey - ay * ex) / across
                 if 0.0 <= away < out[n % count]:
                     out[n % count] = away
-
-
-@kernel(allocates=True)
-def near_outlines(
-    x: float,
-    y: float,
-    reach: float,
-    poses: FloatArray,
-    radii: FloatArray,
-    vertices: FloatArray,
-    offsets: IntArray,
-) -> tuple[FloatArray, IntArray]:
-    """World-frame outlines of the bodies of which a part may lie within ``reach`` [m]."""
-    keep = np.zeros(poses.shape[0], dtype=np.int64)
-    bodies, corners = 0, 0
-    for k in range(poses.shape[0]):
-        far = reach + radii[k]
-        if (poses[k, 0] - x) ** 2 + (poses[k, 1] - y) ** 2 <= far * far:
-            keep[bodies] = k
-            bodies += 1
-            corners += offsets[k + 1] - offsets[k]
-    out, ends = np.empty((corners, 2)), np.zeros(bodies + 1, dtype=np.int64)
-    n = 0
-    for i in range(bodies):
-        k = keep[i]
-        size = offsets[k + 1] - offsets[k]
-        transform_points(poses[k], vertices[offsets[k] : offsets[k + 1]], out[n : n + size])
-        n += size
-        ends[i + 1] = n
-    return out, ends
 
 
 _GUIDE, _EACH = 10, 9
@@ -133,26 +107,19 @@ class FeatureObservation(LimitedVector, CheckedFields):
         out[:2] = c, s
         self._guide(out[2:_GUIDE], world, to_body)
         if self.rays:
-            parts = _walls(world.static)
-            out[_GUIDE : _GUIDE + self.rays] = self._cast(x, y, theta, *parts)
             objects = world.movables
-            near = near_outlines(
-                *(x, y, self.range, objects.poses, objects.radii),
-                *(objects.vertices, objects.offsets),
-            )
-            out[_GUIDE + self.rays : _GUIDE + 2 * self.rays] = self._cast(
-                x, y, theta, *map(frozen, near)
-            )
+            corners = np.empty_like(objects.vertices)
+            transform_outlines(objects.poses, objects.vertices, objects.offsets, corners)
+            rays = out[_GUIDE : _GUIDE + 2 * self.rays].reshape(2, self.rays)
+            for row, outlines in zip(
+                rays, (_walls(world.static), (frozen(corners), objects.offsets)), strict=True
+            ):
+                lengths = np.full(self.rays, self.range)
+                cast_rays(lengths, x, y, theta, *outlines)
+                row[:] = 1.0 - lengths / self.range
         if self.objects and len(world.movables):
             self._nearest(out[_GUIDE + 2 * self.rays :].reshape(-1, _EACH), world, to_body)
         return np.clip(out, -self.limit, self.limit).astype(np.float32)
-
-    def _cast(
-        self, x: float, y: float, theta: float, vertices: FloatArray, offsets: IntArray
-    ) -> FloatArray:
-        lengths = np.full(self.rays, self.range)
-        cast_rays(lengths, x, y, theta, vertices, offsets)
-        return 1.0 - lengths / self.range
 
     def _guide(self, out: FloatArray, world: World, to_body: FloatArray) -> None:
         """The numbers after cosine and sine."""

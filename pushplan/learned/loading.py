@@ -53,14 +53,19 @@ def load_policy(source: str, label: str | None = None, **options: Any) -> Networ
         UnknownNameError: if there is no shipped network of that name.
         MissingDependencyError: if a library that runs it is not there.
     """
-    if not source.startswith(LEARNED_PREFIXES):
-        return _onnx(weights_of(source), label or source, options)
-    kind, path = source.partition(":")[0], learned_file(source)
-    if kind == "onnx":
-        return _onnx(path, label, options)
-    from pushplan.learned.sb3_policy import Sb3Policy
+    if source.startswith(LEARNED_PREFIXES):
+        path = learned_file(source)
+    else:
+        path, label = weights_of(source), label or source
+    if source.startswith("sb3:"):
+        from pushplan.learned.sb3_policy import Sb3Policy
 
-    return Sb3Policy(path, label=label, **options)
+        return Sb3Policy(path, label=label, **options)
+    if options:
+        raise InvalidInputError(f"an ONNX policy has no options, got {', '.join(options)}")
+    from pushplan.learned.onnx_policy import OnnxPolicy
+
+    return OnnxPolicy(path, label)
 
 
 def learned_file(source: str) -> Path:
@@ -78,11 +83,3 @@ def learned_file(source: str) -> Path:
         if candidate.is_file():
             return candidate.resolve()
     raise InvalidInputError(f"policy {source!r}: there is no file {path} or {with_ending}")
-
-
-def _onnx(path: Path, label: str | None, options: dict[str, Any]) -> NetworkPolicy:
-    if options:
-        raise InvalidInputError(f"an ONNX policy has no options, got {', '.join(options)}")
-    from pushplan.learned.onnx_policy import OnnxPolicy
-
-    return OnnxPolicy(path, label)

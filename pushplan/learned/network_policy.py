@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pushplan.learned.outputs import BadOutputError
+from pushplan.learned.outputs import CHOOSING, BadOutputError
 from pushplan.learned.specification import Specification
 from pushplan.observation import ObservationBuilder
 from pushplan.world import InvalidInputError, World
@@ -121,20 +121,14 @@ class NetworkPolicy:
     def _decide(self, world: World, seen: NDArray[Any]) -> NDArray[np.float32]:
         """(repeat, n) the next actions."""
         spec, output = self.specification.action, self._function(seen)
-        if spec.output not in ("pixel_values", "direction"):
+        if spec.output not in CHOOSING:
             return spec.steps(output)
         still = _STILL * (spec.window or spec.step)
         tried = [old.choice for old in self._decisions if old.was_made_at(world, still)]
-        choice: Any
-        if spec.output == "pixel_values":
-            choice = spec.pixel(output, tried)
-            action = spec.waypoint(*choice)
-        else:
-            choice = spec.direction(output, tried)
-            action = spec.heading(choice)
+        choice = spec.choose(output, tried)
         objects = world.movables
         self._decisions.append(_Decision(objects.ids, world.robot_pose, objects.poses, choice))
-        return spec.held(action)
+        return spec.chosen(choice)
 
     def _check(self, seen: Any) -> None:
         shape, dtype = self.observation.shape, self.observation.dtype

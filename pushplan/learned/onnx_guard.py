@@ -8,8 +8,8 @@ networks that are complete in their file.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator
-from dataclasses import dataclass, field
 
 from pushplan.world import InvalidInputError
 
@@ -35,30 +35,35 @@ GREATEST_TENSOR = 64 * 2**20
 """Elements that a tensor of the file may have."""
 _MOST_NODES = 20_000
 
-_VARINT, _FIXED64, _BYTES, _FIXED32 = 0, 1, 2, 5
-_MODEL = {"producer": 2, "graph": 7, "opset": 8, "metadata": 14, "training": 20, "functions": 25}
-_GRAPH = {"node": 1, "initializer": 5, "sparse": 15}
-_NODE = {"attribute": 5, "operator": 4, "domain": 7}
-_ATTRIBUTE = {"tensor": 5, "graph": 6, "tensors": 10, "graphs": 11, "sparse": 22, "sparses": 23}
-_TENSOR = {"dims": 1, "name": 8, "external": 13, "location": 14}
+_FIELDS = {
+    "model": {7: "graph", 8: "opset", 14: "metadata", 20: "training", 25: "function"},
+    "opset": {1: "domain"},
+    "metadata": {1: "key", 2: "value"},
+    "graph": {1: "node", 5: "tensor", 15: "sparse"},
+    "node": {4: "operator", 5: "attribute", 7: "domain"},
+    "attribute": {5: "tensor", 6: "inner", 10: "tensor", 11: "inner", 22: "inner", 23: "inner"},
+    "tensor": {1: "sides", 8: "name", 13: "external", 14: "location"},
+}
+"""Of each message: numbers of the fields that matter. A field called like a message holds one."""
+_EXTERNAL = "it keeps weights in another file (external data): save the model in one file"
+_REFUSED = {
+    "training": "it holds functions or training graphs, which are not run here",
+    "function": "it holds functions or training graphs, which are not run here",
+    "sparse": "it holds sparse tensors, which are not run here",
+    "inner": "a node holds a graph or a sparse tensor, which are not run here",
+    "external": _EXTERNAL,
+}
+_VARINT, _BYTES = 0, 2
+_FIXED = {1: 8, 5: 4}
+"""Wire types of protobuf with a fixed size: bytes of each."""
 
 
 class NotOnnxError(InvalidInputError):
     """A file is no ONNX network, or one that is not run here."""
 
 
-@dataclass
-class OnnxContents:
-    """What was found."""
-
-    metadata: dict[str, str] = field(default_factory=dict)  # the model's own key-value texts
-    operators: set[str] = field(default_factory=set)  # names of the operators that it uses
-    opset: int = 0  # version of the operator set
-    nodes: int = 0
-
-
-def inspect(data: bytes) -> OnnxContents:
-    """Check a model and read its metadata.
+def inspect(data: bytes) -> dict[str, str]:
+    """Check a model and give its metadata, key-value texts.
 
     Raises:
         NotOnnxError: if it is empty, truncated, no ONNX, or asks for what a policy does not need:
@@ -69,91 +74,53 @@ def inspect(data: bytes) -> OnnxContents:
         raise NotOnnxError("the file is empty")
     if len(data) > GREATEST_FILE:
         raise NotOnnxError(f"the file has {len(data)} bytes, {GREATEST_FILE} are the limit")
-    contents = OnnxContents()
-    graphs = 0
-    for number, value in _fields(data):
-        if number == _MODEL["graph"]:
-            graphs += 1
-            _graph(_message(value), contents)
-        elif number == _MODEL["opset"]:
-            _opset(_message(value), contents)
-        elif number == _MODEL["metadata"]:
-            entry = dict(_fields(_message(value)))
-            contents.metadata[_text(entry.get(1, b""))] = _text(entry.get(2, b""))
-        elif number in (_MODEL["training"], _MODEL["functions"]):
-            raise NotOnnxError("it holds functions or training graphs, which are not run here")
-    if graphs != 1 or not contents.nodes:
+    counts = Counter[str]()
+    metadata = dict[str, str]()
+    _look_through("model", data, counts, metadata)
+    if counts["graph"] != 1 or not counts["node"]:
         raise NotOnnxError("it is no ONNX model: it holds no graph")
-    return contents
+    return metadata
 
 
-def _opset(data: bytes, contents: OnnxContents) -> None:
-    entry = dict(_fields(data))
-    domain = _text(entry.get(1, b""))
-    if domain not in ("", "ai.onnx"):
+def _look_through(kind: str, data: bytes, counts: Counter[str], metadata: dict[str, str]) -> None:
+    """Check a message and all that it holds; counts messages by kind and collects metadata."""
+    counts[kind] += 1
+    if counts["node"] > _MOST_NODES:
+        raise NotOnnxError(f"it has more than {_MOST_NODES} nodes")
+    texts = dict[str, str]()
+    elements = 1
+    for number, value in _fields(data):
+        name = _FIELDS[kind].get(number, "")
+        if name in _REFUSED:
+            raise NotOnnxError(_REFUSED[name])
+        if name in _FIELDS:
+            _look_through(name, _message(value), counts, metadata)
+        elif name == "sides":
+            for size in [value] if isinstance(value, int) else _varints(value):
+                elements *= size
+                if size >= 2**63 or elements > GREATEST_TENSOR:
+                    raise NotOnnxError(
+                        f"tensor {texts.get('name', '')!r:.60} is larger than {GREATEST_TENSOR} "
+                        "elements"
+                    )
+        elif name == "location":
+            if value != 0:
+                raise NotOnnxError(_EXTERNAL)
+        elif name:
+            texts[name] = _message(value).decode("utf-8", errors="replace")
+    if kind == "metadata":
+        metadata[texts.get("key", "")] = texts.get("value", "")
+    domain = texts.get("domain", "")
+    foreign = domain not in ("", "ai.onnx")
+    if kind == "opset" and foreign:
         raise NotOnnxError(f"it uses operators of domain {domain!r:.60}; only ONNX's own are run")
-    version = entry.get(2, 0)
-    contents.opset = version if isinstance(version, int) else 0
-
-
-def _graph(data: bytes, contents: OnnxContents) -> None:
-    for number, value in _fields(data):
-        if number == _GRAPH["node"]:
-            contents.nodes += 1
-            if contents.nodes > _MOST_NODES:
-                raise NotOnnxError(f"it has more than {_MOST_NODES} nodes")
-            _node(_message(value), contents)
-        elif number == _GRAPH["initializer"]:
-            _tensor(_message(value))
-        elif number == _GRAPH["sparse"]:
-            raise NotOnnxError("it holds sparse tensors, which are not run here")
-
-
-def _node(data: bytes, contents: OnnxContents) -> None:
-    operator, domain = "", ""
-    for number, value in _fields(data):
-        if number == _NODE["operator"]:
-            operator = _text(value)
-        elif number == _NODE["domain"]:
-            domain = _text(value)
-        elif number == _NODE["attribute"]:
-            _attribute(_message(value))
-    if domain not in ("", "ai.onnx") or operator not in OPERATORS:
+    operator = texts.get("operator", "")
+    if kind == "node" and (foreign or operator not in OPERATORS):
         name = f"{domain}.{operator}" if domain else operator
         raise NotOnnxError(
             f"it uses the operator {name!r:.80}, which is not run here: custom operators, control "
             "flow and random numbers have no place in a policy file"
         )
-    contents.operators.add(operator)
-
-
-def _attribute(data: bytes) -> None:
-    for number, value in _fields(data):
-        if number in (_ATTRIBUTE["tensor"], _ATTRIBUTE["tensors"]):
-            _tensor(_message(value))
-        elif number in (
-            *(_ATTRIBUTE["graph"], _ATTRIBUTE["graphs"]),
-            *(_ATTRIBUTE["sparse"], _ATTRIBUTE["sparses"]),
-        ):
-            raise NotOnnxError("a node holds a graph or a sparse tensor, which are not run here")
-
-
-def _tensor(data: bytes) -> None:
-    count, name = 1, ""
-    for number, value in _fields(data):
-        if number == _TENSOR["external"] or (number == _TENSOR["location"] and value != 0):
-            raise NotOnnxError(
-                "it keeps weights in another file (external data): save the model in one file"
-            )
-        if number == _TENSOR["name"]:
-            name = _text(value)
-        elif number == _TENSOR["dims"]:
-            for size in [value] if isinstance(value, int) else _varints(value):
-                count *= size
-                if size >= 2**63 or count > GREATEST_TENSOR:
-                    raise NotOnnxError(
-                        f"tensor {name!r:.60} is larger than {GREATEST_TENSOR} elements"
-                    )
 
 
 def _fields(data: bytes) -> Iterator[tuple[int, int | bytes]]:
@@ -170,8 +137,8 @@ def _fields(data: bytes) -> Iterator[tuple[int, int | bytes]]:
             continue
         if kind == _BYTES:
             size, at = _varint(data, at)
-        elif kind in (_FIXED32, _FIXED64):
-            size = 4 if kind == _FIXED32 else 8
+        elif kind in _FIXED:
+            size = _FIXED[kind]
         else:
             raise NotOnnxError("it is no ONNX model, or damaged")
         if at + size > end:
@@ -204,7 +171,3 @@ def _message(value: int | bytes) -> bytes:
     if isinstance(value, int):
         raise NotOnnxError("it is no ONNX model, or damaged")
     return value
-
-
-def _text(value: int | bytes) -> str:
-    return _message(value).decode("utf-8", errors="replace")

@@ -44,18 +44,18 @@ class OnnxPolicy(NetworkPolicy):
         label = self.path.stem if label is None else label
         try:
             data = _read(self.path)
-            contents = inspect(data)
-            if METADATA_KEY not in contents.metadata:
+            metadata = inspect(data)
+            if METADATA_KEY not in metadata:
                 raise NotOnnxError(
                     f"it has no specification (metadata {METADATA_KEY!r}): see "
                     "pushplan.training.policies.export, or docs/learned.md"
                 )
-            specification = Specification.from_json(contents.metadata[METADATA_KEY])
+            specification = Specification.from_json(metadata[METADATA_KEY])
             self._network = Network(data)
             _check_doors(self._network, specification)
             self._rng = np.random.default_rng(0)
             blank = np.zeros(specification.observation.shape, specification.observation.dtype)
-            specification.action.read(_first(self._network.run(blank[None], self._noise())))
+            specification.action.steps(self._network.run(blank, self._noise(), timed=True))
         except InvalidInputError as error:
             raise InvalidInputError(f"{self.path} is no policy: {error}") from error
         self.sha256 = hashlib.sha256(data).hexdigest()
@@ -73,14 +73,15 @@ class OnnxPolicy(NetworkPolicy):
             seen: the observation.
             noise: (N,) for a network that takes noise; drawn if None.
         """
-        given = self._noise() if noise is None else noise[None]
-        return _first(self._network.run_fast(seen[None], given))
+        return self._network.run(seen, self._noise() if noise is None else noise)
 
     def _noise(self) -> NDArray[np.float32] | None:
-        """(1, N) fresh noise for a network that takes it."""
+        """(N,) fresh noise for a network that takes it."""
         if self._network.noise is None:
             return None
-        return self._rng.standard_normal((1, self._network.noise.shape[1]), dtype=np.float32)
+        (size,) = self._network.noise.shape[1:]
+        noise: NDArray[np.float32] = self._rng.standard_normal(size, dtype=np.float32)
+        return noise
 
 
 def read_specification(path: str | Path) -> Specification:
@@ -90,8 +91,7 @@ def read_specification(path: str | Path) -> Specification:
         InvalidInputError: if there is none.
     """
     try:
-        metadata = inspect(_read(Path(path))).metadata
-        return Specification.from_json(metadata.get(METADATA_KEY, ""))
+        return Specification.from_json(inspect(_read(Path(path))).get(METADATA_KEY, ""))
     except InvalidInputError as error:
         raise InvalidInputError(f"{path} is no policy: {error}") from error
 
@@ -103,41 +103,30 @@ def _read(path: Path) -> bytes:
         return file.read(GREATEST_FILE + 1)
 
 
-def _first(output: NDArray[Any]) -> NDArray[Any]:
-    if output.ndim == 0 or len(output) != 1:
-        raise NotOnnxError(f"the network must keep the batch axis, it gave shape {output.shape}")
-    only: NDArray[Any] = output[0]
-    return only
-
-
 def _check_doors(network: Network, specification: Specification) -> None:
     """The network takes what is observed and gives what is acted on."""
     if network.noise is not None:
-        _check_noise(network.noise)
-    for door, shape, types in (
-        (network.input, specification.observation.shape, (specification.observation.dtype.name,)),
-        (network.output, specification.action.shape, ("float32",)),
+        sizes = network.noise.shape[1:]
+        small = len(sizes) == 1 and isinstance(sizes[0], int) and 1 <= sizes[0] <= _MOST_NOISE
+        wanted = f"float32 of shape (batch, N), N from 1 to {_MOST_NOISE}"
+        _check_door(network.noise, small, "float32", wanted)
+    seen = specification.observation
+    for door, shape, kind in (
+        (network.input, seen.shape, seen.dtype.name),
+        (network.output, specification.action.shape, "float32"),
     ):
-        found = list(door.shape)
-        fits = len(found) == len(shape) + 1 and all(
-            not isinstance(has, int) or has == want
-            for has, want in zip(found[1:], shape, strict=False)
+        fits = len(door.shape) == len(shape) + 1 and all(
+            has == want or not isinstance(has, int)
+            for has, want in zip(door.shape[1:], shape, strict=False)
         )
-        if found and isinstance(found[0], int) and found[0] != 1:
-            fits = False
-        if not fits or _TYPES.get(door.type) not in types:
-            raise NotOnnxError(
-                f"{door.name!r:.40} must be {types[0]} of shape (batch, "
-                f"{', '.join(map(str, shape))}) by its specification, it is {door.type} of shape "
-                f"{tuple(found)}"
-            )
+        wanted = f"{kind} of shape (batch, {', '.join(map(str, shape))}) by its specification"
+        _check_door(door, fits, kind, wanted)
 
 
-def _check_noise(door: Door) -> None:
-    batch, *sizes = door.shape or (0,)
-    small = len(sizes) == 1 and isinstance(sizes[0], int) and 1 <= sizes[0] <= _MOST_NOISE
-    if door.type != "tensor(float)" or not small or (isinstance(batch, int) and batch != 1):
+def _check_door(door: Door, fits: bool, kind: str, wanted: str) -> None:
+    """Refuse an input or output of another type or shape, or of batches of a fixed size."""
+    batch = door.shape[0] if door.shape else 0
+    if not fits or _TYPES.get(door.type) != kind or (isinstance(batch, int) and batch != 1):
         raise NotOnnxError(
-            f"{door.name!r} must be float32 of shape (batch, N), N from 1 to {_MOST_NOISE}, it is "
-            f"{door.type} of shape {door.shape}"
+            f"{door.name!r:.40} must be {wanted}, it is {door.type} of shape {door.shape}"
         )

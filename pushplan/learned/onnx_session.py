@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import functools
 import threading
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,8 +22,7 @@ NOISE = "noise"
 """Name of the input for random numbers, of a network that samples its output."""
 
 
-@dataclass(frozen=True)
-class Door:
+class Door(NamedTuple):
     """Input or output of a network."""
 
     name: str  # of the tensor
@@ -61,65 +59,59 @@ class Network:
                 [Door(door.name, door.type, tuple(door.shape or ())) for door in doors]
                 for doors in (self._session.get_inputs(), self._session.get_outputs())
             )
-        except Exception as error:  # its errors share no root of their own
+        except Exception as error:  # its errors share no root of their own; names may be no text
             raise NotOnnxError(f"ONNX Runtime does not take it: {_short(error)}") from error
-        noise = [door for door in inputs if door.name == NOISE]
-        inputs = [door for door in inputs if door.name != NOISE]
-        if len(inputs) != 1 or len(outputs) != 1:
+        doors = {door.name: door for door in inputs}
+        self.noise = doors.pop(NOISE, None)
+        if len(doors) != 1 or len(outputs) != 1:
             raise NotOnnxError(
                 f"a policy has one input and one output beside an input {NOISE!r}, this one has "
-                f"{len(inputs)} and {len(outputs)}"
+                f"{len(doors)} and {len(outputs)}"
             )
-        self.input, self.output = inputs[0], outputs[0]
-        self.noise = noise[0] if noise else None
+        (self.input,) = doors.values()
+        (self.output,) = outputs
 
-    def run(self, batch: NDArray[Any], noise: NDArray[np.float32] | None = None) -> NDArray[Any]:
-        """The output for a batch.
+    def run(
+        self, seen: NDArray[Any], noise: NDArray[np.float32] | None = None, *, timed: bool = False
+    ) -> NDArray[Any]:
+        """The output for one observation.
 
         Args:
-            batch: of observations.
-            noise: a batch for the input ``noise``, where the network has one.
+            seen: the observation, without batch axis.
+            noise: for the input ``noise``, where the network has one.
+            timed: whether to stop it after `LONGEST_DECISION_S`; a network that has kept it once
+                need not be watched.
 
         Raises:
-            NotOnnxError: if it fails, also for want of memory or time.
+            NotOnnxError: if it fails, also for want of memory or time, or gives no batch.
         """
+        fed = {self.input.name: seen[None]}
+        if noise is not None:
+            fed[NOISE] = noise[None]
         limits = self._runtime.RunOptions()
         limits.log_severity_level = 4
-        over = threading.Event()
-
-        def stop() -> None:
-            over.set()
-            limits.terminate = True
-
-        timer = threading.Timer(LONGEST_DECISION_S, stop)
-        timer.daemon = True
-        timer.start()
+        timer = None
+        if timed:  # a timer is a thread, which costs more than most decisions
+            timer = threading.Timer(LONGEST_DECISION_S, setattr, (limits, "terminate", True))
+            timer.daemon = True
+            timer.start()
         try:
-            result: NDArray[Any] = self._session.run(None, self._fed(batch, noise), limits)[0]
+            output = np.asarray(self._session.run(None, fed, limits)[0])
         except Exception as error:
-            if over.is_set():
+            if limits.terminate:
                 raise NotOnnxError(
                     f"the network takes more than {LONGEST_DECISION_S:g} s for a decision"
                 ) from None
             raise NotOnnxError(f"the network cannot be run: {_short(error)}") from error
         finally:
-            timer.cancel()
-        return np.asarray(result)
-
-    def run_fast(
-        self, batch: NDArray[Any], noise: NDArray[np.float32] | None = None
-    ) -> NDArray[Any]:
-        """`run` without a limit of time, for a network that has kept it."""
-        try:
-            result: NDArray[Any] = self._session.run(None, self._fed(batch, noise))[0]
-        except Exception as error:
-            raise NotOnnxError(f"the network cannot be run: {_short(error)}") from error
-        return result
-
-    def _fed(
-        self, batch: NDArray[Any], noise: NDArray[np.float32] | None
-    ) -> dict[str, NDArray[Any]]:
-        return {self.input.name: batch} | ({} if noise is None else {NOISE: noise})
+            if timer is not None:
+                timer.cancel()
+        if output.ndim == 0 or len(output) != 1:
+            raise NotOnnxError(
+                f"the network must keep the batch axis, it gave shape {output.shape}"
+            )
+        only: NDArray[Any] = output[0]
+        return only
 
 
 @functools.lru_cache(maxsize=1)

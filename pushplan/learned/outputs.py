@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Mapping
-from dataclasses import asdict, dataclass
+from collections.abc import Collection
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -12,18 +12,18 @@ from numpy.typing import ArrayLike, NDArray
 
 from pushplan.world import InvalidInputError
 from pushplan.world.checked_fields import CheckedFields, NonNegativeFloat, PositiveInt
-from pushplan.world.checks import choice, integer, known_keys
+from pushplan.world.checks import choice, integer
 
 MODES = {"turn_rate": 1, "velocity": 2, "wheels": 2, "heading": 1, "waypoint": 2}
 """Action modes of `pushplan.envs` and the number of elements of an action."""
 
 OUTPUTS = ("continuous", "direction", "pixel_values", "chunk")
+CHOOSING = ("direction", "pixel_values")
+"""Outputs that `ActionSpec.choose` makes a choice of."""
 NEIGHBOURS = 1.0 / 32.0
-"""How far around a tried pixel `ActionSpec.pixel` leaves pixels out, in sides of the map."""
+"""How far around a tried pixel `ActionSpec.choose` leaves pixels out, in sides of the map."""
 APART = 0.3
-"""How far `ActionSpec.direction` keeps from a tried direction [rad]."""
-
-_KEYS = ("mode", "output", "shape", "repeat", "window", "step")
+"""How far `ActionSpec.choose` keeps from a tried direction [rad]."""
 
 
 class BadOutputError(InvalidInputError):
@@ -103,77 +103,54 @@ class ActionSpec(CheckedFields):
         """(repeat, n) the actions in [-1, 1] of the steps for which an output stands.
 
         Raises:
-            BadOutputError: as `read`.
-        """
-        if self.output == "chunk":
-            return _clipped(self._checked(output)[: self.repeat])
-        return self.held(self.read(output))
-
-    def held(self, action: NDArray[np.float32]) -> NDArray[np.float32]:
-        """(repeat, n) one action for all steps of a decision."""
-        return np.tile(action, (self.repeat, 1))
-
-    def read(self, output: ArrayLike) -> NDArray[np.float32]:
-        """The action in [-1, 1] that an output asks for; of a chunk the first.
-
-        Raises:
             BadOutputError: if it is not finite or has another shape.
         """
-        if self.output == "pixel_values":
-            return self.waypoint(*self.pixel(output))
-        if self.output == "direction":
-            return self.heading(self.direction(output))
-        values = self._checked(output)
-        return _clipped(values[0] if self.output == "chunk" else values)
+        if self.output in CHOOSING:
+            return self.chosen(self.choose(output))
+        actions = np.clip(self._checked(output), -1.0, 1.0).astype(np.float32)
+        return actions[: self.repeat] if self.output == "chunk" else self._held(actions)
 
-    def pixel(self, output: ArrayLike, tried: Collection[tuple[int, int]] = ()) -> tuple[int, int]:
-        """Row and column of the best pixel of ``pixel_values``.
+    def choose(self, output: ArrayLike, tried: Collection[Any] = ()) -> Any:
+        """The best pixel of ``pixel_values`` or the angle of a ``direction``.
 
         Args:
-            output: values of the pixels.
-            tried: pixels to leave out, each with its neighbours up to `NEIGHBOURS` of the map's
-                side away; if nothing is left then, none is left out.
+            output: values of the pixels, or the vector.
+            tried: what to leave out: pixels, each with its neighbours up to `NEIGHBOURS` of the
+                map's side away, or angles, from which the least turn keeps `APART`; if nothing is
+                left then, none is left out.
+
+        Returns:
+            Row and column of the pixel, or the angle in the robot's frame [rad].
 
         Raises:
             InvalidInputError: if the output is another one.
-            BadOutputError: as `read`.
+            BadOutputError: as `steps`.
         """
-        if self.output != "pixel_values":
-            raise InvalidInputError(f"output {self.output!r} has no pixels")
+        if self.output not in CHOOSING:
+            raise InvalidInputError(f"output {self.output!r} has nothing to choose from")
         values = self._checked(output)
+        if self.output == "direction":
+            return _best_angle(math.atan2(float(values[1]), float(values[0])), tried)
         up, side = (int(NEIGHBOURS * pixels) for pixels in self.shape)
         open_ = np.ones(values.shape, dtype=np.bool_)
         for row, col in tried:
             open_[max(row - up, 0) : row + up + 1, max(col - side, 0) : col + side + 1] = False
         if open_.any():
             values = np.where(open_, values, -np.inf)
-        row, col = divmod(int(np.argmax(values)), self.shape[1])
-        return row, col
+        return divmod(int(np.argmax(values)), self.shape[1])
 
-    def direction(self, output: ArrayLike, tried: Collection[float] = ()) -> float:
-        """The angle of a ``direction`` in the robot's frame [rad].
+    def chosen(self, choice: Any) -> NDArray[np.float32]:
+        """(repeat, n) the actions that drive to the middle of a pixel, or go along an angle."""
+        if self.output == "direction":
+            action = [math.remainder(choice, math.tau) / math.pi]
+        else:
+            action = [
+                1.0 - 2.0 * (at + 0.5) / count for at, count in zip(choice, self.shape, strict=True)
+            ]
+        return self._held(np.array(action, dtype=np.float32))
 
-        Args:
-            output: the vector.
-            tried: angles to keep `APART` from, by the least turn; if no angle is left then, the
-                vector's own is given.
-
-        Raises:
-            InvalidInputError: if the output is another one.
-            BadOutputError: as `read`.
-        """
-        if self.output != "direction":
-            raise InvalidInputError(f"output {self.output!r} has no direction")
-        values = self._checked(output)
-        wanted = math.atan2(float(values[1]), float(values[0]))
-        least = APART - 1e-9
-        beside = (old + side for old in tried for side in (APART, -APART))
-        free = [
-            angle
-            for angle in (wanted, *beside)
-            if all(abs(math.remainder(angle - old, math.tau)) >= least for old in tried)
-        ]
-        return min(free, key=lambda a: abs(math.remainder(a - wanted, math.tau)), default=wanted)
+    def _held(self, action: NDArray[np.float32]) -> NDArray[np.float32]:
+        return np.tile(action, (self.repeat, 1))
 
     def _checked(self, output: ArrayLike) -> NDArray[Any]:
         values = np.asarray(output)
@@ -186,31 +163,14 @@ class ActionSpec(CheckedFields):
             raise BadOutputError("the network gave values that are not finite")
         return values
 
-    def waypoint(self, row: int, col: int) -> NDArray[np.float32]:
-        """(2,) the action that drives to the middle of a pixel."""
-        rows, cols = self.shape
-        ahead, left = 1.0 - 2.0 * (row + 0.5) / rows, 1.0 - 2.0 * (col + 0.5) / cols
-        return np.array([ahead, left], dtype=np.float32)
 
-    def heading(self, angle: float) -> NDArray[np.float32]:
-        """(1,) the action that goes along an angle in the robot's frame [rad]."""
-        return np.array([math.remainder(angle, math.tau) / math.pi], dtype=np.float32)
-
-    def to_dict(self) -> dict[str, Any]:
-        """JSON values."""
-        return {**asdict(self), "shape": list(self.shape)}
-
-    @classmethod
-    def from_dict(cls, data: Mapping[str, Any]) -> ActionSpec:
-        """Read what `to_dict` gives.
-
-        Raises:
-            SchemaError, InvalidInputError: if a key or a value is wrong.
-        """
-        known_keys("action", data, _KEYS, ("mode", "output", "shape"))
-        return cls(**data)
-
-
-def _clipped(values: NDArray[Any]) -> NDArray[np.float32]:
-    clipped: NDArray[np.float32] = np.clip(values, -1.0, 1.0).astype(np.float32)
-    return clipped
+def _best_angle(wanted: float, tried: Collection[float]) -> float:
+    """The angle nearest to a wanted one [rad] that keeps `APART` from all that were tried."""
+    least = APART - 1e-9
+    beside = (old + side for old in tried for side in (APART, -APART))
+    free = [
+        angle
+        for angle in (wanted, *beside)
+        if all(abs(math.remainder(angle - old, math.tau)) >= least for old in tried)
+    ]
+    return min(free, key=lambda a: abs(math.remainder(a - wanted, math.tau)), default=wanted)

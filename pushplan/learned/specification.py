@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
-from pushplan.learned.builders import builder_from_dict, builder_to_dict
+from pushplan.learned.builders import builder_from_dict, builder_to_dict, from_mapping
 from pushplan.learned.outputs import ActionSpec
 from pushplan.observation import ObservationBuilder
 from pushplan.world import InvalidInputError, RobotModel, SchemaError
@@ -101,7 +101,7 @@ class Specification:
             "robot": None if self.robot is None else asdict(self.robot),
             "control_step": self.control_step,
             "observation": builder_to_dict(self.observation),
-            "action": self.action.to_dict(),
+            "action": asdict(self.action),
             "training": dict(self.training),
         }
         return json.dumps(data, allow_nan=False)
@@ -123,15 +123,16 @@ class Specification:
             )
         known_keys("the specification", data, _KEYS, tuple(k for k in _KEYS if k != "training"))
         training = data.get("training", {})
+        robot = data["robot"]
         if not isinstance(training, dict):
             raise SchemaError(f"training must be a mapping, got {training!r:.60}")
         return cls(
             tasks=data["tasks"],
             presets=data["presets"],
-            robot=_robot(data["robot"]),
+            robot=None if robot is None else from_mapping(RobotSpec, "robot", robot),
             control_step=data["control_step"],
             observation=builder_from_dict(data["observation"]),
-            action=ActionSpec.from_dict(data["action"]),
+            action=from_mapping(ActionSpec, "action", data["action"]),
             training=training,
         )
 
@@ -174,11 +175,3 @@ def _mismatch(label: str, kind: str, mine: object, theirs: object) -> InvalidInp
     return InvalidInputError(
         f"policy {label!r} was made for {kind} {mine}, the environment has {theirs}"
     )
-
-
-def _robot(data: Any) -> RobotSpec | None:
-    if data is None:
-        return None
-    keys = ("drive", "max_speed", "max_turn_rate", "radius")
-    known_keys("robot", data, keys, keys)
-    return RobotSpec(**data)

@@ -3,13 +3,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import shapely
-from conftest import make_boxes, make_u_maze
+from conftest import make_u_maze
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from pushplan.envs import PushEnv
 from pushplan.learned import FeatureObservation
-from pushplan.learned.features import cast_rays, near_outlines
+from pushplan.learned.features import cast_rays
 from pushplan.world import InvalidInputError
 from pushplan.world.outline import flatten
 
@@ -32,16 +32,6 @@ def test_rays_are_as_long_as_shapely_says(seed, count):
         hit = ray.intersection(rings)
         wanted = 6.0 if hit.is_empty else shapely.Point(x, y).distance(hit)
         assert found == pytest.approx(wanted, abs=1e-6)
-
-
-def test_only_near_bodies_are_looked_at():
-    boxes = make_boxes([[1, 0, 0.3], [9, 0, 0], [0, 2, 0]])
-    vertices, offsets = near_outlines(
-        0.0, 0.0, 3.0, boxes.poses, boxes.radii, boxes.vertices, boxes.offsets
-    )
-    assert len(offsets) == 3
-    assert np.allclose(vertices[:4], boxes.outline_world(0))
-    assert np.allclose(vertices[4:], boxes.outline_world(2))
 
 
 def test_what_the_numbers_mean():

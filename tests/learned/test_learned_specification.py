@@ -118,7 +118,7 @@ class TestEnvironment:
 class TestOutputs:
     def test_continuous_is_clipped(self):
         spec = ActionSpec("velocity", "continuous", (2,))
-        assert spec.read(np.array([-3.0, 0.5])).tolist() == [-1.0, 0.5]
+        assert spec.steps(np.array([-3.0, 0.5])).tolist() == [[-1.0, 0.5]]
 
     def test_a_chunk_is_carried_out_action_by_action(self):
         spec = ActionSpec("velocity", "chunk", (4, 2), repeat=3)
@@ -145,7 +145,7 @@ class TestOutputs:
     @given(st.floats(-3.1, 3.1), st.floats(0.1, 50.0))
     def test_a_direction_is_a_heading(self, angle, size):
         spec = ActionSpec("heading", "direction", (2,), step=1.0)
-        action = spec.read(size * np.array([np.cos(angle), np.sin(angle)]))
+        (action,) = spec.steps(size * np.array([np.cos(angle), np.sin(angle)]))
         assert action.shape == (1,)
         assert float(action[0]) * np.pi == pytest.approx(angle, abs=1e-5)
 
@@ -154,7 +154,7 @@ class TestOutputs:
     )
     def test_what_is_no_action_is_refused(self, output):
         with pytest.raises(BadOutputError):
-            ActionSpec("turn_rate", "continuous", (1,)).read(output)
+            ActionSpec("turn_rate", "continuous", (1,)).steps(output)
 
     def test_a_pixel_is_the_place_that_it_shows(self):
         env = PushEnv(task="box_delivery", observation="state", action="waypoint")
@@ -166,44 +166,44 @@ class TestOutputs:
         assert len(shown) > 20
         centres = world.movables.poses[:, :2]
         for row, col in shown:
-            at = transform(world.robot_pose, 5.0 * spec.waypoint(int(row), int(col))[None])[0]
+            at = transform(world.robot_pose, 5.0 * spec.chosen((row, col)))[0]
             assert np.hypot(*(centres - at).T).min() <= world.movables.radii[0] + 1e-6
         values = np.zeros((96, 96))
         values[tuple(shown[7])] = 1.0
-        assert np.array_equal(spec.read(values), spec.waypoint(*map(int, shown[7])))
+        assert np.array_equal(spec.steps(values), spec.chosen(shown[7]))
 
     def test_a_tried_pixel_is_left_out_with_its_neighbours(self):
         spec = ActionSpec("waypoint", "pixel_values", (96, 96), window=10.0)
         values = np.random.default_rng(0).uniform(size=(96, 96))
         best = np.unravel_index(np.argmax(values), values.shape)
-        assert spec.pixel(values) == best
-        second = spec.pixel(values, [best])
+        assert spec.choose(values) == best
+        second = spec.choose(values, [best])
         apart = np.abs(np.subtract(np.indices(values.shape).T, best)).max(axis=2).T
         assert apart[second] > 3
         assert values[second] == values[apart > 3].max()
         flat = ActionSpec("waypoint", "pixel_values", (32, 96), window=10.0)
         values = np.full((32, 96), 0.5)
         values[16, 48], values[16, 51], values[18, 48] = 1.0, 0.9, 0.8
-        assert flat.pixel(values, [(16, 48)]) == (18, 48)  # a pixel up is as far as three aside
-        with pytest.raises(InvalidInputError, match="no pixels"):
-            ActionSpec("turn_rate", "continuous", (1,)).pixel(np.zeros(1))
+        assert flat.choose(values, [(16, 48)]) == (18, 48)  # a pixel up is as far as three aside
+        with pytest.raises(InvalidInputError, match="nothing to choose"):
+            ActionSpec("turn_rate", "continuous", (1,)).choose(np.zeros(1))
         values = np.random.default_rng(0).uniform(size=(96, 96))
         everywhere = [(row, col) for row in range(96) for col in range(96)]
-        assert spec.pixel(values, everywhere) == best
+        assert spec.choose(values, everywhere) == best
 
     def test_a_tried_direction_is_left_out_with_its_neighbours(self):
         spec = ActionSpec("heading", "direction", (2,), step=1.75)
         ahead = np.array([2.0, 0.2])
-        first = spec.direction(ahead)
+        first = spec.choose(ahead)
         assert first == pytest.approx(math.atan2(0.2, 2.0))
-        assert spec.direction(ahead, [first]) == pytest.approx(first + APART)
-        assert spec.direction(ahead, [first + 0.1]) == pytest.approx(first + 0.1 - APART)
+        assert spec.choose(ahead, [first]) == pytest.approx(first + APART)
+        assert spec.choose(ahead, [first + 0.1]) == pytest.approx(first + 0.1 - APART)
         back = np.array([-1.0, 0.0])  # across the seam of the circle
-        beside = spec.direction(back, [np.pi - 0.1])
+        beside = spec.choose(back, [np.pi - 0.1])
         assert math.remainder(beside + np.pi, math.tau) == pytest.approx(APART - 0.1)
-        assert spec.direction(back, np.linspace(-3.0, 3.0, 20)) == pytest.approx(np.pi)
-        with pytest.raises(InvalidInputError, match="no direction"):
-            ActionSpec("turn_rate", "continuous", (1,)).direction(np.zeros(1))
+        assert spec.choose(back, np.linspace(-3.0, 3.0, 20)) == pytest.approx(np.pi)
+        with pytest.raises(InvalidInputError, match="nothing to choose"):
+            ActionSpec("turn_rate", "continuous", (1,)).choose(np.zeros(1))
 
 
 class TestNoRepeat:

@@ -162,7 +162,7 @@ class TestGood:
         policy = load_policy(name)
         assert policy.specification.tasks and policy.label == name
         seen = np.zeros(policy.observation.shape, policy.observation.dtype)
-        assert len(policy.specification.action.read(policy.decide(seen)))
+        assert len(policy.specification.action.steps(policy.decide(seen)))
 
     def test_bench_compares_it(self, tmp_path):
         path = turning(tmp_path / "turn.onnx", 0.0)

@@ -121,7 +121,7 @@ class TrainingEnv(gymnasium.Env[NDArray[Any], Any]):
     def step(self, action: Any) -> tuple[NDArray[Any], float, bool, bool, dict[str, Any]]:
         """Carry out one decision."""
         commands = (
-            self.action.held(self.action.waypoint(*divmod(int(action), self.action.shape[1])))
+            self.action.chosen(divmod(int(action), self.action.shape[1]))
             if self.action.output == "pixel_values"
             else self.action.steps(action)
         )
