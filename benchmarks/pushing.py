@@ -26,7 +26,7 @@ import numpy as np
 
 from pushplan.envs.registry import SIMULATORS
 from pushplan.envs.simulators.base import Materials, Simulator
-from pushplan.envs.tasks.materials import SOLIDS
+from pushplan.envs.tasks.presets import SOLIDS
 from pushplan.planners.pushing import (
     PushingConfig,
     PushingMpc,

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from pushplan.envs import PushEnv
 from pushplan.envs.registry import ACTIONS
 from pushplan.envs.tasks.base import drive_of
-from pushplan.envs.tasks.maze_presets import PRESETS
+from pushplan.envs.tasks.maze import PRESETS
 from pushplan.world import (
     GoalDisc,
     InvalidInputError,

@@ -1,7 +1,9 @@
 """Whether bodies in the MuJoCo simulator move as mechanics says."""
 
 import math
+import runpy
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -22,9 +24,11 @@ from mujoco_scenes import (
     without_drag,
 )
 
-from pushplan.envs.simulators.water import coasting
 from pushplan.geometry.convex import convex_penetration
 from pushplan.world import Twist
+
+_TABLE = Path(__file__).parents[2] / "benchmarks" / "water_coasting.py"
+coasting = runpy.run_path(str(_TABLE))["coasting"]
 
 G = 9.81
 

@@ -12,13 +12,14 @@ from conftest import quickest
 from gymnasium.utils.env_checker import check_env
 
 from pushplan.envs import PushEnv, make
+from pushplan.envs.tasks import ship_ice
 from pushplan.envs.tasks.ship_ice import ShipIceTask
-from pushplan.envs.tasks.ship_presets import BENCHMARK, FULL_SCALE
 from pushplan.scenarios import Scenario, generate_ice, save_ice
 from pushplan.world import ScenarioError, UnknownNameError, stream
 from pushplan.world.outline import signed_area
 
 PRESETS = ("benchmark", "full_scale")
+BENCHMARK, FULL_SCALE = (ship_ice.PRESETS[name] for name in PRESETS)
 UP = math.pi / 2.0
 
 

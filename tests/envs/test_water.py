@@ -9,10 +9,14 @@ import pytest
 
 from pushplan.envs.simulators.base import Materials
 from pushplan.envs.simulators.pymunk_simulator import PymunkSimulator
-from pushplan.envs.simulators.water import Water, coasting, flow_shapes
-from pushplan.envs.tasks.ship_ice import ShipIceTask
-from pushplan.envs.tasks.ship_presets import FULL_SCALE
+from pushplan.envs.simulators.water import Water, flow_shapes
+from pushplan.envs.tasks.ship_ice import PRESETS, ShipIceTask
 from pushplan.world import Movables, Twist, World, stream
+
+FULL_SCALE = PRESETS["full_scale"]
+ROOT = Path(__file__).parents[2]
+TABLE = str(ROOT / "benchmarks" / "water_coasting.py")
+coasting = runpy.run_path(TABLE)["coasting"]
 
 
 def open_water():
@@ -40,9 +44,8 @@ def test_the_ship_slows_down_as_the_cited_vessel():
 
 
 def test_the_documented_table_of_coasting_is_what_the_command_prints(capsys):
-    root = Path(__file__).parents[2]
-    runpy.run_path(str(root / "benchmarks" / "water_coasting.py"), run_name="__main__")
-    assert capsys.readouterr().out in (root / "docs" / "tasks.md").read_text(encoding="utf-8")
+    runpy.run_path(TABLE, run_name="__main__")
+    assert capsys.readouterr().out in (ROOT / "docs" / "tasks.md").read_text(encoding="utf-8")
 
 
 def test_what_the_flow_meets():

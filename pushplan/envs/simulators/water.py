@@ -11,7 +11,7 @@ from pushplan.compiled import kernel, owned
 from pushplan.geometry import polygon_area, polygon_centroid, polygon_inertia
 from pushplan.world import World
 from pushplan.world.checked_fields import CheckedFields, NonNegativeFloat, PositiveFloat
-from pushplan.world.checks import FloatArray, IntArray, frozen, number
+from pushplan.world.checks import FloatArray, IntArray, frozen
 
 
 @kernel(allocates=True)
@@ -96,32 +96,6 @@ class Water(CheckedFields):
         out[1:, 0] = self.ambient_speed * out[1:, 1]
         out[1:, 2] = self.ambient_speed / np.sqrt(shape[:, 1] / np.pi) * out[1:, 3]
         return frozen(out)
-
-
-def coasting(
-    linear: float, quadratic: float, mass: float, start: float, end: float
-) -> tuple[float, float]:
-    """Time [s] and way [m] in which a free body slows down from one speed to another [m/s].
-
-    The exact solution of ``mass dv/dt = -(linear + quadratic v) v``. Also holds about the vertical
-    axis, with the moment of inertia for the mass and angles for ways.
-
-    Raises:
-        InvalidInputError: if a value is negative, or the speeds do not fall.
-    """
-    b = number("linear", linear, low=0.0)
-    c = number("quadratic", quadratic, low=0.0)
-    m = number("mass", mass, low=0.0, open_low=True)
-    v1 = number("end speed", end, low=0.0, open_low=True)
-    v0 = number("start speed", start, low=v1)
-    if b == 0.0 and c == 0.0:
-        return (0.0, 0.0) if v0 == v1 else (math.inf, math.inf)
-    if c == 0.0:
-        return m / b * math.log(v0 / v1), m / b * (v0 - v1)
-    if b == 0.0:
-        return m / c * (1.0 / v1 - 1.0 / v0), m / c * math.log(v0 / v1)
-    slower = math.log((b + c * v0) / (b + c * v1))
-    return m / b * (math.log(v0 / v1) - slower), m / c * slower
 
 
 def _hull_inertia(world: World) -> float:

@@ -9,10 +9,16 @@ from typing import Any, ClassVar
 import numpy as np
 import shapely
 
-from pushplan.envs.tasks.area_clearing_presets import LAYOUTS, PRESETS, AreaClearingPreset
 from pushplan.envs.tasks.base import StepOutcome
 from pushplan.envs.tasks.layout import FreeSpace, rectangle, squares, walls_around
-from pushplan.envs.tasks.manipulation import START_TRIES, ManipulationTask, ManipulationVariations
+from pushplan.envs.tasks.manipulation import (
+    START_TRIES,
+    ManipulationPreset,
+    ManipulationTask,
+    ManipulationVariations,
+    robot_makers,
+)
+from pushplan.envs.tasks.presets import build, read_presets
 from pushplan.envs.tasks.variations import Yaw
 from pushplan.world import ClearanceArea, InvalidInputError, ScenarioError, StaticMap, World
 from pushplan.world.checks import BoolArray, FloatArray
@@ -21,6 +27,36 @@ CLEARED_REWARD = 10.0
 BACK_REWARD = -10.0
 STATIC_REWARD = -0.25
 END_REWARD = 50.0
+
+
+@dataclass(frozen=True)
+class ClearingLayout:
+    """One room, with its middle and that of the clearance area at the origin."""
+
+    outer: tuple[float, float]  # half the width and half the length of the room [m]
+    area: tuple[float, float]  # half the width and half the length of the clearance area [m]
+    walls: float = 0.0  # distance of the walls beside the area from the middle [m]; 0 for none
+    columns: tuple[tuple[float, float], ...] = ()  # (x, y) of the middles of columns [m]
+
+
+@dataclass(frozen=True, kw_only=True)
+class AreaClearingPreset(ManipulationPreset):
+    """One set of dimensions."""
+
+    layouts: Mapping[str, ClearingLayout]  # by name
+    column: float  # side of the square columns [m]
+    inner_wall: float  # thickness of the walls beside the area [m]
+    box_margin: float  # least distance of a box's centre from the edge of the area at the start [m]
+    start_margin: float  # distance of the robot's start from the lower edge of the area [m]
+
+
+PRESETS: Mapping[str, AreaClearingPreset] = read_presets(
+    "area_clearing",
+    AreaClearingPreset,
+    robots=robot_makers,
+    layouts=lambda found: {name: build(ClearingLayout, one) for name, one in found.items()},
+)
+LAYOUTS = tuple(PRESETS["benchmark"].boxes)
 
 
 @dataclass(frozen=True, kw_only=True)

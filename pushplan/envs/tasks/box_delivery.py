@@ -10,9 +10,15 @@ import numpy as np
 import shapely
 
 from pushplan.envs.tasks.base import StepOutcome
-from pushplan.envs.tasks.box_delivery_presets import LAYOUTS, PRESETS, BoxDeliveryPreset
 from pushplan.envs.tasks.layout import rectangle, walls_around
-from pushplan.envs.tasks.manipulation import START_TRIES, ManipulationTask, ManipulationVariations
+from pushplan.envs.tasks.manipulation import (
+    START_TRIES,
+    ManipulationPreset,
+    ManipulationTask,
+    ManipulationVariations,
+    robot_makers,
+)
+from pushplan.envs.tasks.presets import read_presets
 from pushplan.envs.tasks.variations import Yaw
 from pushplan.world import InvalidInputError, Receptacle, StaticMap, World
 from pushplan.world.checks import FloatArray, IntArray
@@ -26,6 +32,36 @@ STATIC_REWARD = -0.25
 STILL_REWARD = -0.25
 _STILL_TURN = 0.02
 _COLUMN_TRIES = 20
+
+
+@dataclass(frozen=True, kw_only=True)
+class BoxDeliveryPreset(ManipulationPreset):
+    """One set of dimensions. Rooms have their middle at the origin."""
+
+    # length along x and width along y of the room by layout [m]
+    rooms: Mapping[str, tuple[float, float]]
+    receptacle: float  # side of the square receptacle in the corner at +x, +y [m]
+    # pieces that fill the other corners: (3, 2) corners each about the room's corner, with the room
+    # at +x and +y [m]
+    corner: tuple[FloatArray, ...]
+    columns: Mapping[str, int]  # greatest number of columns by layout
+    column: float  # side of the square columns [m]
+    column_spacing: float  # least distance between the centres of two columns [m]
+    column_margin: float  # least way between a column and the walls [m]
+    # length, as a fraction of the room's, and thickness of the divider [m]
+    divider: tuple[float, float]
+    divider_margin: float  # least distance of its centre line from the walls along it [m]
+    start_margin: float  # distance of a fixed start from the wall at -x [m]
+    still: float  # a robot that moves less than this in an action has not moved [m]
+
+
+PRESETS: Mapping[str, BoxDeliveryPreset] = read_presets(
+    "box_delivery",
+    BoxDeliveryPreset,
+    robots=robot_makers,
+    corner=lambda pieces: tuple(map(np.array, pieces)),
+)
+LAYOUTS = tuple(PRESETS["benchmark"].boxes)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -6,19 +6,22 @@ import math
 from abc import abstractmethod
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from typing import Annotated, Any, ClassVar
+from functools import lru_cache, partial
+from pkgutil import resolve_name
+from typing import Annotated, Any, ClassVar, Self
 
 import numpy as np
+from scipy import ndimage
 
 from pushplan.compiled import kernel
 from pushplan.envs.simulators.base import Materials
 from pushplan.envs.tasks.base import Task, drive_of
 from pushplan.envs.tasks.layout import FreeSpace, footprint_at, square_boxes
-from pushplan.envs.tasks.materials import SOLIDS
-from pushplan.envs.tasks.reach import Reach
+from pushplan.envs.tasks.presets import SOLIDS
 from pushplan.envs.tasks.variations import TaskVariations, Yaw
-from pushplan.geometry import GeodesicField, geodesic_field
+from pushplan.geometry import GeodesicField, Grid, clearance_field, geodesic_field
 from pushplan.geometry.distance_field import sample_values
+from pushplan.geometry.free_components import FreeComponents
 from pushplan.observation import ImageObservation
 from pushplan.world import (
     BUMPERS,
@@ -36,7 +39,7 @@ from pushplan.world.checked_fields import (
     PositiveFloat,
     PositiveInt,
 )
-from pushplan.world.checks import FloatArray, choice
+from pushplan.world.checks import BoolArray, FloatArray, IntArray, choice
 
 
 @kernel(allocates=True)
@@ -89,6 +92,15 @@ class ManipulationPreset:
     touching: bool = False  # whether boxes may start in touch with the robot
 
 
+def robot_makers(robots: Mapping[str, Mapping[str, Any]]) -> dict[str, Callable[..., RobotModel]]:
+    """Makers of robots as `presets.yaml` has them."""
+    return {name: _maker(**entry) for name, entry in robots.items()}
+
+
+def _maker(make: str, **limits: float) -> Callable[..., RobotModel]:
+    return partial(resolve_name(make), **limits)
+
+
 @dataclass(frozen=True, kw_only=True)
 class ManipulationVariations(TaskVariations):
     """What may depart from a preset; None leaves the preset's value."""
@@ -113,6 +125,55 @@ class ManipulationVariations(TaskVariations):
     def __post_init__(self) -> None:
         super().__post_init__()
         choice("layout", self.layout, self.layouts)
+
+
+@dataclass(frozen=True)
+class Reach:
+    """The connected free space of a disc-shaped robot around one point."""
+
+    grid: Grid  # where the cells are
+    # (rows, columns) distance of each cell to the nearest place where the robot's centre can be [m]
+    distances: FloatArray
+
+    @classmethod
+    def around(cls, static: StaticMap, point: FloatArray, radius: float, resolution: float) -> Self:
+        """The free space of a disc of ``radius`` [m] whose nearest part is nearest to ``point``.
+
+        Args:
+            static: obstacles; the map's bounds are where the grid ends.
+            point: (2,) [m].
+            radius: of the robot [m].
+            resolution: side of a cell [m].
+        """
+        grid, labels, nearest = _components(static, radius, resolution)
+        row, col = _cells(grid, point[None])
+        wanted = labels[tuple(nearest[:, row, col])][0]
+        if wanted == 0:  # the robot fits nowhere
+            return cls(grid, np.full(grid.shape, np.inf))
+        return cls(grid, ndimage.distance_transform_edt(labels != wanted) * resolution)
+
+    def within(self, points: FloatArray, distance: float) -> BoolArray:
+        """Which of the points (N, 2) [m] are at most ``distance`` [m] from where the robot fits."""
+        near: BoolArray = self.distances[_cells(self.grid, points)] <= distance
+        return near
+
+
+@lru_cache(maxsize=8)
+def _components(static: StaticMap, radius: float, resolution: float) -> tuple[Grid, IntArray, Any]:
+    """The grid, the number of each cell's free component (0: none), the nearest free cell."""
+    grid = Grid.cover(static.bounds, resolution)
+    labels = FreeComponents.of(grid, clearance_field(static, grid), radius).labels
+    nearest = ndimage.distance_transform_edt(
+        labels == 0, return_distances=False, return_indices=True
+    )
+    return grid, labels, nearest
+
+
+def _cells(grid: Grid, points: FloatArray) -> tuple[IntArray, IntArray]:
+    """Row and column of the cells of points (N, 2), of the nearest cell where one is outside."""
+    index = np.floor((points - grid.origin) / grid.resolution).astype(np.int64)
+    last = np.array(grid.shape) - 1
+    return np.clip(index[:, 1], 0, last[0]), np.clip(index[:, 0], 0, last[1])
 
 
 class ManipulationTask(Task):
@@ -222,7 +283,7 @@ class ManipulationTask(Task):
         radius = self.robot.circumscribed_radius
         resolution = self.preset.field_resolution
         middle = self.goal.polygon.mean(axis=0)
-        reach = Reach.around(static, middle, radius=radius, resolution=resolution)
+        reach = Reach.around(static, middle, radius, resolution)
         extent = 0.5 * float(np.ptp(self.goal.polygon, axis=0).max())
         candidates = self._robot_poses(rng, static)
         if not reach.within(middle[None], radius + extent).all():

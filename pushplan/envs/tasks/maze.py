@@ -2,25 +2,39 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
+from pkgutil import resolve_name
 from typing import Annotated, ClassVar
 
 import numpy as np
 import shapely
 
+from pushplan.envs.simulators.base import Materials
 from pushplan.envs.tasks.base import StepOutcome, Task, drive_of
-from pushplan.envs.tasks.layout import FreeSpace, footprint_at, square_boxes
-from pushplan.envs.tasks.maze_presets import PRESETS, MazePreset
+from pushplan.envs.tasks.layout import (
+    FreeSpace,
+    footprint_at,
+    rectangle,
+    square_boxes,
+    walls_around,
+)
+from pushplan.envs.tasks.presets import read_presets
 from pushplan.envs.tasks.variations import TaskVariations, Yaw
 from pushplan.geometry.distance_field import GeodesicField, geodesic_field
 from pushplan.observation import ImageObservation
 from pushplan.world import (
+    BUMPERS,
+    Drive,
     GoalDisc,
     InvalidInputError,
     Movables,
+    RobotModel,
     ScenarioError,
+    StaticMap,
     World,
+    turtlebot3_burger,
 )
 from pushplan.world.checked_fields import (
     Fraction,
@@ -29,7 +43,7 @@ from pushplan.world.checked_fields import (
     OneOf,
     PositiveFloat,
 )
-from pushplan.world.checks import FloatArray
+from pushplan.world.checks import FloatArray, choice
 
 WALL_REWARD = -50.0
 SUCCESS_REWARD = 200.0
@@ -37,6 +51,89 @@ GAP = 0.01
 """Least distance between bodies at the start, as a fraction of the box size."""
 _IMAGE_CHANNELS = ("footprint", "movable", "static", "goal_distance")
 _START_TRIES = 2000
+
+
+@dataclass(frozen=True)
+class MazePreset:
+    """One set of dimensions. Mazes are rooms with their lower left corner at the origin."""
+
+    rooms: Mapping[str, tuple[float, float]]  # width and length of the room by shape [m]
+    wall: float  # half thickness of the walls [m]
+    # whether walls are rounded segments whose centre lines bound the room, or boxes around the free
+    # room
+    thick_lines: bool
+    starts: Mapping[str, tuple[float, float, float]]  # fixed start x, y [m], theta [rad], by shape
+    goals: Mapping[str, tuple[float, float]]  # goal point by shape [m]
+    goal_radius: float  # of the goal itself [m]
+    robot_radius: float  # added to it, as the robot's centre is what has to get there [m]
+    random_start: bool  # whether the start is random unless said otherwise
+    max_speed: float  # [m/s]
+    max_turn_rate: float  # [rad/s]
+    box_size: float  # side of the boxes [m]
+    box_mass: float | None  # [kg], or None for 1 kg/m² of their area
+    materials: Materials  # friction and rolling
+    control_step: float  # [s]
+    max_steps: int  # control steps until the episode is cut off
+    progress_reward: float  # for the whole way to the goal
+    work_reward: float  # per kg m of work on the boxes
+    window: float  # side of the image observation [m]
+    field_resolution: float  # cells of the goal distance field [m]
+    # makes the robot, which has no bumpers; None for the TurtleBot3 with one of them
+    body: Callable[..., RobotModel] | None = None
+    contact_radius: float = 0.0  # of the boxes [m]
+    touching: bool = False  # whether boxes may start in touch with the robot
+
+    def robot(self, drive: Drive, bumper: str | None = None) -> RobotModel:
+        """The robot; a differential drive may also reverse at full speed.
+
+        Args:
+            drive: how it may move.
+            bumper: one of `pushplan.world.BUMPERS`; the preset's own robot if None.
+
+        Raises:
+            InvalidInputError: if there is no such bumper, or the robot cannot carry one.
+        """
+        limits = {"max_speed": self.max_speed, "max_turn_rate": self.max_turn_rate}
+        if self.body is None:
+            return turtlebot3_burger("none" if bumper is None else bumper, drive, **limits)
+        if choice("bumper", "none" if bumper is None else bumper, BUMPERS) != "none":
+            raise InvalidInputError(
+                f"bumper {bumper!r} does not fit the robot of this preset (valid: none)"
+            )
+        return self.body(drive, **limits)
+
+    def static(self, shape: str) -> StaticMap:
+        """The walls of the room and inside it."""
+        width, length = self.rooms[shape]
+        inner = inner_walls(shape, width, length)
+        if self.thick_lines:
+            around = [
+                (0.0, 0.0, width, 0.0),
+                (width, 0.0, width, length),
+                (width, length, 0.0, length),
+                (0.0, length, 0.0, 0.0),
+            ]
+            return StaticMap.build(
+                segments=[*around, *inner], radii=self.wall, bounds=(0.0, 0.0, width, length)
+            )
+        bounds = (0.0, 0.0, width, length)
+        inside = [rectangle(x - self.wall, low, x + self.wall, high) for x, low, _, high in inner]
+        return StaticMap.build(
+            polygons=[*walls_around(bounds, 2.0 * self.wall), *inside], bounds=bounds
+        )
+
+
+def inner_walls(shape: str, width: float, length: float) -> list[tuple[float, float, float, float]]:
+    """Centre lines x1, y1, x2, y2 [m] of the walls that make the way a U or a Z."""
+    if shape == "u":
+        return [(width / 2, 0.0, width / 2, length * 2 / 3)]
+    return [
+        (width / 3, 0.0, width / 3, length * 2 / 3),
+        (width * 2 / 3, length / 3, width * 2 / 3, length),
+    ]
+
+
+PRESETS: Mapping[str, MazePreset] = read_presets("maze", MazePreset, body=resolve_name)
 
 
 @dataclass(frozen=True, kw_only=True)

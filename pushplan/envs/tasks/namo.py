@@ -3,23 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from pkgutil import resolve_name
 from typing import Annotated, ClassVar
 
 import numpy as np
 
-from pushplan.envs.tasks.maze import MazeTask
-from pushplan.envs.tasks.maze_presets import BENCHMARK, TESTBED, MazePreset
+from pushplan.envs.tasks.maze import MazePreset, MazeTask
 from pushplan.envs.tasks.namo_layout import LAYOUTS, ROOM, NamoLayout, Opening, box_outline
 from pushplan.envs.tasks.namo_proof import proves
+from pushplan.envs.tasks.presets import read_presets
 from pushplan.envs.tasks.variations import TaskVariations
 from pushplan.world import GoalDisc, Movables, ScenarioError, World
 from pushplan.world.checked_fields import NonNegativeFloat, OneOf, PositiveFloat
 
-PRESETS: Mapping[str, MazePreset] = {
-    "benchmark": replace(BENCHMARK, max_steps=1000),
-    "testbed": replace(TESTBED, max_steps=2000),
-}
+PRESETS: Mapping[str, MazePreset] = read_presets("namo", MazePreset, body=resolve_name)
 _TRIES = 500
 _ROOMS = 3  # at most
 

@@ -13,7 +13,7 @@ import shapely
 from pushplan.envs.simulators.base import Materials
 from pushplan.envs.tasks.base import StepOutcome, Task
 from pushplan.envs.tasks.layout import FreeSpace
-from pushplan.envs.tasks.materials import BENCHMARK_MATERIALS, TESTBED_MATERIALS
+from pushplan.envs.tasks.presets import read_presets
 from pushplan.envs.tasks.room_goals import ObjectsGoal, RobotGoal
 from pushplan.envs.tasks.variations import TaskVariations
 from pushplan.geometry.distance_field import geodesic_field
@@ -52,10 +52,7 @@ class RoomPreset:
     control_step: float = 0.1  # [s]
 
 
-PRESETS: Mapping[str, RoomPreset] = {
-    "benchmark": RoomPreset(BENCHMARK_MATERIALS),
-    "testbed": RoomPreset(TESTBED_MATERIALS),
-}
+PRESETS: Mapping[str, RoomPreset] = read_presets("room", RoomPreset)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -3,21 +3,26 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Annotated, ClassVar
 
 import numpy as np
 import shapely
 
+from pushplan.envs.simulators.base import Materials
 from pushplan.envs.tasks.base import StepOutcome, Task
-from pushplan.envs.tasks.ship_presets import PRESETS, ShipPreset
+from pushplan.envs.tasks.presets import build, read_presets
 from pushplan.envs.tasks.variations import TaskVariations
 from pushplan.observation import ImageObservation
-from pushplan.scenarios.ice import IceField, generate_ice, load_ice
+from pushplan.scenarios.ice import FloeSizes, IceField, generate_ice, load_ice
 from pushplan.world import (
+    Drive,
     GoalLine,
     InvalidInputError,
     Movables,
+    RobotModel,
     ScenarioError,
     StaticMap,
     World,
@@ -34,6 +39,59 @@ _IMAGE_CHANNELS = ("footprint", "movable", "goal_distance", "heading_line")
 _PIXELS = 150
 _START_TRIES = 500
 _UP = 0.5 * math.pi
+
+
+@dataclass(frozen=True)
+class ShipPreset:
+    """One set of dimensions. The channel has its lower left corner at the origin; +y is ahead."""
+
+    channel: tuple[float, float]  # width and length [m]. It has no walls.
+    ice: tuple[float, float]  # y from which and to which there is ice [m]
+    sizes: FloeSizes  # of the floes
+    floe_density: float  # mass of a floe over its area [kg/m²]
+    footprint: FloatArray  # (N, 2) corners of the ship about its origin [m]
+    ship_mass: float  # as the metrics count it [kg]
+    max_speed: float  # at which the ship always goes [m/s]
+    max_turn_rate: float  # [rad/s]
+    start_y: float  # of the ship's origin [m]
+    side_margin: float  # least distance of a random start from the sides of the channel [m]
+    clearance: float  # water around the hull that is free of ice at the start [m]
+    goal_y: float  # of the goal line [m]
+    materials: Materials  # friction, water and the third dimension
+    control_step: float  # [s]
+    max_steps: int  # control steps until the episode is cut off
+    work_reward: float  # per kg m of work on the floes
+    window: float  # side of the image observation [m]
+    shift: float  # how far its middle lies ahead of the ship's origin [m]
+    contact_radius: float = 0.0  # of the ship and the floes [m]
+    overlaps: bool = False  # whether floes from a file may overlap
+
+    def robot(self) -> RobotModel:
+        """The ship."""
+        return RobotModel.from_outline(
+            self.footprint,
+            mass=self.ship_mass,
+            drive=Drive.CONSTANT_SPEED,
+            max_speed=self.max_speed,
+            max_turn_rate=self.max_turn_rate,
+            contact_radius=self.contact_radius,
+            name="ship",
+        )
+
+    @property
+    def bounds(self) -> FloatArray:
+        """(4,) x_min, y_min, x_max, y_max of the channel [m]."""
+        return np.array([0.0, 0.0, *self.channel])
+
+    @property
+    def ice_bounds(self) -> FloatArray:
+        """(4,) those of the ice [m]."""
+        return np.array([0.0, self.ice[0], self.channel[0], self.ice[1]])
+
+
+PRESETS: Mapping[str, ShipPreset] = read_presets(
+    "ship_ice", ShipPreset, sizes=partial(build, FloeSizes), footprint=np.array
+)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -9,7 +9,7 @@ import numpy as np
 
 from pushplan.envs.registry import SIMULATORS
 from pushplan.envs.simulators.base import Materials, Simulator
-from pushplan.envs.tasks.materials import SOLIDS
+from pushplan.envs.tasks.presets import SOLIDS
 from pushplan.planners.pushing import PushModel, PushPath, PushState, contact_kernels
 from pushplan.world import Episode, Movables, Receptacle, RobotModel, StaticMap, Twist, World
 from pushplan.world.lazy_names import look_up
