@@ -1,7 +1,7 @@
 """A policy behind a socket: worlds in, commands out, for programs of any language."""
 
 from pushplan.serving.address import Address
-from pushplan.serving.limits import ServerLimits
+from pushplan.serving.connection import ServerLimits
 from pushplan.serving.messages import PROTOCOL
 from pushplan.serving.server import PolicyServer
 

@@ -77,24 +77,15 @@ class Address:
                 system refuses it.
         """
         try:
-            return self._listen_at_path() if self.path else self._listen_at_port()
+            if self.path:
+                return self._listen_at_path()
+            six = ":" in self.host
+            family = socket.AF_INET6 if six else socket.AF_INET
+            dual = six and socket.has_dualstack_ipv6()  # [::] stands for IPv4, too
+            return socket.create_server((self.host, self.port), family=family, dualstack_ipv6=dual)
         except OSError as error:
             why = "the path is too long" if "too long" in str(error) else error.strerror or error
             raise InvalidInputError(f"cannot listen at {self}: {why}") from error
-
-    def _listen_at_port(self) -> socket.socket:
-        family, kind, protocol, _, where = socket.getaddrinfo(
-            self.host, self.port, type=socket.SOCK_STREAM
-        )[0]
-        listener = socket.socket(family, kind, protocol)
-        try:
-            listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-            listener.bind(where)
-            listener.listen()
-        except BaseException:
-            listener.close()
-            raise
-        return listener
 
     def _listen_at_path(self) -> socket.socket:
         listener = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
@@ -121,15 +112,16 @@ class Address:
             )
         with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as caller:
             caller.settimeout(1.0)
-            error = caller.connect_ex(self.path)
-        if error == errno.ECONNREFUSED:
-            os.unlink(self.path)
-        elif error in (0, errno.EAGAIN, errno.ETIMEDOUT):
-            raise InvalidInputError(
-                f"cannot listen at {self}: another server does; end it or choose another path"
-            )
-        else:
-            raise OSError(error, os.strerror(error))
+            try:
+                caller.connect(self.path)
+            except ConnectionRefusedError:
+                os.unlink(self.path)
+                return
+            except (BlockingIOError, TimeoutError):
+                pass  # its server is busy
+        raise InvalidInputError(
+            f"cannot listen at {self}: another server does; end it or choose another path"
+        )
 
 
 @contextlib.contextmanager
@@ -148,7 +140,6 @@ def _alone(folder: str) -> Iterator[None]:
 
 
 def _is_loopback(host: str) -> bool:
-    try:
+    with contextlib.suppress(ValueError):  # a name may be of any machine
         return ipaddress.ip_address(host).is_loopback
-    except ValueError:
-        return False
+    return False

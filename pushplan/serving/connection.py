@@ -7,10 +7,12 @@ import select
 import socket
 import time
 from contextlib import suppress
+from dataclasses import dataclass
+from typing import Annotated, ClassVar
 
 from pushplan.serving import messages
-from pushplan.serving.limits import ServerLimits
 from pushplan.world import PushplanError
+from pushplan.world.checked_fields import CheckedFields, Limits, PositiveFloat
 
 _PIECE = 65536  # most bytes that are read at once
 _LINGER_S = 0.5  # for how long a client that is sent away may still send, and read why [s]
@@ -18,8 +20,25 @@ _GONE = select.POLLHUP | select.POLLERR
 _SENDS_NO_MORE = getattr(select, "POLLRDHUP", 0)
 
 
-class LeftError(Exception):
-    """The client has closed the connection, or does not read what it is sent."""
+@dataclass(frozen=True)
+class ServerLimits(CheckedFields):
+    """What clients may take; whoever wants more gets an error message and is sent away.
+
+    Args:
+        clients: how many there may be at once. One that has left counts until its planning call has
+            returned.
+        message_bytes: greatest length of a message; of a longer one nothing is read.
+        message_s: time for a whole message, from its first byte to its last, in either direction,
+            and from connecting to the end of the hello [s].
+        idle_s: time in which a client may be silent that waits for no reply [s].
+    """
+
+    field_prefix: ClassVar[str] = "server limit "
+
+    clients: Annotated[int, Limits(1, 1000)] = 8
+    message_bytes: Annotated[int, Limits(1000, 64_000_000)] = 4_000_000
+    message_s: PositiveFloat = 10.0
+    idle_s: PositiveFloat = 600.0
 
 
 class RefusedError(PushplanError):
@@ -36,9 +55,10 @@ class Connection:
 
     def __init__(self, client: socket.socket, limits: ServerLimits) -> None:
         self._socket, self._limits = client, limits
+        self._tcp = client.family != socket.AF_UNIX
         self._buffer = bytearray()
         self._hello_by = time.monotonic() + limits.message_s
-        if client.family != socket.AF_UNIX:
+        if self._tcp:
             client.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
 
     def greeted(self) -> None:
@@ -49,82 +69,71 @@ class Connection:
         """The body of the next message.
 
         Raises:
-            LeftError: if the client has left.
+            OSError: if the client has left.
             RefusedError: if the message is too long, too slow or cut off, or none comes.
         """
-        idle = self._limits.idle_s
+        limits = self._limits
         if not self._buffer:
-            self._wait(idle, f"no message came for {idle:g} s, which is the limit")
-        end = time.monotonic() + self._limits.message_s
-        self._fill(messages.LENGTH.size, end)
-        (length,) = messages.LENGTH.unpack_from(self._buffer)
-        most = self._limits.message_bytes
-        if length > most:
+            late = f"no message came for {limits.idle_s:g} s, which is the limit"
+            self._receive(time.monotonic() + limits.idle_s, late)
+        end = time.monotonic() + limits.message_s
+        start = messages.LENGTH.size
+        (length,) = messages.LENGTH.unpack(self._first(start, end))
+        if length > limits.message_bytes:
             raise RefusedError(
-                f"a message may have {most:,} bytes, the length before this one says {length:,}"
+                f"a message may have {limits.message_bytes:,} bytes, the length before this one "
+                f"says {length:,}"
             )
-        whole = messages.LENGTH.size + length
-        self._fill(whole, end)
-        body = bytes(self._buffer[messages.LENGTH.size : whole])
-        del self._buffer[:whole]
+        body = self._first(start + length, end)[start:]
+        del self._buffer[: start + length]
         return body
 
-    def _fill(self, count: int, end: float) -> None:
-        """Read until so many bytes are there; until a time of the monotonic clock [s]."""
-        limit = self._limits.message_s
+    def _first(self, count: int, end: float) -> bytes:
+        """The first bytes of a message, which has to come until a time [s]."""
+        late = f"a message must be whole {self._limits.message_s:g} s after its first byte"
         while len(self._buffer) < count:
-            left = end - time.monotonic()
-            self._wait(left, f"a message must be whole {limit:g} s after its first byte")
+            self._receive(end, late)
+        return bytes(self._buffer[:count])
 
-    def _wait(self, seconds: float, late: str) -> None:
-        """Read what comes within a time [s], or refuse the client with these words."""
-        left = self._hello_by - time.monotonic()
-        if left < seconds:
-            seconds = left
+    def _receive(self, end: float, late: str) -> None:
+        """Read what comes until a time of the monotonic clock [s], or refuse the client."""
+        if self._hello_by < end:
+            end = self._hello_by
             late = f"no valid hello came within {self._limits.message_s:g} s of connecting"
-        if not self._receive(seconds):
+        left = end - time.monotonic()
+        if left <= 0.0:
             raise RefusedError(late)
-
-    def _receive(self, seconds: float) -> bool:
-        """Read what comes within a time; whether anything did."""
-        if seconds <= 0.0:
-            return False
         try:
-            self._socket.settimeout(seconds)
+            self._socket.settimeout(left)
             piece = self._socket.recv(_PIECE)
         except TimeoutError:
-            return False
-        except OSError:
-            raise LeftError from None
+            raise RefusedError(late) from None
         if not piece and self._buffer:
             raise RefusedError("the connection was closed amid a message")
         if not piece:
-            raise LeftError
+            raise ConnectionResetError
         self._buffer += piece
-        return True
 
     def write(self, data: bytes) -> None:
         """Send a reply.
 
         Raises:
-            LeftError: if the client has left, or has not read it within the time for a message.
+            OSError: if the client has left, or has not read it within the time for a message.
         """
-        try:
-            self._socket.settimeout(self._limits.message_s)
-            self._socket.sendall(data)
-        except OSError:
-            raise LeftError from None
+        self._socket.settimeout(self._limits.message_s)
+        self._socket.sendall(data)
 
     def refuse(self, message: str) -> None:
         """Send a last error, and give the client a moment to read it."""
         end = time.monotonic() + _LINGER_S
-        self._buffer.clear()
-        with suppress(OSError, LeftError):
+        self.greeted()
+        with suppress(OSError, RefusedError):
             self._socket.settimeout(_LINGER_S)
             self._socket.sendall(messages.error(message, closing=True))
             self._socket.shutdown(socket.SHUT_WR)
-            while self._receive(end - time.monotonic()):  # else a reset takes the error along
+            while True:  # else a reset takes the error along
                 self._buffer.clear()
+                self._receive(end, "")
 
     def has_left(self) -> bool:
         """True if the client has closed its side; from any thread, at once.
@@ -133,9 +142,8 @@ class Connection:
         left; a TCP socket does not, and such a client counts as having left.
         """
         poll = select.poll()
-        tcp = self._socket.family != socket.AF_UNIX
         try:
-            poll.register(self._socket, _GONE | _SENDS_NO_MORE if tcp else _GONE)
+            poll.register(self._socket, _GONE | _SENDS_NO_MORE if self._tcp else _GONE)
             return bool(poll.poll(0))
         except (OSError, ValueError):  # closed by ourselves
             return True

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
-from typing import Any
+from dataclasses import asdict
+from typing import Any, ClassVar
 
 from pushplan.control import ImmediateExecutor
 from pushplan.runtime import PLAN_STOP, Command, Runner
 from pushplan.runtime.held_actions import twist_of
-from pushplan.serving.messages import plan_fields, twist_fields
+from pushplan.serving.messages import plan_fields
 from pushplan.world import (
     Cancellation,
     Deadline,
@@ -62,33 +62,34 @@ class StepEpisode:
 
     Args:
         policy: acts by the world alone.
-        planning_limit: wall-clock limit of a planning call [s]; infinite for none.
+        settings: of `SETTINGS`, as a client gave them.
     """
 
-    def __init__(self, policy: Policy, planning_limit: float) -> None:
+    missing: ClassVar[str] = "send 'reset' first; after 'start' only 'command' is answered"
+
+    def __init__(self, policy: Policy, settings: Mapping[str, Any]) -> None:
         self._policy = policy
         self._token = Cancellation()
-        limited = math.isfinite(planning_limit)
-        self._executor = ImmediateExecutor(
-            self._token | Deadline(planning_limit) if limited else self._token
-        )
+        limit = _limit(settings)
+        self._executor = ImmediateExecutor(self._token if limit is None else self._token | limit)
         self._shows = policy if isinstance(policy, ShowsPlan) else None  # asking is not quick
 
-    def reset(self, world: World, seed: int) -> None:
+    def begin(self, world: World, seed: int) -> dict[str, Any]:
         """Begin an episode, with the stream of random numbers that batches give this seed."""
         self._plans = PlanCount()
         self._policy.reset(world, stream(seed, "policy"))
         if isinstance(self._policy, PlansBesideDriving):
             self._policy.plan_with(self._executor)
+        return {"type": "reset", "time": world.time}
 
     def act(self, world: World, with_plan: bool) -> dict[str, Any]:
         """The reply to a world."""
         action = self._policy.act(world, None)
         fields: dict[str, Any] = {"type": "action", "time": world.time, "twist": None}
         if isinstance(action, WheelSpeeds):
-            fields["wheels"] = {"left": action.left, "right": action.right}
+            fields["wheels"] = asdict(action)
         if "wheels" not in fields or world.robot.wheel_separation > 0.0:
-            fields["twist"] = twist_fields(twist_of(world, action))
+            fields["twist"] = asdict(twist_of(world, action))
         plan = None if self._shows is None else self._shows.current_plan
         plans = self._plans.fields(plan, world.time, with_plan)
         return {**fields, "done": world.goal_reached, **plans}
@@ -106,18 +107,18 @@ class LoopEpisode:
 
     Args:
         policy: a fresh one.
-        period: of the robot's loop [s].
-        settings: of `SETTINGS`, as a client gave them.
+        settings: of `SETTINGS`, as a client gave them, and the period of the robot's loop [s].
     """
 
-    def __init__(self, policy: Policy, period: float, settings: Mapping[str, Any]) -> None:
-        options = {key: value for key, value in settings.items() if key != "planning_limit"}
-        stop = PLAN_STOP
-        if "planning_limit" in settings:
-            stop = OwnBudget() | Deadline(limit_of(settings))
-        self._runner = Runner(policy, period=period, plan_stop=stop, **options)
+    missing: ClassVar[str] = "send 'start' first; after 'reset' only 'act' is answered"
 
-    def start(self, world: World, with_plan: bool) -> dict[str, Any]:
+    def __init__(self, policy: Policy, settings: Mapping[str, Any]) -> None:
+        options = {key: value for key, value in settings.items() if key != "planning_limit"}
+        limit = _limit(settings)
+        stop = PLAN_STOP if limit is None else OwnBudget() | limit
+        self._runner = Runner(policy, plan_stop=stop, **options)
+
+    def begin(self, world: World, with_plan: bool) -> dict[str, Any]:
         """Begin an episode; the reply is the first command."""
         self._plans = PlanCount()
         return self._fields(self._runner.start(world), with_plan)
@@ -139,7 +140,7 @@ class LoopEpisode:
         return {
             "type": "command",
             "time": command.time,
-            "twist": twist_fields(command.twist),
+            "twist": asdict(command.twist),
             "status": command.status.value,
             "reason": command.reason,
             "world_age": command.world_age,
@@ -157,15 +158,12 @@ class LoopEpisode:
             pass
 
 
-def limit_of(settings: Mapping[str, Any]) -> float:
-    """The setting ``planning_limit`` [s], infinite where it is not given.
-
-    Raises:
-        InvalidInputError: if it is not a positive number.
-    """
+def _limit(settings: Mapping[str, Any]) -> Deadline | None:
+    """The setting ``planning_limit`` [s], if it is given."""
     if "planning_limit" not in settings:
-        return math.inf
-    return number("settings.planning_limit", settings["planning_limit"], low=0.0, open_low=True)
+        return None
+    limit = settings["planning_limit"]
+    return Deadline(number("settings.planning_limit", limit, low=0.0, open_low=True))
 
 
 def check_settings(policy: Policy, settings: object) -> dict[str, Any]:
@@ -177,5 +175,5 @@ def check_settings(policy: Policy, settings: object) -> dict[str, Any]:
     """
     known_keys("settings", settings, SETTINGS, ())
     chosen = dict(expect("settings", settings, dict))
-    LoopEpisode(policy, 1.0, chosen).close()
+    LoopEpisode(policy, {"period": 1.0, **chosen}).close()
     return chosen

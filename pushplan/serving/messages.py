@@ -11,7 +11,7 @@ import struct
 from collections.abc import Mapping
 from typing import Any
 
-from pushplan.world import Plan, SchemaError, Twist
+from pushplan.world import Plan, SchemaError
 from pushplan.world.checks import known_keys
 from pushplan.world.errors import one_line, short, unknown_name_message
 from pushplan.world.safe_files import parse_json
@@ -20,7 +20,9 @@ PROTOCOL = "pushplan-serve/1"
 """Name and version; a client of another version is refused."""
 LENGTH = struct.Struct(">I")
 
-_WORLD = ("world", "time", "robot_pose", "robot_twist", "ids", "poses", "twists", "added")
+CHANGES = ("time", "robot_pose", "robot_twist", "ids", "poses", "twists", "added")
+"""Keys of a world of which a message says only what has changed."""
+_WORLD = ("world", *CHANGES)
 REQUESTS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     "hello": (("protocol",), ("robot", "period", "settings")),
     "reset": (("world",), ("seed",)),
@@ -72,11 +74,6 @@ def error(message: str, request: str | None = None, *, closing: bool = False) ->
     return encode(
         {"type": "error", "message": one_line(message), "request": request, "closing": closing}
     )
-
-
-def twist_fields(twist: Twist) -> dict[str, float]:
-    """A velocity as it is sent [m/s, rad/s]."""
-    return {"linear": twist.linear, "angular": twist.angular}
 
 
 def plan_fields(plan: Plan | None) -> dict[str, Any] | None:

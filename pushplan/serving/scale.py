@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from pushplan.world import GoalDisc, GoalLine, InvalidInputError, Movables, World
 from pushplan.world.checks import FloatArray
@@ -35,12 +36,12 @@ def check_scale(world: World) -> None:
     _within("static.radii", static.radii, FARTHEST, "m")
     _within("goal", _goal_points(world), FARTHEST, "m")
     if isinstance(goal, GoalDisc):
-        _within("goal.radius", np.array(goal.radius), FARTHEST, "m")
-    _within("robot.max_speed", np.array(robot.max_speed), FASTEST, "m/s", LEAST)
-    _within("robot.min_speed", np.array(robot.min_speed), FASTEST, "m/s")
-    _within("robot.max_turn_rate", np.array(robot.max_turn_rate), FASTEST, "rad/s", LEAST)
-    _within("robot.mass", np.array(robot.mass), HEAVIEST, "kg", LEAST)
-    changes = np.array([robot.max_acceleration, robot.max_turn_acceleration])
+        _within("goal.radius", goal.radius, FARTHEST, "m")
+    _within("robot.max_speed", robot.max_speed, FASTEST, "m/s", LEAST)
+    _within("robot.min_speed", robot.min_speed, FASTEST, "m/s")
+    _within("robot.max_turn_rate", robot.max_turn_rate, FASTEST, "rad/s", LEAST)
+    _within("robot.mass", robot.mass, HEAVIEST, "kg", LEAST)
+    changes = [robot.max_acceleration, robot.max_turn_acceleration]
     _within("accelerations of the robot", changes, np.inf, "m/s², rad/s²", LEAST)
     check_shapes(world.movables)
     check_motion(world)
@@ -84,11 +85,10 @@ def _goal_points(world: World) -> FloatArray:
     return goal.point if isinstance(goal, GoalLine) else goal.polygon
 
 
-def _within(name: str, values: FloatArray, most: float, unit: str, least: float = 0.0) -> None:
-    if not values.size:
-        return
-    sizes = np.abs(values)
-    if float(sizes.max()) > most:
-        raise InvalidInputError(f"{name} must be at most {most:g} [{unit}], got {sizes.max():g}")
-    if float(sizes.min()) < least:
-        raise InvalidInputError(f"{name} must be at least {least:g} [{unit}], got {sizes.min():g}")
+def _within(name: str, values: ArrayLike, most: float, unit: str, least: float = 0.0) -> None:
+    sizes: FloatArray = np.abs(values)
+    largest, smallest = sizes.max(initial=0.0), sizes.min(initial=np.inf)
+    if largest > most:
+        raise InvalidInputError(f"{name} must be at most {most:g} [{unit}], got {largest:g}")
+    if smallest < least:
+        raise InvalidInputError(f"{name} must be at least {least:g} [{unit}], got {smallest:g}")

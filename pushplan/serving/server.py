@@ -10,14 +10,13 @@ import threading
 import time
 from collections.abc import Callable
 from contextlib import suppress
+from dataclasses import replace
 
 from pushplan.planners import make_policy
 from pushplan.planners.kernel_warmup import warm_up_policy
 from pushplan.runtime.held_actions import check_world_policy
 from pushplan.serving.address import Address
-from pushplan.serving.connection import Connection, LeftError, RefusedError
-from pushplan.serving.limits import ServerLimits
-from pushplan.serving.listener import Listener
+from pushplan.serving.connection import Connection, RefusedError, ServerLimits
 from pushplan.serving.session import LOG, Session
 from pushplan.world import InvalidInputError, Policy
 from pushplan.world.checks import expect
@@ -25,6 +24,7 @@ from pushplan.world.errors import short
 
 _GRACE_S = 5.0  # for how long planning calls may go on after the end of the server [s]
 _LOOK_S = 0.1  # how often it looks whether clients have left that wait for an answer [s]
+_PAUSE_S = 0.1  # after a connection that could not be accepted [s]
 _SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 _MOST_REFUSED = 32  # clients that are told at the same time why they are sent away
 
@@ -76,11 +76,10 @@ class PolicyServer:
         self._limits = expect("limits", limits or ServerLimits(), ServerLimits)
         check_world_policy(self._policy())
         self._numbers = itertools.count(1)
-        self._lock = threading.Lock()
-        self._present: dict[int, _Client] = {}
-        self._refused = 0
+        self._present: set[_Client] = set()
+        self._places = threading.Semaphore(self._limits.clients)
+        self._refusals = threading.Semaphore(_MOST_REFUSED)
         self._warm = self._over = False
-        self._listener: Listener | None = None
         self._thread: threading.Thread | None = None
         self._inode = 0
 
@@ -117,22 +116,17 @@ class PolicyServer:
         Raises:
             InvalidInputError: if it serves already, or cannot listen at the address.
         """
-        if self._listener is not None:
+        if self._thread is not None:
             raise InvalidInputError(f"the server at {self.address} serves already")
         self.warm_up()
-        listening = self._address.listen()
+        listener = self._address.listen()
         if self._address.path:
             self._inode = os.stat(self._address.path).st_ino
         else:
-            port = int(listening.getsockname()[1])
-            self._address = Address(host=self._address.host, port=port)
+            self._address = replace(self._address, port=int(listener.getsockname()[1]))
         self._over = False
-        self._listener = Listener(listening, self._attend, self._look)
         self._thread = threading.Thread(
-            target=self._listener.serve_forever,
-            args=(_LOOK_S,),
-            name="pushplan server",
-            daemon=True,
+            target=self._accept, args=(listener,), name="pushplan server", daemon=True
         )
         self._thread.start()
 
@@ -142,26 +136,24 @@ class PolicyServer:
         Returns:
             Whether no thread is left.
         """
-        if self._listener is None:
+        if self._thread is None:
             return True
-        assert self._thread is not None
         self._over = True
-        self._listener.shutdown()
         self._thread.join()
-        self._listener.server_close()
-        self._listener = None
+        self._thread = None
         if self._address.path:
-            self._remove_socket()
-        with self._lock:
-            present = list(self._present.values())
+            with suppress(OSError):  # another server may have put its own socket there
+                if os.lstat(self._address.path).st_ino == self._inode:
+                    os.unlink(self._address.path)
+        present = list(self._present)
         for client in present:
             client.session.abandon()
             client.connection.cut()
         end = time.monotonic() + _GRACE_S
         for client in present:
-            client.thread.join(max(0.0, end - time.monotonic()))
-            if client.thread.is_alive():
-                LOG.warning("%s has not returned from its planning call", client.thread.name)
+            client.join(max(0.0, end - time.monotonic()))
+            if client.is_alive():
+                LOG.warning("%s has not returned from its planning call", client.name)
         return not self._present
 
     def serve_forever(self, ready: Callable[[], object] = lambda: None) -> bool:
@@ -193,81 +185,77 @@ class PolicyServer:
                 signal.signal(one, handler)
         return ended
 
-    def _remove_socket(self) -> None:
-        """Remove the socket, unless another server has put its own there."""
-        with suppress(OSError):
-            if os.lstat(self._address.path).st_ino == self._inode:
-                os.unlink(self._address.path)
+    def _accept(self, listener: socket.socket) -> None:
+        """Give each connection a thread, and look after the clients meanwhile."""
+        listener.settimeout(_LOOK_S)
+        with listener:
+            while not self._over:
+                self._look()
+                try:
+                    connected, _ = listener.accept()
+                    _Client(self, connected).start()
+                except TimeoutError:
+                    continue
+                except (OSError, RuntimeError):  # without file handles, or threads
+                    time.sleep(_PAUSE_S)
 
     def _look(self) -> None:
         """End planning calls whose clients have left."""
-        with self._lock:
-            busy = [client for client in self._present.values() if client.busy]
-        for client in busy:
-            if client.connection.has_left():
+        for client in list(self._present):
+            if client.busy and client.connection.has_left():
                 client.session.abandon()
 
-    def _attend(self, connected: socket.socket) -> None:
-        """Answer a client until it leaves; its place is free when its planning has ended."""
-        connection = Connection(connected, self._limits)
-        client = _Client(connection, Session(self._policy, self._label, self._limits))
-        with self._lock:
-            number = next(self._numbers)
-            full, over = len(self._present) >= self._limits.clients, self._over
-            if not (full or over):
-                self._present[number] = client
-        if over:
-            return
-        if full:
-            limit = self._limits.clients
-            self._send_away(connection, f"the server has {limit} clients, which is its limit")
-            return
-        client.thread.name = f"pushplan client {number}"
+
+class _Client(threading.Thread):
+    """A client, and the thread that answers it."""
+
+    def __init__(self, server: PolicyServer, connected: socket.socket) -> None:
+        super().__init__(daemon=True)
+        self._server, self._socket = server, connected
+        self.connection = Connection(connected, server._limits)
+        self.session = Session(server._policy, server._label, server._limits)
+        self.busy = False
+
+    def run(self) -> None:
+        """Hold a place while the client is served; whoever is sent away is told why after it."""
+        server = self._server
+        with self._socket:
+            refusal = f"the server has {server._limits.clients} clients, which is its limit"
+            if server._places.acquire(blocking=False):
+                server._present.add(self)
+                try:
+                    refusal = self._serve(next(server._numbers))
+                finally:
+                    server._present.remove(self)
+                    server._places.release()
+            if refusal and server._refusals.acquire(blocking=False):
+                self.connection.refuse(refusal)
+                server._refusals.release()
+
+    def _serve(self, number: int) -> str:
+        """Answer the client until it leaves; the reason if it is sent away, else nothing."""
+        self.name = f"pushplan client {number}"
         LOG.info("client %d has come", number)
         why, refusal = "closed", ""
         try:
-            client.converse()
-        except LeftError:
+            self._converse()
+        except OSError:
             why = "left"
         except RefusedError as error:
             why = refusal = str(error)
-        finally:
-            if not refusal:
-                connected.close()
-            client.session.close()
-            with self._lock:
-                del self._present[number]
-            LOG.info("client %d has gone: %s", number, why)
-            if refusal:  # its place is free already
-                self._send_away(connection, refusal)
-                connected.close()
+        if not refusal:
+            self.connection.cut()
+        self.session.close()
+        LOG.info("client %d has gone: %s", number, why)
+        return refusal
 
-    def _send_away(self, connection: Connection, why: str) -> None:
-        """Tell a client that holds no place (any more) why."""
-        with self._lock:
-            if self._refused >= _MOST_REFUSED:
-                return
-            self._refused += 1
-        connection.refuse(why)
-        with self._lock:
-            self._refused -= 1
-
-
-class _Client:
-    """A client that is there, and the thread that answers it, which makes this."""
-
-    def __init__(self, connection: Connection, session: Session) -> None:
-        self.connection, self.session = connection, session
-        self.thread = threading.current_thread()
-        self.busy = False
-
-    def converse(self) -> None:
-        """Answer message after message until the client says close."""
+    def _converse(self) -> None:
+        """Answer message after message until the client says close, or the server ends."""
         last = False
-        while not last:
+        while not (last or self._server._over):
             body = self.connection.read()
             self.busy = True
-            answer = self.session.answer(body)
+            data, last = self.session.answer(body)
             self.busy = False
             if self.session.abandoned:  # cut short, planning gives an action that nobody asked for
                 raise RefusedError(
@@ -275,5 +263,4 @@ class _Client:
                 )
             if self.session.greeted:
                 self.connection.greeted()
-            self.connection.write(answer.data)
-            last = answer.last
+            self.connection.write(data)

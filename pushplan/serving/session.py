@@ -3,20 +3,18 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from copy import copy
-from dataclasses import dataclass
 from traceback import format_tb
-from typing import Any
+from typing import Any, NamedTuple, TypeVar
 
 from pushplan import __version__
 from pushplan.runtime.held_actions import check_world_policy
 from pushplan.serving import messages
-from pushplan.serving.episodes import LoopEpisode, StepEpisode, check_settings, limit_of
-from pushplan.serving.limits import ServerLimits
+from pushplan.serving.connection import ServerLimits
+from pushplan.serving.episodes import LoopEpisode, StepEpisode, check_settings
 from pushplan.serving.world_feed import WorldFeed
-from pushplan.world import ChoosesActions, InvalidInputError, Policy, PushplanError
+from pushplan.world import ChoosesActions, InvalidInputError, Policy, PushplanError, World
 from pushplan.world.checks import boolean, integer, number, word
 from pushplan.world.errors import describe, one_line, short
 from pushplan.world.files import SCHEMA
@@ -25,10 +23,10 @@ from pushplan.world.safe_files import MAX_DEPTH, MAX_VALUES
 LOG = logging.getLogger("pushplan.serving")
 _GOALS = {"robot": ("disc", "line"), "objects": ("receptacle", "clearance_area")}
 Fields = dict[str, Any]
+_Kind = TypeVar("_Kind", StepEpisode, LoopEpisode)
 
 
-@dataclass(frozen=True)
-class Answer:
+class Answer(NamedTuple):
     """A reply as it is sent, and whether it is the last one."""
 
     data: bytes
@@ -39,6 +37,7 @@ class Session:
     """A client's policy and episode. All but `abandon` is called by one thread.
 
     Attributes:
+        greeted: whether the client has said hello.
         abandoned: whether planning was ended from outside, so that what is answered is void.
 
     Args:
@@ -49,16 +48,10 @@ class Session:
 
     def __init__(self, make_policy: Callable[[], Policy], label: str, limits: ServerLimits) -> None:
         self._make_policy, self._label, self._limits = make_policy, label, limits
-        self._feed: WorldFeed | None = None
-        self._period: float | None = None
+        self._feed = WorldFeed()
         self._settings: Fields = {}
         self._episode: StepEpisode | LoopEpisode | None = None
-        self.abandoned = False
-
-    @property
-    def greeted(self) -> bool:
-        """True if the client has said hello."""
-        return self._feed is not None
+        self.greeted = self.abandoned = False
 
     def answer(self, body: bytes) -> Answer:
         """The reply to the body of a message: an error where the message is wrong.
@@ -71,7 +64,7 @@ class Session:
         try:
             request = messages.decode(body)
             kind = request["type"]
-            if self._feed is None and kind not in ("hello", "close"):
+            if not self.greeted and kind not in ("hello", "close"):
                 raise InvalidInputError(f"the first message must be 'hello', got {kind!r}")
             reply = getattr(self, f"_{kind}")(request)
             return Answer(messages.encode(reply), kind == "close")
@@ -96,7 +89,7 @@ class Session:
             self._episode = None
 
     def _hello(self, request: Fields) -> Fields:
-        if self._feed is not None:
+        if self.greeted:
             raise InvalidInputError("hello was said already; connect once more to begin anew")
         if request["protocol"] != messages.PROTOCOL:
             raise InvalidInputError(
@@ -108,8 +101,9 @@ class Session:
         feed = WorldFeed(request.get("robot"))
         policy = self._make_policy()
         check_world_policy(policy)
-        self._settings = check_settings(policy, request.get("settings", {}))
-        self._feed, self._period = feed, period
+        settings = check_settings(policy, request.get("settings", {}))
+        self._feed, self._settings = feed, {"period": period, **settings}
+        self.greeted = True
         goals = _GOALS.get(getattr(policy, "goal_kind", ""), sum(_GOALS.values(), ()))
         return {
             "type": "hello",
@@ -120,7 +114,7 @@ class Session:
             "goals": list(goals),
             "world_schema": SCHEMA,
             "period": period,
-            "settings": self._settings,
+            "settings": settings,
             "limits": {
                 "message_bytes": self._limits.message_bytes,
                 "values": MAX_VALUES,
@@ -132,70 +126,55 @@ class Session:
 
     def _reset(self, request: Fields) -> Fields:
         seed = integer("seed", request.get("seed", 0), low=0)
-        world = self._worlds.whole(request["world"])
-        if not isinstance(self._episode, StepEpisode):
-            self._begin(StepEpisode(self._make_policy(), limit_of(self._settings)))
-        with self._beginning():
-            self._steps.reset(world, seed)
-        return {"type": "reset", "time": world.time}
-
-    def _act(self, request: Fields) -> Fields:
-        episode, with_plan = self._steps, _with_plan(request)
-        return episode.act(self._worlds.next(request), with_plan)
+        return self._begin(StepEpisode, self._feed.whole(request["world"]), seed)
 
     def _start(self, request: Fields) -> Fields:
-        if self._period is None:
+        if self._settings["period"] is None:
             raise InvalidInputError("give the 'period' of the robot's loop [s] in hello")
-        with_plan, world = _with_plan(request), self._worlds.whole(request["world"])
-        if not isinstance(self._episode, LoopEpisode):
-            self._begin(LoopEpisode(self._make_policy(), self._period, self._settings))
-        with self._beginning():
-            return self._loop.start(world, with_plan)
+        with_plan = _with_plan(request)
+        return self._begin(LoopEpisode, self._feed.whole(request["world"]), with_plan)
 
-    def _update(self, request: Fields) -> Fields:
-        episode = self._loop
-        return episode.update(self._worlds.next(request))
-
-    def _command(self, request: Fields) -> Fields:
-        return self._loop.command(number("now", request["now"]), _with_plan(request))
-
-    def _cancel(self, request: Fields) -> Fields:
-        return self._loop.cancel(one_line(word("reason", request.get("reason", "cancelled"))))
-
-    def _close(self, request: Fields) -> Fields:
-        return {"type": "closed"}
-
-    @property
-    def _worlds(self) -> WorldFeed:
-        assert self._feed is not None
-        return self._feed
-
-    @property
-    def _steps(self) -> StepEpisode:
-        if not isinstance(self._episode, StepEpisode):
-            raise InvalidInputError("send 'reset' first; after 'start' only 'command' is answered")
-        return self._episode
-
-    @property
-    def _loop(self) -> LoopEpisode:
-        if not isinstance(self._episode, LoopEpisode):
-            raise InvalidInputError("send 'start' first; after 'reset' only 'act' is answered")
-        return self._episode
-
-    @contextmanager
-    def _beginning(self) -> Iterator[None]:
-        """Leave no episode behind that has begun by half."""
+    def _begin(
+        self, kind: type[StepEpisode] | type[LoopEpisode], world: World, option: Any
+    ) -> Fields:
+        """Begin an episode of a kind; leave none behind that has begun by half."""
+        episode = self._episode
+        if not isinstance(episode, kind):
+            episode = kind(self._make_policy(), self._settings)
+            self.close()
+            self._episode = episode
+            if self.abandoned:  # meanwhile
+                episode.abandon()
         try:
-            yield
+            return episode.begin(world, option)
         except BaseException:
             self.close()
             raise
 
-    def _begin(self, episode: StepEpisode | LoopEpisode) -> None:
-        self.close()
-        self._episode = episode
-        if self.abandoned:  # meanwhile
-            episode.abandon()
+    def _act(self, request: Fields) -> Fields:
+        episode, with_plan = self._running(StepEpisode), _with_plan(request)
+        return episode.act(self._feed.next(request), with_plan)
+
+    def _update(self, request: Fields) -> Fields:
+        episode = self._running(LoopEpisode)
+        return episode.update(self._feed.next(request))
+
+    def _command(self, request: Fields) -> Fields:
+        episode, now = self._running(LoopEpisode), number("now", request["now"])
+        return episode.command(now, _with_plan(request))
+
+    def _cancel(self, request: Fields) -> Fields:
+        episode = self._running(LoopEpisode)
+        reason = one_line(word("reason", request.get("reason", "cancelled")))
+        return episode.cancel(reason)
+
+    def _close(self, request: Fields) -> Fields:
+        return {"type": "closed"}
+
+    def _running(self, kind: type[_Kind]) -> _Kind:
+        if not isinstance(self._episode, kind):
+            raise InvalidInputError(kind.missing)
+        return self._episode
 
 
 def _with_plan(request: Fields) -> bool:

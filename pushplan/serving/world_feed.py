@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from pushplan.serving.messages import CHANGES
 from pushplan.serving.scale import check_motion, check_scale, check_shapes
 from pushplan.world import InvalidInputError, Movables, SchemaError, World, world_from_dict
 from pushplan.world.checks import FloatArray, array
@@ -17,7 +18,6 @@ from pushplan.world.files import movables_from_list, robot_from_dict
 
 MAX_OBJECTS = 20_000
 """Most objects that one client may make known."""
-_CHANGES = ("time", "robot_pose", "robot_twist", "ids", "poses", "twists", "added")
 _AT_REST = (0.0, 0.0, 0.0)
 
 
@@ -30,7 +30,9 @@ class WorldFeed:
 
     def __init__(self, robot: Mapping[str, Any] | None = None) -> None:
         if robot is not None:
-            robot_from_dict({**_mapping("robot", robot), "pose": _AT_REST})
+            if not isinstance(robot, Mapping):
+                raise SchemaError(f"robot must be a mapping, got {short(robot)}")
+            robot_from_dict({**robot, "pose": _AT_REST})
         self._robot = dict(robot or {})
         self._world: World | None = None
         self._known = Movables.empty()
@@ -54,8 +56,7 @@ class WorldFeed:
                 data = {**data, "robot": {**self._robot, **robot}}
         world = world_from_dict(data)
         check_scale(world)
-        self._keep(world, world.movables)
-        return world
+        return self._keep(world, world.movables)
 
     def next(self, message: Mapping[str, Any]) -> World:
         """The world of a message: ``world``, or ``time``, ``robot_pose`` and what else changed.
@@ -64,7 +65,7 @@ class WorldFeed:
             SchemaError, InvalidInputError: if it is neither, names an object that no world had, or
                 nothing was there before.
         """
-        changes = [key for key in _CHANGES if key in message]
+        changes = [key for key in CHANGES if key in message]
         if "world" in message:
             if changes:
                 raise SchemaError(f"give either 'world' or {changes[0]!r}, not both")
@@ -77,12 +78,17 @@ class WorldFeed:
         return self._changed(self._world, message)
 
     def _changed(self, world: World, message: Mapping[str, Any]) -> World:
-        seen, added = self._seen(message), None
+        seen, known = self._seen(world.movables, message), self._known
         if "added" in message:
             added = movables_from_list(message["added"])
-            self._refuse_known(added)
+            for one in added.ids.tolist():
+                if one in self._index:
+                    raise InvalidInputError(
+                        f"added has the id {one}, which is known already: give its pose in "
+                        "'poses', or a whole 'world' if its outline has changed"
+                    )
             check_shapes(added)
-            seen = seen.updated(added)
+            seen, known = seen.updated(added), known.updated(added)
         world = replace(
             world,
             time=message["time"],
@@ -91,35 +97,27 @@ class WorldFeed:
             movables=seen,
         )
         check_motion(world)
-        if added is not None:
-            self._keep(world, self._known.updated(added))
-        self._world = world
-        return world
+        return self._keep(world, known)
 
-    def _seen(self, message: Mapping[str, Any]) -> Movables:
+    def _seen(self, last: Movables, message: Mapping[str, Any]) -> Movables:
         """The known objects that a message gives poses of; all where they were if it gives none."""
-        assert self._world is not None
-        last = self._world.movables
         if "poses" not in message:
             if "ids" in message or "twists" in message:
                 raise SchemaError("'ids' and 'twists' need 'poses', one [x, y, theta] for each")
             return last
         objects = self._chosen(message["ids"]) if "ids" in message else self._known
-        count = len(objects)
-        poses = self._rows("poses", message["poses"], count)
-        twists = None
-        if "twists" in message:
-            twists = self._rows("twists", message["twists"], count)
-        return objects.moved_to(poses, twists)
-
-    def _rows(self, name: str, value: Any, count: int) -> FloatArray:
-        rows: FloatArray = array(name, value, (None, 3))
-        if len(rows) != count:
-            raise InvalidInputError(
-                f"{name} must have one row for each of {count} objects, got {len(rows)}: those of "
-                "'ids', or without 'ids' all that are known, in the order of the worlds"
-            )
-        return rows
+        rows: dict[str, FloatArray] = {}
+        for name in ("poses", "twists"):
+            if name not in message:
+                continue
+            rows[name] = array(name, message[name], (None, 3))
+            if len(rows[name]) != len(objects):
+                raise InvalidInputError(
+                    f"{name} must have one row for each of {len(objects)} objects, got "
+                    f"{len(rows[name])}: those of 'ids', or without 'ids' all that are known, in "
+                    "the order of the worlds"
+                )
+        return objects.moved_to(**rows)
 
     def _chosen(self, value: Any) -> Movables:
         ids = array("ids", value, (None,), dtype=np.int64).tolist()
@@ -134,27 +132,17 @@ class WorldFeed:
             raise InvalidInputError(f"ids must be distinct, got {most} more than once")
         if ids == list(self._index):
             return self._known
-        return self._known.select(np.array([self._index[one] for one in ids], dtype=np.int64))
+        return self._known.select([self._index[one] for one in ids])
 
-    def _refuse_known(self, added: Movables) -> None:
-        for one in added.ids.tolist():
-            if one in self._index:
-                raise InvalidInputError(
-                    f"added has the id {one}, which is known already: give its pose in 'poses', or "
-                    "a whole 'world' if its outline has changed"
-                )
-
-    def _keep(self, world: World, known: Movables) -> None:
+    def _keep(self, world: World, known: Movables) -> World:
+        """Go on from a world, and from all objects that are known by then."""
         if len(known) > MAX_OBJECTS:
             raise InvalidInputError(
                 f"a client may make {MAX_OBJECTS:,} objects known, got {len(known):,}: send a "
                 "whole 'world' to begin anew"
             )
-        self._world, self._known = world, known
-        self._index = {one: place for place, one in enumerate(known.ids.tolist())}
-
-
-def _mapping(name: str, value: object) -> Mapping[str, Any]:
-    if not isinstance(value, Mapping):
-        raise SchemaError(f"{name} must be a mapping, got {short(value)}")
-    return value
+        if known is not self._known:
+            self._known = known
+            self._index = {one: place for place, one in enumerate(known.ids.tolist())}
+        self._world = world
+        return world
