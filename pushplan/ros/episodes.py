@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 from collections import defaultdict
 from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -62,25 +63,23 @@ def load_episode(path: str | Path) -> Episode:
         SchemaError: if the file is missing, truncated, or no log of pushplan.
         MissingDependencyError: if `mcap` is not installed.
     """
-    by_topic: defaultdict[str, list[Any]] = defaultdict(list)
-    for topic, message in _messages(Path(path)):
-        by_topic[topic].append(message)
-    if not by_topic[WORLD] or not by_topic[STATE]:
+    logged = _messages(Path(path))
+    if not logged[WORLD] or not logged[STATE]:
         raise SchemaError(f"{path} holds no world: the robot's loop ended before the first one")
     try:
-        return _episode(by_topic)
+        return _episode(logged)
     except (KeyError, TypeError, ValueError) as error:
         why = f"no {error}" if isinstance(error, KeyError) else str(error)
         raise SchemaError(f"{path} is not a log of this version of pushplan: {why}") from error
 
 
-def _messages(path: Path) -> Iterator[tuple[str, Any]]:
+def _messages(path: Path) -> Mapping[str, list[Any]]:
     """The messages of our own topics, in the order of their times, and what was lost."""
     library = need("mcap.stream_reader")
     types, data = RosbagsTypes(), read_bytes(path, "log")
     channels: dict[int, Any] = {}
-    messages, notes = [], []
-    try:
+    messages, by_topic = [], defaultdict[str, list[Any]](list)
+    with _whole(path):
         for record in _records(library, data):
             kind = type(record).__name__
             if kind == "Channel":
@@ -88,25 +87,18 @@ def _messages(path: Path) -> Iterator[tuple[str, Any]]:
             elif kind == "Message" and channels[record.channel_id].topic in _READ:
                 messages.append(record)
             elif kind == "Metadata":
-                notes.append(record)
-    except SchemaError:
-        raise
-    except Exception as error:  # of many kinds, by where the bytes are wrong
-        raise _unreadable(path, error) from error
+                by_topic[record.name].append(record.metadata)
     found = {channel.topic: channel for channel in channels.values()}
     if WORLD not in found or found[WORLD].metadata.get("schema") != SCHEMA:
         raise SchemaError(
             f"{path} is no log of this version of pushplan: it needs topic {WORLD} with schema "
             f"{SCHEMA!r}, found {', '.join(sorted(found)) or 'no topic'}"
         )
-    try:
+    with _whole(path):
         for message in sorted(messages, key=lambda message: message.log_time):
             topic = channels[message.channel_id].topic
-            yield topic, types.deserialize(message.data, TOPICS[topic])
-        for record in notes:
-            yield record.name, record.metadata["notes"]
-    except Exception as error:
-        raise _unreadable(path, error) from error
+            by_topic[topic].append(types.deserialize(message.data, TOPICS[topic]))
+    return by_topic
 
 
 def _records(library: Any, data: bytes) -> Iterator[Any]:
@@ -125,12 +117,18 @@ def _records(library: Any, data: bytes) -> Iterator[Any]:
         yield from library.breakup_chunk(record, validate_crc=True)
 
 
-def _unreadable(path: Path, error: Exception) -> SchemaError:
-    why = " ".join(str(error).split()) or type(error).__name__
-    return SchemaError(
-        f"{path} is not a whole MCAP file ({why}): it is damaged, or its recorder was stopped "
-        "before it could close it; 'mcap recover' of the MCAP tools saves the part that is there"
-    )
+@contextmanager
+def _whole(path: Path) -> Iterator[None]:
+    """Say that a file is damaged; the kind of error depends on where its bytes are wrong."""
+    try:
+        yield
+    except Exception as error:
+        why = " ".join(str(error).split()) or type(error).__name__
+        raise SchemaError(
+            f"{path} is not a whole MCAP file ({why}): it is damaged, or its recorder was stopped "
+            "before it could close it; 'mcap recover' of the MCAP tools saves the part that is "
+            "there"
+        ) from error
 
 
 def _episode(logged: Mapping[str, list[Any]]) -> Episode:
@@ -154,7 +152,10 @@ def _episode(logged: Mapping[str, list[Any]]) -> Episode:
         end = parse_json(logged[EPISODE][-1].json)
         actions = np.reshape(end.pop("actions"), (-1, end.pop("action_size")))
         return Episode(world=world, **recorded, actions=actions, **end)
-    about = {"source": "a robot's log", "dropped": sum(map(int, logged[DROPPED]))}
+    about = {
+        "source": "a robot's log",
+        "dropped": sum(int(one["notes"]) for one in logged[DROPPED]),
+    }
     return _driven(world, recorded, logged[COMMAND], about)
 
 

@@ -30,9 +30,9 @@ def scene_markers(messages: Messages, world: World) -> Any:
     elif isinstance(goal, Receptacle | ClearanceArea):
         area = [goal.polygon]
     base, frame, time = messages.base_frame, messages.frame_id, world.time
-    return _array(
-        messages,
-        [
+    return messages.make(
+        "visualization_msgs/MarkerArray",
+        markers=[
             _marker(messages, "robot", 0, base, time, world.robot.contact_parts),
             _marker(messages, "static", 0, frame, time, world.static.convex_parts),
             _marker(messages, "goal", 0, frame, time, area),
@@ -49,16 +49,14 @@ def object_markers(messages: Messages, world: World, which: Sequence[int], gone:
         which: indices of those that are new or have another outline.
         gone: ids of those that are not there any more.
     """
-    objects, time = world.movables, world.time
-    shown = [
-        _marker(messages, "object", number, object_frame(number), time, [objects.outline(k)])
-        for k, number in ((k, int(objects.ids[k])) for k in which)
+    objects = world.movables
+    outlines = {int(objects.ids[k]): [objects.outline(k)] for k in which}
+    outlines |= {number: [] for number in sorted(gone)}
+    markers = [
+        _marker(messages, "object", number, object_frame(number), world.time, some)
+        for number, some in outlines.items()
     ]
-    hidden = [
-        _marker(messages, "object", number, object_frame(number), time, [], _DELETE)
-        for number in sorted(gone)
-    ]
-    return _array(messages, shown + hidden)
+    return messages.make("visualization_msgs/MarkerArray", markers=markers)
 
 
 def object_frame(number: int) -> str:
@@ -86,10 +84,6 @@ def transforms(messages: Messages, time: float, poses: Iterable[tuple[str, Float
     )
 
 
-def _array(messages: Messages, markers: list[Any]) -> Any:
-    return messages.make("visualization_msgs/MarkerArray", markers=markers)
-
-
 def _marker(
     messages: Messages,
     kind: str,
@@ -97,9 +91,8 @@ def _marker(
     frame: str,
     time: float,
     outlines: Iterable[FloatArray],
-    action: int = _ADD,
 ) -> Any:
-    """Convex outlines, each (N, 2) [m], filled with triangles."""
+    """Convex outlines, each (N, 2) [m], filled with triangles; without any, the marker goes."""
     make = messages.make
     corners = [
         make("geometry_msgs/Point", x=x, y=y, z=0.0)
@@ -116,7 +109,7 @@ def _marker(
         ns=kind,
         id=number,
         type=_TRIANGLES,
-        action=action if corners else _DELETE,
+        action=_ADD if corners else _DELETE,
         pose=messages.pose((0.0, 0.0, 0.0)),
         scale=messages.vector(1.0, 1.0, 1.0),
         color=make("std_msgs/ColorRGBA", r=r, g=g, b=b, a=a),

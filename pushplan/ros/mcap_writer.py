@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+from collections import Counter
+from operator import attrgetter
 from pathlib import Path
 from typing import Any
 
@@ -17,23 +19,21 @@ from pushplan.world.checks import FloatArray
 from pushplan.world.files import world_to_dict
 from pushplan.world.libraries import need
 
-WORLD, STATE, COMMAND, EPISODE = (
-    f"/pushplan/{name}" for name in ("world", "state", "command", "episode")
-)
-"""Topics from which an episode comes back."""
 TOPICS = {
-    WORLD: "pushplan_msgs/msg/World",
-    STATE: "pushplan_msgs/msg/State",
-    COMMAND: "pushplan_msgs/msg/Command",
-    EPISODE: "pushplan_msgs/msg/Episode",
+    "/pushplan/world": "pushplan_msgs/msg/World",
+    "/pushplan/state": "pushplan_msgs/msg/State",
+    "/pushplan/command": "pushplan_msgs/msg/Command",
+    "/pushplan/episode": "pushplan_msgs/msg/Episode",
     "/tf": "tf2_msgs/msg/TFMessage",
     "/scene": "visualization_msgs/msg/MarkerArray",
     "/objects": "visualization_msgs/msg/MarkerArray",
     "/plan": "nav_msgs/msg/Path",
     "/cmd_vel": "geometry_msgs/msg/TwistStamped",
 }
-"""Topic -> its type."""
+"""Topic -> its type; an episode comes back from the first four, which are our own."""
+WORLD, STATE, COMMAND, EPISODE, *_ = TOPICS
 SCHEMA = "pushplan-log/1"
+_STANDING = attrgetter("robot", "static", "goal", "margin")
 DROPPED = "pushplan dropped"
 """Name of the metadata that say how much a log has lost."""
 
@@ -60,30 +60,27 @@ class McapWriter:
             raise InvalidInputError(f"cannot write {path}: {error.strerror}") from error
         self._writer = library.Writer(self._file)
         self._writer.start(profile="ros2", library="pushplan")
-        self._channels = {topic: self._channel(topic) for topic in TOPICS}
-        self._counts = dict.fromkeys(self._channels, 0)
+        self._channels: dict[str, int] = {}
+        for topic, name in TOPICS.items():
+            text = self._types.definition(name).encode()
+            schema = self._writer.register_schema(name, "ros2msg", text)
+            kept = {"schema": SCHEMA}
+            self._channels[topic] = self._writer.register_channel(topic, "cdr", schema, kept)
+        self._counts = Counter[str]()
         self._scene: World | None = None
         self._known: set[int] = set()
         self._shown: dict[int, FloatArray] = {}
 
-    def _channel(self, topic: str) -> int:
-        name = TOPICS[topic]
-        text = self._types.definition(name)
-        schema = self._writer.register_schema(name, "ros2msg", text.encode())
-        return int(self._writer.register_channel(topic, "cdr", schema, {"schema": SCHEMA}))
-
     def scene(self, world: World) -> None:
         """Write robot, map, goal and objects, unless they are those of the last scene."""
         old = self._scene
-        if old is not None and all(
-            getattr(old, key) is getattr(world, key) or getattr(old, key) == getattr(world, key)
-            for key in ("robot", "static", "goal", "margin")
-        ):
+        if old is not None and _STANDING(old) == _STANDING(world):
             return
         if old is None:
             self._known.update(world.movables.ids.tolist())
         self._scene = world
-        self._put_json(WORLD, world.time, world_to_dict(world))
+        content = json.dumps(world_to_dict(world), allow_nan=False)
+        self._put_own(WORLD, world.time, json=content)
         self._put("/scene", world.time, scene_markers(self._messages, world))
 
     def world(self, world: World) -> None:
@@ -95,16 +92,16 @@ class McapWriter:
         new = [k for k, number in enumerate(ids) if number not in self._known]
         self._known.update(ids)
         described = world_to_dict(world)["movables"] if new else []
-        state = self._own(
+        self._put_own(
             STATE,
             time,
+            time=time,
             robot_pose=world.robot_pose,
             robot_twist=world.robot_twist,
             ids=objects.ids,
             object_poses=objects.poses.ravel(),
             new_objects=json.dumps([described[k] for k in new]),
         )
-        self._put(STATE, time, state)
         outlines = {number: objects.outline(k) for k, number in enumerate(ids)}
         changed = [
             k
@@ -126,9 +123,10 @@ class McapWriter:
 
     def command(self, command: Command) -> None:
         """Write a command, and how old it was what it rests on."""
-        own = self._own(
+        self._put_own(
             COMMAND,
             command.time,
+            time=command.time,
             linear=command.twist.linear,
             angular=command.twist.angular,
             status=command.status.value,
@@ -137,13 +135,12 @@ class McapWriter:
             world_age=command.world_age,
             late=command.late,
         )
-        self._put(COMMAND, command.time, own)
         twist = self._messages.twist_stamped(command.twist, command.time)
         self._put("/cmd_vel", command.time, twist)
 
     def episode(self, time: float, content: dict[str, Any]) -> None:
         """Write what is known of an episode when it has ended."""
-        self._put_json(EPISODE, time, content)
+        self._put_own(EPISODE, time, json=json.dumps(content, allow_nan=False))
 
     def close(self, dropped: int = 0) -> None:
         """Write the index that every reader needs, and how much was dropped; close the file."""
@@ -154,13 +151,9 @@ class McapWriter:
         finally:
             self._file.close()
 
-    def _put_json(self, topic: str, time: float, content: dict[str, Any]) -> None:
-        kind, header = self._types(TOPICS[topic]), self._messages.header(time)
-        self._put(topic, time, kind(header=header, json=json.dumps(content, allow_nan=False)))
-
-    def _own(self, topic: str, time: float, **fields: Any) -> Any:
-        header = self._messages.header(time)
-        return self._types(TOPICS[topic])(header=header, time=time, **fields)
+    def _put_own(self, topic: str, stamp: float, **fields: Any) -> None:
+        kind, header = self._types(TOPICS[topic]), self._messages.header(stamp)
+        self._put(topic, stamp, kind(header=header, **fields))
 
     def _put(self, topic: str, time: float, message: Any) -> None:
         data = self._types.serialize(message)

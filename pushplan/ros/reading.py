@@ -151,10 +151,7 @@ def twist_from(message: Any) -> Twist:
         InvalidInputError: if it is another message, or asks for more than driving ahead and
             turning about z.
     """
-    name = _name(message)
-    if name not in ("geometry_msgs/Twist", "geometry_msgs/TwistStamped"):
-        raise _wrong(name, "geometry_msgs/Twist or TwistStamped")
-    twist = message.twist if name.endswith("Stamped") else message
+    twist = _unstamped(message, "Twist")
     linear, angular = twist.linear, twist.angular
     others = (linear.y, linear.z, angular.x, angular.y)
     if not max(abs(value) for value in others) <= _LATERAL:
@@ -171,11 +168,8 @@ def polygon_from(message: Any, frame: str | None = None) -> FloatArray:
     Raises:
         InvalidInputError: if it is another message, or in another frame than ``frame``.
     """
-    name = _name(message)
-    if name not in ("geometry_msgs/Polygon", "geometry_msgs/PolygonStamped"):
-        raise _wrong(name, "geometry_msgs/Polygon or PolygonStamped")
+    polygon = _unstamped(message, "Polygon")
     _in_frame(message, frame)
-    polygon = message.polygon if name.endswith("Stamped") else message
     corners = [[point.x, point.y] for point in polygon.points]
     return array("polygon", np.reshape(corners, (-1, 2)), (None, 2))
 
@@ -208,17 +202,15 @@ def static_map_from(
 
 def _heading(q: Any) -> float:
     """Heading [rad] of a quaternion."""
-    length = math.sqrt(q.x * q.x + q.y * q.y + q.z * q.z + q.w * q.w)
-    if not abs(length - 1.0) <= 1e-3:
+    x, y, z, w = q.x, q.y, q.z, q.w
+    given = f"x, y, z, w = {x:g}, {y:g}, {z:g}, {w:g}"
+    if not abs(math.sqrt(x * x + y * y + z * z + w * w) - 1.0) <= 1e-3:
+        raise InvalidInputError(f"a quaternion must have length 1, got {given}")
+    if 1.0 - 2.0 * (x * x + y * y) < _TILT:
         raise InvalidInputError(
-            f"a quaternion must have length 1, got x, y, z, w = {q.x:g}, {q.y:g}, {q.z:g}, {q.w:g}"
+            f"poses lie in the ground plane, got one tilted by more than 15 degrees: {given}"
         )
-    if 1.0 - 2.0 * (q.x * q.x + q.y * q.y) < _TILT:
-        raise InvalidInputError(
-            "poses lie in the ground plane, got one tilted by more than 15 degrees: "
-            f"x, y, z, w = {q.x:g}, {q.y:g}, {q.z:g}, {q.w:g}"
-        )
-    return math.atan2(2.0 * (q.w * q.z + q.x * q.y), 1.0 - 2.0 * (q.y * q.y + q.z * q.z))
+    return math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
 
 
 def _name(message: Any) -> str:
@@ -236,6 +228,14 @@ def _wrong(name: str, wanted: str) -> InvalidInputError:
 def _expect(message: Any, wanted: str) -> None:
     if _name(message) != wanted:
         raise _wrong(_name(message), wanted)
+
+
+def _unstamped(message: Any, kind: str) -> Any:
+    """A message of ``geometry_msgs``, out of its form with a stamp if it has that."""
+    name = _name(message)
+    if name not in (f"geometry_msgs/{kind}", f"geometry_msgs/{kind}Stamped"):
+        raise _wrong(name, f"geometry_msgs/{kind} or {kind}Stamped")
+    return getattr(message, kind.lower(), message)
 
 
 def _header(message: Any) -> Any:
