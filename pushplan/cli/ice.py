@@ -66,5 +66,5 @@ def _draw(field: IceField, path: str) -> None:
 
     canvas = Canvas(field.bounds, PICTURE_PX, WATER_PALETTE.floor)
     for corners in field.polygons:
-        canvas.polygon(corners, *WATER_PALETTE.box, WATER_PALETTE.box_edge_px)
+        canvas.polygon(corners, *WATER_PALETTE.box, WATER_PALETTE.box_edge_px / canvas.unit)
     save_image(path, np.asarray(canvas.finish()))

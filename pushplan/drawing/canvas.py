@@ -5,23 +5,32 @@ from __future__ import annotations
 import numpy as np
 from PIL import Image, ImageDraw
 
-from pushplan.drawing.pen import Color, Pen
+from pushplan.drawing.palette import Color
 from pushplan.world.checks import FloatArray
+from pushplan.world.polyline import arc_lengths
 
 SMOOTHING = 2
 """Everything is drawn this many times larger and then averaged."""
 THIN = 3
 """Edges up to this width [px, before smoothing] need no round joints."""
+NOMINAL_PX = 600.0
+"""Longer side of a picture to which widths of lines refer [px]."""
 
 
-class Canvas(Pen):
+class Canvas:
     """A picture of a rectangle of the world, y upwards.
+
+    Widths are in pixels of a picture whose longer side has `NOMINAL_PX`.
 
     Args:
         bounds: (4,) x_min, y_min, x_max, y_max [m].
         size_px: longer side of the finished picture [px].
         background: colour.
         image: a picture of the same rectangle to draw on, instead of an empty one.
+
+    Attributes:
+        unit: pixels of the finished picture in one of the nominal picture.
+        pixels_per_metre: scale of the finished picture [px/m].
     """
 
     def __init__(
@@ -33,8 +42,8 @@ class Canvas(Pen):
     ) -> None:
         width, height = (float(side) for side in bounds[2:] - bounds[:2])
         self.scale = SMOOTHING * size_px / max(width, height)
-        self.bounds = bounds
-        self.corner = np.array([bounds[0], bounds[3]])
+        self.bounds, self.unit = bounds, size_px / NOMINAL_PX
+        self.pixels_per_metre = self.scale / SMOOTHING
         if image is None:
             # even sides, as video codecs want them
             shape = [
@@ -45,18 +54,17 @@ class Canvas(Pen):
         self.image = image
         self.draw = ImageDraw.Draw(image)
 
-    @property
-    def pixels_per_metre(self) -> float:
-        """Scale of the finished picture [px/m]."""
-        return self.scale / SMOOTHING
+    def metres(self, width_px: float) -> float:
+        """Length of a width in the world [m]."""
+        return width_px * self.unit / self.pixels_per_metre
 
     def pixels(self, points: FloatArray) -> list[tuple[float, float]]:
         """World points (N, 2) [m] as pixel coordinates."""
-        moved = (points - self.corner) * np.array([self.scale, -self.scale])
+        moved = (points - self.bounds[[0, 3]]) * np.array([self.scale, -self.scale])
         return [(x, y) for x, y in moved.tolist()]
 
     def polygon(
-        self, corners: FloatArray, fill: Color | None, edge: Color, width_px: float
+        self, corners: FloatArray, fill: Color | None, edge: Color, width_px: float = 0.0
     ) -> None:
         """A closed polygon with corners (N, 2) [m]."""
         spots = self.pixels(corners)
@@ -75,7 +83,7 @@ class Canvas(Pen):
         self.draw.line(spots, fill=color, width=self._width(width_px), joint="curve")
 
     def disc(
-        self, center: FloatArray, radius_m: float, fill: Color | None, edge: Color, width_px: float
+        self, center: FloatArray, radius_m: float, fill: Color, edge: Color, width_px: float = 0.0
     ) -> None:
         """A disc about ``center`` (2,) [m]."""
         (x, y), r = self.pixels(center[None])[0], radius_m * self.scale
@@ -86,6 +94,31 @@ class Canvas(Pen):
         """The smooth picture at its final size."""
         return self.image.reduce(SMOOTHING)
 
-    @staticmethod
-    def _width(width_px: float) -> int:
-        return max(1, round(width_px * SMOOTHING)) if width_px > 0.0 else 0
+    def _width(self, width_px: float) -> int:
+        return max(1, round(width_px * self.unit * SMOOTHING)) if width_px > 0.0 else 0
+
+    def line(self, points: FloatArray, color: Color, width_px: float, dash_m: float = 0.0) -> None:
+        """An open line through (N, 2) points [m], dashed if ``dash_m`` is positive."""
+        if len(points) < 2:
+            return
+        if dash_m <= 0.0:
+            self.stroke(points, color, width_px)
+            return
+        along = arc_lengths(points)
+        length = float(along[-1])
+        for start in np.arange(0.0, length, 2.0 * dash_m):  # gaps are as long as dashes
+            inner = along[(along > start) & (along < start + dash_m)]
+            at = np.concatenate([[start], inner, [min(start + dash_m, length)]])
+            dash = np.column_stack([np.interp(at, along, one) for one in points.T])
+            self.stroke(dash, color, width_px)
+
+    def thick_segment(self, ends: FloatArray, radius_m: float, color: Color) -> None:
+        """A segment (4,) x1, y1, x2, y2 [m] with round ends."""
+        a, b = ends[:2], ends[2:]
+        along = b - a
+        length = float(np.hypot(along[0], along[1]))
+        if length > 0.0:
+            side = radius_m * np.array([-along[1], along[0]]) / length
+            self.polygon(np.array([a + side, b + side, b - side, a - side]), color, color)
+        for end in (a, b):
+            self.disc(end, radius_m, color, color)

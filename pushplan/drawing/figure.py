@@ -11,10 +11,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from pushplan.drawing.canvas import NOMINAL_PX, Canvas
+from pushplan.drawing.ground import draw_ground
 from pushplan.drawing.legend import Entry, legend_of
-from pushplan.drawing.palette import SERIES, palette_of
-from pushplan.drawing.pen import Color, Pen
-from pushplan.drawing.scene import draw_scene, view_bounds
+from pushplan.drawing.palette import SERIES, Color, palette_of
+from pushplan.drawing.scene import draw_moving, view_bounds
 from pushplan.world import InvalidInputError, Plan, World
 from pushplan.world.checks import FloatArray, array, number
 from pushplan.world.libraries import need
@@ -40,7 +41,6 @@ STYLE: Any = {
 """Settings of Matplotlib for figures that are printed as they are, one column wide."""
 _LEFT, _RIGHT, _TITLE, _BELOW = 0.55, 0.08, 0.15, 0.4  # around the axes [inch]
 _ENTRY = (1.12, 0.18)  # of the legend: width and height [inch]
-_NOMINAL = 600.0  # the longer side of a picture, to which widths of lines refer [px]
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,7 +82,16 @@ def draw_figure(*panels: Panel, width_in: float = COLUMN, columns: int | None = 
     matplotlib = need("matplotlib")
     need("matplotlib.figure")
     columns = min(len(panels), columns or len(panels))
-    entries = {one.label: one for panel in panels for one in _entries(panel)}
+    entries: dict[str, Entry] = {}
+    for panel in panels:
+        shown = legend_of(
+            panel.world,
+            plan=panel.plan,
+            trail=panel.trail is not None,
+            object_trails=panel.object_trails is not None,
+            pushes=bool(panel.pushes),
+        )
+        entries.update((one.label, one) for one in shown)
     across = max(1, int(width_in / _ENTRY[0]))
     boxes = [np.array(view_bounds(panel.world, 600, None)) for panel in panels]
     side = width_in / columns - _LEFT - _RIGHT
@@ -138,77 +147,57 @@ def save_figure(path: str | Path, figure: Figure, *, title: str = "", source: st
         raise InvalidInputError(f"cannot write {path}: {error}") from error
 
 
-class _AxesPen(Pen):
-    """Draws on axes of Matplotlib, one shape over the other."""
+class _AxesCanvas(Canvas):
+    """Axes of Matplotlib, on which one shape is drawn over the other."""
 
     def __init__(self, axes: Any, bounds: FloatArray, inches: float) -> None:
-        self.bounds = bounds
-        self._axes = axes
-        self._points = 72.0 * inches / _NOMINAL  # of a pixel
-        self._scale = _NOMINAL / float((bounds[2:] - bounds[:2]).max())
-        self._order = 1.0
-
-    @property
-    def pixels_per_metre(self) -> float:
-        return self._scale
+        self.bounds, self.unit = bounds, 1.0
+        self.pixels_per_metre = NOMINAL_PX / float((bounds[2:] - bounds[:2]).max())
+        self._axes, self._order = axes, 1.0
+        self._points = 72.0 * inches / NOMINAL_PX  # of a pixel
 
     def polygon(
-        self, corners: FloatArray, fill: Color | None, edge: Color, width_px: float
+        self, corners: FloatArray, fill: Color | None, edge: Color, width_px: float = 0.0
     ) -> None:
         self._add(need("matplotlib.patches").Polygon(corners), fill, edge, width_px)
 
     def disc(
-        self, center: FloatArray, radius_m: float, fill: Color | None, edge: Color, width_px: float
+        self, center: FloatArray, radius_m: float, fill: Color, edge: Color, width_px: float = 0.0
     ) -> None:
         self._add(need("matplotlib.patches").Circle(center, radius_m), fill, edge, width_px)
 
     def stroke(self, points: FloatArray, color: Color, width_px: float) -> None:
-        width = self._points * width_px
-        self._axes.plot(*points.T, color=rgb(color), linewidth=width, zorder=self._above())
+        (line,) = self._axes.plot(*points.T, color=rgb(color), linewidth=self._points * width_px)
+        self._raise(line)
 
     def _add(self, patch: Any, fill: Color | None, edge: Color, width_px: float) -> None:
         patch.set(
-            facecolor="none" if fill is None else rgb(fill),
-            edgecolor=rgb(edge) if width_px else "none",
+            facecolor=rgb(fill),
+            edgecolor=rgb(edge if width_px else None),
             linewidth=self._points * width_px,
-            zorder=self._above(),
         )
-        self._axes.add_patch(patch)
+        self._raise(self._axes.add_patch(patch))
 
-    def _above(self) -> float:
+    def _raise(self, artist: Any) -> None:
         self._order += 1e-4
-        return self._order
+        artist.set_zorder(self._order)
 
 
-def rgb(color: Color) -> tuple[float, ...]:
-    """A colour of the palette as Matplotlib takes it."""
-    return tuple(value / 255.0 for value in color)
-
-
-def _entries(panel: Panel) -> list[Entry]:
-    return legend_of(
-        panel.world,
-        plan=panel.plan,
-        trail=panel.trail is not None,
-        object_trails=panel.object_trails is not None,
-        pushes=bool(panel.pushes),
-    )
+def rgb(color: Color | None) -> Any:
+    """A colour of the palette, or none, as Matplotlib takes it."""
+    return "none" if color is None else tuple(value / 255.0 for value in color)
 
 
 def _draw(axes: Any, panel: Panel, box: FloatArray, inches: float) -> None:
     world = panel.world
-    axes.set(xlim=box[[0, 2]], ylim=box[[1, 3]], aspect="equal", facecolor=_floor(world))
+    palette = palette_of(world)
+    axes.set(xlim=box[[0, 2]], ylim=box[[1, 3]], aspect="equal", facecolor=rgb(palette.floor))
     axes.set_title(panel.title)
     axes.tick_params(length=2.5, width=0.6)
     axes.locator_params(steps=[1, 2, 5, 10])
-    draw_scene(
-        _AxesPen(axes, box, inches),
-        world,
-        1.0,
-        plan=panel.plan,
-        trail=panel.trail,
-        object_trails=panel.object_trails,
-    )
+    canvas = _AxesCanvas(axes, box, inches)
+    draw_ground(canvas, world.static, world.goal, palette)
+    draw_moving(canvas, world, panel.plan, panel.trail, panel.object_trails)
     here = world.robot_pose[:2]
     for n, path in enumerate(panel.pushes):
         line = array(f"pushes[{n}]", np.asarray(path)[:, :2], (None, 2))
@@ -229,16 +218,12 @@ def _draw(axes: Any, panel: Panel, box: FloatArray, inches: float) -> None:
         here = line[-1]
 
 
-def _floor(world: World) -> tuple[float, ...]:
-    return rgb(palette_of(world).floor)
-
-
 def _handle(entry: Entry) -> Any:
     """What stands beside the label in the legend."""
-    colours = {key: rgb(c) if c else "none" for key, c in (("f", entry.fill), ("e", entry.edge))}
+    edge = rgb(entry.edge)
     if entry.line:
         style: Any = (0, (3, 2)) if entry.dashed else "-"
         line = need("matplotlib.lines").Line2D
-        return line([], [], color=colours["e"], linewidth=1.3, linestyle=style, label=entry.label)
+        return line([], [], color=edge, linewidth=1.3, linestyle=style, label=entry.label)
     patch = need("matplotlib.patches").Patch
-    return patch(facecolor=colours["f"], edgecolor=colours["e"], linewidth=0.8, label=entry.label)
+    return patch(facecolor=rgb(entry.fill), edgecolor=edge, linewidth=0.8, label=entry.label)

@@ -9,7 +9,6 @@ from PIL import Image
 
 from pushplan.drawing.canvas import Canvas
 from pushplan.drawing.palette import Palette
-from pushplan.drawing.pen import Pen
 from pushplan.world import ClearanceArea, Goal, GoalDisc, GoalLine, StaticMap
 from pushplan.world.checks import FloatArray
 
@@ -30,68 +29,49 @@ def ground_picture(
         size_px: longer side of the picture [px].
     """
     canvas = Canvas(np.array(shown), size_px, palette.floor)
-    draw_ground(canvas, static, goal, palette, size_px / 600.0)
+    draw_ground(canvas, static, goal, palette)
     return canvas.image
 
 
-def draw_ground(canvas: Pen, static: StaticMap, goal: Goal, palette: Palette, unit: float) -> None:
-    """Draw it; ``unit`` is the width of a thin line [px]."""
+def draw_ground(canvas: Canvas, static: StaticMap, goal: Goal, palette: Palette) -> None:
+    """Draw it on any canvas."""
     fill, edge = palette.goal
     if isinstance(goal, GoalDisc):
-        canvas.disc(goal.center, goal.radius, fill, edge, 1.5 * unit)
+        canvas.disc(goal.center, goal.radius, fill, edge, 1.5)
     elif isinstance(goal, GoalLine):
-        _goal_line(canvas, static, goal, palette, unit)
+        reach = 2.0 * float(np.hypot(*(static.bounds[2:] - static.bounds[:2])))
+        along = reach * np.array([-goal.normal[1], goal.normal[0]])
+        a, b = goal.point - along, goal.point + along
+        beyond = reach * goal.normal
+        canvas.polygon(np.array([a, b, b + beyond, a + beyond]), fill, fill)
+        canvas.line(np.stack([a, b]), edge, 2.5)
     elif isinstance(goal, ClearanceArea):
-        _clearance_area(canvas, goal, palette, unit)
+        _clearance_area(canvas, goal, palette)
     else:
-        canvas.polygon(goal.polygon, fill, edge, 3.0 * unit)
+        canvas.polygon(goal.polygon, fill, edge, 3.0)
     for polygon in static.polygons:
-        canvas.polygon(polygon, palette.wall, palette.wall, 0.0)
+        canvas.polygon(polygon, palette.wall, palette.wall)
     for line, radius in zip(static.segments, static.radii, strict=True):
-        canvas.thick_segment(
-            line, max(float(radius), 1.5 * unit / canvas.pixels_per_metre), palette.wall
-        )
+        canvas.thick_segment(line, max(float(radius), canvas.metres(1.5)), palette.wall)
 
 
-def _goal_line(
-    canvas: Pen, static: StaticMap, goal: GoalLine, palette: Palette, unit: float
-) -> None:
-    fill, edge = palette.goal
-    reach = 2.0 * float(np.hypot(*(static.bounds[2:] - static.bounds[:2])))
-    along = reach * np.array([-goal.normal[1], goal.normal[0]])
-    a, b = goal.point - along, goal.point + along
-    beyond = reach * goal.normal
-    canvas.polygon(np.array([a, b, b + beyond, a + beyond]), fill, fill, 0.0)
-    canvas.line(np.stack([a, b]), edge, 2.5 * unit)
-
-
-def _clearance_area(canvas: Pen, goal: ClearanceArea, palette: Palette, unit: float) -> None:
+def _clearance_area(canvas: Canvas, goal: ClearanceArea, palette: Palette) -> None:
     """Open edges are thick and have arrows that point out; closed ones are thin and dashed."""
     fill, edge = palette.goal
-    canvas.polygon(goal.polygon, fill, fill, 0.0)
+    canvas.polygon(goal.polygon, fill, fill)
     ends = np.roll(goal.polygon, -1, axis=0)
-    spacing = 40.0 * unit / canvas.pixels_per_metre
+    spacing = canvas.metres(40.0)
     for a, b, is_open in zip(goal.polygon, ends, goal.open_edges, strict=True):
         if not is_open:
-            canvas.line(np.stack([a, b]), palette.wall, 1.5 * unit, dash_m=0.2 * spacing)
+            canvas.line(np.stack([a, b]), palette.wall, 1.5, dash_m=0.2 * spacing)
             continue
-        canvas.line(np.stack([a, b]), edge, 3.5 * unit)
+        canvas.line(np.stack([a, b]), edge, 3.5)
         length = float(np.hypot(*(b - a)))
         along: FloatArray = (b - a) / length
-        out = np.array([along[1], -along[0]])
-        for fraction in np.arange(0.5, n := max(1, round(length / spacing))) / n:
-            _arrow(
-                canvas, a + fraction * (b - a), 0.13 * spacing * along, 0.22 * spacing * out, edge
-            )
-
-
-def _arrow(
-    canvas: Pen,
-    tip_line: FloatArray,
-    half_width: FloatArray,
-    height: FloatArray,
-    color: tuple[int, int, int],
-) -> None:
-    base = tip_line + 0.2 * height
-    corners = np.array([base - half_width, base + half_width, base + height])
-    canvas.polygon(corners, color, color, 0.0)
+        half_width = 0.13 * spacing * along
+        height = 0.22 * spacing * np.array([along[1], -along[0]])
+        count = max(1, round(length / spacing))
+        for fraction in np.arange(0.5, count) / count:
+            base = a + fraction * (b - a) + 0.2 * height
+            arrow = np.array([base - half_width, base + half_width, base + height])
+            canvas.polygon(arrow, edge, edge)

@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 from PIL import Image, ImageDraw
 
 from pushplan.drawing.canvas import SMOOTHING
-from pushplan.drawing.palette import FLOOR_PALETTE, palette_of
-from pushplan.drawing.pen import Color
+from pushplan.drawing.palette import FLOOR_PALETTE, Color, palette_of
 from pushplan.drawing.scene import Font, font_of, pushed
 from pushplan.world import GoalDisc, Plan, World
 

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from pushplan.drawing.pen import Color
 from pushplan.world import GoalLine, World
+
+Color = tuple[int, int, int]
 
 
 @dataclass(frozen=True)

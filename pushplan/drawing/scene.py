@@ -4,16 +4,14 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from PIL import Image, ImageDraw, ImageFont
 
 from pushplan.drawing.canvas import Canvas
-from pushplan.drawing.ground import Bounds, draw_ground, ground_picture
+from pushplan.drawing.ground import Bounds, ground_picture
 from pushplan.drawing.palette import FLOOR_PALETTE, Palette, palette_of
-from pushplan.drawing.pen import Pen
 from pushplan.world import Movables, Plan, StaticMap, World
 from pushplan.world.checks import FloatArray, array, frozen, integer, number
 from pushplan.world.outline import transform
@@ -64,46 +62,38 @@ def draw_world(
     palette = palette_of(world)
     ground = ground_picture(world.static, world.goal, palette, shown, size_px)
     canvas = Canvas(np.array(shown), size_px, palette.floor, ground.copy())
-    unit = size_px / 600.0
-    draw_moving(canvas, world, unit, plan=plan, trail=trail, object_trails=object_trails)
+    draw_moving(canvas, world, plan, trail, object_trails)
     picture = canvas.finish()
     if text:
-        _write([text] if isinstance(text, str) else [str(line) for line in text], picture, unit)
+        lines = [text] if isinstance(text, str) else [str(line) for line in text]
+        _write(lines, picture, canvas.unit)
     return np.asarray(picture)
 
 
-def draw_scene(pen: Pen, world: World, unit: float, **paths: Any) -> None:
-    """Draw the ground and then all of `draw_moving` by any pen; ``unit`` is a thin line [px]."""
-    draw_ground(pen, world.static, world.goal, palette_of(world), unit)
-    draw_moving(pen, world, unit, **paths)
-
-
 def draw_moving(
-    pen: Pen,
+    canvas: Canvas,
     world: World,
-    unit: float,
-    *,
-    plan: Plan | None = None,
-    trail: ArrayLike | None = None,
-    object_trails: ArrayLike | None = None,
+    plan: Plan | None,
+    trail: ArrayLike | None,
+    object_trails: ArrayLike | None,
 ) -> None:
     """Draw robot, objects, plan and paths of `draw_world` over the ground."""
-    palette = palette_of(world)
-    size_m = world.robot.circumscribed_radius
+    palette, objects = palette_of(world), world.movables
     if object_trails is not None:
-        paths: FloatArray = array("object_trails", object_trails, (None, len(world.movables), 3))
-        for k in range(paths.shape[1]):
-            pen.line(paths[:, k, :2], palette.ghost, 1.5 * unit)
-    _objects(pen, world.movables, palette, unit)
-    if plan is not None:
-        _prediction(pen, world, plan, palette, unit)
+        paths: FloatArray = array("object_trails", object_trails, (None, len(objects), 3))
+        for k in range(len(objects)):
+            canvas.line(paths[:, k, :2], palette.ghost, 1.5)
+    _objects(canvas, objects, palette)
+    for poses, outline in pushed(world, plan):  # and where the plan expects them at its end
+        canvas.line(poses[:, :2], palette.prediction, 1.5)
+        canvas.polygon(transform(poses[-1], outline), None, palette.prediction, 2.0)
     if trail is not None:
         points = np.atleast_2d(np.asarray(trail, dtype=np.float64))
-        pen.line(array("trail", points[:, :2], (None, 2)), palette.trail, 2.5 * unit)
+        canvas.line(array("trail", points[:, :2], (None, 2)), palette.trail, 2.5)
     if plan is not None:
-        dash = max(0.25 * size_m, SHORT * unit / pen.pixels_per_metre)
-        pen.line(plan.poses[:, :2], palette.plan, 2.0 * unit, dash_m=dash)
-    _robot(pen, world, palette, unit)
+        dash = max(0.25 * world.robot.circumscribed_radius, canvas.metres(SHORT))
+        canvas.line(plan.poses[:, :2], palette.plan, 2.0, dash_m=dash)
+    _robot(canvas, world, palette)
 
 
 def view_bounds(world: World, size_px: int, view: float | None) -> Bounds:
@@ -140,18 +130,18 @@ def _with_walls(static: StaticMap) -> FloatArray:
     return frozen(np.concatenate([low, high]))
 
 
-def _objects(pen: Pen, objects: Movables, palette: Palette, unit: float) -> None:
+def _objects(canvas: Canvas, objects: Movables, palette: Palette) -> None:
     if len(objects) == 0:
         return
     corners = objects.vertices_world
-    reach, (middles, radii) = pen.bounds, (objects.poses[:, :2], objects.radii[:, None])
+    reach, (middles, radii) = canvas.bounds, (objects.poses[:, :2], objects.radii[:, None])
     seen = ((middles + radii > reach[:2]) & (middles - radii < reach[2:])).all(axis=1)
     for k in np.flatnonzero(seen).tolist():
         fill, edge = palette.wheeled if objects.wheeled[k] else palette.box
         if objects.fixed[k]:
             fill, edge = palette.fixed
         outline = corners[objects.offsets[k] : objects.offsets[k + 1]]
-        pen.polygon(outline, fill, edge, palette.box_edge_px * unit)
+        canvas.polygon(outline, fill, edge, palette.box_edge_px)
 
 
 def pushed(world: World, plan: Plan | None) -> list[tuple[FloatArray, FloatArray]]:
@@ -168,27 +158,17 @@ def pushed(world: World, plan: Plan | None) -> list[tuple[FloatArray, FloatArray
     return [(poses[:, k], objects.outline(int(k))) for k in moved]
 
 
-def _prediction(pen: Pen, world: World, plan: Plan, palette: Palette, unit: float) -> None:
-    """The path of each object that the plan expects to move, and its outline at the end."""
-    for poses, outline in pushed(world, plan):
-        pen.line(poses[:, :2], palette.prediction, 1.5 * unit)
-        pen.polygon(transform(poses[-1], outline), None, palette.prediction, 2.0 * unit)
-
-
-def _robot(pen: Pen, world: World, palette: Palette, unit: float) -> None:
+def _robot(canvas: Canvas, world: World, palette: Palette) -> None:
     """The bumper's parts as one shape, the chassis on it, and an arrow where it faces."""
     chassis, *bumper = world.robot_outline_world()
     for part in (chassis, *bumper):
-        pen.polygon(part, None, palette.robot_edge, 2.5 * unit)
+        canvas.polygon(part, None, palette.robot_edge, 2.5)
     for part in bumper:
-        pen.polygon(part, palette.bumper, palette.bumper, 0.0)
-    if bumper:
-        pen.polygon(chassis, palette.robot, palette.robot_edge, 1.0 * unit)
-    else:
-        pen.polygon(chassis, palette.robot, palette.robot, 0.0)
+        canvas.polygon(part, palette.bumper, palette.bumper)
+    canvas.polygon(chassis, palette.robot, palette.robot_edge, 1.0 if bumper else 0.0)
     size = world.robot.inscribed_radius or 0.5 * world.robot.circumscribed_radius
     arrow = size * np.array([[0.75, 0.0], [-0.45, 0.5], [-0.2, 0.0], [-0.45, -0.5]])
-    pen.polygon(transform(world.robot_pose, arrow), (255, 255, 255), palette.robot, 0.0)
+    canvas.polygon(transform(world.robot_pose, arrow), (255, 255, 255), palette.robot)
 
 
 def _write(lines: list[str], picture: Image.Image, unit: float) -> None:
