@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pushplan.perception.assignment import assign
+from pushplan.perception.contour_alignment import Contour
 from pushplan.perception.sighting import Sighting, sightings_of
 from pushplan.perception.track import Track, see_all
 from pushplan.world import InvalidInputError, Movables
@@ -51,6 +52,8 @@ class ObjectTracker:
         wheeled: whether they stand on casters.
 
     Attributes:
+        time: of the newest snapshot [s]; None before the first.
+        movables: what the last `update` returned.
         ignored: how many snapshots were not later than the one before.
         flat: how many outlines had no area.
 
@@ -89,22 +92,12 @@ class ObjectTracker:
     def reset(self) -> None:
         """Forget everything; the next snapshot begins anew, at any time."""
         self.ignored = self.flat = 0
-        self._time: float | None = None
+        self.time: float | None = None
         self._tracks: list[Track] = []
         self._candidates: list[Candidate] = []
         self._next = 0
-        self._movables = Movables.empty()
+        self.movables = Movables.empty()
         self._shown: dict[int, tuple[int, int]] = {}
-
-    @property
-    def time(self) -> float | None:
-        """Of the newest snapshot [s]; None before the first."""
-        return self._time
-
-    @property
-    def movables(self) -> Movables:
-        """What the last `update` returned."""
-        return self._movables
 
     @property
     def unseen_s(self) -> FloatArray:
@@ -139,12 +132,12 @@ class ObjectTracker:
         if labels is not None and len(np.unique(labels)) != len(labels):
             raise InvalidInputError(f"ids must be distinct, got {labels.tolist()}")
         points = [array(f"polygons[{i}]", p, (None, 2)) for i, p in enumerate(polygons)]
-        if self._time is not None and stamp <= self._time:
+        if self.time is not None and stamp <= self.time:
             self.ignored += 1
-            return self._movables
+            return self.movables
         sightings = sightings_of(points, labels)
         self.flat += len(points) - len(sightings)
-        first, self._time = self._time is None, stamp
+        first, self.time = self.time is None, stamp
         for track in self._tracks:
             track.predict(stamp)
         rest = self._match(sightings)
@@ -154,8 +147,8 @@ class ObjectTracker:
         else:
             self._doubt(rest)
         self._tracks = [one for one in self._tracks if stamp - one.seen_at <= self.keep]
-        self._movables = self._collected()
-        return self._movables
+        self.movables = self._collected()
+        return self.movables
 
     def _match(self, sightings: list[Sighting]) -> list[Sighting]:
         """Give the sightings within the gates to their tracks; return the others."""
@@ -166,10 +159,10 @@ class ObjectTracker:
         if sightings[0].label is None:
             pairs = list(
                 assign(
-                    _plane([one.centre for one in tracks]),
+                    _plane(np.array([one.centre for one in tracks])),
                     np.sqrt([one.area for one in tracks]),
                     gates,
-                    _plane([one.centre for one in sightings]),
+                    _plane(np.array([one.centre for one in sightings])),
                     np.sqrt([one.area for one in sightings]),
                 )
             )
@@ -188,7 +181,7 @@ class ObjectTracker:
 
     def _doubt(self, sightings: list[Sighting]) -> None:
         """Believe what was seen often enough at a place, and remember the others."""
-        assert self._time is not None
+        assert self.time is not None
         before, self._candidates = self._candidates, []
         for sighting in sightings:
             lost = self._lost(sighting)
@@ -196,17 +189,16 @@ class ObjectTracker:
                 self._add(sighting)
                 continue
             reach = self.gate * float(np.abs(sighting.contour - sighting.centre).max())
-            near = [one for one in before if _is_same(one.sighting, sighting, reach)]
-            old = min(
-                near, key=lambda one: abs(one.sighting.centre - sighting.centre), default=None
-            )
-            if old is not None:
-                before = [one for one in before if one is not old]
-            found = Candidate(
-                sighting,
-                self._time if old is None else old.since,
-                1 if old is None else old.times + 1,
-            )
+            near = [
+                (away, k)
+                for k, one in enumerate(before)
+                if one.sighting.label == sighting.label
+                and (away := abs(one.sighting.centre - sighting.centre)) <= reach
+            ]
+            found = Candidate(sighting, self.time, 1)
+            if near:
+                old = before.pop(min(near)[1])
+                found = Candidate(sighting, old.since, old.times + 1)
             if found.times < self.confirm:
                 self._candidates.append(found)
                 continue
@@ -229,21 +221,19 @@ class ObjectTracker:
         return min(lost, key=lambda one: abs(one.centre - sighting.centre), default=None)
 
     def _add(self, sighting: Sighting) -> None:
-        assert self._time is not None
+        assert self.time is not None
         label = self._next if sighting.label is None else int(sighting.label)
         self._next = max(self._next, label) + 1
-        contour, centre, area, _ = sighting
-        self._tracks.append(Track(label, contour, centre, area, self._time, self._accelerations))
+        self._tracks.append(Track(label, sighting, self.time, self._accelerations))
 
     def _collected(self) -> Movables:
         """The tracks as `Movables`; outlines are made anew where a mean has become better."""
         shown = {one.label: (len(one.shape), one.sightings.bit_length()) for one in self._tracks}
         better = [one for one in self._tracks if self._shown.get(one.label) != shown[one.label]]
         gone = [label for label in self._shown if label not in shown]
-        movables, self._shown = self._movables, shown
+        movables, self._shown = self.movables, shown
         if better or gone:
-            shapes = [np.column_stack([one.shape.real, one.shape.imag]) for one in better]
-            hulls = convex_outlines("outline", [convex_hull(shape) for shape in shapes])
+            hulls = convex_outlines("outline", [convex_hull(_plane(one.shape)) for one in better])
             areas, centres = areas_and_centroids(*flatten(hulls))
             for one, area, centre in zip(better, areas.tolist(), centres.tolist(), strict=True):
                 one.area, one.middle = area, complex(*centre)
@@ -259,22 +249,18 @@ class ObjectTracker:
 
     def _states(self) -> tuple[FloatArray, FloatArray]:
         """(K, 3) poses and twists of the centroids."""
-        tracks = self._tracks
-        headings = np.array([one.heading for one in tracks], dtype=float)
-        rates = np.array([one.turn_rate for one in tracks], dtype=float)
-        arms = np.array([one.middle for one in tracks], dtype=complex) * np.exp(1j * headings)
-        places = np.array([one.centre for one in tracks], dtype=complex) + arms
-        speeds = np.array([one.velocity for one in tracks], dtype=complex) + 1j * rates * arms
+        states = [
+            (one.centre, one.velocity, one.middle, one.heading, one.turn_rate)
+            for one in self._tracks
+        ]
+        columns = np.array(states, dtype=complex).reshape(-1, 5).T.copy()
+        centres, velocities, middles, headings, rates = columns
+        arms = middles * np.exp(1j * headings)
         return (
-            np.column_stack([places.real, places.imag, headings]),
-            np.column_stack([speeds.real, speeds.imag, rates]),
+            np.column_stack([_plane(centres + arms), headings.real]),
+            np.column_stack([_plane(velocities + 1j * rates * arms), rates.real]),
         )
 
 
-def _is_same(one: Sighting, other: Sighting, reach: float) -> bool:
-    return one.label == other.label and abs(one.centre - other.centre) <= reach
-
-
-def _plane(points: Sequence[complex]) -> FloatArray:
-    values = np.array(points)
-    return np.column_stack([values.real, values.imag])
+def _plane(points: Contour) -> FloatArray:
+    return np.column_stack([points.real, points.imag])

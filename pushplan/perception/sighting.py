@@ -37,47 +37,30 @@ def sightings_of(points: Sequence[FloatArray], labels: FloatArray | None) -> lis
     closed = [i for i, corners in enumerate(points) if len(corners) >= 3]
     if not closed:
         return []
-    areas, centres, signs, sizes = _measured([points[i] for i in closed])
-    solid = np.flatnonzero(areas > _FLAT * sizes**2).tolist()
-    return [
-        Sighting(
-            _contour(points[closed[i]], signs[i]),
-            complex(*centres[i]),
-            float(areas[i]),
-            None if labels is None else int(labels[i]),
-        )
-        for i in solid
-    ]
-
-
-def _measured(points: Sequence[FloatArray]) -> tuple[FloatArray, ...]:
-    """Of M outlines with three corners or more: what tells a hull from a line, and where it lies.
-
-    Returns:
-        (M,) areas [m²] and (M, 2) centroids [m] of the hulls, (M,) positive where the corners run
-        counter-clockwise, and (M,) longer sides of the boxes around them [m].
-    """
-    vertices, offsets = flatten(points)
-    counts = np.diff(offsets)
-    clouds = np.full(len(points), shapely.MultiPoint())
-    owners = np.repeat(np.arange(len(points)), counts)
+    vertices, offsets = flatten([points[i] for i in closed])
+    counts, starts = np.diff(offsets), offsets[:-1]
+    clouds = np.full(len(closed), shapely.MultiPoint())
+    owners = np.repeat(np.arange(len(closed)), counts)
     shapely.multipoints(shapely.points(vertices), indices=owners, out=clouds)
     hulls = shapely.convex_hull(clouds)
-    starts = offsets[:-1]
+    areas, centres = shapely.area(hulls), shapely.get_coordinates(shapely.centroid(hulls))
     shifted = vertices - np.repeat(vertices[starts], counts, axis=0)
     after = shifted[next_corner(offsets)]
     cross = shifted[:, 0] * after[:, 1] - shifted[:, 1] * after[:, 0]
-    return (
-        shapely.area(hulls),
-        shapely.get_coordinates(shapely.centroid(hulls)),
-        np.add.reduceat(cross, starts),
-        (np.maximum.reduceat(vertices, starts) - np.minimum.reduceat(vertices, starts)).max(axis=1),
-    )
-
-
-def _contour(corners: FloatArray, sign: float) -> Contour:
-    """Corners as a contour, counter-clockwise, without the first one repeated at the end."""
-    if (corners[0] == corners[-1]).all():
-        corners = corners[:-1]
-    points = corners[:, 0] + 1j * corners[:, 1]
-    return points if sign >= 0.0 else points[::-1]
+    turns = np.add.reduceat(cross, starts)  # positive where corners run counter-clockwise
+    boxes = np.maximum.reduceat(vertices, starts) - np.minimum.reduceat(vertices, starts)
+    found = []
+    for i in np.flatnonzero(areas > _FLAT * boxes.max(axis=1) ** 2).tolist():
+        corners = points[closed[i]]
+        if (corners[0] == corners[-1]).all():
+            corners = corners[:-1]
+        contour = corners[:, 0] + 1j * corners[:, 1]
+        found.append(
+            Sighting(
+                contour if turns[i] >= 0.0 else contour[::-1],
+                complex(*centres[i]),
+                float(areas[i]),
+                None if labels is None else int(labels[closed[i]]),
+            )
+        )
+    return found

@@ -8,7 +8,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from pushplan.perception.contour_alignment import Alignments, Contour, align, resampled
+from pushplan.perception.contour_alignment import Contour, align, resampled
+from pushplan.perception.sighting import Sighting
 
 _MOST_SIGHTINGS = 100  # over so many a shape is averaged
 _LEAST_NOISE = 1e-4  # standard deviation of a corner [radii]
@@ -60,32 +61,24 @@ class Track:
 
     Args:
         label: of the object.
-        seen: (N,) its first contour, world frame.
-        centre: of its hull, x + iy [m].
-        area: of its hull [m²].
-        time: [s].
+        first: its first sighting.
+        time: of that [s].
         accelerations: standard deviations [m/s²] and [rad/s²].
     """
 
     def __init__(
-        self,
-        label: int,
-        seen: Contour,
-        centre: complex,
-        area: float,
-        time: float,
-        accelerations: tuple[float, float],
+        self, label: int, first: Sighting, time: float, accelerations: tuple[float, float]
     ) -> None:
-        self.label, self.area = label, area
-        self.centre, self.heading = centre, 0.0
+        self.label, self.area = label, first.area
+        self.centre, self.heading = first.centre, 0.0
         self.middle = 0j  # centroid of the shape's hull, in the frame of the body
         self.velocity, self.turn_rate = 0j, 0.0
-        self.shape = seen - centre
+        self.shape = first.contour - first.centre
         self.radius = float(np.abs(self.shape).max())
         self.variance = (_FIRST_NOISE * self.radius) ** 2
         self.sightings, self.votes = 1, 1
         self.seen_at = self.time = time
-        self.place = Axis(accelerations[0], self.variance / len(seen))
+        self.place = Axis(accelerations[0], self.variance / len(self.shape))
         self.direction = Axis(accelerations[1], self.variance / self._moment)
 
     @property
@@ -118,22 +111,29 @@ class Track:
         """Standard deviation of the heading, as far as contours are to be told from each other."""
         return math.sqrt(_SPREAD**2 + self.direction.variance)
 
-    def see(self, seen: Contour, found: Alignments, k: int) -> None:
-        """Take in a contour (M,) of this object, seen now, by its ``k``-th alignment."""
-        centre, turn = complex(found.centres[k]), float(found.turns[k])
-        variance, points = float(found.variances[k]), min(len(self.shape), len(seen))
-        self._average(seen, centre, self.heading + turn, int(found.orders[k]))
+    def see(
+        self,
+        seen: Contour,
+        centre: complex,
+        turn: float,
+        order: int,
+        variance: float,
+        moment: float,
+    ) -> None:
+        """Take in a contour (M,) of this object, seen now, by its fields of `Alignments`."""
+        points = min(len(self.shape), len(seen))
+        self._average(seen, centre, self.heading + turn, order)
         self.sightings += 1
         if len(self.shape) == len(seen):
             least = (_LEAST_NOISE * self.radius) ** 2
-            part = 1.0 / min(self.sightings - 1, 20) if self.sightings > 1 else 1.0
+            part = 1.0 / min(max(self.sightings - 1, 1), 20)
             self.variance += part * (max(variance, least) - self.variance)
         noise = max(self.variance, variance)
         gain, rate_gain = self.place.correct(noise / points)
         away = centre - self.centre
         self.centre += gain * away
         self.velocity += rate_gain * away
-        gain, rate_gain = self.direction.correct(noise / float(found.moments[k]))
+        gain, rate_gain = self.direction.correct(noise / moment)
         self.heading += gain * turn
         self.turn_rate += rate_gain * turn
         self.seen_at = self.time
@@ -178,5 +178,5 @@ def see_all(tracks: Sequence[Track], contours: Sequence[Contour]) -> None:
             np.array([one.spread for one in some]),
             sampled=not corners,
         )
-        for i, k in enumerate(members):
-            tracks[k].see(contours[k], found, i)
+        for k, *fit in zip(members, *(values.tolist() for values in found), strict=True):
+            tracks[k].see(contours[k], *fit)
