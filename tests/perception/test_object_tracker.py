@@ -174,6 +174,7 @@ def test_outlines_without_area_count_as_unseen() -> None:
     assert tracker.unseen_s.tolist() == [0.0]
     tracker.update([[]], 0.2)
     assert tracker.flat == 4
+    assert ObjectTracker().update([[], BOX], 0.0, ids=[5, 7]).ids.tolist() == [7]
 
 
 def test_what_is_collected_is_what_the_planners_take() -> None:
