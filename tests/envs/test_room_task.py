@@ -12,7 +12,7 @@ import shapely
 
 from pushplan.envs import PushEnv
 from pushplan.envs.registry import goal_kind
-from pushplan.envs.tasks.room import small_room
+from pushplan.envs.tasks.room import SMALL_ROOM
 from pushplan.evaluation import Experiment, bench
 from pushplan.scenarios import Scenario, world_suite
 from pushplan.world import (
@@ -26,6 +26,7 @@ from pushplan.world import (
     SchemaError,
     StaticMap,
     World,
+    load_world,
     save_world,
 )
 from pushplan.world.goals import Goal
@@ -44,7 +45,7 @@ def start(env: PushEnv, seed: int = 0) -> World:
 
 
 def test_the_file_says_what_there_is(tmp_path: Path) -> None:
-    given = replace(small_room(), time=7.0, margin=0.03)
+    given = replace(load_world(SMALL_ROOM), time=7.0, margin=0.03)
     save_world(given, tmp_path / "a.yaml")
     world = start(room(tmp_path / "a.yaml"), 5)
     assert world == replace(given, time=0.0)
@@ -65,7 +66,7 @@ def bodies(world: World) -> list[shapely.Geometry]:
 
 
 def test_a_spread_moves_bodies_a_little_and_never_onto_each_other() -> None:
-    spread, plain = 0.3, small_room()
+    spread, plain = 0.3, load_world(SMALL_ROOM)
     env = room(spread=spread)
     starts = [start(env, seed) for seed in range(20)]
     assert start(env, 3) == starts[3] and starts[3] != starts[4]
@@ -109,7 +110,7 @@ def test_time_runs_out() -> None:
 def test_what_makes_no_sense_is_said(
     tmp_path: Path, goal: GoalDisc, action: str, words: str | None
 ) -> None:
-    save_world(replace(small_room(), goal=goal), tmp_path / "a.yaml")
+    save_world(replace(load_world(SMALL_ROOM), goal=goal), tmp_path / "a.yaml")
     options = {"task": "room", "variations": {"world_file": str(tmp_path / "a.yaml")}}
     if words is None:
         env = PushEnv(**options, action=action)
@@ -130,7 +131,7 @@ SQUARE = np.array([(1.0, 0.0), (3.0, 0.0), (3.0, 1.2), (1.0, 1.2)])
 
 def boxes_ahead(goal: Goal, path: Path) -> PushEnv:
     """The small room without its column and one box ahead of the robot."""
-    plain = small_room()
+    plain = load_world(SMALL_ROOM)
     static = replace(plain.static, polygons=())
     world = replace(plain, static=static, movables=plain.movables.select([0]), goal=goal)
     save_world(world, path)
@@ -185,7 +186,7 @@ def test_open_water_ends_at_its_sides(tmp_path: Path) -> None:
         max_turn_rate=1.0,
     )
     world = replace(
-        small_room(),
+        load_world(SMALL_ROOM),
         robot=ship,
         static=StaticMap.build(bounds=(0.0, 0.0, 1.0, 9.0)),
         goal=GoalLine(np.array([0.5, 3.0]), np.array([0.0, 1.0])),
@@ -206,8 +207,8 @@ class TestSuites:
     def folder(self, tmp_path: Path) -> Path:
         folder = tmp_path / "rooms"
         folder.mkdir()
-        save_world(small_room(), folder / "b.yaml")
-        save_world(replace(small_room(), margin=0.05), folder / "a.json")
+        save_world(load_world(SMALL_ROOM), folder / "b.yaml")
+        save_world(replace(load_world(SMALL_ROOM), margin=0.05), folder / "a.json")
         (folder / "map.yaml").write_text("image: map.pgm\n")
         (folder / "notes.txt").write_text("no world")
         return folder
@@ -247,7 +248,7 @@ class TestSuites:
 
         assert run() == 2
         assert run() == 2
-        save_world(replace(small_room(), margin=0.06), folder / "b.yaml")
+        save_world(replace(load_world(SMALL_ROOM), margin=0.06), folder / "b.yaml")
         assert run() == 3
 
     def test_unknown_keys_are_named(self, folder: Path) -> None:
@@ -262,7 +263,7 @@ class TestSuites:
 
 
 def test_bodies_are_spread_on_their_side_of_the_walls(tmp_path: Path) -> None:
-    world = small_room()
+    world = load_world(SMALL_ROOM)
     save_world(world, tmp_path / "a.yaml")
     env = room(tmp_path / "a.yaml", spread=1.0)
     low, high = world.static.bounds[:2], world.static.bounds[2:]
@@ -276,7 +277,7 @@ def test_bodies_are_spread_on_their_side_of_the_walls(tmp_path: Path) -> None:
 
 
 def test_goals_for_objects_that_nothing_can_reach_are_refused(tmp_path: Path) -> None:
-    world = small_room()
+    world = load_world(SMALL_ROOM)
     corner = np.array([(0.0, 0.0), (0.5, 0.0), (0.5, 0.5), (0.0, 0.5)]) + world.static.bounds[:2]
     empty = replace(world, goal=Receptacle(corner), movables=world.movables.select([]))
     save_world(empty, tmp_path / "empty.yaml")

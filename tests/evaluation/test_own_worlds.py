@@ -10,17 +10,17 @@ import pytest
 import yaml
 
 from pushplan.cli import main
-from pushplan.envs.tasks.room import small_room
+from pushplan.envs.tasks.room import SMALL_ROOM
 from pushplan.evaluation import Experiment, Results, bench, compare_runs
 from pushplan.evaluation.benchmark import suites_of
 from pushplan.scenarios import Scenario, Suite, load_scenarios, save_scenarios, suite, world_suite
-from pushplan.world import InvalidInputError, SchemaError, save_world
+from pushplan.world import InvalidInputError, SchemaError, load_world, save_world
 
 
 def folder_of(path: Path, *names: str) -> Path:
     path.mkdir(parents=True, exist_ok=True)
     for place, name in enumerate(names):
-        save_world(replace(small_room(), margin=0.01 * place), path / name)
+        save_world(replace(load_world(SMALL_ROOM), margin=0.01 * place), path / name)
     return path
 
 

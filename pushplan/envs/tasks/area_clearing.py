@@ -9,7 +9,6 @@ from typing import Any, ClassVar
 import numpy as np
 import shapely
 
-from pushplan.envs.tasks.base import StepOutcome
 from pushplan.envs.tasks.layout import FreeSpace, rectangle, squares, walls_around
 from pushplan.envs.tasks.manipulation import (
     START_TRIES,
@@ -20,13 +19,8 @@ from pushplan.envs.tasks.manipulation import (
 )
 from pushplan.envs.tasks.presets import build, read_presets
 from pushplan.envs.tasks.variations import Yaw
-from pushplan.world import ClearanceArea, InvalidInputError, ScenarioError, StaticMap, World
+from pushplan.world import ClearanceArea, ScenarioError, StaticMap, World
 from pushplan.world.checks import BoolArray, FloatArray
-
-CLEARED_REWARD = 10.0
-BACK_REWARD = -10.0
-STATIC_REWARD = -0.25
-END_REWARD = 50.0
 
 
 @dataclass(frozen=True)
@@ -84,6 +78,9 @@ class AreaClearingTask(ManipulationTask):
     presets = tuple(PRESETS)
     solid_presets = ("testbed",)
     idle_limits: ClassVar[Mapping[str, int]] = {"heading": 200, "waypoint": 200}
+    end = "cleared"
+    back_reward = -10.0
+    end_reward = 50.0
 
     preset: AreaClearingPreset
     preset_table = PRESETS
@@ -137,38 +134,8 @@ class AreaClearingTask(ManipulationTask):
         x, y = (half - margin for half in self._room.area)
         return np.array([-x, -y, x, y]), []
 
-    def start(self, rng: np.random.Generator) -> World:
-        """A new start: the robot at the lower edge heading up, boxes inside the area."""
-        world = super().start(rng)
-        self._seen = (world, *self._measure(world))
-        return world
-
     def _measure(self, world: World) -> tuple[FloatArray, BoolArray]:
         return self.goal_distances(world.movables.poses), world.completed
-
-    def _state(self, world: World) -> tuple[FloatArray, BoolArray]:
-        """Distances and cleared flags, kept for the world that the last step ended in."""
-        if self._seen[0] is not world:
-            self._seen = (world, *self._measure(world))
-        return self._seen[1:]
-
-    def score(
-        self, before: World, after: World, *, work: float, touched_static: bool
-    ) -> StepOutcome:
-        """The reward above; over when every box is clear of the area."""
-        if self._field is None:
-            raise InvalidInputError("area_clearing: start() has to be called before score()")
-        far, was_cleared = self._state(before)
-        near, cleared = self._state(after)
-        gained = int((cleared & ~was_cleared).sum())
-        reward = self.preset.progress_reward * float((far - near).sum()) + CLEARED_REWARD * gained
-        reward += BACK_REWARD * int((was_cleared & ~cleared).sum())
-        if touched_static:
-            reward += STATIC_REWARD
-        idle = self._idle(after, gained > 0)
-        if cleared.all():
-            return StepOutcome(reward + END_REWARD, True, "cleared", True, False, cleared)
-        return StepOutcome(reward, False, "no_progress" if idle else "", False, idle, cleared)
 
 
 def open_edges(static: StaticMap, polygon: FloatArray, size: float) -> BoolArray:

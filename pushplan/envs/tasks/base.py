@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, ClassVar, Literal
 
 import numpy as np
@@ -15,6 +15,13 @@ from pushplan.envs.tasks.variations import TaskVariations
 from pushplan.observation import ObservationBuilder, StateObservation
 from pushplan.world import Drive, RobotModel, UnknownNameError, World
 from pushplan.world.checks import BoolArray, FloatArray, IntArray
+
+_FRICTIONS = {
+    "bumper_friction": "robot_object",
+    "object_friction": "object_object",
+    "wall_friction": "object_static",
+}
+"""Variation -> the field of `Materials` that it replaces."""
 
 
 @dataclass(frozen=True)
@@ -114,8 +121,11 @@ class Task(ABC):
         raise NotImplementedError(f"task {self.name!r} has neither __init__ nor _prepare")
 
     def _drive(self, robot: RobotModel) -> None:
-        """Set robot, control step and slowness, from the preset and what departs from it."""
+        """Set robot, materials, control step and slowness: the preset and what departs from it."""
         preset, wanted = self.preset, self.variations
+        frictions = {field: getattr(wanted, name, None) for name, field in _FRICTIONS.items()}
+        asked = {field: value for field, value in frictions.items() if value is not None}
+        self.materials = replace(preset.materials, **asked)
         self.robot = wanted.limit(robot)
         self.control_step = wanted.control_step or preset.control_step
         speed, turn = robot.max_speed, robot.max_turn_rate

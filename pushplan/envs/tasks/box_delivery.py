@@ -9,8 +9,7 @@ from typing import Any, ClassVar
 import numpy as np
 import shapely
 
-from pushplan.envs.tasks.base import StepOutcome
-from pushplan.envs.tasks.layout import rectangle, walls_around
+from pushplan.envs.tasks.layout import rectangle, those_inside, walls_around
 from pushplan.envs.tasks.manipulation import (
     START_TRIES,
     ManipulationPreset,
@@ -20,16 +19,10 @@ from pushplan.envs.tasks.manipulation import (
 )
 from pushplan.envs.tasks.presets import read_presets
 from pushplan.envs.tasks.variations import Yaw
-from pushplan.world import InvalidInputError, Receptacle, StaticMap, World
-from pushplan.world.checks import FloatArray, IntArray
-from pushplan.world.outline import transform_outlines
+from pushplan.world import Receptacle, StaticMap, World
+from pushplan.world.checks import BoolArray, FloatArray, IntArray
 
-TOWARDS = 3.0
-"""How much more a metre towards the receptacle counts than one away from it."""
-DELIVERY_REWARD = 10.0
-WAYPOINT_DELIVERY_REWARD = 1.0
-STATIC_REWARD = -0.25
-STILL_REWARD = -0.25
+_WAYPOINT_DELIVERY_REWARD = 1.0
 _STILL_TURN = 0.02
 _COLUMN_TRIES = 20
 
@@ -90,12 +83,16 @@ class BoxDeliveryTask(ManipulationTask):
     solid_presets = ("testbed",)
     objects_leave = True
     idle_limits: ClassVar[Mapping[str, int]] = {"heading": 200, "waypoint": 100}
+    end = "delivered"
+    towards = 3.0
 
     preset: BoxDeliveryPreset
     preset_table = PRESETS
     variation_class = BoxDeliveryVariations
 
     def _furnish_room(self) -> None:
+        if self.action == "waypoint":
+            self.done_reward = _WAYPOINT_DELIVERY_REWARD
         length, width = self.preset.rooms[self.variations.layout]
         self.bounds = (-0.5 * length, -0.5 * width, 0.5 * length, 0.5 * width)
         side = self.preset.receptacle
@@ -172,58 +169,19 @@ class BoxDeliveryTask(ManipulationTask):
     def _box_region(self) -> tuple[FloatArray, list[Any]]:
         return np.array(self.bounds), [shapely.Polygon(self.goal.polygon)]
 
-    def start(self, rng: np.random.Generator) -> World:
-        """A new start: what is static, the robot, then boxes that it can get to."""
-        world = super().start(rng)
-        self._start = world.movables
-        self._seen = (world, self.goal_distances(world.movables.poses))
-        return world
-
     def leaving(self, ids: IntArray, poses: FloatArray) -> IntArray:
         """Boxes with all corners inside the receptacle."""
-        start = self._start
-        if not len(ids):
-            return ids
-        if len(ids) == len(start):
-            vertices, offsets = start.drawn_vertices, start.drawn_offsets
-        else:  # boxes are alike
-            offsets = start.drawn_offsets[: len(ids) + 1]
-            vertices = start.drawn_vertices[: 4 * len(ids)]
-        corners = transform_outlines(poses, vertices, offsets)
-        gone: IntArray = ids[self._mouth.contains_each(corners, offsets)]
-        return gone
+        return those_inside(self._mouth, self._start, ids, poses) if len(ids) else ids
 
-    def _distances(self, world: World) -> FloatArray:
-        """(K,) goal distance of each box of the start, 0 where it has been delivered."""
-        if self._seen[0] is not world:
-            distances = np.zeros(self.box_count)
-            distances[world.movables.ids] = self.goal_distances(world.movables.poses)
-            self._seen = (world, distances)
-        return self._seen[1]
-
-    def score(
-        self, before: World, after: World, *, work: float, touched_static: bool
-    ) -> StepOutcome:
-        """The reward above; over when every box has left the floor."""
-        if self._field is None:
-            raise InvalidInputError("box_delivery: start() has to be called before score()")
-        closer = self._distances(before) - self._distances(after)
-        delivered = len(before.movables) - len(after.movables)
-        each = WAYPOINT_DELIVERY_REWARD if self.action == "waypoint" else DELIVERY_REWARD
-        progress = float((closer * np.where(closer > 0.0, TOWARDS, 1.0)).sum())
-        reward = self.preset.progress_reward * progress + each * delivered
-        if touched_static:
-            reward += STATIC_REWARD
-        if self.action == "waypoint" and self._is_still(before, after):
-            reward += STILL_REWARD
-        completed = np.ones(self.box_count, dtype=bool)
-        completed[after.movables.ids] = False
-        idle = self._idle(after, delivered > 0)
-        if completed.all():
-            return StepOutcome(reward, True, "delivered", True, False, completed)
-        return StepOutcome(reward, False, "no_progress" if idle else "", False, idle, completed)
+    def _measure(self, world: World) -> tuple[FloatArray, BoolArray]:
+        distances, done = np.zeros(self.box_count), np.ones(self.box_count, dtype=bool)
+        distances[world.movables.ids] = self.goal_distances(world.movables.poses)
+        done[world.movables.ids] = False
+        return distances, done
 
     def _is_still(self, before: World, after: World) -> bool:
+        if self.action != "waypoint":
+            return False
         dx, dy, turn = (after.robot_pose - before.robot_pose).tolist()
         turned = abs(np.remainder(turn + np.pi, 2.0 * np.pi) - np.pi)
         return bool(np.hypot(dx, dy) < self.preset.still and turned < _STILL_TURN)

@@ -12,9 +12,9 @@ import numpy as np
 import shapely
 from numpy.typing import ArrayLike, NDArray
 
-from pushplan.world import Movables, RobotModel, ScenarioError, StaticMap
-from pushplan.world.checks import BoolArray, FloatArray
-from pushplan.world.outline import transform
+from pushplan.world import Movables, Receptacle, RobotModel, ScenarioError, StaticMap
+from pushplan.world.checks import BoolArray, FloatArray, IntArray
+from pushplan.world.outline import transform, transform_outlines
 
 _BATCH = 64
 _LATTICE_SHIFTS = 16
@@ -42,10 +42,18 @@ class FreeSpace:
         ]
         return (*polygons, *lines)
 
-    def is_free(self, shapes: NDArray[Any], gap: float) -> BoolArray:
-        """Which of some Shapely geometries stay more than ``gap`` [m] off every obstacle."""
+    def is_free(
+        self, shapes: NDArray[Any], gap: float, keep_off: Sequence[tuple[Any, float]] = ()
+    ) -> BoolArray:
+        """Which of some Shapely geometries stay more than ``gap`` [m] off every obstacle.
+
+        Args:
+            shapes: the geometries.
+            gap: [m].
+            keep_off: further obstacles: Shapely geometries, each with a radius [m] around it.
+        """
         free = np.ones(len(shapes), dtype=bool)
-        for piece, reach in self._pieces:
+        for piece, reach in (*self._pieces, *keep_off):
             free &= shapely.distance(shapes, piece) > reach + gap
         return free
 
@@ -89,7 +97,7 @@ class FreeSpace:
         low, high = box[:2], box[2:]
 
         def fits(poses: FloatArray) -> BoolArray:
-            found = self._fits(poses, size, keep_off, gap)
+            found = self.is_free(shapely.polygons(squares(poses, size)), gap, keep_off)
             if allowed is not None and found.any():
                 found[found] = allowed(poses[found, :2])
             return found
@@ -121,10 +129,7 @@ class FreeSpace:
         *,
         touching: bool,
         keep_off: Sequence[tuple[Any, float]] = (),
-        within: ArrayLike | None = None,
-        allowed: Callable[[FloatArray], BoolArray] | None = None,
-        spacing: float = 0.0,
-        **options: Any,
+        **rules: Any,
     ) -> FloatArray:
         """`place_squares` off a robot, or in touch with it.
 
@@ -135,34 +140,28 @@ class FreeSpace:
             robot: Shapely geometries.
             touching: whether squares may touch the robot: they are placed as if it were not there,
                 and those that overlap it are moved straight away from its middle until they touch.
-            keep_off, within, allowed, spacing, options: as `place_squares` takes them.
+            keep_off, rules: as `place_squares` takes them.
 
         Raises:
             ScenarioError: if there is no room for them.
         """
-        rules: Any = {"within": within, "allowed": allowed, "spacing": spacing, **options}
         body = shapely.union_all(list(robot))
-        box = np.asarray(self.static.bounds if within is None else within)
+        box = np.asarray(rules.get("within", self.static.bounds))
+        allowed, spacing = rules.get("allowed"), rules.get("spacing", 0.0)
         for _ in range(_TOUCH_TRIES if touching else 0):
             poses = self.place_squares(rng, count, size, keep_off=keep_off, **rules)
             moved = _moved_off(poses, size, body)
             pushed = moved[(moved != poses).any(axis=1)]
             inside = (pushed[:, :2] >= box[:2]).all() and (pushed[:, :2] <= box[2:]).all()
-            fits = self._fits(pushed, size, keep_off, 0.0).all()
+            fits = self.is_free(shapely.polygons(squares(pushed, size)), 0.0, keep_off).all()
             reached = allowed is None or not len(pushed) or allowed(pushed[:, :2]).all()
-            if inside and fits and reached and _apart(moved, size, spacing):
+            apart = all(
+                _keeps_off(pose, moved[k + 1 :], size, spacing) for k, pose in enumerate(moved)
+            )
+            if inside and fits and reached and apart:
                 return moved
         off = [*keep_off, *((shape, 0.0) for shape in robot)]
         return self.place_squares(rng, count, size, keep_off=off, **rules)
-
-    def _fits(
-        self, poses: FloatArray, size: float, keep_off: Sequence[tuple[Any, float]], gap: float
-    ) -> BoolArray:
-        shapes = shapely.polygons(squares(poses, size))
-        fits = self.is_free(shapes, gap)
-        for shape, reach in keep_off:
-            fits &= shapely.distance(shapes, shape) > reach + gap
-        return fits
 
 
 def _moved_off(poses: FloatArray, size: float, body: Any) -> FloatArray:
@@ -184,14 +183,10 @@ def _moved_off(poses: FloatArray, size: float, body: Any) -> FloatArray:
     return moved
 
 
-def _apart(poses: FloatArray, size: float, spacing: float) -> bool:
-    """Whether squares at poses (N, 3) overlap none of the others and keep their spacing."""
-    for k, pose in enumerate(poses):
-        others = poses[k + 1 :]
-        near = np.hypot(*(others[:, :2] - pose[:2]).T) < spacing
-        if near.any() or squares_overlap(pose, others, size).any():
-            return False
-    return True
+def _keeps_off(pose: FloatArray, others: FloatArray, size: float, spacing: float) -> bool:
+    """Whether a square overlaps none of others (N, 3), and their centres keep their spacing."""
+    near = np.hypot(*(others[:, :2] - pose[:2]).T) < spacing
+    return not (near.any() or squares_overlap(pose, others, size).any())
 
 
 def _throw(
@@ -212,9 +207,7 @@ def _throw(
         if random_yaw:
             poses[:, 2] = rng.uniform(-np.pi, np.pi, _BATCH)
         for pose in poses[fits(poses)]:
-            others = placed[:done]
-            near = np.hypot(*(others[:, :2] - pose[:2]).T) < spacing
-            if not (near.any() or squares_overlap(pose, others, size).any()):
+            if _keeps_off(pose, placed[:done], size, spacing):
                 placed[done] = pose
                 done += 1
                 if done == count:
@@ -245,6 +238,24 @@ def _lattice(
         if len(best) >= count:
             break
     return best
+
+
+def those_inside(
+    receptacle: Receptacle, movables: Movables, ids: IntArray, poses: FloatArray
+) -> IntArray:
+    """Ids of the objects that are in a receptacle with all corners.
+
+    Args:
+        receptacle: the area.
+        movables: all objects of the start, by increasing ids.
+        ids: (K,) of those that are on the floor, increasing.
+        poses: (K, 3) of them.
+    """
+    if len(ids) < len(movables):
+        movables = movables.select(np.isin(movables.ids, ids))
+    corners = transform_outlines(poses, movables.drawn_vertices, movables.drawn_offsets)
+    inside: IntArray = ids[receptacle.contains_each(corners, movables.drawn_offsets)]
+    return inside
 
 
 def square_boxes(

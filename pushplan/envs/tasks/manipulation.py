@@ -15,7 +15,7 @@ from scipy import ndimage
 
 from pushplan.compiled import kernel
 from pushplan.envs.simulators.base import Materials
-from pushplan.envs.tasks.base import Task, drive_of
+from pushplan.envs.tasks.base import StepOutcome, Task, drive_of
 from pushplan.envs.tasks.layout import FreeSpace, footprint_at, square_boxes
 from pushplan.envs.tasks.presets import SOLIDS
 from pushplan.envs.tasks.variations import TaskVariations, Yaw
@@ -67,6 +67,8 @@ _CHANNELS = ("occupancy", "footprint", "robot_distance", "goal_distance")
 _PIXELS = {"image": 224, "spatial": 96}
 _LAYOUT_TRIES = 8
 START_TRIES = 2000
+STATIC_REWARD = -0.25
+STILL_REWARD = -0.25
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -186,6 +188,15 @@ class ManipulationTask(Task):
     """Actions without progress after which an episode is cut off, by action mode. The others
     are cut off after as much simulated time as that many heading actions take to drive."""
 
+    end: ClassVar[str]
+    """The reason for which a successful episode ends."""
+    towards: ClassVar[float] = 1.0
+    """How much more a metre towards the goal counts than one away from it."""
+    done_reward: float = 10.0
+    back_reward: ClassVar[float] = 0.0
+    """For each box that was done and is no longer."""
+    end_reward: ClassVar[float] = 0.0
+
     goal: ManipulationGoal
     preset: ManipulationPreset
     variations: ManipulationVariations
@@ -194,7 +205,8 @@ class ManipulationTask(Task):
         dimensions, wanted = self.preset, self.variations
         robot = self._make_robot()
         self._drive(robot)
-        self.materials = self._make_materials()
+        if self.materials.solids is not None:
+            self.materials = replace(self.materials, solids=SOLIDS[self.robot_name])
         self.heading_step = dimensions.heading_step
         self.waypoint_window = dimensions.windows[wanted.layout]
         step_time = self.slowness * self.heading_step / robot.max_speed
@@ -232,14 +244,6 @@ class ManipulationTask(Task):
         options = {} if bumper is None else {"bumper": bumper}
         return preset.robots[self.robot_name](drive=drive_of(self.action), **options)
 
-    def _make_materials(self) -> Materials:
-        materials = self.preset.materials
-        if self.variations.bumper_friction is not None:
-            materials = replace(materials, robot_object=self.variations.bumper_friction)
-        if materials.solids is not None:
-            materials = replace(materials, solids=SOLIDS[self.robot_name])
-        return materials
-
     @property
     def field(self) -> GeodesicField:
         """Distance of a point to the goal around what is static [m], in this episode."""
@@ -262,6 +266,8 @@ class ManipulationTask(Task):
         self._field = field
         self._farthest = float(field.values[np.isfinite(field.values)].max())
         self._idle_actions, self._idle_since = 0, world.time
+        self._start = world.movables
+        self._seen = (world, *self._measure(world))
         return world
 
     @abstractmethod
@@ -331,6 +337,42 @@ class ManipulationTask(Task):
             f"{self.name}: there is no free start for robot {self.robot.name!r} in layout "
             f"{self.variations.layout!r} from which it can get to the goal"
         )
+
+    @abstractmethod
+    def _measure(self, world: World) -> tuple[FloatArray, BoolArray]:
+        """(K,) goal distance [m] of each box of the start, and whether it is done."""
+
+    def _state(self, world: World) -> tuple[FloatArray, BoolArray]:
+        """`_measure`, kept for the world that the last step ended in."""
+        if self._seen[0] is not world:
+            self._seen = (world, *self._measure(world))
+        return self._seen[1:]
+
+    def score(
+        self, before: World, after: World, *, work: float, touched_static: bool
+    ) -> StepOutcome:
+        """The reward of the task; over when every box is done."""
+        if self._field is None:
+            raise InvalidInputError(f"{self.name}: start() has to be called before score()")
+        far, was_done = self._state(before)
+        near, done = self._state(after)
+        closer = far - near
+        gained = int((done & ~was_done).sum())
+        progress = float((closer * np.where(closer > 0.0, self.towards, 1.0)).sum())
+        reward = self.preset.progress_reward * progress + self.done_reward * gained
+        reward += self.back_reward * int((was_done & ~done).sum())
+        if touched_static:
+            reward += STATIC_REWARD
+        if self._is_still(before, after):
+            reward += STILL_REWARD
+        idle = self._idle(after, gained > 0)
+        if done.all():
+            return StepOutcome(reward + self.end_reward, True, self.end, True, False, done)
+        return StepOutcome(reward, False, "no_progress" if idle else "", False, idle, done)
+
+    def _is_still(self, before: World, after: World) -> bool:
+        """Whether the robot has not moved although it should."""
+        return False
 
     def goal_distances(self, poses: FloatArray) -> FloatArray:
         """(K,) shortest way of each box centre to the goal [m], from poses (K, 3)."""

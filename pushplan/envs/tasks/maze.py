@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from pkgutil import resolve_name
 from typing import Annotated, ClassVar
@@ -183,12 +183,6 @@ class MazeTask(Task):
         except InvalidInputError as error:
             raise ScenarioError(f"maze, preset {self.preset_name!r}: {error}") from error
         self._drive(robot)
-        friction = self.variations.bumper_friction
-        self.materials = (
-            self.preset.materials
-            if friction is None
-            else replace(self.preset.materials, robot_object=friction)
-        )
         self._steps = 0
         self._lay_out()
 

@@ -4,20 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from functools import cache, partial
-from importlib import resources
+from pathlib import Path
 from typing import Any, TypeVar
 
 from pushplan.envs.simulators.base import Materials, Solids
 from pushplan.envs.simulators.water import Water
-from pushplan.world.safe_files import parse_yaml
+from pushplan.world.safe_files import read_data
 
 T = TypeVar("T")
 
 
 @cache
 def _table() -> Mapping[str, Any]:
-    text = resources.files("pushplan.envs.tasks").joinpath("presets.yaml").read_text("utf-8")
-    table: Mapping[str, Any] = parse_yaml(text)
+    table: Mapping[str, Any] = read_data(Path(__file__).with_suffix(".yaml"), "presets")
     return table
 
 

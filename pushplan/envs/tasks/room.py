@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import ClassVar, Literal
 
 import numpy as np
@@ -20,15 +21,11 @@ from pushplan.geometry.distance_field import geodesic_field
 from pushplan.observation import ImageObservation
 from pushplan.world import (
     ClearanceArea,
-    GoalDisc,
     InvalidInputError,
-    Movables,
     Receptacle,
     ScenarioError,
-    StaticMap,
     World,
     load_world,
-    turtlebot3_burger,
 )
 from pushplan.world.checked_fields import NonNegativeFloat, PositiveFloat
 from pushplan.world.checks import FloatArray, IntArray
@@ -40,6 +37,8 @@ _CELLS = 200
 _SHORTEST_WAYS = 10.0
 _LEAST_TIME = 10.0
 _TRIES = 100
+SMALL_ROOM = Path(__file__).with_suffix(".yaml")
+"""A room of 3 m with a column, two boxes in the way and a TurtleBot3."""
 _WINDOW = 10.0
 """Side of the image observation, in robot lengths."""
 
@@ -98,14 +97,13 @@ class RoomTask(Task):
     def _prepare(self) -> None:
         path = self.variations.world_file
         try:
-            world = small_room() if path is None else load_world(path)
-            robot = self.variations.limit(world.robot)
+            world = load_world(SMALL_ROOM if path is None else path)
+            self._drive(world.robot)
+            robot = self.robot
             if self.action == "wheels" and robot.wheel_separation == 0.0:
                 raise InvalidInputError(f"robot {robot.name!r} has no wheels (valid: velocity)")
         except InvalidInputError as error:
             raise ScenarioError(f"room: {error}") from error
-        self.robot, self.materials = robot, self._make_materials()
-        self.control_step = self.variations.control_step or self.preset.control_step
         at_rest = world.movables.moved_to(world.movables.poses)
         self._world = replace(world, robot=robot, movables=at_rest, robot_twist=None, time=0.0)
         room = world.static.bounds[2:] - world.static.bounds[:2]
@@ -127,14 +125,6 @@ class RoomTask(Task):
             limit = max(_SHORTEST_WAYS * way / robot.max_speed, _LEAST_TIME)
         self._most = math.ceil(limit / self.control_step - 1e-9)
         self._steps, self._idle_since, self._done = 0, 0, 0
-
-    def _make_materials(self) -> Materials:
-        """The preset's, with the friction that is asked for."""
-        wanted, given = self.variations, self.preset.materials
-        asked = (wanted.bumper_friction, wanted.object_friction, wanted.wall_friction)
-        own = (given.robot_object, given.object_object, given.object_static)
-        bumper, objects, walls = (b if a is None else a for a, b in zip(asked, own, strict=True))
-        return replace(given, robot_object=bumper, object_object=objects, object_static=walls)
 
     def start(self, rng: np.random.Generator) -> World:
         """The world of the file, with the robot and the objects moved a little if asked for."""
@@ -213,26 +203,6 @@ class RoomTask(Task):
     def _image(self, name: str) -> ImageObservation:
         window = _WINDOW * 2.0 * self.robot.circumscribed_radius
         return ImageObservation(channels=_IMAGE_CHANNELS, window=(window, window))
-
-
-def small_room() -> World:
-    """A room of 3 m with a column, two boxes in the way and a TurtleBot3."""
-    around = [(0, 0, 3, 0), (3, 0, 3, 3), (3, 3, 0, 3), (0, 3, 0, 0)]
-    column = [(1.2, 1.2), (1.8, 1.2), (1.8, 1.8), (1.2, 1.8)]
-    static = StaticMap.build(
-        polygons=[column], segments=around, radii=0.02, bounds=(0.0, 0.0, 3.0, 3.0)
-    )
-    corners = np.array([(-0.1, -0.1), (0.1, -0.1), (0.1, 0.1), (-0.1, 0.1)])
-    boxes = Movables.from_outlines(
-        [corners, corners], [(1.5, 0.6, 0.0), (2.4, 1.5, 0.3)], masses=[0.1, 0.1]
-    )
-    return World(
-        robot=turtlebot3_burger(),
-        robot_pose=np.array((0.6, 0.6, 0.0)),
-        static=static,
-        movables=boxes,
-        goal=GoalDisc(np.array([2.4, 2.4]), 0.2),
-    )
 
 
 def _shape(pose: FloatArray, parts: list[FloatArray]) -> shapely.Geometry:

@@ -8,10 +8,11 @@ from typing import Literal
 import numpy as np
 
 from pushplan.envs.tasks.base import StepOutcome
+from pushplan.envs.tasks.layout import those_inside
 from pushplan.geometry.distance_field import GeodesicField
 from pushplan.world import Receptacle, ScenarioError, World
 from pushplan.world.checks import BoolArray, FloatArray, IntArray
-from pushplan.world.outline import grown_outline, transform_outlines
+from pushplan.world.outline import grown_outline
 
 WALL_REWARD = -50.0
 OUTSIDE_REWARD = -50.0
@@ -91,11 +92,7 @@ class ObjectsGoal:
     def leaving(self, ids: IntArray, poses: FloatArray) -> IntArray:
         """Ids of the objects that are in the receptacle now."""
         assert self._mouth is not None
-        start = self._world.movables
-        there = start.select(np.isin(start.ids, ids))
-        corners = transform_outlines(poses, there.drawn_vertices, there.drawn_offsets)
-        gone: IntArray = ids[self._mouth.contains_each(corners, there.drawn_offsets)]
-        return gone
+        return those_inside(self._mouth, self._world.movables, ids, poses)
 
     def _state(self, world: World) -> tuple[float, BoolArray]:
         """Summed goal distance of all objects of the start [m], and which are done."""

@@ -145,7 +145,6 @@ class ShipIceTask(Task):
         if self.variations.channel_length is not None:
             self.preset = self._lengthened(self.variations.channel_length)
         self._drive(self.preset.robot())
-        self.materials = self.preset.materials
         bounds = self.preset.bounds
         self.static = StaticMap.build(bounds=bounds)
         self.goal = GoalLine(np.array([0.5 * bounds[2], self._goal_y()]), np.array([0.0, 1.0]))
