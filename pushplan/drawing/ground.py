@@ -12,7 +12,7 @@ from pushplan.drawing.palette import Palette
 from pushplan.world import ClearanceArea, Goal, GoalDisc, GoalLine, StaticMap
 from pushplan.world.checks import FloatArray
 
-Bounds = tuple[float, float, float, float]
+Bounds = tuple[float, ...]
 
 
 @functools.lru_cache(maxsize=8)

@@ -53,13 +53,17 @@ def legend_of(
         object_trails: whether those of the objects are.
         pushes: whether numbered pushes are.
     """
-    palette, objects = palette_of(world), world.movables
+    palette, objects, goal = palette_of(world), world.movables, world.goal
+    has_goal = True
+    if isinstance(goal, GoalDisc):  # goals of tests may be far away
+        nearest = np.clip(goal.center, world.static.bounds[:2], world.static.bounds[2:])
+        has_goal = bool(np.hypot(*(goal.center - nearest)) < goal.radius)
     wheeled, fixed = objects.wheeled & ~objects.fixed, objects.fixed
     has_walls = bool(len(world.static.polygons) or len(world.static.segments))
     predicted = plan is True or (not isinstance(plan, bool) and bool(pushed(world, plan)))
     entries = {
         Entry("robot", palette.robot, palette.robot_edge): True,
-        Entry("goal", *palette.goal): _has_goal(world),
+        Entry("goal", *palette.goal): has_goal,
         Entry("wall", palette.wall, palette.wall): has_walls,
         Entry("movable object", *palette.box): bool((~wheeled & ~fixed).any()),
         Entry("object on casters", *palette.wheeled): bool(wheeled.any()),
@@ -71,15 +75,6 @@ def legend_of(
         Entry("on the way to a push", None, _GREY, line=True): pushes,
     }
     return [entry for entry, there in entries.items() if there]
-
-
-def _has_goal(world: World) -> bool:
-    """Whether some of the goal is within the bounds; goals of tests may be far away."""
-    goal, bounds = world.goal, world.static.bounds
-    if not isinstance(goal, GoalDisc):
-        return True
-    nearest = np.clip(goal.center, bounds[:2], bounds[2:])
-    return bool(np.hypot(*(goal.center - nearest)) < goal.radius)
 
 
 def add_strips(

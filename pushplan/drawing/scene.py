@@ -12,7 +12,7 @@ from PIL import Image, ImageDraw, ImageFont
 from pushplan.drawing.canvas import Canvas
 from pushplan.drawing.ground import Bounds, ground_picture
 from pushplan.drawing.palette import FLOOR_PALETTE, Palette, palette_of
-from pushplan.world import Movables, Plan, StaticMap, World
+from pushplan.world import Plan, StaticMap, World
 from pushplan.world.checks import FloatArray, array, frozen, integer, number
 from pushplan.world.outline import transform
 
@@ -83,7 +83,15 @@ def draw_moving(
         paths: FloatArray = array("object_trails", object_trails, (None, len(objects), 3))
         for k in range(len(objects)):
             canvas.line(paths[:, k, :2], palette.ghost, 1.5)
-    _objects(canvas, objects, palette)
+    corners = objects.vertices_world
+    reach, (middles, radii) = canvas.bounds, (objects.poses[:, :2], objects.radii[:, None])
+    seen = ((middles + radii > reach[:2]) & (middles - radii < reach[2:])).all(axis=1)
+    for k in np.flatnonzero(seen).tolist():
+        fill, edge = palette.wheeled if objects.wheeled[k] else palette.box
+        if objects.fixed[k]:
+            fill, edge = palette.fixed
+        outline = corners[objects.offsets[k] : objects.offsets[k + 1]]
+        canvas.polygon(outline, fill, edge, palette.box_edge_px)
     for poses, outline in pushed(world, plan):  # and where the plan expects them at its end
         canvas.line(poses[:, :2], palette.prediction, 1.5)
         canvas.polygon(transform(poses[-1], outline), None, palette.prediction, 2.0)
@@ -114,7 +122,7 @@ def view_bounds(world: World, size_px: int, view: float | None) -> Bounds:
         # by whole pixels, so that still things look the same in every frame
         low[axis] += pixel * round((start - float(low[axis])) / pixel)
         high[axis] = low[axis] + length
-    return float(low[0]), float(low[1]), float(high[0]), float(high[1])
+    return (*low.tolist(), *high.tolist())
 
 
 @functools.lru_cache(maxsize=8)
@@ -128,20 +136,6 @@ def _with_walls(static: StaticMap) -> FloatArray:
     low = np.clip(corners.min(axis=0), box[:2] - rim, box[:2])
     high = np.clip(corners.max(axis=0), box[2:], box[2:] + rim)
     return frozen(np.concatenate([low, high]))
-
-
-def _objects(canvas: Canvas, objects: Movables, palette: Palette) -> None:
-    if len(objects) == 0:
-        return
-    corners = objects.vertices_world
-    reach, (middles, radii) = canvas.bounds, (objects.poses[:, :2], objects.radii[:, None])
-    seen = ((middles + radii > reach[:2]) & (middles - radii < reach[2:])).all(axis=1)
-    for k in np.flatnonzero(seen).tolist():
-        fill, edge = palette.wheeled if objects.wheeled[k] else palette.box
-        if objects.fixed[k]:
-            fill, edge = palette.fixed
-        outline = corners[objects.offsets[k] : objects.offsets[k + 1]]
-        canvas.polygon(outline, fill, edge, palette.box_edge_px)
 
 
 def pushed(world: World, plan: Plan | None) -> list[tuple[FloatArray, FloatArray]]:

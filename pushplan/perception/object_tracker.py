@@ -155,7 +155,8 @@ class ObjectTracker:
         if not sightings or not self._tracks:
             return sightings
         tracks = self._tracks
-        gates = np.array([self.gate * one.radius + 3.0 * one.deviation for one in tracks])
+        deviations = [math.sqrt(one.place.variance) for one in tracks]
+        gates = self.gate * np.array([one.radius for one in tracks]) + 3.0 * np.array(deviations)
         if sightings[0].label is None:
             pairs = list(
                 assign(

@@ -79,17 +79,8 @@ class Track:
         self.sightings, self.votes = 1, 1
         self.seen_at = self.time = time
         self.place = Axis(accelerations[0], self.variance / len(self.shape))
-        self.direction = Axis(accelerations[1], self.variance / self._moment)
-
-    @property
-    def _moment(self) -> float:
         away = self.shape - self.shape.mean()
-        return float(np.vdot(away, away).real)
-
-    @property
-    def deviation(self) -> float:
-        """Standard deviation of the place [m]."""
-        return math.sqrt(self.place.variance)
+        self.direction = Axis(accelerations[1], self.variance / float(np.vdot(away, away).real))
 
     def predict(self, time: float) -> None:
         """Move on as before; an object that was not seen lately comes to rest."""
@@ -105,11 +96,6 @@ class Track:
         self.place.predict(step)
         self.direction.predict(step)
         self.time = time
-
-    @property
-    def spread(self) -> float:
-        """Standard deviation of the heading, as far as contours are to be told from each other."""
-        return math.sqrt(_SPREAD**2 + self.direction.variance)
 
     def see(
         self,
@@ -175,7 +161,7 @@ def see_all(tracks: Sequence[Track], contours: Sequence[Contour]) -> None:
             np.array(seen_there),
             np.array([one.heading for one in some]),
             np.array([one.variance for one in some]),
-            np.array([one.spread for one in some]),
+            np.array([math.sqrt(_SPREAD**2 + one.direction.variance) for one in some]),
             sampled=not corners,
         )
         for k, *fit in zip(members, *(values.tolist() for values in found), strict=True):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 from collections import defaultdict
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -22,7 +22,7 @@ from pushplan.ros.mcap_writer import (
     McapWriter,
 )
 from pushplan.ros.message_types import RosbagsTypes
-from pushplan.world import Episode, GoalDisc, GoalLine, SchemaError, World
+from pushplan.world import ClearanceArea, Episode, Receptacle, SchemaError, World
 from pushplan.world.checks import FloatArray
 from pushplan.world.files import world_from_dict
 from pushplan.world.libraries import need
@@ -39,8 +39,7 @@ def save_episode(episode: Episode, path: str | Path) -> None:
         InvalidInputError: if the file cannot be written.
         MissingDependencyError: if `mcap` or `rosbags` is not installed.
     """
-    writer = McapWriter(path)
-    try:
+    with closing(McapWriter(path)) as writer:
         writer.scene(episode.world)
         for index in range(len(episode.times)):
             writer.world(episode.world_at(index))
@@ -48,8 +47,6 @@ def save_episode(episode: Episode, path: str | Path) -> None:
         content |= {"success": episode.success, "reason": episode.reason}
         content |= {"about": dict(episode.about), "action_size": episode.actions.shape[1]}
         writer.episode(float(episode.times[-1]), content)
-    finally:
-        writer.close()
 
 
 def load_episode(path: str | Path) -> Episode:
@@ -166,12 +163,8 @@ def _driven(
     last = world.moved(
         robot_pose=recorded["robot_poses"][-1], movable_poses=recorded["object_poses"][-1]
     )
-    if isinstance(world.goal, GoalDisc | GoalLine):
-        x, y, _ = last.robot_pose.tolist()
-        completed, success = None, world.goal.distance(x, y) == 0.0
-    else:
-        completed = last.completed
-        success = bool(completed.all())
+    moves_objects = isinstance(world.goal, Receptacle | ClearanceArea)
+    success = last.goal_reached
     ended = commands[-1].status if commands else "no command"
     actions = [[command.linear, command.angular] for command in commands]
     return Episode(
@@ -179,7 +172,7 @@ def _driven(
         **recorded,
         success=success,
         reason="goal" if success else ended,
-        completed=completed,
+        completed=last.completed if moves_objects else None,
         actions=np.reshape(actions, (-1, 2)),
         about=about,
     )
