@@ -167,13 +167,13 @@ class _AxesCanvas(Canvas):
         self._add(need("matplotlib.patches").Circle(center, radius_m), fill, edge, width_px)
 
     def stroke(self, points: FloatArray, color: Color, width_px: float) -> None:
-        (line,) = self._axes.plot(*points.T, color=rgb(color), linewidth=self._points * width_px)
+        (line,) = self._axes.plot(*points.T, color=color, linewidth=self._points * width_px)
         self._raise(line)
 
     def _add(self, patch: Any, fill: Color | None, edge: Color, width_px: float) -> None:
         patch.set(
-            facecolor=rgb(fill),
-            edgecolor=rgb(edge if width_px else None),
+            facecolor=fill or "none",
+            edgecolor=edge if width_px else "none",
             linewidth=self._points * width_px,
         )
         self._raise(self._axes.add_patch(patch))
@@ -183,15 +183,10 @@ class _AxesCanvas(Canvas):
         artist.set_zorder(self._order)
 
 
-def rgb(color: Color | None) -> Any:
-    """A colour of the palette, or none, as Matplotlib takes it."""
-    return "none" if color is None else tuple(value / 255.0 for value in color)
-
-
 def _draw(axes: Any, panel: Panel, box: FloatArray, inches: float) -> None:
     world = panel.world
     palette = palette_of(world)
-    axes.set(xlim=box[[0, 2]], ylim=box[[1, 3]], aspect="equal", facecolor=rgb(palette.floor))
+    axes.set(xlim=box[[0, 2]], ylim=box[[1, 3]], aspect="equal", facecolor=palette.floor)
     axes.set_title(panel.title)
     axes.tick_params(length=2.5, width=0.6)
     axes.locator_params(steps=[1, 2, 5, 10])
@@ -220,10 +215,11 @@ def _draw(axes: Any, panel: Panel, box: FloatArray, inches: float) -> None:
 
 def _handle(entry: Entry) -> Any:
     """What stands beside the label in the legend."""
-    edge = rgb(entry.edge)
     if entry.line:
         style: Any = (0, (3, 2)) if entry.dashed else "-"
         line = need("matplotlib.lines").Line2D
-        return line([], [], color=edge, linewidth=1.3, linestyle=style, label=entry.label)
+        return line([], [], color=entry.edge, linewidth=1.3, linestyle=style, label=entry.label)
     patch = need("matplotlib.patches").Patch
-    return patch(facecolor=rgb(entry.fill), edgecolor=edge, linewidth=0.8, label=entry.label)
+    return patch(
+        facecolor=entry.fill or "none", edgecolor=entry.edge, linewidth=0.8, label=entry.label
+    )

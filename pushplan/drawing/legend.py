@@ -14,7 +14,7 @@ from pushplan.drawing.palette import FLOOR_PALETTE, Color, palette_of
 from pushplan.drawing.scene import Font, font_of, pushed
 from pushplan.world import GoalDisc, Plan, World
 
-_GREY = (128, 128, 128)
+_GREY = "#808080"
 
 
 @dataclass(frozen=True)

@@ -6,28 +6,29 @@ from dataclasses import dataclass
 
 from pushplan.world import GoalLine, World
 
-Color = tuple[int, int, int]
+Color = str
+"""``#rrggbb``, as Pillow, Matplotlib and pages take it."""
 
 
 @dataclass(frozen=True)
 class Palette:
     """Colours of what is drawn; pairs are a fill and an edge."""
 
-    floor: Color = (250, 249, 246)  # the ground
-    wall: Color = (84, 84, 88)  # what is static
-    robot: Color = (0, 114, 178)  # the chassis
-    robot_edge: Color = (0, 66, 110)  # outline of the robot
-    bumper: Color = (38, 50, 66)  # its other parts
-    box: tuple[Color, Color] = ((146, 94, 52), (92, 56, 28))  # objects
-    wheeled: tuple[Color, Color] = ((226, 192, 140), (150, 112, 62))  # objects on casters
-    fixed: tuple[Color, Color] = ((126, 122, 120), (72, 70, 70))  # objects held not to move
+    floor: Color = "#faf9f6"  # the ground
+    wall: Color = "#545458"  # what is static
+    robot: Color = "#0072b2"  # the chassis
+    robot_edge: Color = "#00426e"  # outline of the robot
+    bumper: Color = "#263242"  # its other parts
+    box: tuple[Color, Color] = ("#925e34", "#5c381c")  # objects
+    wheeled: tuple[Color, Color] = ("#e2c08c", "#96703e")  # objects on casters
+    fixed: tuple[Color, Color] = ("#7e7a78", "#484646")  # objects held not to move
     box_edge_px: float = 1.5  # width of their edges at 600 px
-    ghost: Color = (214, 160, 116)  # where objects were
-    prediction: Color = (204, 121, 167)  # where objects will be
-    goal: tuple[Color, Color] = ((206, 236, 222), (0, 158, 115))  # where something has to go
-    plan: Color = (213, 94, 0)  # the planned path
-    trail: Color = (86, 180, 233)  # the path so far
-    text: Color = (40, 40, 44)  # letters
+    ghost: Color = "#d6a074"  # where objects were
+    prediction: Color = "#cc79a7"  # where objects will be
+    goal: tuple[Color, Color] = ("#ceecde", "#009e73")  # where something has to go
+    plan: Color = "#d55e00"  # the planned path
+    trail: Color = "#56b4e9"  # the path so far
+    text: Color = "#28282c"  # letters
 
 
 SERIES = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000", "#8C6D31")
@@ -40,15 +41,15 @@ DASHES = ("-", "--", "-.", ":", (0, (5, 1)), (0, (3, 1, 1, 1)), (0, (1, 1)), (0,
 
 FLOOR_PALETTE = Palette()
 WATER_PALETTE = Palette(
-    floor=(176, 206, 226),
-    robot=(64, 60, 72),
-    robot_edge=(24, 24, 30),
-    box=((246, 250, 252), (128, 158, 180)),
-    wheeled=((246, 250, 252), (128, 158, 180)),
+    floor="#b0cee2",
+    robot="#403c48",
+    robot_edge="#18181e",
+    box=("#f6fafc", "#809eb4"),
+    wheeled=("#f6fafc", "#809eb4"),
     box_edge_px=1.0,
-    ghost=(120, 150, 180),
-    goal=((186, 222, 216), (0, 130, 95)),
-    trail=(0, 96, 160),
+    ghost="#7896b4",
+    goal=("#baded8", "#00825f"),
+    trail="#0060a0",
 )
 
 

@@ -162,7 +162,7 @@ def _robot(canvas: Canvas, world: World, palette: Palette) -> None:
     canvas.polygon(chassis, palette.robot, palette.robot_edge, 1.0 if bumper else 0.0)
     size = world.robot.inscribed_radius or 0.5 * world.robot.circumscribed_radius
     arrow = size * np.array([[0.75, 0.0], [-0.45, 0.5], [-0.2, 0.0], [-0.45, -0.5]])
-    canvas.polygon(transform(world.robot_pose, arrow), (255, 255, 255), palette.robot)
+    canvas.polygon(transform(world.robot_pose, arrow), "#ffffff", palette.robot)
 
 
 def _write(lines: list[str], picture: Image.Image, unit: float) -> None:

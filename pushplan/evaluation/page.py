@@ -132,17 +132,13 @@ def page_data(run: RunRecord, replays: Mapping[str, int]) -> dict[str, Any]:
 
 def _colours() -> dict[str, Any]:
     """The palette of figures and films, for replays and the names of policies."""
-    palette = FLOOR_PALETTE
-    shown = {
-        **{name: getattr(palette, name) for name in ("wall", "robot", "trail", "plan")},
-        **{name: getattr(palette, name) for name in ("ghost", "prediction", "robot_edge")},
-        "goal": palette.goal[1],
-        "object": palette.box[0],
-        "edge": palette.box[1],
-    }
+    names = ("wall", "robot", "trail", "plan", "ghost", "prediction", "robot_edge")
     return {
         "policies": SERIES,
-        **{name: "#" + bytes(colour).hex() for name, colour in shown.items()},
+        **{name: getattr(FLOOR_PALETTE, name) for name in names},
+        "goal": FLOOR_PALETTE.goal[1],
+        "object": FLOOR_PALETTE.box[0],
+        "edge": FLOOR_PALETTE.box[1],
     }
 
 

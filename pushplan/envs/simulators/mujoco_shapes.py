@@ -150,6 +150,7 @@ def set_mass(
     body.explicitinertial = True
 
 
-def color_of(rgb: tuple[int, int, int]) -> Color:
-    """A colour of the drawing room in MuJoCo's units."""
-    return rgb[0] / 255.0, rgb[1] / 255.0, rgb[2] / 255.0
+def color_of(color: str) -> Color:
+    """A colour ``#rrggbb`` of the drawing room in MuJoCo's units."""
+    red, green, blue = bytes.fromhex(color[1:])
+    return red / 255.0, green / 255.0, blue / 255.0
