@@ -26,33 +26,23 @@ class Canvas:
         bounds: (4,) x_min, y_min, x_max, y_max [m].
         size_px: longer side of the finished picture [px].
         background: colour.
-        image: a picture of the same rectangle to draw on, instead of an empty one.
 
     Attributes:
         unit: pixels of the finished picture in one of the nominal picture.
         pixels_per_metre: scale of the finished picture [px/m].
     """
 
-    def __init__(
-        self,
-        bounds: FloatArray,
-        size_px: int,
-        background: Color,
-        image: Image.Image | None = None,
-    ) -> None:
-        width, height = (float(side) for side in bounds[2:] - bounds[:2])
-        self.scale = SMOOTHING * size_px / max(width, height)
+    def __init__(self, bounds: FloatArray, size_px: int, background: Color) -> None:
+        sides: list[float] = (bounds[2:] - bounds[:2]).tolist()
+        self.scale = SMOOTHING * size_px / max(sides)
         self.bounds, self.unit = bounds, size_px / NOMINAL_PX
         self.pixels_per_metre = self.scale / SMOOTHING
-        if image is None:
-            # even sides, as video codecs want them
-            shape = [
-                2 * SMOOTHING * max(1, round(s * self.scale / 2 / SMOOTHING))
-                for s in (width, height)
-            ]
-            image = Image.new("RGB", (shape[0], shape[1]), background)
-        self.image = image
-        self.draw = ImageDraw.Draw(image)
+        # even sides, as video codecs want them
+        width, height = (
+            2 * SMOOTHING * max(1, round(side * self.scale / 2 / SMOOTHING)) for side in sides
+        )
+        self.image = Image.new("RGB", (width, height), background)
+        self.draw = ImageDraw.Draw(self.image)
 
     def metres(self, width_px: float) -> float:
         """Length of a width in the world [m]."""

@@ -19,7 +19,7 @@ Bounds = tuple[float, ...]
 def ground_picture(
     static: StaticMap, goal: Goal, palette: Palette, shown: Bounds, size_px: int
 ) -> Image.Image:
-    """Draw it on a canvas; the picture is kept, so copy it before drawing on it.
+    """Draw it on a canvas; the picture is kept: draw on a copy.
 
     Args:
         static: walls.

@@ -61,7 +61,8 @@ def draw_world(
     shown = view_bounds(world, size_px, view)
     palette = palette_of(world)
     ground = ground_picture(world.static, world.goal, palette, shown, size_px)
-    canvas = Canvas(np.array(shown), size_px, palette.floor, ground.copy())
+    canvas = Canvas(np.array(shown), size_px, palette.floor)
+    canvas.image.paste(ground)
     draw_moving(canvas, world, plan, trail, object_trails)
     picture = canvas.finish()
     if text:

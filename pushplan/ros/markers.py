@@ -101,11 +101,10 @@ def _marker(
         for x, y in outline[[0, k, k + 1]].tolist()
     ]
     r, g, b, a = _COLOURS[kind]
-    now, never = messages.stamp(time), messages.stamp(0.0)
-    header = make("std_msgs/Header", stamp=never, frame_id="")
+    nothing = np.zeros(0, np.uint8)
     return make(
         "visualization_msgs/Marker",
-        header=make("std_msgs/Header", stamp=now, frame_id=frame),
+        header=messages.header(time, frame),
         ns=kind,
         id=number,
         type=_TRIANGLES,
@@ -119,11 +118,11 @@ def _marker(
         colors=[],
         texture_resource="",
         texture=make(
-            "sensor_msgs/CompressedImage", header=header, format="", data=np.zeros(0, np.uint8)
+            "sensor_msgs/CompressedImage", header=messages.header(0.0, ""), format="", data=nothing
         ),
         uv_coordinates=[],
         text="",
         mesh_resource="",
-        mesh_file=make("visualization_msgs/MeshFile", filename="", data=np.zeros(0, np.uint8)),
+        mesh_file=make("visualization_msgs/MeshFile", filename="", data=nothing),
         mesh_use_embedded_materials=False,
     )

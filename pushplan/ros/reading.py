@@ -193,8 +193,7 @@ def static_map_from(
             f"got {len(cells)}"
         )
     side = float(str(np.float32(message.info.resolution)))  # 0.05 is meant, not 0.0500000007
-    place = message.info.origin
-    origin = [place.position.x, place.position.y, _heading(place.orientation)]
+    origin = pose_from(message.info.origin)
     return StaticMap.from_occupancy(
         cells.reshape(height, width), side, origin, occupied=occupied, unknown=unknown
     )
