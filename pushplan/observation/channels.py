@@ -12,44 +12,33 @@ import numpy as np
 from pushplan.compiled import kernel
 from pushplan.geometry import geodesic_field
 from pushplan.geometry.shadows import BendDistances, Table, bend_distances, fill_shadows
-from pushplan.observation.view import Image, View, to_pixels
+from pushplan.observation.view import Image, View, fill_bodies, fill_parts, sample, to_pixels
 from pushplan.world import Goal, StaticMap
 from pushplan.world.checks import FloatArray, IntArray, frozen
 from pushplan.world.outline import flatten, transform
 
 
-@kernel(allocates=True)
-def draw_ray(
-    image: Image,  # (H, W), changed in place
-    x: float,  # where it starts [px], also outside the image
-    y: float,  # where it starts [px], also outside the image
-    dx: float,  # its direction, not zero
-    dy: float,  # its direction, not zero
-    value: int,  # what the pixels are set to
-) -> None:
-    """A line one pixel wide from a point to the edge of the image."""
-    rows, cols = image.shape
-    if abs(dx) >= abs(dy):
-        step = 1 if dx > 0.0 else -1
-        first = math.floor(x)
-        # from outside it goes on where it meets the image
-        col = max(first, -1) if step > 0 else min(first, cols)
-        while 0 <= col < cols or (col < 0 and step > 0) or (col >= cols and step < 0):
-            along = 0.0 if col == first else (col + 0.5 - x) / dx
-            row = math.floor(y + along * dy)
-            if 0 <= row < rows and 0 <= col < cols:
-                image[row, col] = value
-            col += step
-    else:
-        step = 1 if dy > 0.0 else -1
-        first = math.floor(y)
-        row = max(first, -1) if step > 0 else min(first, rows)
-        while 0 <= row < rows or (row < 0 and step > 0) or (row >= rows and step < 0):
-            along = 0.0 if row == first else (row + 0.5 - y) / dy
-            col = math.floor(x + along * dx)
-            if 0 <= col < cols and 0 <= row < rows:
-                image[row, col] = value
-            row += step
+def draw_ray(image: Image, x: float, y: float, dx: float, dy: float, value: int) -> None:
+    """Draw a line one pixel wide from a point to the edge of the image.
+
+    Args:
+        image: (H, W), changed in place.
+        x: column where it starts [px], also outside the image.
+        y: row where it starts [px], also outside the image.
+        dx: its direction along the columns; not zero together with dy.
+        dy: its direction along the rows.
+        value: what the pixels are set to.
+    """
+    if abs(dx) < abs(dy):  # one pixel in each row then
+        draw_ray(image.T, y, x, dy, dx, value)
+        return
+    first = math.floor(x)
+    cols = np.arange(image.shape[1])
+    cols = cols[cols >= first] if dx > 0.0 else cols[cols <= first]
+    along = np.where(cols == first, 0.0, (cols + 0.5 - x) / dx)
+    rows = np.floor(y + along * dy)
+    inside = (rows >= 0) & (rows < image.shape[0])
+    image[rows[inside].astype(np.int64), cols[inside]] = value
 
 
 def fill_hidden(image: Image, view: View, source: BendDistances, per_metre: float) -> None:
@@ -113,31 +102,31 @@ def _fill_hidden(
             image[r, q] = int(min(255.0, per_metre * best + 0.5))
 
 
-STATIC, MOVABLE = 255, 128
-"""Values of static and of movable things in the occupancy channel."""
+MOVABLE = 128
+"""Value of movable things in the occupancy channel."""
 
 
 def footprint(image: Image, view: View) -> None:
     """Where the robot is, 255."""
     robot = view.world.robot
     vertices = frozen(transform(view.world.robot_pose, robot.vertices))
-    view.fill_parts(image, vertices, robot.offsets)
+    fill_parts(image, view.numbers, vertices, robot.offsets, 255)
 
 
 def movable(image: Image, view: View) -> None:
     """What may be pushed, 255."""
-    view.fill_movables(image, view.world.movables)
+    _fill_movables(image, view, 255)
 
 
 def static(image: Image, view: View) -> None:
     """What never moves, 255."""
-    view.fill_parts(image, *_static_parts(view.world.static))
+    _fill_static(image, view)
 
 
 def occupancy(image: Image, view: View) -> None:
     """Both: what never moves at 255, what may be pushed at 128."""
-    view.fill_movables(image, view.world.movables, MOVABLE)
-    view.fill_parts(image, *_static_parts(view.world.static), STATIC)
+    _fill_movables(image, view, MOVABLE)
+    _fill_static(image, view)
 
 
 def goal_distance(image: Image, view: View) -> None:
@@ -145,7 +134,8 @@ def goal_distance(image: Image, view: View) -> None:
 
     0 at the goal, 255 at the farthest place from which there is a way, and where there is none.
     """
-    view.sample(image, *_distance_raster(view.world.static, view.world.goal, view.finest))
+    values, origin, step = _distance_raster(view.world.static, view.world.goal, view.finest)
+    sample(image, view.numbers, values, origin[0], origin[1], step)
 
 
 def robot_distance(image: Image, view: View) -> None:
@@ -162,14 +152,16 @@ def robot_distance(image: Image, view: View) -> None:
     static_map = view.world.static
     if len(static_map.polygons) or len(static_map.segments):
         fill_hidden(image, view, bend_distances(static_map, view.finest), per_metre)
-        view.fill_parts(image, *_static_parts(static_map), 255)
+        _fill_static(image, view)
 
 
 def heading_line(image: Image, view: View) -> None:
     """A line one pixel wide from the robot's origin along its heading to the edge, 255."""
     x, y, heading = view.world.robot_pose.tolist()
     ahead = [x + view.finest * math.cos(heading), y + view.finest * math.sin(heading)]
-    (col, row), (next_col, next_row) = view.pixels(np.array([[x, y], ahead])).tolist()
+    points = np.array([[x, y], ahead])
+    to_pixels(view.numbers, points, points)
+    (col, row), (next_col, next_row) = points.tolist()
     draw_ray(image, col, row, next_col - col, next_row - row, 255)
 
 
@@ -183,6 +175,16 @@ CHANNELS: dict[str, Callable[[Image, View], None]] = {
     "heading_line": heading_line,
 }
 """Name -> function that writes a channel into a zeroed (H, W) uint8 image."""
+
+
+def _fill_movables(image: Image, view: View, value: int) -> None:
+    objects = view.world.movables
+    shapes = objects.poses, objects.vertices, objects.offsets, objects.radii
+    fill_bodies(image, view.numbers, *shapes, value)
+
+
+def _fill_static(image: Image, view: View) -> None:
+    fill_parts(image, view.numbers, *_static_parts(view.world.static), 255)
 
 
 @functools.lru_cache(maxsize=16)

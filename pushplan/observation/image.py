@@ -13,11 +13,12 @@ from numpy.typing import NDArray
 from pushplan.observation.channels import CHANNELS
 from pushplan.observation.view import View
 from pushplan.world import InvalidInputError, UnknownNameError, World
+from pushplan.world.checked_fields import CheckedFields
 from pushplan.world.checks import integer, number
 
 
 @dataclass(frozen=True)
-class ImageObservation:
+class ImageObservation(CheckedFields):
     """Image channels around the robot (Bench-Push, Table II).
 
     By default the robot is in the middle and faces up: row 0 is ahead of it, column 0 to its left.
@@ -47,6 +48,7 @@ class ImageObservation:
     dtype: ClassVar[np.dtype[np.uint8]] = np.dtype(np.uint8)
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         put = object.__setattr__
         if isinstance(self.channels, str) or not isinstance(self.channels, Sequence):
             raise InvalidInputError(f"channels must be a list of names, got {self.channels!r}")
@@ -62,9 +64,6 @@ class ImageObservation:
             number("window", side, low=0.0, open_low=True)
         for count in self.pixels:
             integer("pixels", count, low=1, high=4096)
-        if not isinstance(self.north_up, bool):
-            raise InvalidInputError(f"north_up must be true or false, got {self.north_up!r}")
-        put(self, "shift", number("shift", self.shift))
 
     @staticmethod
     def _pair(name: str, sides: object) -> tuple[Any, Any]:

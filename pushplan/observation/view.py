@@ -16,7 +16,6 @@ from pushplan.geometry import fill_convex
 from pushplan.geometry.transforms import transform_points
 from pushplan.world import World
 from pushplan.world.checks import FloatArray, IntArray
-from pushplan.world.movables import Movables
 
 Image = np.ndarray[tuple[int, int], np.dtype[np.uint8]]
 
@@ -108,31 +107,3 @@ class View:
     def finest(self) -> float:
         """The shorter side of a pixel [m]."""
         return min(self.step_up, self.step_across)
-
-    def pixels(self, points: FloatArray) -> FloatArray:
-        """World points (N, 2) [m] as column and row [px]."""
-        spots = np.empty_like(points)
-        to_pixels(self.numbers, points, spots)
-        return spots
-
-    def fill_movables(self, image: Image, objects: Movables, value: int = 255) -> None:
-        """Fill the outlines of objects."""
-        fill_bodies(
-            image,
-            self.numbers,
-            objects.poses,
-            objects.vertices,
-            objects.offsets,
-            objects.radii,
-            value,
-        )
-
-    def fill_parts(
-        self, image: Image, vertices: FloatArray, offsets: IntArray, value: int = 255
-    ) -> None:
-        """Fill convex polygons given in the world frame."""
-        fill_parts(image, self.numbers, vertices, offsets, value)
-
-    def sample(self, image: Image, values: Image, origin: FloatArray, step: float) -> None:
-        """Read a raster in the world frame at every pixel; outside it its border counts."""
-        sample(image, self.numbers, values, origin[0], origin[1], step)
