@@ -8,11 +8,11 @@ from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.interpolate import make_interp_spline
 
 from pushplan.cli.keyboard import HELP, Keyboard, twist_of
 from pushplan.cli.scoreboard import Scoreboard, closing_lines
 from pushplan.drawing import draw_world
-from pushplan.envs.trace import Trace
 from pushplan.evaluation.episode import Recording
 from pushplan.world import Episode, Policy, Twist, World
 from pushplan.world.checks import FloatArray, IntArray
@@ -89,7 +89,7 @@ class Cockpit:
         self._due = self._time = 0.0
         self._ids: IntArray = np.zeros(0, dtype=np.int64)
         self._trail: list[FloatArray] = []
-        self._last = (np.zeros(3), np.zeros((0, 3)))
+        self._last = np.zeros((1, 3))  # poses of the robot and of the objects
 
     def __call__(self, step: int, world: World, policy: Policy) -> None:
         """Show what happened in this step.
@@ -105,34 +105,23 @@ class Cockpit:
         lines, begin = self._board.lines(), self._due
         seconds = (world.time - self._time) / self._speed
         rows = np.flatnonzero(np.isin(self._ids, world.movables.ids))
+        # a simulator records no more poses than the metrics need, so they are interpolated
+        recorded = np.concatenate([trace.robot_poses[:, None], trace.object_poses], axis=1)
+        poses = np.concatenate([self._last[None], recorded])
+        poses[..., 2] = np.unwrap(poses[..., 2], axis=0)
+        motion = make_interp_spline([self._time, *trace.times], poses, k=1)
         count = max(1, int(seconds / FRAME_TIME))
         for fraction in (np.arange(count) + 1.0) / count:
-            robot, objects = self._between(trace, self._time + fraction * seconds * self._speed)
+            now = motion(min(self._time + fraction * seconds * self._speed, trace.times[-1]))
             scene = world
             if fraction < 1.0:
-                scene = world.moved(robot_pose=robot, movable_poses=objects[rows])
-            self._show(scene, lines, robot[None, :2])
+                scene = world.moved(robot_pose=now[0], movable_poses=now[1:][rows])
+            self._show(scene, lines, now[:1, :2])
             self._wait(begin + fraction * seconds)
         self._trail.append(trace.robot_poses[:, :2])
-        self._last = (trace.robot_poses[-1], trace.object_poses[-1])
+        self._last = recorded[-1]
         self._time = world.time
         self._due = max(begin + seconds, self._clock.perf_counter() - LATE)
-
-    def _between(self, trace: Trace, at: float) -> tuple[FloatArray, FloatArray]:
-        """Poses of the robot (3,) and of the objects (K, 3) at a time [s] within the last step.
-
-        A simulator records no more poses than the metrics need, so they are interpolated.
-        """
-        i = min(int(np.searchsorted(trace.times, at)), len(trace.times) - 1)
-        robot, objects = self._last
-        before = self._time
-        if i > 0:
-            robot, objects = trace.robot_poses[i - 1], trace.object_poses[i - 1]
-            before = float(trace.times[i - 1])
-        fraction = min(1.0, (at - before) / (float(trace.times[i]) - before))
-        return _mix(robot, trace.robot_poses[i], fraction), _mix(
-            objects, trace.object_poses[i], fraction
-        )
 
     def farewell(self, episode: Episode) -> bool:
         """Show the final scores until the person has had enough.
@@ -153,7 +142,7 @@ class Cockpit:
         """Wait for the first key: nobody is ready in the first instant."""
         self._board, self._time = Scoreboard(world), world.time
         self._ids = world.movables.ids
-        self._last = (world.robot_pose, world.movables.poses)
+        self._last = np.concatenate([world.robot_pose[None], world.movables.poses])
         self._trail = [world.robot_pose[None, :2]]
         self._display.keyboard.clear()
         self._show(world, [HELP, "press a key to start"])
@@ -178,13 +167,6 @@ class Cockpit:
             raise _Left(restart=False)
         if self._display.keyboard.take("restart"):
             raise _Left(restart=True)
-
-
-def _mix(a: FloatArray, b: FloatArray, fraction: float) -> FloatArray:
-    """Poses between a and b (..., 3); headings turn the short way."""
-    step = b - a
-    step[..., 2] = np.remainder(step[..., 2] + np.pi, 2.0 * np.pi) - np.pi
-    return a + fraction * step
 
 
 def drive(
