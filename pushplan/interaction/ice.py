@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pushplan.compiled import owned
+from pushplan.compiled import copy_into, kernel, owned
+from pushplan.geometry.transforms import transform_points
+from pushplan.interaction.advance import advance_objects
 from pushplan.interaction.ice_bodies import IceBodies, IceProblem, IceSettings, ice_problem
-from pushplan.interaction.ice_contacts import sweep_ice
-from pushplan.interaction.ice_step import IceContacts
+from pushplan.interaction.ice_contacts import drive_ice, sweep_ice
 from pushplan.interaction.model import Interaction, checked_path
 from pushplan.interaction.quasi_static import QuasiStatic
 from pushplan.world import World
@@ -20,10 +22,51 @@ from pushplan.world.checked_fields import (
     PositiveFraction,
     PositiveInt,
 )
+from pushplan.world.checks import FloatArray, IntArray
 from pushplan.world.errors import InvalidInputError
 
 STILL = 0.03
 """Fraction of a step's motion that a body may be moved without a look at its neighbours."""
+
+
+class IceContacts(NamedTuple):
+    """`IceInteraction` in compiled form, with memory for one thread."""
+
+    inverse_masses: FloatArray  # (K,)
+    radii: FloatArray  # (K,) circumscribed radii [m]
+    tests: IntArray  # (1,) steps of the hull so far
+    problem: IceProblem
+    known: FloatArray  # (K, 3) the poses for which the corners in the memory are worked out
+
+
+@kernel
+def _step(
+    model: IceContacts,
+    robot_from: FloatArray,
+    robot_to: FloatArray,
+    poses: FloatArray,
+    moved: FloatArray,
+) -> bool:
+    """Drive the hull a step among the floes, which never hold it."""
+    problem, known = model.problem, model.known
+    bodies, scratch = problem.bodies, problem.scratch
+    for k in range(poses.shape[0]):  # only where the last step left other corners behind
+        if poses[k, 0] != known[k, 0] or poses[k, 1] != known[k, 1] or poses[k, 2] != known[k, 2]:
+            copy_into(known[k], poses[k])
+            a, b = bodies.offsets[k], bodies.offsets[k + 1]
+            transform_points(poses[k], bodies.vertices[a:b], scratch.corners[a:b])
+    work, steps = drive_ice(robot_from, robot_to, poses, problem, 0.0)
+    model.tests[0] += steps
+    if work > 0.0:
+        for k in range(poses.shape[0]):
+            gx, gy = poses[k, 0] - known[k, 0], poses[k, 1] - known[k, 1]
+            if gx != 0.0 or gy != 0.0 or poses[k, 2] != known[k, 2]:
+                moved[k] += np.sqrt(gx * gx + gy * gy)
+                copy_into(known[k], poses[k])
+    return True
+
+
+advance_objects.add(IceContacts, _step)
 
 
 @dataclass(frozen=True)

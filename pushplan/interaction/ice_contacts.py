@@ -203,22 +203,35 @@ def advance_ice(poses: FloatArray, problem: IceProblem) -> float:
 
 
 @kernel
+def drive_ice(
+    robot_from: FloatArray,  # (3,)
+    robot_to: FloatArray,  # (3,) where it goes, along a straight line
+    poses: FloatArray,  # (K, 3) of the objects, changed in place
+    problem: IceProblem,  # with the corners of these poses in its memory
+    work: float,  # what the result is added to [kg m]
+) -> tuple[float, int]:
+    """Move the hull to a pose in small steps among the objects; the work and how many steps."""
+    here, by = problem.scratch.pose[0], problem.scratch.pose[1]
+    turn = wrap_angle(robot_to[2] - robot_from[2])
+    dx, dy = robot_to[0] - robot_from[0], robot_to[1] - robot_from[1]
+    motion = np.sqrt(dx * dx + dy * dy) + abs(turn) * problem.bodies.hull_radius
+    steps = max(1, int(np.ceil(motion / problem.settings.step)))
+    by[0], by[1], by[2] = dx / steps, dy / steps, turn / steps
+    for step in range(steps):
+        for i in range(3):
+            here[i] = robot_from[i] + step * by[i]
+        work += advance_ice(poses, problem)
+    return work, steps
+
+
+@kernel
 def sweep_ice(path: FloatArray, poses: FloatArray, problem: IceProblem, out: FloatArray) -> float:
     """Sweep the hull along (N, 3) poses among objects (K, 3), into ``out`` (N, K, 3); the work."""
-    bodies, scratch = problem.bodies, problem.scratch
+    bodies = problem.bodies
     work = 0.0
-    transform_outlines(poses, bodies.vertices, bodies.offsets, scratch.corners)
+    transform_outlines(poses, bodies.vertices, bodies.offsets, problem.scratch.corners)
     copy_into(out[0], poses)
-    here, by = scratch.pose[0], scratch.pose[1]
     for n in range(1, path.shape[0]):
-        turn = wrap_angle(path[n, 2] - path[n - 1, 2])
-        dx, dy = path[n, 0] - path[n - 1, 0], path[n, 1] - path[n - 1, 1]
-        motion = np.sqrt(dx * dx + dy * dy) + abs(turn) * bodies.hull_radius
-        steps = max(1, int(np.ceil(motion / problem.settings.step)))
-        by[0], by[1], by[2] = dx / steps, dy / steps, turn / steps
-        for step in range(steps):
-            for i in range(3):
-                here[i] = path[n - 1, i] + step * by[i]
-            work += advance_ice(poses, problem)
+        work, _ = drive_ice(path[n - 1], path[n], poses, problem, work)
         copy_into(out[n], poses)
     return work
