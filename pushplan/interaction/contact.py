@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
 from pushplan.compiled import kernel
@@ -54,23 +52,17 @@ def contacts(a: FloatArray, b: FloatArray, out: FloatArray) -> int:
     return int(found)
 
 
-class FacingEdges(NamedTuple):
-    """An edge of a polygon, and the edge of another one that faces it most."""
-
-    px: float  # Where the first edge begins [m]
-    py: float
-    tx: float  # Unit vector along it; its outward normal is (ty, -tx)
-    ty: float
-    length: float
-    su: float  # Ends of the other edge along the first [m]
-    sw: float
-    du: float  # The same ends along the normal [m]
-    dw: float
-
-
 @kernel
-def facing_edges(ref: FloatArray, edge: int, inc: FloatArray) -> FacingEdges:
-    """The edge of ``ref`` that begins at corner ``edge``, and the edge of ``inc`` that faces it."""
+def clip_facing(
+    ref: FloatArray,
+    edge: int,  # corner of ``ref`` where its edge begins
+    inc: FloatArray,
+    sign: float,  # factor on the edge's outward normal
+    widest: float,  # gap up to which a point counts [m]
+    beside: bool,  # whether a facing edge that lies beside the reference edge counts
+    out: FloatArray,  # (2, 5) receives x, y [m], normal, gap [m]
+) -> int:
+    """Clip the edge that faces the reference edge against it; returns the number of points."""
     after = edge + 1 if edge + 1 < ref.shape[0] else 0
     px, py = ref[edge, 0], ref[edge, 1]
     tx, ty = ref[after, 0] - px, ref[after, 1] - py
@@ -84,48 +76,26 @@ def facing_edges(ref: FloatArray, edge: int, inc: FloatArray) -> FacingEdges:
         d = (ex * nx + ey * ny) / np.sqrt(ex * ex + ey * ey)
         if d < facing:
             facing, side, other = d, i, j
+    # the ends of the facing edge along the reference edge and along its normal
     ux, uy, wx, wy = inc[side, 0] - px, inc[side, 1] - py, inc[other, 0] - px, inc[other, 1] - py
     su, sw = ux * tx + uy * ty, wx * tx + wy * ty
     du, dw = ux * nx + uy * ny, wx * nx + wy * ny
-    return FacingEdges(px, py, tx, ty, length, su, sw, du, dw)
-
-
-@kernel
-def write_point(edges: FacingEdges, s: float, d: float, sign: float, out: FloatArray) -> None:
-    """Write the point at ``s`` along and ``d`` across an edge, and its normal times ``sign``."""
-    nx, ny = edges.ty, -edges.tx
-    out[0] = edges.px + s * edges.tx + d * nx
-    out[1] = edges.py + s * edges.ty + d * ny
-    out[2] = sign * nx
-    out[3] = sign * ny
-
-
-@kernel
-def clip_facing(
-    ref: FloatArray,
-    edge: int,  # corner of ``ref`` where its edge begins
-    inc: FloatArray,
-    sign: float,  # factor on the edge's outward normal
-    widest: float,  # gap up to which a point counts [m]
-    beside: bool,  # whether a facing edge that lies beside the reference edge counts
-    out: FloatArray,  # (2, 5) receives x, y [m], normal, gap [m]
-) -> int:
-    """Clip the edge that faces the reference edge against it; returns the number of points."""
-    edges = facing_edges(ref, edge, inc)
-    found = 0
-    span = edges.sw - edges.su
+    found, span = 0, sw - su
     for end in range(2):
-        s, d = (edges.su, edges.du) if end == 0 else (edges.sw, edges.dw)
-        clipped = min(max(s, 0.0), edges.length)
+        s, d = (su, du) if end == 0 else (sw, dw)
+        clipped = min(max(s, 0.0), length)
         if clipped != s:
-            if abs(span) < 1e-12 * edges.length:
+            if abs(span) < 1e-12 * length:
                 continue
-            fraction = (clipped - edges.su) / span
+            fraction = (clipped - su) / span
             if not beside and (fraction < 0.0 or fraction > 1.0):
                 continue
-            d = edges.du + fraction * (edges.dw - edges.du)
+            d = du + fraction * (dw - du)
         if d <= widest:
-            write_point(edges, clipped, d, sign, out[found])
+            out[found, 0] = px + clipped * tx + d * nx
+            out[found, 1] = py + clipped * ty + d * ny
+            out[found, 2] = sign * nx
+            out[found, 3] = sign * ny
             out[found, 4] = d
             found += 1
     return found
