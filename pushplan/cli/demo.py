@@ -5,14 +5,10 @@ from __future__ import annotations
 import argparse
 import os
 import sys
-from typing import TYPE_CHECKING
 
 from pushplan.cli.common import has_screen, say
 from pushplan.cli.outputs import check_directory
 from pushplan.cli.progress import progress_of
-
-if TYPE_CHECKING:
-    from pushplan.evaluation import Job
 
 EPISODES = {
     "maze-2d-3": "kinodynamic-rrt",
@@ -28,17 +24,23 @@ def run(options: argparse.Namespace) -> int:
     import webbrowser
 
     from pushplan.cli.report import exit_code
-    from pushplan.evaluation import Results, run_batch
+    from pushplan.evaluation import Job, Results, parse_policy, run_batch
+    from pushplan.scenarios import suite
     from pushplan.world.libraries import need
 
     check_directory(options.out)
     for library in ("gymnasium", "pymunk", "rich", "jinja2", "matplotlib"):
         need(library)  # before the work, not after it
+    jobs = [
+        Job(parse_policy(policy), scenario)
+        for name, policy in EPISODES.items()
+        for scenario in suite(name, episodes=1).scenarios
+    ]
     say(f"{len(EPISODES)} episodes; the first time they take up to a minute:")
     with progress_of(*EPISODES.values(), out=options.out) as progress:
         workers = min(os.cpu_count() or 1, _MOST_WORKERS)
         about = {"suite": "demo"}
-        run_batch(_jobs(), out=options.out, workers=workers, about=about, progress=progress)
+        run_batch(jobs, out=options.out, workers=workers, about=about, progress=progress)
     results = Results.load(options.out)
     for row in results.rows:
         how = "success" if row.success else row.reason
@@ -50,14 +52,3 @@ def run(options: argparse.Namespace) -> int:
     if not options.no_open and sys.stdout.isatty() and has_screen():  # no browser in the terminal
         webbrowser.open(page.absolute().as_uri())
     return exit_code(results)
-
-
-def _jobs() -> list[Job]:
-    from pushplan.evaluation import Job, parse_policy
-    from pushplan.scenarios import suite
-
-    return [
-        Job(parse_policy(policy), scenario)
-        for name, policy in EPISODES.items()
-        for scenario in suite(name, episodes=1).scenarios
-    ]

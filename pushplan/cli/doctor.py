@@ -6,11 +6,14 @@ import argparse
 import ctypes.util
 import os
 import platform
+from collections.abc import Iterable
 from importlib.metadata import PackageNotFoundError, packages_distributions, version
 from importlib.util import find_spec
 from typing import Any
 
+from pushplan import __version__
 from pushplan.cli.common import has_screen, say, say_json
+from pushplan.world.libraries import EXTRAS
 
 BASE = ("numba", "numpy", "ompl", "yaml", "ruckig", "scipy", "shapely")
 """Libraries that come with pushplan itself; Ruckig where it has a wheel."""
@@ -30,15 +33,12 @@ def run(options: argparse.Namespace) -> int:
 
 def examine() -> dict[str, Any]:
     """Facts about this installation, as JSON values."""
-    from pushplan import __version__
-    from pushplan.world.libraries import EXTRAS
-
     owners = packages_distributions()
     libraries = {name: _version(name, owners) for name in (*BASE, *EXTRAS)}
-    missing: dict[str, list[str]] = {}
-    for name, extra in EXTRAS.items():
-        if libraries[name] is None:
-            missing.setdefault(extra, []).append(name)
+    missing = {
+        extra: [one for one in EXTRAS if EXTRAS[one] == extra and libraries[one] is None]
+        for extra in dict.fromkeys(EXTRAS.values())
+    }
     return {
         "pushplan": __version__,
         "python": platform.python_version(),
@@ -47,10 +47,10 @@ def examine() -> dict[str, Any]:
         "libraries": libraries,
         "extras": {
             extra: {
-                "missing": missing.get(extra, []),
-                "install": f"pip install 'pushplan[{extra}]'" if extra in missing else None,
+                "missing": lost,
+                "install": f"pip install 'pushplan[{extra}]'" if lost else None,
             }
-            for extra in dict.fromkeys(EXTRAS.values())
+            for extra, lost in missing.items()
         },
         "kernels": _kernels() if libraries["numba"] is not None else None,
         "drawing": {
@@ -90,22 +90,22 @@ def _tell(found: dict[str, Any]) -> None:
     say(f"pushplan {found['pushplan']}, Python {found['python']}, {found['system']}, ", end="")
     say(f"{found['cores']} cores")
     versions = found["libraries"]
-    there = [f"{name} {versions[name]}" for name in BASE if versions[name] is not None]
+
+    def said(names: Iterable[str]) -> str:
+        return ", ".join(f"{name} {versions[name]}" for name in names if versions[name] is not None)
+
     lost = [name for name in BASE if versions[name] is None]
-    say(f"base: {', '.join(there)}" + (f"; missing: {', '.join(lost)}" if lost else ""))
+    say(f"base: {said(BASE)}" + (f"; missing: {', '.join(lost)}" if lost else ""))
     for extra, one in found["extras"].items():
         if one["missing"]:
             say(f"{extra}: missing {', '.join(one['missing'])}; type: {one['install']}")
         else:
-            from pushplan.world.libraries import EXTRAS
-
-            own = [f"{name} {versions[name]}" for name in EXTRAS if EXTRAS[name] == extra]
-            say(f"{extra}: {', '.join(own)}")
+            say(f"{extra}: {said(name for name in EXTRAS if EXTRAS[name] == extra)}")
     if (kernels := found["kernels"]) is not None:
         _tell_kernels(kernels)
     drawing = found["drawing"]
-    said = [f"{name} {'yes' if drawing[name] else 'no'}" for name in (*_DISPLAYS, "screen")]
-    say(f"MuJoCo's camera and windows: {', '.join(said)}")
+    usable = [f"{name} {'yes' if drawing[name] else 'no'}" for name in (*_DISPLAYS, "screen")]
+    say(f"MuJoCo's camera and windows: {', '.join(usable)}")
     if not any(drawing[name] for name in (*_DISPLAYS, "screen")):
         say("  render_mode 'camera' needs one of them: on Debian 'apt install libegl1'")
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from pushplan.cli.common import (
     check_episode_file,
     milliseconds,
@@ -17,6 +19,7 @@ from pushplan.cli.scenario_options import scenario_of
 if TYPE_CHECKING:
     from pushplan.scenarios import Scenario
     from pushplan.world import Episode
+    from pushplan.world.checks import FloatArray
 
 
 def run(options: argparse.Namespace) -> int:
@@ -54,8 +57,6 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _print(label: str, scenario: Scenario, episode: Episode) -> None:
-    import numpy as np
-
     from pushplan.metrics import compute
 
     values = compute(episode)
@@ -66,17 +67,14 @@ def _print(label: str, scenario: Scenario, episode: Episode) -> None:
         f"  path {values['path_length_m']:.2f} m, work {values['interaction_work_kg_m']:.3f} kg m, "
         f"{len(episode.actions)} steps, {values['sim_time_s']:.1f} s simulated"
     )
-    if len(episode.plan_times_s):
-        times = episode.plan_times_s
-        say(
-            f"  planning: {len(times)} calls, median {milliseconds(np.median(times))}, "
-            f"max {milliseconds(times.max())}"
-        )
+    calls = len(episode.plan_times_s)
+    _print_times(f"planning: {calls} calls,", episode.plan_times_s)
     if (factor := episode.about.get("latency_factor")) is not None:
         say(f"  latency-aware simulation: a second of computing was {factor:g} s for the robot")
-    if len(episode.act_times_s):
-        times = episode.act_times_s
-        say(
-            f"  policy: median {milliseconds(np.median(times))} a step, "
-            f"max {milliseconds(times.max())}"
-        )
+    _print_times("policy:", episode.act_times_s, " a step")
+
+
+def _print_times(what: str, times: FloatArray, each: str = "") -> None:
+    if len(times):
+        typical = milliseconds(float(np.median(times)))
+        say(f"  {what} median {typical}{each}, max {milliseconds(times.max())}")

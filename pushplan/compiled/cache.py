@@ -12,7 +12,7 @@ import sys
 import time
 from typing import Any, TextIO
 
-from numba.core.caching import _Cache
+from numba.core.caching import NullCache
 from numba.core.serialize import dumps
 
 from pushplan.compiled.cache_files import Folders, find_folders, read, remove, warn_once, write
@@ -24,7 +24,7 @@ _PATIENCE = 300.0  # how long a process waits for another that compiles the same
 _POLL = 0.05  # [s]
 
 
-class KernelCache(_Cache):
+class KernelCache(NullCache):
     """The files of one form of one kernel."""
 
     def __init__(self, kernel: Any, form: str) -> None:
@@ -36,31 +36,14 @@ class KernelCache(_Cache):
         """
         self._kernel, self._form = kernel, form
         self._lock: TextIO | None = None
-        self._enabled = True
 
     @property
     def cache_path(self) -> str:
         """The folder that it writes to; empty where there is none."""
         return str(self._folders.write or "")
 
-    def enable(self) -> None:
-        """Use the cache."""
-        self._enabled = True
-
-    def disable(self) -> None:
-        """Leave the cache alone."""
-        self._enabled = False
-
-    def flush(self) -> None:
-        """Remove the kernel's files."""
-        if self._folders.write is not None:
-            for path in self._folders.write.glob(f"{self._stem}.*.nbc"):
-                remove(path)
-
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """Load what was compiled for a signature; if nothing was, lock its place."""
-        if not self._enabled:
-            return None
         target_context.refresh()
         name = self._name(sig, target_context.codegen())
         found = self._load(name, target_context)
@@ -71,7 +54,7 @@ class KernelCache(_Cache):
     def save_overload(self, sig: Any, data: Any) -> None:
         """Write what was compiled for a signature."""
         folder = self._folders.write
-        if not self._enabled or folder is None or data.library.has_dynamic_globals:
+        if folder is None or data.library.has_dynamic_globals:
             return
         name = self._name(sig, data.codegen)
         try:

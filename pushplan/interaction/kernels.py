@@ -174,6 +174,13 @@ def _against_robot(
 
 
 @kernel
+def _reaches(box: FloatArray, x: float, y: float, r: float) -> bool:
+    """Whether the square around a disc overlaps a box (4,) x_min, y_min, x_max, y_max."""
+    across: bool = x + r > box[0] and x - r < box[2]
+    return across and y + r > box[1] and y - r < box[3]
+
+
+@kernel
 def _against_static(
     k: int, poses: FloatArray, bodies: Bodies, settings: Settings, scratch: Scratch
 ) -> float:
@@ -186,9 +193,7 @@ def _against_static(
     body, outline = bodies.vertices[first:end], scratch.outlines[first:end]
     transform_points(poses[k], body, outline)
     for part in range(boxes.shape[0]):
-        if x + r <= boxes[part, 0] or x - r >= boxes[part, 2]:
-            continue
-        if y + r <= boxes[part, 1] or y - r >= boxes[part, 3]:
+        if not _reaches(boxes[part], x, y, r):
             continue
         wall = bodies.static_vertices[parts[part] : parts[part + 1]]
         found = contacts(wall, outline, points)
@@ -344,9 +349,7 @@ def robot_held(pose: FloatArray, bodies: Bodies, settings: Settings, scratch: Sc
     x, y, r = pose[0], pose[1], bodies.robot_radius
     placed, boxes = False, bodies.static_boxes
     for part in range(boxes.shape[0]):
-        if x + r <= boxes[part, 0] or x - r >= boxes[part, 2]:
-            continue
-        if y + r <= boxes[part, 1] or y - r >= boxes[part, 3]:
+        if not _reaches(boxes[part], x, y, r):
             continue
         if not placed:
             transform_points(pose, bodies.robot_vertices, scratch.robot)

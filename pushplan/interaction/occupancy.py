@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike
 
 from pushplan.compiled import owned
 from pushplan.interaction.occupancy_kernels import Patch, cover_objects, cover_sweep
-from pushplan.world import World
+from pushplan.world import Movables, World
 from pushplan.world.checked_fields import CheckedFields, PositiveFloat, Shape
 from pushplan.world.checks import ArrayRecord, FloatArray, array
 from pushplan.world.errors import InvalidInputError
@@ -170,8 +170,7 @@ def make_batch(passages: Sequence[Passage], *, ahead: float = 0.5 * math.pi) -> 
     for i, passage in enumerate(passages):
         frames[i] = patch_frame(passage.path, ahead, cell)
         movables, robot = passage.world.movables, passage.world.robot
-        shapes = (owned(movables.vertices), owned(movables.offsets))
-        cover_objects(owned(movables.poses), *shapes, frames[i], cell, patches[i, 0])
+        _cover(movables, movables.poses, frames[i], cell, patches[i, 0])
         hull, path = (owned(robot.vertices), owned(robot.offsets)), owned(passage.path)
         cover_sweep(path[:1], *hull, frames[i], cell, patches[i, 1])
         cover_sweep(path, *hull, frames[i], cell, patches[i, 2])
@@ -185,6 +184,12 @@ def patch_after(batch: PassageBatch, index: int, poses: ArrayLike) -> Patch:
     movables = batch.passages[index].world.movables
     at: FloatArray = array("poses", poses, (len(movables), 3))
     out = np.empty((PATCH_CELLS, PATCH_CELLS), np.float32)
-    shapes = (owned(movables.vertices), owned(movables.offsets))
-    cover_objects(owned(at), *shapes, owned(batch.frames[index]), batch.cell, out)
+    _cover(movables, at, batch.frames[index], batch.cell, out)
     return out
+
+
+def _cover(
+    objects: Movables, poses: FloatArray, frame: FloatArray, cell: float, out: Patch
+) -> None:
+    shapes = (owned(objects.vertices), owned(objects.offsets))
+    cover_objects(owned(poses), *shapes, owned(frame), cell, out)
