@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from pushplan.compiled import copy_into, kernel, owned
+from pushplan.compiled import kernel, owned
 from pushplan.interaction.ice import IceInteraction
 from pushplan.interaction.ice_bodies import IceBodies, IceSettings, ice_problem, select_bodies
 from pushplan.interaction.ice_contacts import sweep_ice
@@ -39,29 +39,19 @@ def sweep_near(
 ) -> None:
     """`sweep_ice` with those objects only that are near a short path; the rest stays."""
     middle = path[path.shape[0] // 2]
-    span = 0.0
-    for n in range(path.shape[0]):
-        span = max(span, (path[n, 0] - middle[0]) ** 2 + (path[n, 1] - middle[1]) ** 2)
-    reach = np.sqrt(span) + bodies.hull_radius + margin
-    chosen = np.empty(poses.shape[0], np.int64)
-    count = 0
-    for k in range(poses.shape[0]):
-        dx, dy = poses[k, 0] - middle[0], poses[k, 1] - middle[1]
-        if dx * dx + dy * dy < (reach + bodies.radii[k]) ** 2:
-            chosen[count] = k
-            count += 1
-    chosen = chosen[:count]
+    dx, dy = path[:, 0] - middle[0], path[:, 1] - middle[1]
+    reach = np.sqrt((dx * dx + dy * dy).max()) + bodies.hull_radius + margin
+    gx, gy, far = poses[:, 0] - middle[0], poses[:, 1] - middle[1], reach + bodies.radii
+    chosen = np.flatnonzero(gx * gx + gy * gy < far * far)
     part = select_bodies(bodies, chosen)
     here = poses[chosen]
-    moved = np.empty((path.shape[0], count, 3))
+    moved = np.empty((path.shape[0], chosen.shape[0], 3))
     sweep_ice(path, here, ice_problem(part, settings), moved)
     add_works(moved, part.masses, works)
     for n in range(path.shape[0]):
-        copy_into(out[n], poses)
-        for i in range(count):
-            copy_into(out[n, chosen[i]], moved[n, i])
-    for i in range(count):
-        copy_into(poses[chosen[i]], here[i])
+        out[n] = poses
+        out[n][chosen] = moved[n]
+    poses[chosen] = here
 
 
 MARGIN = 1.0
