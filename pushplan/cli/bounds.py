@@ -19,7 +19,7 @@ def run(options: argparse.Namespace) -> int:
     from pushplan.scenarios.known_bounds import known_bounds, load_bounds, save_bounds
 
     check_file(options.out, [".csv"])
-    runs = [Results.load(path) for path in options.runs.split(",")] if options.runs else []
+    runs = [Results.load(path) for path in options.runs or ()]
     scenarios = [
         scenario
         for name in options.suites.split(",")

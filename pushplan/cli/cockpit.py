@@ -104,7 +104,7 @@ class Cockpit:
         self._board.advance(world, trace.robot_poses, trace.object_poses)
         lines, begin = self._board.lines(), self._due
         seconds = (world.time - self._time) / self._speed
-        rows = np.flatnonzero(np.isin(self._ids, world.movables.ids))
+        here = np.isin(self._ids, world.movables.ids)
         # a simulator records no more poses than the metrics need, so they are interpolated
         recorded = np.concatenate([trace.robot_poses[:, None], trace.object_poses], axis=1)
         poses = np.concatenate([self._last[None], recorded])
@@ -115,7 +115,7 @@ class Cockpit:
             now = motion(min(self._time + fraction * seconds * self._speed, trace.times[-1]))
             scene = world
             if fraction < 1.0:
-                scene = world.moved(robot_pose=now[0], movable_poses=now[1:][rows])
+                scene = world.moved(robot_pose=now[0], movable_poses=now[1:][here])
             self._show(scene, lines, now[:1, :2])
             self._wait(begin + fraction * seconds)
         self._trail.append(trace.robot_poses[:, :2])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import os
+import re
 import sys
 import tomllib
 from collections.abc import Callable, Mapping
@@ -156,12 +157,12 @@ def positive(text: str) -> float:
 
 
 def _shard(text: str) -> tuple[int, int]:
-    part, _, parts = text.partition("/")
-    if not (part.isascii() and part.isdigit() and parts.isascii() and parts.isdigit()):
+    if re.fullmatch("[0-9]+/[0-9]+", text) is None:
         raise argparse.ArgumentTypeError(f"a part is given as K/N, such as 3/16, got {text!r}")
-    if not 1 <= int(part) <= int(parts):
+    part, parts = map(int, text.split("/"))
+    if not 1 <= part <= parts:
         raise argparse.ArgumentTypeError(f"K must be between 1 and N, got {text}")
-    return int(part), int(parts)
+    return part, parts
 
 
 def _numbers(separator: str, count: int) -> Callable[[str], tuple[float, ...]]:
@@ -187,6 +188,7 @@ OPTION_TYPES: Mapping[str, Callable[[str], Any]] = {
     "count": whole(1),
     "number": float,
     "positive": positive,
+    "names": lambda text: text.split(",") if text else None,
     "shard": _shard,
     "size": _numbers("x", 2),
     "range": _numbers(",", 2),

@@ -21,11 +21,11 @@ def run(options: argparse.Namespace) -> int:
 
     results = Results.load(options.directory)
     if options.metrics is None and options.format is None:
-        figures = options.figures.split(",") if options.figures else ()
+        figures = options.figures or ()
         show(results, options, replays=options.replays, most=options.replay_most, figures=figures)
         return 0
     if options.metrics:
-        tables = results.measure(options.metrics.split(","))
+        tables = results.measure(options.metrics)
     else:
         tables = results.tables(settings=options.settings, pairs=options.pairs)
     if options.format is None:

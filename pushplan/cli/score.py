@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
 
 from pushplan.cli.common import (
     check_episode_file,
@@ -15,25 +13,23 @@ from pushplan.cli.common import (
     say_scores,
 )
 
-if TYPE_CHECKING:
-    from pushplan.world import Episode
-
 
 def run(options: argparse.Namespace) -> int:
     """One block of lines an episode."""
+    from pushplan.metrics import compute
     from pushplan.world import InvalidInputError
 
     if options.out and len(options.episodes) > 1:
         raise InvalidInputError(f"--out writes one episode, got {len(options.episodes)}")
     check_episode_file(options.out)
-    names = options.metrics.split(",") if options.metrics else None
     scored = []
     for path in options.episodes:
         episode = load_episode(path)
         if options.json:
-            scored.append(_as_dict(path, episode, names))
+            ended = {"episode": path, "success": episode.success, "reason": episode.reason}
+            scored.append({**ended, "metrics": dict(compute(episode, options.metrics))})
         else:
-            say_scores(episode, names, f"{path}: ")
+            say_scores(episode, options.metrics, f"{path}: ")
         if options.out:
             save_episode(episode, options.out)
             if not options.json:
@@ -41,10 +37,3 @@ def run(options: argparse.Namespace) -> int:
     if options.json:
         say_json(scored)
     return 0
-
-
-def _as_dict(path: str, episode: Episode, names: Sequence[str] | None) -> dict[str, Any]:
-    from pushplan.metrics import compute
-
-    ended = {"episode": path, "success": episode.success, "reason": episode.reason}
-    return {**ended, "metrics": dict(compute(episode, names))}

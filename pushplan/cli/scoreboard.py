@@ -22,9 +22,6 @@ class Scoreboard:
         self._lengths = np.zeros(len(start.movables))
         self._trees: dict[bytes, tuple[float, FloatArray]] = {}
         self.manipulates = isinstance(start.goal, Receptacle | ClearanceArea)
-        self._there = np.zeros(len(start.movables), dtype=bool)
-        if self.manipulates:
-            self._there = start.completed
 
     def advance(self, world: World, robot_poses: FloatArray, object_poses: FloatArray) -> None:
         """Take in what moved since the last call.
@@ -43,9 +40,8 @@ class Scoreboard:
     def completed(self) -> BoolArray:
         """(K,) which objects of the start are where they belong; those that left the floor are."""
         done = np.ones(len(self._start.movables), dtype=bool)
-        now = self._world.movables.ids
-        rows = np.flatnonzero(np.isin(self._start.movables.ids, now))
-        done[rows] = self._world.completed
+        here = np.isin(self._start.movables.ids, self._world.movables.ids)
+        done[here] = self._world.completed
         return done
 
     def lines(self) -> list[str]:
@@ -65,7 +61,7 @@ class Scoreboard:
     def _tree(self, done: BoolArray) -> tuple[float, FloatArray]:
         key = done.tobytes()
         if key not in self._trees:
-            needed = done & ~self._there
+            needed = done & ~self._start.completed
             self._trees[key] = (
                 manipulation.tree_length(self._start, needed),
                 manipulation.shortest_lengths(self._start, needed),

@@ -19,7 +19,7 @@ def run(options: argparse.Namespace) -> int:
         sheet = stress(
             options.policy,
             options.suite,
-            conditions=options.conditions.split(",") if options.conditions else None,
+            conditions=options.conditions,
             episodes=options.episodes,
             seed=options.seed,
             rate=options.rate,

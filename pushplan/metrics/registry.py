@@ -128,7 +128,12 @@ def compute(episode: Episode, names: Iterable[str] | None = None) -> Mapping[str
         function = metric_function(name)
         if name in METRICS and METRICS[name].goal not in (kind, None):
             continue
-        value = function(episode) if name in METRICS else _own_value(name, function, episode)
+        try:
+            value = function(episode)
+        except Exception as error:
+            if name in METRICS:
+                raise
+            raise InvalidInputError(f"metric {name!r} raised {describe(error)}") from error
         if value is None:
             continue
         try:
@@ -140,15 +145,6 @@ def compute(episode: Episode, names: Iterable[str] | None = None) -> Mapping[str
         if math.isnan(values[name]):
             del values[name]
     return values
-
-
-def _own_value(
-    name: str, function: Callable[[Episode], float | None], episode: Episode
-) -> float | None:
-    try:
-        return function(episode)
-    except Exception as error:
-        raise InvalidInputError(f"metric {name!r} raised {describe(error)}") from error
 
 
 def metric_function(name: str) -> Callable[[Episode], float | None]:
