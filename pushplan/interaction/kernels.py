@@ -142,6 +142,32 @@ def _widen(k: int, count: int, poses: FloatArray, bodies: Bodies, scratch: Scrat
             copy_into(scratch.saved[other], poses[other])
 
 
+@kernel(inline=True)
+def _out_of(
+    piece: FloatArray,  # (N, 2) convex corners of what does not yield [m]
+    piece_from: FloatArray,  # (3,) where it was
+    piece_to: FloatArray,  # (3,) where it is
+    friction: float,
+    k: int,
+    outline: FloatArray,  # (M, 2) corners of object ``k``, changed in place
+    poses: FloatArray,
+    bodies: Bodies,
+    scratch: Scratch,
+) -> float:
+    """Move object ``k`` out of a piece; returns the deepest overlap found."""
+    points, inv = scratch.points, bodies.inverse_gyration[k]
+    found = contacts(piece, outline, points)
+    if found == 0:
+        return 0.0
+    depth: float = points[0, 4] if found == 1 else max(points[0, 4], points[1, 4])
+    pushed = separate(points, found, scratch.fixed, 0.0, 0.0, poses[k], 1.0, inv)
+    if friction > 0.0:
+        limit, before = friction * pushed, scratch.before[k]
+        drag_along(points, found, limit, piece_from, piece_to, before, poses[k], inv)
+    transform_points(poses[k], bodies.vertices[bodies.offsets[k] : bodies.offsets[k + 1]], outline)
+    return depth
+
+
 @kernel
 def _against_robot(
     k: int,
@@ -153,23 +179,14 @@ def _against_robot(
     scratch: Scratch,
 ) -> float:
     """Move object ``k`` out of the robot; returns the deepest overlap found."""
-    deepest, inv = 0.0, bodies.inverse_gyration[k]
-    parts, points = bodies.robot_offsets, scratch.points
+    deepest, friction, parts = 0.0, settings.friction, bodies.robot_offsets
     first, end = bodies.offsets[k], bodies.offsets[k + 1]
-    body, outline = bodies.vertices[first:end], scratch.outlines[first:end]
-    transform_points(poses[k], body, outline)
+    outline = scratch.outlines[first:end]
+    transform_points(poses[k], bodies.vertices[first:end], outline)
     for part in range(parts.shape[0] - 1):
         corners = scratch.robot[parts[part] : parts[part + 1]]
-        found = contacts(corners, outline, points)
-        if found == 0:
-            continue
-        for i in range(found):
-            deepest = max(deepest, points[i, 4])
-        pushed = separate(points, found, scratch.fixed, 0.0, 0.0, poses[k], 1.0, inv)
-        if settings.friction > 0.0:
-            limit, before = settings.friction * pushed, scratch.before[k]
-            drag_along(points, found, limit, robot_from, robot_to, before, poses[k], inv)
-        transform_points(poses[k], body, outline)
+        depth = _out_of(corners, robot_from, robot_to, friction, k, outline, poses, bodies, scratch)
+        deepest = max(deepest, depth)
     return deepest
 
 
@@ -185,27 +202,17 @@ def _against_static(
     k: int, poses: FloatArray, bodies: Bodies, settings: Settings, scratch: Scratch
 ) -> float:
     """Move object ``k`` out of the walls; returns the deepest overlap found."""
-    deepest, inv = 0.0, bodies.inverse_gyration[k]
+    deepest, friction, still = 0.0, settings.static_friction, scratch.fixed
     boxes, parts = bodies.static_boxes, bodies.static_offsets
-    points, still = scratch.points, scratch.fixed
     x, y, r = poses[k, 0], poses[k, 1], bodies.radii[k]
     first, end = bodies.offsets[k], bodies.offsets[k + 1]
-    body, outline = bodies.vertices[first:end], scratch.outlines[first:end]
-    transform_points(poses[k], body, outline)
+    outline = scratch.outlines[first:end]
+    transform_points(poses[k], bodies.vertices[first:end], outline)
     for part in range(boxes.shape[0]):
-        if not _reaches(boxes[part], x, y, r):
-            continue
-        wall = bodies.static_vertices[parts[part] : parts[part + 1]]
-        found = contacts(wall, outline, points)
-        if found == 0:
-            continue
-        for i in range(found):
-            deepest = max(deepest, points[i, 4])
-        pushed = separate(points, found, still, 0.0, 0.0, poses[k], 1.0, inv)
-        if settings.static_friction > 0.0:
-            limit = settings.static_friction * pushed
-            drag_along(points, found, limit, still, still, scratch.before[k], poses[k], inv)
-        transform_points(poses[k], body, outline)
+        if _reaches(boxes[part], x, y, r):
+            wall = bodies.static_vertices[parts[part] : parts[part + 1]]
+            depth = _out_of(wall, still, still, friction, k, outline, poses, bodies, scratch)
+            deepest = max(deepest, depth)
     return deepest
 
 
