@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from rich.console import RenderableType
 
     from pushplan.evaluation import Experiment, ResultRow, Results
-    from pushplan.evaluation.cost import Cost
+    from pushplan.evaluation.experiment import Cost
 
     Progress = Callable[[int, int, ResultRow | None], None]
 

@@ -5,28 +5,25 @@ from __future__ import annotations
 import logging
 import os
 import pickle
-from collections import deque
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections import Counter, deque
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, wait
 from contextlib import contextmanager
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 from pushplan.evaluation.execute import execute
 from pushplan.evaluation.job_identity import identified
 from pushplan.evaluation.jobs import (
-    DEFAULT_ENV,
-    BatchStoppedError,
     Job,
     JobResult,
     JobSettings,
     batch_stopped,
 )
 from pushplan.evaluation.limits import MEMORY_MB, check_limits
-from pushplan.evaluation.outcome import PRELOAD, outcome_of
 from pushplan.evaluation.pending import note_batch, pending_jobs
-from pushplan.evaluation.pool import WorkerPool
+from pushplan.evaluation.pool import WorkerPool, outcome_of
 from pushplan.evaluation.provenance import provenance
 from pushplan.evaluation.rows import ResultRow, instant
 from pushplan.evaluation.store import RunDirectory, remove_report
@@ -101,7 +98,14 @@ def run_batch(
     if memory_limit_mb is not None:
         number("memory_limit_mb", memory_limit_mb, low=1.0)
     choice("traces", traces, TRACES)
-    _check(jobs)
+    if os.environ.get(WORKER_VARIABLE):
+        raise InvalidInputError(
+            "a worker process came upon run_batch while it imported the main script: put the "
+            "call under `if __name__ == '__main__':`"
+        )
+    for key, count in Counter(job.key for job in jobs).items():
+        if count > 1:
+            raise InvalidInputError(f"two jobs are the same: policy, scenario, seed = {key}")
     jobs = identified(jobs, settings)
     with RunDirectory(out) as store:
         note_batch(store, jobs, settings, about)
@@ -110,11 +114,20 @@ def run_batch(
         pending = pending_jobs(jobs, store, any_version)
         if pending:
             begun = {**provenance(workers), "jobs": len(jobs), "done": len(jobs) - len(pending)}
-            store.append("runs", begun)
+            store.note("runs", [*store.about().get("runs", []), begun])
             remove_report(store.path)
         if progress is not None:
             progress(len(jobs) - len(pending), len(jobs), None)
-        batch = _Batch(pending, store, settings, memory_limit_mb, traces, len(jobs), progress)
+        batch = _Batch(
+            jobs=deque(pending),
+            store=store,
+            settings=settings,
+            memory_limit_mb=memory_limit_mb,
+            traces=traces,
+            total=len(jobs),
+            done=len(jobs) - len(pending),
+            progress=progress,
+        )
         if executor is None and workers == 0:
             batch.run_here()
         elif pending:
@@ -125,85 +138,58 @@ def run_batch(
         return store.rows()
 
 
-def _check(jobs: Sequence[Job]) -> None:
-    if os.environ.get(WORKER_VARIABLE):
-        raise InvalidInputError(
-            "a worker process came upon run_batch while it imported the main script: put the "
-            "call under `if __name__ == '__main__':`"
-        )
-    seen: set[tuple[str, str, int]] = set()
-    for job in jobs:
-        if job.key in seen:
-            raise InvalidInputError(f"two jobs are the same: policy, scenario, seed = {job.key}")
-        seen.add(job.key)
-
-
+@dataclass
 class _Batch:
     """The jobs of one call of `run_batch` that have no row yet."""
 
-    def __init__(
-        self,
-        jobs: Sequence[Job],
-        store: RunDirectory,
-        settings: JobSettings,
-        memory_limit_mb: float | None,
-        traces: str,
-        total: int,
-        progress: Progress | None,
-    ) -> None:
-        self._jobs = deque(jobs)
-        self._began: dict[tuple[str, str, int], str] = {}
-        self._store = store
-        self._settings = settings
-        self._memory_limit_mb = memory_limit_mb
-        self._traces = traces
-        self._total = total
-        self._left = len(jobs)
-        self._progress = progress
+    jobs: deque[Job]
+    store: RunDirectory
+    settings: JobSettings
+    memory_limit_mb: float | None
+    traces: str
+    total: int
+    done: int
+    progress: Progress | None
+    began: dict[tuple[str, str, int], str] = field(default_factory=dict)
 
     def run_here(self) -> None:
         """One after the other in this process."""
-        while self._jobs:
-            job = self._jobs.popleft()
+        while self.jobs:
+            job = self.jobs.popleft()
             self._begin(job)
-            self._keep(job, execute(job, self._settings).checked(job))
+            self._keep(job, execute(job, self.settings).checked(job))
 
     def run(self, executor: Executor | None, window: int) -> None:
         """Through an executor, ``window`` jobs at a time; through our own pool if None."""
         if executor is None:
-            self._jobs = _in_turns(self._jobs)
-            with _closing(self._pool(window)) as pool:
+            self.jobs = _in_turns(self.jobs)
+            logs = self.store.path / "logs"
+            make_folder(logs)
+            with _closing(WorkerPool(window, self.settings, self.memory_limit_mb, logs)) as pool:
                 # one job waits for each worker, so that none is idle while a row is stored
-                self._drain(_sending(pool, self._settings), 2 * window, foreign=False)
-        else:
-            settings, owner = self._settings, os.getpid()
+                self._drain(pool.submit, 2 * window)
+            return
+        settings, owner = self.settings, os.getpid()
 
-            def submit(job: Job) -> Future[JobResult]:
-                return executor.submit(execute, job, settings, owner)
+        def submit(job: Job) -> Future[JobResult]:
+            return executor.submit(execute, job, settings, owner)
 
-            if suspects := self._drain(submit, window, foreign=True):
-                self._clear(suspects)
-                _log.warning("the executor broke; its jobs go on in %d processes of ours", window)
-                self.run(None, window)
+        if suspects := self._drain(submit, window):
+            rest = self.jobs
+            for job in suspects:  # each alone in a fresh process: one of them ended the other
+                self.jobs = deque([job])
+                self.run(None, 1)
+            self.jobs = rest
+            _log.warning("the executor broke; its jobs go on in %d processes of ours", window)
+            self.run(None, window)
 
-    def _pool(self, workers: int) -> WorkerPool:
-        logs = self._store.path / "logs"
-        make_folder(logs)
-        return WorkerPool(
-            workers,
-            limit_s=self._settings.force_after_s,
-            memory_limit_mb=self._memory_limit_mb,
-            preload=PRELOAD if self._settings.make_env == DEFAULT_ENV else PRELOAD[:1],
-            log_dir=logs,
-        )
-
-    def _drain(self, submit: Submit, window: int, *, foreign: bool) -> list[Job]:
+    def _drain(self, submit: Submit, window: int) -> list[Job]:
         """Run jobs until there are none; those in flight when the executor broke otherwise."""
         flying: dict[Future[JobResult], Job] = {}
         suspects: list[Job] = []
-        while (self._jobs or flying) and not suspects:
-            while self._jobs and len(flying) < window:
-                job = self._jobs.popleft()
+        while (self.jobs or flying) and not suspects:
+            while self.jobs and len(flying) < window:
+                job = self.jobs.popleft()
                 self._begin(job)
                 try:
                     flying[_sent(submit, job)] = job
@@ -213,44 +199,27 @@ class _Batch:
             done, _ = wait(flying, return_when=FIRST_COMPLETED)
             for future in done:
                 job = flying.pop(future)
-                outcome = self._outcome(job, future, foreign)
-                if outcome is None:
+                try:
+                    outcome = outcome_of(job, future, self.settings)
+                except BrokenExecutor:  # it may be innocent
                     suspects.append(job)
                 else:
                     self._keep(job, outcome)
         return [*suspects, *flying.values()]
 
-    def _outcome(self, job: Job, future: Future[JobResult], foreign: bool) -> JobResult | None:
-        """What became of a job; None if its executor broke and it may be innocent."""
-        try:
-            return outcome_of(job, future, self._settings)
-        except BrokenExecutor as error:
-            if not foreign:
-                raise InvalidInputError(f"no worker process can be started: {error}") from error
-            return None
-
-    def _clear(self, suspects: Sequence[Job]) -> None:
-        """Run jobs that were in flight when a process died each alone in a fresh process."""
-        for job in suspects:
-            with _closing(self._pool(1)) as pool:
-                future = _sent(_sending(pool, self._settings), job)
-                outcome = self._outcome(job, future, foreign=False)
-                assert outcome is not None
-                self._keep(job, outcome)
-
     def _begin(self, job: Job) -> None:
-        self._began[job.key] = instant()
-        self._store.begin(job.id, " ".join(map(str, job.key[:2])))
+        self.began[job.key] = instant()
+        self.store.begin(job.id, " ".join(map(str, job.key[:2])))
 
     def _keep(self, job: Job, outcome: JobResult) -> None:
-        began = self._began.pop(job.key)
+        began = self.began.pop(job.key)
         row = replace(outcome.row, job=job.id, trace="", began=outcome.row.began or began)
-        kept = self._traces == "all" or (self._traces == "failures" and not row.success)
+        kept = self.traces == "all" or (self.traces == "failures" and not row.success)
         trace = outcome.trace if kept else None
-        row = self._store.add(row, trace, outcome.detail, job.spec)
-        self._left -= 1
-        if self._progress is not None:
-            self._progress(self._total - self._left, self._total, row)
+        row = self.store.add(row, trace, outcome.detail, job.spec)
+        self.done += 1
+        if self.progress is not None:
+            self.progress(self.done, self.total, row)
 
 
 @contextmanager
@@ -264,10 +233,6 @@ def _closing(pool: WorkerPool) -> Iterator[WorkerPool]:
     pool.shutdown()
 
 
-def _sending(pool: WorkerPool, settings: JobSettings) -> Submit:
-    return lambda job: pool.submit(job.policy.group, execute, job, settings)
-
-
 def _sent(submit: Submit, job: Job) -> Future[JobResult]:
     try:
         return submit(job)
@@ -279,7 +244,7 @@ def _sent(submit: Submit, job: Job) -> Future[JobResult]:
     except BrokenExecutor:
         raise
     except (OSError, MemoryError, RuntimeError) as error:  # no thread can be started
-        raise BatchStoppedError(batch_stopped(error)) from error
+        raise batch_stopped(error) from error
 
 
 def _in_turns(jobs: Iterable[Job]) -> deque[Job]:

@@ -12,7 +12,7 @@ from pushplan.motion.transport_bound import transport_bound
 from pushplan.motion.work_bound import work_bound
 from pushplan.scenarios import Scenario
 from pushplan.scenarios.known_bounds import KnownBounds
-from pushplan.world import GoalDisc, GoalLine, World
+from pushplan.world import GoalDisc, GoalLine
 
 
 def scenario_bound(scenario: Scenario, *, most_nodes: int = 400) -> KnownBounds:
@@ -29,13 +29,11 @@ def scenario_bound(scenario: Scenario, *, most_nodes: int = 400) -> KnownBounds:
         world = env.true_world
     finally:
         env.close()
-    return KnownBounds(world.robot.mass, _bound(world, most_nodes))
-
-
-def _bound(world: World, most_nodes: int) -> float:
     if isinstance(world.goal, GoalDisc | GoalLine):
-        return work_bound(world, most_nodes=most_nodes).work
-    return transport_bound(world)
+        bound = work_bound(world, most_nodes=most_nodes).work
+    else:
+        bound = transport_bound(world)
+    return KnownBounds(world.robot.mass, bound)
 
 
 def with_solutions(

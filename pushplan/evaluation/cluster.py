@@ -10,8 +10,7 @@ from contextlib import contextmanager
 from typing import Any
 
 from pushplan.evaluation.jobs import Job, JobResult, JobSettings
-from pushplan.evaluation.outcome import PRELOAD, outcome_of
-from pushplan.evaluation.pool import WorkerPool
+from pushplan.evaluation.pool import WorkerPool, outcome_of
 from pushplan.world import InvalidInputError
 from pushplan.world.errors import describe
 from pushplan.world.libraries import need
@@ -58,29 +57,22 @@ class DaskExecutor(Executor):
 
 
 def _hand_over(task: Any, found: Future[Any]) -> None:
-    try:
-        found.set_result(_fetched(task))
-    except Exception as error:
-        found.set_exception(error)
-
-
-def _fetched(task: Any) -> Any:
-    if task.status == "error":
-        failure = task.exception()
-        if type(failure).__name__ == "KilledWorker":  # a job's own errors are in its result
-            raise failure
-        raise ClusterError(f"the cluster's workers cannot run jobs: {describe(failure)}")
+    """Let a future end as a task of Dask ended."""
+    text = "the scheduler of the cluster was lost; what was stored is kept, and the same command "
+    lost = ClusterError(f"{text}goes on")
     try:
         if task.status == "finished":
-            return task.result()
+            found.set_result(task.result())
+            return
+        if task.status == "error":
+            lost = task.exception()
+            if type(lost).__name__ != "KilledWorker":  # a job's own errors are in its result
+                lost = ClusterError(f"the cluster's workers cannot run jobs: {describe(lost)}")
     except (OSError, CancelledError):  # the scheduler went before the result was fetched
         pass
     except Exception as error:
-        raise ClusterError(f"a result was lost: {describe(error)}") from error
-    raise ClusterError(
-        "the scheduler of the cluster was lost; what was stored is kept, and the same command "
-        "goes on"
-    )
+        lost = ClusterError(f"a result was lost: {describe(error)}")
+    found.set_exception(lost)
 
 
 @contextmanager
@@ -123,15 +115,10 @@ def dask_executor(where: str, memory_limit_mb: float | None) -> Iterator[DaskExe
 
 def run_isolated(job: Job, settings: JobSettings, memory_limit_mb: float | None) -> JobResult:
     """Run a job on a Dask worker, in a process beside it that outlives the job."""
-    wanted = (settings.force_after_s, memory_limit_mb)
+    wanted = (settings, memory_limit_mb)
     if getattr(_local, "wanted", None) != wanted:
         if (old := getattr(_local, "pool", None)) is not None:
             old.kill()
-        _local.pool = WorkerPool(
-            1, limit_s=wanted[0], memory_limit_mb=memory_limit_mb, preload=PRELOAD
-        )
+        _local.pool = WorkerPool(1, settings, memory_limit_mb)
         _local.wanted = wanted
-    from pushplan.evaluation.execute import execute
-
-    future = _local.pool.submit(job.policy.group, execute, job, settings)
-    return outcome_of(job, future, settings)
+    return outcome_of(job, _local.pool.submit(job), settings)

@@ -3,22 +3,28 @@
 from __future__ import annotations
 
 import csv
+import itertools
 import math
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from pushplan.evaluation.rows import ResultRow, columns, csv_lines, row_from_texts
-from pushplan.evaluation.statistics import estimate
-from pushplan.evaluation.statistics_paired import ENOUGH, pairs_needed
+from pushplan.evaluation.rows import (
+    ResultRow,
+    column_type,
+    columns,
+    csv_lines,
+    row_from_texts,
+)
+from pushplan.evaluation.statistics import ENOUGH, estimate, pairs_needed
 from pushplan.evaluation.store import open_results
-from pushplan.evaluation.summary import policies_of, settings_of
+from pushplan.evaluation.summary import by_scenario, grouped, policies_of, settings_of
 from pushplan.evaluation.tables import Table
 from pushplan.world import InvalidInputError, SchemaError, UnknownNameError
-from pushplan.world.checks import FloatArray
 from pushplan.world.errors import describe, short
 
 SHORT = {
@@ -102,7 +108,7 @@ def read_rules(text: str) -> list[Rule]:
         UnknownNameError: if there is no such column.
     """
     rules = []
-    numbers = [name for name in columns() if name not in _TEXTS]
+    numbers = [name for name in columns() if column_type(name) != "str" and name != "seed"]
     for part in text.split(","):
         if (found := _RULE.fullmatch(part)) is None:
             raise InvalidInputError(
@@ -122,9 +128,6 @@ def read_rules(text: str) -> list[Rule]:
         unit = 100.0 if percent else 1.0
         rules.append(Rule(metric, direction == ">", value / unit, bool(percent)))
     return rules
-
-
-_TEXTS = "policy task simulator scenario seed status reason began host job trace".split()
 
 
 def compare_runs(old: str | Path, new: str | Path, rules: str | Sequence[Rule]) -> list[Verdict]:
@@ -148,15 +151,14 @@ def compare_runs(old: str | Path, new: str | Path, rules: str | Sequence[Rule]) 
     chosen = read_rules(rules) if isinstance(rules, str) else rules
     before, after = _read(old), _read(new)
     found = []
-    for setting in settings_of(before):
-        mine = [row for row in before if row.setting == setting]
-        for policy in policies_of(mine):
-            first = [row for row in mine if row.policy == policy]
-            second = [r for r in after if r.setting == setting and r.policy == policy]
-            for rule in chosen:
-                one, two = _values(first, rule.metric), _values(second, rule.metric)
-                if one:
-                    found.append(_judge(rule, policy, setting, one, two))
+    old_rows, new_rows = grouped(before), grouped(after)
+    for setting, policy in itertools.product(settings_of(before), policies_of(before)):
+        mine = setting, policy
+        for rule in chosen:
+            one = by_scenario(old_rows.get(mine, []), rule.metric)
+            two = by_scenario(new_rows.get(mine, []), rule.metric)
+            if one:
+                found.append(_judge(rule, policy, setting, one, two))
     if not found:
         names = ", ".join(sorted({rule.metric for rule in chosen}))
         raise InvalidInputError(f"{old} has no values of {names}: nothing can be compared")
@@ -181,7 +183,7 @@ def verdict_table(verdicts: Sequence[Verdict]) -> Table:
 
 
 def _judge(
-    rule: Rule, policy: str, setting: str, one: Mapping[str, float], two: Mapping[str, float]
+    rule: Rule, policy: str, setting: str, one: Mapping[Any, float], two: Mapping[Any, float]
 ) -> Verdict:
     common = sorted(one.keys() & two.keys())
     paired = bool(common)
@@ -194,7 +196,19 @@ def _judge(
         return Verdict(rule, policy, setting, 0, False, mean, nan, nan, nan, nan, "missing")
     unit = abs(float(old.mean())) if rule.relative else 1.0
     gaps = (new - old if paired else np.array([new.mean() - old.mean()])) / (unit or 1.0)
-    change, (low, high) = float(gaps.mean()), _interval(gaps, old, new, unit or 1.0, paired)
+    change = float(gaps.mean())
+    if paired:
+        found = estimate(gaps)
+        low, high = found.low, found.high
+    elif count < 2:
+        low, high = -math.inf, math.inf
+    elif np.ptp(old) == np.ptp(new) == 0.0:
+        low, high = change, change
+    else:
+        from scipy import stats
+
+        welch = stats.ttest_ind(new, old, equal_var=False).confidence_interval()
+        low, high = float(welch.low) / (unit or 1.0), float(welch.high) / (unit or 1.0)
     sign = 1.0 if rule.above else -1.0
     worst, best = max(sign * low, sign * high), min(sign * low, sign * high)
     bound = sign * rule.bound
@@ -206,26 +220,6 @@ def _judge(
     return Verdict(
         rule, policy, setting, count, paired, *means, change, low, high, verdict, needed
     )  # fmt: skip
-
-
-def _interval(
-    gaps: FloatArray, old: FloatArray, new: FloatArray, unit: float, paired: bool
-) -> tuple[float, float]:
-    if paired:
-        found = estimate(gaps)
-        return found.low, found.high
-    from scipy import stats
-
-    if min(len(old), len(new)) < 2:
-        return -math.inf, math.inf
-    if np.ptp(old) == np.ptp(new) == 0.0:
-        return float(gaps[0]), float(gaps[0])
-    welch = stats.ttest_ind(new, old, equal_var=False).confidence_interval()
-    return float(welch.low) / unit, float(welch.high) / unit
-
-
-def _values(rows: Sequence[ResultRow], metric: str) -> dict[str, float]:
-    return {r.scenario: float(v) for r in rows if (v := getattr(r, metric)) is not None}
 
 
 def _read(path: str | Path) -> list[ResultRow]:

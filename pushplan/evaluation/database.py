@@ -8,15 +8,14 @@ import os
 import re
 import sqlite3
 import stat
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from pushplan.evaluation.provenance import in_words
-from pushplan.evaluation.rows import ResultRow, checked_row, columns
-from pushplan.metrics import METRICS
+from pushplan.evaluation.rows import ResultRow, checked_row, column_type, columns
 from pushplan.world import InvalidInputError, PushplanError, SchemaError
 from pushplan.world.errors import describe, short
 from pushplan.world.file_locks import is_locked
@@ -30,14 +29,7 @@ WAIT_S = 30.0
 """How long a writer waits for another program that holds the database [s]."""
 _UNLOCKED = "&vfs=unix-none"
 """Option of SQLite for a disk without locks, or without the file that readers of a log share."""
-HIDE_OTHERS = (
-    "UPDATE results SET current = (job = ?) WHERE (policy, scenario, seed) = "
-    "(SELECT policy, scenario, seed FROM results WHERE job = ?)"
-)
-"""Let the result of one job be the one that counts for its policy and scenario."""
-_TEXTS = "policy task simulator scenario status reason began host job trace"
-_TYPES = dict.fromkeys(_TEXTS.split(), "TEXT")
-_TYPES |= dict.fromkeys(("seed", "success", "plan_calls"), "INTEGER")
+_TYPES = {"str": "TEXT", "bool": "INTEGER", "int": "INTEGER", "float": "REAL"}
 _TABLES = """
 CREATE TABLE IF NOT EXISTS about (key TEXT PRIMARY KEY, value TEXT);
 CREATE TABLE IF NOT EXISTS results ({columns}, spec TEXT, current INTEGER, PRIMARY KEY (job));
@@ -143,11 +135,10 @@ def connect(path: Path) -> sqlite3.Connection:
                 raise sqlite3.DatabaseError(verdict)
             _create(db)
             db.set_progress_handler(None, 0)
-            return db
         except BaseException:
             db.close()
             raise
-    raise AssertionError("unreachable")
+    return db
 
 
 @contextmanager
@@ -192,6 +183,7 @@ def _checked(path: Path, mode: str, way: str) -> sqlite3.Connection:
     try:
         if way:
             db.execute("PRAGMA locking_mode=EXCLUSIVE")
+        db.row_factory = sqlite3.Row
         db.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, MAX_TEXT)
         room = _LEAST_STEPS + _STEPS_PER_BYTE * 512 * path.stat().st_blocks
         steps = iter(range(room // _STEPS))
@@ -209,25 +201,25 @@ def _checked(path: Path, mode: str, way: str) -> sqlite3.Connection:
 
 def _create(db: sqlite3.Connection) -> None:
     """Make the tables, or add the columns of metrics that have come since they were made."""
-    names = columns()
-    kinds = ", ".join(f'"{name}" {_type(name)}' for name in names)
-    db.executescript(_TABLES.format(columns=kinds))
+    kinds = {name: f'"{name}" {_TYPES[column_type(name)]}' for name in columns()}
+    db.executescript(_TABLES.format(columns=", ".join(kinds.values())))
     with db:
-        for name in names:
-            if name not in columns_of(db):
-                db.execute(f'ALTER TABLE results ADD COLUMN "{name}" {_type(name)}')
+        there = {name for _, name, *_ in db.execute("PRAGMA table_info(results)")}
+        for name, kind in kinds.items():
+            if name not in there:
+                db.execute(f"ALTER TABLE results ADD COLUMN {kind}")
         db.execute("INSERT OR REPLACE INTO about VALUES ('schema', ?)", (json.dumps(SCHEMA),))
 
 
-def insert(db: sqlite3.Connection, row: ResultRow, spec: str, current: int = 0) -> None:
-    """Add a row, or replace that of its job."""
+def insert(db: sqlite3.Connection, row: ResultRow, spec: Mapping[str, Any]) -> None:
+    """Add a row that does not count yet, or replace that of its job."""
     names = columns()
     listed = ", ".join(f'"{name}"' for name in names)
-    marks = ", ".join("?" * (len(names) + 2))
+    marks = "?, " * len(names)
     values = [getattr(row, name) for name in names]
     db.execute(
-        f"INSERT OR REPLACE INTO results ({listed}, spec, current) VALUES ({marks})",
-        (*values, spec, current),
+        f"INSERT OR REPLACE INTO results ({listed}, spec, current) VALUES ({marks}?, 0)",
+        (*values, json.dumps(spec)),
     )
 
 
@@ -251,28 +243,29 @@ class StoredResult:
 def read_results(db: sqlite3.Connection) -> list[StoredResult]:
     """Every result, also those that do not count now."""
     measured = _measured(db)
-    return [
-        StoredResult(row, read_spec(spec), bool(current), tuple(measured.get(row.job, ())))
-        for row, spec, current in _rows(db, "spec, current", "ORDER BY job")
-    ]
+    found = db.execute("SELECT * FROM results ORDER BY job")
+    return [result_of(dict(values), measured.get(values["job"], ())) for values in found]
 
 
-def read_spec(text: object) -> dict[str, Any]:
-    """What `job_spec` said about a job.
+def result_of(
+    values: Mapping[str, Any], measured: Sequence[tuple[str, str, float | None]] = ()
+) -> StoredResult:
+    """The result that the database holds, by column.
 
     Raises:
-        TypeError, ValueError: if it is no mapping in JSON.
+        KeyError, TypeError, ValueError: if it can be none.
     """
-    spec = _json(text)
+    spec = _json(values["spec"])
     if not isinstance(spec, dict):
         raise TypeError(f"spec is {short(spec)}")
-    return spec
+    return StoredResult(_row_of(values), spec, bool(values["current"]), tuple(measured))
 
 
 def read_rows(db: sqlite3.Connection) -> list[ResultRow]:
     """All rows that count, sorted; a column that the database lacks is empty."""
-    order = "WHERE current ORDER BY policy, task, simulator, seed, scenario"
-    return [row for row, _ in _rows(db, "1", order)]
+    order = "policy, task, simulator, seed, scenario"
+    found = db.execute(f"SELECT * FROM results WHERE current ORDER BY {order}")
+    return [_row_of(dict(values)) for values in found]
 
 
 def read_measured(db: sqlite3.Connection) -> dict[str, dict[str, float]]:
@@ -292,31 +285,10 @@ def _measured(db: sqlite3.Connection) -> dict[str, list[tuple[str, str, float | 
     return found
 
 
-def _rows(db: sqlite3.Connection, more: str, rest: str) -> Iterator[tuple[Any, ...]]:
-    there = [name for name in columns() if name in columns_of(db)]
-    names = ", ".join(f'"{name}"' for name in there)
-    for values in db.execute(f"SELECT {names}, {more} FROM results {rest}"):
-        yield row_of(dict(zip(there, values, strict=False))), *values[len(there) :]
-
-
-def row_of(values: Mapping[str, Any]) -> ResultRow:
-    """The row that the database holds, by column.
-
-    Raises:
-        KeyError, TypeError, ValueError: if it can be none.
-    """
+def _row_of(values: Mapping[str, Any]) -> ResultRow:
+    found = {name: values[name] for name in columns() if name in values}
     success = {0: False, 1: True}[values["success"]]
-    return checked_row(ResultRow.from_columns({**values, "success": success}))
-
-
-def _type(column: str) -> str:
-    whole = column in METRICS and METRICS[column].whole
-    return _TYPES.get(column, "INTEGER" if whole else "REAL")
-
-
-def columns_of(db: sqlite3.Connection) -> set[str]:
-    """Names of the columns of the results."""
-    return {row[1] for row in db.execute("PRAGMA table_info(results)")}
+    return checked_row(ResultRow.from_columns({**found, "success": success}))
 
 
 def read_about(db: sqlite3.Connection) -> dict[str, Any]:
@@ -337,21 +309,15 @@ def read_about(db: sqlite3.Connection) -> dict[str, Any]:
         if not isinstance(values, kind):
             raise TypeError(f"the note {key!r} is {short(values)}")
         for value in values.values() if isinstance(values, dict) else values:
-            _check_note(key, value)
+            known = key == "configuration" or isinstance(value, str)
+            if key == "runs":
+                known = isinstance(value, dict) and isinstance(value["packages"], dict)
+                known = known and bool(in_words(value))  # it reads all that others read
+            elif key == "deadlines":
+                known = type(value) in (int, float) and math.isfinite(value)
+            if not known:
+                raise TypeError(f"the note {key!r} holds {short(value)}")
     return about
-
-
-def _check_note(key: str, value: Any) -> None:
-    known = True
-    if key == "runs":
-        known = isinstance(value, dict) and isinstance(value["packages"], dict)
-        known = known and bool(in_words(value))  # it reads all that others read
-    elif key == "deadlines":
-        known = type(value) in (int, float) and math.isfinite(value)
-    elif key != "configuration":
-        known = isinstance(value, str)
-    if not known:
-        raise TypeError(f"the note {key!r} holds {short(value)}")
 
 
 def _json(text: object) -> Any:

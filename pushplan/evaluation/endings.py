@@ -4,16 +4,16 @@ from __future__ import annotations
 
 from collections import Counter
 
-from pushplan.evaluation.rows import ResultRow
-from pushplan.evaluation.run_record import RunRecord
+from pushplan.evaluation.results import Results
 
 MOST_LINES = 6
 
 
-def failure_lines(run: RunRecord) -> list[str]:
+def failure_lines(run: Results) -> list[str]:
     """A line for each policy with failed jobs: how many, the most frequent reason, a traceback."""
     lines = []
-    for policy, rows in _by_policy(run).items():
+    for policy in run.policies:
+        rows = [row for row in run.rows if row.policy == policy]
         failed = [row for row in rows if row.failed]
         if not failed:
             continue
@@ -27,25 +27,19 @@ def failure_lines(run: RunRecord) -> list[str]:
     return lines
 
 
-def unsuccessful_lines(run: RunRecord) -> list[str]:
+def unsuccessful_lines(run: Results) -> list[str]:
     """A line for each policy with episodes that ended by the rules of their task without success.
 
     It says how many ended for each reason. More than `MOST_LINES` policies have one together.
     """
-    lines = []
-    groups = _by_policy(run)
+    ended = [row for row in run.rows if not row.failed and not row.success]
+    groups = {policy: [row for row in ended if row.policy == policy] for policy in run.policies}
     if len(groups) > MOST_LINES:
-        groups = {f"all {len(groups)} policies": list(run.rows)}
+        groups = {f"all {len(groups)} policies": ended}
+    lines = []
     for policy, rows in groups.items():
-        reasons = Counter(row.reason for row in rows if not row.failed and not row.success)
-        if reasons:
-            listed = ", ".join(f"{count} {reason}" for reason, count in reasons.most_common())
+        if rows:
+            reasons = Counter(row.reason for row in rows).most_common()
+            listed = ", ".join(f"{count} {reason}" for reason, count in reasons)
             lines.append(f"{policy} without success: {listed}")
     return lines
-
-
-def _by_policy(run: RunRecord) -> dict[str, list[ResultRow]]:
-    found: dict[str, list[ResultRow]] = {policy: [] for policy in run.policies}
-    for row in run.rows:
-        found[row.policy].append(row)
-    return found

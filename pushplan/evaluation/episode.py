@@ -116,9 +116,7 @@ class Recording:
         self.reason = ""
         self._world: World | None = None
         self._completed: Any = None
-        self._times: list[FloatArray] = []
-        self._robot: list[FloatArray] = []
-        self._objects: list[FloatArray] = []
+        self._motion: list[tuple[FloatArray, ...]] = []  # times, poses of robot and of objects
         self._actions: list[FloatArray] = []
         self._rewards: list[float] = []
         self._act_times: list[float] = []
@@ -161,7 +159,12 @@ class Recording:
             elapsed += seeing
             world = env.world
             shown = self._copy(world)
-            self._step(env.trace, command, float(reward), elapsed)
+            trace = env.trace
+            parts = trace.times, trace.robot_poses, trace.object_poses
+            self._motion.append(tuple(map(np.array, parts)))
+            self._actions.append(np.array(command, dtype=np.float64).reshape(-1))
+            self._rewards.append(float(reward))
+            self._act_times.append(elapsed)
             self._completed = info.get("completed", self._completed)
             ended = bool(terminated or truncated) or len(self._actions) == limit
             if observer is not None:
@@ -177,11 +180,12 @@ class Recording:
         """
         assert self._world is not None
         actions = np.array(self._actions) if self._actions else np.zeros((0, 0))
+        times, robot_poses, object_poses = map(np.concatenate, zip(*self._motion, strict=True))
         return Episode(
             world=self._world,
-            times=np.concatenate(self._times),
-            robot_poses=np.concatenate(self._robot),
-            object_poses=np.concatenate(self._objects),
+            times=times,
+            robot_poses=robot_poses,
+            object_poses=object_poses,
             success=self.success,
             reason=self.reason if reason is None else reason,
             completed=self._completed,
@@ -227,9 +231,8 @@ class Recording:
         self._world = copy.deepcopy(world)
         shows = isinstance(self.policy, ShowsPlan)
         self._plans = PlanRecorder(self._world.movables.ids) if shows else None
-        self._times = [np.array([world.time])]
-        self._robot = [np.array(world.robot_pose)[None]]
-        self._objects = [np.array(world.movables.poses)[None]]
+        poses = np.array(world.robot_pose)[None], np.array(world.movables.poses)[None]
+        self._motion = [(np.array([world.time]), *poses)]
 
     def _copy(self, world: World) -> World:
         """The world for the policy: what it does to its copy changes nothing that is scored.
@@ -242,14 +245,6 @@ class Recording:
         self._told = [world.robot, world.static, world.goal]
         self._shown = {id(part): memo[id(part)] for part in self._told}
         return shown
-
-    def _step(self, trace: Any, command: FloatArray, reward: float, elapsed_s: float) -> None:
-        self._times.append(np.array(trace.times))
-        self._robot.append(np.array(trace.robot_poses))
-        self._objects.append(np.array(trace.object_poses))
-        self._actions.append(np.array(command, dtype=np.float64).reshape(-1))
-        self._rewards.append(reward)
-        self._act_times.append(elapsed_s)
 
     def _note_plan(self, world: World) -> None:
         if self._plans is not None:
@@ -310,7 +305,7 @@ def checked_action(env: Any, action: object) -> FloatArray:
         except (TypeError, ValueError):
             raise InvalidActionError(
                 f"an action is a Twist, WheelSpeeds or an array of shape {shape}, "
-                f"got {describe_value(action)}"
+                f"got {type(action).__name__} {action!r:.60}"
             ) from None
         if values.shape != shape:
             raise InvalidActionError(f"an action has shape {shape} here, got {values.shape}")
@@ -329,8 +324,3 @@ def plan_times(policy: Policy) -> list[float] | None:
     if not isinstance(policy, LogsPlans):
         return None
     return [float(result.stats.wall_time_s) for result in policy.plan_log]
-
-
-def describe_value(value: object) -> str:
-    """A short text for a value that should have been something else."""
-    return f"{type(value).__name__} {value!r:.60}"

@@ -108,7 +108,7 @@ def _execute(job: Job, settings: JobSettings) -> JobResult:
         policy, job.scenario, job.policy.label, latency_factor=settings.latency_factor
     )
     begin, began = time.perf_counter(), instant()
-    status, reason, detail = Status.DONE, None, ""
+    status, detail = Status.DONE, ""
     try:
         # whoever looks at a policy later may look at what raises
         asked(lambda: [isinstance(policy, one) for one in _ABILITIES])
@@ -124,24 +124,22 @@ def _execute(job: Job, settings: JobSettings) -> JobResult:
     except (BatchStoppedError, MemoryError):
         raise
     except Exception as error:
-        status, reason = _failure(error)
-        detail = traceback.format_exc()
-    reason = None if reason is None else clean_reason(reason)
-    row = blank_row(
-        job.policy.label,
-        job.scenario,
-        status,
-        clean_reason(recording.reason if reason is None else reason),
-    )
+        status, reason = Status.ENV_ERROR, describe(error)
+        if isinstance(error, PolicyError):
+            invalid = isinstance(error, InvalidActionError)
+            status = Status.INVALID_ACTION if invalid else Status.POLICY_ERROR
+            reason = str(error)
+        recording.reason, detail = clean_reason(reason), traceback.format_exc()
+    reason = clean_reason(recording.reason)
     row = replace(
-        row,
+        blank_row(job.policy.label, job.scenario, status, reason),
         wall_time_s=time.perf_counter() - begin,
         began=began,
         host=platform.node(),
     )
     if not recording.started:
         return JobResult(row, detail=detail)
-    episode = recording.episode(reason)
+    episode = recording.episode()
     calls = plan_times(policy)
     row = scored_row(row, episode, None if calls is None else len(calls))
     try:
@@ -169,14 +167,6 @@ def dry_run(job: Job, settings: JobSettings) -> None:
             Recording(policy, job.scenario).run(env, limit=DRY_RUN_STEPS)
         finally:
             getattr(env, "close", _nothing)()
-
-
-def _failure(error: Exception) -> tuple[Status, str]:
-    if isinstance(error, InvalidActionError):
-        return Status.INVALID_ACTION, str(error)
-    if isinstance(error, PolicyError):
-        return Status.POLICY_ERROR, str(error)
-    return Status.ENV_ERROR, describe(error)
 
 
 def _nothing() -> None:

@@ -34,6 +34,10 @@ _MISFITS = ("refuse", "skip")
 _POLICY = ("policy", "label", "parameters", "sweep", "deadline_s")
 _SUITE = ("suite", "scenarios", "worlds", "episodes", "seed", "variations", "policies")
 _WORLDS = ("simulator", "preset")
+_FILE = re.compile(
+    r"(.*[=:])?([^=:]+(?:\.(?:onnx|zip)|\.(?:py|onnx|zip)(?=:[^:]*$)))(:[^:]*)?", re.DOTALL
+)
+"""A text with a file: ``LABEL=FILE.py:NAME``, ``onnx:FILE.onnx``, ``sb3:FILE.zip`` ..."""
 
 
 def fields_of(data: object, folder: Path) -> dict[str, Any]:
@@ -82,14 +86,10 @@ def _texts(what: str, value: object) -> Sequence[str]:
 
 def _beside(source: str, folder: Path) -> str:
     """A text that may name a ``file.py`` beside the experiment file, made absolute."""
-    label, equals, rest = source.rpartition("=")
-    where, colon, name = rest.rpartition(":")
-    if not where.endswith((".py", ".onnx", ".zip")) and not name.endswith((".onnx", ".zip")):
+    if (found := _FILE.fullmatch(source)) is None:
         return source
-    prefix, colon_too, file = where.rpartition(":")
-    if name.endswith((".onnx", ".zip")):  # onnx:FILE, sb3:FILE
-        return f"{label}{equals}{where}{colon}{_path(name, folder)}"
-    return f"{label}{equals}{prefix}{colon_too}{_path(file, folder)}{colon}{name}"
+    before, file, name = found.groups(default="")
+    return f"{before}{_path(file, folder)}{name}"
 
 
 def _path(file: str, folder: Path) -> Path:
@@ -165,7 +165,10 @@ def _policies(given: object, folder: Path) -> Iterable[PolicySpec]:
         raise SchemaError(f"a sweep may give {MOST_POLICIES} policies, this one gives {count}")
     for combination in itertools.product(*values):
         chosen = dict(zip(sweep, combination, strict=True))
-        words = "".join(f"@{name}-{_word(value)}" for name, value in chosen.items())
+        words = ""
+        for name, value in chosen.items():
+            text = f"{value:g}" if isinstance(value, int | float) else str(value)
+            words += f"@{name}-{re.sub(r'[^A-Za-z0-9_.+-]', '_', text)}"
         yield PolicySpec(f"{spec.label}{words}"[:64], spec.source, {**options, **chosen})
 
 
@@ -173,8 +176,3 @@ def _mapping(what: str, value: object) -> dict[str, Any]:
     if not isinstance(value, Mapping) or not all(isinstance(key, str) for key in value):
         raise SchemaError(f"{what} must be a mapping from names to values, got {short(value)}")
     return dict(value)
-
-
-def _word(value: object) -> str:
-    text = f"{value:g}" if isinstance(value, int | float) else str(value)
-    return re.sub(r"[^A-Za-z0-9_.+-]", "_", text)

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pushplan.evaluation.rows import ResultRow
+from pushplan.evaluation.summary import grouped, policies_of, settings_of
 from pushplan.scenarios.known_bounds import KnownBounds
 
 
@@ -45,20 +46,20 @@ def gaps(
     rows: Sequence[ResultRow], policies: Sequence[str], bounds: Mapping[str, KnownBounds]
 ) -> list[Gap]:
     """The gaps of each policy in each setting; none where no bound is known."""
-    ratios: dict[tuple[str, str], list[tuple[float, float]]] = {}
-    for row in rows:
-        if (known := bounds.get(row.scenario)) is None:
-            continue
-        if (work := total_work(row, known)) is None or known.bound <= 0.0:
-            continue
-        best = np.nan if known.best is None else work / known.best - 1.0
-        pair = (work / known.bound - 1.0, best)
-        ratios.setdefault((row.setting, row.policy), []).append(pair)
     found = []
-    place = {policy: i for i, policy in enumerate(policies)}
-    for setting, policy in sorted(ratios, key=lambda key: (key[0], place.get(key[1], len(place)))):
-        to_bound, to_best = np.array(ratios[setting, policy]).T
-        seen = to_best[~np.isnan(to_best)]
-        mean = float(seen.mean()) if len(seen) else float("nan")
-        found.append(Gap(setting, policy, len(to_bound), float(to_bound.mean()), len(seen), mean))
+    groups = grouped(rows)
+    for setting in sorted(settings_of(rows)):
+        for policy in policies_of(rows, policies):
+            to_bound, to_best = [], []
+            for row in groups.get((setting, policy), []):
+                mine = bounds.get(row.scenario)
+                if mine is None or (work := total_work(row, mine)) is None or mine.bound <= 0.0:
+                    continue
+                to_bound.append(work / mine.bound - 1.0)
+                if mine.best is not None:
+                    to_best.append(work / mine.best - 1.0)
+            if to_bound:
+                mean = float(np.mean(to_best)) if to_best else float("nan")
+                to = float(np.mean(to_bound))
+                found.append(Gap(setting, policy, len(to_bound), to, len(to_best), mean))
     return found

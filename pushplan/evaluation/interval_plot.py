@@ -9,21 +9,21 @@ from matplotlib.figure import Figure
 
 from pushplan.drawing.figure import COLUMN
 from pushplan.evaluation.plot_style import LINE, dots, interval, tidy, unclipped, wrapped
-from pushplan.evaluation.run_record import RunRecord
+from pushplan.evaluation.results import Results
 from pushplan.evaluation.summary import PolicySummary
 from pushplan.metrics import Role, metric_names
 
 
-def draw_intervals(run: RunRecord) -> Figure:
+def draw_intervals(run: Results) -> Figure:
     """A line for each policy in each setting, a panel for success and each kind of score.
 
     Success has Wilson's interval, a mean that of the bootstrap, as in the tables.
     """
     columns: dict[str, list[str]] = {}
     for name in metric_names(Role.SCORE):
-        if any(name in summary.metrics for summary in run.summaries):
+        if any(name in summary.metrics for summary in run.summary()):
             columns.setdefault(name[0], []).append(name)
-    found = {(one.setting, one.policy): one for one in run.summaries}
+    found = {(one.setting, one.policy): one for one in run.summary()}
     figure = Figure(figsize=(COLUMN, 1.0), layout="constrained")
     panels = figure.subplots(1, 1 + len(columns), squeeze=False, sharey=True)[0]
     ticks: dict[float, str] = {}

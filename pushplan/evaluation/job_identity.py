@@ -26,10 +26,10 @@ from pushplan.world import InvalidInputError
 
 _ENGINES = ("mujoco", "pymunk")
 _REPORTS = (
-    *("bounding", "comparing", "endings", "exporting", "gaps", "interval_plot", "merging"),
+    *("bounding", "comparing", "endings", "gaps", "interval_plot", "merging"),
     *("page", "page_files", "plot_style", "plots", "replays"),
-    *("reproduction", "rescoring", "results", "run_record", "salvaging", "statistics"),
-    *("statistics_aggregate", "statistics_paired", "status", "summary", "table_formats", "tables"),
+    *("reproduction", "rescoring", "results", "salvaging", "statistics"),
+    *("statistics_aggregate", "status", "summary", "table_formats", "tables"),
 )
 UNSEEN = frozenset({"cli", "ros", "training", *(f"evaluation/{name}" for name in _REPORTS)})
 """Rooms and files of the package that no episode runs through. All others count."""
@@ -39,13 +39,11 @@ _OURS = "pushplan."
 
 def identified(jobs: Iterable[Job], settings: JobSettings) -> list[Job]:
     """The jobs with their specifications."""
-    policies: dict[int, tuple[dict[str, Any], dict[str, str]]] = {}
-    found = []
-    for job in jobs:
-        if id(job.policy) not in policies:  # its files are read once for all of its jobs
-            policies[id(job.policy)] = _of_policy(job.policy)
-        found.append(replace(job, spec=_spec(job, settings, *policies[id(job.policy)])))
-    return found
+    jobs = list(jobs)
+    policies = {id(job.policy): job.policy for job in jobs}
+    # the files of a policy are read once for all of its jobs
+    said = {key: _of_policy(policy) for key, policy in policies.items()}
+    return [replace(job, spec=_spec(job, settings, *said[id(job.policy)])) for job in jobs]
 
 
 def check_unchanged(job: Job, settings: JobSettings) -> None:
@@ -82,7 +80,8 @@ def _of_policy(spec: PolicySpec) -> tuple[dict[str, Any], dict[str, str]]:
         if isinstance(spec.source, str):
             policy |= {"options": _plain(spec.options), "source": spec.source}
     others = spec.libraries - {*PACKAGES, *sys.stdlib_module_names, "pushplan"}
-    return policy, dict(sorted(pair for module in others for pair in _versions_of(module)))
+    packages = sorted({name for module in others for name in _distributions().get(module, ())})
+    return policy, {name: metadata.version(name) for name in packages}
 
 
 def _spec(
@@ -121,12 +120,6 @@ def _files(job: Job, settings: JobSettings) -> dict[str, str]:
     return files
 
 
-@functools.cache
-def _versions_of(module: str) -> list[tuple[str, str]]:
-    """Name and version of each installed package that brings a module."""
-    return [(name, metadata.version(name)) for name in _distributions().get(module, ())]
-
-
 _distributions = functools.cache(metadata.packages_distributions)
 
 
@@ -151,14 +144,18 @@ def differences(before: Mapping[str, Any], now: Mapping[str, Any]) -> str:
     changed, noted = [], []
     for section in ("policy", "scenario", "files", "settings", "versions"):
         old, new = before.get(section, {}), now.get(section, {})
-        names = [name for name in sorted({*old, *new}) if old.get(name) != new.get(name)]
-        if section == "policy":  # its source may have moved, its options are in its identity
-            names = [name for name in names if name == "identity"]
-        changed += [f"{section} {n} {old[n]!r} -> {new.get(n)!r}" for n in names if n in old]
-        noted += [f"{section} {n} was not noted before" for n in names if n not in old]
+        # the source of a policy may have moved, its options are in its identity
+        names = {"identity"} if section == "policy" else {*old, *new}
+        for name in sorted(names):
+            if name not in old and name in new:
+                noted.append(f"{section} {name} was not noted before")
+            elif old.get(name) != new.get(name):
+                changed.append(f"{section} {name} {old[name]!r} -> {new.get(name)!r}")
     parts = [*changed, *noted]
-    more = len(parts) - _MOST_DIFFERENCES
-    return "; ".join([*parts[:_MOST_DIFFERENCES], *([f"{more} more"] if more > 0 else [])])
+    shown = parts[:_MOST_DIFFERENCES]
+    if len(parts) > len(shown):
+        shown.append(f"{len(parts) - len(shown)} more")
+    return "; ".join(shown)
 
 
 def job_of(spec: Mapping[str, Any]) -> tuple[Job, JobSettings]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import Any
 
 from pushplan.evaluation.episode import wanted_observation
@@ -24,9 +24,9 @@ class BatchStoppedError(InvalidInputError):
     """Something is wrong that is no policy's fault: nothing is recorded, and the batch ends."""
 
 
-def batch_stopped(error: BaseException) -> str:
-    """What to say where files, processes or memory of a batch itself fail."""
-    return (
+def batch_stopped(error: BaseException) -> BatchStoppedError:
+    """What to raise where files, processes or memory of a batch itself fail."""
+    return BatchStoppedError(
         f"no job can be run now ({describe(error)}); what was stored is kept, and the same command "
         "goes on"
     )
@@ -130,21 +130,6 @@ class JobResult:
     def tainted(self) -> bool:
         """Whether the process that ran the job should not run another one."""
         return self.row.status in (Status.TIMEOUT, Status.OUT_OF_MEMORY)
-
-    def to_message(self) -> tuple[dict[str, Any], bytes]:
-        """As JSON values and raw bytes."""
-        header = {"row": asdict(self.row), "traced": self.trace is not None, "detail": self.detail}
-        return header, self.trace or b""
-
-    @classmethod
-    def from_message(cls, header: Mapping[str, Any], body: bytes) -> JobResult:
-        """Read what `to_message` gave, from somebody who is not trusted: see `checked`.
-
-        Raises:
-            KeyError, TypeError: if it is no result.
-        """
-        row = ResultRow(**header["row"])
-        return cls(row, body if header["traced"] else None, str(header["detail"]))
 
     def checked(self, job: Job) -> JobResult:
         """This result, or a failure if it cannot be one of that job."""

@@ -7,8 +7,10 @@ import re
 import textwrap
 import unicodedata
 from collections.abc import Iterator, Sequence
+from pathlib import Path
 
 from pushplan.evaluation.tables import Table
+from pushplan.world.safe_files import read_data
 
 TEXT_WIDTH = 345.0
 """Width of the text in the class ``article`` [pt]; most other classes have more."""
@@ -18,32 +20,9 @@ _LINES = 36  # of a table on a page
 _PARTS = 3  # groups of columns on a page
 _FLOATS = 10  # tables that LaTeX is given before it has to place them
 _NARROW, _BROAD = frozenset("iljft.,:;'`|!()[]/ -1I"), frozenset("mwMW@%&<>=+~")
-_SYMBOLS = dict(
-    pair.split(" ", 1)
-    for pair in (
-        r"\ \textbackslash{};~ \textasciitilde{};^ \textasciicircum{};| $|$;` {`};& \&;% \%;$ \$;"
-        r"# \#;_ \_;{ \{;} \};< $<$;> $>$;± $\pm$;× $\times$;÷ $\div$;− $-$;· $\cdot$;⋅ $\cdot$;"
-        r"≤ $\le$;≥ $\ge$;≠ $\neq$;≈ $\approx$;∞ $\infty$;→ $\to$;← $\gets$;↔ $\leftrightarrow$;"
-        r"∈ $\in$;∑ $\sum$;∏ $\prod$;√ $\surd$;∂ $\partial$;∇ $\nabla$;∝ $\propto$;‖ $\|$;"
-        r"° $^\circ$;∆ $\Delta$;∅ $\emptyset$;✓ $\surd$;✗ $\times$;• $\bullet$;⁄ /;– \textendash{};"
-        r"— \textemdash{};… \dots{};‘ `;’ ';“ ``;” '';„ ,,;§ \S{};ß \ss{};æ \ae{};Æ \AE{};œ \oe{};"
-        r"ø \o{};Ø \O{};ł \l{};Ł \L{};ı \i{};£ \pounds{};€ EUR"
-    ).split(";")
-)
-_ACCENTS = dict(
-    pair.split(" ")
-    for pair in (
-        "\u0300 `;\u0301 ';\u0302 ^;\u0303 ~;\u0304 =;\u0306 u;\u0307 .;\u0308 \";\u030a r;"
-        "\u030b H;\u030c v;\u0327 c"
-    ).split(";")
-)
-_LATIN_CAPITALS = dict(
-    zip(
-        "ALPHA BETA EPSILON ZETA ETA IOTA KAPPA MU NU OMICRON RHO TAU CHI".split(),
-        "ABEZHIKMNOPTX",
-        strict=True,
-    )
-)
+_CHARACTERS = read_data(Path(__file__).with_name("latex_symbols.json"))
+_SYMBOLS: dict[str, str] = _CHARACTERS["symbols"]
+_ACCENTS: dict[str, str] = _CHARACTERS["accents"]
 
 
 def latex(tables: Sequence[Table]) -> str:
@@ -155,12 +134,6 @@ def _character(character: str) -> str:
         return character if character.isprintable() else " "
     if unicodedata.combining(character):
         return ""
-    word = unicodedata.name(character, "").split(" WITH ")[0].split(" ")[-1]
-    if word and "Α" <= character <= "ω":
-        if word == "OMICRON" or (character.isupper() and word in _LATIN_CAPITALS):
-            return "o" if character.islower() else _LATIN_CAPITALS[word]
-        name = word.replace("LAMDA", "LAMBDA").lower()
-        return f"$\\{name if character.islower() else name.capitalize()}$"
     kind, *codes = unicodedata.decomposition(character).split() or [""]
     base, *marks = list(unicodedata.normalize("NFKD", character))
     inner = "".join(map(_character, [base, *marks])) if codes else ""

@@ -7,13 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from pushplan.evaluation.database import (
-    StoredResult,
-    database_of,
-    read_about,
-    read_results,
-    reading,
-)
+from pushplan.evaluation.database import database_of, read_about, read_results, reading
 from pushplan.evaluation.rows import TIMING_COLUMNS, ResultRow, columns
 from pushplan.evaluation.store import RunDirectory, files_of
 from pushplan.world import InvalidInputError
@@ -70,23 +64,17 @@ def merge(out: str | Path, sources: Sequence[str | Path]) -> Merged:
                         known += 1
                         if _timeless(one.row) != _timeless(there[one.row.job]):
                             differing.append(one.row.job)
-                    elif _copy(one, folder, store):
-                        added += 1
-                    else:
+                        continue
+                    trace, detail = files_of(folder, one.row)
+                    if one.row.trace and trace is None:  # its episode is not what its name says
                         incomplete.append(one.row.job)
+                        continue
+                    store.add(one.row, trace, detail, one.spec, show=one.current)
+                    store.measure((one.row.job, *value) for value in one.measured)
+                    added += 1
                 _note(db, store)
         store.write_csv()
     return Merged(added, known, tuple(differing), tuple(incomplete))
-
-
-def _copy(one: StoredResult, folder: Path, store: RunDirectory) -> bool:
-    """Take over a result; False if its episode is not what its name says."""
-    trace, detail = files_of(folder, one.row)
-    if one.row.trace and trace is None:
-        return False
-    store.add(one.row, trace, detail, one.spec, show=one.current)
-    store.measure((one.row.job, *value) for value in one.measured)
-    return True
 
 
 def _note(db: sqlite3.Connection, store: RunDirectory) -> None:

@@ -12,10 +12,9 @@ import pushplan
 from pushplan.drawing.palette import FLOOR_PALETTE, SERIES
 from pushplan.evaluation.provenance import in_words
 from pushplan.evaluation.replays import chosen, packed, write_beside
-from pushplan.evaluation.rows import ResultRow
-from pushplan.evaluation.run_record import RunRecord
+from pushplan.evaluation.results import Results
 from pushplan.evaluation.tables import Table, heading
-from pushplan.metrics import Role, metric_names
+from pushplan.metrics import METRICS, Role, metric_names
 from pushplan.world import SchemaError
 from pushplan.world.libraries import need
 from pushplan.world.output_files import write_atomic
@@ -31,7 +30,7 @@ _USUAL = {"make_env": "pushplan.envs:make", "observation": "auto"}
 
 
 def write_page(
-    run: RunRecord,
+    run: Results,
     tables: Sequence[Table],
     figures: Mapping[str, Path],
     folder: Path,
@@ -60,19 +59,27 @@ def write_page(
     elif replays == "beside":
         there = dict.fromkeys(write_beside(run, rows, folder), 2)
     pairs = [table for table in tables if table.title.startswith("Paired")]
+    configuration = run.about.get("configuration", {})
+    facts = {"episodes": len(run.rows), **configuration}
+    told = {key: value for key, value in facts.items() if value not in (None, _USUAL.get(key))}
+    drawn = []
+    for caption, file in figures.items():
+        picture = file.read_text(encoding="utf-8")
+        # without what stands before its root
+        drawn.append((caption, file.name, Markup(picture[picture.index("<svg") :])))
     page = need("jinja2").Environment(autoescape=True, trim_blocks=True, lstrip_blocks=True)
     text = page.from_string(_file("page.html")).render(
         version=pushplan.__version__,
-        title=_title(run),
-        facts=_facts(run),
+        title=f"pushplan: {configuration.get('suite') or 'results'}",
+        facts=", ".join(f"{key} {value}" for key, value in told.items()),
         style=Markup(_file("page.css")),
         script=Markup(_file("page.js") + _file("replay.js") + "filter();\nchooseFirst();\n"),
         scores=[table for table in tables if table not in pairs],
         pairs=pairs,
-        figures=[(c, p.name, Markup(_inline(p))) for c, p in figures.items()],
+        figures=drawn,
         sources=[(k, v) for k, v in run.about.get("policies", {}).items() if k != v],
         runs=[in_words(one) for one in run.about.get("runs", ())],
-        data=Markup(_script_json(page_data(run, there))),
+        data=Markup(_escaped(json.dumps(page_data(run, there), separators=(",", ":")))),
         replays=[Markup(_escaped(one)) for one in texts],
     )
     path = folder / PAGE
@@ -88,44 +95,50 @@ def is_page(path: Path) -> bool:
         return False
 
 
-def page_data(run: RunRecord, replays: Mapping[str, int]) -> dict[str, Any]:
+def page_data(run: Results, replays: Mapping[str, int]) -> dict[str, Any]:
     """What the scripts of the page read: the rows, column by column, texts as numbers of a list.
 
     Args:
         run: the rows.
         replays: job -> 1 for a replay in the page, 2 for one beside it.
     """
-    policies, titles = run.policies, run.titles
-    settings = {setting: index for index, setting in enumerate(titles)}
+    policies, settings = run.policies, list(run.titles)
     scenarios: dict[str, int] = {}
     listed: list[tuple[str, int, int]] = []
     for row in run.rows:
         if row.scenario not in scenarios:
             scenarios[row.scenario] = len(listed)
-            listed.append((row.scenario, settings[row.setting], row.seed))
+            listed.append((row.scenario, settings.index(row.setting), row.seed))
     reasons = {reason: i for i, reason in enumerate(dict.fromkeys(r.reason for r in run.rows))}
-    statuses = {status: i for i, status in enumerate(dict.fromkeys(r.status for r in run.rows))}
-    numbers = {label: index for index, label in enumerate(policies)}
+    statuses = list(dict.fromkeys(row.status for row in run.rows))
     values = _values(run)
+    headings = {name: heading(name) for name in values if name in METRICS}
+    headings |= {name: name.removesuffix("_s") + " [s]" for name in _TIMES}
+    outcomes = [
+        row.status if row.failed else "success" if row.success else row.reason for row in run.rows
+    ]
     return {
         "folder": str(run.path) if run.path is not None else "DIR",
         "policies": policies,
         "colours": _colours(),
-        "settings": list(titles.values()),
+        "settings": list(run.titles.values()),
         "scenarios": listed,
-        "statuses": list(statuses),
+        "statuses": statuses,
         "reasons": list(reasons),
-        "measures": [("outcome", "outcome"), *((name, _heading(name)) for name in values)],
+        "measures": [
+            ("outcome", "outcome"),
+            *((name, headings.get(name, name)) for name in values),
+        ],
         "rows": {
-            "policy": [numbers[row.policy] for row in run.rows],
+            "policy": [policies.index(row.policy) for row in run.rows],
             "scenario": [scenarios[row.scenario] for row in run.rows],
-            "status": [statuses[row.status] for row in run.rows],
+            "status": [statuses.index(row.status) for row in run.rows],
             "reason": [reasons[row.reason] for row in run.rows],
             "success": [int(row.success) for row in run.rows],
             "job": [row.job for row in run.rows],
             "trace": [row.trace for row in run.rows],
             "replay": [replays.get(row.job, 0) for row in run.rows],
-            "values": {"outcome": [_outcome(row) for row in run.rows], **values},
+            "values": {"outcome": outcomes, **values},
         },
     }
 
@@ -142,7 +155,7 @@ def _colours() -> dict[str, Any]:
     }
 
 
-def _values(run: RunRecord) -> dict[str, list[float | None]]:
+def _values(run: Results) -> dict[str, list[float | None]]:
     """Columns that have values, rounded, and metrics that are no columns."""
     found = {}
     for name in (*metric_names(Role.SCORE, Role.DETAIL, Role.FACT), *_TIMES):
@@ -158,42 +171,8 @@ def _rounded(value: float | None) -> float | None:
     return None if value is None else float(f"{value:.{_DIGITS}g}")
 
 
-def _outcome(row: ResultRow) -> str:
-    if row.failed:
-        return row.status
-    return "success" if row.success else row.reason
-
-
-def _heading(name: str) -> str:
-    try:
-        return heading(name) if name not in _TIMES else name.removesuffix("_s") + " [s]"
-    except KeyError:
-        return name
-
-
-def _title(run: RunRecord) -> str:
-    name = run.about.get("configuration", {}).get("suite")
-    return f"pushplan: {name}" if name else "pushplan: results"
-
-
-def _facts(run: RunRecord) -> str:
-    facts = {"episodes": len(run.rows), **run.about.get("configuration", {})}
-    told = {key: value for key, value in facts.items() if value not in (None, _USUAL.get(key))}
-    return ", ".join(f"{key} {value}" for key, value in told.items())
-
-
 def _file(name: str) -> str:
     return (_FILES / name).read_text(encoding="utf-8")
-
-
-def _inline(path: Path) -> str:
-    """An SVG file without what stands before its root."""
-    text = path.read_text(encoding="utf-8")
-    return text[text.index("<svg") :]
-
-
-def _script_json(value: object) -> str:
-    return _escaped(json.dumps(value, separators=(",", ":")))
 
 
 def _escaped(text: str) -> str:

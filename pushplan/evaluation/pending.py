@@ -7,12 +7,8 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from pushplan.evaluation.database import DATABASE
-from pushplan.evaluation.job_identity import (
-    differences,
-    same_but_versions,
-    settings_dict,
-)
+from pushplan.evaluation.database import DATABASE, StoredResult
+from pushplan.evaluation.job_identity import differences, same_but_versions, settings_dict
 from pushplan.evaluation.jobs import Job, JobSettings
 from pushplan.evaluation.rows import setting_of
 from pushplan.evaluation.store import RunDirectory
@@ -47,62 +43,58 @@ def note_batch(
 
 def pending_jobs(jobs: Sequence[Job], store: RunDirectory, any_version: bool) -> list[Job]:
     """The `identified` jobs without a result; results of the others count from now on."""
-    done = {job: job for job in store.done()}
+    stored = store.results()
+    _hide_outdated(jobs, stored, store, any_version)
+    done = {one.row.job: one.row.job for one in stored}
     if any_version:
-        done |= {same_but_versions(spec): job for job, spec in store.specs().items()}
-
-    def found(one: Job) -> str | None:
-        other = same_but_versions(one.spec) if any_version and one.spec else one.id
-        return done.get(one.id, done.get(other))
-
-    _hide_outdated(jobs, store, any_version)
-    there = [found(one) for one in jobs]
-    store.show(job for job in there if job is not None)
-    pending = [one for one, job in zip(jobs, there, strict=True) if job is None]
-    keys = store.keys()
-    if changed := [one for one in pending if one.key in keys]:
-        *_, before = store.specs(changed[0].key).values()
+        done |= {same_but_versions(one.spec): one.row.job for one in stored if one.spec}
+    shown, pending = [], []
+    for job in jobs:
+        names = [job.id, *([same_but_versions(job.spec)] if any_version and job.spec else [])]
+        if (there := next((done[name] for name in names if name in done), None)) is None:
+            pending.append(job)
+        else:
+            shown.append(there)
+    store.show(shown)
+    before = {
+        (one.row.policy, one.row.scenario, one.row.seed): one.spec
+        for one in sorted(stored, key=lambda one: one.current)
+    }
+    if changed := [one for one in pending if one.key in before]:
         _log.warning(
             "%d of %d jobs have results in %s from before a change: %s; they are run again, and "
             "the old results stay in %s",
-            *(
-                len(changed),
-                len(jobs),
-                store.path,
-                differences(before, changed[0].spec or {}),
-                DATABASE,
-            ),
+            len(changed),
+            len(jobs),
+            store.path,
+            differences(before[changed[0].key], changed[0].spec or {}),
+            DATABASE,
         )
     return pending
 
 
-def _hide_outdated(jobs: Sequence[Job], store: RunDirectory, any_version: bool) -> None:
+def _hide_outdated(
+    jobs: Sequence[Job], stored: Sequence[StoredResult], store: RunDirectory, any_version: bool
+) -> None:
     """Let results of a policy that is another one now, or was run otherwise, count no more.
 
     They would be averaged with those of now: a label is one policy, and a setting is run one way.
     """
-    policies: dict[str, Any] = {}
-    ways: dict[tuple[str, str], Any] = {}
-    for spec in (job.spec for job in jobs if job.spec):
-        policies[spec["policy"]["label"]] = spec["policy"]["identity"]
-        ways[_setting(spec)] = _way(spec, any_version)
-    outdated = []
-    for job, spec in store.specs(current=True).items():
-        policy = spec.get("policy", {})
-        mine = _way(spec, any_version)
-        changed = policies.get(policy.get("label"), policy.get("identity")) != policy.get(
-            "identity"
-        )
-        if changed or ways.get(_setting(spec), mine) != mine:
-            outdated.append(job)
-    store.hide(outdated)
-
-
-def _setting(spec: Mapping[str, Any]) -> tuple[str, str]:
-    scenario, seed = spec.get("key", ("", 0))
-    return spec.get("policy", {}).get("label", ""), setting_of(scenario, seed)
-
-
-def _way(spec: Mapping[str, Any], any_version: bool) -> list[Any]:
     names = ("settings",) if any_version else ("settings", "versions")
-    return [spec.get(name) for name in names]
+    policies: dict[str, str] = {}
+    ways: dict[tuple[str, str], list[Any]] = {}
+    for job in jobs:
+        assert job.spec is not None
+        policies[job.policy.label] = job.spec["policy"]["identity"]
+        setting = job.policy.label, setting_of(*job.key[1:])
+        ways[setting] = [job.spec[name] for name in names]
+    outdated = []
+    for one in stored:
+        if not one.spec:  # saved from a CSV file, which does not say how it came about
+            continue
+        row, identity = one.row, one.spec.get("policy", {}).get("identity")
+        way = [one.spec.get(name) for name in names]
+        changed = policies.get(row.policy, identity) != identity
+        if changed or ways.get((row.policy, setting_of(row.scenario, row.seed)), way) != way:
+            outdated.append(row.job)
+    store.hide(outdated)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from typing import Any
 
 from matplotlib.figure import Figure
@@ -22,20 +23,17 @@ LINE = 0.15
 
 def dots(index: int) -> dict[str, Any]:
     """Colour and marker of a policy; they repeat together after 64 policies."""
-    count = len(SERIES)
-    return {
-        "color": SERIES[index % count],
-        "marker": MARKERS[(index + index // count) % len(MARKERS)],
-    }
+    return _style(index, "marker", MARKERS)
 
 
 def line(index: int) -> dict[str, Any]:
     """Colour and dashes of a policy."""
-    count = len(SERIES)
-    return {
-        "color": SERIES[index % count],
-        "linestyle": DASHES[(index + index // count) % len(DASHES)],
-    }
+    return _style(index, "linestyle", DASHES)
+
+
+def _style(index: int, name: str, kinds: Sequence[Any]) -> dict[str, Any]:
+    turn, colour = divmod(index, len(SERIES))
+    return {"color": SERIES[colour], name: kinds[(index + turn) % len(kinds)]}
 
 
 def interval(mean: float, low: float, high: float) -> list[list[float]]:

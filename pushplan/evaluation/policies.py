@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import functools
 import re
+from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, is_dataclass
 from hashlib import sha256
@@ -67,7 +68,7 @@ class PolicySpec:
         )
         if not isinstance(self.source, str):
             return f"{described(self.source)}{options}"
-        if (file := _network_file(self.source)) is not None:
+        if (file := self.network) is not None:
             from pushplan.learned.sb3_policy import beside
 
             return f"{file.name}{file_digest(file)}{file_digest(beside(file))}{options}"
@@ -94,9 +95,8 @@ class PolicySpec:
     @property
     def is_ours(self) -> bool:
         """Whether it runs code of pushplan only: a name, or the file of a network."""
-        if not isinstance(self.source, str):
-            return False
-        return ":" not in self.source or self.network is not None
+        named = isinstance(self.source, str) and ":" not in self.source
+        return named or self.network is not None
 
     @property
     def group(self) -> str:
@@ -107,14 +107,25 @@ class PolicySpec:
     @property
     def network(self) -> Path | None:
         """The file of the network, if it is one."""
-        return _network_file(self.source) if isinstance(self.source, str) else None
+        from pushplan.learned.loading import (
+            LEARNED_PREFIXES,
+            learned_file,
+            learned_names,
+            weights_of,
+        )
+
+        if not isinstance(self.source, str):
+            return None
+        if self.source.startswith(LEARNED_PREFIXES):
+            return learned_file(self.source)
+        return weights_of(self.source) if self.source in learned_names() else None
 
     def warm_up(self) -> None:
         """Load, once in a process, what a planner of ours may need in any step of an episode."""
-        if isinstance(self.source, str) and self.is_ours and self.network is None:
+        if self.is_ours and self.network is None:
             from pushplan.planners import warm_up
 
-            warm_up(self.source)
+            warm_up(str(self.source))
 
     def make(self) -> Policy:
         """A fresh policy.
@@ -124,15 +135,15 @@ class PolicySpec:
                 what it raised and where.
         """
         with _saying_what_fails("policy", self.label):
-            if not isinstance(self.source, str) or _is_object(self.source):
+            if not self.is_ours:
                 return as_policy(self._made_object(), self.label)
-            if _network_file(self.source) is not None:
+            if self.network is not None:
                 from pushplan.learned import load_policy
 
-                return load_policy(self.source, self.label, **self.options)
+                return load_policy(str(self.source), self.label, **self.options)
             from pushplan.planners import make_policy
 
-            return make_policy(self.source, **self.options)
+            return make_policy(str(self.source), **self.options)
 
     def make_planner(self) -> Planner:
         """A fresh planner, of a source that `parse_planner` read.
@@ -142,10 +153,10 @@ class PolicySpec:
                 where.
         """
         with _saying_what_fails("planner", self.label):
-            if isinstance(self.source, str) and not _is_object(self.source):
+            if self.is_ours:
                 from pushplan.planners import make_planner
 
-                return make_planner(self.source, **self.options)
+                return make_planner(str(self.source), **self.options)
             made = self._made_object()
         if callable(getattr(made, "plan", None)):
             return cast(Planner, made)
@@ -256,15 +267,6 @@ def policy_names() -> tuple[str, ...]:
     return (*classical_names(), *learned_names())
 
 
-def _network_file(source: str) -> Path | None:
-    """The file of a network, if a source names one."""
-    from pushplan.learned.loading import LEARNED_PREFIXES, learned_file, learned_names, weights_of
-
-    if source.startswith(LEARNED_PREFIXES):
-        return learned_file(source)
-    return weights_of(source) if source in learned_names() else None
-
-
 def parse_policy(given: str | Callable[..., Any] | PolicySpec) -> PolicySpec:
     """Read one policy as users give it.
 
@@ -330,11 +332,6 @@ def _parse_text(given: str, kind: str, names: Sequence[str]) -> PolicySpec:
     return PolicySpec(label or source, source)
 
 
-def _is_object(source: str) -> bool:
-    """Whether a source names a class or another callable, not one of ours or a network's file."""
-    return ":" in source and _network_file(source) is None
-
-
 def _classes_to_give(file: str) -> str:
     """What to give instead of a file alone: its classes that could be policies or planners."""
     with _saying_what_fails("policy", file):
@@ -357,16 +354,12 @@ def parse_policies(
         InvalidInputError: if there is none, or two share a label.
     """
     items: Sequence[Any] = given.split(",") if isinstance(given, str) else given
-    specs = [
-        parse_policy(item.strip() if isinstance(item, str) else item)
-        for item in items
-        if not isinstance(item, str) or item.strip()
-    ]
+    stripped = [item.strip() if isinstance(item, str) else item for item in items]
+    specs = [parse_policy(item) for item in stripped if item != ""]
     if not specs:
         raise InvalidInputError("at least one policy is needed")
-    labels = [spec.label for spec in specs]
-    for label in labels:
-        if labels.count(label) > 1:
+    for label, count in Counter(spec.label for spec in specs).items():
+        if count > 1:
             raise InvalidInputError(
                 f"two policies are labelled {label!r}: tell them apart as 'label=policy'"
             )

@@ -9,17 +9,34 @@ import pickle
 import sys
 import threading
 from collections import deque
-from collections.abc import Callable, Sequence
 from concurrent.futures import BrokenExecutor, Future
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
-from pushplan.evaluation.jobs import BatchStoppedError, JobResult, batch_stopped
+from pushplan.evaluation.jobs import (
+    DEFAULT_ENV,
+    Job,
+    JobResult,
+    JobSettings,
+    batch_stopped,
+    failed_result,
+    timeout_reason,
+)
+from pushplan.evaluation.rows import Status
 from pushplan.evaluation.worker import WorkerSetup
 from pushplan.evaluation.worker_process import WorkerDiedError, WorkerProcess
 from pushplan.world import InvalidInputError
+from pushplan.world.errors import describe
 
+PRELOAD = (
+    "pushplan.evaluation.execute",
+    "pushplan.planners.push_aware.policies",
+    "pushplan.planners.rrt.policies",
+    "pushplan.planners.ship_predictive.policies",
+    "pushplan.envs.push_env",
+    "pushplan.envs.simulators.pymunk_simulator",
+)
+"""What a worker imports before its first job, so that no job's time holds it."""
 _STARTS = 2  # so many workers in a row may end before they are ready until a call gives up
 
 
@@ -27,46 +44,44 @@ _STARTS = 2  # so many workers in a row may end before they are ready until a ca
 class _Call:
     group: str
     payload: bytes
-    future: Future[JobResult]
+    future: Future[JobResult] = field(default_factory=Future)
     tries: int = 2  # so often it may lose its worker to somebody outside
 
 
 class WorkerPool:
-    """Runs calls that return a `JobResult` in processes of its own, one at a time in each.
+    """Runs jobs in processes of its own, one at a time in each.
 
     Unlike the executors of the standard library, Pebble and loky it reads nothing from its workers
-    that could run code, and knows groups of calls: a process answers calls of one group only. It
-    ends calls that take too long or too much memory, with everything that they started, and tries
-    a call again whose process was killed from outside. It does not import the main module of the
-    program unless a call needs it. Workers ignore Ctrl-C and end when their owner does. Results
+    that could run code, and knows groups of policies: a process runs jobs of one group only. It
+    ends jobs that take too long or too much memory, with everything that they started, and tries
+    a job again whose process was killed from outside. It does not import the main module of the
+    program unless a job needs it. Workers ignore Ctrl-C and end when their owner does. Results
     with a true attribute ``tainted`` retire the worker they come from.
 
     Args:
         workers: number of processes.
-        limit_s: wall-clock time after which a call is ended by force [s].
+        settings: of the jobs.
         memory_limit_mb: private memory of a worker at which allocations fail, and memory of it and
             its children, shared or not, at which it is ended [MB].
-        preload: modules that each worker imports before its first call.
         log_dir: folder for what workers write to standard output and error; discarded if None.
     """
 
     def __init__(
         self,
         workers: int,
-        *,
-        limit_s: float | None = None,
-        memory_limit_mb: float | None = None,
-        preload: Sequence[str] = (),
+        settings: JobSettings,
+        memory_limit_mb: float | None,
         log_dir: Path | None = None,
     ) -> None:
         main = getattr(sys.modules.get("__main__"), "__file__", None)
+        limit_s = settings.force_after_s
         self._setup = WorkerSetup(
             main=None if main is None else os.path.abspath(main),
-            preload=tuple(preload),
+            preload=PRELOAD if settings.make_env == DEFAULT_ENV else PRELOAD[:1],
             memory_limit_mb=memory_limit_mb,
             trace_after_s=limit_s,
         )
-        self._most, self._log_dir = workers, log_dir
+        self._most, self._settings, self._log_dir = workers, settings, log_dir
         self._limit_s = math.inf if limit_s is None else limit_s
         self._calls: deque[_Call] = deque()
         self._threads: list[threading.Thread] = []  # one for each worker
@@ -75,17 +90,9 @@ class WorkerPool:
         self._closing = self._killed = False
         self._numbers = itertools.count(1)
 
-    def submit(
-        self, group: str, function: Callable[..., JobResult], *arguments: Any
-    ) -> Future[JobResult]:
-        """Queue one call.
-
-        Args:
-            group: calls of another one never run in the same process.
-            function: what to call; picklable.
-            arguments: for it; picklable.
-        """
-        call = _Call(group, pickle.dumps((function, arguments)), Future())
+    def submit(self, job: Job) -> Future[JobResult]:
+        """Queue one job."""
+        call = _Call(job.policy.group, pickle.dumps((job, self._settings)))
         with self._changed:
             if self._closing:
                 raise RuntimeError("cannot submit to a pool that has been shut down")
@@ -130,7 +137,7 @@ class WorkerPool:
                     worker = self._start(log)
                     worker.group = call.group
                 result = worker.ask(call.payload, self._limit_s)
-            except (BrokenExecutor, InvalidInputError) as error:
+            except InvalidInputError as error:
                 call.future.set_exception(error)
             except WorkerDiedError as error:
                 worker = None
@@ -144,7 +151,7 @@ class WorkerPool:
                 if worker is not None:
                     worker.kill()
                     worker = None
-                call.future.set_exception(BatchStoppedError(batch_stopped(error)))
+                call.future.set_exception(batch_stopped(error))
             else:
                 if result.tainted:
                     worker.end()
@@ -184,4 +191,27 @@ class WorkerPool:
                 ending = f"{error} while it started: {error.log[-500:]}"
             else:
                 return worker
-        raise BrokenExecutor(ending)
+        raise InvalidInputError(f"no worker process can be started: {ending}")
+
+
+def outcome_of(job: Job, future: Future[JobResult], settings: JobSettings) -> JobResult:
+    """Wait for a job; a process that died, overran or took too much memory is a failed result.
+
+    Raises:
+        BrokenExecutor: if the executor as a whole has failed.
+        InvalidInputError: if nothing can run: a worker cannot load what it was sent.
+    """
+    try:
+        return future.result().checked(job)
+    except WorkerDiedError as error:
+        reason, detail = str(error), f"{error}\n{error.log}"
+        if error.status is Status.TIMEOUT:
+            reason = timeout_reason(settings.timeout_s)
+            detail = f"The process did not react and was ended.\n{error.log}"
+        return failed_result(job, error.status, reason, detail)
+    except (BrokenExecutor, InvalidInputError):
+        raise
+    except (OSError, MemoryError, RuntimeError) as error:
+        raise batch_stopped(error) from error
+    except Exception as error:
+        return failed_result(job, Status.CRASHED, describe(error))

@@ -35,7 +35,8 @@ def provenance(workers: int) -> dict[str, Any]:
         ``machine``, ``cores``, ``load`` (of the last minute, None if unknown), ``workers`` and
         ``packages`` (name -> version).
     """
-    commit, changed = _checkout(Path(pushplan.__file__).resolve().parents[1])
+    root = Path(pushplan.__file__).resolve().parents[1]
+    commit, changed = _checkout(root) if (root / ".git").exists() else (None, None)
     return {
         "began": instant(),
         "command": shlex.join([Path(sys.argv[0]).name, *sys.argv[1:]]) if sys.argv[0] else "",
@@ -80,21 +81,12 @@ def packages() -> dict[str, str]:
 
 def _checkout(root: Path) -> tuple[str | None, bool | None]:
     """Commit of the code that runs, and whether it has been changed."""
-    if not (root / ".git").exists():
-        return None, None
-    try:
-        commit = _git(root, "rev-parse", "HEAD")
-        return commit, bool(_git(root, "status", "--porcelain", "--untracked-files=no"))
-    except (OSError, subprocess.SubprocessError):
-        return None, None
-
-
-def _git(root: Path, *words: str) -> str:
-    done = subprocess.run(
-        ["git", "-C", str(root), *words],
-        capture_output=True,
-        text=True,
-        check=True,
-        timeout=_GIT_S,
-    )
-    return done.stdout.strip()
+    said = []
+    for words in (["rev-parse", "HEAD"], ["status", "--porcelain", "--untracked-files=no"]):
+        command = ["git", "-C", str(root), *words]
+        try:
+            done = subprocess.run(command, capture_output=True, check=True, timeout=_GIT_S)
+        except (OSError, subprocess.SubprocessError):
+            return None, None
+        said.append(done.stdout.decode().strip())
+    return said[0], bool(said[1])

@@ -65,7 +65,7 @@ def reproduce(path: str | Path, job: str) -> Reproduction:
         (row,) = run_batch([again], out=folder, workers=1, settings=settings)
         names = [name for name in columns() if name not in (*TIMING_COLUMNS, "job")]
         found = [name for name in names if getattr(row, name) != getattr(stored.row, name)]
-        found += _differing_arrays(_episode(Path(path), stored.row), _episode(Path(folder), row))
+        found += _differing_parts(_episode(Path(path), stored.row), _episode(Path(folder), row))
     changed = differences(stored.spec, job_spec(again, settings))
     return Reproduction(stored.row, row, tuple(found), changed)
 
@@ -86,17 +86,14 @@ def _episode(path: Path, row: ResultRow) -> Episode | None:
     return None if row.trace_file is None else Episode.load(path / row.trace_file)
 
 
-def _differing_arrays(first: Episode | None, second: Episode | None) -> list[str]:
+def _differing_parts(first: Episode | None, second: Episode | None) -> list[str]:
     if first is None or second is None:
         return [] if first is second else ["episode"]
-    found = [
-        name
-        for name in _ARRAYS
-        if not np.array_equal(getattr(first, name), getattr(second, name), equal_nan=True)
-    ]
-    for name in _TIMES:
-        if len(getattr(first, name)) != len(getattr(second, name)):
-            found.append(name)
-    if first.plans != second.plans:
-        found.append("plans")
-    return found + [n for n in ("about",) if dict(first.about) != dict(second.about)]
+    same = {}
+    for name in (*_ARRAYS, *_TIMES):
+        one, two = getattr(first, name), getattr(second, name)
+        timed = name in _TIMES  # which are never the same, but as many
+        same[name] = len(one) == len(two) if timed else np.array_equal(one, two, equal_nan=True)
+    same["plans"] = first.plans == second.plans
+    same["about"] = dict(first.about) == dict(second.about)
+    return [name for name, equal in same.items() if not equal]

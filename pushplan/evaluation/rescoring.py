@@ -44,7 +44,10 @@ def rescore(path: str | Path, metrics: Sequence[str] = (), *, columns: bool = Tr
         InvalidInputError: if another process writes there.
     """
     wanted = {metric_label(metric): metric for metric in metrics}
-    sources = {label: _source(metric) for label, metric in wanted.items()}
+    sources = {}  # what tells versions of a metric apart: a hash of its file, or of our code
+    for label, metric in wanted.items():
+        metric_function(metric)
+        sources[label] = source_digest(metric.rpartition(":")[0]) or code_digest()
     changed: list[str] = []
     unreadable: list[str] = []
     scored = 0
@@ -66,7 +69,7 @@ def rescore(path: str | Path, metrics: Sequence[str] = (), *, columns: bool = Tr
             new = scored_row(row, episode, row.plan_calls) if columns else row
             if new != row:
                 changed.append(row.job)
-                store.rescore(new)
+                store.add(new, spec=stored.spec, show=stored.current)
             values = compute(episode, [wanted[label] for label in missing])
             store.measure(
                 (row.job, label, sources[label], values.get(wanted[label])) for label in missing
@@ -80,10 +83,3 @@ def metric_label(metric: str) -> str:
     """What a metric is called in results: its name, a file's without its folder."""
     where, colon, name = metric.rpartition(":")
     return f"{Path(where).name}{colon}{name}" if where.endswith(".py") else metric
-
-
-def _source(metric: str) -> str:
-    """What tells versions of a metric apart: a hash of its file, or of our code."""
-    metric_function(metric)
-    where, _, _ = metric.rpartition(":")
-    return source_digest(where) or code_digest()

@@ -3,23 +3,26 @@
 from __future__ import annotations
 
 import functools
+import io
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 from pushplan.evaluation.database import DATABASE
 from pushplan.evaluation.gaps import gaps
 from pushplan.evaluation.rescoring import metric_label, rescore
-from pushplan.evaluation.rows import rows_csv
-from pushplan.evaluation.run_record import RunRecord
-from pushplan.evaluation.statistics import estimate
+from pushplan.evaluation.rows import ResultRow, columns, rows_csv
 from pushplan.evaluation.store import open_results, remove_report
 from pushplan.evaluation.summary import (
     PairedDifference,
     PolicySummary,
+    natural,
     paired_differences,
+    policies_of,
+    settings_of,
+    summarise,
 )
 from pushplan.evaluation.table_formats import differences_csv, markdown, summary_csv, text
 from pushplan.evaluation.tables import (
@@ -32,15 +35,27 @@ from pushplan.evaluation.tables import (
     score_tables,
 )
 from pushplan.scenarios.known_bounds import known_bounds
-from pushplan.world import InvalidInputError, UnknownNameError
+from pushplan.world import Episode, InvalidInputError, UnknownNameError
 from pushplan.world.checks import choice, integer
 from pushplan.world.libraries import need
 from pushplan.world.output_files import check_folder, write_atomic
 
 
 @dataclass(frozen=True)
-class Results(RunRecord):
+class Results:
     """What a run says: summaries, paired differences, tables and a report."""
+
+    rows: tuple[ResultRow, ...]  # by the titles of their settings, otherwise as given
+    # configuration, policies and titles of the settings
+    about: Mapping[str, Any] = field(default_factory=dict)
+    path: Path | None = None  # the run directory; None for rows that come from elsewhere
+    # job -> value by name of metrics that are no columns
+    measured: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        place = {setting: natural(title) for setting, title in self.titles.items()}
+        rows = sorted(self.rows, key=lambda row: place[row.setting])
+        object.__setattr__(self, "rows", tuple(rows))
 
     @classmethod
     def load(cls, path: str | Path) -> Results:
@@ -52,9 +67,51 @@ class Results(RunRecord):
         rows, about, measured = open_results(path)
         return cls(tuple(rows), about, Path(path), measured)
 
+    @property
+    def policies(self) -> list[str]:
+        """Labels, in the order in which they were given."""
+        return policies_of(self.rows, list(self.about.get("policies", {})))
+
+    @property
+    def titles(self) -> dict[str, str]:
+        """Words for each setting."""
+        known = self.about.get("settings", {})
+        return {setting: known.get(setting, setting) for setting in settings_of(self.rows)}
+
+    @functools.cached_property
+    def pooled(self) -> Self:
+        """The rows of all settings as one setting."""
+        title = f"All {len(self.titles)} settings together"
+        rows = tuple(replace(row, pool=title) for row in self.rows)
+        return replace(self, rows=rows, about={**self.about, "settings": {}})
+
+    def rows_of(self, setting: str) -> list[ResultRow]:
+        """The rows of one setting."""
+        return [row for row in self.rows if row.setting == setting]
+
+    def policies_in(self, setting: str) -> dict[str, int]:
+        """Labels of the policies that ran in a setting -> their places in `policies`."""
+        ran = {row.policy for row in self.rows_of(setting)}
+        return {label: place for place, label in enumerate(self.policies) if label in ran}
+
+    def episode(self, row: ResultRow) -> Episode | None:
+        """The recorded episode of a row; None if none was kept.
+
+        Raises:
+            SchemaError: if it cannot be read.
+        """
+        if self.path is None or row.trace_file is None:
+            return None
+        path = self.path / row.trace_file
+        return Episode.load(path) if path.is_file() else None
+
     def summary(self) -> list[PolicySummary]:
         """What the rows say about each policy in each setting."""
-        return list(self.summaries)
+        return list(self._summaries)
+
+    @functools.cached_property
+    def _summaries(self) -> list[PolicySummary]:
+        return summarise(self.rows, self.policies)
 
     def compare(self, pairs: str = "first") -> list[PairedDifference]:
         """Paired differences of policies on the same scenarios.
@@ -91,18 +148,8 @@ class Results(RunRecord):
             raise InvalidInputError(
                 f"{self.path} has no readable episode of {len(done.unreadable) or 'any'} jobs"
             )
-        return self._measured_tables([metric_label(metric) for metric in metrics], measured)
-
-    def _measured_tables(
-        self, metrics: Sequence[str], measured: Mapping[str, Mapping[str, float]]
-    ) -> list[Table]:
-        values: dict[tuple[str, str, str], list[float]] = {}
-        for row in self.rows:
-            for name in metrics:
-                if (value := measured.get(row.job, {}).get(name)) is not None:
-                    values.setdefault((row.setting, row.policy, name), []).append(value)
-        estimates = {key: estimate(found) for key, found in values.items()}
-        return measured_tables(estimates, self.policies, metrics, self.titles) if values else []
+        names = [metric_label(metric) for metric in metrics]
+        return measured_tables(self.rows, measured, names, self.policies, self.titles)
 
     def tables(
         self, *, wide: bool = False, settings: bool = False, pairs: str = "first"
@@ -120,12 +167,13 @@ class Results(RunRecord):
         found = self.pooled.tables(wide=wide, pairs=pairs) if len(titles) > 1 else []
         if found and not settings:
             return found
+        metrics = self.about.get("metrics", [])
         together = aggregate_table(self.rows, self.policies) if wide else None
         return [
             *found,
             *([together] if together else []),
             *score_tables(self.summary(), titles, wide=wide),
-            *self._measured_tables(self.about.get("metrics", []), self.measured),
+            *measured_tables(self.rows, self.measured, metrics, self.policies, titles),
             *gap_tables(gaps(self.rows, self.policies, known_bounds()), titles),
             *difference_tables(self.compare(pairs), titles, wide=wide),
         ]
@@ -172,9 +220,24 @@ class Results(RunRecord):
             InvalidInputError: if the file ends otherwise, or its folder does not exist.
             MissingDependencyError: for Parquet, without PyArrow.
         """
-        from pushplan.evaluation.exporting import export
-
-        export(self, Path(path))
+        path = Path(path)
+        if path.suffix not in (".csv", ".parquet"):
+            raise InvalidInputError(f"rows are written as .csv or .parquet, got {path.name!r}")
+        if not path.absolute().parent.is_dir():
+            raise InvalidInputError(f"there is no folder {path.parent} for {path.name!r}")
+        more = {
+            name: [self.measured.get(row.job, {}).get(name) for row in self.rows]
+            for name in self.about.get("metrics", [])
+        }
+        if path.suffix == ".csv":
+            data = rows_csv(self.rows, more).encode()
+        else:
+            named = {name: [getattr(row, name) for row in self.rows] for name in columns()}
+            buffer = io.BytesIO()
+            table = need("pyarrow").table({**named, **more})
+            need("pyarrow.parquet").write_table(table, buffer)
+            data = buffer.getvalue()
+        write_atomic(path, data)
         return len(self.rows)
 
     def report(
@@ -213,9 +276,15 @@ class Results(RunRecord):
         folder = Path(out) if out is not None else self.path or Path()
         if not is_page(folder / PAGE):
             check_folder(folder, "run directory", DATABASE)
-        self._check_same_run(folder)
+        there = open_results(folder)[0] if os.path.lexists(folder / DATABASE) else self.rows
+        if set(there) != set(self.rows):
+            raise InvalidInputError(
+                f"{folder} is the directory of a run with {len(there)} rows, which are not the "
+                f"{len(self.rows)} of these results: report to another folder, or report that run "
+                f"with Results.load({str(folder)!r}).report()"
+            )
         folder.mkdir(parents=True, exist_ok=True)
-        if (folder / DATABASE).is_file() or (folder / "report.html").is_file():
+        if (folder / DATABASE).is_file() or (folder / PAGE).is_file():
             remove_report(folder)
         write_atomic(folder / "results.csv", rows_csv(self.rows).encode())
         tables = self.tables(wide=True, settings=True, pairs=pairs)
@@ -226,14 +295,3 @@ class Results(RunRecord):
         write_atomic(folder / "differences.csv", differences_csv(compared, self.titles).encode())
         drawn = plots.write_plots(self, folder, figures)
         return write_page(self, tables, drawn, folder, replays=replays, most=most)
-
-    def _check_same_run(self, folder: Path) -> None:
-        if not os.path.lexists(folder / DATABASE):
-            return
-        there, _, _ = open_results(folder)
-        if set(there) != set(self.rows):
-            raise InvalidInputError(
-                f"{folder} is the directory of a run with {len(there)} rows, which are not the "
-                f"{len(self.rows)} of these results: report to another folder, or report that run "
-                f"with Results.load({str(folder)!r}).report()"
-            )

@@ -155,43 +155,44 @@ class ResultRow:
 
 
 _ROUNDING = 1e-6
-_TEXTS = ("policy", "task", "simulator", "scenario", "status", "reason", "host", "job", "trace")
-_INSTANT = re.compile(r"(\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d\.\d{3}Z)?")
 _TEXT = re.compile(r"[^\x00-\x1f\x7f-\x9f\ud800-\udfff]{0,1000}")
 """Texts that may be shown on a terminal."""
-_FILE_NAMES = {"job": re.compile(r"[\w-]{0,64}", re.ASCII), "trace": re.compile("([0-9a-f]{32})?")}
-"""Hashes that name files in a run directory."""
-_OWN = tuple(item.name for item in fields(ResultRow) if item.name != "pool")
-_TIMES = tuple(
-    name for name in _OWN if name.startswith(("wall_time", "plan_time", "decision_time"))
-)
+_FORMS = {
+    "began": re.compile(r"(\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d\.\d{3}Z)?"),
+    # hashes that name files in a run directory
+    "job": re.compile(r"[\w-]{0,64}", re.ASCII),
+    "trace": re.compile("([0-9a-f]{32})?"),
+}
+_OWN = {item.name: str(item.type) for item in fields(ResultRow) if item.name != "pool"}
+_TEXTS = tuple(name for name, kind in _OWN.items() if kind == "str")
+_TIMES = tuple(name for name, kind in _OWN.items() if kind == "float | None")
 TIMING_COLUMNS = (*_TIMES, "began", "host", "trace")
 """Columns that differ from run to run: times are in the recorded episodes too."""
 
 
 def columns() -> tuple[str, ...]:
     """Names of the columns of ``results.csv``, in order: each metric that is one among them."""
-    at = _OWN.index("metrics")
+    own = list(_OWN)
+    at = own.index("metrics")
     shown = metric_names(Role.SCORE, Role.DETAIL, Role.FACT)
-    return (*_OWN[:at], *shown, *_OWN[at + 1 :])
+    return (*own[:at], *shown, *own[at + 1 :])
+
+
+def column_type(name: str) -> str:
+    """Type of the values of a column: ``"str"``, ``"bool"``, ``"int"`` or ``"float"``."""
+    if name in _OWN:
+        return _OWN[name].removesuffix(" | None")
+    return "int" if METRICS[name].whole else "float"
 
 
 def rows_csv(rows: Sequence[ResultRow], more: Mapping[str, Sequence[object]] | None = None) -> str:
     """The rows as CSV with a header, and further columns behind."""
     names, more = columns(), more or {}
-    lines = (
-        [_cell(value) for value in (*(getattr(row, name) for name in names), *rest)]
-        for row, *rest in zip(rows, *more.values(), strict=True)
-    )
+    lines = []
+    for row, *rest in zip(rows, *more.values(), strict=True):
+        values = [*(getattr(row, name) for name in names), *rest]
+        lines.append([int(value) if isinstance(value, bool) else value for value in values])
     return csv_text([*names, *more], lines)
-
-
-def _cell(value: object) -> object:
-    if value is None:
-        return ""
-    if isinstance(value, bool):
-        return int(value)
-    return repr(float(value)) if isinstance(value, float) else value
 
 
 def setting_of(scenario: str, seed: int) -> str:
@@ -221,13 +222,13 @@ def row_from_texts(texts: Mapping[str, str | None]) -> ResultRow:
     values: dict[str, Any] = {}
     for name in columns():
         text = texts.get(name) or ""
-        whole = name in ("seed", "plan_calls") or (name in METRICS and METRICS[name].whole)
-        if name in _TEXTS or name == "began":
+        kind = column_type(name)
+        if kind == "str":
             values[name] = text
-        elif name == "success":
+        elif kind == "bool":
             values[name] = {"1": True, "0": False}[text]
         else:
-            values[name] = (int if whole else float)(text) if text else None
+            values[name] = (int if kind == "int" else float)(text) if text else None
     return checked_row(ResultRow.from_columns(values))
 
 
@@ -240,16 +241,12 @@ def checked_row(row: ResultRow) -> ResultRow:
     if not isinstance(row.metrics, Mapping):
         raise TypeError(f"metrics is {row.metrics!r:.60}")
     for name in _TEXTS:
-        if type(getattr(row, name)) is not str and not isinstance(getattr(row, name), Status):
-            raise TypeError(f"{name} is {getattr(row, name)!r:.60}")
-        if not _TEXT.fullmatch(getattr(row, name)):
-            raise ValueError(f"{name} is {getattr(row, name)!r:.60}")
-    for name, form in _FILE_NAMES.items():
-        if not form.fullmatch(getattr(row, name)):
-            raise ValueError(f"{name} is {getattr(row, name)!r:.60}")
+        text = getattr(row, name)
+        if type(text) not in (str, Status):
+            raise TypeError(f"{name} is {text!r:.60}")
+        if not _FORMS.get(name, _TEXT).fullmatch(text):
+            raise ValueError(f"{name} is {text!r:.60}")
     Status(row.status)
-    if not _INSTANT.fullmatch(row.began):
-        raise ValueError(f"began is {row.began!r:.60}")
     if type(row.success) is not bool or type(row.seed) is not int or abs(row.seed) >= 2**63:
         raise TypeError(f"success is {row.success!r:.60} and seed {row.seed!r:.60}")
     for name in (*_TIMES, "plan_calls"):
@@ -306,29 +303,21 @@ def scored_row(row: ResultRow, episode: Episode, plan_calls: int | None) -> Resu
         name: int(value) if METRICS[name].whole else value
         for name, value in compute(episode, names).items()
     }
-    success = episode.success and not row.failed
-    times = {**_plan_times(episode, plan_calls), **_decision_times(episode)}
-    return replace(row, success=success, metrics={**row.metrics, **found}, **times)
-
-
-def _plan_times(episode: Episode, plan_calls: int | None) -> Mapping[str, Any]:
-    times = episode.plan_times_s
-    if plan_calls is None or len(times) == 0:
-        return {"plan_calls": plan_calls}
-    return {
-        "plan_calls": plan_calls,
-        "plan_time_median_s": float(np.median(times)),
-        "plan_time_p99_s": float(np.percentile(times, 99.0)),
-        "plan_time_max_s": float(times.max()),
-    }
-
-
-def _decision_times(episode: Episode) -> Mapping[str, float]:
-    times = episode.act_times_s
-    if len(times) == 0:
-        return {}
-    return {
-        "decision_time_median_s": float(np.median(times[:: episode.about.get("held_for", 1)])),
-        "decision_time_mean_s": float(times.mean()),
-        "decision_time_max_s": float(times.max()),
-    }
+    times: dict[str, float] = {}
+    calls, decisions = episode.plan_times_s, episode.act_times_s
+    if plan_calls is not None and len(calls):
+        times["plan_time_median_s"] = float(np.median(calls))
+        times["plan_time_p99_s"] = float(np.percentile(calls, 99.0))
+        times["plan_time_max_s"] = float(calls.max())
+    if len(decisions):
+        held = episode.about.get("held_for", 1)
+        times["decision_time_median_s"] = float(np.median(decisions[::held]))
+        times["decision_time_mean_s"] = float(decisions.mean())
+        times["decision_time_max_s"] = float(decisions.max())
+    return replace(
+        row,
+        success=episode.success and not row.failed,
+        metrics={**row.metrics, **found},
+        plan_calls=plan_calls,
+        **times,  # type: ignore[arg-type]
+    )

@@ -13,14 +13,13 @@ from typing import Any
 
 from pushplan.evaluation.database import (
     DATABASE,
-    columns_of,
+    StoredResult,
     database_of,
     open_checked,
     read_about,
-    read_spec,
-    row_of,
+    result_of,
 )
-from pushplan.evaluation.rows import ResultRow, columns, csv_lines, row_from_texts
+from pushplan.evaluation.rows import ResultRow, csv_lines, row_from_texts
 from pushplan.evaluation.store import RunDirectory, files_of
 from pushplan.world import InvalidInputError, SchemaError
 
@@ -58,41 +57,41 @@ def salvage(path: str | Path, out: str | Path) -> Salvaged:
         raise InvalidInputError(f"{path} holds neither {DATABASE} nor results.csv")
     if os.path.lexists(Path(out) / DATABASE):
         raise InvalidInputError(f"{out} holds a run already: choose another folder")
-    found = {row.job: (row, spec, shown) for row, spec, shown in _from_database(path / DATABASE)}
+    notes, found = _from_database(path)
     of_database = len(found)
     for row in _from_csv(path / "results.csv"):
-        found.setdefault(row.job, (row, {}, True))
+        found.setdefault(row.job, StoredResult(row, {}, True))
     without = []
     with RunDirectory(out) as store:
-        for key, value in _notes(path / DATABASE).items():
-            store.note(key, value)
-        for row, spec, shown in found.values():
-            trace, detail = files_of(path, row)
-            if row.trace and trace is None:
-                without.append(row.job)
-            store.add(replace(row, trace=""), trace, detail, spec, show=shown)
+        for key, value in notes.items():
+            if key != "schema":
+                store.note(key, value)
+        for one in found.values():
+            trace, detail = files_of(path, one.row)
+            if one.row.trace and trace is None:
+                without.append(one.row.job)
+            store.add(replace(one.row, trace=""), trace, detail, one.spec, show=one.current)
         store.write_csv()
     return Salvaged(len(found), len(found) - of_database, tuple(without))
 
 
-def _from_database(file: Path) -> Iterator[tuple[ResultRow, dict[str, Any], bool]]:
-    """Each row by its number: one that cannot be read costs no other."""
-    with contextlib.suppress(*_BAD), contextlib.closing(_opened(file)) as db:
-        names = [name for name in columns() if name in columns_of(db)]
-        listed = ", ".join(f'"{name}"' for name in names)
-        query = f"SELECT {listed}, spec, current FROM results WHERE rowid = ?"
+def _from_database(path: Path) -> tuple[dict[str, Any], dict[str, StoredResult]]:
+    """Notes, and each row by its number: one that cannot be read costs no other."""
+    notes: dict[str, Any] = {}
+    found: dict[str, StoredResult] = {}
+    with contextlib.suppress(*_BAD), contextlib.closing(open_checked(database_of(path))) as db:
+        with contextlib.suppress(*_BAD):
+            notes = read_about(db)
         misses = number = 0
         while misses < _MISSES:
-            number, misses = number + 1, misses + 1
+            number += 1
+            misses += 1
             with contextlib.suppress(*_BAD):
-                for *values, spec, current in db.execute(query, (number,)):
+                for values in db.execute("SELECT * FROM results WHERE rowid = ?", (number,)):
                     misses = 0
-                    row = row_of(dict(zip(names, values, strict=True)))
-                    yield row, read_spec(spec), bool(current)
-
-
-def _opened(file: Path) -> sqlite3.Connection:
-    return open_checked(database_of(file.parent))
+                    one = result_of(dict(values))
+                    found[one.row.job] = one
+    return notes, found
 
 
 def _from_csv(file: Path) -> Iterator[ResultRow]:
@@ -100,9 +99,3 @@ def _from_csv(file: Path) -> Iterator[ResultRow]:
         for line in csv_lines(file):
             with contextlib.suppress(*_BAD):
                 yield row_from_texts(line)
-
-
-def _notes(file: Path) -> dict[str, Any]:
-    with contextlib.suppress(*_BAD), contextlib.closing(_opened(file)) as db:
-        return {key: value for key, value in read_about(db).items() if key != "schema"}
-    return {}

@@ -117,17 +117,18 @@ def _file_of(module: str) -> Path | None:
 @functools.lru_cache(maxsize=1024)
 def _imports(file: Path, *_version: int) -> tuple[tuple[int, str], ...]:
     """Dots before and name of each module that a file of source may import."""
-    found: dict[tuple[int, str], None] = {}
+    found: list[tuple[int, str]] = []
     with contextlib.suppress(SyntaxError, ValueError):  # no source: an extension, for one
         for node in ast.walk(ast.parse(file.read_bytes())):
-            if isinstance(node, ast.Import):
-                found |= dict.fromkeys((0, one.name) for one in node.names)
-            elif isinstance(node, ast.ImportFrom):
-                start = f"{node.module}." if node.module else ""
-                found |= dict.fromkeys((node.level, start + one.name) for one in node.names)
-            elif isinstance(node, ast.Call) and ast.unparse(node.func).endswith(_IMPORTERS):
-                named = [one.value for one in node.args[:1] if isinstance(one, ast.Constant)]
-                found |= dict.fromkeys((0, str(name)) for name in named)
+            match node:
+                case ast.Import(names):
+                    found += [(0, one.name) for one in names]
+                case ast.ImportFrom(module, names, level):
+                    start = f"{module}." if module else ""
+                    found += [(level, start + one.name) for one in names]
+                case ast.Call(function, [ast.Constant(name), *_]):
+                    if ast.unparse(function).endswith(_IMPORTERS):
+                        found.append((0, str(name)))
     return tuple(found)
 
 

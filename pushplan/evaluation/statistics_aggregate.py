@@ -54,7 +54,7 @@ def interquartile_mean(scores: Strata) -> Aggregate:
     def middle(drawn: list[list[FloatArray]]) -> FloatArray:
         return np.asarray(stats.trim_mean(np.concatenate(drawn[0], axis=1), 0.25, axis=1))
 
-    return _aggregate([scores], middle)
+    return Aggregate(*map(float, _bootstrap([scores], middle)))
 
 
 def probability_of_improvement(first: Strata, second: Strata) -> Aggregate:
@@ -78,7 +78,7 @@ def probability_of_improvement(first: Strata, second: Strata) -> Aggregate:
         found = [_mann_whitney(x, y) for x, y in zip(*drawn, strict=True)]
         return np.asarray(np.mean(found, axis=0))
 
-    return _aggregate([first, second], exceeds)
+    return Aggregate(*map(float, _bootstrap([first, second], exceeds)))
 
 
 def performance_profile(scores: Strata, thresholds: FloatArray) -> Profile:
@@ -109,13 +109,6 @@ def _mann_whitney(first: FloatArray, second: FloatArray) -> FloatArray:
     ranks = stats.rankdata(np.concatenate([first, second], axis=1), axis=1)
     above = ranks[:, :count].sum(axis=1) - 0.5 * count * (count + 1)
     return np.asarray(above / (count * second.shape[1]))
-
-
-def _aggregate(
-    samples: Sequence[Strata], statistic: Callable[[list[list[FloatArray]]], FloatArray]
-) -> Aggregate:
-    value, low, high = _bootstrap(samples, statistic)
-    return Aggregate(float(value), float(low), float(high))
 
 
 def _bootstrap(

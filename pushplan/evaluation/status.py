@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sqlite3
 import time
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -54,30 +53,29 @@ def run_status(path: str | Path, slowest: int = 3) -> RunStatus:
     """
     active = is_locked(Path(path) / LOCK)
     with reading(path) as db:
-        return _look(db, active, slowest)
-
-
-def _look(db: sqlite3.Connection, active: bool | None, slowest: int) -> RunStatus:
-    *_, call = read_about(db).get("runs", []) or [{}]
-    began = str(call.get("began", ""))
-    ((failed,),) = db.execute("SELECT count(*) FROM results WHERE status != ?", (str(Status.DONE),))
-    ((new, last),) = db.execute(
-        "SELECT count(*), max(began) FROM results WHERE began >= ?", (began,)
-    )
+        *_, call = read_about(db).get("runs", []) or [{}]
+        began = str(call.get("began", ""))
+        query = "SELECT count(*) FROM results WHERE status != ?"
+        ((failed,),) = db.execute(query, (str(Status.DONE),))
+        query = "SELECT count(*), max(began) FROM results WHERE began >= ?"
+        ((new, last),) = db.execute(query, (began,))
+        flying = db.execute("SELECT title, began FROM running ORDER BY began")
+        running = tuple(
+            (one_line(str(title)), time.time() - number("began", start)) for title, start in flying
+        )
+        took = db.execute(
+            "SELECT policy || ' ' || scenario, wall_time_s FROM results "
+            "WHERE wall_time_s IS NOT NULL ORDER BY wall_time_s DESC LIMIT ?",
+            (slowest,),
+        )
+        longest = tuple(
+            (one_line(str(title)), number("wall_time_s", seconds)) for title, seconds in took
+        )
     end = datetime.now(UTC) if active or not last else datetime.fromisoformat(last)
     elapsed = (end - datetime.fromisoformat(began)).total_seconds() if began else 0.0
     jobs = int(call.get("jobs", 0))
     done = min(jobs, int(call.get("done", 0)) + new)
     rate = new / elapsed if elapsed > 0.0 else 0.0
-    flying = db.execute("SELECT title, began FROM running ORDER BY began")
-    running = tuple(
-        (one_line(str(title)), time.time() - number("began", start)) for title, start in flying
-    )
-    took = db.execute(
-        "SELECT policy || ' ' || scenario, wall_time_s FROM results WHERE wall_time_s IS NOT NULL "
-        "ORDER BY wall_time_s DESC LIMIT ?",
-        (slowest,),
-    )
     return RunStatus(
         active=active,
         jobs=jobs,
@@ -86,7 +84,5 @@ def _look(db: sqlite3.Connection, active: bool | None, slowest: int) -> RunStatu
         per_minute=60.0 * rate,
         left_s=(jobs - done) / rate if rate and done < jobs else None,
         running=running if active else (),
-        slowest=tuple(
-            (one_line(str(title)), number("wall_time_s", seconds)) for title, seconds in took
-        ),
+        slowest=longest,
     )

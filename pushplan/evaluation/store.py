@@ -13,12 +13,10 @@ import time
 from collections.abc import Container, Iterable, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
-from types import TracebackType
 from typing import Any
 
 from pushplan.evaluation.database import (
     DATABASE,
-    HIDE_OTHERS,
     LOCK,
     StoredResult,
     clear_errors,
@@ -30,7 +28,6 @@ from pushplan.evaluation.database import (
     read_measured,
     read_results,
     read_rows,
-    read_spec,
     reading,
 )
 from pushplan.evaluation.rows import ResultRow, Status, rows_csv
@@ -40,6 +37,11 @@ from pushplan.world.output_files import TEMPORARY, check_folder, make_folder, wr
 from pushplan.world.safe_files import MAX_BYTES, read_bytes
 
 _log = logging.getLogger(__name__)
+_HIDE_OTHERS = (
+    "UPDATE results SET current = (job = ?) WHERE (policy, scenario, seed) = "
+    "(SELECT policy, scenario, seed FROM results WHERE job = ?)"
+)
+"""Let the result of one job be the one that counts for its policy and scenario."""
 _MAX_DETAIL = 1_000_000  # bytes of a traceback
 _EPISODE = re.compile(r"[0-9a-f]{32}\.npz(\.tmp)?")
 """Names of recorded episodes, and of those that version 0.2 left half written."""
@@ -90,10 +92,10 @@ class RunDirectory:
             with clear_errors(self.path):
                 if not os.path.lexists(file):  # the mark of a run directory comes first
                     write_atomic(file, new_database())
-                make_folder(self.episodes)
-                make_folder(self.failures)
-                for folder in (self.path, self.episodes, self.failures):
-                    _remove(folder, TEMPORARY)
+                _remove(self.path, TEMPORARY)
+                for name in ("episodes", "failures"):
+                    make_folder(self.path / name)
+                    _remove(self.path / name, TEMPORARY)
             self._db = connect(file)
         except BaseException:
             os.close(self._lock)
@@ -105,23 +107,12 @@ class RunDirectory:
     def __enter__(self) -> RunDirectory:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self.close()
-
-    @property
-    def episodes(self) -> Path:
-        """Folder of the recorded episodes."""
-        return self.path / "episodes"
-
-    @property
-    def failures(self) -> Path:
-        """Folder of the tracebacks of failed jobs."""
-        return self.path / "failures"
+    def __exit__(self, *_: object) -> None:
+        """Fold the write-ahead log into the database file and let others write."""
+        with contextlib.suppress(sqlite3.Error):
+            self._db.execute("PRAGMA wal_checkpoint(TRUNCATE)")
+        self._db.close()
+        os.close(self._lock)
 
     @contextlib.contextmanager
     def _use(self) -> Iterator[sqlite3.Connection]:
@@ -143,40 +134,10 @@ class RunDirectory:
         """Add entries to a JSON mapping about the run."""
         self.note(key, {**self.about().get(key, {}), **entries})
 
-    def append(self, key: str, value: Any) -> None:
-        """Add a value to a JSON list about the run."""
-        self.note(key, [*self.about().get(key, []), value])
-
-    def done(self) -> set[str]:
-        """Every job that has a result."""
-        with self._use() as db:
-            return {job for (job,) in db.execute("SELECT job FROM results")}
-
-    def keys(self) -> set[tuple[str, str, int]]:
-        """(policy, scenario, seed) of every result."""
-        with self._use() as db:
-            return set(db.execute("SELECT DISTINCT policy, scenario, seed FROM results"))
-
-    def specs(
-        self, key: tuple[str, str, int] | None = None, *, current: bool = False
-    ) -> dict[str, dict[str, Any]]:
-        """Job -> what `job_spec` said, of all results or those of a policy, scenario and seed.
-
-        Args:
-            key: policy, scenario and seed.
-            current: leave out results that do not count now.
-        """
-        where = "1" if key is None else "(policy, scenario, seed) = (?, ?, ?)"
-        least = int(current)
-        with self._use() as db:
-            query = f"SELECT job, spec FROM results WHERE {where} AND current >= {least}"
-            found = db.execute(query, key or ())
-            return {job: read_spec(spec) for job, spec in found}
-
     def show(self, jobs: Iterable[str]) -> None:
         """Let these results be the ones that count for their policies and scenarios."""
         with self._use() as db:
-            db.executemany(HIDE_OTHERS, ((job, job) for job in jobs))
+            db.executemany(_HIDE_OTHERS, ((job, job) for job in jobs))
 
     def hide(self, jobs: Iterable[str]) -> None:
         """Let these results count no more, until they are shown again."""
@@ -216,9 +177,9 @@ class RunDirectory:
                 write_atomic(self.path / row.trace_file, trace)
             if detail:
                 write_atomic(self.path / row.detail_file, detail.encode(errors="replace"))
-            insert(db, row, json.dumps(spec or {}))
+            insert(db, row, spec or {})
             if show:
-                db.execute(HIDE_OTHERS, (row.job, row.job))
+                db.execute(_HIDE_OTHERS, (row.job, row.job))
             db.execute("DELETE FROM running WHERE job = ?", (row.job,))
         return row
 
@@ -231,14 +192,7 @@ class RunDirectory:
         """Remove recorded episodes that no result names: of calls that were killed or forgotten."""
         with self._use() as db:
             named = {f"{trace}.npz" for (trace,) in db.execute("SELECT trace FROM results")}
-            _remove(self.episodes, _EPISODE, named)
-
-    def rescore(self, row: ResultRow) -> None:
-        """Replace a row by one of the same job."""
-        with self._use() as db:
-            query = "SELECT spec, current FROM results WHERE job = ?"
-            ((spec, current),) = db.execute(query, (row.job,))
-            insert(db, row, spec, current)
+            _remove(self.path / "episodes", _EPISODE, named)
 
     def measure(self, values: Iterable[tuple[str, str, str, float | None]]) -> None:
         """Keep values of metrics that are no columns: job, metric, its source, value."""
@@ -269,13 +223,6 @@ class RunDirectory:
                 remove_report(self.path)
                 write_atomic(path, text)
         return path
-
-    def close(self) -> None:
-        """Fold the write-ahead log into the database file and let others write."""
-        with contextlib.suppress(sqlite3.Error):
-            self._db.execute("PRAGMA wal_checkpoint(TRUNCATE)")
-        self._db.close()
-        os.close(self._lock)
 
 
 def files_of(folder: Path, row: ResultRow) -> tuple[bytes | None, str]:

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import math
 import tempfile
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
@@ -28,8 +27,8 @@ from pushplan.runtime.disturbed_policy import DisturbedPolicy
 from pushplan.scenarios.scenario import Variations
 from pushplan.world import InvalidInputError, UnknownNameError
 from pushplan.world.checks import number
+from pushplan.world.safe_files import read_data
 
-_DEG = math.pi / 180.0
 UNDISTURBED = "undisturbed"
 
 
@@ -52,31 +51,15 @@ class Condition:
     kept: float = 0.0
 
 
-def _noise(position: float, heading: float, **more: float) -> Disturbances:
-    return Disturbances(position_noise=position, heading_noise=heading * _DEG, **more)
+def _standard_conditions() -> dict[str, Condition]:
+    found = {}
+    for name, one in read_data(Path(__file__).with_name("stress_conditions.yaml")).items():
+        disturbances = Disturbances(**one.pop("disturbances", {}))
+        found[name] = Condition(disturbances, **one)
+    return found
 
 
-CONDITIONS: Mapping[str, Condition] = {
-    UNDISTURBED: Condition(),
-    "noise-1cm-2deg": Condition(_noise(0.01, 2.0), kept=0.85),
-    "noise-2cm-3deg": Condition(_noise(0.02, 3.0)),
-    "noise-3cm-5deg": Condition(_noise(0.03, 5.0), success=0.8),
-    "delay-100ms": Condition(Disturbances(delay=0.1)),
-    "delay-200ms": Condition(Disturbances(delay=0.2)),
-    "loss-20": Condition(Disturbances(loss=0.2)),
-    "loss-50": Condition(Disturbances(loss=0.5), success=None),
-    "rate-10hz": Condition(rate=10.0),
-    "rate-100hz": Condition(rate=100.0),
-    "mass-half": Condition(Disturbances(mass_factor=0.5)),
-    "mass-double": Condition(Disturbances(mass_factor=2.0)),
-    "friction-0": Condition(variations={"bumper_friction": 0.0}),
-    "friction-0.8": Condition(variations={"bumper_friction": 0.8}),
-    "lag-100ms": Condition(Disturbances(lag=0.1)),
-    "lag-300ms": Condition(Disturbances(lag=0.3), success=None),
-    "vanish-20": Condition(Disturbances(vanish=0.2), success=None),
-    "jump-5": Condition(Disturbances(jump=0.05), success=None),
-    "together": Condition(_noise(0.02, 3.0, delay=0.2, loss=0.2), success=None),
-}
+CONDITIONS: Mapping[str, Condition] = _standard_conditions()
 """The standard conditions by name. Noise is that of every pose seen; what is lost comes in bursts
 of four on average; "mass" is what the policy is told over what is true."""
 
@@ -197,15 +180,22 @@ def stress(
             varied = replace(scenario, variations=Variations({**scenario.variations, **changes}))
             jobs.append(Job(tried, varied))
     jobs.sort(key=lambda job: job.key[2])  # a test that is cut short still compares conditions
-    options: dict[str, Any] = {"settings": JobSettings(timeout_s=timeout_s), "progress": progress}
-    if out is not None:
-        rows = run_batch(jobs, out=out, workers=workers, **options)
-    else:
-        with tempfile.TemporaryDirectory(prefix="pushplan-") as folder:
-            rows = run_batch(jobs, out=folder, workers=workers, **options)
+    with tempfile.TemporaryDirectory(prefix="pushplan-") as temporary:
+        rows = run_batch(
+            jobs,
+            out=temporary if out is None else out,
+            workers=workers,
+            settings=JobSettings(timeout_s=timeout_s),
+            progress=progress,
+        )
     asked = {job.key for job in jobs}  # the folder may hold other tests
-    mine = [row for row in rows if (row.policy, row.scenario, row.seed) in asked]
-    return ScoreSheet(spec.label, name, tuple(_rows(wanted, mine)))
+    found: dict[str, list[ResultRow]] = {label: [] for label in wanted}
+    for row in rows:
+        if (row.policy, row.scenario, row.seed) in asked:
+            found[row.policy].append(row)
+    calm = {row.seed: row for row in found[UNDISTURBED]}
+    judged = (_judged(label, one, found[label], calm) for label, one in wanted.items())
+    return ScoreSheet(spec.label, name, tuple(judged))
 
 
 def _disturbed(
@@ -229,31 +219,18 @@ def _conditions(
     return {name: one for name, one in CONDITIONS.items() if known.issuperset(one.variations)}
 
 
-def _rows(conditions: Mapping[str, Condition], rows: Sequence[ResultRow]) -> Iterable[StressRow]:
-    found = {name: [row for row in rows if row.policy == name] for name in conditions}
-    scores = metric_names(Role.SCORE)
-    base = {row.seed: row for row in found[UNDISTURBED]}
-    for name, condition in conditions.items():
-        mine = found[name]
-        means, kept = {}, {}
-        for score in scores:
-            pairs = [(getattr(row, score), getattr(base[row.seed], score)) for row in mine]
-            pairs = [pair for pair in pairs if None not in pair]
-            if pairs:
-                value, before = np.mean(pairs, axis=0).tolist()
-                means[score] = value
-                if before > 0.0:
-                    kept[score] = value / before
-        yield _judged(name, condition, mine, means, kept)
-
-
 def _judged(
-    name: str,
-    condition: Condition,
-    rows: Sequence[ResultRow],
-    scores: Mapping[str, float],
-    kept: Mapping[str, float],
+    name: str, condition: Condition, rows: Sequence[ResultRow], calm: Mapping[int, ResultRow]
 ) -> StressRow:
+    """What became of a condition; ``calm`` are the undisturbed episodes by their seeds."""
+    scores, kept = {}, {}
+    for score in metric_names(Role.SCORE):
+        pairs = [(getattr(row, score), getattr(calm[row.seed], score)) for row in rows]
+        pairs = [pair for pair in pairs if None not in pair]
+        if pairs:
+            scores[score], before = np.mean(pairs, axis=0).tolist()
+            if before > 0.0:
+                kept[score] = scores[score] / before
     ends = Counter(row.reason for row in rows if not row.success)
     successes = len(rows) - ends.total()
     missed = []

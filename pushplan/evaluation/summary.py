@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -9,13 +10,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from pushplan.evaluation.rows import ResultRow
-from pushplan.evaluation.statistics import Estimate, Proportion, estimate, wilson
-from pushplan.evaluation.statistics_paired import (
+from pushplan.evaluation.statistics import (
     ENOUGH,
     LEVEL,
+    Estimate,
+    Proportion,
+    estimate,
     holm,
     pairs_needed,
     signed_rank_test,
+    wilson,
 )
 from pushplan.metrics import METRICS, Role, metric_names
 from pushplan.world.checks import FloatArray, choice
@@ -107,12 +111,24 @@ def summarise(rows: Sequence[ResultRow], order: Sequence[str] = ()) -> list[Poli
         order: labels in the order in which policies are shown; others follow by name.
     """
     groups = grouped(rows)
-    return [
-        _summary(setting, policy, groups[setting, policy])
-        for setting in settings_of(rows)
-        for policy in policies_of(rows, order)
-        if (setting, policy) in groups
-    ]
+    shown = (*metric_names(Role.SCORE, Role.DETAIL, Role.FACT), *TIMINGS)
+    found = []
+    for setting, policy in itertools.product(settings_of(rows), policies_of(rows, order)):
+        if (setting, policy) not in groups:
+            continue
+        mine = groups[setting, policy]
+        columns = {name: values_of(mine, name) for name in shown}
+        found.append(
+            PolicySummary(
+                setting=setting,
+                policy=policy,
+                episodes=len(mine),
+                failed=sum(row.failed for row in mine),
+                success=wilson(sum(row.success for row in mine), len(mine)),
+                metrics={name: estimate(values) for name, values in columns.items() if values},
+            )
+        )
+    return found
 
 
 def paired_differences(
@@ -128,30 +144,29 @@ def paired_differences(
         order: labels in the order of the policies; others follow by name.
         pairs: ``"first"`` for the first policy with each other one, or ``"all"``.
     """
-    labels = policies_of(rows, order)
-    firsts = labels if choice("pairs", pairs, PAIRS) == "all" else labels[:1]
-    compared = [(a, b) for i, a in enumerate(firsts) for b in labels[i + 1 :]]
-    groups = grouped(rows)
+    compared = list(itertools.combinations(policies_of(rows, order), 2))
+    if choice("pairs", pairs, PAIRS) == "first":
+        compared = [pair for pair in compared if pair[0] == compared[0][0]]
+    groups, settings = grouped(rows), settings_of(rows)
     found: list[PairedDifference] = []
     for metric in ("success", *metric_names(Role.SCORE, Role.DETAIL)):
         if (higher := METRICS[metric].higher_is_better) is None:
             continue
         every = METRICS[metric].role is not Role.DETAIL
         values = {
-            key: _by_scenario([row for row in mine if every or row.success], metric)
+            key: by_scenario([row for row in mine if every or row.success], metric)
             for key, mine in groups.items()
         }
         gaps: dict[tuple[str, str, str], FloatArray] = {}
-        for setting in settings_of(rows):
+        for setting in settings:
             for first, second in compared:
                 one, two = values.get((setting, first), {}), values.get((setting, second), {})
                 if common := sorted(one.keys() & two.keys()):
                     gaps[setting, first, second] = np.array([two[k] - one[k] for k in common])
         tested = [signed_rank_test(gap) for gap in gaps.values()]
+        corrected = holm([p_value for p_value, _ in tested])
         sign = 1.0 if higher else -1.0
-        for ((setting, first, second), gap), (p_value, effect), corrected in zip(
-            gaps.items(), tested, holm([p for p, _ in tested]), strict=True
-        ):
+        for i, ((setting, first, second), gap) in enumerate(gaps.items()):
             found.append(
                 PairedDifference(
                     setting=setting,
@@ -161,14 +176,13 @@ def paired_differences(
                     difference=estimate(gap),
                     better=int((sign * gap > 0.0).sum()),
                     worse=int((sign * gap < 0.0).sum()),
-                    p_value=p_value,
-                    p_corrected=corrected,
-                    effect=sign * effect,
+                    p_value=tested[i][0],
+                    p_corrected=corrected[i],
+                    effect=sign * tested[i][1],
                     needed=pairs_needed(gap, len(tested)),
                 )
             )
-    place = {setting: i for i, setting in enumerate(settings_of(rows))}
-    return sorted(found, key=lambda pair: place[pair.setting])
+    return sorted(found, key=lambda pair: settings.index(pair.setting))
 
 
 def grouped(rows: Sequence[ResultRow]) -> dict[tuple[str, str], list[ResultRow]]:
@@ -190,20 +204,8 @@ def values_of(rows: Sequence[ResultRow], metric: str) -> list[float]:
     return [float(v) for row in rows if (v := getattr(row, metric)) is not None]
 
 
-def _summary(setting: str, policy: str, rows: Sequence[ResultRow]) -> PolicySummary:
-    shown = metric_names(Role.SCORE, Role.DETAIL, Role.FACT)
-    columns = {name: values_of(rows, name) for name in (*shown, *TIMINGS)}
-    return PolicySummary(
-        setting=setting,
-        policy=policy,
-        episodes=len(rows),
-        failed=sum(row.failed for row in rows),
-        success=wilson(sum(row.success for row in rows), len(rows)),
-        metrics={name: estimate(values) for name, values in columns.items() if values},
-    )
-
-
-def _by_scenario(rows: Sequence[ResultRow], metric: str) -> dict[tuple[str, int], float]:
+def by_scenario(rows: Sequence[ResultRow], metric: str) -> dict[tuple[str, int], float]:
+    """Scenario and seed -> value of a column, without empty fields."""
     return {
         (row.scenario, row.seed): float(value)
         for row in rows

@@ -9,7 +9,7 @@ import numpy as np
 
 from pushplan.evaluation.gaps import Gap
 from pushplan.evaluation.rows import ResultRow
-from pushplan.evaluation.statistics import Estimate
+from pushplan.evaluation.statistics import Estimate, estimate
 from pushplan.evaluation.statistics_aggregate import (
     Aggregate,
     interquartile_mean,
@@ -36,6 +36,10 @@ _TIMES = {
 }
 
 
+_PAIR_HEADINGS: tuple[str, ...] = (
+    *("metric", "pair", "difference", "95 % interval"),
+    *("better / worse / of", "p", "effect", "more"),
+)
 MANY_PAIRS = 12
 """From more lines on, a table of differences has one for each pair of policies."""
 MANY_POLICIES = 6
@@ -139,33 +143,35 @@ def gap_tables(found: Sequence[Gap], titles: Mapping[str, str]) -> list[Table]:
 
 
 def measured_tables(
-    estimates: Mapping[tuple[str, str, str], Estimate],
-    policies: Sequence[str],
+    rows: Sequence[ResultRow],
+    measured: Mapping[str, Mapping[str, float]],
     metrics: Sequence[str],
+    policies: Sequence[str],
     titles: Mapping[str, str],
 ) -> list[Table]:
     """One table a setting of metrics that were computed from stored episodes.
 
     Args:
-        estimates: (setting, policy, metric) -> estimate.
-        policies: rows, in order.
+        rows: of a run.
+        measured: job -> value by name of a metric.
         metrics: columns, in order.
+        policies: rows, in order.
         titles: text for each setting, in order.
     """
+    groups = grouped(rows)
     tables = []
     for setting, title in titles.items():
         cells = []
         for policy in policies:
-            found = [estimates.get((setting, policy, name)) for name in metrics]
-            if any(found):
-                cells.append(
-                    (
-                        policy,
-                        *(_estimate(e, _digits(n)) for n, e in zip(metrics, found, strict=True)),
-                    )
-                )
+            found = [measured.get(row.job, {}) for row in groups.get((setting, policy), [])]
+            line = []
+            for name in metrics:
+                values = [one[name] for one in found if name in one]
+                line.append(_estimate(estimate(values), _digits(name)) if values else "")
+            if any(line):
+                cells.append((policy, *line))
         tables.append(Table(title, ("policy", *metrics), tuple(cells), MEASURED_NOTE))
-    return tables
+    return tables if any(table.cells for table in tables) else []
 
 
 def difference_tables(
@@ -176,46 +182,36 @@ def difference_tables(
     if not wide:
         pairs = [p for p in pairs if METRICS[p.metric].role is not Role.DETAIL]
     for setting in dict.fromkeys(pair.setting for pair in pairs):
-        cells = tuple(
-            (
-                heading(pair.metric),
-                f"{pair.second} - {pair.first}",
-                _number(pair.difference.mean, _digits(pair.metric), sign=True)
-                + (" *" if pair.significant else ""),
-                _interval(pair.difference, _digits(pair.metric), sign=True),
-                f"{pair.better} / {pair.worse} / {pair.difference.count}",
-                "< 0.001" if pair.p_corrected < 0.001 else f"{pair.p_corrected:.3f}",
-                f"{pair.effect:+.2f}",
-                _more(pair),
+        mine = [pair for pair in pairs if pair.setting == setting]
+        metrics = list(dict.fromkeys(pair.metric for pair in mine))
+        cells: list[tuple[str, ...]] = []
+        brief: dict[str, list[str]] = {}
+        for pair in mine:
+            names, digits = f"{pair.second} - {pair.first}", _digits(pair.metric)
+            mean = _number(pair.difference.mean, digits, sign=True)
+            interval = _interval(pair.difference, digits, sign=True)
+            star = " *" if pair.significant else ""
+            line = brief.setdefault(names, [""] * len(metrics))
+            line[metrics.index(pair.metric)] = f"{mean} {interval}{star}"
+            cells.append(
+                (
+                    heading(pair.metric),
+                    names,
+                    mean + star,
+                    interval,
+                    f"{pair.better} / {pair.worse} / {pair.difference.count}",
+                    "< 0.001" if pair.p_corrected < 0.001 else f"{pair.p_corrected:.3f}",
+                    f"{pair.effect:+.2f}",
+                    _more(pair),
+                )
             )
-            for pair in pairs
-            if pair.setting == setting
-        )
-        headings = (
-            *("metric", "pair", "difference", "95 % interval"),
-            *("better / worse / of", "p", "effect", "more"),
-        )
-        title = f"Paired differences: {titles.get(setting, setting)}"
+        headings, note = _PAIR_HEADINGS, PAIR_NOTE
         if not wide and len(cells) > MANY_PAIRS:
-            tables.append(_brief(title, [pair for pair in pairs if pair.setting == setting]))
-        else:
-            tables.append(Table(title, headings, cells, PAIR_NOTE))
+            cells = [(names, *line) for names, line in brief.items()]
+            headings, note = ("pair", *map(heading, metrics)), BRIEF_NOTE
+        title = f"Paired differences: {titles.get(setting, setting)}"
+        tables.append(Table(title, headings, tuple(cells), note))
     return tables
-
-
-def _brief(title: str, pairs: Sequence[PairedDifference]) -> Table:
-    """A line for each pair of policies, a column for each metric."""
-    metrics = list(dict.fromkeys(pair.metric for pair in pairs))
-    lines: dict[str, list[str]] = {}
-    for pair in pairs:
-        digits = _digits(pair.metric)
-        star = " *" if pair.significant else ""
-        mean = _number(pair.difference.mean, digits, sign=True)
-        line = lines.setdefault(f"{pair.second} - {pair.first}", [""] * len(metrics))
-        interval = _interval(pair.difference, digits, sign=True)
-        line[metrics.index(pair.metric)] = f"{mean} {interval}{star}"
-    cells = tuple((name, *line) for name, line in lines.items())
-    return Table(title, ("pair", *map(heading, metrics)), cells, BRIEF_NOTE)
 
 
 def on_few_lines(tables: Sequence[Table]) -> list[Table]:
@@ -254,11 +250,9 @@ def aggregate_table(rows: Sequence[ResultRow], policies: Sequence[str]) -> Table
     strata: dict[tuple[str, str], list[FloatArray]] = {}
     for label in policies:
         for name in metric_names(Role.SCORE):
-            values = [
-                np.array(values_of(groups.get((setting, label), []), name)) for setting in settings
-            ]
-            if all(len(found) for found in values):
-                strata[label, name] = values
+            values = [values_of(groups.get((setting, label), []), name) for setting in settings]
+            if all(values):
+                strata[label, name] = [np.array(found) for found in values]
     shown = [n for n in metric_names(Role.SCORE) if any(name == n for _, name in strata)]
     if not shown:
         return None
@@ -271,22 +265,18 @@ def aggregate_table(rows: Sequence[ResultRow], policies: Sequence[str]) -> Table
         line = [label]
         for name in shown:
             mine, base = strata.get((label, name)), strata.get((first, name))
-            line.append(_aggregate(interquartile_mean(mine), 3) if mine else "")
-            better = ""
+            middle, better = "", ""
+            if mine:
+                found = interquartile_mean(mine)
+                middle = f"{found.value:.3f}\n{_interval(found, 3)}"
             if mine and base and label != first:
-                better = _aggregate(probability_of_improvement(mine, base), 2)
-            line.append(better)
+                found = probability_of_improvement(mine, base)
+                better = f"{found.value:.2f}\n{_interval(found, 2)}"
+            line += [middle, better]
         if any(line[1:]):
             cells.append(tuple(line))
     title = f"Interquartile means of all {len(settings)} settings"
     return Table(title, tuple(headings), tuple(cells), AGGREGATE_NOTE.format(first=first))
-
-
-def _aggregate(value: Aggregate, digits: int) -> str:
-    return (
-        f"{_number(value.value, digits)}\n"
-        f"[{_number(value.low, digits)}, {_number(value.high, digits)}]"
-    )
 
 
 def _policy_cells(summary: PolicySummary, metrics: Sequence[str], wide: bool) -> tuple[str, ...]:
@@ -314,15 +304,13 @@ def _digits(column: str) -> int:
     return METRICS[column].digits if column in METRICS else 3
 
 
-def _estimate(value: Estimate | None, digits: int, *, wide: bool = True) -> str:
-    if value is None:
-        return ""
+def _estimate(value: Estimate, digits: int, *, wide: bool = True) -> str:
     middle = f"\nmed {_number(value.median, digits)}" if wide else ""
     spread = f"{_number(value.mean, digits)} ± {_number(value.sd, digits)}"
     return f"{spread}\n{_interval(value, digits)}{middle}"
 
 
-def _interval(value: Estimate, digits: int, *, sign: bool = False) -> str:
+def _interval(value: Estimate | Aggregate, digits: int, *, sign: bool = False) -> str:
     return f"[{_number(value.low, digits, sign=sign)}, {_number(value.high, digits, sign=sign)}]"
 
 

@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
 from pushplan.evaluation.episode import PolicyError, Recording
 from pushplan.evaluation.jobs import JobSettings
 from pushplan.evaluation.policies import PolicySpec, policy_names
+from pushplan.metrics import compute
 from pushplan.world import InvalidInputError, UnknownNameError
 
 if TYPE_CHECKING:
-    from pushplan.scenarios import Scenario
+    pass
 
 _OTHERS = ("observations", "metrics")
 
@@ -28,6 +28,7 @@ def names() -> tuple[str, ...]:
 def warm_up(name: str) -> float:
     """Run a policy, or one of the other `names`, for a moment.
 
+    "observations" are those that a network may have been trained on, "metrics" are all.
     A policy is warmed up as `pushplan.planners.warm_up` does it, and makes a few steps in every
     kind of start of the smoke suite that it is made for; networks only do that.
 
@@ -37,33 +38,21 @@ def warm_up(name: str) -> float:
     Raises:
         UnknownNameError: if there is no such name.
     """
+    from pushplan.learned import FeatureObservation
+
     begin = time.perf_counter()
     if name == "observations":
-        _observations()
+        for observation in ("image", "spatial", FeatureObservation()):
+            _record("random", observation)
     elif name == "metrics":
-        _metrics()
+        for recording in _record("random"):
+            compute(recording.episode())
     else:
         if name not in policy_names():
             raise UnknownNameError("policy", name, names())
         PolicySpec(name, name).warm_up()
         _record(name)
     return time.perf_counter() - begin
-
-
-def _observations() -> None:
-    """A few steps with each kind of observation that a network may have been trained on."""
-    from pushplan.learned import FeatureObservation
-
-    for observation in ("image", "spatial", FeatureObservation()):
-        _record("random", observation)
-
-
-def _metrics() -> None:
-    """Every metric of a short episode."""
-    from pushplan.metrics import compute
-
-    for recording in _record("random"):
-        compute(recording.episode())
 
 
 def _record(policy: str, observation: Any = None) -> list[Recording]:
@@ -75,13 +64,10 @@ def _record(policy: str, observation: Any = None) -> list[Recording]:
     """
     from pushplan.scenarios import suite
 
-    found = _record_in(suite("smoke").scenarios, policy, observation)
-    return found or _record_in(suite(_COLUMNS, episodes=1).scenarios, policy, observation)
-
-
-def _record_in(scenarios: Iterable[Scenario], policy: str, observation: Any) -> list[Recording]:
-    recordings = []
-    for scenario in scenarios:
+    recordings: list[Recording] = []
+    for scenario in (*suite("smoke").scenarios, *suite(_COLUMNS, episodes=1).scenarios):
+        if recordings and scenario.key.startswith(_COLUMNS):
+            break
         runner = PolicySpec(policy, policy).make()
         if observation is not None:
             runner.observation = observation  # type: ignore[attr-defined]

@@ -13,15 +13,11 @@ import signal
 import socket
 import sys
 import types
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from dataclasses import asdict, dataclass
 
 from pushplan.evaluation.channel import Channel
 from pushplan.world import InvalidInputError
 from pushplan.world.errors import describe
-
-if TYPE_CHECKING:
-    from pushplan.evaluation.jobs import JobResult
 
 _DIE_WITH_OWNER = 1  # PR_SET_PDEATHSIG of Linux, however the owner ends
 _ADOPT_ORPHANS = 36  # PR_SET_CHILD_SUBREAPER: what a policy leaves behind can still be found
@@ -79,19 +75,31 @@ def main(descriptor: int) -> None:
 
 
 def _answer(channel: Channel, payload: bytes, setup: WorkerSetup) -> bool:
-    """Run a call and send what it returned; whether this worker ends with it."""
+    """Run a job and send what became of it; whether this worker ends with it."""
+    from pushplan.evaluation.execute import execute
+
     try:
         if setup.trace_after_s is not None:
             faulthandler.dump_traceback_later(setup.trace_after_s)
         try:
-            function, arguments = _unpacked(payload, setup.main)
+            if b"__main__" in payload and setup.main is not None:
+                _import_main(setup.main)
+            job, settings = pickle.loads(payload)
+        except (AttributeError, ImportError) as error:
+            text = (
+                f"a worker process cannot load what it was sent ({error}): define it at the top "
+                "level of a file, name it as 'file.py:Class', or use workers=0"
+            )
+            channel.send({"kind": "refused", "text": text})
+            return False
         except InvalidInputError as error:
             channel.send({"kind": "refused", "text": str(error)})
             return False
         channel.send({"kind": "running"})
-        result: JobResult = function(*arguments)
-        header, body = result.to_message()
-        channel.send({"kind": "result", **header}, body)
+        result = execute(job, settings)
+        row, traced = asdict(result.row), result.trace is not None
+        header = {"kind": "result", "row": row, "traced": traced, "detail": result.detail}
+        channel.send(header, result.trace or b"")
         return result.tainted
     except InvalidInputError as error:  # `execute` lets through what is no policy's fault
         channel.send({"kind": "refused", "text": str(error)})
@@ -102,18 +110,6 @@ def _answer(channel: Channel, payload: bytes, setup: WorkerSetup) -> bool:
     finally:
         faulthandler.cancel_dump_traceback_later()
     return True
-
-
-def _unpacked(payload: bytes, main_path: str | None) -> Any:
-    if b"__main__" in payload and main_path is not None:
-        _import_main(main_path)
-    try:
-        return pickle.loads(payload)
-    except (AttributeError, ImportError) as error:
-        raise InvalidInputError(
-            f"a worker process cannot load what it was sent ({error}): define it at the top level "
-            "of a file, name it as 'file.py:Class', or use workers=0"
-        ) from error
 
 
 def _import_main(path: str) -> None:

@@ -18,6 +18,7 @@ from typing import Any
 
 from pushplan.evaluation.channel import Channel, ChannelError
 from pushplan.evaluation.jobs import BatchStoppedError, JobResult
+from pushplan.evaluation.rows import ResultRow, Status
 from pushplan.evaluation.worker import THREAD_VARIABLES, WORKER_VARIABLE, WorkerSetup
 from pushplan.world import PushplanError
 from pushplan.world.file_locks import NO_FOLLOW
@@ -41,21 +42,17 @@ class WorkerDiedError(PushplanError):
 
     Attributes:
         log: what it had written to its standard error.
+        status: of the job that it ran.
         from_outside: whether somebody else may have killed it.
     """
 
-    def __init__(self, message: str, log: str = "", *, from_outside: bool = False) -> None:
+    def __init__(
+        self, message: str, log: str, status: Status = Status.CRASHED, *, from_outside: bool = False
+    ) -> None:
         super().__init__(message)
         self.log = log
+        self.status = status
         self.from_outside = from_outside
-
-
-class WorkerOverranError(WorkerDiedError):
-    """The call took too long."""
-
-
-class WorkerOutOfMemoryError(WorkerDiedError):
-    """The call needed more memory than it may have."""
 
 
 class WorkerProcess:
@@ -119,13 +116,14 @@ class WorkerProcess:
         if header.get("kind") == "refused":
             raise BatchStoppedError(str(header.get("text")))
         if header.get("kind") == "error":
-            raise self._died(WorkerDiedError, str(header.get("text")))
+            raise self._died(str(header.get("text")))
         if header.get("kind") == "out of memory":
-            raise self._died(WorkerOutOfMemoryError, "an allocation failed")
-        try:
-            return JobResult.from_message(header, body)
+            raise self._died("an allocation failed", Status.OUT_OF_MEMORY)
+        try:  # who sends it is not trusted: the owner checks what it says
+            trace = body if header["traced"] else None
+            return JobResult(ResultRow(**header["row"]), trace, str(header["detail"]))
         except (KeyError, TypeError) as error:
-            raise self._died(WorkerDiedError, f"its message is no result: {error}") from error
+            raise self._died(f"its message is no result: {error}") from error
 
     def _receive(self, left_s: float, limit_s: float = math.inf) -> tuple[dict[str, Any], bytes]:
         until = time.monotonic() + left_s + _TRACE_S
@@ -135,17 +133,18 @@ class WorkerProcess:
             if self._has_ended():  # it may die without closing its socket
                 raise EOFError
             if time.monotonic() > until:
-                raise self._died(WorkerOverranError, f"not done after {min(limit_s, left_s):g} s")
-            if limit_mb is not None and (used := self._memory_mb()) > limit_mb:
+                raise self._died(f"not done after {min(limit_s, left_s):g} s", Status.TIMEOUT)
+            pids = (self._process.pid, *_descendants(self._process.pid))
+            if limit_mb is not None and (used := _memory_kb(pids) * 1024 / 1e6) > limit_mb:
                 text = f"{used:.0f} MB in use, the limit is {limit_mb:.0f} MB"
-                raise self._died(WorkerOutOfMemoryError, text)
+                raise self._died(text, Status.OUT_OF_MEMORY)
             self._trimmed_log()
 
         try:
             return self._channel.receive(waiting)
         except ChannelError as error:
             text = f"the worker process sent what is no message: {error}"
-            raise self._died(WorkerDiedError, text) from error
+            raise self._died(text) from error
         except (EOFError, OSError):
             code = self.end()
             raise WorkerDiedError(
@@ -154,11 +153,11 @@ class WorkerProcess:
                 from_outside=code in (-signal.SIGKILL, -signal.SIGTERM),
             ) from None
 
-    def _died(self, kind: type[WorkerDiedError], reason: str) -> WorkerDiedError:
+    def _died(self, reason: str, status: Status = Status.CRASHED) -> WorkerDiedError:
         """End it for a reason."""
         log = self._tail()
         self.end(force=True)
-        return kind(reason, log)
+        return WorkerDiedError(reason, log, status)
 
     def end(self, *, force: bool = False) -> int:
         """Let it finish, or not, and end what it started; its log stays if it holds anything.
@@ -215,10 +214,6 @@ class WorkerProcess:
         except ChildProcessError:
             return True
 
-    def _memory_mb(self) -> float:
-        pids = (self._process.pid, *_descendants(self._process.pid))
-        return _memory_kb(pids) * 1024 / 1e6
-
     def _trimmed_log(self) -> int:
         """Bytes in the log, of which the beginning is dropped when they are too many."""
         if self._log is None or not self._log.exists():
@@ -241,17 +236,13 @@ class WorkerProcess:
             return file.read(_LOG_TAIL).decode(errors="replace")
 
 
-def _descendants(pid: int) -> tuple[int, ...]:
+def _descendants(pid: int) -> Iterator[int]:
     """Processes that a process started, and those that they started (Linux)."""
-    return tuple(_below(pid))
-
-
-def _below(pid: int) -> Iterator[int]:
     for file in Path(f"/proc/{pid}/task").glob("*/children"):
         with contextlib.suppress(OSError):
             for child in map(int, file.read_text().split()):
                 yield child
-                yield from _below(child)
+                yield from _descendants(child)
 
 
 def _marked(mark: str) -> Iterator[int]:
@@ -291,9 +282,7 @@ def _memory_kb(pids: Iterable[int]) -> float:
 
 
 def _describe_exit(code: int) -> str:
-    if code < 0:
-        try:
-            return f"the worker process was ended by {signal.Signals(-code).name}"
-        except ValueError:
-            return f"the worker process was ended by signal {-code}"
-    return f"the worker process exited with code {code}"
+    if code >= 0:
+        return f"the worker process exited with code {code}"
+    known = {int(one): one.name for one in signal.Signals}
+    return f"the worker process was ended by {known.get(-code, f'signal {-code}')}"

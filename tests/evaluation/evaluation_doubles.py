@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import csv
 import ctypes
+import functools
 import os
+import shutil
 import signal
+import tempfile
 import time
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from pushplan.evaluation import TIMING_COLUMNS
+from pushplan.evaluation import TIMING_COLUMNS, Job, JobSettings, parse_policies, run_batch
 from pushplan.world import Drive, GoalDisc, Movables, RobotModel, StaticMap, Twist, World
 
 HERE = __file__
@@ -205,6 +208,27 @@ class BrokenEnv(LineEnv):
 
 def make_broken_env(scenario: LineScenario, observation: str = "state") -> BrokenEnv:
     return BrokenEnv(scenario, observation)
+
+
+SETTINGS = JobSettings(make_env=f"{HERE}:make_env", timeout_s=30.0, dry_run=False)
+
+
+def line_jobs(seeds: int, *names: str) -> list[Job]:
+    """Policies of this file, ``Ahead`` and ``Raises`` by default, on so many scenarios."""
+    specs = parse_policies([f"{HERE}:{name}" for name in names or ("Ahead", "Raises")])
+    return [Job(spec, LineScenario(seed)) for seed in range(seeds) for spec in specs]
+
+
+@functools.cache
+def _stored_run(seeds: int) -> tempfile.TemporaryDirectory[str]:
+    folder = tempfile.TemporaryDirectory(prefix="pushplan-stored-run-")
+    run_batch(line_jobs(seeds), out=folder.name, workers=0, settings=SETTINGS)
+    return folder
+
+
+def stored_run(folder: Path, seeds: int = 3) -> Path:
+    """A run directory with the results of `line_jobs`, which are run once for all tests."""
+    return Path(shutil.copytree(_stored_run(seeds).name, folder))
 
 
 def plain_policy() -> Ahead:

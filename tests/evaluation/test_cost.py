@@ -9,7 +9,7 @@ import pytest
 
 from pushplan.cli import main
 from pushplan.evaluation import Experiment
-from pushplan.evaluation.cost import EPISODE_BYTES
+from pushplan.evaluation.experiment import EPISODE_BYTES
 from pushplan.evaluation.job_identity import identified
 from pushplan.evaluation.rows import Status, blank_row
 from pushplan.evaluation.store import RunDirectory

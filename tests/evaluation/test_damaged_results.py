@@ -10,39 +10,18 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from evaluation_doubles import HERE, LineScenario
+from evaluation_doubles import SETTINGS, LineScenario, line_jobs, stored_run
 
 from pushplan.cli import main
-from pushplan.evaluation import (
-    DamagedResultsError,
-    Job,
-    JobSettings,
-    Results,
-    parse_policies,
-    run_batch,
-    salvage,
-)
+from pushplan.evaluation import DamagedResultsError, Results, run_batch, salvage
 from pushplan.world import InvalidInputError, PushplanError
 
-SETTINGS = JobSettings(make_env=f"{HERE}:make_env", timeout_s=5.0, dry_run=False)
-JOBS = [
-    Job(spec, LineScenario(seed))
-    for seed in range(10)
-    for spec in parse_policies([f"{HERE}:{name}" for name in ("Ahead", "Raises")])
-]
-
-
-@pytest.fixture(scope="module")
-def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("whole") / "run"
-    run_batch(JOBS, out=folder, workers=0, settings=SETTINGS)
-    return folder
+JOBS = line_jobs(10)
 
 
 @pytest.fixture
-def run(whole: Path, tmp_path: Path) -> Path:
-    shutil.copytree(whole, tmp_path / "run")
-    return tmp_path / "run"
+def run(tmp_path: Path) -> Path:
+    return stored_run(tmp_path / "run", 10)
 
 
 def flip(file: Path, bits: int, rng: np.random.Generator) -> None:

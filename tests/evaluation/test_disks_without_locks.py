@@ -9,25 +9,14 @@ import shutil
 from pathlib import Path
 
 import pytest
-from evaluation_doubles import HERE, LineScenario
+from evaluation_doubles import SETTINGS, line_jobs
 
 from pushplan.cli import main
-from pushplan.evaluation import (
-    Job,
-    JobSettings,
-    Results,
-    merge,
-    parse_policies,
-    run_batch,
-    run_status,
-)
+from pushplan.evaluation import Results, merge, run_batch, run_status
 from pushplan.world import InvalidInputError
 from pushplan.world.file_locks import is_locked, take_lock
 
-SETTINGS = JobSettings(make_env=f"{HERE}:make_env", timeout_s=5.0, dry_run=False)
-JOBS = [
-    Job(spec, LineScenario(seed)) for seed in range(3) for spec in parse_policies([f"{HERE}:Ahead"])
-]
+JOBS = line_jobs(3, "Ahead")
 
 
 def without_locks(monkeypatch: pytest.MonkeyPatch, code: int, *names: str) -> None:

@@ -105,7 +105,7 @@ def test_reports_commands_and_caches_do_not_count(package: Path) -> None:
 def test_no_episode_imports_what_does_not_count() -> None:
     code = (
         "import importlib, sys\n"
-        "from pushplan.evaluation.outcome import PRELOAD\n"
+        "from pushplan.evaluation.pool import PRELOAD\n"
         "for name in (*PRELOAD, 'pushplan.evaluation.worker'): importlib.import_module(name)\n"
         "from pushplan.evaluation import Job, JobSettings, parse_policy\n"
         "from pushplan.evaluation.execute import execute\n"

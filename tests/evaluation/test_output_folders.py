@@ -9,39 +9,25 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from evaluation_doubles import HERE, LineScenario
+from evaluation_doubles import SETTINGS, line_jobs, stored_run
 
 from pushplan.cli import main
-from pushplan.evaluation import (
-    Job,
-    JobSettings,
-    Results,
-    merge,
-    parse_policies,
-    run_batch,
-    salvage,
-)
+from pushplan.evaluation import Results, merge, run_batch, salvage
 from pushplan.world import InvalidInputError
 from pushplan.world.output_files import write_atomic
 
-SETTINGS = JobSettings(make_env=f"{HERE}:make_env", timeout_s=5.0, dry_run=False)
-JOBS = [
-    Job(spec, LineScenario(seed))
-    for seed in range(2)
-    for spec in parse_policies([f"{HERE}:{name}" for name in ("Ahead", "Raises")])
-]
 REPORT = ("report.html", "results.csv", "summary.md", "summary.csv", "differences.csv")
 
 
 def run(out: Path) -> Results:
-    run_batch(JOBS, out=out, workers=0, settings=SETTINGS)
+    run_batch(line_jobs(3), out=out, workers=0, settings=SETTINGS)
     return Results.load(out)
 
 
 @pytest.fixture(scope="module")
 def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("whole") / "run"
-    run(folder).report()
+    folder = stored_run(tmp_path_factory.mktemp("whole") / "run")
+    Results.load(folder).report()
     return folder
 
 
@@ -131,7 +117,7 @@ def test_a_run_directory_goes_on_and_keeps_what_is_not_ours(whole: Path, tmp_pat
 def test_a_folder_in_which_a_run_was_killed_at_once_is_taken(tmp_path: Path) -> None:
     (tmp_path / ".lock").touch()
     (tmp_path / ".pushplan-0123456789abcdef.tmp").write_text("torn")
-    assert len(run(tmp_path).rows) == 4
+    assert len(run(tmp_path).rows) == 6
 
 
 def test_a_report_is_written_again_beside_the_first_one(whole: Path, tmp_path: Path) -> None:

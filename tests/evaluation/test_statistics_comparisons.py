@@ -6,13 +6,19 @@ import scipy.stats
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from pushplan.evaluation.statistics import MANY, bootstrap_interval
+from pushplan.evaluation.statistics import (
+    ENOUGH,
+    MANY,
+    bootstrap_interval,
+    holm,
+    pairs_needed,
+    signed_rank_test,
+)
 from pushplan.evaluation.statistics_aggregate import (
     interquartile_mean,
     performance_profile,
     probability_of_improvement,
 )
-from pushplan.evaluation.statistics_paired import ENOUGH, holm, pairs_needed, signed_rank_test
 from pushplan.world import InvalidInputError
 
 P_VALUES = st.lists(st.floats(0.0, 1.0), min_size=1, max_size=30)

@@ -7,39 +7,32 @@ import os
 import shutil
 import sqlite3
 import struct
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
-from evaluation_doubles import HERE, LineScenario
+from evaluation_doubles import stored_run
 
-from pushplan.cli import main
-from pushplan.evaluation import Job, JobSettings, Results, parse_policies, run_batch
+from pushplan.cli import build_parser, main
+from pushplan.evaluation import Results
 from pushplan.evaluation.comparing import read_rules
 from pushplan.world import InvalidInputError
 
-SETTINGS = JobSettings(make_env=f"{HERE}:make_env", timeout_s=5.0, dry_run=False)
-JOBS = [
-    Job(spec, LineScenario(seed))
-    for seed in range(3)
-    for spec in parse_policies([f"{HERE}:{name}" for name in ("Ahead", "Raises")])
-]
 
-
-@pytest.fixture(scope="module")
-def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("whole") / "run"
-    run_batch(JOBS, out=folder, workers=0, settings=SETTINGS)
-    return folder
+@pytest.fixture(scope="module", autouse=True)
+def one_parser() -> Iterator[None]:
+    """Build the parser once: that takes longer than most of the four hundred commands here."""
+    parser = build_parser()
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr("pushplan.cli.build_parser", lambda: parser)
+        yield
 
 
 @pytest.fixture
-def run(whole: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A copy two folders deep, so that ``../..`` leads to the folder of the test."""
-    folder = tmp_path / "theirs" / "run"
-    shutil.copytree(whole, folder)
     monkeypatch.chdir(tmp_path)
-    return folder
+    return stored_run(tmp_path / "theirs" / "run")
 
 
 COMMANDS = (
