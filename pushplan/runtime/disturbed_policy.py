@@ -46,13 +46,14 @@ class DisturbedPolicy:
     ) -> None:
         self.disturbances = disturbances or Disturbances()
         number("planning_time", planning_time, low=0.0)
-        self._options = {"max_age": 1.0, **runner}
-        if told:
-            self._options.setdefault("delay", 0.7 * self.disturbances.lag)
-            self._options.setdefault("position_noise", self.disturbances.position_noise)
-            self._options.setdefault("heading_noise", self.disturbances.heading_noise)
-            if self.disturbances.vanish > 0.0:
-                self._options.setdefault("keep_unseen", 6.0 * self.disturbances.vanish_time)
+        d = self.disturbances
+        known = {
+            "delay": 0.7 * d.lag,
+            "position_noise": d.position_noise,
+            "heading_noise": d.heading_noise,
+            "keep_unseen": 6.0 * d.vanish_time if d.vanish > 0.0 else 0.0,
+        }
+        self._options = {"max_age": 1.0, **(known if told else {}), **runner}
         self._policy, self._period, self._planning_time = policy, period, planning_time
         driven = self._make().policy
         given = driven.actions if isinstance(driven, ChoosesActions) else ()

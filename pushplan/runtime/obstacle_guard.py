@@ -21,6 +21,7 @@ from pushplan.motion.collision import (
 from pushplan.runtime.noise_allowance import NoiseAllowance
 from pushplan.world import StaticMap, Twist, World
 from pushplan.world.checks import FloatArray
+from pushplan.world.outline import flatten, outline_boxes
 
 _CLEARANCE = 0.02  # kept from what is new, beside the noise [circumscribed radii]
 _RESUMED = 1.5  # times the clearance where the robot has stood, so that noise moves it nowhere
@@ -70,7 +71,6 @@ class ObstacleGuard:
             parts = {part.tobytes(): part for part in world.static.convex_parts}
             self._known &= parts.keys()
             self._new = [part for key, part in parts.items() if key not in self._known]
-            self._boxes = _boxes(self._new)
         clearance = self._clearance(world)
         fixed = _fixed(world)
         self._known_fixed = {
@@ -144,12 +144,13 @@ class ObstacleGuard:
         objects = world.movables
         chosen = np.flatnonzero(np.isin(objects.ids, list(self._new_fixed))).tolist()
         held = [objects.outline_world(k) for k in chosen]
-        boxes = np.concatenate([self._boxes, _boxes(held)])
+        outlines = [*self._new, *held]
+        boxes = outline_boxes(*flatten(outlines))
         path = np.concatenate([path for _, path in self._paths(world, twist)])
         reach = world.robot.circumscribed_radius + 2.0 * _RESUMED * self._clearance(world)
         low, high = path[:, :2].min(axis=0) - reach, path[:, :2].max(axis=0) + reach
-        near = ((boxes[:, 1] >= low) & (boxes[:, 0] <= high)).all(axis=1)
-        return [part for part, is_near in zip([*self._new, *held], near, strict=True) if is_near]
+        near = ((boxes[:, 2:] >= low) & (boxes[:, :2] <= high)).all(axis=1)
+        return [part for part, is_near in zip(outlines, near, strict=True) if is_near]
 
     def _clearance(self, world: World) -> float:
         reach = world.robot.circumscribed_radius
@@ -189,12 +190,6 @@ class _Closeness:
 
     def _depth(self, pose: FloatArray, one: ConvexObstacles) -> float:
         return float(static_depth(pose, self._shape, one, self._scratch))
-
-
-def _boxes(outlines: list[FloatArray]) -> FloatArray:
-    """(S, 2, 2) lower and upper corners of the boxes around outlines [m]."""
-    corners = [[part.min(axis=0), part.max(axis=0)] for part in outlines]
-    return np.array(corners).reshape(-1, 2, 2)
 
 
 def _fixed(world: World) -> dict[int, FloatArray]:

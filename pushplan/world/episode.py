@@ -141,11 +141,7 @@ class Episode(ArrayRecord, CheckedFields):
                 version.
         """
         arrays = read_npz(path, "episode file", ("header", *_ARRAYS), tuple(_PLANS))
-        try:
-            text = str(arrays.pop("header"))
-        except ValueError as error:
-            raise SchemaError(f"cannot read episode file {path}: {error}") from error
-        header = parse_json(text, f"the header of {path}")
+        header = parse_json(str(arrays.pop("header")), f"the header of {path}")
         if not isinstance(header, dict) or header.get("schema") != SCHEMA:
             raise SchemaError(f"{path}: this pushplan reads schema {SCHEMA!r}")
         keys = ("schema", "world", "success", "reason", "about")

@@ -178,30 +178,21 @@ class Movables(ArrayRecord, CheckedFields):
     def from_polygons(
         cls,
         polygons: Sequence[ArrayLike],
-        *,
-        masses: ArrayLike | None = None,
-        density: float = 1.0,
-        wheeled: ArrayLike | None = None,
-        ids: ArrayLike | None = None,
-        contact_radii: ArrayLike = 0.0,
+        **options: Any,
     ) -> Movables:
         """Objects from convex polygons in the world frame, as perception reports them.
 
-        Each gets a pose at its centroid with theta = 0. Arguments as in `from_outlines`.
+        Each gets a pose at its centroid with theta = 0.
+
+        Args:
+            polygons: K convex polygons, each (N, 2) [m].
+            options: further arguments of `from_outlines`, such as ``masses``.
         """
         clean = convex_outlines("polygon", polygons)
         _, centres = areas_and_centroids(*flatten(clean))
         poses = np.column_stack([centres, np.zeros(len(clean))])
         outlines = [c - centre for c, centre in zip(clean, centres, strict=True)]
-        return cls.from_outlines(
-            outlines,
-            poses,
-            masses=masses,
-            density=density,
-            wheeled=wheeled,
-            ids=ids,
-            contact_radii=contact_radii,
-        )
+        return cls.from_outlines(outlines, poses, **options)
 
     @cached_property
     def _contact_outlines(self) -> tuple[FloatArray, IntArray]:
@@ -244,16 +235,18 @@ class Movables(ArrayRecord, CheckedFields):
         """
         count = len(self)
         still = frozen(np.zeros((count, 3)))
-        clone = self._unchecked(self.__dict__)
-        clone.__dict__["poses"] = array("poses", poses, (count, 3))
-        clone.__dict__["twists"] = still if twists is None else array("twists", twists, (count, 3))
-        return clone
+        return self._unchecked(
+            {
+                **self.__dict__,
+                "poses": array("poses", poses, (count, 3)),
+                "twists": still if twists is None else array("twists", twists, (count, 3)),
+            }
+        )
 
     def holding_fixed(self, fixed: ArrayLike) -> Movables:
         """The same objects, of which those flagged in (K,) are held not to move."""
-        clone = self._unchecked(self.__dict__)
-        clone.__dict__["fixed"] = array("movables.fixed", fixed, (len(self),), dtype=np.bool_)
-        return clone
+        flags = array("movables.fixed", fixed, (len(self),), dtype=np.bool_)
+        return self._unchecked({**self.__dict__, "fixed": flags})
 
     def select(self, keep: ArrayLike) -> Movables:
         """The objects whose index or flag is in ``keep``."""
@@ -287,12 +280,12 @@ class Movables(ArrayRecord, CheckedFields):
         at = self._index_of(changes.ids)
         known = np.flatnonzero(at >= 0)
         if len(gone) == 0 and len(known) == len(at) and self._has_outlines_of(changes, at):
-            clone = self._unchecked(self.__dict__)
+            same = dict(self.__dict__)
             for name in _ONE_EACH:
-                values = getattr(self, name).copy()
-                values[at] = getattr(changes, name)
-                clone.__dict__[name] = frozen(values)
-            return clone
+                same[name] = getattr(self, name).copy()
+                same[name][at] = getattr(changes, name)
+                frozen(same[name])
+            return self._unchecked(same)
         values = {
             name: np.concatenate([getattr(self, name), getattr(changes, name)])
             for name in (*_ONE_EACH, "ids", "drawn_vertices")

@@ -78,10 +78,8 @@ def read_nav2_grid(path: str | Path) -> tuple[IntArray, float, FloatArray]:
         side = number("resolution", data["resolution"], low=0.0, open_low=True)
         origin: FloatArray = array("origin", data["origin"], (3,))
         grey, opaque = _picture(path.parent / word("image", data["image"]))
-    except SchemaError as error:
-        raise SchemaError(f"{path}: {error}") from error
     except InvalidInputError as error:
-        raise InvalidInputError(f"{path}: {error}") from error
+        raise type(error)(f"{path}: {error}") from error
     if mode == "raw":
         cells = np.where(grey <= 100, grey, -1)
     else:

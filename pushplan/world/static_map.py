@@ -73,14 +73,8 @@ class StaticMap(ArrayRecord, CheckedFields):
             ) from error
         if bounds is None:
             polygons = convex_outlines("static.polygons", polygons)
-            corners = [
-                *polygons,
-                lines[:, :2] - thick[:, None],
-                lines[:, :2] + thick[:, None],
-                lines[:, 2:] - thick[:, None],
-                lines[:, 2:] + thick[:, None],
-            ]
-            every = np.concatenate(corners)
+            ends, reach = lines.reshape(-1, 2), np.repeat(thick, 2)[:, None]
+            every = np.concatenate([*polygons, ends - reach, ends + reach])
             if len(every) == 0:
                 raise InvalidInputError("a static map without obstacles needs bounds")
             bounds = np.concatenate([every.min(axis=0), every.max(axis=0)])

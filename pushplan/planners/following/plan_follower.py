@@ -105,7 +105,8 @@ class PlanFollower:
         self.replanning = Replanning() if replanning is None else replanning
         self.interaction = QuasiStatic() if interaction is None else interaction
         self.stop = stop
-        self._progress: Progress | None = None
+        self._begun = False
+        self._progress: Progress
         self._recovery: RecoveryRule
         self._forget(np.random.default_rng(0))
 
@@ -116,6 +117,7 @@ class PlanFollower:
         self._forget(rng)
         self.controller.reset(world)
         self._clock.command = driven_twist(world)
+        self._begun = True
         self._progress = Progress(window=2.0 * world.robot.circumscribed_radius)
         self._recovery = RecoveryRule(world)
 
@@ -144,11 +146,11 @@ class PlanFollower:
     @property
     def stuck(self) -> bool:
         """Whether all recoveries at this place are used up; plans are still made and driven."""
-        return self._progress is not None and self._recovery.stuck
+        return self._begun and self._recovery.stuck
 
     def act(self, world: World, observation: Any = None) -> Twist:
         """The twist for this step; plans first where that is necessary."""
-        if self._progress is None:
+        if not self._begun:
             self.reset(world, self._rng)
         if self._map is not world.static:
             if self._map not in (None, world.static):
@@ -179,7 +181,6 @@ class PlanFollower:
         """Whether a robot that cannot stand is at the end of its plan, the next on its way."""
         if world.robot.can_stop or self._pending is None:
             return False
-        assert self._progress is not None
         return self._progress.update(plan, world.robot_pose) >= self._progress.total - 1e-9
 
     def _update_plan(self, world: World) -> None:
@@ -219,14 +220,15 @@ class PlanFollower:
 
     def _ask(self, world: World, reason: Reason) -> None:
         """Call the planner; its plan is there after the time that the call takes."""
-        assert self._progress is not None
         latency = self._latency()
         plan, now = self.current_plan, 0.0
         if plan is not None and latency > 0.0:
             self._progress.update(plan, world.robot_pose)
             now = self._progress.time
         if plan is None and reason is Reason.BLOCKED:
-            world = _at_rest(world, self._clock.held)
+            held = self._clock.held
+            path = stopping_path(world.robot, world.robot_pose, driven_twist(world), held, held)
+            world = world.moved(robot_pose=path[-1], robot_twist=np.zeros(3))  # where it has braked
         start, stretch = world_ahead(world, plan, now, latency, self.interaction)
         self._planned_at, self._planned_from = world.time, world.robot_pose[:2]
         self._planned_ids = world.movables.ids
@@ -268,7 +270,6 @@ class PlanFollower:
             return False
         if self._free_length(world, old) < math.inf:
             return False
-        assert self._progress is not None
         index = self._progress.index(self._progress.along)
         weight = self.replanning.weight(self.planner)
         swept, path = sweep_rest(world, old, index, self.interaction)
@@ -307,7 +308,6 @@ class PlanFollower:
             return Reason.JAM
         if rule.never:
             return None
-        assert self._progress is not None
         x, y = (float(value) for value in world.robot_pose[:2])
         along = self._progress.update(plan, world.robot_pose)
         index = self._progress.index(along)
@@ -330,7 +330,6 @@ class PlanFollower:
         """How far the rest of a plan leads before something static that it was not made for [m]."""
         if self._fits is world.static:
             return math.inf
-        assert self._progress is not None
         index = self._progress.index(self._progress.update(plan, world.robot_pose))
         path = np.concatenate([world.robot_pose[None], plan.poses[index + 1 :]])
         free = math.inf if self._fits == world.static else free_length(world, path)
@@ -379,12 +378,6 @@ def _timed_call(
     took = time.perf_counter() - began
     result = expect("what the planner returns", result, PlanResult)
     return replace(result, stats=replace(result.stats, wall_time_s=took))
-
-
-def _at_rest(world: World, period: float) -> World:
-    """The world with the robot where it stands when it has braked."""
-    path = stopping_path(world.robot, world.robot_pose, driven_twist(world), period, period)
-    return world.moved(robot_pose=path[-1], robot_twist=np.zeros(3))
 
 
 def _without_predictions(result: PlanResult) -> PlanResult:

@@ -44,8 +44,7 @@ class RenewingFollower(PlanFollower):
         self._renewal = renewal
 
     def reset(self, world: World, rng: np.random.Generator) -> None:
-        """Forget the last episode, and measure the robot and the water of this one."""
-        self.interaction = default_interaction(world)
+        """Forget the last episode, and measure the robot of this one."""
         every = self._renewal * world.robot.circumscribed_radius
         self.replanning = replace(self.replanning, every_metres=every)
         if isinstance(self.planner, PreparedPlanner):

@@ -129,6 +129,12 @@ def sweep_rest(
     return interaction.sweep(world, path), path
 
 
+def poses_at(at: FloatArray, along: FloatArray, path: FloatArray) -> FloatArray:
+    """(M, 3) poses at places (M,) of a path (N, 3) whose own lie ``along`` (N,) it."""
+    columns = (path[:, 0], path[:, 1], np.unwrap(path[:, 2]))
+    return np.column_stack([np.interp(at, along, column) for column in columns])
+
+
 def free_length(world: World, path: FloatArray) -> float:
     """How far a path leads before the robot meets what is static [m]; inf where it does not.
 
@@ -137,12 +143,10 @@ def free_length(world: World, path: FloatArray) -> float:
         path: (N, 3) poses, from that of the robot on.
     """
     size = world.robot.circumscribed_radius
-    headings = np.unwrap(path[:, 2])
-    lengths = arc_lengths(path)
-    along = lengths + size * np.concatenate([[0.0], np.cumsum(np.abs(np.diff(headings)))])
+    lengths, turns = arc_lengths(path), np.abs(np.diff(np.unwrap(path[:, 2])))
+    along = lengths + size * np.concatenate([[0.0], np.cumsum(turns)])
     fine = np.linspace(0.0, along[-1], 1 + math.ceil(along[-1] / (_SPACING * size)))
-    columns = (path[:, 0], path[:, 1], headings)
-    poses = np.column_stack([np.interp(fine, along, column) for column in columns])
+    poses = poses_at(fine, along, path)
     shape = footprint(world.robot, 0.5 * world.margin)
     scratch = np.empty_like(shape.vertices)
     first = first_blocked(poses, len(fine), shape, obstacles(world.static), scratch)

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
 from pushplan.control import Progress, waiting_twist
 from pushplan.geometry.transforms import arc_step
 from pushplan.interaction import InteractionModel
+from pushplan.planners.following.replanning import poses_at
 from pushplan.world import Plan, World
 from pushplan.world.checks import FloatArray
 from pushplan.world.polyline import path_length
@@ -68,20 +70,19 @@ def joined(stretch: Plan | None, plan: Plan) -> Plan:
     """One plan of a stretch and the plan that begins at its end."""
     if stretch is None:
         return plan
-    objects = None
-    if stretch.object_poses is not None and plan.object_poses is not None:
-        objects = np.concatenate([stretch.object_poses[:-1], plan.object_poses])
+    columns: dict[str, Any] = {
+        name: np.concatenate([getattr(stretch, name)[:-1], getattr(plan, name)])
+        for name in ("poses", "speeds", "turn_rates", "object_poses")
+        if getattr(stretch, name) is not None and getattr(plan, name) is not None
+    }
+    begun = len(stretch.times) - 1
     return Plan(
         times=np.concatenate([stretch.times[:-1], stretch.times[-1] + plan.times]),
-        poses=np.concatenate([stretch.poses[:-1], plan.poses]),
-        speeds=np.concatenate([stretch.speeds[:-1], plan.speeds]),
-        turn_rates=np.concatenate([stretch.turn_rates[:-1], plan.turn_rates]),
+        **columns,
         travel_cost=stretch.travel_cost + plan.travel_cost,
         interaction_cost=stretch.interaction_cost + plan.interaction_cost,
-        object_poses=objects,
         subtasks=tuple(
-            replace(s, first=s.first + len(stretch.times) - 1, last=s.last + len(stretch.times) - 1)
-            for s in plan.subtasks
+            replace(s, first=s.first + begun, last=s.last + begun) for s in plan.subtasks
         ),
     )
 
@@ -128,12 +129,6 @@ def _on_plan(plan: Plan, now: float, latency: float) -> tuple[FloatArray, FloatA
     end = min(now + latency, float(plan.times[-1]))
     inner = (plan.times > now + 1e-9) & (plan.times < end - 1e-9)
     times = np.concatenate([[now], plan.times[inner], [end] if end > now else []])
-    headings = np.unwrap(plan.poses[:, 2])
-    poses = np.column_stack(
-        [
-            np.interp(times, plan.times, column)
-            for column in (plan.poses[:, 0], plan.poses[:, 1], headings)
-        ]
-    )
+    poses = poses_at(times, plan.times, plan.poses)
     index = np.searchsorted(plan.times, times + 1e-9, side="right") - 1
     return times - now, poses, np.column_stack([plan.speeds[index], plan.turn_rates[index]])
