@@ -53,20 +53,6 @@ def can_turn(pose: FloatArray, size: float, among: ConvexObstacles) -> bool:
     return True
 
 
-@kernel(allocates=True)
-def _path_to(node: int, nodes: FloatArray, before: IntArray) -> FloatArray:
-    """(N, 3) the poses that have led to one."""
-    count, last = 1, node
-    while before[last] >= 0:
-        last = before[last]
-        count += 1
-    path = np.empty((count, 3))
-    for n in range(count - 1, -1, -1):
-        copy_into(path[n], nodes[node])
-        node = before[node]
-    return path
-
-
 @kernel
 def _gets_deeper(
     pose: FloatArray, problem: RecoveryProblem, allowed: FloatArray, scratch: FloatArray
@@ -80,8 +66,13 @@ def _gets_deeper(
 
 
 @kernel(allocates=True)
-def search_recovery(problem: RecoveryProblem) -> FloatArray:
-    """The drive with the fewest steps, (N, 3), to where it can turn; (0, 3) if there is none."""
+def search_recovery(problem: RecoveryProblem) -> tuple[FloatArray, IntArray, int]:
+    """Look for the drive with the fewest steps to where the robot can turn.
+
+    Returns:
+        (M, 3) poses that were found, (M,) the pose before each, and the last one of the drive; -1
+        if there is none.
+    """
     start, body, grown, among = problem.start, problem.body, problem.grown, problem.among
     size = problem.size
     unit = _CELL * STEP
@@ -113,11 +104,11 @@ def search_recovery(problem: RecoveryProblem) -> FloatArray:
             before[count] = at
             count += 1
             if count == _MOST:
-                return nodes[:0]
+                return nodes, before, -1
             if can_turn(pose, size, among):
-                return _path_to(count - 1, nodes, before)
+                return nodes, before, count - 1
         at += 1
-    return nodes[:0]
+    return nodes, before, -1
 
 
 def recovery_path(world: World, margin: float) -> FloatArray | None:
@@ -145,7 +136,12 @@ def recovery_path(world: World, margin: float) -> FloatArray | None:
             return None
         for distance in dict.fromkeys((margin, 0.0)):
             grown = footprint(world.robot, distance)
-            path = search_recovery(RecoveryProblem(start, steps, body, grown, among, size))
-            if len(path):
-                return path
+            problem = RecoveryProblem(start, steps, body, grown, among, size)
+            nodes, before, last = search_recovery(problem)
+            path = []
+            while last >= 0:
+                path.append(nodes[last])
+                last = before[last]
+            if path:
+                return np.array(path[::-1])
     return None

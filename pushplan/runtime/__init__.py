@@ -1,10 +1,9 @@
 """From worlds to motor commands, in a robot's own loop."""
 
-from pushplan.runtime.command import Command, CommandStatus
+from pushplan.runtime.command import Command, CommandStatus, RunLog
 from pushplan.runtime.disturbances import Disturbances
 from pushplan.runtime.disturbed_policy import DisturbedPolicy
 from pushplan.runtime.motors import Motors
-from pushplan.runtime.run_log import RunLog
 from pushplan.runtime.runner import PLAN_STOP, Runner
 from pushplan.runtime.state_estimator import StateEstimator
 from pushplan.runtime.thread_executor import PlanningError, ThreadExecutor

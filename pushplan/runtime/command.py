@@ -1,11 +1,12 @@
-"""`Command`: what a robot drives now, and why."""
+"""`Command`: what a robot drives now, and why; `RunLog`, which keeps it."""
 
 from __future__ import annotations
 
 import enum
 from dataclasses import dataclass
+from typing import Protocol
 
-from pushplan.world import Plan, Twist
+from pushplan.world import Plan, Twist, World
 
 
 class CommandStatus(enum.StrEnum):
@@ -50,3 +51,16 @@ class Command:
     plan_age: float = 0.0
     world_age: float = 0.0
     late: bool = False
+
+
+class RunLog(Protocol):
+    """Keeps what a `Runner` sees and does; a log that raises is not called again."""
+
+    def world(self, world: World) -> None:
+        """A snapshot has come in."""
+
+    def plan(self, plan: Plan, time: float) -> None:
+        """A plan was taken up, at a time [s]."""
+
+    def command(self, command: Command) -> None:
+        """A command was given."""

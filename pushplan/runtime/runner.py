@@ -5,23 +5,23 @@ from __future__ import annotations
 import math
 import threading
 import time
+import warnings
 from collections.abc import Callable
 from dataclasses import replace
 from numbers import Real
+from typing import Any
 
 import numpy as np
 
 from pushplan.control import waiting_twist
 from pushplan.control.limits import driven_twist
 from pushplan.planners.kernel_warmup import warm_up_policy
-from pushplan.runtime.command import Command, CommandStatus
+from pushplan.runtime.command import Command, CommandStatus, RunLog
 from pushplan.runtime.held_actions import drivable
 from pushplan.runtime.interpreter_turns import take_short_turns, take_usual_turns
 from pushplan.runtime.noise_allowance import NoiseAllowance
-from pushplan.runtime.object_memory import ObjectMemory
 from pushplan.runtime.obstacle_guard import ObstacleGuard
-from pushplan.runtime.run_log import QuietLog, RunLog
-from pushplan.runtime.state_estimator import StateEstimator
+from pushplan.runtime.state_estimator import ObjectMemory, StateEstimator
 from pushplan.runtime.thread_executor import ThreadExecutor
 from pushplan.world import (
     Deadline,
@@ -143,7 +143,7 @@ class Runner:
             self.policy.expect_noise(left * noise[0], left * noise[1])
         self._believed = max(self.max_age, _BLIND if self.on_stale == "continue" else 0.0)
         self._estimator = StateEstimator(delay, gain, self._believed)
-        self._delay, self._clock, self._log = delay, clock, QuietLog(log)
+        self._delay, self._log = delay, log
         self._executor = executor or ThreadExecutor(self.plan_stop, clock)
         self._lock = threading.Lock()  # of the snapshots that have come in, and their counts
         self._prompt = False
@@ -200,7 +200,7 @@ class Runner:
         if not self._prompt:
             take_short_turns()
             self._prompt = True
-        self._log.note("world", world)
+        self._note("world", world)
         return self.command(world.time)
 
     def _restart(self, world: World) -> None:
@@ -277,7 +277,7 @@ class Runner:
             fresh.sort(key=lambda world: world.time)
             self._newest, self._refused = fresh[-1], ""
         for world in fresh:
-            self._log.note("world", world)
+            self._note("world", world)
         seen = self._guard.observe(fresh[-1])
         if self._stepped:
             self._restart(seen)
@@ -344,7 +344,7 @@ class Runner:
         if plan is not self._plan:
             self._plan, self._planned_at = plan, at
             if plan is not None:
-                self._log.note("plan", plan, at)
+                self._note("plan", plan, at)
         command = Command(
             at,
             twist,
@@ -355,7 +355,7 @@ class Runner:
             at - newest.time,
             gap > 1.5 * self.period,
         )
-        self._log.note("command", command)
+        self._note("command", command)
         if math.isfinite(now) and now != at:
             command = replace(command, time=now)
         self._last, self.status, self._at = command, status, at
@@ -381,6 +381,16 @@ class Runner:
                 "waiting for a world of that time"
             )
         return self._at + self.period, self._stepped
+
+    def _note(self, what: str, *values: Any) -> None:
+        """Call a method of the log by its name; a log that fails is not called again."""
+        if self._log is None:
+            return
+        try:
+            getattr(self._log, what)(*values)
+        except Exception as error:
+            self._log = None
+            warnings.warn(f"logging has ended: {describe(error)}", RuntimeWarning, stacklevel=3)
 
     def _choose(
         self, world: World, now: float, age: float, clock: str

@@ -23,7 +23,6 @@ from pushplan.world.goals import (
 from pushplan.world.movables import Movables
 from pushplan.world.nav2_map import load_nav2_map
 from pushplan.world.plan import Plan, PlanResult, PlanStats, PlanStatus, Stage, SubTask
-from pushplan.world.planning_executor import PendingResult, PlanningExecutor
 from pushplan.world.policy_abilities import (
     ChecksEnvironment,
     ChecksScenario,
@@ -32,6 +31,8 @@ from pushplan.world.policy_abilities import (
     ExpectsNoise,
     HoldsDecisions,
     LogsPlans,
+    PendingResult,
+    PlanningExecutor,
     PlansBesideDriving,
     ShowsPlan,
     WarmsUp,

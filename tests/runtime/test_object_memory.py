@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 from conftest import make_boxes, make_u_maze
 
-from pushplan.runtime.object_memory import ObjectMemory
+from pushplan.runtime.state_estimator import ObjectMemory
 from pushplan.world import ClearanceArea, World
 
 MAZE = make_u_maze([(11.0, 8.0, 0.1), (4.0, 8.0, 0.2), (8.0, 13.0, 0.3)])

@@ -20,7 +20,7 @@ from pushplan.world import (
     rectangles,
 )
 from pushplan.world.nav2_map import read_nav2_grid
-from pushplan.world.rectangles import rectangle_cover
+from pushplan.world.occupancy import rectangle_cover
 
 SHAPES = st.tuples(st.integers(1, 12), st.integers(1, 12))
 CORNER = {"image": "map.pgm", "resolution": 0.5, "origin": [1.0, -2.0, 0.0]}

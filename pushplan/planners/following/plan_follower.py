@@ -15,9 +15,8 @@ from pushplan.control.limits import driven_twist, ramp_twist
 from pushplan.control.stopping import stopping_path
 from pushplan.control.tracking import Progress
 from pushplan.interaction import InteractionModel, QuasiStatic
-from pushplan.planners.following.fruitless_calls import FruitlessCalls
 from pushplan.planners.following.plan_controller import PlanController
-from pushplan.planners.following.recovery import RecoveryRule
+from pushplan.planners.following.recovery import FruitlessCalls, RecoveryRule
 from pushplan.planners.following.replanning import (
     Reason,
     Replanning,

@@ -1,4 +1,4 @@
-"""`RecoveryRule`: when a robot that follows plans recovers, and when it gives that up."""
+"""When a robot that follows plans recovers, and how long it waits where no plan is found."""
 
 from __future__ import annotations
 
@@ -10,6 +10,8 @@ from pushplan.world import Drive, RobotModel, Twist, World
 _DISTANCE = 1.0  # by which a recovery takes the robot away [circumscribed radii]
 _PLACE = 2.0  # recoveries that are no farther apart are at the same place [circumscribed radii]
 _MOST = 6  # recoveries at one place
+_HERE = 0.5  # size of a place where calls find nothing [circumscribed radii]
+_MOST_DOUBLINGS = 5
 
 
 class RecoveryRule:
@@ -84,3 +86,30 @@ def _can_back_off(robot: RobotModel) -> bool:
     if robot.drive is Drive.CAR:
         return robot.min_speed < 0.0
     return robot.drive is Drive.DIFFERENTIAL
+
+
+class FruitlessCalls:
+    """Counts the calls that found nothing since the robot is where it is."""
+
+    def __init__(self) -> None:
+        self._count, self._place = 0, (math.nan, math.nan)
+
+    def add(self, world: World) -> None:
+        """Another call from here has found nothing."""
+        self._count = 1 + self.count(world)
+        if self._count == 1:
+            x, y, _ = world.robot_pose.tolist()
+            self._place = x, y
+
+    def clear(self) -> None:
+        """A call has found a plan."""
+        self._count = 0
+
+    def count(self, world: World) -> int:
+        """How many calls in a row have found no plan since the robot is at this place."""
+        away = math.dist(world.robot_pose[:2].tolist(), self._place)
+        return self._count if away <= _HERE * world.robot.circumscribed_radius else 0
+
+    def delay(self, world: World) -> float:
+        """Factor of the time before the next call; planners without randomness search the same."""
+        return 2.0 ** min(max(self.count(world) - 1, 0), _MOST_DOUBLINGS)
