@@ -14,7 +14,7 @@ from pushplan.motion.time_slicing import never
 from pushplan.search.grid_dijkstra import grid_dijkstra
 from pushplan.world import GoalDisc, StaticMap, World
 from pushplan.world.checks import FloatArray, IntArray, frozen
-from pushplan.world.outline import flatten, unflatten
+from pushplan.world.outline import flatten, outline_boxes, unflatten
 
 _SIDE = 96  # cells along the longer side of the workspace, if that resolves the robot's own width
 _MOST = 400  # cells along the longer side at most
@@ -28,23 +28,16 @@ def _cell_weights(
     cols: int,
     vertices: FloatArray,
     offsets: IntArray,
+    within: IntArray,  # (K, 4) first column, first row, last column, last row of each polygon
     reach: FloatArray,
     weight: FloatArray,
 ) -> FloatArray:
     """Extra cost per metre of each cell: weights of polygons, fading to 0 at their reach."""
     extra = np.zeros((rows, cols))
     for k in range(offsets.shape[0] - 1):
-        corners = vertices[offsets[k] : offsets[k + 1]]
         far = reach[k]
-        x0, x1, y0, y1 = corners[0, 0], corners[0, 0], corners[0, 1], corners[0, 1]
-        for i in range(1, corners.shape[0]):
-            x0, x1 = min(x0, corners[i, 0]), max(x1, corners[i, 0])
-            y0, y1 = min(y0, corners[i, 1]), max(y1, corners[i, 1])
-        x0, x1, y0, y1 = x0 - far, x1 + far, y0 - far, y1 + far
-        c0, c1 = int((x0 - origin[0]) / cell), int((x1 - origin[0]) / cell) + 1
-        r0, r1 = int((y0 - origin[1]) / cell), int((y1 - origin[1]) / cell) + 1
-        for r in range(max(r0, 0), min(r1, rows)):
-            for c in range(max(c0, 0), min(c1, cols)):
+        for r in range(max(within[k, 1], 0), min(within[k, 3] + 1, rows)):
+            for c in range(max(within[k, 0], 0), min(within[k, 2] + 1, cols)):
                 x, y = origin[0] + (c + 0.5) * cell, origin[1] + (r + 0.5) * cell
                 gap = max(core_distance(x, y, vertices, offsets[k], offsets[k + 1]), 0.0)
                 if gap < far:
@@ -121,7 +114,10 @@ def _grid_weights(
     weight: FloatArray,
 ) -> FloatArray:
     cols, rows = (int(np.ceil(side / cell)) for side in bounds[2:] - bounds[:2])
-    return _cell_weights(bounds[:2], cell, rows, cols, *flatten(shapes), reach, weight)
+    vertices, offsets = flatten(shapes)
+    boxes = outline_boxes(vertices, offsets) + reach[:, None] * [-1.0, -1.0, 1.0, 1.0]
+    within = ((boxes - np.tile(bounds[:2], 2)) / cell).astype(np.int64)
+    return _cell_weights(bounds[:2], cell, rows, cols, vertices, offsets, within, reach, weight)
 
 
 def _cheapest(

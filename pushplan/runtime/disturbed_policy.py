@@ -29,9 +29,8 @@ class DisturbedPolicy:
         disturbances: what perception and actuators do.
         period: of the robot's loop, which is that of the environment [s].
         planning_time: what every planning call takes [s].
-        told: whether the runner knows the noise and the delays of the actuators, as on a robot
-            that has been measured.
-        runner: further arguments of `Runner`.
+        runner: further arguments of `Runner`. By default it knows the noise and the delays of the
+            actuators, as on a robot that has been measured.
     """
 
     def __init__(
@@ -41,7 +40,6 @@ class DisturbedPolicy:
         *,
         period: float,
         planning_time: float = 0.05,
-        told: bool = True,
         **runner: Any,
     ) -> None:
         self.disturbances = disturbances or Disturbances()
@@ -53,7 +51,7 @@ class DisturbedPolicy:
             "heading_noise": d.heading_noise,
             "keep_unseen": 6.0 * d.vanish_time if d.vanish > 0.0 else 0.0,
         }
-        self._options = {"max_age": 1.0, **(known if told else {}), **runner}
+        self._options = {"max_age": 1.0, **known, **runner}
         self._policy, self._period, self._planning_time = policy, period, planning_time
         driven = self._make().policy
         given = driven.actions if isinstance(driven, ChoosesActions) else ()

@@ -163,22 +163,19 @@ class World(ArrayRecord, CheckedFields):
         objects: Movables,
         *,
         removed: ArrayLike = (),
-        robot_pose: ArrayLike | None = None,
-        robot_twist: ArrayLike | None = None,
-        time: float | None = None,
+        **moved: Any,
     ) -> World:
         """The same scene with some objects changed, added or removed, at the cost of a copy.
 
         Args:
             objects: those that have changed, and new ones, by their ids; see `Movables.updated`.
             removed: (R,) ids of objects that are gone.
-            robot_pose, robot_twist, time: as in `moved`.
+            moved: ``robot_pose``, ``robot_twist`` and ``time``, as in `moved`.
 
         Raises:
             InvalidInputError: if an id in ``removed`` is unknown, or in ``objects`` too.
         """
-        world = self.moved(robot_pose=robot_pose, robot_twist=robot_twist, time=time)
-        return replace(world, movables=self.movables.updated(objects, removed))
+        return replace(self.moved(**moved), movables=self.movables.updated(objects, removed))
 
 
 @functools.lru_cache(maxsize=8)

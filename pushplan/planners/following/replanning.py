@@ -20,21 +20,22 @@ _SPACING = 0.15  # distance between the poses of a path that are looked at [R]
 
 
 class Reason(enum.Enum):
-    """Why a new plan is wanted; ``urgent`` where the old one cannot be driven on."""
+    """Why a new plan is wanted."""
 
-    NO_PLAN = ("no plan", True)
-    OBJECTS = ("objects came or went", False)
-    OFFSET = ("the robot has left the path", True)
-    USED_UP = ("the plan is used up", True)
-    TIGHT = ("out of a tight place", True)
-    JAM = ("the robot would jam", True)
-    BLOCKED = ("the robot is about to jam", True)
-    SURPRISE = ("the plan costs more than was predicted", False)
-    PERIOD = ("it is time", False)
+    NO_PLAN = "no plan"
+    OBJECTS = "objects came or went"
+    OFFSET = "the robot has left the path"
+    USED_UP = "the plan is used up"
+    TIGHT = "out of a tight place"
+    JAM = "the robot would jam"
+    BLOCKED = "the robot is about to jam"
+    SURPRISE = "the plan costs more than was predicted"
+    PERIOD = "it is time"
 
-    def __init__(self, words: str, urgent: bool) -> None:
-        self.words = words
-        self.urgent = urgent
+    @property
+    def urgent(self) -> bool:
+        """True where the old plan cannot be driven on."""
+        return self not in (Reason.OBJECTS, Reason.SURPRISE, Reason.PERIOD)
 
 
 _Endless = Annotated[float, Limits(0.0, open_low=True, finite=False)]
