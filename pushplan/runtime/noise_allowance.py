@@ -21,6 +21,7 @@ from pushplan.world import (
 )
 from pushplan.world.checks import FloatArray, expect
 from pushplan.world.goals import ManipulationGoal
+from pushplan.world.outline import outward_normals
 
 _SURE = 3.0  # standard deviations by which the robot, or an object, has to be within its goal
 _NARROWEST = 0.25  # part of a receptacle's width that is taken off each of its sides at most
@@ -80,14 +81,13 @@ class NoiseAllowance:
 def _surer_goal(goal: ManipulationGoal, static: StaticMap, inset: float) -> ManipulationGoal:
     """The goal for objects, farther out, or farther in except where a wall is behind it [m]."""
     corners = goal.polygon
-    along = np.roll(corners, -1, axis=0) - corners
-    normals = np.stack([along[:, 1], -along[:, 0]], axis=1) / np.hypot(*along.T)[:, None]
+    normals = outward_normals(corners)
     if isinstance(goal, ClearanceArea):
         by = np.full(len(corners), inset)
         return ClearanceArea(_with_edges_moved(corners, normals, by), goal.open_edges)
     widths = (corners * normals).sum(axis=1) - (corners @ normals.T).min(axis=0)
     inset = min(inset, _NARROWEST * float(widths.min()))
-    middles = corners + 0.5 * along
+    middles = corners + 0.5 * (np.roll(corners, -1, axis=0) - corners)
     probes = shapely.linestrings(np.stack([middles, middles + inset * normals], axis=1))
     by = np.where(shapely.covers(shapely.box(*static.bounds), probes), -inset, 0.0)
     for part in static.convex_parts:

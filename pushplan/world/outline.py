@@ -52,6 +52,15 @@ def inscribed_radius(corners: FloatArray) -> float:
     return max(0.0, float((inside / np.hypot(edges[:, 0], edges[:, 1])).min()))
 
 
+def outward_normals(corners: FloatArray) -> FloatArray:
+    """(N, 2) unit vectors outwards from the edges that begin at (N, 2) corners, in order [m]."""
+    along = np.roll(corners, -1, axis=0) - corners
+    normals: FloatArray = (
+        np.stack([along[:, 1], -along[:, 0]], axis=1) / np.hypot(*along.T)[:, None]
+    )
+    return normals
+
+
 def convex_outline(name: str, corners: ArrayLike) -> FloatArray:
     """Check one convex outline and return it counter-clockwise, as (N, 2) [m].
 

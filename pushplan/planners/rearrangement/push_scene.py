@@ -37,6 +37,7 @@ from pushplan.planners.rearrangement.rollout_cache import RolloutCache
 from pushplan.planners.rearrangement.search_budget import SearchBudget
 from pushplan.world import ClearanceArea, Goal, Receptacle, RobotModel, StaticMap, World
 from pushplan.world.checks import BoolArray, FloatArray, IntArray, frozen
+from pushplan.world.outline import outward_normals
 
 
 @functools.lru_cache(maxsize=8)
@@ -56,8 +57,7 @@ def make_object_goal(goal: Goal, static: StaticMap, slack: float) -> ObjectGoal:
     """The goal for kernels. Sides of a receptacle that lie on the bounds do not count."""
     assert isinstance(goal, ClearanceArea | Receptacle)
     polygon = goal.polygon
-    along = np.roll(polygon, -1, axis=0) - polygon
-    normals = np.stack([along[:, 1], -along[:, 0]], axis=1) / np.hypot(*along.T)[:, None]
+    normals = outward_normals(polygon)
     offsets = (normals * polygon).sum(axis=1)
     low, high = static.bounds[:2], static.bounds[2:]
     corners = np.array([[low[0], low[1]], [high[0], low[1]], [high[0], high[1]], [low[0], high[1]]])
