@@ -78,7 +78,12 @@ class World(ArrayRecord, CheckedFields):
         Raises:
             InvalidInputError: if it is a goal for the objects.
         """
-        return _goal_for("robot", self.goal, (GoalDisc, GoalLine))
+        if not isinstance(self.goal, GoalDisc | GoalLine):
+            raise InvalidInputError(
+                "this needs a goal for the robot (GoalDisc or GoalLine), "
+                f"got {type(self.goal).__name__}"
+            )
+        return self.goal
 
     @property
     def manipulation_goal(self) -> ManipulationGoal:
@@ -87,7 +92,12 @@ class World(ArrayRecord, CheckedFields):
         Raises:
             InvalidInputError: if it is a goal for the robot.
         """
-        return _goal_for("objects", self.goal, (Receptacle, ClearanceArea))
+        if not isinstance(self.goal, Receptacle | ClearanceArea):
+            raise InvalidInputError(
+                "this needs a goal for the objects (Receptacle or ClearanceArea), "
+                f"got {type(self.goal).__name__}"
+            )
+        return self.goal
 
     @property
     def completed(self) -> BoolArray:
@@ -166,15 +176,6 @@ class World(ArrayRecord, CheckedFields):
             InvalidInputError: if an id in ``removed`` is unknown, or in ``objects`` too.
         """
         return replace(self.moved(**moved), movables=self.movables.updated(objects, removed))
-
-
-def _goal_for(whom: str, goal: Goal, kinds: tuple[type[Goal], type[Goal]]) -> Any:
-    if not isinstance(goal, kinds):
-        names = " or ".join(kind.__name__ for kind in kinds)
-        raise InvalidInputError(
-            f"this needs a goal for the {whom} ({names}), got {type(goal).__name__}"
-        )
-    return goal
 
 
 @functools.lru_cache(maxsize=8)
