@@ -85,9 +85,8 @@ def _packed(places: FloatArray) -> list[int]:
     by_x = np.argsort(places[:, 0], kind="stable")
     slices = int(np.ceil(np.sqrt(len(places) / GROUP)))
     size = GROUP * int(np.ceil(len(places) / (slices * GROUP)))
-    rank = np.empty(len(places), dtype=np.int64)
-    rank[by_x] = np.arange(len(places)) // size
-    order: list[int] = np.lexsort((places[:, 1], rank)).tolist()
+    rank = np.argsort(by_x)
+    order: list[int] = np.lexsort((places[:, 1], rank // size)).tolist()
     return order
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 
@@ -24,14 +23,6 @@ from pushplan.world.polyline import arc_lengths
 
 _LEAST = 0.1
 """A turn that brings the heading nearer by less is not worth while [rad]."""
-
-
-class _Turn(NamedTuple):
-    """A turn on the spot that is free."""
-
-    angle: float  # [rad]
-    error: float  # |heading error| that is left [rad]
-    objects: FloatArray  # (K, 3) where the objects are after it
 
 
 def start_turn(improver: PathImprover, before: Lead | None = None) -> Lead | None:
@@ -59,17 +50,16 @@ def start_turn(improver: PathImprover, before: Lead | None = None) -> Lead | Non
     left = math.remainder(heading - float(start[2]), math.tau)
     if abs(left) < _LEAST:
         return None
-    best: _Turn | None = None
-    for angle in (left, left - math.copysign(math.tau, left)):
-        turn = _Turn(*_turn_freely(improver.problem, start, before.objects, angle))
-        if best is None or turn.error < best.error - _LEAST:
-            best = turn
-    assert best is not None
-    if best.error > abs(left) - _LEAST:
+    angle, error, objects = _turn_freely(improver.problem, start, before.objects, left)
+    longer = left - math.copysign(math.tau, left)
+    other = _turn_freely(improver.problem, start, before.objects, longer)
+    if other[1] < error - _LEAST:
+        angle, error, objects = other
+    if error > abs(left) - _LEAST:
         return None
-    pose = start + np.array([0.0, 0.0, best.angle])
-    piece = np.array([[abs(best.angle), math.copysign(math.inf, best.angle)]])
-    return Lead(np.concatenate([before.pieces, piece]), pose, best.objects)
+    pose = start + np.array([0.0, 0.0, angle])
+    piece = np.array([[abs(angle), math.copysign(math.inf, angle)]])
+    return Lead(np.concatenate([before.pieces, piece]), pose, objects)
 
 
 def drive_to_turn(improver: PathImprover) -> Lead | None:
@@ -122,7 +112,11 @@ def _turn_freely(
     objects: FloatArray,  # (K, 3) poses of the objects there
     angle: float,  # to turn by [rad]
 ) -> tuple[float, float, FloatArray]:
-    """Turn until something blocks it; what of the turn comes nearest to the wanted heading."""
+    """Turn until something blocks it; what of the turn comes nearest to the wanted heading.
+
+    Returns:
+        The angle [rad], the heading error that is left [rad], and (K, 3) poses of the objects.
+    """
     steps = int(np.ceil(abs(angle) / MAX_TURN))
     here, last = start.copy(), start.copy()
     poses, moved = objects.copy(), np.zeros(objects.shape[0])

@@ -6,6 +6,7 @@ import io
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -33,6 +34,7 @@ _ARRAYS = (
 _PLANS = {f"plans_{field.name}": field.name for field in fields(RecordedPlans)}
 
 Numbers = Annotated[FloatArray, Shape(None)]
+_none = partial(np.zeros, 0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,9 +73,9 @@ class Episode(ArrayRecord, CheckedFields):
     actions: Annotated[FloatArray, Shape(None, None)] = field(
         default_factory=lambda: np.zeros((0, 0))
     )
-    rewards: Numbers = field(default_factory=lambda: np.zeros(0))
-    act_times_s: Numbers = field(default_factory=lambda: np.zeros(0), compare=False)
-    plan_times_s: Numbers = field(default_factory=lambda: np.zeros(0), compare=False)
+    rewards: Numbers = field(default_factory=_none)
+    act_times_s: Numbers = field(default_factory=_none, compare=False)
+    plan_times_s: Numbers = field(default_factory=_none, compare=False)
     about: Mapping[str, Any] = field(default_factory=dict, compare=False)
     plans: RecordedPlans | None = field(default=None, compare=False)
 
