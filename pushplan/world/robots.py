@@ -108,10 +108,9 @@ def _robot(
     for key in limits:
         if key not in _LIMITS:
             raise UnknownNameError("limit of a robot", key, _LIMITS)
-    values = {"bumpers": {"none": []}, **_catalogue()[name], **limits, "name": name}
-    parts = (*values.pop("parts"), *values.pop("bumpers")[bumper])
-    drive = Drive(choice("drive", drive, [d.value for d in Drive]))
-    robot = RobotModel(parts, drive=drive, **values)
-    if drive is Drive.DIFFERENTIAL and "min_speed" not in limits:
+    own = {"bumpers": {"none": []}, **_catalogue()[name]}
+    parts = (*own.pop("parts"), *own.pop("bumpers")[bumper])
+    robot = RobotModel(parts, **{**own, **limits, "drive": drive, "name": name})
+    if robot.drive is Drive.DIFFERENTIAL and "min_speed" not in limits:
         robot = replace(robot, min_speed=-robot.max_speed)  # reverses as fast
     return robot

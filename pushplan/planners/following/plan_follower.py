@@ -132,9 +132,8 @@ class PlanFollower:
         self._clock = EpisodeClock(_PERIOD)
         self._pending: _PendingPlan | None = None
         self._rng = rng
-        self._planned_at = -np.inf
-        self._planned_from = np.full(2, np.nan)
-        self._planned_ids = np.zeros(0, dtype=np.int64)
+        self._planned: World | None = None
+        """The snapshot that was there when a plan was last asked for."""
         self._tight = False
         self._map: StaticMap | None = None
         self._map_has_changed = False
@@ -198,8 +197,7 @@ class PlanFollower:
             if found_none and self._map_has_changed and self.plan_log[-1].status in _CLOSED:
                 return True  # it waits before a door, and does not get free
             return self._pending is not None and not found_none
-        goal, (x, y, _) = world.goal, world.robot_pose
-        there = isinstance(goal, GoalDisc | GoalLine) and goal.distance(float(x), float(y)) == 0.0
+        there = isinstance(world.goal, GoalDisc | GoalLine) and world.goal_reached
         return there or self.replanning.never
 
     def _recover(self, world: World) -> Twist | None:
@@ -229,8 +227,7 @@ class PlanFollower:
             path = stopping_path(world.robot, world.robot_pose, driven_twist(world), held, held)
             world = world.moved(robot_pose=path[-1], robot_twist=np.zeros(3))  # where it has braked
         start, stretch = world_ahead(world, plan, now, latency, self.interaction)
-        self._planned_at, self._planned_from = world.time, world.robot_pose[:2]
-        self._planned_ids = world.movables.ids
+        self._planned = world
         call = self._executor.submit(
             partial(_timed_call, self.planner, start, self._rng), world.time, self.stop
         )
@@ -288,14 +285,15 @@ class PlanFollower:
     def _needs_plan(self, world: World) -> Reason | None:
         plan, rule = self.current_plan, self.replanning
         size = world.robot.circumscribed_radius
-        waited = world.time - self._planned_at
+        planned = self._planned
+        waited = math.inf if planned is None else world.time - planned.time
         pause = rule.interval * size / world.robot.max_speed * self._fruitless.delay(world)
         # a robot that stays stuck thinks less and less often, so that the episode ends in time
         pause = max(pause, _PAUSE * self._recovery.idle)
         rested = waited >= pause - 1e-9
-        if plan is None:
+        if plan is None or planned is None:
             return Reason.NO_PLAN if rested else None
-        if not (rule.never or np.array_equal(world.movables.ids, self._planned_ids)):
+        if not (rule.never or np.array_equal(world.movables.ids, planned.movables.ids)):
             return Reason.OBJECTS  # something was delivered, lost or found
         left = self._free_length(world, plan)
         if left <= self._reaction(world):
@@ -317,7 +315,7 @@ class PlanFollower:
             return Reason.USED_UP if rested else None
         if self._tight and waited >= 4.0 * pause:
             return Reason.TIGHT  # there may be a plan that keeps its distance
-        driven = np.hypot(*(world.robot_pose[:2] - self._planned_from))
+        driven = np.hypot(*(world.robot_pose[:2] - planned.robot_pose[:2]))
         if waited >= rule.every_seconds - 1e-9 or driven >= rule.every_metres:
             return Reason.PERIOD
         end = None
