@@ -76,7 +76,7 @@ class PolicyServer:
         self._limits = expect("limits", limits or ServerLimits(), ServerLimits)
         check_world_policy(self._policy())
         self._numbers = itertools.count(1)
-        self._present: set[_Client] = set()
+        self._present: dict[threading.Thread, tuple[Connection, Session]] = {}
         self._places = threading.Semaphore(self._limits.clients)
         self._refusals = threading.Semaphore(_MOST_REFUSED)
         self._warm = self._over = False
@@ -145,15 +145,15 @@ class PolicyServer:
             with suppress(OSError):  # another server may have put its own socket there
                 if os.lstat(self._address.path).st_ino == self._inode:
                     os.unlink(self._address.path)
-        present = list(self._present)
-        for client in present:
-            client.session.abandon()
-            client.connection.cut()
+        present = self._present.copy()
+        for connection, session in present.values():
+            session.abandon()
+            connection.cut()
         end = time.monotonic() + _GRACE_S
-        for client in present:
-            client.join(max(0.0, end - time.monotonic()))
-            if client.is_alive():
-                LOG.warning("%s has not returned from its planning call", client.name)
+        for thread in present:
+            thread.join(max(0.0, end - time.monotonic()))
+            if thread.is_alive():
+                LOG.warning("%s has not returned from its planning call", thread.name)
         return not self._present
 
     def serve_forever(self, ready: Callable[[], object] = lambda: None) -> bool:
@@ -193,7 +193,8 @@ class PolicyServer:
                 self._look()
                 try:
                     connected, _ = listener.accept()
-                    _Client(self, connected).start()
+                    client = (connected, Connection(connected, self._limits))
+                    threading.Thread(target=self._attend, args=client, daemon=True).start()
                 except TimeoutError:
                     continue
                 except (OSError, RuntimeError):  # without file handles, or threads
@@ -201,66 +202,49 @@ class PolicyServer:
 
     def _look(self) -> None:
         """End planning calls whose clients have left."""
-        for client in list(self._present):
-            if client.busy and client.connection.has_left():
-                client.session.abandon()
+        for connection, session in self._present.copy().values():
+            if session.busy and connection.has_left():
+                session.abandon()
 
-
-class _Client(threading.Thread):
-    """A client, and the thread that answers it."""
-
-    def __init__(self, server: PolicyServer, connected: socket.socket) -> None:
-        super().__init__(daemon=True)
-        self._server, self._socket = server, connected
-        self.connection = Connection(connected, server._limits)
-        self.session = Session(server._policy, server._label, server._limits)
-        self.busy = False
-
-    def run(self) -> None:
-        """Hold a place while the client is served; whoever is sent away is told why after it."""
-        server = self._server
-        with self._socket:
-            refusal = f"the server has {server._limits.clients} clients, which is its limit"
-            if server._places.acquire(blocking=False):
-                server._present.add(self)
+    def _attend(self, connected: socket.socket, connection: Connection) -> None:
+        """Answer a client in its thread; who is sent away is told why when its place is free."""
+        with connected:
+            refusal = f"the server has {self._limits.clients} clients, which is its limit"
+            if self._places.acquire(blocking=False):
+                thread = threading.current_thread()
+                session = Session(self._policy, self._label, self._limits)
+                self._present[thread] = (connection, session)
                 try:
-                    refusal = self._serve(next(server._numbers))
+                    refusal = self._serve(thread, connection, session)
                 finally:
-                    server._present.remove(self)
-                    server._places.release()
-            if refusal and server._refusals.acquire(blocking=False):
-                self.connection.refuse(refusal)
-                server._refusals.release()
+                    del self._present[thread]
+                    self._places.release()
+            if refusal and self._refusals.acquire(blocking=False):
+                connection.refuse(refusal)
+                self._refusals.release()
 
-    def _serve(self, number: int) -> str:
-        """Answer the client until it leaves; the reason if it is sent away, else nothing."""
-        self.name = f"pushplan client {number}"
+    def _serve(self, thread: threading.Thread, connection: Connection, session: Session) -> str:
+        """Answer message after message, then end planning; why it is sent away, if it is."""
+        number = next(self._numbers)
+        thread.name = f"pushplan client {number}"
         LOG.info("client %d has come", number)
-        why, refusal = "closed", ""
+        why, refusal, last = "closed", "", False
         try:
-            self._converse()
+            while not (last or self._over):
+                data, last = session.answer(connection.read())
+                if session.abandoned:  # cut short, planning gives an action that nobody asked for
+                    raise RefusedError(
+                        "planning was ended: the client sends no more, or the server ends"
+                    )
+                if session.greeted:
+                    connection.greeted()
+                connection.write(data)
         except OSError:
             why = "left"
         except RefusedError as error:
             why = refusal = str(error)
         if not refusal:
-            self.connection.cut()
-        self.session.close()
+            connection.cut()
+        session.close()
         LOG.info("client %d has gone: %s", number, why)
         return refusal
-
-    def _converse(self) -> None:
-        """Answer message after message until the client says close, or the server ends."""
-        last = False
-        while not (last or self._server._over):
-            body = self.connection.read()
-            self.busy = True
-            data, last = self.session.answer(body)
-            self.busy = False
-            if self.session.abandoned:  # cut short, planning gives an action that nobody asked for
-                raise RefusedError(
-                    "planning was ended: the client sends no more, or the server ends"
-                )
-            if self.session.greeted:
-                self.connection.greeted()
-            self.connection.write(data)

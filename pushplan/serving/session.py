@@ -38,6 +38,7 @@ class Session:
 
     Attributes:
         greeted: whether the client has said hello.
+        busy: whether a message is being answered.
         abandoned: whether planning was ended from outside, so that what is answered is void.
 
     Args:
@@ -51,7 +52,7 @@ class Session:
         self._feed = WorldFeed()
         self._settings: Fields = {}
         self._episode: StepEpisode | LoopEpisode | None = None
-        self.greeted = self.abandoned = False
+        self.greeted = self.busy = self.abandoned = False
 
     def answer(self, body: bytes) -> Answer:
         """The reply to the body of a message: an error where the message is wrong.
@@ -60,7 +61,7 @@ class Session:
         leaves the known world as it was.
         """
         kind: str | None = None
-        before = copy(self._feed)
+        before, self.busy = copy(self._feed), True
         try:
             request = messages.decode(body)
             kind = request["type"]
@@ -73,6 +74,8 @@ class Session:
         except BaseException as error:  # of a policy, of any kind: its thread goes on
             said = f"{kind}: {self._label} failed: {describe(error)}"
             LOG.warning("%s\n%s", said, "".join(format_tb(error.__traceback__)))
+        finally:
+            self.busy = False
         self._feed = before
         return Answer(messages.error(said, kind))
 
