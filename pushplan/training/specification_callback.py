@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+from pushplan.learned.sb3_saving import describe_model, write_beside
 from pushplan.world.libraries import need
 
 
@@ -27,7 +28,16 @@ def specification_callback(path: str | Path, *, env: Any = None, repeat: int = 1
     Raises:
         MissingDependencyError: without Stable-Baselines3.
     """
-    need("stable_baselines3")
-    from pushplan.training.policies.sb3_parts import SpecificationWriter
+    callbacks = need("stable_baselines3.common.callbacks")
 
-    return SpecificationWriter(path, env, repeat)
+    class SpecificationWriter(callbacks.BaseCallback):  # type: ignore[name-defined]
+        def _on_training_start(self) -> None:
+            # what cannot be described is an error before the training, not after it
+            write_beside(path, describe_model(self.model, env=env, repeat=repeat))
+
+        def _on_step(self) -> bool:
+            return True
+
+        _on_training_end = _on_training_start
+
+    return SpecificationWriter()

@@ -432,9 +432,7 @@ class TestDataset:
 
 class TestReplay:
     def test_the_oldest_are_forgotten(self):
-        buffer = ReplayBuffer(3, (2,), np.uint8)
-        with pytest.raises(InvalidInputError, match="empty"):
-            buffer.sample(1, np.random.default_rng(0))
+        buffer = ReplayBuffer(3, (2,))
         for i in range(5):
             buffer.add(np.full(2, i), i, float(i), np.full(2, i + 1), 0.5 * (i < 4))
         assert len(buffer) == 3
@@ -442,9 +440,10 @@ class TestReplay:
         assert set(actions.tolist()) == {2, 3, 4}
         assert (seen[:, 0] == actions).all() and (following[:, 0] == actions + 1).all()
         assert (rewards == actions).all() and (discounts == 0.5 * (actions < 4)).all()
-        other = ReplayBuffer(3, (2,), np.uint8)
+        other = ReplayBuffer(3, (2,))
         other.restore(buffer.state())
-        assert np.array_equal(other.seen, buffer.seen) and other.position == buffer.position
+        assert np.array_equal(other.arrays["seen"], buffer.arrays["seen"])
+        assert other.position == buffer.position
 
     @pytest.mark.parametrize("terminated", [True, False])
     def test_rewards_are_added_up_as_far_as_is_looked_ahead(self, terminated):
@@ -453,11 +452,11 @@ class TestReplay:
         for i in range(5):
             ahead.add(np.full(1, i), i, 1.0)
             ahead.settle(np.full(1, i + 1), terminated and i == 4, last=i == 4)
-        assert memory.actions[:5].tolist() == [0, 1, 2, 3, 4]
-        assert memory.rewards[:5].tolist() == [1.75, 1.75, 1.75, 1.5, 1.0]
-        assert memory.next[:5, 0].tolist() == [3, 4, 5, 5, 5]
+        assert memory.arrays["actions"][:5].tolist() == [0, 1, 2, 3, 4]
+        assert memory.arrays["rewards"][:5].tolist() == [1.75, 1.75, 1.75, 1.5, 1.0]
+        assert memory.arrays["next"][:5, 0].tolist() == [3, 4, 5, 5, 5]
         left = [0.0] * 3 if terminated else [0.125, 0.25, 0.5]
-        assert memory.discounts[:5].tolist() == [0.125, 0.125, *left]
+        assert memory.arrays["discounts"][:5].tolist() == [0.125, 0.125, *left]
 
 
 @pytest.mark.learn
@@ -468,8 +467,8 @@ class TestSamLearner:
         from pushplan.training.policies.sam import SamLearner
 
         options = {"batch": 4, "buffer": 8, "widths": [4, 8], "blocks": 1, "follow": 0.25}
-        learner = SamLearner(tiny("sam", options=options), (4, 16, 16), "cpu")
-        assert learner.result is learner.target
+        learner = SamLearner(tiny("sam", options=options), "cpu")
+        assert learner.policy is learner.target
         before = [p.clone() for p in learner.target.parameters()]
         learner.memory.add(np.zeros((4, 16, 16), np.uint8), 3, 1.0, np.zeros((4, 16, 16)), 0.0)
         learner.update(np.random.default_rng(0), 0.01)
@@ -486,29 +485,31 @@ class TestSamLearner:
         network = SpatialActionNetwork(4, (4, 8), 1, shrink=2)
         assert network(torch.zeros(3, 4, 32, 48)).shape == (3, 32, 48)
         with pytest.raises(InvalidInputError, match="divisible by 8"):
-            SamLearner(tiny("sam", options={"shrink": 2}), (4, 16, 20), "cpu")
+            SamLearner(
+                tiny("sam", options={"shrink": 2}, observation={**MAP, "pixels": [20, 20]}), "cpu"
+            )
 
     @pytest.mark.slow
     def test_it_starts_with_the_weights_of_an_exported_network(self, tmp_path, data):
         import torch
 
-        from pushplan.training.policies.sam import SamLearner, _explore
+        from pushplan.training.policies.sam import SamLearner
 
         first = trained(tiny("sam"), tmp_path / "first", data)
         never = {"explore": 0.0, "explore_end": 0.0}
         options = {**TINY["sam"], "start": str(first.with_suffix("")), **never}
         config = tiny("sam", seed=1, options=options)
-        learner = SamLearner(config, (4, 16, 16), "cpu")
+        learner = SamLearner(config, "cpu")
         learner.begin_with(options["start"])
         seen = np.random.default_rng(0).integers(0, 255, (4, 16, 16)).astype(np.uint8)
         with torch.no_grad():
             values = learner.network(torch.from_numpy(seen[None]))[0].numpy()
         np.testing.assert_allclose(values, OnnxPolicy(first).decide(seen), atol=1e-5)
-        for network in (learner.target, learner.result):
+        for network in (learner.target, learner.policy):
             assert all(map(torch.equal, network.parameters(), learner.network.parameters()))
         # it acts by them from the first decision on
         rng = np.random.default_rng(0)
-        assert all(_explore(learner, seen, rng, 0.5) == learner.best(seen) for _ in range(20))
+        assert all(learner.explore(seen, rng, 0.5) == learner.best(seen) for _ in range(20))
         assert trained(config, tmp_path / "second", data, until=lambda done: done == 1) is None
         first.unlink()  # a training that is resumed needs it no more
         assert trained(config, tmp_path / "second", data, resume=True) is not None
@@ -552,7 +553,7 @@ class TestSamLearner:
 
         options = {"rate": 0.01, "batch": 16, "buffer": 128, "widths": [8, 8], "blocks": 1}
         config = tiny("sam", options={**options, "discount": 0.0, "target_every": 20})
-        learner = SamLearner(config, (4, 16, 16), "cpu")
+        learner = SamLearner(config, "cpu")
         rng = np.random.default_rng(0)
         for _ in range(128):  # the pixel that is lit pays
             seen = np.zeros((4, 16, 16), np.uint8)

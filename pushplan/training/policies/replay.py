@@ -8,74 +8,52 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pushplan.world import InvalidInputError
-from pushplan.world.checks import integer
-
 
 class ReplayBuffer:
     """The last decisions, in arrays; images stay 8-bit."""
 
-    def __init__(self, size: int, shape: tuple[int, ...], dtype: Any = np.uint8) -> None:
-        self.size = integer("size", size, low=1)
+    def __init__(self, size: int, shape: tuple[int, ...]) -> None:
+        self.size = size
         self.count, self.position = 0, 0
-        self.seen = np.zeros((size, *shape), dtype)
-        self.next = np.zeros((size, *shape), dtype)
-        self.actions = np.zeros(size, np.int64)
-        self.rewards = np.zeros(size, np.float32)
-        self.discounts = np.zeros(size, np.float32)
+        self.arrays: dict[str, NDArray[Any]] = {
+            "seen": np.zeros((size, *shape), np.uint8),
+            "actions": np.zeros(size, np.int64),
+            "rewards": np.zeros(size, np.float32),
+            "next": np.zeros((size, *shape), np.uint8),
+            "discounts": np.zeros(size, np.float32),
+        }
 
     def __len__(self) -> int:
         return self.count
 
-    def add(
-        self,
-        seen: NDArray[Any],
-        action: int,
-        reward: float,
-        following: NDArray[Any],
-        discount: float,
-    ) -> None:
+    def add(self, *decision: Any) -> None:
         """Remember a decision, and forget the oldest if there are too many.
 
         Args:
-            seen: before it.
-            action: number of the pixel.
-            reward: of it, and of those after it that are looked ahead.
-            following: what was seen after them.
-            discount: of the value of that; 0 where the task was over then, not only cut off.
+            decision: what was seen before it; the number of its pixel; its reward, with those that
+                are looked ahead; what was seen after them; the discount of the value of that, 0
+                where the task was over then, not only cut off.
         """
-        i = self.position
-        self.seen[i], self.next[i] = seen, following
-        self.actions[i], self.rewards[i], self.discounts[i] = action, reward, discount
-        self.position = (i + 1) % self.size
+        for array, value in zip(self.arrays.values(), decision, strict=True):
+            array[self.position] = value
+        self.position = (self.position + 1) % self.size
         self.count = min(self.count + 1, self.size)
 
     def sample(self, count: int, rng: np.random.Generator) -> tuple[NDArray[Any], ...]:
-        """Some decisions: seen, actions, rewards, following, discounts.
-
-        Raises:
-            InvalidInputError: if there are none yet.
-        """
-        if not self.count:
-            raise InvalidInputError("the replay buffer is empty")
+        """Some decisions: seen, actions, rewards, seen after them, discounts."""
         chosen = rng.integers(self.count, size=count)
-        arrays = (self.seen, self.actions, self.rewards, self.next, self.discounts)
-        return tuple(array[chosen] for array in arrays)
+        return tuple(array[chosen] for array in self.arrays.values())
 
     def state(self) -> dict[str, Any]:
         """Arrays and numbers from which `restore` makes the buffer again."""
-        used = slice(0, self.count)
-        return {
-            "count": self.count,
-            "position": self.position,
-            **{name: getattr(self, name)[used] for name in _ARRAYS},
-        }
+        used = {name: array[: self.count] for name, array in self.arrays.items()}
+        return {"count": self.count, "position": self.position, **used}
 
     def restore(self, state: Any) -> None:
         """Take over what `state` gave."""
         self.count, self.position = int(state["count"]), int(state["position"])
-        for name in _ARRAYS:
-            getattr(self, name)[: self.count] = np.asarray(state[name])
+        for name, array in self.arrays.items():
+            array[: self.count] = np.asarray(state[name])
 
 
 class Lookahead:
@@ -97,6 +75,3 @@ class Lookahead:
             left = 0.0 if terminated else self._discount ** len(rewards)
             seen, action, _ = self._open.popleft()
             self._memory.add(seen, action, total, following, left)
-
-
-_ARRAYS = ("seen", "next", "actions", "rewards", "discounts")

@@ -6,12 +6,14 @@ import csv
 import dataclasses
 import io
 import json
+import logging
 import math
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+import zlib
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
@@ -24,7 +26,11 @@ from pushplan.world.safe_yaml import dump
 
 CONFIG, CURVE, PICTURE = "config.yaml", "curve.csv", "curve.png"
 CHECKPOINT, BEST, POLICY, RECORD = "checkpoint.pt", "best.pt", "policy.onnx", "training.json"
+MODEL = "model.zip"
+_ON_BOARD = ("train_return", "valid_return", "valid_share", "valid_success", "loss")
+"""Columns of the learning curve that TensorBoard shows."""
 
+log = logging.getLogger(__name__)
 
 Until = Callable[[int], bool]
 """Asked with the number of chunks that are done; true leaves a training off."""
@@ -153,13 +159,12 @@ class TrainingRun:
         write_atomic(self.path(RECORD), text.encode())
 
     def _write_curve(self) -> None:
-        names = [entry.name for entry in dataclasses.fields(CurvePoint)]
         text = io.StringIO(newline="")
-        writer = csv.writer(text)
-        writer.writerow(names)
+        writer = csv.DictWriter(text, [entry.name for entry in dataclasses.fields(CurvePoint)])
+        writer.writeheader()
         for point in self.curve:
-            values = dataclasses.astuple(point)
-            writer.writerow([v if isinstance(v, int) else f"{v:.6g}" for v in values])
+            row = vars(point).items()
+            writer.writerow({k: v if isinstance(v, int) else f"{v:.6g}" for k, v in row})
         write_atomic(self.path(CURVE), text.getvalue().encode())
 
 
@@ -172,47 +177,89 @@ class Learned(NamedTuple):
     successes: Sequence[float] = ()  # whether these episodes reached the goal
 
 
-def train_chunks(
-    run: TrainingRun,
-    env: TrainingEnv,
-    until: Until | None,
-    *,
-    learn: Callable[[int], Learned],
-    decide: Callable[[Any], Any],
-    state: Callable[[], Mapping[str, Any]],
-) -> Iterator[CurvePoint]:
-    """Train chunk by chunk, from the last checkpoint of a run to its end.
+class Learner(Protocol):
+    """An algorithm, which `train` asks chunk by chunk."""
+
+    progress: str  # logged after each chunk, with the row of the curve and ``total``
+
+    @property
+    def policy(self) -> Any:
+        """The PyTorch module whose weights are the result."""
+
+    def learn(self, steps: range, seed: int) -> Learned:
+        """Learn from some of the training's decisions or pairs, with generators of that seed."""
+
+    def decide(self, seen: Any) -> Any:
+        """The action for an observation, as `validate` takes it."""
+
+    def state(self) -> dict[str, Any]:
+        """Beside the policy's weights, what `restore` needs: as `TrainingRun.save` takes it."""
+
+    def restore(self, state: Any) -> None:
+        """Go on from a checkpoint; the policy has its weights."""
+
+    def close(self) -> None:
+        """Close the environments."""
+
+
+def chunk_seed(seed: int, chunk: int) -> int:
+    """A seed for a chunk, far from those of its neighbours."""
+    return zlib.crc32(f"{seed} {chunk}".encode()) % 2**31
+
+
+def train(run: TrainingRun, learner: Learner, env: TrainingEnv, until: Until | None) -> None:
+    """Train from the last checkpoint of a run to its end; the policy then has its best weights.
+
+    Each chunk begins with fresh episodes and with generators seeded by the seed and the number of
+    the chunk, so that a training that was left off ends with the same weights as one that was not
+    (on the same machine and versions, on the processor).
 
     Args:
         run: the folder and the configuration.
+        learner: what learns.
         env: in which the policy is validated.
         until: leaves the training off.
-        learn: trains for the chunk of this number.
-        decide: from observation to action, as `validate` takes it.
-        state: what `TrainingRun.save` keeps.
-
-    Yields:
-        The row of the curve of each chunk, after its checkpoint was written.
     """
+    config = run.config
+    state = run.load()
+    if state is not None:
+        learner.policy.load_state_dict(state["weights"])
+        learner.restore(state)
     began = time.perf_counter() - run.seconds
     for chunk in range(run.done, run.chunks):
         if until is not None and until(chunk):
             break
-        learned = learn(chunk)
+        first = chunk * config.chunk
+        steps = range(first, min(first + config.chunk, config.steps))
+        learned = learner.learn(steps, chunk_seed(config.seed, chunk))
         paused = time.perf_counter()
-        scores = validate(env, decide, run.config.validation)
+        scores = validate(env, learner.decide, config.validation)
         began += time.perf_counter() - paused  # validation is no training
         point = CurvePoint(
             learned.steps,
             time.perf_counter() - began,
             len(learned.returns),
-            _mean(learned.returns) / run.config.reward_scale,
+            _mean(learned.returns) / config.reward_scale,
             _mean(learned.successes),
             *scores,
             loss=learned.loss,
         )
-        run.save(state(), point)
-        yield point
+        run.save({**learner.state(), "weights": learner.policy.state_dict()}, point)
+        _show(run, point)
+        log.info(learner.progress, {**vars(point), "total": config.steps})
+    if run.done:
+        learner.policy.load_state_dict(run.best_weights())
+
+
+def _show(run: TrainingRun, point: CurvePoint) -> None:
+    """Write a row of the curve for TensorBoard, where it is installed."""
+    try:
+        from torch.utils.tensorboard import SummaryWriter
+    except ImportError:
+        return
+    with SummaryWriter(str(run.path("tb_0"))) as board:
+        for name in _ON_BOARD:
+            board.add_scalar(f"pushplan/{name}", getattr(point, name), point.steps)
 
 
 def _mean(values: Sequence[float]) -> float:

@@ -1,125 +1,157 @@
-"""PPO and SAC with Stable-Baselines3."""
+"""PPO and SAC with Stable-Baselines3. Import it only where the library is there."""
 
 from __future__ import annotations
 
-import logging
-import zlib
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import torch
+from stable_baselines3 import PPO, SAC
+from stable_baselines3.common.monitor import Monitor
+from stable_baselines3.common.torch_layers import BaseFeaturesExtractor
+from stable_baselines3.common.vec_env import DummyVecEnv, SubprocVecEnv
 
 from pushplan.training.policies.config import TrainingConfig
 from pushplan.training.policies.environment import TrainingEnv
+from pushplan.training.policies.networks import SmallEncoder
 from pushplan.training.policies.options import PpoOptions, SacOptions
-from pushplan.training.policies.run import Learned, TrainingRun, Until, train_chunks
-from pushplan.world.libraries import need
-
-log = logging.getLogger(__name__)
+from pushplan.training.policies.run import Learned, chunk_seed
 
 _LEAST_RATE = 0.1
-MODEL = "model.zip"
+_BUFFER = ("observations", "next_observations", "actions", "rewards", "dones", "timeouts")
 
 
-def train_sb3(
-    run: TrainingRun,
-    *,
-    device: str = "cpu",
-    processes: bool = False,
-    until: Until | None = None,
-) -> Any:
-    """Train from the last checkpoint of a run to its end.
+class ImageFeatures(BaseFeaturesExtractor):
+    """`SmallEncoder` as a features extractor; images arrive in [0, 1]."""
 
-    Each chunk begins with fresh episodes and with generators seeded by the seed and the number of
-    the chunk, so that a training that was left off ends with the same weights as one that was not
-    (on the same machine and versions, on the processor).
+    def __init__(self, observation_space: Any, features_dim: int = 128) -> None:
+        super().__init__(observation_space, features_dim)
+        channels, rows, cols = observation_space.shape
+        self.encoder = SmallEncoder(channels, (rows, cols), features_dim)
 
-    Returns:
-        The Stable-Baselines3 model with the weights of the best chunk.
+    def forward(self, observations: Any) -> Any:
+        """(B, features_dim)."""
+        return self.encoder(observations)
+
+
+class Sb3Learner:
+    """A model of the library.
+
+    Args:
+        config: what is trained.
+        device: of PyTorch.
+        processes: whether each environment has a process of its own.
+        logs: folder for TensorBoard.
     """
-    need("stable_baselines3")
-    from pushplan.training.policies.sb3_parts import Watcher
 
-    config = run.config
-    valid_env = TrainingEnv(config)
-    state = run.load()
-    model: Any = None
+    progress = (
+        "%(steps)d of %(total)d decisions, %(seconds).0f s: success %(train_success).2f in "
+        "training, %(valid_success).2f in validation"
+    )
 
-    def learn(chunk: int) -> Learned:
-        nonlocal model
-        seed = chunk_seed(config.seed, chunk)
-        if model is None:
-            model = make_model(config, vector_env(config, processes), device, run.folder, seed)
-            if state is not None:
-                _restore(model, state, run)
-        _begin_chunk(model, config, seed, chunk / run.chunks)
-        watcher = Watcher()
-        size = min(config.chunk, config.steps - chunk * config.chunk)
-        model.learn(size, callback=watcher, reset_num_timesteps=False, tb_log_name="tb")
-        loss = float(model.logger.name_to_value.get(_loss_key(config), np.nan))
-        return Learned(model.num_timesteps, loss, watcher.returns, watcher.successes)
-
-    def decide(seen: Any) -> Any:
-        return model.predict(seen, deterministic=True)[0]
-
-    def state_now() -> dict[str, Any]:
-        return _state(model, config)
-
-    for point in train_chunks(run, valid_env, until, learn=learn, decide=decide, state=state_now):
-        log.info(
-            "%d of %d decisions, %.0f s: success %.2f in training, %.2f in validation",
-            *(point.steps, config.steps, point.seconds, point.train_success, point.valid_success),
+    def __init__(self, config: TrainingConfig, device: str, processes: bool, logs: Path) -> None:
+        self.config = config
+        makers = [lambda: Monitor(TrainingEnv(config), info_keywords=("is_success",))] * config.envs
+        env: Any = (
+            SubprocVecEnv(makers, start_method="forkserver")
+            if processes and config.envs > 1
+            else DummyVecEnv(makers)
         )
-    valid_env.close()
-    if model is None:
-        model = make_model(config, vector_env(config, False), device, None, config.seed)
-    if run.done:
-        model.policy.load_state_dict(run.best_weights())
-    model.get_env().close()
-    return model
+        is_image = len(env.observation_space.shape) == 3
+        network: dict[str, Any] = {
+            "net_arch": list(config.options.widths),
+            "activation_fn": torch.nn.ReLU,
+        }
+        if is_image:
+            network["features_extractor_class"] = ImageFeatures
+        shared: dict[str, Any] = {
+            "policy": "CnnPolicy" if is_image else "MlpPolicy",
+            "env": env,
+            "seed": chunk_seed(config.seed, 0),
+            "device": device,
+            "tensorboard_log": str(logs),
+        }
+        self.model = _model(config.options, network, shared)
+
+    @property
+    def policy(self) -> Any:
+        """The policy of the model."""
+        return self.model.policy
+
+    def learn(self, steps: range, seed: int) -> Learned:
+        """Learn with fresh episodes and generators, and the rate of this part of the training."""
+        model, config = self.model, self.config
+        model.set_random_seed(seed)  # also of the environments, at their next reset
+        model.env.seed(seed)
+        model._last_obs = None
+        if isinstance(config.options, PpoOptions):
+            # rates fall chunk by chunk: the library's own schedule would begin anew in each
+            chunks = -(-config.steps // config.chunk)
+            fraction = steps.start // config.chunk / chunks
+            model.learning_rate = config.options.rate * (1.0 - (1.0 - _LEAST_RATE) * fraction)
+            model._setup_lr_schedule()
+        ended: list[Any] = []
+
+        def watch(local: dict[str, Any], _: dict[str, Any]) -> bool:
+            ended.extend(info for info in local["infos"] if "episode" in info)
+            return True
+
+        model.learn(len(steps), callback=watch, reset_num_timesteps=False, tb_log_name="tb")
+        loss = "train/loss" if config.algorithm == "ppo" else "train/critic_loss"
+        return Learned(
+            model.num_timesteps,
+            float(model.logger.name_to_value.get(loss, np.nan)),
+            [float(info["episode"]["r"]) for info in ended],
+            [float(info["is_success"]) for info in ended],
+        )
+
+    def decide(self, seen: Any) -> Any:
+        """The action of the policy without exploration."""
+        return self.model.predict(seen, deterministic=True)[0]
+
+    def state(self) -> dict[str, Any]:
+        """Optimisers and counters as tensors and numbers; a replay buffer beside them."""
+        model = self.model
+        parameters = model.get_parameters()
+        parameters.pop("policy")
+        state: dict[str, Any] = {
+            "optimizers": parameters,
+            "steps": int(model.num_timesteps),
+            "updates": int(model._n_updates),
+        }
+        if self.config.algorithm == "sac":
+            buffer = model.replay_buffer
+            used = buffer.buffer_size if buffer.full else buffer.pos
+            state["temperature"] = model.log_ent_coef.detach().cpu()
+            state["position"], state["full"] = int(buffer.pos), bool(buffer.full)
+            for name in _BUFFER:
+                state[name] = torch.from_numpy(getattr(buffer, name)[:used])
+        return state
+
+    def restore(self, state: Any) -> None:
+        """From a checkpoint."""
+        model = self.model
+        model.set_parameters(state["optimizers"], exact_match=False)
+        model.num_timesteps = int(state["steps"])
+        model._n_updates = int(state["updates"])
+        if self.config.algorithm == "sac":
+            model.log_ent_coef.data.copy_(state["temperature"])
+            buffer = model.replay_buffer
+            buffer.pos, buffer.full = int(state["position"]), bool(state["full"])
+            for name in _BUFFER:
+                values = state[name].numpy()
+                getattr(buffer, name)[: len(values)] = values
+
+    def close(self) -> None:
+        """Close the environments."""
+        self.model.get_env().close()
 
 
-def chunk_seed(seed: int, chunk: int) -> int:
-    """A seed for a chunk, far from those of its neighbours."""
-    return zlib.crc32(f"{seed} {chunk}".encode()) % 2**31
-
-
-def vector_env(config: TrainingConfig, processes: bool) -> Any:
-    """The environments of a training, as Stable-Baselines3 wants them."""
-    vectors = need("stable_baselines3.common.vec_env")
-    monitor = need("stable_baselines3.common.monitor").Monitor
-
-    def one() -> Any:
-        return monitor(TrainingEnv(config), info_keywords=("is_success",))
-
-    makers = [one] * config.envs
-    if processes and config.envs > 1:
-        return vectors.SubprocVecEnv(makers, start_method="forkserver")
-    return vectors.DummyVecEnv(makers)
-
-
-def make_model(
-    config: TrainingConfig, env: Any, device: str, logs: Path | None, seed: int | None = None
-) -> Any:
+def _model(options: Any, network: dict[str, Any], shared: dict[str, Any]) -> Any:
     """An untrained model."""
-    sb3 = need("stable_baselines3")
-    from pushplan.training.policies.sb3_parts import ImageFeatures
-
-    options = config.options
-    is_image = len(env.observation_space.shape) == 3
-    network: dict[str, Any] = {"net_arch": list(options.widths)}
-    if is_image:
-        network |= {"features_extractor_class": ImageFeatures}
-    shared: dict[str, Any] = {
-        "policy": "CnnPolicy" if is_image else "MlpPolicy",
-        "env": env,
-        "seed": config.seed if seed is None else seed,
-        "device": device,
-        "tensorboard_log": None if logs is None else str(logs),
-    }
-    relu = need("torch").nn.ReLU
     if isinstance(options, PpoOptions):
-        return sb3.PPO(
+        return PPO(
             **shared,
             learning_rate=options.rate,
             n_steps=options.rollout,
@@ -129,14 +161,10 @@ def make_model(
             gae_lambda=options.trace,
             clip_range=options.clip,
             ent_coef=options.entropy,
-            policy_kwargs={
-                **network,
-                "log_std_init": options.deviation,
-                "activation_fn": relu,
-            },
+            policy_kwargs={**network, "log_std_init": options.deviation},
         )
     assert isinstance(options, SacOptions)
-    return sb3.SAC(
+    return SAC(
         **shared,
         learning_rate=options.rate,
         buffer_size=options.buffer,
@@ -146,57 +174,5 @@ def make_model(
         gradient_steps=options.updates,
         gamma=options.discount,
         tau=options.follow,
-        policy_kwargs={**network, "activation_fn": relu},
+        policy_kwargs=network,
     )
-
-
-def _begin_chunk(model: Any, config: TrainingConfig, seed: int, fraction: float) -> None:
-    """Fresh episodes and generators, and the learning rate of this part of the training."""
-    model.set_random_seed(seed)  # also of the environments, at their next reset
-    model.env.seed(seed)
-    model._last_obs = None
-    options = config.options
-    if isinstance(options, PpoOptions):
-        rate = options.rate * (1.0 - (1.0 - _LEAST_RATE) * fraction)
-        model.learning_rate = rate
-        model._setup_lr_schedule()
-
-
-def _loss_key(config: TrainingConfig) -> str:
-    return "train/loss" if config.algorithm == "ppo" else "train/critic_loss"
-
-
-def _state(model: Any, config: TrainingConfig) -> dict[str, Any]:
-    """Weights, optimisers and counters as tensors and numbers; a replay buffer beside them."""
-    parameters = model.get_parameters()
-    state: dict[str, Any] = {
-        "weights": parameters.pop("policy"),
-        "optimizers": parameters,
-        "steps": int(model.num_timesteps),
-        "updates": int(model._n_updates),
-    }
-    if config.algorithm == "sac":
-        torch = need("torch")
-        buffer = model.replay_buffer
-        used = buffer.buffer_size if buffer.full else buffer.pos
-        state["temperature"] = model.log_ent_coef.detach().cpu()
-        state["position"], state["full"] = int(buffer.pos), bool(buffer.full)
-        for name in _BUFFER:
-            state[name] = torch.from_numpy(getattr(buffer, name)[:used])
-    return state
-
-
-_BUFFER = ("observations", "next_observations", "actions", "rewards", "dones", "timeouts")
-
-
-def _restore(model: Any, state: Any, run: TrainingRun) -> None:
-    model.set_parameters({"policy": state["weights"], **state["optimizers"]})
-    model.num_timesteps = int(state["steps"])
-    model._n_updates = int(state["updates"])
-    if run.config.algorithm == "sac":
-        model.log_ent_coef.data.copy_(state["temperature"])
-        buffer = model.replay_buffer
-        buffer.pos, buffer.full = int(state["position"]), bool(state["full"])
-        for name in _BUFFER:
-            values = state[name].numpy()
-            getattr(buffer, name)[: len(values)] = values

@@ -10,10 +10,21 @@ from typing import Any
 
 from pushplan.drawing.figure import COLUMN, DPI, STYLE
 from pushplan.learned.sb3_saving import attach
+from pushplan.learned.specification import Specification
 from pushplan.training.libraries import chosen_device, hardware, parameter_count
 from pushplan.training.policies.config import IMITATING, TrainingConfig
 from pushplan.training.policies.environment import TrainingEnv
-from pushplan.training.policies.run import CURVE, PICTURE, POLICY, TrainingRun, Until
+from pushplan.training.policies.options import SamOptions
+from pushplan.training.policies.run import (
+    CHECKPOINT,
+    CURVE,
+    MODEL,
+    PICTURE,
+    POLICY,
+    TrainingRun,
+    Until,
+    train,
+)
 from pushplan.world import InvalidInputError
 from pushplan.world.libraries import need
 
@@ -64,55 +75,64 @@ def train_policy(
     need("torch").set_num_threads(threads)
     device = chosen_device(device)
     run = TrainingRun(folder, config, resume=resume)
-    options: dict[str, Any] = {"device": device, "until": until}
     try:
-        network = _train(run, processes, folders, options)
+        env = TrainingEnv(config)
+        learner = _learner(run, env, folders, device, processes)
+        train(run, learner, env, until)
     except InvalidInputError:  # the configuration asks for what cannot be
         run.abandon()
         raise
+    learner.close()
+    env.close()
+    network = learner.policy
+    if config.algorithm in ("ppo", "sac"):
+        network = _saved_actor(run, learner.model, env)
     _draw(run)
     if run.done < run.chunks:
         return None
-    return _finish(run, network, device, threads, folders, command)
+    return _finish(run, network, env, device, threads, folders, command)
 
 
-def _train(
-    run: TrainingRun, processes: bool, data: Sequence[str | Path], options: dict[str, Any]
+def _learner(
+    run: TrainingRun, env: TrainingEnv, data: Sequence[str | Path], device: str, processes: bool
 ) -> Any:
-    if run.config.algorithm in IMITATING:
-        from pushplan.training.policies.cloning import train_imitation
+    config = run.config
+    if config.algorithm in IMITATING:
+        from pushplan.training.policies.cloning import Imitator
 
-        return train_imitation(run, data, **options)
-    if run.config.algorithm == "sam":
-        from pushplan.training.policies.sam import train_sam
+        return Imitator(config, data, env, device)
+    if isinstance(config.options, SamOptions):
+        from pushplan.training.policies.sam import SamLearner
 
-        return train_sam(run, **options)
-    return _train_actor(run, processes, options)
+        learner = SamLearner(config, device)
+        if config.options.start and not run.path(CHECKPOINT).is_file():
+            learner.begin_with(config.options.start)
+        return learner
+    need("stable_baselines3")
+    from pushplan.training.policies.sb3_training import Sb3Learner
+
+    return Sb3Learner(config, device, processes, run.folder)
 
 
-def _train_actor(run: TrainingRun, processes: bool, options: dict[str, Any]) -> Any:
-    """Train with Stable-Baselines3; keeps its model too, and gives the actor alone."""
+def _saved_actor(run: TrainingRun, model: Any, env: TrainingEnv) -> Any:
+    """Keep a model of Stable-Baselines3 as it is too, and give its actor alone."""
     from pushplan.training.policies.networks import SquashedActor
-    from pushplan.training.policies.sb3_training import MODEL, train_sb3
 
-    model = train_sb3(run, processes=processes, **options)
     path = run.path(MODEL)
     path.unlink(missing_ok=True)
     model.save(path)
-    attach(path, specification_of(run))
+    attach(path, _specification(env))
     return SquashedActor(model.policy, len(model.observation_space.shape) == 3)
 
 
-def specification_of(run: TrainingRun, **facts: Any) -> Any:
+def _specification(env: TrainingEnv, **facts: Any) -> Specification:
     """What the network of a training says about itself."""
-    env = TrainingEnv(run.config)
-    specification = env.specification
-    env.close()
+    config, specification = env.config, env.specification
     training = {
         **specification.training,
-        "scenarios": [dict(one) for one in run.config.scenarios],
-        "steps": run.config.steps,
-        "seed": run.config.seed,
+        "scenarios": [dict(one) for one in config.scenarios],
+        "steps": config.steps,
+        "seed": config.seed,
         **facts,
     }
     return replace(specification, training=training)
@@ -154,6 +174,7 @@ def _draw(run: TrainingRun) -> None:
 def _finish(
     run: TrainingRun,
     network: Any,
+    env: TrainingEnv,
     device: str,
     threads: int,
     data: Sequence[str | Path],
@@ -163,7 +184,7 @@ def _finish(
     from pushplan.training.policies.export import decision_time, export, observation_time
 
     best = max(run.curve, key=lambda point: (point.rank, point.steps))
-    path = export(network, specification_of(run, best_steps=best.steps), run.path(POLICY))
+    path = export(network, _specification(env, best_steps=best.steps), run.path(POLICY))
     run.record(
         parameters=parameter_count(network),
         bytes=path.stat().st_size,
