@@ -12,8 +12,8 @@ from pushplan.learned.builders import builder_from_dict, builder_to_dict, from_m
 from pushplan.learned.outputs import ActionSpec
 from pushplan.observation import ObservationBuilder
 from pushplan.world import InvalidInputError, RobotModel, SchemaError
-from pushplan.world.checked_fields import CheckedFields, PositiveFloat
-from pushplan.world.checks import known_keys, number
+from pushplan.world.checked_fields import CheckedFields, NonNegativeFloat, PositiveFloat
+from pushplan.world.checks import known_keys
 from pushplan.world.safe_files import parse_json
 
 FORMAT = "pushplan-policy/1"
@@ -61,7 +61,7 @@ class RobotSpec(CheckedFields):
 
 
 @dataclass(frozen=True)
-class Specification:
+class Specification(CheckedFields):
     """Observation and action of a network, and what it was made for.
 
     Args:
@@ -77,7 +77,7 @@ class Specification:
     tasks: tuple[str, ...]
     presets: tuple[str, ...]
     robot: RobotSpec | None
-    control_step: float
+    control_step: NonNegativeFloat
     observation: ObservationBuilder
     action: ActionSpec
     training: Mapping[str, Any] = field(default_factory=dict)
@@ -89,8 +89,7 @@ class Specification:
             if not listed or not all(isinstance(text, str) for text in given):
                 raise InvalidInputError(f"{name} must be a list of names, got {given!r:.80}")
             object.__setattr__(self, name, tuple(given))
-        step = number("control_step", self.control_step, low=0.0)
-        object.__setattr__(self, "control_step", step)
+        super().__post_init__()
 
     def to_json(self) -> str:
         """One line of JSON."""

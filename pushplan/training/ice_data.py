@@ -9,11 +9,11 @@ from __future__ import annotations
 import argparse
 import logging
 import multiprocessing
-import os
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor
+from contextlib import ExitStack
 from dataclasses import dataclass
-from itertools import starmap
+from itertools import repeat
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 from pushplan.training.ice_passages import SPLITS, voyage_passages
 from pushplan.world import InvalidInputError
 from pushplan.world.checks import choice, integer
+from pushplan.world.output_files import replacing
 from pushplan.world.safe_files import read_npz
 
 log = logging.getLogger(__name__)
@@ -30,6 +31,7 @@ log = logging.getLogger(__name__)
 LEVELS = 16
 """Coverage is stored in steps of 1 / 16, which is what it is drawn in."""
 VOYAGES_PER_SHARD = 10
+_ARRAYS = ("patches", "after", "work")
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,8 +57,7 @@ def voyage_pairs(seed: int, split: str) -> IcePairs:
 
 
 def _joined(pairs: Sequence[IcePairs]) -> dict[str, Any]:
-    names = ("patches", "after", "work")
-    return {name: np.concatenate([getattr(p, name) for p in pairs]) for name in names}
+    return {name: np.concatenate([getattr(p, name) for p in pairs]) for name in _ARRAYS}
 
 
 def write_shard(folder: str | Path, split: str, index: int) -> Path:
@@ -65,11 +66,9 @@ def write_shard(folder: str | Path, split: str, index: int) -> Path:
     if path.exists():
         return path
     seeds = range(index * VOYAGES_PER_SHARD, (index + 1) * VOYAGES_PER_SHARD)
-    pairs = [voyage_pairs(seed, split) for seed in seeds]
-    partial = path.with_suffix(f".{os.getpid()}.partial")
-    with partial.open("wb") as file:
-        np.savez_compressed(file, **_joined(pairs))
-    partial.replace(path)
+    arrays = _joined([voyage_pairs(seed, split) for seed in seeds])
+    with replacing(path) as file:
+        np.savez_compressed(file, **arrays)
     return path
 
 
@@ -86,20 +85,16 @@ def write_shards(folder: str | Path, *, split: str, shards: int, workers: int = 
     integer("shards", shards, low=1)
     integer("workers", workers, low=1)
     Path(folder).mkdir(parents=True, exist_ok=True)
-    jobs = [(folder, split, i) for i in range(shards)]
-    if workers == 1:
-        return _logged(starmap(write_shard, jobs), split, shards)
-    context = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(workers, mp_context=context) as pool:
-        return _logged(pool.map(write_shard, *zip(*jobs, strict=True)), split, shards)
-
-
-def _logged(paths: Iterable[Path], split: str, shards: int) -> list[Path]:
-    found = []
-    for path in paths:
-        found.append(path)
-        log.info("%s: shard %d of %d", split, len(found), shards)
-    return found
+    paths = []
+    with ExitStack() as stack:
+        run: Any = map
+        if workers > 1:
+            context = multiprocessing.get_context("spawn")
+            run = stack.enter_context(ProcessPoolExecutor(workers, mp_context=context)).map
+        for path in run(write_shard, repeat(folder), repeat(split), range(shards)):
+            paths.append(path)
+            log.info("%s: shard %d of %d", split, len(paths), shards)
+    return paths
 
 
 def read_shards(folder: str | Path, split: str, limit: int | None = None) -> IcePairs:
@@ -115,12 +110,11 @@ def read_shards(folder: str | Path, split: str, limit: int | None = None) -> Ice
             f"no shards {split}-*.npz in {folder}: make them with "
             f"'python -m pushplan.training.ice_data --out {folder} --split {split}'"
         )
-    pairs = [_read(path) for path in paths]
-    return IcePairs(**_joined(pairs))
+    return IcePairs(**_joined([_read(path) for path in paths]))
 
 
 def _read(path: Path) -> IcePairs:
-    pairs = IcePairs(**read_npz(path, "shard of ice passages", ("patches", "after", "work")))
+    pairs = IcePairs(**read_npz(path, "shard of ice passages", _ARRAYS))
     count = len(pairs.work)
     if pairs.patches.shape[:2] != (count, 3) or pairs.after.shape[0] != count:
         raise InvalidInputError(f"{path} is not a shard of ice passages: shapes disagree")

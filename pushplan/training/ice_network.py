@@ -60,11 +60,12 @@ def train(pairs: IcePairs, config: IceTrainingConfig | None = None) -> tuple[Ice
         MissingDependencyError: without PyTorch.
     """
     torch = need("torch")
-    from pushplan.training.ice_unet import IceUNet, seeded
+    from pushplan.training.ice_unet import IceUNet
 
     config = config or IceTrainingConfig()
     torch.set_num_threads(config.threads)
-    generator = seeded(config.seed)
+    torch.manual_seed(config.seed)  # initialises the weights
+    generator = torch.Generator().manual_seed(config.seed)
     network: Any = IceUNet()
     network = network.to(memory_format=torch.channels_last)
     log.info("%d parameters, %d pairs", parameter_count(network), len(pairs))
@@ -123,9 +124,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     default = IceTrainingConfig()
     parser.add_argument("--data", required=True, metavar="DIR", help="shards of ice_data")
     parser.add_argument("--out", required=True, metavar="FILE.onnx", help="the network")
-    parser.add_argument("--epochs", type=int, default=default.epochs)
-    parser.add_argument("--seed", type=int, default=default.seed)
-    parser.add_argument("--threads", type=int, default=default.threads)
+    for name in ("epochs", "seed", "threads"):
+        parser.add_argument(f"--{name}", type=int, default=getattr(default, name))
     parser.add_argument("--shards", type=int, default=None, help="use only so many")
     options = parser.parse_args(arguments)
     logging.basicConfig(level=logging.INFO, format="%(message)s")

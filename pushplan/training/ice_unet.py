@@ -2,26 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import torch
 from torch import Tensor, nn
 from torch.nn import functional as F
 from torch.nn.utils.fusion import fuse_conv_bn_eval
 
 from pushplan.interaction.occupancy import CHANNELS
-from pushplan.world.checks import integer
 
-
-@dataclass(frozen=True)
-class UNetConfig:
-    """Widths of `IceUNet` at a half, a quarter and an eighth of the patch's resolution."""
-
-    widths: tuple[int, int, int] = (32, 48, 64)
-
-    def __post_init__(self) -> None:
-        for width in self.widths:
-            integer("width", width, low=1)
+WIDTHS = (32, 48, 64)
+"""Channels of `IceUNet` at a half, a quarter and an eighth of the patch's resolution."""
 
 
 def _block(inputs: int, outputs: int, stride: int = 1) -> nn.Sequential:
@@ -40,9 +29,9 @@ class IceUNet(nn.Module):
     head gives the work on the ice done at each place, whose sum is the forecast's work.
     """
 
-    def __init__(self, config: UNetConfig | None = None) -> None:
+    def __init__(self) -> None:
         super().__init__()
-        a, b, c = (config or UNetConfig()).widths
+        a, b, c = WIDTHS
         self.top = nn.Sequential(_block(4 * len(CHANNELS), a), _block(a, a))
         self.middle = nn.Sequential(_block(a, b, stride=2), _block(b, b))
         self.bottom = nn.Sequential(_block(b, c, stride=2), _block(c, c), _block(c, c))
@@ -94,9 +83,3 @@ class ExportedIceUNet(nn.Module):
         """As `IceUNet.forward`."""
         after, work = self.network.forward(patches)
         return after.clamp(0.0, 1.0), work
-
-
-def seeded(seed: int) -> torch.Generator:
-    """A generator for shuffling; also seeds the one that initialises weights."""
-    torch.manual_seed(seed)
-    return torch.Generator().manual_seed(seed)

@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import dataclasses
 import json
-import re
-from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
 from importlib import resources
 from pathlib import Path
 from typing import Annotated, Any
 
 from pushplan.envs.registry import SIMULATORS, TASKS, default_preset
-from pushplan.learned.builders import builder_from_dict
+from pushplan.learned.builders import builder_from_dict, from_mapping
 from pushplan.learned.outputs import OUTPUTS
 from pushplan.training.policies.options import OPTIONS, Options
 from pushplan.world import InvalidInputError, SchemaError, UnknownNameError
@@ -30,7 +29,6 @@ ALGORITHMS = tuple(OPTIONS)
 IMITATING = ("bc", "flow")
 """Algorithms that learn from a data set."""
 _OUTPUT_OF = {"pixel_values": "sam", "chunk": "flow"}
-_SCIENTIFIC = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)[eE][-+]?\d+")
 
 
 @dataclass(frozen=True)
@@ -75,7 +73,7 @@ class TrainingConfig(CheckedFields):
     limit: NonNegativeInt = 0
     validation: NonNegativeInt = 20  # episodes of each validation
     # on which the result is scored, with scenarios that training never draws
-    suites: tuple[str, ...] = field(default_factory=tuple)
+    suites: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -105,22 +103,22 @@ class TrainingConfig(CheckedFields):
         Raises:
             SchemaError, InvalidInputError, UnknownNameError: if a key or a value is wrong.
         """
-        names = [entry.name for entry in dataclasses.fields(cls)]
-        needed = ("algorithm", "task", "scenarios", "observation", "action")
-        known_keys("the training configuration", data, names, needed)
-        values = dict(data)
-        algorithm = choice("algorithm", values["algorithm"], ALGORITHMS)
+        kind = "the training configuration"
+        known_keys(kind, data, None, ("algorithm", "task", "scenarios", "observation", "action"))
+        algorithm = choice("algorithm", data["algorithm"], ALGORITHMS)
         for name in ("scenarios", "suites"):
-            given = values.get(name, ())
-            if isinstance(given, str) or not isinstance(given, Sequence):
+            given = data.get(name, ())
+            if not isinstance(given, list | tuple):
                 raise SchemaError(f"{name} must be a list, got {given!r:.60}")
-            values[name] = tuple(given)
-        if not all(isinstance(one, Mapping) for one in values["scenarios"]):
+        if not all(isinstance(one, Mapping) for one in data["scenarios"]):
             raise SchemaError("each of scenarios must be a mapping of variations")
-        values["action"] = _record(ActionChoice, "action", values["action"])
         options = OPTIONS[algorithm]
-        values["options"] = _record(options, f"options of {algorithm}", values.get("options", {}))
-        return cls(**values)
+        parts = {
+            "action": from_mapping(ActionChoice, "action", data["action"]),
+            "options": from_mapping(options, f"options of {algorithm}", data.get("options", {})),
+        }
+        config: TrainingConfig = from_mapping(cls, kind, {**data, **parts})
+        return config
 
     def to_dict(self) -> dict[str, Any]:
         """JSON values."""
@@ -163,24 +161,3 @@ def config_named(task: str, algorithm: str) -> TrainingConfig:
     if name not in known:
         raise UnknownNameError("training configuration", name, known)
     return read_config(known[name])
-
-
-def _record(kind: type[Any], name: str, data: Any) -> Any:
-    if isinstance(data, kind):
-        return data
-    keys = [entry.name for entry in dataclasses.fields(kind)]
-    known_keys(name, data, keys, ())
-    values = {key: _plain(value) for key, value in data.items()}
-    try:
-        return kind(**values)
-    except TypeError as error:  # a required key is missing
-        raise SchemaError(f"{name}: {error}") from error
-
-
-def _plain(value: Any) -> Any:
-    """Lists as tuples; numbers that YAML 1.1 takes for text, such as 1e-3, as numbers."""
-    if isinstance(value, list):
-        return tuple(value)
-    if isinstance(value, str) and _SCIENTIFIC.fullmatch(value):
-        return float(value)
-    return value

@@ -12,7 +12,7 @@ from __future__ import annotations
 import json
 import warnings
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -40,6 +40,7 @@ SCHEMA = "pushplan-dataset/1"
 METADATA = "metadata.json"
 ARRAYS = ("observations", "actions", "rewards", "terminations", "truncations")
 _EXECUTED = "executed"
+_TRUTHS = ("terminations", "truncations")
 _KEYS = (
     *("format", "task", "simulator", "preset", "scenarios", "policy", "action_mode", "observation"),
     *("robot", "control_step", "total_episodes", "total_steps", "successes", "first_seed", "noise"),
@@ -82,7 +83,6 @@ class EpisodeData:
     terminations: NDArray[np.bool_]
     truncations: NDArray[np.bool_]
     executed: NDArray[np.float32]
-    success: bool = field(default=False)
 
 
 def record(
@@ -115,14 +115,24 @@ def record(
         raise InvalidInputError(f"{folder} is not empty")
     builder = builder_from_dict(request.observation)
     wanted = policy.observation if isinstance(policy, ChoosesObservation) else "state"
-    envs = [_environment(request, dict(v), policy, wanted) for v in request.scenarios]
+    envs = [
+        PushEnv(
+            task=request.task,
+            simulator=request.simulator,
+            preset=request.preset,
+            variations=dict(variations),
+            observation=wanted,
+            action=policy.actions if isinstance(policy, ChoosesActions) else None,
+        )
+        for variations in request.scenarios
+    ]
     (folder / "data").mkdir(parents=True, exist_ok=True)
     steps = successes = 0
     for number_ in range(request.episodes):
         env = envs[number_ % len(envs)]
-        episode = _run(env, (policy, driver), builder, request, request.first_seed + number_)
-        steps, successes = steps + len(episode.actions), successes + episode.success
-        arrays = {name: getattr(episode, name) for name in (*ARRAYS, _EXECUTED)}
+        arrays, success = _run(env, policy, driver, builder, request, request.first_seed + number_)
+        steps += len(arrays["actions"])
+        successes += success
         np.savez_compressed(folder / "data" / f"episode_{number_:05d}.npz", **arrays)
     env = envs[0]
     about = {
@@ -132,7 +142,7 @@ def record(
         "preset": request.preset,
         "scenarios": [dict(v) for v in request.scenarios],
         "policy": label,
-        "action_mode": _mode(env),
+        "action_mode": env.action_mode,
         "observation": builder_to_dict(builder),
         "robot": vars(RobotSpec.of(env.task.robot)),
         "control_step": env.task.control_step,
@@ -150,68 +160,41 @@ def record(
     return folder
 
 
-def _environment(
-    request: DatasetRequest, variations: dict[str, Any], policy: Any, observation: Any
-) -> PushEnv:
-    return PushEnv(
-        task=request.task,
-        simulator=request.simulator,
-        preset=request.preset,
-        variations=variations,
-        observation=observation,
-        action=policy.actions if isinstance(policy, ChoosesActions) else None,
-    )
-
-
-def _mode(env: PushEnv) -> str:
-    from pushplan.envs.registry import ACTIONS
-    from pushplan.world.lazy_names import look_up
-
-    kinds = {look_up("action", ACTIONS, name): name for name in ACTIONS}
-    return kinds[type(env._mode)]
-
-
 def _run(
     env: PushEnv,
-    policies: tuple[Any, Any],
+    policy: Any,
+    driver: Any,
     builder: ObservationBuilder,
     request: DatasetRequest,
     seed: int,
-) -> EpisodeData:
-    policy, driver = policies
+) -> tuple[dict[str, NDArray[Any]], bool]:
+    """The arrays of an episode, and its success."""
     seen, _ = env.reset(seed=seed)
     policy.reset(env.world, stream(seed, "policy"))
     rng = stream(seed, "noise")
     observed = [builder.observe(env.world)]
-    actions, executed, rewards, terminations, truncations = [], [], [], [], []
+    rows: list[tuple[Any, ...]] = []
     held, disturbed, over = 0, np.zeros(0), False
     while not over:
         action = env.encode(policy.act(env.world, seen))
-        actions.append(action)
         if held == 0 and request.noise and rng.random() < request.noise:
             held, disturbed = request.hold, rng.uniform(-1.0, 1.0, action.shape)
             if driver is not None:
                 driver.reset(env.world, stream(seed, "driver"))
-        carried_out: NDArray[Any] = action
+        executed: NDArray[Any] = action
         if held:
-            carried_out = disturbed if driver is None else env.encode(driver.act(env.world))
+            executed = disturbed if driver is None else env.encode(driver.act(env.world))
         held = max(0, held - 1)
-        executed.append(carried_out)
-        seen, reward, terminated, truncated, info = env.step(carried_out)
+        seen, reward, terminated, truncated, info = env.step(executed)
         observed.append(builder.observe(env.world))
-        rewards.append(reward)
-        terminations.append(terminated)
-        truncations.append(truncated)
+        rows.append((action, reward, terminated, truncated, executed))
         over = terminated or truncated
-    return EpisodeData(
-        np.stack(observed),
-        np.stack(actions).astype(np.float32),
-        np.array(rewards, np.float32),
-        np.array(terminations),
-        np.array(truncations),
-        np.stack(executed).astype(np.float32),
-        bool(info["success"]),
-    )
+    columns = zip((*ARRAYS[1:], _EXECUTED), zip(*rows, strict=True), strict=True)
+    arrays = {
+        name: np.array(values, np.bool_ if name in _TRUTHS else np.float32)
+        for name, values in columns
+    }
+    return {"observations": np.stack(observed), **arrays}, bool(info["success"])
 
 
 def read_metadata(folder: str | Path) -> dict[str, Any]:

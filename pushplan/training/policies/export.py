@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-import time
+from functools import partial
 from pathlib import Path
+from timeit import timeit
 from typing import Any
 
 import numpy as np
@@ -47,32 +48,22 @@ def export(network: Any, specification: Specification, path: str | Path) -> Path
     entry.key, entry.value = METADATA_KEY, specification.to_json()
     model.producer_version = ""
     onnx.save(model, str(path))
-    if (off := difference(network, path, specification)) > PARITY:
+    policy = OnnxPolicy(path)
+    batch = _inputs(network, specification, 16)
+    with torch.no_grad():
+        wanted = network(*map(torch.from_numpy, batch)).numpy()
+    found = np.stack([policy.decide(*one) for one in zip(*batch, strict=True)])
+    off = float(np.abs(found - wanted).max()) / max(1.0, float(np.abs(wanted).max()))
+    if off > PARITY:
         raise InvalidInputError(f"{path} differs from the network by {off:.2g} (limit {PARITY:g})")
     return path
-
-
-def difference(network: Any, path: Path, specification: Specification, count: int = 16) -> float:
-    """Greatest difference of outputs between PyTorch and the file, relative to the greatest."""
-    torch = need("torch")
-    policy = OnnxPolicy(path)
-    inputs = _inputs(network, specification, count)
-    with torch.no_grad():
-        wanted = network(*map(torch.from_numpy, inputs)).numpy()
-    found = np.stack([policy.decide(*one) for one in zip(*inputs, strict=True)])
-    scale = max(1.0, float(np.abs(wanted).max()))
-    return float(np.abs(found - wanted).max()) / scale
 
 
 def decision_time(path: Path, count: int = 200) -> float:
     """Median time of a decision of the network in a file, without the observation [s]."""
     policy = OnnxPolicy(path)
-    times = []
-    for seen in examples(policy.specification, count):
-        began = time.perf_counter()
-        policy.decide(seen)
-        times.append(time.perf_counter() - began)
-    return float(np.median(times))
+    seen = examples(policy.specification, count)
+    return float(np.median([timeit(partial(policy.decide, one), number=1) for one in seen]))
 
 
 def observation_time(config: TrainingConfig, count: int = 50) -> float:
@@ -80,14 +71,13 @@ def observation_time(config: TrainingConfig, count: int = 50) -> float:
     env = TrainingEnv(config)
     env.action_space.seed(0)
     times: list[float] = []
-    env.reset(options={"layout": 0})
+    over = True
     while len(times) < count:
-        *_, terminated, truncated, _ = env.step(env.action_space.sample())
-        began = time.perf_counter()
-        env.observe()
-        times.append(time.perf_counter() - began)
-        if terminated or truncated:
+        if over:
             env.reset(options={"layout": len(times)})
+        *_, terminated, truncated, _ = env.step(env.action_space.sample())
+        times.append(timeit(env.observe, number=1))
+        over = terminated or truncated
     env.close()
     return float(np.median(times))
 

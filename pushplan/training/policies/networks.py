@@ -18,17 +18,12 @@ class SmallEncoder(nn.Module):
 
     def __init__(self, channels: int, pixels: tuple[int, int], outputs: int = 128) -> None:
         super().__init__()
-        self.layers = nn.Sequential(
-            nn.Conv2d(channels, 16, 5, stride=2, padding=2),
-            nn.ReLU(),
-            nn.Conv2d(16, 32, 3, stride=2, padding=1),
-            nn.ReLU(),
-            nn.Conv2d(32, 32, 3, stride=2, padding=1),
-            nn.ReLU(),
-            nn.Conv2d(32, 32, 3, stride=2, padding=1),
-            nn.ReLU(),
-            nn.Flatten(),
-        )
+        hidden: list[nn.Module] = []
+        for inside, outside in pairwise((channels, 16, 32, 32, 32)):
+            size = 3 if hidden else 5
+            hidden.append(nn.Conv2d(inside, outside, size, stride=2, padding=size // 2))
+            hidden.append(nn.ReLU())
+        self.layers = nn.Sequential(*hidden, nn.Flatten())
         with torch.no_grad():
             flat = self.layers(torch.zeros(1, channels, *pixels)).shape[1]
         self.head = nn.Sequential(nn.Linear(flat, outputs), nn.ReLU())

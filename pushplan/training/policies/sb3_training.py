@@ -6,8 +6,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import stable_baselines3
 import torch
-from stable_baselines3 import PPO, SAC
 from stable_baselines3.common.monitor import Monitor
 from stable_baselines3.common.torch_layers import BaseFeaturesExtractor
 from stable_baselines3.common.vec_env import DummyVecEnv, SubprocVecEnv
@@ -15,10 +15,26 @@ from stable_baselines3.common.vec_env import DummyVecEnv, SubprocVecEnv
 from pushplan.training.policies.config import TrainingConfig
 from pushplan.training.policies.environment import TrainingEnv
 from pushplan.training.policies.networks import SmallEncoder
-from pushplan.training.policies.options import PpoOptions, SacOptions
+from pushplan.training.policies.options import PpoOptions
 from pushplan.training.policies.run import Learned, chunk_seed
 
 _LEAST_RATE = 0.1
+_ARGUMENTS = {
+    "rate": "learning_rate",
+    "rollout": "n_steps",
+    "batch": "batch_size",
+    "epochs": "n_epochs",
+    "discount": "gamma",
+    "trace": "gae_lambda",
+    "clip": "clip_range",
+    "entropy": "ent_coef",
+    "buffer": "buffer_size",
+    "first": "learning_starts",
+    "every": "train_freq",
+    "updates": "gradient_steps",
+    "follow": "tau",
+}
+"""Names of our options in the library, of those that the algorithm has."""
 _BUFFER = ("observations", "next_observations", "actions", "rewards", "dones", "timeouts")
 
 
@@ -59,20 +75,25 @@ class Sb3Learner:
             else DummyVecEnv(makers)
         )
         is_image = len(env.observation_space.shape) == 3
-        network: dict[str, Any] = {
-            "net_arch": list(config.options.widths),
-            "activation_fn": torch.nn.ReLU,
-        }
+        options = config.options
+        network: dict[str, Any] = {"net_arch": list(options.widths), "activation_fn": torch.nn.ReLU}
         if is_image:
             network["features_extractor_class"] = ImageFeatures
-        shared: dict[str, Any] = {
-            "policy": "CnnPolicy" if is_image else "MlpPolicy",
-            "env": env,
-            "seed": chunk_seed(config.seed, 0),
-            "device": device,
-            "tensorboard_log": str(logs),
-        }
-        self.model = _model(config.options, network, shared)
+        if isinstance(options, PpoOptions):
+            network["log_std_init"] = options.deviation
+        self.model: Any = getattr(stable_baselines3, config.algorithm.upper())(
+            policy="CnnPolicy" if is_image else "MlpPolicy",
+            env=env,
+            seed=chunk_seed(config.seed, 0),
+            device=device,
+            tensorboard_log=str(logs),
+            policy_kwargs=network,
+            **{
+                theirs: getattr(options, ours)
+                for ours, theirs in _ARGUMENTS.items()
+                if hasattr(options, ours)
+            },
+        )
 
     @property
     def policy(self) -> Any:
@@ -146,33 +167,3 @@ class Sb3Learner:
     def close(self) -> None:
         """Close the environments."""
         self.model.get_env().close()
-
-
-def _model(options: Any, network: dict[str, Any], shared: dict[str, Any]) -> Any:
-    """An untrained model."""
-    if isinstance(options, PpoOptions):
-        return PPO(
-            **shared,
-            learning_rate=options.rate,
-            n_steps=options.rollout,
-            batch_size=options.batch,
-            n_epochs=options.epochs,
-            gamma=options.discount,
-            gae_lambda=options.trace,
-            clip_range=options.clip,
-            ent_coef=options.entropy,
-            policy_kwargs={**network, "log_std_init": options.deviation},
-        )
-    assert isinstance(options, SacOptions)
-    return SAC(
-        **shared,
-        learning_rate=options.rate,
-        buffer_size=options.buffer,
-        learning_starts=options.first,
-        batch_size=options.batch,
-        train_freq=options.every,
-        gradient_steps=options.updates,
-        gamma=options.discount,
-        tau=options.follow,
-        policy_kwargs=network,
-    )
