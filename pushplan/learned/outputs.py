@@ -76,12 +76,13 @@ class ActionSpec(CheckedFields):
             raise InvalidInputError(
                 f"output {self.output!r} belongs to action mode {wanted!r}, not {self.mode!r}"
             )
+        size = MODES[self.mode]
+        rows = self.shape[:1]
+        wanted_shape = {"direction": (2,), "chunk": (*rows, size), "continuous": (size,)}
         if self.output == "pixel_values":
             fits = len(self.shape) == 2
-        elif self.output == "chunk":
-            fits = len(self.shape) == 2 and self.shape[1] == MODES[self.mode]
         else:
-            fits = self.shape == (2 if self.output == "direction" else MODES[self.mode],)
+            fits = self.shape == wanted_shape[self.output]
         if not fits:
             raise InvalidInputError(
                 f"output {self.output!r} of action mode {self.mode!r} cannot have shape "

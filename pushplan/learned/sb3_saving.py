@@ -37,25 +37,20 @@ def save_sb3(model: Any, path: str | Path, *, env: Any = None, repeat: int = 1) 
 
 
 def describe_model(model: Any, *, env: Any = None, repeat: int = 1) -> Specification:
-    """The specification of a Stable-Baselines3 model; arguments and errors as `save_sb3`."""
+    """The specification of a Stable-Baselines3 model; arguments and errors as `save_sb3`.
+
+    It names the model's algorithm, one of `ALGORITHMS` of the library itself: that says how its
+    file is loaded.
+    """
     env = model.get_env() if env is None else env
     if env is None:
         raise InvalidInputError(
             "the model has no environment, give one like that of its training as env"
         )
-    facts = {"algorithm": algorithm_of(model), "steps": int(model.num_timesteps)}
-    return describe(env, repeat=repeat, training=facts)
-
-
-def algorithm_of(model: Any) -> str:
-    """The name of a model's algorithm, which says how its file is loaded.
-
-    Raises:
-        InvalidInputError: if it is none of `ALGORITHMS`, of Stable-Baselines3 itself.
-    """
     for kind in type(model).__mro__:
         if kind.__name__ in ALGORITHMS and kind.__module__.startswith("stable_baselines3."):
-            return kind.__name__.lower()
+            facts = {"algorithm": kind.__name__.lower(), "steps": int(model.num_timesteps)}
+            return describe(env, repeat=repeat, training=facts)
     raise InvalidInputError(
         f"a model must be one of {', '.join(ALGORITHMS)} of Stable-Baselines3, got "
         f"{type(model).__module__}.{type(model).__name__}"

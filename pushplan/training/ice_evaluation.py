@@ -57,25 +57,23 @@ def score(
 ) -> PredictionScores:
     """Score a predictor on batches with their truth."""
     predictor.predict(batches[0][0])  # loads and compiles
-    patch, swath, works, truths, times = [], [], [], [], []
+    columns, times = [], []
     for batch, truth in batches:
         began = time.perf_counter()
         found = predictor.predict(batch)
         times.append((time.perf_counter() - began) / len(batch))
         error = (found.after - truth.after).astype(np.float64) ** 2
         window = swath_windows(batch)
-        patch.append(error.mean(axis=(1, 2)))
-        swath.append((error * window).sum(axis=(1, 2)) / window.sum(axis=(1, 2)))
-        works.append(found.work)
-        truths.append(truth.work)
-    work, true = np.concatenate(works), np.concatenate(truths)
-    mean = float(true.mean())
+        near = (error * window).sum(axis=(1, 2)) / window.sum(axis=(1, 2))
+        columns.append((error.mean(axis=(1, 2)), near, found.work, truth.work))
+    patch, swath, work, true = map(np.concatenate, zip(*columns, strict=True))
+    mean = float(true.mean()) or float("nan")
     return PredictionScores(
         passages=len(true),
-        patch_mse=float(np.concatenate(patch).mean()),
-        swath_mse=float(np.concatenate(swath).mean()),
-        work_bias=float(work.mean()) / mean if mean > 0.0 else float("nan"),
-        work_error=float(np.abs(work - true).mean()) / mean if mean > 0.0 else float("nan"),
+        patch_mse=float(patch.mean()),
+        swath_mse=float(swath.mean()),
+        work_bias=float(work.mean()) / mean,
+        work_error=float(np.abs(work - true).mean()) / mean,
         work_correlation=_correlation(work, true),
         milliseconds=1e3 * float(np.median(times)),
     )

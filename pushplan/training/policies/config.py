@@ -22,7 +22,7 @@ from pushplan.world.checked_fields import (
     PositiveFloat,
     PositiveInt,
 )
-from pushplan.world.checks import choice, integer, known_keys
+from pushplan.world.checks import choice, known_keys
 from pushplan.world.safe_files import read_data
 
 ALGORITHMS = tuple(OPTIONS)
@@ -32,18 +32,15 @@ _OUTPUT_OF = {"pixel_values": "sam", "chunk": "flow"}
 
 
 @dataclass(frozen=True)
-class ActionChoice:
+class ActionChoice(CheckedFields):
     """How the network acts."""
 
-    mode: str  # action mode of the environment
-    output: str = "continuous"  # see `pushplan.learned.ActionSpec`
-    repeat: int = 1  # control steps, or actions, for which a decision stands
-    horizon: int = 1  # actions of a chunk, of which the first ``repeat`` are carried out
+    field_prefix = "action."
 
-    def __post_init__(self) -> None:
-        choice("output", self.output, OUTPUTS)
-        integer("action.repeat", self.repeat, low=1)
-        integer("action.horizon", self.horizon, low=1)
+    mode: str  # action mode of the environment
+    output: Annotated[str, OneOf(OUTPUTS)] = "continuous"  # see `pushplan.learned.ActionSpec`
+    repeat: PositiveInt = 1  # control steps, or actions, for which a decision stands
+    horizon: PositiveInt = 1  # actions of a chunk, of which the first ``repeat`` are carried out
 
 
 @dataclass(frozen=True)

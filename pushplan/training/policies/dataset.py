@@ -243,11 +243,10 @@ def to_minari(folder: str | Path, name: str) -> Any:
 
     about = read_metadata(folder)
     builder: Any = builder_from_dict(about["observation"])
-    buffers, size = [], 1
-    for i, episode in enumerate(episodes(folder)):
-        size = episode.actions.shape[1]
-        values = {key: getattr(episode, key) for key in ARRAYS}
-        buffers.append(minari.data_collector.EpisodeBuffer(id=i, **values))
+    buffers = [
+        minari.data_collector.EpisodeBuffer(id=i, **{key: getattr(one, key) for key in ARRAYS})
+        for i, one in enumerate(episodes(folder))
+    ]
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # it misses an author and a link, which its users may add
         return minari.create_dataset_from_buffers(
@@ -256,6 +255,6 @@ def to_minari(folder: str | Path, name: str) -> Any:
             algorithm_name=about["policy"],
             description=f"{about['task']} of pushplan, {about['preset']}, {about['simulator']}",
             observation_space=Box(builder.low, builder.high, builder.shape, builder.dtype.type),
-            action_space=Box(-1.0, 1.0, (size,), np.float32),
+            action_space=Box(-1.0, 1.0, buffers[0].actions.shape[1:], np.float32),
             data_format="hdf5",
         )

@@ -106,14 +106,15 @@ class TrainingEnv(gymnasium.Env[NDArray[Any], Any]):
         if seed is not None:
             self._rng = stream(seed, "starts")
         if options is not None and "layout" in options:
-            number = int(options["layout"])
-            self._env = self._envs[number % len(self._envs)]
-            layout = VALIDATION_SEEDS + number
-            self._limit = PATIENCE * self.config.limit
+            index = int(options["layout"])
+            layout = VALIDATION_SEEDS + index
+            patience = PATIENCE
         else:
-            self._env = self._envs[int(self._rng.integers(len(self._envs)))]
+            index = int(self._rng.integers(len(self._envs)))
             layout = TRAINING_SEEDS + int(self._rng.integers(_SEED_COUNT))
-            self._limit = self.config.limit
+            patience = 1
+        self._env = self._envs[index % len(self._envs)]
+        self._limit = patience * self.config.limit
         self._decisions = 0
         self._env.reset(seed=layout)
         return self.observe(), {}
@@ -157,9 +158,8 @@ class TrainingEnv(gymnasium.Env[NDArray[Any], Any]):
 def action_spec(config: TrainingConfig, env: PushEnv) -> ActionSpec:
     """What the output of the network means in an environment."""
     output, mode = config.action.output, config.action.mode
-    shape: tuple[int, ...] = (2 if output == "direction" else MODES[mode],)
-    if output == "chunk":
-        shape = (config.action.horizon, MODES[mode])
+    shapes = {"direction": (2,), "chunk": (config.action.horizon, MODES[mode])}
+    shape: tuple[int, ...] = shapes.get(output, (MODES[mode],))
     if output == "pixel_values":
         view = builder_from_dict(config.observation)
         side = env.task.waypoint_window

@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 import math
+import platform
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import pushplan
 from pushplan.drawing.figure import COLUMN, DPI, STYLE
 from pushplan.learned.sb3_saving import attach
 from pushplan.learned.specification import Specification
 from pushplan.training.libraries import chosen_device, hardware, parameter_count
 from pushplan.training.policies.config import IMITATING, TrainingConfig
 from pushplan.training.policies.environment import TrainingEnv
-from pushplan.training.policies.options import SamOptions
+from pushplan.training.policies.options import PpoOptions, SacOptions, SamOptions
 from pushplan.training.policies.run import (
     CHECKPOINT,
     CURVE,
@@ -85,7 +87,7 @@ def train_policy(
     learner.close()
     env.close()
     network = learner.policy
-    if config.algorithm in ("ppo", "sac"):
+    if isinstance(config.options, PpoOptions | SacOptions):
         network = _saved_actor(run, learner.model, env)
     _draw(run)
     if run.done < run.chunks:
@@ -183,6 +185,10 @@ def _finish(
     from pushplan.training.policies.dataset import read_metadata
     from pushplan.training.policies.export import decision_time, export, observation_time
 
+    libraries = [
+        "torch",
+        *(["stable_baselines3"] if isinstance(run.config.options, PpoOptions | SacOptions) else []),
+    ]
     best = max(run.curve, key=lambda point: (point.rank, point.steps))
     path = export(network, _specification(env, best_steps=best.steps), run.path(POLICY))
     run.record(
@@ -193,26 +199,16 @@ def _finish(
         steps=run.curve[-1].steps,
         seconds=run.seconds,
         best_steps=best.steps,
-        valid_success=_finite(best.valid_success),
-        valid_share=_finite(best.valid_share),
+        valid_success=None if math.isnan(best.valid_success) else best.valid_success,
+        valid_share=None if math.isnan(best.valid_share) else best.valid_share,
         hardware=f"{hardware(device)}, {threads} thread{'s' * (threads > 1)}",
-        versions=_versions(run.config.algorithm),
+        versions={
+            "pushplan": pushplan.__version__,
+            "Python": platform.python_version(),
+            **{name: str(need(name).__version__) for name in libraries},
+        },
         command=command,
         data=[read_metadata(folder) for folder in data],
         curve=CURVE,
     )
     return path
-
-
-def _finite(value: float) -> float | None:
-    return value if math.isfinite(value) else None
-
-
-def _versions(algorithm: str) -> dict[str, str]:
-    import platform
-
-    import pushplan
-
-    names = ["torch"] + (["stable_baselines3"] if algorithm in ("ppo", "sac") else [])
-    found = {name: str(need(name).__version__) for name in names}
-    return {"pushplan": pushplan.__version__, "Python": platform.python_version(), **found}
