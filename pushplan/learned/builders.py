@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import MISSING, asdict, fields
 from typing import Any
-
-import numpy as np
 
 from pushplan.learned.features import FeatureObservation
 from pushplan.observation import ImageObservation, ObservationBuilder, StateObservation
@@ -81,7 +80,7 @@ def builder_from_dict(data: Mapping[str, Any]) -> ObservationBuilder:
     builder: ObservationBuilder = from_mapping(
         kind, "observation", data, beside=("kind", "shape", "dtype")
     )
-    if float(np.prod([float(n) for n in builder.shape])) > GREATEST_SIZE:
+    if math.prod(builder.shape) > GREATEST_SIZE:
         raise InvalidInputError(f"an observation of shape {builder.shape} is too large")
     shape, dtype = data.get("shape", builder.shape), data.get("dtype")
     if isinstance(shape, list):

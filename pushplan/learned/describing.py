@@ -9,6 +9,7 @@ from typing import Any
 from pushplan.learned.builders import builder_to_dict
 from pushplan.learned.outputs import MODES, ActionSpec
 from pushplan.learned.specification import RobotSpec, Specification
+from pushplan.observation import ObservationBuilder
 from pushplan.world import InvalidInputError, UnknownNameError
 
 _CHANGING = frozenset(
@@ -78,20 +79,28 @@ def _of_one(env: Any, repeat: int, training: Mapping[str, Any]) -> Specification
     if mode not in MODES:
         raise UnknownNameError("action mode in a specification", mode, MODES)
     builder_to_dict(builder)  # refuses builders of one's own
+    action = ActionSpec(
+        mode=mode,
+        output="continuous",
+        shape=(MODES[mode],),
+        repeat=repeat,
+        step=task.heading_step if mode == "heading" else 0.0,
+    )
+    return specification_of(task, builder, action, training)
+
+
+def specification_of(
+    task: Any, observation: ObservationBuilder, action: ActionSpec, training: Mapping[str, Any]
+) -> Specification:
+    """The specification of a network that learns a task."""
     preset = getattr(task, "preset_name", None)
     return Specification(
         tasks=(task.name,),
         presets=() if preset is None else (preset,),
         robot=RobotSpec.of(task.robot),
         control_step=task.control_step,
-        observation=builder,
-        action=ActionSpec(
-            mode=mode,
-            output="continuous",
-            shape=(MODES[mode],),
-            repeat=repeat,
-            step=task.heading_step if mode == "heading" else 0.0,
-        ),
+        observation=observation,
+        action=action,
         training=training,
     )
 

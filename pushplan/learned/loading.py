@@ -17,10 +17,15 @@ LEARNED_PREFIXES = ("onnx:", "sb3:")
 _ENDINGS = {"onnx": ".onnx", "sb3": ".zip"}
 
 
-@functools.lru_cache(maxsize=1)
+@functools.cache
+def shipped_files(package: str, pattern: str) -> dict[str, Path]:
+    """Files that come with a package of ours, by the first part of their names."""
+    folder = Path(str(resources.files(package)))
+    return {path.stem: path for path in sorted(folder.glob(pattern), key=lambda path: path.stem)}
+
+
 def _shipped() -> dict[str, Path]:
-    folder = Path(str(resources.files("pushplan.learned"))) / "weights"
-    return {path.stem: path for path in sorted(folder.glob("*.onnx"), key=lambda path: path.stem)}
+    return shipped_files("pushplan.learned", "weights/*.onnx")
 
 
 def learned_names() -> tuple[str, ...]:

@@ -43,14 +43,7 @@ class OnnxPolicy(NetworkPolicy):
         self.path = Path(path)
         label = self.path.stem if label is None else label
         try:
-            data = _read(self.path)
-            metadata = inspect(data)
-            if METADATA_KEY not in metadata:
-                raise NotOnnxError(
-                    f"it has no specification (metadata {METADATA_KEY!r}): see "
-                    "pushplan.training.policies.export, or docs/learned.md"
-                )
-            specification = Specification.from_json(metadata[METADATA_KEY])
+            data, specification = _read(self.path)
             self._network = Network(data)
             _check_doors(self._network, specification)
             self._rng = np.random.default_rng(0)
@@ -91,16 +84,24 @@ def read_specification(path: str | Path) -> Specification:
         InvalidInputError: if there is none.
     """
     try:
-        return Specification.from_json(inspect(_read(Path(path))).get(METADATA_KEY, ""))
+        return _read(Path(path))[1]
     except InvalidInputError as error:
         raise InvalidInputError(f"{path} is no policy: {error}") from error
 
 
-def _read(path: Path) -> bytes:
+def _read(path: Path) -> tuple[bytes, Specification]:
+    """The content of a file, looked through, and its specification."""
     if not path.is_file():
         raise NotOnnxError("there is no such file")
     with path.open("rb") as file:
-        return file.read(GREATEST_FILE + 1)
+        data = file.read(GREATEST_FILE + 1)
+    metadata = inspect(data)
+    if METADATA_KEY not in metadata:
+        raise NotOnnxError(
+            f"it has no specification (metadata {METADATA_KEY!r}): see "
+            "pushplan.training.policies.export, or docs/learned.md"
+        )
+    return data, Specification.from_json(metadata[METADATA_KEY])
 
 
 def _check_doors(network: Network, specification: Specification) -> None:

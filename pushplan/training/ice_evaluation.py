@@ -26,7 +26,7 @@ from pushplan.interaction.occupancy import (
 )
 from pushplan.interaction.occupancy_models import ICE_FRICTION, InteractionOccupancy
 from pushplan.training.ice_passages import PassageConfig, voyage_passages
-from pushplan.world.checks import BoolArray, FloatArray, integer
+from pushplan.world.checks import BoolArray, integer
 
 AROUND = 5
 """Cells about the swath that belong to its window: half a hull length."""
@@ -68,21 +68,17 @@ def score(
         columns.append((error.mean(axis=(1, 2)), near, found.work, truth.work))
     patch, swath, work, true = map(np.concatenate, zip(*columns, strict=True))
     mean = float(true.mean()) or float("nan")
+    with np.errstate(invalid="ignore"):  # NaN where one of them is constant
+        correlation = float(np.corrcoef(work, true)[0, 1])
     return PredictionScores(
         passages=len(true),
         patch_mse=float(patch.mean()),
         swath_mse=float(swath.mean()),
         work_bias=float(work.mean()) / mean,
         work_error=float(np.abs(work - true).mean()) / mean,
-        work_correlation=_correlation(work, true),
+        work_correlation=correlation,
         milliseconds=1e3 * float(np.median(times)),
     )
-
-
-def _correlation(a: FloatArray, b: FloatArray) -> float:
-    if a.std() == 0.0 or b.std() == 0.0:
-        return float("nan")
-    return float(np.corrcoef(a, b)[0, 1])
 
 
 def held_out(

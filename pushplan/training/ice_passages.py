@@ -25,43 +25,41 @@ from pushplan.world.checks import FloatArray, number
 SPLITS = ("train", "held-out")
 
 
+SHORTEST, LONGEST = 0.2, 1.2
+"""Length of a passage, in hull lengths."""
+ARCS = (0.15, 1.0)
+"""Least and greatest length of the arcs that a voyage is made of, in hull lengths."""
+SPACING = 0.05
+"""Between the poses of a voyage, in hull lengths."""
+STEEPEST = math.radians(75.0)
+"""Greatest angle between the ship and the channel [rad]."""
+
+
 @dataclass(frozen=True)
 class PassageConfig(CheckedFields):
-    """What passages are drawn. Lengths in hull lengths."""
+    """What passages are drawn."""
 
     # of the ice, drawn from ``least_concentration`` to this
     greatest_concentration: Annotated[float, Limits(0.0, 0.5)] = 0.5
     least_concentration: float = 0.01  # fraction of ice
     passages: PositiveInt = 48  # drawn from each voyage along the channel
-    shortest: float = 0.2  # least length of a passage
-    longest: float = 1.2  # greatest length
-    # least and greatest length of the arcs that a voyage is made of
-    arcs: tuple[float, float] = (0.15, 1.0)
-    spacing: Annotated[float, Limits(0.0, 0.2, open_low=True)] = (
-        0.05  # between the poses of a voyage
-    )
-    steepest: float = math.radians(75.0)  # greatest angle between the ship and the channel [rad]
 
     def __post_init__(self) -> None:
         super().__post_init__()
         most = self.greatest_concentration
         number("least_concentration", self.least_concentration, low=0.0, high=most)
-        number("shortest", self.shortest, low=self.spacing)
-        number("longest", self.longest, low=self.shortest, high=1.5)
-        number("arcs", self.arcs[0], low=self.spacing, high=self.arcs[1])
-        number("steepest", self.steepest, low=0.1, high=0.5 * math.pi)
 
 
-def random_voyage(world: World, config: PassageConfig, rng: np.random.Generator) -> FloatArray:
+def random_voyage(world: World, rng: np.random.Generator) -> FloatArray:
     """A path along the channel in arcs of random length and curvature.
 
     Returns:
-        (N, 3) poses, the hull's ``spacing`` apart, that keep clear of the channel's ends. They may
+        (N, 3) poses, `SPACING` apart, that keep clear of the channel's ends. They may
         pass its sides by up to a hull length.
     """
     length = float(np.ptp(world.robot.vertices[:, 0]))
     tightest = 1.0 / world.robot.turning_radius
-    step = config.spacing * length
+    step = SPACING * length
     x_low, _, x_high, y_high = world.static.bounds.tolist()
     x, y, theta = world.robot_pose.tolist()
     poses = [(x, y, theta)]
@@ -69,16 +67,16 @@ def random_voyage(world: World, config: PassageConfig, rng: np.random.Generator)
         straight = rng.random() < 0.25
         curvature = 0.0 if straight else rng.choice([-1.0, 1.0]) * tightest * rng.uniform(0.1, 1.0)
         off = theta - 0.5 * math.pi
-        if abs(off) > config.steepest or x < x_low + length or x > x_high - length:
+        if abs(off) > STEEPEST or x < x_low + length or x > x_high - length:
             wanted = math.copysign(1.0, 0.5 * (x_low + x_high) - x) if abs(off) < 0.3 else off
             curvature = -math.copysign(tightest, wanted)
-        for _ in range(max(1, round(rng.uniform(*config.arcs) * length / step))):
+        for _ in range(max(1, round(rng.uniform(*ARCS) * length / step))):
             middle = theta + 0.5 * curvature * step
             x += step * math.cos(middle)
             y += step * math.sin(middle)
             theta += curvature * step
             poses.append((x, y, theta))
-            if abs(theta - 0.5 * math.pi) > config.steepest and curvature * (theta - 1.57) > 0.0:
+            if abs(theta - 0.5 * math.pi) > STEEPEST and curvature * (theta - 1.57) > 0.0:
                 break
     return np.array(poses)
 
@@ -106,7 +104,7 @@ def voyage_passages(
         }
     )
     world = task.start(rng)
-    voyage = random_voyage(world, config, rng)
+    voyage = random_voyage(world, rng)
     simulator = PymunkSimulator()
     simulator.build(world, task.materials)
     moved = simulator.follow(voyage)
@@ -128,9 +126,7 @@ def _choose(
 ) -> tuple[list[Passage], list[tuple[int, int]]]:
     """Pieces of a voyage, from the poses with the first number to those with the second."""
     last = len(voyage) - 1 if moved.jammed_at < 0 else moved.jammed_at - 1
-    shortest, longest = (
-        max(1, round(fraction / config.spacing)) for fraction in (config.shortest, config.longest)
-    )
+    shortest, longest = (max(1, round(fraction / SPACING)) for fraction in (SHORTEST, LONGEST))
     passages, ends = [], []
     for _ in range(config.passages):
         count = int(rng.integers(shortest, longest + 1))

@@ -54,14 +54,14 @@ class TestPassages:
         world = made.passages[0].world
         start = world.moved(robot_pose=[6.0, 1.0, np.pi / 2])
         for seed in range(5):
-            poses = random_voyage(start, PassageConfig(), np.random.default_rng(seed))
+            poses = random_voyage(start, np.random.default_rng(seed))
             steps = np.hypot(*np.diff(poses[:, :2], axis=0).T)
             bends = np.abs(np.diff(poses[:, 2])) / steps
             assert (bends <= 1.01 / world.robot.turning_radius).all()
             assert (poses[:, 0] > -2.0).all() and (poses[:, 0] < 14.0).all()  # a hull length
 
     @pytest.mark.parametrize(
-        "values", [{"passages": 0}, {"greatest_concentration": 0.9}, {"longest": 0.1}]
+        "values", [{"passages": 0}, {"greatest_concentration": 0.9}, {"least_concentration": 0.6}]
     )
     def test_bad_settings(self, values):
         with pytest.raises(InvalidInputError):

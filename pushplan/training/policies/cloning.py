@@ -61,7 +61,7 @@ class Imitator:
             rate = options.rate * max(_LEAST_RATE, 0.5 * (1.0 + np.cos(np.pi * fraction)))
             for group in self.optimizer.param_groups:
                 group["lr"] = float(rate)
-            chosen = rng.integers(len(self.pairs), size=options.batch)
+            chosen = rng.integers(len(self.pairs.seen), size=options.batch)
             loss = self.policy.loss(*(self._tensor(values[chosen]) for values in self.pairs))
             self.optimizer.zero_grad(set_to_none=True)
             loss.backward()
@@ -90,7 +90,7 @@ class Imitator:
         total, count = 0.0, 0.0
         self.policy.eval()
         with torch.no_grad():
-            for i in range(0, len(self.held_out), 1024):
+            for i in range(0, len(self.held_out.seen), 1024):
                 seen, wanted, counted = (self._tensor(v[i : i + 1024]) for v in self.held_out)
                 squares = ((self.policy(seen) - wanted) ** 2).mean(dim=-1)  # (B,) or (B, horizon)
                 counted = counted.reshape(squares.shape)

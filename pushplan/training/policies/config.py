@@ -6,12 +6,12 @@ import dataclasses
 import json
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
-from importlib import resources
 from pathlib import Path
 from typing import Annotated, Any
 
 from pushplan.envs.registry import SIMULATORS, TASKS, default_preset
 from pushplan.learned.builders import builder_from_dict, from_mapping
+from pushplan.learned.loading import shipped_files
 from pushplan.learned.outputs import OUTPUTS
 from pushplan.training.policies.options import OPTIONS, Options
 from pushplan.world import InvalidInputError, SchemaError, UnknownNameError
@@ -143,8 +143,7 @@ def read_config(path: str | Path) -> TrainingConfig:
 
 def shipped_configs() -> dict[str, Path]:
     """The configurations that come with the package, by name, such as ``maze-ppo``."""
-    folder = Path(str(resources.files("pushplan.training.policies"))) / "configs"
-    return {path.stem: path for path in sorted(folder.glob("*.yaml"), key=lambda p: p.stem)}
+    return shipped_files("pushplan.training.policies", "configs/*.yaml")
 
 
 def config_named(task: str, algorithm: str) -> TrainingConfig:

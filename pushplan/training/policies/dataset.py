@@ -23,7 +23,7 @@ from pushplan.envs import PushEnv
 from pushplan.learned.builders import builder_from_dict, builder_to_dict
 from pushplan.learned.specification import RobotSpec
 from pushplan.observation import ObservationBuilder
-from pushplan.training.policies.environment import TRAINING_SEEDS
+from pushplan.training.policies.environment import TRAINING_SEEDS, environments
 from pushplan.world import (
     ChoosesActions,
     ChoosesObservation,
@@ -115,17 +115,8 @@ def record(
         raise InvalidInputError(f"{folder} is not empty")
     builder = builder_from_dict(request.observation)
     wanted = policy.observation if isinstance(policy, ChoosesObservation) else "state"
-    envs = [
-        PushEnv(
-            task=request.task,
-            simulator=request.simulator,
-            preset=request.preset,
-            variations=dict(variations),
-            observation=wanted,
-            action=policy.actions if isinstance(policy, ChoosesActions) else None,
-        )
-        for variations in request.scenarios
-    ]
+    mode = policy.actions if isinstance(policy, ChoosesActions) else None
+    envs = environments(request, wanted, mode)
     (folder / "data").mkdir(parents=True, exist_ok=True)
     steps = successes = 0
     for number_ in range(request.episodes):
@@ -167,7 +158,7 @@ def _run(
     builder: ObservationBuilder,
     request: DatasetRequest,
     seed: int,
-) -> tuple[dict[str, NDArray[Any]], bool]:
+) -> tuple[dict[str, Any], bool]:
     """The arrays of an episode, and its success."""
     seen, _ = env.reset(seed=seed)
     policy.reset(env.world, stream(seed, "policy"))

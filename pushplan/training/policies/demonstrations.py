@@ -25,9 +25,6 @@ class Demonstrations(NamedTuple):
     wanted: NDArray[np.float32]  # (N, n) actions or directions, or (N, horizon, n) chunks
     counted: NDArray[np.float32]  # (N, 1) or (N, horizon) 1 where it is known what was wanted
 
-    def __len__(self) -> int:
-        return len(self.seen)
-
 
 def check_dataset(config: TrainingConfig, data: str | Path) -> None:
     """Refuse a data set of another task, observation or action.

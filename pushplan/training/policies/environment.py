@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import gymnasium
 import numpy as np
@@ -11,11 +11,15 @@ from numpy.typing import NDArray
 
 from pushplan.envs import PushEnv
 from pushplan.learned.builders import builder_from_dict
+from pushplan.learned.describing import specification_of
 from pushplan.learned.outputs import MODES, ActionSpec
-from pushplan.learned.specification import RobotSpec, Specification
+from pushplan.learned.specification import Specification
 from pushplan.observation import ObservationBuilder
 from pushplan.training.policies.config import TrainingConfig
 from pushplan.world import InvalidInputError, World, stream
+
+if TYPE_CHECKING:
+    from pushplan.training.policies.dataset import DatasetRequest
 
 TRAINING_SEEDS = 2**20
 """Layouts of training have seeds from here on; those below are for validation and scoring."""
@@ -38,6 +42,23 @@ class _Blank:
         return self._nothing
 
 
+def environments(
+    config: TrainingConfig | DatasetRequest, observation: Any, action: Any
+) -> list[PushEnv]:
+    """An environment for each scenario of a training or of a data set."""
+    return [
+        PushEnv(
+            task=config.task,
+            simulator=config.simulator,
+            preset=config.preset,
+            variations=dict(variations),
+            observation=observation,
+            action=action,
+        )
+        for variations in config.scenarios
+    ]
+
+
 class TrainingEnv(gymnasium.Env[NDArray[Any], Any]):
     """Draws a scenario for each episode, repeats each decision, scales the reward.
 
@@ -49,7 +70,8 @@ class TrainingEnv(gymnasium.Env[NDArray[Any], Any]):
     def __init__(self, config: TrainingConfig) -> None:
         self.config = config
         self._builder = builder_from_dict(config.observation)
-        self._envs = [self._make(dict(variations)) for variations in config.scenarios]
+        blank: Any = _Blank(self._builder)
+        self._envs = environments(config, blank, config.action.mode)
         self._env = self._envs[0]
         self.action = action_spec(config, self._env)
         for env in self._envs[1:]:
@@ -68,30 +90,11 @@ class TrainingEnv(gymnasium.Env[NDArray[Any], Any]):
         self._decisions = 0
         self._limit = config.limit
 
-    def _make(self, variations: dict[str, Any]) -> PushEnv:
-        config = self.config
-        return PushEnv(
-            task=config.task,
-            simulator=config.simulator,
-            preset=config.preset,
-            variations=variations,
-            observation=_Blank(self._builder),
-            action=config.action.mode,
-        )
-
     @property
     def specification(self) -> Specification:
         """What a network says about itself that has learned here."""
-        task = self._env.task
-        return Specification(
-            tasks=(self.config.task,),
-            presets=(str(self.config.preset),),
-            robot=RobotSpec.of(task.robot),
-            control_step=task.control_step,
-            observation=self._builder,
-            action=self.action,
-            training={"algorithm": self.config.algorithm},
-        )
+        facts = {"algorithm": self.config.algorithm}
+        return specification_of(self._env.task, self._builder, self.action, facts)
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None

@@ -14,7 +14,6 @@ from pushplan.learned import OnnxPolicy, Specification
 from pushplan.learned.onnx_session import NOISE
 from pushplan.learned.specification import METADATA_KEY
 from pushplan.training.libraries import write_onnx
-from pushplan.training.policies.config import TrainingConfig
 from pushplan.training.policies.environment import TrainingEnv
 from pushplan.world import InvalidInputError
 from pushplan.world.libraries import need
@@ -66,9 +65,8 @@ def decision_time(path: Path, count: int = 200) -> float:
     return float(np.median([timeit(partial(policy.decide, one), number=1) for one in seen]))
 
 
-def observation_time(config: TrainingConfig, count: int = 50) -> float:
+def observation_time(env: TrainingEnv, count: int = 50) -> float:
     """Median time of an observation in validation episodes with random actions [s]."""
-    env = TrainingEnv(config)
     env.action_space.seed(0)
     times: list[float] = []
     over = True
@@ -78,7 +76,6 @@ def observation_time(config: TrainingConfig, count: int = 50) -> float:
         *_, terminated, truncated, _ = env.step(env.action_space.sample())
         times.append(timeit(env.observe, number=1))
         over = terminated or truncated
-    env.close()
     return float(np.median(times))
 
 

@@ -306,10 +306,9 @@ def _read_curve(path: Path) -> list[CurvePoint]:
         rows = list(csv.DictReader(file))
     whole = ("steps", "episodes")  # older files have 1e+06
     try:
-        numbers = [{name: float(text) for name, text in row.items()} for row in rows]
         return [
-            CurvePoint(**{k: int(v) if k in whole else v for k, v in row.items()})  # type: ignore[arg-type]
-            for row in numbers
+            CurvePoint(**{k: int(float(v)) if k in whole else float(v) for k, v in row.items()})  # type: ignore[arg-type]
+            for row in rows
         ]
     except (TypeError, ValueError) as error:
         raise InvalidInputError(f"{path} is no learning curve: {error}") from error

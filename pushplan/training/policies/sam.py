@@ -25,6 +25,7 @@ from pushplan.training.policies.run import Learned, chunk_seed
 from pushplan.world import InvalidInputError, stream
 
 _LEAST_RATE = 0.1
+_PARTS = ("network", "target", "optimizer")
 _AROUND = 2  # pixels about a movable one that exploration at objects may take
 
 
@@ -89,7 +90,7 @@ class SamLearner:
         if options.mirror and rng.random() < 0.5:  # what is left is right
             seen, following = seen[..., ::-1], following[..., ::-1]
             actions = actions - actions % cols + (cols - 1 - actions % cols)
-        seen, following = (
+        before, after = (
             torch.from_numpy(np.ascontiguousarray(a)).to(
                 self.device, memory_format=torch.channels_last
             )
@@ -99,11 +100,11 @@ class SamLearner:
             torch.from_numpy(a).to(self.device) for a in (actions, rewards, discounts)
         )
         with torch.no_grad():
-            choice = self.network(following).flatten(1).argmax(1, keepdim=True)
-            future = self.target(following).flatten(1).gather(1, choice)[:, 0]
+            choice = self.network(after).flatten(1).argmax(1, keepdim=True)
+            future = self.target(after).flatten(1).gather(1, choice)[:, 0]
             wanted = reward + discount * future
-        value = self.network(seen).flatten(1).gather(1, chosen[:, None])[:, 0]
-        loss = torch.nn.functional.smooth_l1_loss(value, wanted)
+        value = self.network(before).flatten(1).gather(1, chosen[:, None])[:, 0]
+        loss: Any = torch.nn.functional.smooth_l1_loss(value, wanted)
         for group in self.optimizer.param_groups:
             group["lr"] = rate
         self.optimizer.zero_grad(set_to_none=True)
@@ -126,19 +127,13 @@ class SamLearner:
             key: torch.from_numpy(value) if isinstance(value, np.ndarray) else value
             for key, value in self.memory.state().items()
         }
-        return {
-            "network": self.network.state_dict(),
-            "target": self.target.state_dict(),
-            "optimizer": self.optimizer.state_dict(),
-            "memory": memory,
-            "updates": self.updates,
-        }
+        parts = {name: getattr(self, name).state_dict() for name in _PARTS}
+        return {**parts, "memory": memory, "updates": self.updates}
 
     def restore(self, state: Any) -> None:
         """From a checkpoint."""
-        self.network.load_state_dict(state["network"])
-        self.target.load_state_dict(state["target"])
-        self.optimizer.load_state_dict(state["optimizer"])
+        for name in _PARTS:
+            getattr(self, name).load_state_dict(state[name])
         self.memory.restore(state["memory"])
         self.updates = int(state["updates"])
 

@@ -68,7 +68,9 @@ class Sb3Learner:
 
     def __init__(self, config: TrainingConfig, device: str, processes: bool, logs: Path) -> None:
         self.config = config
-        makers = [lambda: Monitor(TrainingEnv(config), info_keywords=("is_success",))] * config.envs
+        makers: list[Any] = [
+            lambda: Monitor(TrainingEnv(config), info_keywords=("is_success",))
+        ] * config.envs
         env: Any = (
             SubprocVecEnv(makers, start_method="forkserver")
             if processes and config.envs > 1

@@ -85,14 +85,15 @@ def train_policy(
         run.abandon()
         raise
     learner.close()
-    env.close()
     network = learner.policy
     if isinstance(config.options, PpoOptions | SacOptions):
         network = _saved_actor(run, learner.model, env)
     _draw(run)
-    if run.done < run.chunks:
-        return None
-    return _finish(run, network, env, device, threads, folders, command)
+    path = None
+    if run.done >= run.chunks:
+        path = _finish(run, network, env, device, threads, folders, command)
+    env.close()
+    return path
 
 
 def _learner(
@@ -195,7 +196,7 @@ def _finish(
         parameters=parameter_count(network),
         bytes=path.stat().st_size,
         decision_ms=1e3 * decision_time(path),
-        observation_ms=1e3 * observation_time(run.config),
+        observation_ms=1e3 * observation_time(env),
         steps=run.curve[-1].steps,
         seconds=run.seconds,
         best_steps=best.steps,
