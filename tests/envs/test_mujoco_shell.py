@@ -36,18 +36,18 @@ def driven(robot: RobotModel, ground: object) -> list[bytes]:
 )
 def test_the_shell_changes_no_bit_of_a_trajectory(monkeypatch, robot, ground):
     with_shell = driven(robot, ground)
-    mujoco_model._store.clear()
+    mujoco_model.scene_model.cache_clear()
     for name in ("add_shell", "add_tyre"):
         monkeypatch.setattr(mujoco_robot, name, lambda *arguments: None)
     bare = driven(robot, ground)
-    mujoco_model._store.clear()
+    mujoco_model.scene_model.cache_clear()
     assert with_shell == bare
     assert len(set(bare)) == len(bare)  # it does drive
 
 
 def test_the_house_of_a_ship_changes_no_bit_of_a_trajectory(monkeypatch):
     def driven_ship() -> bytes:
-        mujoco_model._store.clear()
+        mujoco_model.scene_model.cache_clear()
         env = PushEnv(task="ship_ice", simulator="mujoco", variations={"concentration": 0.1})
         env.reset(seed=3)
         for _ in range(40):
@@ -57,7 +57,7 @@ def test_the_house_of_a_ship_changes_no_bit_of_a_trajectory(monkeypatch):
     with_house = driven_ship()
     monkeypatch.setattr(mujoco_robot, "add_superstructure", lambda *arguments: None)
     assert driven_ship() == with_house
-    mujoco_model._store.clear()
+    mujoco_model.scene_model.cache_clear()
 
 
 def test_the_shell_has_neither_contacts_nor_mass():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
@@ -13,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from pushplan.envs.simulators.water import Water
 from pushplan.envs.trace import Trace
 from pushplan.interaction.model import Interaction
-from pushplan.world import InvalidInputError, Twist, World
+from pushplan.world import InvalidInputError, RobotModel, Twist, World
 from pushplan.world.checked_fields import CheckedFields, NonNegativeFloat, PositiveFloat
 from pushplan.world.checks import ArrayRecord, FloatArray, IntArray, array, frozen
 
@@ -202,6 +203,15 @@ def checked_path(path: ArrayLike) -> FloatArray:
     if len(poses) == 0:
         raise InvalidInputError("path must hold at least one pose")
     return poses
+
+
+def straight_leg(
+    robot: RobotModel, a: FloatArray, b: FloatArray
+) -> tuple[float, float, float, float]:
+    """From a pose (3,) to another at full speed: dx, dy [m], turn [rad], time [s]."""
+    dx, dy = float(b[0] - a[0]), float(b[1] - a[1])
+    turn = math.remainder(float(b[2] - a[2]), 2.0 * math.pi)
+    return dx, dy, turn, max(math.hypot(dx, dy) / robot.max_speed, abs(turn) / robot.max_turn_rate)
 
 
 def warm_up_simulator(simulator: Simulator, world: World, materials: Materials) -> None:

@@ -52,7 +52,7 @@ class MujocoBodies:
     def __init__(self, world: World, materials: Materials, options: MujocoOptions) -> None:
         log_warnings()
         self.key = SceneKey.of(world, materials, options)
-        self.model = scene_model(self.key, world.movables)
+        self.model = scene_model(self.key).__copy__()
         self.data = mujoco.MjData(self.model)
         self.afloat = materials.water is not None
         self.count = len(world.movables)

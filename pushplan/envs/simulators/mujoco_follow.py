@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from pushplan.envs.simulators.base import Simulator
+from pushplan.envs.simulators.base import Simulator, straight_leg
 from pushplan.world import RobotModel, Twist
 from pushplan.world.checks import FloatArray
 
@@ -52,10 +52,7 @@ def _drive_leg(
     patience: float,
 ) -> bool:
     """Move the reference from ``a`` to ``b``; False if the robot was held on the way."""
-    dx, dy = float(b[0] - a[0]), float(b[1] - a[1])
-    turn = math.remainder(float(b[2] - a[2]), 2.0 * math.pi)
-    length = math.hypot(dx, dy)
-    duration = max(length / robot.max_speed, abs(turn) / robot.max_turn_rate)
+    dx, dy, turn, duration = straight_leg(robot, a, b)
     if duration == 0.0:
         return True
     middle = float(a[2]) + 0.5 * turn

@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
-import threading
-from collections import OrderedDict
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import lru_cache
 from typing import Any
 
 import mujoco
 import numpy as np
 
-from pushplan.drawing.palette import FLOOR_PALETTE, WATER_PALETTE, Palette
+from pushplan.drawing.palette import FLOOR_PALETTE, WATER_PALETTE
 from pushplan.envs.simulators.base import Materials, Solids
 from pushplan.envs.simulators.mujoco_options import MujocoOptions
-from pushplan.envs.simulators.mujoco_robot import GRAVITY, add_floating, add_ship, add_wheeled_robot
+from pushplan.envs.simulators.mujoco_robot import (
+    GRAVITY,
+    add_floating,
+    add_ship,
+    add_wheeled_robot,
+    palette_of,
+)
 from pushplan.envs.simulators.mujoco_shapes import (
     FLOOR_BIT,
     OBJECT_BIT,
@@ -31,14 +36,6 @@ from pushplan.world.checks import FloatArray
 
 _CASTER_BALL = (0.25, 0.25, 0.27)
 _HOLDING = 1e7  # damping of a fixed object over its mass [1/s]
-_STORED = 8
-_store: OrderedDict[Any, Any] = OrderedDict()
-_store_lock = threading.Lock()
-
-
-def palette_for(materials: Materials) -> Palette:
-    """Colours of a scene on water or on dry ground."""
-    return FLOOR_PALETTE if materials.water is None else WATER_PALETTE
 
 
 @dataclass(frozen=True)
@@ -49,7 +46,8 @@ class SceneKey:
     static: StaticMap
     materials: Materials
     options: MujocoOptions
-    shapes: bytes
+    shapes: bytes  # what counts of the objects
+    movables: Movables = field(compare=False)
 
     @classmethod
     def of(cls, world: World, materials: Materials, options: MujocoOptions) -> SceneKey:
@@ -57,38 +55,18 @@ class SceneKey:
         m = world.movables
         shapes = (m.vertices + 0.0, m.offsets, m.masses, m.wheeled, m.fixed)
         packed = b"".join(part.tobytes() for part in shapes)
-        return cls(world.robot, world.static, materials, options, packed)
+        return cls(world.robot, world.static, materials, options, packed, m)
 
 
-def scene_model(key: SceneKey, movables: Movables) -> Any:
-    """A model of a scene that belongs to the caller.
-
-    Args:
-        key: of the scene.
-        movables: the objects whose shapes are in the key; their poses do not matter.
-
-    Returns:
-        MjModel; compiled anew only where the scene's shapes are none of the last few.
+@lru_cache(maxsize=8)
+def scene_model(key: SceneKey) -> Any:
+    """The MjModel of a scene, to be copied; compiled anew where it is none of the last few.
 
     Raises:
         InvalidInputError: if the scene has no third dimension, or the robot neither wheels nor
             water.
     """
-    with _store_lock:
-        found = _store.get(key)
-        if found is not None:
-            _store.move_to_end(key)
-    if found is None:
-        found = _compile(key, movables)
-        with _store_lock:
-            _store[key] = found
-            while len(_store) > _STORED:
-                _store.popitem(last=False)
-    return found.__copy__()
-
-
-def _compile(key: SceneKey, movables: Movables) -> Any:
-    solids, robot = key.materials.solids, key.robot
+    solids, robot, movables = key.materials.solids, key.robot, key.movables
     if solids is None:
         raise InvalidInputError("MuJoCo needs materials.solids: the heights of everything")
     afloat = key.materials.water is not None
@@ -158,7 +136,7 @@ def _add_ground(spec: Any, key: SceneKey) -> None:
     afloat = key.materials.water is not None
     low, high = key.static.bounds[:2], key.static.bounds[2:]
     half = 0.5 * (high - low)
-    color = color_of(palette_for(key.materials).floor)
+    color = color_of(palette_of(key.materials).floor)
     surface = Surface(FLOOR_BIT, 0, key.materials.object_ground, 1, color)
     settings = surface.options()
     if afloat:
@@ -181,7 +159,7 @@ def _add_ground(spec: Any, key: SceneKey) -> None:
 def _add_static(spec: Any, key: SceneKey, solids: Solids) -> None:
     """Walls and columns; rounded ends of thick segments are upright cylinders."""
     static = key.static
-    color = color_of(palette_for(key.materials).wall)
+    color = color_of(palette_of(key.materials).wall)
     surface = Surface(STATIC_BIT, OBJECT_BIT, key.materials.object_static, 1, color)
     top = solids.wall_height
     bottom = -top if key.materials.water is not None else 0.0

@@ -7,7 +7,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from pushplan.drawing.palette import FLOOR_PALETTE, WATER_PALETTE
+from pushplan.drawing.palette import FLOOR_PALETTE, WATER_PALETTE, Palette
 from pushplan.envs.simulators.base import Materials, Solids
 from pushplan.envs.simulators.mujoco_options import MujocoOptions
 from pushplan.envs.simulators.mujoco_shapes import (
@@ -37,6 +37,11 @@ _CASTER = 0.25  # radius of the caster's ball, in units of the wheel radius
 _CLEARANCE = 0.35  # height of the chassis above ground, in units of the wheel radius
 _BALANCE = 0.4  # where the centre of mass is on the way from the axle to the caster
 _MASS_HEIGHT = 0.25  # of the centre of mass, in units of the robot's height
+
+
+def palette_of(materials: Materials) -> Palette:
+    """Colours of a scene on water or on dry ground."""
+    return FLOOR_PALETTE if materials.water is None else WATER_PALETTE
 
 
 def caster_position(robot: RobotModel) -> float:
@@ -145,7 +150,7 @@ def add_hull(
         low: height of the lower side above the ground [m].
         ground: height of the body's frame above the ground [m].
     """
-    palette = FLOOR_PALETTE if materials.water is None else WATER_PALETTE
+    palette = palette_of(materials)
     meets = FLOOR_BIT | STATIC_BIT | OBJECT_BIT
     for i, part in enumerate(robot.contact_parts):
         top = solids.bumper_height if i else solids.robot_height

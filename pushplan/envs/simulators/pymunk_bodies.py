@@ -84,7 +84,7 @@ class PymunkBodies:
         self.space.iterations = iterations
         self._step = _step_of(self.space)
         self._h = 0.0
-        self._contacts = _Contacts()
+        self.contacts = _Contacts()
         self._buffer = batch.Buffer()
         self._arbiters = batch.Buffer()
         self._momentum = Momentum.of(world, materials)
@@ -121,7 +121,7 @@ class PymunkBodies:
             self._active = active
         self.write(rows)  # first, as the broad phase remembers where a shape was when it came
         self.space.add(*self._shapes)
-        self._contacts.clear()
+        self.contacts.clear()
 
     def _add_static(self, world: World, friction: float) -> None:
         ground, static = self.space.static_body, world.static
@@ -165,7 +165,7 @@ class PymunkBodies:
         return made
 
     def _watch(self) -> None:
-        contacts = self._contacts
+        contacts = self.contacts
 
         def begin_object(arbiter: Any, space: Any, data: Any) -> None:
             contacts.object_static += 1
@@ -175,10 +175,7 @@ class PymunkBodies:
 
         def begin_robot(arbiter: Any, space: Any, data: Any) -> None:
             contacts.robot_static += 1
-            contacts.robot_touched = True
-
-        def begin_fixed(arbiter: Any, space: Any, data: Any) -> None:
-            contacts.robot_static += 1
+            contacts.robot_touched |= arbiter.shapes[1].collision_type == STATIC
 
         def end_robot(arbiter: Any, space: Any, data: Any) -> None:
             contacts.robot_static -= 1
@@ -189,22 +186,14 @@ class PymunkBodies:
 
         for still in (STATIC, FIXED):
             self.space.on_collision(OBJECT, still, begin=begin_object, separate=end_object)
-        self.space.on_collision(
-            ROBOT, STATIC, begin=begin_robot, pre_solve=measure_robot, separate=end_robot
-        )
-        self.space.on_collision(
-            ROBOT, FIXED, begin=begin_fixed, pre_solve=measure_robot, separate=end_robot
-        )
-
-    @property
-    def robot_touched(self) -> bool:
-        """Whether the robot touched something static since `load`."""
-        return self._contacts.robot_touched
+            self.space.on_collision(
+                ROBOT, still, begin=begin_robot, pre_solve=measure_robot, separate=end_robot
+            )
 
     @property
     def static_contacts(self) -> int:
         """How many pairs of a moving and a static shape touch."""
-        return self._contacts.object_static + self._contacts.robot_static
+        return self.contacts.object_static + self.contacts.robot_static
 
     @property
     def depth(self) -> float:
@@ -213,12 +202,7 @@ class PymunkBodies:
         batch.get_space_arbiters(self.space, _DEPTHS, self._arbiters)
         # a handful of numbers: quicker without making an array
         found = memoryview(self._arbiters.float_buf()).cast("d")
-        return max(self._contacts.robot_depth, -min(found, default=0.0), 0.0)
-
-    @property
-    def heading(self) -> float:
-        """Heading of the robot [rad]."""
-        return float(self.robot.angle)
+        return max(self.contacts.robot_depth, -min(found, default=0.0), 0.0)
 
     def snapshot(self) -> bytes:
         """The rows now, packed; `unpack` makes an array of them."""
@@ -262,7 +246,7 @@ class PymunkBodies:
 
     def advance(self, h: float) -> None:
         """One substep of ``h`` seconds."""
-        self._contacts.robot_depth = 0.0
+        self.contacts.robot_depth = 0.0
         if h != self._h:  # the engine wants the fraction of an overlap that is left after a second
             self._h = h
             self.space.collision_bias = max((1.0 - CORRECTION) ** (1.0 / h), 1e-300)
@@ -286,7 +270,7 @@ class PymunkBodies:
         Returns:
             How many there were, and the heading after them.
         """
-        contacts, half = self._contacts, 0.5 * w * h
+        contacts, half = self.contacts, 0.5 * w * h
         for i in range(1, count + 1):
             middle = heading + half if held is None else held
             self.drive(chord * math.cos(middle), chord * math.sin(middle), w)

@@ -99,7 +99,7 @@ class PymunkDriver:
     @property
     def touched(self) -> bool:
         """Whether the robot touched something static in the last run."""
-        return self._bodies.robot_touched
+        return self._bodies.contacts.robot_touched
 
     def run(
         self,
@@ -109,6 +109,8 @@ class PymunkDriver:
         active: IntArray,
         counts: tuple[int, int],
         course: float,
+        *,
+        careful: bool = False,
     ) -> FloatArray:
         """Run the substeps of one step.
 
@@ -119,34 +121,15 @@ class PymunkDriver:
             active: (A,) indices of those objects.
             counts: samples, and substeps between two of them.
             course: direction in the world [rad] that the robot keeps, if it keeps one.
+            careful: keep a way back from every substep. Without care one is kept only where
+                something static is touched already, which is enough nearly always; where it was
+                missing, the step begins again, carefully.
 
         Returns:
             (samples, 1 + A, 6) rows.
         """
-        held = course if self._holds_direction else None
-        rows = self._run(command, duration, start, active, counts, held, careful=False)
-        if rows is None:
-            rows = self._run(command, duration, start, active, counts, held, careful=True)
-            assert rows is not None
-        return rows
-
-    def _run(
-        self,
-        command: Twist,
-        duration: float,
-        start: FloatArray,
-        active: IntArray,
-        counts: tuple[int, int],
-        held: float | None,
-        *,
-        careful: bool,
-    ) -> FloatArray | None:
-        """As `run`; None if a way back was missing: begin again, carefully.
-
-        Without care a way back is kept only where something static is touched already, which is
-        enough nearly always.
-        """
         bodies, w = self._bodies, command.angular
+        held = course if self._holds_direction else None
         samples, each = counts
         h = duration / (samples * each)
         half = 0.5 * w * h
@@ -166,7 +149,9 @@ class PymunkDriver:
                     done, heading = bodies.march(advancing, heading, held, w, h, each - j)
                     j += done
                     if not self._sound(self._limit):
-                        return None
+                        return self.run(
+                            command, duration, start, active, counts, course, careful=True
+                        )
                     continue
                 middle = heading + half if held is None else held
                 vx, vy = advancing * math.cos(middle), advancing * math.sin(middle)
@@ -176,7 +161,7 @@ class PymunkDriver:
                     return rows
                 if outcome is _Moved.SOME:
                     advancing = self._yielding
-                    heading = bodies.heading
+                    heading = float(bodies.robot.angle)
                 else:
                     heading += w * h
                 j += 1
@@ -190,7 +175,7 @@ class PymunkDriver:
         count: int,
         start: FloatArray,
         active: IntArray,
-    ) -> tuple[bool, FloatArray]:
+    ) -> FloatArray:
         """Move at one velocity in the world frame until done or held.
 
         Args:
@@ -201,13 +186,14 @@ class PymunkDriver:
             active: as in `run`.
 
         Returns:
-            Whether the robot got there, and the rows at the end.
+            (1, 1 + A, 6) rows at the end.
         """
         self._bodies.load(active, start)
+        self.held = False
         for i in range(count):
             if self._substep(*velocity, h, first=i == 0) is not _Moved.ALL:
-                return False, self._bodies.read()
-        return True, self._bodies.read()
+                break
+        return self._bodies.read()[None]
 
     def _substep(self, vx: float, vy: float, w: float, h: float, *, first: bool) -> _Moved:
         """Move everything by ``h`` seconds, the robot at a velocity in the world frame."""

@@ -3,17 +3,23 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pushplan.envs.simulators.base import Materials, Simulator, SimulatorState, checked_path
+from pushplan.envs.simulators.base import (
+    Materials,
+    Simulator,
+    SimulatorState,
+    checked_path,
+    straight_leg,
+)
 from pushplan.envs.simulators.momentum import Momentum
 from pushplan.envs.simulators.pymunk_bodies import PymunkBodies
 from pushplan.envs.simulators.pymunk_drive import PymunkDriver, PymunkOptions
-from pushplan.envs.simulators.reach import arc_pose, clear_time, struck, within_reach
+from pushplan.envs.simulators.reach import Shapes, arc_pose, clear_time, struck, within_reach
 from pushplan.envs.trace import Trace
 from pushplan.geometry.obstacles import obstacles_of
 from pushplan.interaction.model import Interaction
@@ -56,10 +62,17 @@ class PymunkSimulator(Simulator):
         self._materials = materials
         self._world = world
         self._obstacles = obstacles_of(world.static)
+        movables = world.movables
+        self._shapes = Shapes(
+            robot.vertices, robot.offsets, movables.vertices, movables.offsets, movables.radii
+        )
         self._momentum = Momentum.of(world, materials)
         self._driver = self._make_driver()
         self._time = world.time
-        self._rows = _rows(world)
+        assert world.robot_twist is not None
+        robot_row = np.concatenate([world.robot_pose, world.robot_twist])
+        objects = np.concatenate([world.movables.poses, world.movables.twists], axis=1)
+        self._rows = np.concatenate([robot_row[None], objects])  # (1 + K, 6) poses and twists
         self._held = self._touched = False
 
     def _make_driver(self) -> PymunkDriver:
@@ -102,21 +115,43 @@ class PymunkSimulator(Simulator):
         robot = self._glide(command, duration * free / samples, free)
         left = samples - free
         rest = duration * left / samples
-        loaded = self._in_reach(speed * rest, own)
+        resting = self._resting(free)
+        driven, paths = self._simulate(
+            self._in_reach(speed * rest, own),
+            lambda start, active: self._driver.run(
+                command, rest, start, active, (left, each), course
+            ),
+        )
+        self._held, self._touched = self._driver.held, self._driver.touched
+        paths = np.concatenate([resting, paths])
+        return self._traced(duration, np.concatenate([robot, driven]), paths)
+
+    def _simulate(
+        self, loaded: BoolArray, run: Callable[[FloatArray, IntArray], FloatArray]
+    ) -> tuple[FloatArray, FloatArray]:
+        """Run the engine with some objects, and with those that turn out to be struck.
+
+        Args:
+            loaded: (K,) which objects to begin with.
+            run: takes the rows of the robot and some objects and the indices of these, and returns
+                rows (T, 1 + A, 6) of T samples.
+
+        Returns:
+            (T, 3) and (T, K, 3) poses of the robot and of all objects. The last ones stay; objects
+            that were left out are at rest.
+        """
         while True:
             active = np.flatnonzero(loaded)
-            start = self._start(active)
-            found = self._driver.run(command, rest, start, active, (left, each), course)
-            paths = self._resting(left)
+            found = run(np.concatenate([self._rows[:1], self._rows[1 + active]]), active)
+            paths = self._resting(len(found))
             paths[:, active] = found[:, 1:, :3]
-            missed = self._struck(loaded, paths)
+            missed = struck(loaded, paths, self._object_rows(), self._shapes)
             if not missed.any():
                 break
             loaded |= missed
-        paths = np.concatenate([self._resting(free), paths])
-        self._keep(active, found[-1])
-        self._held, self._touched = self._driver.held, self._driver.touched
-        return self._traced(duration, np.concatenate([robot, found[:, 0, :3]]), paths)
+        self._rows[1:, 3:] = 0.0
+        self._rows[0], self._rows[1 + active] = found[-1, 0], found[-1, 1:]
+        return found[:, 0, :3], paths
 
     def clear_for(self, command: Twist, limit: float) -> float:
         """How long the robot certainly touches nothing, as `Simulator.clear_for`."""
@@ -128,7 +163,6 @@ class PymunkSimulator(Simulator):
     ) -> float:
         if self._object_speeds().any():
             return 0.0
-        robot, movables = self._world.robot, self._world.movables
         return clear_time(
             self._rows[0, :3],
             course,
@@ -137,14 +171,14 @@ class PymunkSimulator(Simulator):
             holds,
             limit,
             self.options.travel * self._size,
-            robot.vertices,
-            robot.offsets,
-            np.ascontiguousarray(self._rows[1:, :3]),
-            movables.vertices,
-            movables.offsets,
-            movables.radii,
+            self._shapes,
+            self._object_rows(),
             self._obstacles,
         )
+
+    def _object_rows(self) -> FloatArray:
+        """(K, 3) poses of the objects, contiguous also where there is one object or none."""
+        return np.ascontiguousarray(self._rows[1:, :3])
 
     def _substeps(self, travel: float, duration: float) -> float:
         """How many substeps a step needs in which some point moves by ``travel`` [m]."""
@@ -189,40 +223,7 @@ class PymunkSimulator(Simulator):
         return speeds
 
     def _in_reach(self, reach: float, own: FloatArray) -> BoolArray:
-        robot, movables = self._world.robot, self._world.movables
-        return within_reach(
-            self._rows[0, :3],
-            reach,
-            robot.vertices,
-            robot.offsets,
-            np.ascontiguousarray(self._rows[1:, :3]),  # also where there is one object or none
-            own,
-            movables.vertices,
-            movables.offsets,
-            movables.radii,
-        )
-
-    def _struck(self, loaded: BoolArray, paths: FloatArray) -> BoolArray:
-        movables = self._world.movables
-        if loaded.all():
-            return np.zeros(len(loaded), dtype=bool)
-        return struck(
-            loaded,
-            paths,
-            np.ascontiguousarray(self._rows[1:, :3]),
-            movables.vertices,
-            movables.offsets,
-            movables.radii,
-        )
-
-    def _start(self, active: IntArray) -> FloatArray:
-        """(1 + A, 6) rows of the robot and some objects."""
-        return np.concatenate([self._rows[:1], self._rows[1 + active]])
-
-    def _keep(self, active: IntArray, rows: FloatArray) -> None:
-        """Take over what became of the robot and some objects; the others are at rest."""
-        self._rows[1:, 3:] = 0.0
-        self._rows[0], self._rows[1 + active] = rows[0], rows[1:]
+        return within_reach(self._rows[0, :3], reach, self._shapes, self._object_rows(), own)
 
     def follow(self, path: ArrayLike) -> Interaction:
         """Sweep the robot straight from pose to pose at its full speed."""
@@ -240,10 +241,8 @@ class PymunkSimulator(Simulator):
     def _sweep(self, a: FloatArray, b: FloatArray) -> bool:
         """Drive straight between two poses; whether the robot got there."""
         robot = self._world.robot
-        dx, dy = float(b[0] - a[0]), float(b[1] - a[1])
-        turn = math.remainder(float(b[2] - a[2]), 2.0 * math.pi)
+        dx, dy, turn, duration = straight_leg(robot, a, b)
         length = math.hypot(dx, dy)
-        duration = max(length / robot.max_speed, abs(turn) / robot.max_turn_rate)
         if duration == 0.0:
             return True
         course = math.atan2(dy, dx)
@@ -255,22 +254,15 @@ class PymunkSimulator(Simulator):
             return True
         reach = length + abs(turn) * robot.circumscribed_radius
         own = self._object_speeds() * duration
-        loaded = self._in_reach(reach, own)
         count = max(1, math.ceil(reach / (self.options.travel * self._size)))
         h = duration / count
         velocity = (dx / duration, dy / duration, turn / duration)
-        while True:
-            active = np.flatnonzero(loaded)
-            through, rows = self._driver.sweep(velocity, h, count, self._start(active), active)
-            paths = self._rows[None, 1:, :3].copy()
-            paths[:, active] = rows[1:, :3]
-            missed = self._struck(loaded, paths)
-            if not missed.any():
-                break
-            loaded |= missed
-        self._keep(active, rows)
+        self._simulate(
+            self._in_reach(reach, own),
+            lambda start, active: self._driver.sweep(velocity, h, count, start, active),
+        )
         self._time += duration
-        return through
+        return not self._driver.held
 
     def _motion(self) -> tuple[float, FloatArray, FloatArray]:
         rows = self._rows.copy()
@@ -297,12 +289,3 @@ class PymunkSimulator(Simulator):
     def remove(self, object_ids: Sequence[int]) -> None:
         """Take objects off the floor."""
         self.build(self._without(object_ids)[0], self._materials)
-
-
-def _rows(world: World) -> FloatArray:
-    """(1 + K, 6) pose and twist of the robot and then of each object."""
-    assert world.robot_twist is not None
-    rows = np.zeros((1 + len(world.movables), 6))
-    rows[0, :3], rows[0, 3:] = world.robot_pose, world.robot_twist
-    rows[1:, :3], rows[1:, 3:] = world.movables.poses, world.movables.twists
-    return rows

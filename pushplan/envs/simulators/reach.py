@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
@@ -15,19 +16,26 @@ from pushplan.world.checks import BoolArray, FloatArray, IntArray
 _ADVANCES = 64  # looks at the gap at most
 
 
+class Shapes(NamedTuple):
+    """Outlines of the robot and the objects, body frames [m]."""
+
+    parts: FloatArray  # corners of the robot's footprint
+    part_offsets: IntArray  # where each part starts
+    vertices: FloatArray  # corners of the objects
+    offsets: IntArray  # where each object starts
+    radii: FloatArray  # (K,) their circumscribed radii
+
+
 @kernel(allocates=True)
 def within_reach(
     robot: FloatArray,  # (3,) pose of the robot
     reach: float,  # how far any of its points moves in the step [m]
-    parts: FloatArray,  # corners of its footprint, body frame
-    part_offsets: IntArray,  # where each part starts
+    shapes: Shapes,
     rows: FloatArray,  # (K, 3) poses of the objects
     speeds: FloatArray,  # (K,) how far each object would move by itself in the step [m]
-    vertices: FloatArray,  # corners of the objects, body frames
-    offsets: IntArray,  # where each object starts
-    radii: FloatArray,  # (K,) their circumscribed radii [m]
 ) -> BoolArray:
     """(K,) objects in reach of the robot, those in motion, and those in reach of either."""
+    parts, part_offsets, vertices, offsets, radii = shapes
     count = rows.shape[0]
     near, found = np.zeros(count, dtype=np.bool_), np.zeros(count, dtype=np.bool_)
     corners = np.empty_like(parts)
@@ -35,17 +43,17 @@ def within_reach(
     size = 0.0
     for i in range(parts.shape[0]):
         size = max(size, math.hypot(parts[i, 0], parts[i, 1]))
-    shapes = np.empty_like(vertices)
+    placed = np.empty_like(vertices)
     for k in range(count):
         a, b = offsets[k], offsets[k + 1]
         near[k] = speeds[k] > 0.0
         gap = math.hypot(rows[k, 0] - robot[0], rows[k, 1] - robot[1]) - size - radii[k]
         if near[k] or gap > reach + speeds[k]:
             continue
-        transform_points(rows[k], vertices[a:b], shapes[a:b])
+        transform_points(rows[k], vertices[a:b], placed[a:b])
         for p in range(part_offsets.shape[0] - 1):
             part = corners[part_offsets[p] : part_offsets[p + 1]]
-            if convex_distance(part, shapes[a:b]) <= reach:
+            if convex_distance(part, placed[a:b]) <= reach:
                 near[k] = True
                 break
     for k in range(count):
@@ -69,12 +77,8 @@ def clear_time(
     holds: bool,  # whether it keeps its course; else this turns with it
     limit: float,  # no longer than this [s]
     margin: float,  # distance that counts as contact [m]
-    parts: FloatArray,  # corners of its footprint, body frame
-    part_offsets: IntArray,  # where each part starts
+    shapes: Shapes,
     rows: FloatArray,  # (K, 3) poses of the objects
-    vertices: FloatArray,  # corners of the objects, body frames
-    offsets: IntArray,  # where each object starts
-    radii: FloatArray,  # (K,) their circumscribed radii [m]
     obstacles: Obstacles,  # what is static
 ) -> float:
     """Time [s] for which a robot that drives an arc certainly touches nothing.
@@ -82,18 +86,19 @@ def clear_time(
     Conservative advancement (Mirtich 1996): what is a distance away is not reached before the
     fastest point of the robot has gone that far.
     """
+    parts, part_offsets, vertices, offsets, radii = shapes
     size = 0.0
     for i in range(parts.shape[0]):
         size = max(size, math.hypot(parts[i, 0], parts[i, 1]))
     speed = abs(linear) + abs(angular) * size
     reach = speed * limit + margin
-    shapes, near = np.empty_like(vertices), np.empty(rows.shape[0], np.int64)
+    outlines, near = np.empty_like(vertices), np.empty(rows.shape[0], np.int64)
     count = 0
     for k in range(rows.shape[0]):
         gap = math.hypot(rows[k, 0] - robot[0], rows[k, 1] - robot[1]) - size - radii[k]
         if gap <= reach:
             a, b = offsets[k], offsets[k + 1]
-            transform_points(rows[k], vertices[a:b], shapes[a:b])
+            transform_points(rows[k], vertices[a:b], outlines[a:b])
             near[count] = k
             count += 1
     corners, starts, grown, _ = obstacles
@@ -113,7 +118,7 @@ def clear_time(
         for index in range(count + walls):
             if index < count:
                 k = near[index]
-                shape, round_by = shapes[offsets[k] : offsets[k + 1]], 0.0
+                shape, round_by = outlines[offsets[k] : offsets[k + 1]], 0.0
                 gap = math.hypot(rows[k, 0] - here[0], rows[k, 1] - here[1]) - radii[k]
             else:
                 k = close[index - count]
@@ -161,11 +166,10 @@ def struck(
     loaded: BoolArray,  # (K,) which objects were simulated
     paths: FloatArray,  # (T, K, 3) their poses; those of the others do not change
     rows: FloatArray,  # (K, 3) poses before the step
-    vertices: FloatArray,  # corners of the objects, body frames
-    offsets: IntArray,  # where each object starts
-    radii: FloatArray,  # (K,) their circumscribed radii [m]
+    shapes: Shapes,
 ) -> BoolArray:
     """Objects that were left out although something that moved came to overlap them."""
+    _, _, vertices, offsets, radii = shapes
     steps, count = paths.shape[0], rows.shape[0]
     found = np.zeros(count, dtype=np.bool_)
     here, there = np.empty_like(vertices), np.empty_like(vertices)
