@@ -20,8 +20,7 @@ if TYPE_CHECKING:
     from pushplan.envs.push_env import EpisodeOverError, PushEnv
     from pushplan.envs.rollout import RolloutInteraction
     from pushplan.envs.trace import Trace
-    from pushplan.envs.vector_env import WorkerVectorEnv
-    from pushplan.envs.vector_worker import VectorWorkerError
+    from pushplan.envs.vector_env import VectorWorkerError, WorkerVectorEnv
 
 __all__ = [
     "EpisodeOverError",
@@ -42,8 +41,7 @@ __getattr__, __dir__ = lazy_names(
         "push_env": "EpisodeOverError PushEnv",
         "rollout": "RolloutInteraction",
         "trace": "Trace",
-        "vector_env": "WorkerVectorEnv",
-        "vector_worker": "VectorWorkerError",
+        "vector_env": "VectorWorkerError WorkerVectorEnv",
     },
 )
 

@@ -107,12 +107,6 @@ def chosen_action(task: type[Task], wanted: str | Sequence[str] | None) -> str:
     )
 
 
-def _once(command: Twist) -> Motion:
-    """A motion of one control step."""
-    commands = iter(((command, 1),))
-    return lambda robot_pose, time, held: next(commands, None)
-
-
 def waiting(command: Twist, periods: float = 1.0, *, then: Motion | None = None) -> Motion:
     """A command for some time, one control step at most, and then another motion."""
     first = iter(((command, periods),))
@@ -131,7 +125,7 @@ class TurnRateAction(ActionMode):
 
     def start(self, action: FloatArray, world: World) -> Motion:
         """One command at full speed."""
-        return _once(Twist(self.robot.max_speed, float(action[0]) * self.robot.max_turn_rate))
+        return waiting(Twist(self.robot.max_speed, float(action[0]) * self.robot.max_turn_rate))
 
     def _from_twist(self, twist: Twist) -> FloatArray:
         return np.array([twist.angular / self.robot.max_turn_rate])
@@ -145,7 +139,7 @@ class VelocityAction(ActionMode):
     def start(self, action: FloatArray, world: World) -> Motion:
         """One command within the speed limits."""
         speed = max(float(action[0]) * self.robot.max_speed, self.robot.min_speed)
-        return _once(Twist(speed, float(action[1]) * self.robot.max_turn_rate))
+        return waiting(Twist(speed, float(action[1]) * self.robot.max_turn_rate))
 
     def _from_twist(self, twist: Twist) -> FloatArray:
         return np.array(
@@ -168,7 +162,7 @@ class WheelsAction(ActionMode):
         twist = self._twist(WheelSpeeds(left, right))
         limit = self.robot.max_turn_rate
         speed = max(twist.linear, self.robot.min_speed)
-        return _once(Twist(speed, min(max(twist.angular, -limit), limit)))
+        return waiting(Twist(speed, min(max(twist.angular, -limit), limit)))
 
     def _from_twist(self, twist: Twist) -> FloatArray:
         half = 0.5 * twist.angular * self.robot.wheel_separation

@@ -17,7 +17,6 @@ from pushplan.control import clamp_twist
 from pushplan.envs.actions import ActionMode, Motion, chosen_action, waiting
 from pushplan.envs.registry import ACTIONS, SIMULATORS, TASKS, default_preset
 from pushplan.envs.rendering import Renderer
-from pushplan.envs.roster import Roster
 from pushplan.envs.simulators.base import Simulator, warm_up_simulator
 from pushplan.envs.tasks.base import StepOutcome, Task
 from pushplan.envs.trace import Trace
@@ -26,6 +25,7 @@ from pushplan.world import (
     Action,
     ClearanceArea,
     InvalidInputError,
+    Movables,
     PushplanError,
     Receptacle,
     ScenarioError,
@@ -34,7 +34,7 @@ from pushplan.world import (
     World,
     stream,
 )
-from pushplan.world.checks import frozen, integer, number
+from pushplan.world.checks import IntArray, frozen, integer, number
 from pushplan.world.lazy_names import look_up
 
 _SEED_LIMIT = 2**31
@@ -212,7 +212,7 @@ class PushEnv(gymnasium.Env[NDArray[Any], NDArray[Any]]):
         self._simulator.build(world, self.task.materials)
         self._world = world
         self._meanwhile = clamp_twist(world.robot, 0.0, 0.0)
-        self._roster = Roster(world.movables)
+        self._roster = _Roster(world.movables)
         self._trace = Trace(
             frozen(np.array([world.time])), world.robot_pose[None], world.movables.poses[None]
         )
@@ -334,6 +334,39 @@ class PushEnv(gymnasium.Env[NDArray[Any], NDArray[Any]]):
     def close(self) -> None:
         """Close the window, if there is one; may be called again."""
         self._renderer.close()
+
+
+class _Roster:
+    """The objects of the start, some of which may have left the floor."""
+
+    def __init__(self, movables: Movables) -> None:
+        self.present: IntArray = movables.ids
+        self._poses = np.array(movables.poses)
+        self._before = self._poses
+        self._masses = movables.masses
+        self._rows = np.arange(len(movables))
+        self._ids = movables.ids
+
+    def widen(self, trace: Trace) -> Trace:
+        """The trace of all objects of the start; one that has left keeps its last pose."""
+        if len(self.present) == len(self._ids):
+            self._poses = trace.object_poses[-1]
+            return trace
+        poses = np.repeat(self._poses[None], len(trace.times), axis=0)
+        poses[:, self._rows] = trace.object_poses
+        self._poses = poses[-1]
+        return Trace(trace.times, trace.robot_poses, frozen(poses))
+
+    def drop(self, ids: IntArray) -> None:
+        """Objects have left the floor."""
+        self._rows = self._rows[~np.isin(self.present, ids)]
+        self.present = self._ids[self._rows]
+
+    def work(self, trace: Trace) -> float:
+        """Mass times path length [kg m] since the last call."""
+        lengths = trace.object_lengths(self._before)
+        self._before = self._poses
+        return float(self._masses @ lengths)
 
 
 def _space(builder: ObservationBuilder, reach: float) -> Box:

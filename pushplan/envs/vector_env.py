@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import multiprocessing
+import pickle
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from copy import deepcopy
 from itertools import pairwise
@@ -12,21 +13,27 @@ from multiprocessing.reduction import ForkingPickler
 from typing import Any
 
 import numpy as np
-from gymnasium.vector import AutoresetMode, VectorEnv
+from gymnasium.vector import AutoresetMode, SyncVectorEnv, VectorEnv
 from gymnasium.vector.utils import (
     CloudpickleWrapper,
     batch_space,
+    concatenate,
     create_shared_memory,
     iterate,
     read_from_shared_memory,
 )
 from numpy.typing import ArrayLike, NDArray
 
-from pushplan.envs.vector_worker import VectorWorkerError, work
-from pushplan.world import InvalidInputError, UnknownNameError
+from pushplan.world import InvalidInputError, PushplanError, UnknownNameError
 from pushplan.world.checks import integer
 
+_Batch = tuple[Any, NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]]
+"""Observations, rewards, terminated, truncated and information of some environments."""
 _PATIENCE_S = 5.0  # for which a worker may take to close its environments
+
+
+class VectorWorkerError(PushplanError):
+    """A worker process has ended."""
 
 
 class WorkerVectorEnv(VectorEnv[Any, Any, Any]):
@@ -103,7 +110,7 @@ class WorkerVectorEnv(VectorEnv[Any, Any, Any]):
             ours, theirs = context.Pipe()
             made = [CloudpickleWrapper(env_fn) for env_fn in env_fns[share]]
             process = context.Process(
-                target=work,
+                target=_work,
                 args=(theirs, made, mode, memory, self.num_envs, share),
                 daemon=True,
             )
@@ -129,9 +136,9 @@ class WorkerVectorEnv(VectorEnv[Any, Any, Any]):
             seed: of the first environment, the others count on from there; or one for each.
             options: for each environment; ``"reset_mask"`` (num_envs,) bool says which.
         """
-        arguments = self._reset_arguments(seed, options)
-        infos = _merged(self._ask("reset", arguments), self._shares, self.num_envs)
-        return self._seen(), infos
+        answers = self._ask("reset", self._reset_arguments(seed, options))
+        observations, *_, infos = self._joined(answers)
+        return observations, infos
 
     def _reset_arguments(
         self, seed: int | Sequence[int | None] | None, options: Mapping[str, Any] | None
@@ -162,20 +169,17 @@ class WorkerVectorEnv(VectorEnv[Any, Any, Any]):
             for share in self._shares
         ]
 
-    def step(
-        self, actions: Any
-    ) -> tuple[Any, NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]]:
+    def step(self, actions: Any) -> _Batch:
         """One step of every environment; see `gymnasium.vector.SyncVectorEnv.step`."""
         each = list(iterate(self.action_space, actions))
-        answers = self._ask("step", [each[share] for share in self._shares])
-        rewards, terminated, truncated, infos = zip(*answers, strict=True)
-        return (
-            self._seen(),
-            np.concatenate(rewards),
-            np.concatenate(terminated),
-            np.concatenate(truncated),
-            _merged(infos, self._shares, self.num_envs),
-        )
+        return self._joined(self._ask("step", [each[share] for share in self._shares]))
+
+    def _joined(self, answers: Sequence[Any]) -> _Batch:
+        """What `step` returns, of the answers of all workers."""
+        *arrays, infos = zip(*answers, strict=True)
+        rewards, terminated, truncated = map(np.concatenate, arrays)
+        merged = _merged(infos, self._shares, self.num_envs)
+        return self._seen(), rewards, terminated, truncated, merged
 
     def async_reset(
         self,
@@ -196,7 +200,7 @@ class WorkerVectorEnv(VectorEnv[Any, Any, Any]):
 
     def recv(
         self,
-    ) -> tuple[Any, NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]]:
+    ) -> _Batch:
         """What `step` returns, for the environments of the first worker that is ready.
 
         Which worker that is depends on the machine, an episode of an environment does not.
@@ -217,14 +221,10 @@ class WorkerVectorEnv(VectorEnv[Any, Any, Any]):
         ready = wait([self._connections[n] for n in self._pending])
         n = next(n for n in self._pending if self._connections[n] in ready)
         self._pending.remove(n)
-        (answer,) = self._answers([n])
+        ((rewards, terminated, truncated, infos),) = self._answers([n])
         share = self._shares[n]
-        env_id = np.arange(share.start, share.stop)
-        if isinstance(answer, dict):  # of a reset
-            still = np.zeros(len(env_id), dtype=np.bool_)
-            answer = (np.zeros(len(env_id)), still, still.copy(), answer)
-        rewards, terminated, truncated, infos = answer
-        return self._seen(share), rewards, terminated, truncated, {**infos, "env_id": env_id}
+        infos = {**infos, "env_id": np.arange(share.start, share.stop)}
+        return self._seen(share), rewards, terminated, truncated, infos
 
     def send(self, actions: Any, env_id: ArrayLike) -> None:
         """Step the environments of one worker, without waiting; `recv` returns what comes of it.
@@ -370,3 +370,65 @@ def _merged(
             if value is not None:
                 out[key][share] = value
     return out
+
+
+def _work(
+    connection: Connection,
+    env_fns: Sequence[CloudpickleWrapper],
+    mode: AutoresetMode,
+    memory: Any,
+    count: int,
+    share: slice,
+) -> None:
+    """Answer requests until told to close, or until the other process has ended."""
+    try:
+        envs = SyncVectorEnv(env_fns, copy=False, autoreset_mode=mode)
+        everything = read_from_shared_memory(envs.single_observation_space, memory, count)
+        shared = _part(everything, share)
+        connection.send((True, None))
+    except Exception as error:
+        connection.send((False, _portable(error)))
+        return
+    with contextlib.suppress(EOFError, KeyboardInterrupt, BrokenPipeError):
+        while True:
+            request, argument = connection.recv()
+            if request == "close":
+                break
+            try:
+                answer = ForkingPickler.dumps((True, _do(envs, request, argument, shared)))
+            except Exception as error:
+                answer = ForkingPickler.dumps((False, _portable(error)))
+            connection.send_bytes(answer)
+    envs.close()
+
+
+def _do(envs: SyncVectorEnv, request: str, argument: Any, shared: Any) -> Any:
+    """Carry out a request; observations go to their share of what all processes see."""
+    if request == "set_attr":
+        return envs.set_attr(*argument)
+    if request == "call":
+        name, args, kwargs = argument
+        return envs.call(name, *args, **kwargs)
+    if request == "step":
+        observations, *answer = envs.step(argument)
+    else:
+        seeds, options, mask = argument
+        still = np.zeros(envs.num_envs, dtype=np.bool_)
+        answer = [np.zeros(envs.num_envs), still, still.copy(), {}]
+        if mask is not None and not mask.any():
+            return answer
+        if mask is not None:
+            options = {**(options or {}), "reset_mask": mask}
+        observations, answer[-1] = envs.reset(seed=seeds, options=options)
+    each = list(iterate(envs.observation_space, observations))
+    concatenate(envs.single_observation_space, each, shared)
+    return answer
+
+
+def _portable(error: Exception) -> Exception:
+    """The error itself where it can be sent, else one with its text."""
+    try:
+        pickle.loads(pickle.dumps(error))
+    except Exception:
+        return VectorWorkerError(f"{type(error).__name__}: {error}")
+    return error

@@ -9,8 +9,14 @@ from numpy.typing import ArrayLike
 from scipy.spatial import cKDTree
 
 from pushplan.geometry import polygon_area
-from pushplan.scenarios.disc_kernels import place_discs
-from pushplan.scenarios.floe_kernels import Discs, IceWater, Outlines, cut_cells, fit_floes
+from pushplan.scenarios.floe_kernels import (
+    Discs,
+    IceWater,
+    Outlines,
+    cut_cells,
+    fit_floes,
+    place_discs,
+)
 from pushplan.scenarios.floe_sizes import MARGIN, FloeSizes
 from pushplan.scenarios.ice_field import IceField
 from pushplan.world import InvalidInputError, ScenarioError

@@ -7,12 +7,11 @@ import io
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
-from importlib import resources
 from pathlib import Path
 from types import MappingProxyType
 
 from pushplan.world import InvalidInputError, SchemaError
-from pushplan.world.checks import number
+from pushplan.world.checked_fields import CheckedFields, NonNegativeFloat
 from pushplan.world.output_files import write_atomic
 
 BOUNDS_FILE = "data/bounds.csv"
@@ -22,7 +21,7 @@ _COLUMNS = ("scenario", "robot_mass_kg", "bound_kg_m", "best_kg_m", "best_policy
 
 
 @dataclass(frozen=True)
-class KnownBounds:
+class KnownBounds(CheckedFields):
     """What is known of m₀ l₀ + Σ mᵢ lᵢ of a successful episode of one scenario.
 
     Args:
@@ -32,16 +31,10 @@ class KnownBounds:
         best_policy: label of the policy that drove it; empty where there is none.
     """
 
-    robot_mass: float
-    bound: float
-    best: float | None = None
+    robot_mass: NonNegativeFloat
+    bound: NonNegativeFloat
+    best: NonNegativeFloat | None = None
     best_policy: str = ""
-
-    def __post_init__(self) -> None:
-        number("robot_mass", self.robot_mass, low=0.0)
-        number("bound", self.bound, low=0.0)
-        if self.best is not None:
-            number("best", self.best, low=0.0)
 
     def better(self, work: float, policy: str) -> KnownBounds:
         """The same, with one more solution known.
@@ -62,9 +55,7 @@ class KnownBounds:
 @cache
 def known_bounds() -> Mapping[str, KnownBounds]:
     """What ships with pushplan, by `Scenario.key`."""
-    source = resources.files("pushplan.scenarios") / BOUNDS_FILE
-    with resources.as_file(source) as path:
-        return MappingProxyType(load_bounds(path))
+    return MappingProxyType(load_bounds(Path(__file__).parent / BOUNDS_FILE))
 
 
 def load_bounds(path: str | Path) -> dict[str, KnownBounds]:

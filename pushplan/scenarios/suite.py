@@ -7,7 +7,6 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
-from importlib import resources
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +14,7 @@ from pushplan.scenarios.scenario import Scenario
 from pushplan.world import SchemaError, UnknownNameError
 from pushplan.world.checks import integer
 from pushplan.world.files import SCHEMA
-from pushplan.world.safe_files import parse_yaml, read_data
+from pushplan.world.safe_files import read_data
 
 
 @dataclass(frozen=True)
@@ -188,6 +187,5 @@ MOST_EPISODES = 100_000
 
 @cache
 def _table() -> Mapping[str, Any]:
-    text = resources.files("pushplan.scenarios").joinpath("data/suites.yaml").read_text("utf-8")
-    table: Mapping[str, Any] = parse_yaml(text)
+    table: Mapping[str, Any] = read_data(Path(__file__).parent / "data" / "suites.yaml", "suites")
     return table

@@ -161,15 +161,6 @@ class MujocoBodies:
         rows: FloatArray = self.planar(self.qpos[None])[0]
         return rows
 
-    def robot_pose(self) -> FloatArray:
-        """(3,) pose of the robot now."""
-        q = self.qpos
-        if self.afloat:
-            return np.array(q[:3])
-        w, x, y, z = (float(value) for value in q[3:7])
-        heading = math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
-        return np.array([q[0], q[1], heading])
-
     def twists(self) -> FloatArray:
         """(1 + K, 3) velocities now, world frame."""
         if self.afloat:

@@ -99,7 +99,10 @@ class MujocoSimulator(Simulator):
             (samples, nq) positions after each interval [s], and whether the hull touched anything.
         """
         bodies = self._scene
-        self._command(command)
+        if bodies.afloat:
+            bodies.ctrl[:] = command.linear, 0.0, command.angular
+        else:
+            bodies.ctrl[:] = bodies.wheel_speeds(command.linear, command.angular)
         stored = np.empty((self.options.samples, bodies.model.nq))
         self._touched = touched = False
         for row in stored:
@@ -133,13 +136,6 @@ class MujocoSimulator(Simulator):
             if second < HELD_SHARE * wanted and second - first <= GAIN_SHARE * possible:
                 return True
         return False
-
-    def _command(self, command: Twist) -> None:
-        bodies = self._scene
-        if bodies.afloat:
-            bodies.ctrl[:] = command.linear, 0.0, command.angular
-        else:
-            bodies.ctrl[:] = bodies.wheel_speeds(command.linear, command.angular)
 
     def follow(self, path: ArrayLike) -> Interaction:
         """Drive the robot through poses at its full speed."""
@@ -179,7 +175,8 @@ class MujocoSimulator(Simulator):
     @property
     def robot_pose(self) -> FloatArray:
         """(3,) pose of the robot now."""
-        return self._scene.robot_pose()
+        pose: FloatArray = self._scene.poses()[0]
+        return pose
 
     @property
     def object_poses(self) -> FloatArray:

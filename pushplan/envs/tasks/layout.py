@@ -16,6 +16,8 @@ from pushplan.world import Movables, Receptacle, RobotModel, ScenarioError, Stat
 from pushplan.world.checks import BoolArray, FloatArray, IntArray
 from pushplan.world.outline import transform, transform_outlines
 
+GAP = 0.01
+"""Least distance between bodies at the start, as a fraction of the box size."""
 _BATCH = 64
 _LATTICE_SHIFTS = 16
 _LATTICE_CELLS = 20_000
@@ -258,32 +260,53 @@ def those_inside(
     return inside
 
 
-def square_boxes(
+def place_boxes(
+    free_space: FreeSpace,
     rng: np.random.Generator,
-    poses: FloatArray,
+    count: int,
     size: float,
+    robot: Sequence[Any],
     *,
-    mass: float | None,
-    wheeled: float,
-    contact_radius: float = 0.0,
+    preset: Any,
+    wanted: Any,
+    **rules: Any,
 ) -> Movables:
-    """Square boxes at poses (N, 3), of which some stand on casters.
+    """Square boxes on free floor, of which some stand on casters.
 
     Args:
-        rng: draws which ones.
-        poses: x, y [m], theta [rad].
+        free_space: the floor.
+        rng: the only source of randomness.
+        count: number of boxes.
         size: side [m].
-        mass: [kg]; 1 kg/m² of their area if None.
-        wheeled: fraction on casters, 0 to 1.
-        contact_radius: distance from the squares at which they touch others [m].
+        robot: Shapely geometries of the robot.
+        preset: of a task with boxes: their mass [kg] (None: 1 kg/m² of their area) and contact
+            radius [m].
+        wanted: the variations of that task: heading, fraction on casters, whether boxes may touch
+            the robot.
+        rules: as `FreeSpace.place_squares` takes them.
+
+    Raises:
+        ScenarioError: if there is no room for them.
     """
-    count = len(poses)
+    poses = free_space.place_beside(
+        rng,
+        count,
+        size + 2.0 * preset.contact_radius,
+        robot,
+        touching=preset.touching if wanted.touching is None else wanted.touching,
+        gap=GAP * size,
+        random_yaw=wanted.box_yaw == "random",
+        **rules,
+    )
     on_casters = np.zeros(count, dtype=bool)
-    on_casters[rng.permutation(count)[: round(wheeled * count)]] = True
-    masses = None if mass is None else np.full(count, mass)
-    outlines = [_CORNERS * size] * count
+    on_casters[rng.permutation(count)[: round(wanted.wheeled * count)]] = True
+    masses = None if preset.box_mass is None else np.full(count, preset.box_mass)
     return Movables.from_outlines(
-        outlines, poses, masses=masses, wheeled=on_casters, contact_radii=contact_radius
+        [_CORNERS * size] * count,
+        poses,
+        masses=masses,
+        wheeled=on_casters,
+        contact_radii=preset.contact_radius,
     )
 
 

@@ -16,7 +16,7 @@ from scipy import ndimage
 from pushplan.compiled import kernel
 from pushplan.envs.simulators.base import Materials
 from pushplan.envs.tasks.base import StepOutcome, Task, drive_of
-from pushplan.envs.tasks.layout import FreeSpace, footprint_at, square_boxes
+from pushplan.envs.tasks.layout import GAP, FreeSpace, footprint_at, place_boxes
 from pushplan.envs.tasks.presets import SOLIDS
 from pushplan.envs.tasks.variations import TaskVariations, Yaw
 from pushplan.geometry import GeodesicField, Grid, clearance_field, geodesic_field
@@ -61,8 +61,6 @@ def sample_at(
 
 LEAST_SIZE = 0.01
 """Least size of boxes, as a fraction of the preset's."""
-GAP = 0.01
-"""Least distance between bodies at the start, as a fraction of the box size."""
 _CHANNELS = ("occupancy", "footprint", "robot_distance", "goal_distance")
 _PIXELS = {"image": 224, "spatial": 96}
 _LAYOUT_TRIES = 8
@@ -284,7 +282,7 @@ class ManipulationTask(Task):
 
     def _furnish(self, rng: np.random.Generator, static: StaticMap) -> World:
         """Robot and boxes among static obstacles; every box within the robot's reach."""
-        size, wanted, preset = self.box_size, self.variations, self.preset
+        size, preset = self.box_size, self.preset
         free_space = FreeSpace(static)
         radius = self.robot.circumscribed_radius
         resolution = self.preset.field_resolution
@@ -296,26 +294,18 @@ class ManipulationTask(Task):
             candidates = candidates[:0]
         pose = self._free_pose(candidates, free_space, reach)
         region, keep_off = self._box_region()
-        poses = free_space.place_beside(
+        boxes = place_boxes(
+            free_space,
             rng,
             self.box_count,
-            size + 2.0 * preset.contact_radius,
+            size,
             footprint_at(self.robot, pose),
-            touching=preset.touching if wanted.touching is None else wanted.touching,
+            preset=preset,
+            wanted=self.variations,
             keep_off=[(shape, 0.0) for shape in keep_off],
-            gap=GAP * size,
-            random_yaw=wanted.box_yaw == "random",
             spacing=preset.box_spacing / preset.box_size * size,
             within=region,
             allowed=lambda centres: reach.within(centres, radius + 0.5 * size),
-        )
-        boxes = square_boxes(
-            rng,
-            poses,
-            size,
-            mass=preset.box_mass,
-            wheeled=wanted.wheeled,
-            contact_radius=preset.contact_radius,
         )
         return World(
             robot=self.robot,

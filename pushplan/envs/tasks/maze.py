@@ -14,10 +14,11 @@ import shapely
 from pushplan.envs.simulators.base import Materials
 from pushplan.envs.tasks.base import StepOutcome, Task, drive_of
 from pushplan.envs.tasks.layout import (
+    GAP,
     FreeSpace,
     footprint_at,
+    place_boxes,
     rectangle,
-    square_boxes,
     walls_around,
 )
 from pushplan.envs.tasks.presets import read_presets
@@ -29,7 +30,6 @@ from pushplan.world import (
     Drive,
     GoalDisc,
     InvalidInputError,
-    Movables,
     RobotModel,
     ScenarioError,
     StaticMap,
@@ -47,8 +47,6 @@ from pushplan.world.checks import FloatArray, choice
 
 WALL_REWARD = -50.0
 SUCCESS_REWARD = 200.0
-GAP = 0.01
-"""Least distance between bodies at the start, as a fraction of the box size."""
 _IMAGE_CHANNELS = ("footprint", "movable", "static", "goal_distance")
 _START_TRIES = 2000
 
@@ -216,29 +214,22 @@ class MazeTask(Task):
         """A new start: the robot, then boxes off it, off each other, the walls and the goal."""
         self._steps = 0
         pose = self._start_pose(rng)
+        boxes = place_boxes(
+            self._free_space,
+            rng,
+            self.variations.boxes,
+            self.box_size,
+            footprint_at(self.robot, pose),
+            preset=self.preset,
+            wanted=self.variations,
+            keep_off=[(shapely.Point(self.goal.center), self.goal.radius)],
+        )
         return World(
             robot=self.robot,
             robot_pose=pose,
             static=self.static,
-            movables=self._boxes(rng, pose),
+            movables=boxes,
             goal=self.goal,
-        )
-
-    def _boxes(self, rng: np.random.Generator, robot_pose: FloatArray) -> Movables:
-        wanted, size, radius = self.variations, self.box_size, self.preset.contact_radius
-        poses = self._free_space.place_beside(
-            rng,
-            wanted.boxes,
-            size + 2.0 * radius,
-            footprint_at(self.robot, robot_pose),
-            touching=self.preset.touching if wanted.touching is None else wanted.touching,
-            keep_off=[(shapely.Point(self.goal.center), self.goal.radius)],
-            gap=GAP * size,
-            random_yaw=wanted.box_yaw == "random",
-        )
-        mass = self.preset.box_mass
-        return square_boxes(
-            rng, poses, size, mass=mass, wheeled=wanted.wheeled, contact_radius=radius
         )
 
     def _start_pose(self, rng: np.random.Generator) -> FloatArray:

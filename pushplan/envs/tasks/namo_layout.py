@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -91,7 +91,7 @@ class NamoLayout:
         boxes = [self.add((size, 0.75 * size), at, door + side) for side in (-0.48, 0.48)]
         self.openings.append(Opening(tuple(boxes), (x + THROUGH - at, 0.0)))
 
-    def bar(self, rng: np.random.Generator, wall: int, door: float) -> int:
+    def bar(self, rng: np.random.Generator, wall: int, door: float, size: float) -> int:
         """A wide box before a door, which opens where it is pushed aside, along the wall."""
         x = ROOM[0] * (wall + 1) - BAR_PLACE
         box = self.add(BAR, x, door + float(rng.uniform(-0.1, 0.1)))
@@ -100,46 +100,42 @@ class NamoLayout:
         return box
 
 
+Hold = Callable[[NamoLayout, np.random.Generator, int, float, float], object]
+"""Holds a door of a wall; the last argument is the side of a plain box [units]."""
+_HOLDS: tuple[Hold, ...] = (NamoLayout.plug, NamoLayout.pair, NamoLayout.bar)
+
+
 def _door(rng: np.random.Generator) -> float:
     """The middle of a door that a bar can be slid off to one side."""
     low, high = rng.uniform(3.2, 3.9), rng.uniform(4.1, 4.8)
     return float(low if rng.random() < 0.5 else high)
 
 
-def _one_box(rng: np.random.Generator, size: float) -> NamoLayout:
-    door = float(rng.uniform(EDGE, ROOM[1] - EDGE))
-    layout = NamoLayout(((door,),))
-    layout.plug(rng, 0, door, size)
+def _held(
+    rng: np.random.Generator, size: float, doors: Sequence[float], holds: Sequence[Hold | None]
+) -> NamoLayout:
+    """One door in each wall, held by what is named, or by anything."""
+    layout = NamoLayout(tuple((door,) for door in doors))
+    for wall, hold in enumerate(holds):
+        hold = hold or _HOLDS[rng.integers(3)]
+        hold(layout, rng, wall, doors[wall], size)
     return layout
+
+
+def _one_box(rng: np.random.Generator, size: float) -> NamoLayout:
+    return _held(rng, size, [float(rng.uniform(EDGE, ROOM[1] - EDGE))], [NamoLayout.plug])
 
 
 def _aside(rng: np.random.Generator, size: float) -> NamoLayout:
-    door = _door(rng)
-    layout = NamoLayout(((door,),))
-    layout.bar(rng, 0, door)
-    return layout
+    return _held(rng, size, [_door(rng)], [NamoLayout.bar])
 
 
 def _several(rng: np.random.Generator, size: float) -> NamoLayout:
-    doors = _door(rng), _door(rng)
-    layout = NamoLayout(tuple((door,) for door in doors))
-    for wall, door in enumerate(doors):
-        kind = rng.integers(3)
-        if kind == 0:
-            layout.plug(rng, wall, door, size)
-        elif kind == 1:
-            layout.pair(rng, wall, door, size)
-        else:
-            layout.bar(rng, wall, door)
-    return layout
+    return _held(rng, size, [_door(rng), _door(rng)], [None, None])
 
 
 def _order(rng: np.random.Generator, size: float) -> NamoLayout:
-    door = _door(rng)
-    layout = NamoLayout(((door,), (door,)))
-    layout.plug(rng, 0, door, size)
-    layout.bar(rng, 1, door)
-    return layout
+    return _held(rng, size, [_door(rng)] * 2, [NamoLayout.plug, NamoLayout.bar])
 
 
 def _fixed(rng: np.random.Generator, size: float) -> NamoLayout:
