@@ -66,18 +66,12 @@ class MujocoBodies:
         self._options = options
         self._gap = rest_gap(movables.radii)
         self._quiet = np.empty(self.count, dtype=np.bool_)
-        self.accelerations = self._accelerations(options)
-        self._find_layout()
-
-    def _accelerations(self, options: MujocoOptions) -> tuple[float, float]:
+        self.accelerations = math.inf, math.inf  # up to speed well within a step
         """What the robot's motors can do on free ground: [m/s²] and [rad/s²]."""
-        if not self.afloat:
-            return math.inf, math.inf  # up to speed well within a step
-        limits = self.model.actuator_forcerange[:, 1]
-        inertia = self.model.body("robot").inertia.max()
-        return options.thrust, float(limits[2] / inertia)
-
-    def _find_layout(self) -> None:
+        if self.afloat:
+            limits = self.model.actuator_forcerange[:, 1]
+            inertia = self.model.body("robot").inertia.max()
+            self.accelerations = options.thrust, float(limits[2] / inertia)
         model, data = self.model, self.data
         self.qpos: FloatArray = data.qpos  # all positions and velocities, the engine's own arrays
         self.qvel: FloatArray = data.qvel
@@ -266,23 +260,19 @@ class MujocoBodies:
     def advance(self, interval: float) -> None:
         """Let the engine run for ``interval`` [s], in steps that are short enough."""
         model, data = self.model, self.data
-        steps = self._steps(interval)
+        options = self._options
+        longest = options.water_time_step if self.afloat else options.time_step
+        steps = max(1, math.ceil(interval / longest - 1e-9))
         model.opt.timestep = interval / steps
         if self._drag is None:
             mujoco.mj_step(model, data, steps)
             return
-        most = max(1, int(self._options.drag_interval / model.opt.timestep))
+        most = max(1, int(options.drag_interval / model.opt.timestep))
         velocities, damping = self.qvel.reshape(-1, 3), self._damping.reshape(-1, 3)
         while steps > 0:
             drag_damping(velocities, self._drag, damping)
             mujoco.mj_step(model, data, min(most, steps))
             steps -= most
-
-    def _steps(self, interval: float) -> int:
-        """How many steps of the engine make up an interval [s]."""
-        options = self._options
-        longest = options.water_time_step if self.afloat else options.time_step
-        return max(1, math.ceil(interval / longest - 1e-9))
 
     @property
     def touches(self) -> tuple[bool, bool]:

@@ -9,7 +9,6 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from pushplan.drawing.palette import FLOOR_PALETTE, WATER_PALETTE
 from pushplan.envs.simulators.base import Materials, Solids
 from pushplan.envs.simulators.mujoco_options import MujocoOptions
 from pushplan.envs.simulators.mujoco_robot import (
@@ -83,16 +82,14 @@ def scene_model(key: SceneKey) -> Any:
     else:
         add_wheeled_robot(spec, robot, key.materials, solids, key.options)
     for k in range(len(movables)):
-        add = _add_floe if afloat else _add_box
-        add(spec, k, movables, key.materials, solids)
+        _add_object(spec, k, movables, key.materials, solids)
     _add_touch(spec)
     try:
         model = spec.compile()
     except ValueError as error:
         raise InvalidInputError(f"MuJoCo cannot build this scene: {error}") from error
     if not afloat:
-        _set_rolling(model, movables, key.materials)
-        _hold_fixed(model, movables)
+        _set_damping(model, movables, key.materials)
     return model
 
 
@@ -204,21 +201,23 @@ def ball_radius(outline: FloatArray, solids: Solids) -> float:
     return min(0.025, 0.2 * solids.object_height, 0.3 * float(inside.min()))
 
 
-def _add_box(spec: Any, k: int, movables: Movables, materials: Materials, solids: Solids) -> None:
-    """A free body; its frame is in the middle of its height, above the centroid."""
+def _add_object(
+    spec: Any, k: int, movables: Movables, materials: Materials, solids: Solids
+) -> None:
+    """A floe, or a box: a free body whose frame is in the middle of its height."""
     outline, mass = movables.outline(k), float(movables.masses[k])
-    wheeled = bool(movables.wheeled[k])
-    half = 0.5 * solids.object_height
-    body = spec.worldbody.add_body(name=f"object {k}", pos=[0.0, 0.0, half])
-    body.add_freejoint()
+    half, name = 0.5 * solids.object_height, f"object {k}"
+    wheeled = bool(movables.wheeled[k]) and materials.water is None
+    meets = STATIC_BIT | OBJECT_BIT
+    if materials.water is None:
+        body = spec.worldbody.add_body(name=name, pos=[0.0, 0.0, half])
+        body.add_freejoint()
+        meets |= FLOOR_BIT
+    else:
+        body = add_floating(spec, name)
     set_mass(body, outline, solids.object_height, mass, [0.0, 0.0, 0.0])
-    surface = Surface(
-        OBJECT_BIT,
-        FLOOR_BIT | STATIC_BIT | OBJECT_BIT,
-        materials.object_object,
-        0,
-        color_of((FLOOR_PALETTE.wheeled if wheeled else FLOOR_PALETTE.box)[0]),
-    )
+    palette = palette_of(materials)
+    color = color_of((palette.wheeled if wheeled else palette.box)[0])
     low = -half
     if wheeled:
         radius = ball_radius(outline, solids)
@@ -226,13 +225,14 @@ def _add_box(spec: Any, k: int, movables: Movables, materials: Materials, solids
         ball = Surface(WHEEL_BIT, FLOOR_BIT, 0.0, 3, _CASTER_BALL)
         for i, corner in enumerate(_caster_corners(outline)):
             body.add_geom(
-                name=f"object {k} caster {i}",
+                name=f"{name} caster {i}",
                 type=mujoco.mjtGeom.mjGEOM_SPHERE,
                 size=[radius, 0.0, 0.0],
                 pos=[*(0.75 * corner), radius - half],
                 **ball.options(),
             )
-    add_prism(spec, body, f"object {k}", outline, low, half, surface)
+    surface = Surface(OBJECT_BIT, meets, materials.object_object, 0, color)
+    add_prism(spec, body, name, outline, low, half, surface)
 
 
 def _caster_corners(outline: FloatArray) -> FloatArray:
@@ -241,32 +241,19 @@ def _caster_corners(outline: FloatArray) -> FloatArray:
     return outline[[i * count // 4 for i in range(4)]] if count > 4 else outline
 
 
-def _add_floe(spec: Any, k: int, movables: Movables, materials: Materials, solids: Solids) -> None:
-    half = 0.5 * solids.object_height
-    body = add_floating(spec, f"object {k}")
-    mass, height = float(movables.masses[k]), solids.object_height
-    set_mass(body, movables.outline(k), height, mass, [0.0, 0.0, 0.0])
-    color = color_of(WATER_PALETTE.box[0])
-    surface = Surface(OBJECT_BIT, STATIC_BIT | OBJECT_BIT, materials.object_object, 0, color)
-    add_prism(spec, body, f"object {k}", movables.outline(k), -half, half, surface)
-
-
-def _set_rolling(model: Any, movables: Movables, materials: Materials) -> None:
-    """Wheeled objects lose speed and turn rate with the time constant of rolling.
+def _set_damping(model: Any, movables: Movables, materials: Materials) -> None:
+    """Wheeled objects lose speed and turn rate with the time constant of rolling; fixed ones stay.
 
     A free joint has one damping coefficient for all six directions, so those of the plane are
-    written into the compiled model.
+    written into the compiled model. What pushes a fixed object meets a damping that it cannot
+    drive.
     """
-    for k in np.flatnonzero(movables.wheeled):
-        body = model.body(f"object {k}")
-        first = int(body.dofadr[0])
-        _, inertia = prism_inertia(movables.outline(int(k)), 0.0, float(movables.masses[k]))
-        model.dof_damping[first : first + 2] = movables.masses[k] / materials.rolling_time
-        model.dof_damping[first + 5] = inertia[2] / materials.rolling_time
-
-
-def _hold_fixed(model: Any, movables: Movables) -> None:
-    """Objects that are fixed do not move: what pushes them meets a damping that it cannot drive."""
-    for k in np.flatnonzero(movables.fixed):
+    for k, mass in enumerate(movables.masses):
         first = int(model.body(f"object {k}").dofadr[0])
-        model.dof_damping[first : first + 6] = _HOLDING * float(movables.masses[k])
+        damping = model.dof_damping[first : first + 6]
+        if movables.wheeled[k]:
+            _, inertia = prism_inertia(movables.outline(k), 0.0, float(mass))
+            damping[:2] = mass / materials.rolling_time
+            damping[5] = inertia[2] / materials.rolling_time
+        if movables.fixed[k]:
+            damping[:] = _HOLDING * float(mass)
