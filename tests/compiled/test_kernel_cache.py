@@ -53,6 +53,7 @@ def test_a_second_process_loads_what_the_first_compiled(module: Path, tmp_path: 
     assert _run(module, tmp_path / "cache") == (_LOADED, "")
 
 
+@pytest.mark.slow
 def test_on_a_disk_without_locks_nobody_waits(module: Path, tmp_path: Path) -> None:
     module.write_text(
         "import errno, fcntl, time\n"
@@ -108,6 +109,7 @@ def test_a_class_of_arguments_that_has_moved_is_no_error(tmp_path: Path) -> None
         assert _run(module, cache) == (f"[('total', {said})]", "")
 
 
+@pytest.mark.slow
 def test_damaged_files_are_one_warning_each_and_replaced(module: Path, tmp_path: Path) -> None:
     cache = tmp_path / "cache"
     _run(module, cache)
@@ -166,6 +168,7 @@ def test_processes_that_start_at_once_compile_each_kernel_once(
     assert sorted(out.strip() for out, _ in outputs) == sorted([_COMPILED, _LOADED, _LOADED])
 
 
+@pytest.mark.slow
 def test_an_exception_of_a_called_kernel_reaches_python_from_the_cache(tmp_path: Path) -> None:
     module = tmp_path / "raising.py"
     module.write_text(

@@ -129,6 +129,7 @@ def test_more_iterations_never_cost_more():
     assert costs == sorted(costs, reverse=True)
 
 
+@pytest.mark.slow
 def test_it_costs_no_more_than_the_random_tree():
     config = PushAwareConfig()
     same = {key: getattr(config, key) for key in ("push_weight", "margin", "turn_fraction")}
