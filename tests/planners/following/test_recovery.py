@@ -131,7 +131,9 @@ def test_a_plan_is_driven_however_many_were_not_found_before(failures, controlle
         *(pytest.param(0.02, late, part, marks=pytest.mark.slow) for late, part in SLOWER),
     ],
 )
-@pytest.mark.parametrize("seed", [0, 5017, *(pytest.param(n, marks=pytest.mark.slow) for n in (1, 2))])
+@pytest.mark.parametrize(
+    "seed", [0, 5017, *(pytest.param(n, marks=pytest.mark.slow) for n in (1, 2))]
+)
 def test_no_policy_stands_for_good_with_a_plan(seed, period, delay, effect):
     robot = Unicycle(maze_testbed(seed), period, delay, effect)
     policy = follower()
