@@ -63,7 +63,11 @@ class Sb3Policy(NetworkPolicy):
                 f"--trust-pickles (or trust=True, or {TRUST_VARIABLE}=1); better export it to ONNX"
             )
         log.warning("loading pickles from %s: this can run any code", self.path)
-        self._model = _load(self.path, algorithm)
+        library = need("stable_baselines3")
+        try:
+            self._model = getattr(library, algorithm).load(self.path, device="cpu")
+        except Exception as error:  # whatever unpickling raises
+            raise InvalidInputError(f"{self.path} cannot be loaded: {describe(error)}") from error
         super().__init__(self.decide, specification, label)
 
     def decide(self, seen: NDArray[Any]) -> NDArray[Any]:
@@ -106,14 +110,6 @@ def _look(path: Path) -> tuple[Specification, str]:
             f"{', '.join(ALGORITHMS)}, got {algorithm!r}"
         )
     return specification, algorithm
-
-
-def _load(path: Path, algorithm: str) -> Any:
-    library = need("stable_baselines3")
-    try:
-        return getattr(library, algorithm).load(path, device="cpu")
-    except Exception as error:  # whatever unpickling raises
-        raise InvalidInputError(f"{path} cannot be loaded: {describe(error)}") from error
 
 
 def beside(path: Path) -> Path:

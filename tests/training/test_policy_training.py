@@ -434,7 +434,7 @@ class TestReplay:
         buffer = ReplayBuffer(3, (2,))
         for i in range(5):
             buffer.add(np.full(2, i), i, float(i), np.full(2, i + 1), 0.5 * (i < 4))
-        assert len(buffer) == 3
+        assert buffer.count == 3
         seen, actions, rewards, following, discounts = buffer.sample(50, np.random.default_rng(0))
         assert set(actions.tolist()) == {2, 3, 4}
         assert (seen[:, 0] == actions).all() and (following[:, 0] == actions + 1).all()
@@ -449,8 +449,9 @@ class TestReplay:
         memory = ReplayBuffer(8, (1,))
         ahead = Lookahead(memory, discount=0.5, decisions=3)
         for i in range(5):
-            ahead.add(np.full(1, i), i, 1.0)
-            ahead.settle(np.full(1, i + 1), terminated and i == 4, last=i == 4)
+            last = i == 4
+            following = np.full(1, i + 1)
+            ahead.add(np.full(1, i), i, 1.0, following, terminated=terminated and last, last=last)
         assert memory.arrays["actions"][:5].tolist() == [0, 1, 2, 3, 4]
         assert memory.arrays["rewards"][:5].tolist() == [1.75, 1.75, 1.75, 1.5, 1.0]
         assert memory.arrays["next"][:5, 0].tolist() == [3, 4, 5, 5, 5]

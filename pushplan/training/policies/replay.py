@@ -23,9 +23,6 @@ class ReplayBuffer:
             "discounts": np.zeros(size, np.float32),
         }
 
-    def __len__(self) -> int:
-        return self.count
-
     def add(self, *decision: Any) -> None:
         """Remember a decision, and forget the oldest if there are too many.
 
@@ -63,15 +60,30 @@ class Lookahead:
         self._memory, self._discount, self._decisions = memory, discount, decisions
         self._open: deque[tuple[NDArray[Any], int, float]] = deque()
 
-    def add(self, seen: NDArray[Any], action: int, reward: float) -> None:
-        """A decision and what it brought."""
-        self._open.append((seen, action, reward))
+    def add(
+        self,
+        seen: NDArray[Any],
+        action: int,
+        reward: float,
+        following: NDArray[Any],
+        *,
+        terminated: bool,
+        last: bool,
+    ) -> None:
+        """A decision and what it brought; hands over what has been looked ahead far enough.
 
-    def settle(self, following: NDArray[Any], terminated: bool, *, last: bool) -> None:
-        """Hand over what has been looked ahead far enough; at the end of an episode everything."""
+        Args:
+            seen: before it.
+            action: number of the pixel.
+            reward: of it.
+            following: what was seen after it.
+            terminated: whether the task was over then.
+            last: whether the episode was, which hands over everything.
+        """
+        self._open.append((seen, action, reward))
         while self._open and (last or len(self._open) >= self._decisions):
-            rewards = [reward for _, _, reward in self._open]
-            total = sum(self._discount**k * reward for k, reward in enumerate(rewards))
+            rewards = [one for _, _, one in self._open]
+            total = sum(self._discount**k * one for k, one in enumerate(rewards))
             left = 0.0 if terminated else self._discount ** len(rewards)
-            seen, action, _ = self._open.popleft()
-            self._memory.add(seen, action, total, following, left)
+            first, chosen, _ = self._open.popleft()
+            self._memory.add(first, chosen, total, following, left)

@@ -158,15 +158,15 @@ class SamLearner:
             fraction = step / self.config.steps
             action = self.explore(seen[i], rng, fraction)
             following, reward, terminated, truncated, info = envs[i].step(action)
-            behind[i].add(seen[i], action, reward)
-            behind[i].settle(following, terminated, last=terminated or truncated)
+            over = terminated or truncated
+            behind[i].add(seen[i], action, reward, following, terminated=terminated, last=over)
             totals[i] += reward
-            if terminated or truncated:
+            if over:
                 returns.append(totals[i])
                 successes.append(info["is_success"])
                 following, totals[i] = envs[i].reset()[0], 0.0
             seen[i] = following
-            if len(self.memory) >= options.first and step % options.every == 0:
+            if self.memory.count >= options.first and step % options.every == 0:
                 rate = options.rate * (1.0 - (1.0 - _LEAST_RATE) * fraction)
                 losses.append(self.update(rng, rate))
         loss = float(np.mean(losses)) if losses else float("nan")
@@ -176,7 +176,7 @@ class SamLearner:
         """A pixel: the best, or with the probability of this part of the training a random one."""
         options = self.options
         fallen = 1.0 - (1.0 - options.explore_end) * min(1.0, fraction / max(options.explore, 1e-9))
-        knows = bool(options.start) or len(self.memory) >= options.first
+        knows = bool(options.start) or self.memory.count >= options.first
         if rng.random() >= fallen and knows:
             return self.best(seen)
         rows, cols = seen.shape[1:]

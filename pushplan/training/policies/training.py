@@ -144,7 +144,6 @@ def _specification(env: TrainingEnv, **facts: Any) -> Specification:
 def _draw(run: TrainingRun) -> None:
     """Draw return and success over decisions, for training and validation."""
     from matplotlib import rc_context
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
     points, algorithm = run.curve, run.config.algorithm
@@ -152,7 +151,6 @@ def _draw(run: TrainingRun) -> None:
         return
     with rc_context(STYLE):
         figure: Any = Figure(figsize=(2.0 * COLUMN, 2.6), layout="constrained")
-        FigureCanvasAgg(figure)
         returns, fractions = figure.subplots(1, 2)
         returns.set_ylabel("reward of an episode")
         steps = [point.steps for point in points]
