@@ -22,7 +22,7 @@ from pushplan.ros.mcap_writer import (
     McapWriter,
 )
 from pushplan.ros.message_types import RosbagsTypes
-from pushplan.world import ClearanceArea, Episode, Receptacle, SchemaError, World
+from pushplan.world import ClearanceArea, Episode, Receptacle, SchemaError
 from pushplan.world.checks import FloatArray
 from pushplan.world.files import world_from_dict
 from pushplan.world.libraries import need
@@ -149,30 +149,17 @@ def _episode(logged: Mapping[str, list[Any]]) -> Episode:
         end = parse_json(logged[EPISODE][-1].json)
         actions = np.reshape(end.pop("actions"), (-1, end.pop("action_size")))
         return Episode(world=world, **recorded, actions=actions, **end)
-    about = {
-        "source": "a robot's log",
-        "dropped": sum(int(one["notes"]) for one in logged[DROPPED]),
-    }
-    return _driven(world, recorded, logged[COMMAND], about)
-
-
-def _driven(
-    world: World, recorded: dict[str, Any], commands: list[Any], about: dict[str, Any]
-) -> Episode:
-    """The episode of a robot, from what it saw and the commands that it got."""
-    last = world.moved(
-        robot_pose=recorded["robot_poses"][-1], movable_poses=recorded["object_poses"][-1]
-    )
-    moves_objects = isinstance(world.goal, Receptacle | ClearanceArea)
-    success = last.goal_reached
+    # a robot's own: from what it saw, and the commands that it got
+    commands, dropped = logged[COMMAND], [int(one["notes"]) for one in logged[DROPPED]]
+    last = world.moved(robot_pose=recorded["robot_poses"][-1], movable_poses=poses[-1])
     ended = commands[-1].status if commands else "no command"
-    actions = [[command.linear, command.angular] for command in commands]
+    moves_objects = isinstance(world.goal, Receptacle | ClearanceArea)
     return Episode(
         world=world,
         **recorded,
-        success=success,
-        reason="goal" if success else ended,
+        success=last.goal_reached,
+        reason="goal" if last.goal_reached else ended,
         completed=last.completed if moves_objects else None,
-        actions=np.reshape(actions, (-1, 2)),
-        about=about,
+        actions=np.reshape([[one.linear, one.angular] for one in commands], (-1, 2)),
+        about={"source": "a robot's log", "dropped": sum(dropped)},
     )
