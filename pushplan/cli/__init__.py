@@ -5,12 +5,8 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 from pushplan.cli.parser import build_parser, fail, named
-
-if TYPE_CHECKING:
-    from pushplan.world import PushplanError
 
 __all__ = ["build_parser", "main"]
 
@@ -61,11 +57,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if not isinstance(error, PushplanError | OSError):
             raise
         users = (InvalidInputError, UnknownNameError, MissingDependencyError, *_USER_OS_ERRORS)
-        return fail(_said(error), 2 if isinstance(error, users) else 1)
-
-
-def _said(error: PushplanError | OSError) -> str:
-    """An error in words; that of the operating system without its number."""
-    if isinstance(error, OSError) and error.strerror and error.filename is not None:
-        return f"{error.filename!r}: {error.strerror}"
-    return str(error)
+        text = str(error)
+        if isinstance(error, OSError) and error.strerror and error.filename is not None:
+            text = f"{error.filename!r}: {error.strerror}"  # without the system's number
+        return fail(text, 2 if isinstance(error, users) else 1)

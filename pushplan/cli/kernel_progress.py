@@ -36,17 +36,16 @@ class KernelProgress:
         self.compiled += not loaded
         if not loaded:
             if self.terminal:
-                sys.stderr.write(f"\r\033[K{self}")
-                sys.stderr.flush()
+                self.clear(str(self))
             elif self.compiled == 1:
                 words, _, _ = str(self).partition(":")
                 sys.stderr.write(f"{words}; later runs find them in the cache\n")
         self.ready.add(kernel)
 
-    def clear(self) -> None:
+    def clear(self, text: str = "") -> None:
         """Empty the line for something else."""
         if self.terminal and self.compiled:
-            sys.stderr.write("\r\033[K")
+            sys.stderr.write(f"\r\033[K{text}")
             sys.stderr.flush()
 
     def __str__(self) -> str:

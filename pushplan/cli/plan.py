@@ -21,12 +21,24 @@ def run(options: argparse.Namespace) -> int:
     """Plan, say what came of it, write files."""
     from pushplan.evaluation import parse_planner
     from pushplan.planners import warm_up
-    from pushplan.world import PlanResult, PushplanError, load_world, stream
+    from pushplan.world import (
+        Deadline,
+        MaxIterations,
+        PlanResult,
+        PushplanError,
+        load_world,
+        stream,
+    )
     from pushplan.world.checks import expect
     from pushplan.world.errors import describe
 
     check_file(options.out)
     check_figure(options.render)
+    stop: Stop | None = None
+    if options.deadline is not None:
+        stop = Deadline(options.deadline)
+    elif options.iterations is not None:
+        stop = MaxIterations(options.iterations)
     world = load_world(options.world)
     spec = parse_planner(options.planner)
     planner = spec.make_planner()
@@ -34,7 +46,7 @@ def run(options: argparse.Namespace) -> int:
         with kernel_progress(spec.source):
             warm_up(spec.source)  # a deadline is for planning, not for loading kernels
     try:
-        made = planner.plan(world, stop=_stop(options), rng=stream(options.seed, "policy"))
+        made = planner.plan(world, stop=stop, rng=stream(options.seed, "policy"))
         result = expect("what the planner returns", made, PlanResult)
     except (Exception, SystemExit) as error:
         if spec.is_ours:
@@ -57,14 +69,6 @@ def run(options: argparse.Namespace) -> int:
         if file and not options.json:
             say(f"wrote {file}")
     return 0 if result.plan is not None else 1
-
-
-def _stop(options: argparse.Namespace) -> Stop | None:
-    from pushplan.world import Deadline, MaxIterations
-
-    if options.deadline is not None:
-        return Deadline(options.deadline)
-    return None if options.iterations is None else MaxIterations(options.iterations)
 
 
 def _print(name: str, result: PlanResult) -> None:

@@ -81,39 +81,38 @@ def _command(options: argparse.Namespace, config: TrainingConfig) -> str:
 
 def _score(config: TrainingConfig, path: Path, options: argparse.Namespace) -> Path:
     """Run the policy on held-out scenarios, and write the model card."""
+    from collections import Counter
+
+    from pushplan.evaluation import bench
     from pushplan.training.policies.card import write_card
 
     rows = []
     for suite in config.suites if options.episodes else ():
-        rows.append(score_on(suite, path, options.episodes, options.workers))
-        row = rows[-1]
-        say(f"  {suite}: success {row['success']:.2f} of {row['episodes']}")
+        results = bench(
+            suite,
+            [f"policy=onnx:{path}"],
+            episodes=options.episodes,
+            workers=options.workers,
+        )
+        (found,) = results.pooled.summary()
+        row = {
+            "suite": suite,
+            "episodes": found.episodes,
+            "success": found.success.fraction,
+            "success_low": found.success.low,
+            "success_high": found.success.high,
+            "scores": {
+                name: (one.mean, one.low, one.high)
+                for name in ("S_manip", "E_manip", "I_manip", "E_nav", "I_nav")
+                if (one := found.metrics.get(name)) is not None
+            },
+            "failures": dict(Counter(one.reason for one in results.rows if not one.success)),
+        }
+        rows.append(row)
+        say(f"  {suite}: success {found.success.fraction:.2f} of {found.episodes}")
     scores = path.with_name("scores.json")
     scores.write_text(json.dumps(rows, indent=1) + "\n", encoding="utf-8")
     return write_card(options.out, rows, path.with_name("MODEL_CARD.md"))
-
-
-def score_on(suite: str, path: Path, episodes: int, workers: int) -> dict[str, Any]:
-    """A suite's row of the model card."""
-    from collections import Counter
-
-    from pushplan.evaluation import bench
-
-    results = bench(suite, [f"policy=onnx:{path}"], episodes=episodes, workers=workers)
-    (found,) = results.pooled.summary()
-    return {
-        "suite": suite,
-        "episodes": found.episodes,
-        "success": found.success.fraction,
-        "success_low": found.success.low,
-        "success_high": found.success.high,
-        "scores": {
-            name: (one.mean, one.low, one.high)
-            for name in ("S_manip", "E_manip", "I_manip", "E_nav", "I_nav")
-            if (one := found.metrics.get(name)) is not None
-        },
-        "failures": dict(Counter(row.reason for row in results.rows if not row.success)),
-    }
 
 
 def _show_progress(logger: Any) -> None:

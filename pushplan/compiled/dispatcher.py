@@ -45,18 +45,6 @@ def compiling_kernels(names: Iterable[str]) -> frozenset[str]:
     return frozenset(name for name, kernel in _kernels(names) if kernel.cache.is_locked())
 
 
-@contextmanager
-def _garbage_left() -> Iterator[None]:
-    """Collect no garbage meanwhile: Numba makes much that is still in use."""
-    collected = gc.isenabled()
-    gc.disable()
-    try:
-        yield
-    finally:
-        if collected:
-            gc.enable()
-
-
 def _kernels(names: Iterable[str]) -> Iterator[tuple[str, KernelDispatcher]]:
     for name in names:
         module, _, function = name.rpartition(".")
@@ -83,10 +71,13 @@ class _CachedDispatcher(CPUDispatcher):
         if tuple(getattr(sig, "args", sig)) in self.overloads:
             return super().compile(sig)
         hits = sum(self._cache_hits.values())
+        collected = gc.isenabled()
+        gc.disable()  # Numba makes much that is still in use
         try:
-            with _garbage_left():
-                entry = super().compile(sig)
+            entry = super().compile(sig)
         finally:
+            if collected:
+                gc.enable()
             self._cache.release()
         if self.form == KernelDispatcher.form:
             loaded = sum(self._cache_hits.values()) > hits

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from pushplan.compiled import kernel
 from pushplan.geometry.angles import wrap_angle
 from pushplan.geometry.raster import fill_convex
-from pushplan.geometry.transforms import transform_points
+from pushplan.geometry.transforms import transform_outlines, transform_points
 from pushplan.world.checks import FloatArray, IntArray
 
 Patch = NDArray[np.float32]
@@ -23,14 +23,22 @@ SUBCELLS = 4
 """Samples along each side of a cell: coverage comes in steps of 1/16."""
 
 
-@kernel
-def _to_pixels(points: FloatArray, frame: FloatArray, scale: float, out: FloatArray) -> None:
-    """Carry (N, 2) world points [m] into samples of a raster."""
+@kernel(allocates=True)
+def _fill(
+    corners: FloatArray,  # (V, 2) of convex outlines, world frame [m]; changed into samples
+    offsets: IntArray,  # (P + 1,) where each outline starts
+    frame: FloatArray,
+    scale: float,  # samples per metre
+    fine: NDArray[np.uint8],
+) -> None:
+    """Set the samples that lie in an outline to 1."""
     c, s = math.cos(frame[2]), math.sin(frame[2])
-    for i in range(points.shape[0]):
-        dx, dy = points[i, 0] - frame[0], points[i, 1] - frame[1]
-        out[i, 0] = scale * (c * dx + s * dy)
-        out[i, 1] = scale * (c * dy - s * dx)
+    for i in range(corners.shape[0]):
+        dx, dy = corners[i, 0] - frame[0], corners[i, 1] - frame[1]
+        corners[i, 0] = scale * (c * dx + s * dy)
+        corners[i, 1] = scale * (c * dy - s * dx)
+    for part in range(offsets.shape[0] - 1):
+        fill_convex(fine, corners[offsets[part] : offsets[part + 1]], 1)
 
 
 @kernel
@@ -59,11 +67,8 @@ def cover_objects(
     fine = np.zeros((SUBCELLS * height, SUBCELLS * width), np.uint8)
     scale = SUBCELLS / cell
     corners = np.empty_like(vertices)
-    for k in range(poses.shape[0]):
-        a, b = offsets[k], offsets[k + 1]
-        transform_points(poses[k], vertices[a:b], corners[a:b])
-        _to_pixels(corners[a:b], frame, scale, corners[a:b])
-        fill_convex(fine, corners[a:b], 1)
+    transform_outlines(poses, vertices, offsets, corners)
+    _fill(corners, offsets, frame, scale, fine)
     _average(fine, out)
 
 
@@ -98,7 +103,5 @@ def cover_sweep(
                 pose[:2] -= back * (path[n, :2] - path[n - 1, :2])
                 pose[2] -= back * turn
             transform_points(pose, vertices, corners)
-            _to_pixels(corners, frame, scale, corners)
-            for part in range(offsets.shape[0] - 1):
-                fill_convex(fine, corners[offsets[part] : offsets[part + 1]], 1)
+            _fill(corners, offsets, frame, scale, fine)
     _average(fine, out)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -58,18 +58,15 @@ class ImageObservation(CheckedFields):
         for name in self.channels:
             if name not in CHANNELS:
                 raise UnknownNameError("channel", name, CHANNELS)
-        put(self, "window", self._pair("window", self.window))
-        put(self, "pixels", self._pair("pixels", self.pixels))
+        for name in ("window", "pixels"):
+            sides = getattr(self, name)
+            if isinstance(sides, str) or not isinstance(sides, Sequence) or len(sides) != 2:
+                raise InvalidInputError(f"{name} needs two sides, height and width, got {sides!r}")
+            put(self, name, tuple(sides))
         for side in self.window:
             number("window", side, low=0.0, open_low=True)
         for count in self.pixels:
             integer("pixels", count, low=1, high=4096)
-
-    @staticmethod
-    def _pair(name: str, sides: object) -> tuple[Any, Any]:
-        if isinstance(sides, str) or not isinstance(sides, Sequence) or len(sides) != 2:
-            raise InvalidInputError(f"{name} needs two sides, height and width, got {sides!r}")
-        return sides[0], sides[1]
 
     @property
     def shape(self) -> tuple[int, int, int]:
