@@ -20,7 +20,12 @@ def run(options: argparse.Namespace) -> int:
         raise InvalidInputError(
             "the following arguments are required: --policies; see 'pushplan bench --help'"
         )
-    out = options.out or _default_out(options.suite)
+    out = options.out
+    if not out:  # folders of worlds count by their names
+        names = [
+            Path(one).resolve().name if "/" in one else one for one in options.suite.split(",")
+        ]
+        out = os.path.join("runs", ",".join(names))
     check_directory(out)
     experiment = bench_experiment(
         options.suite,
@@ -40,9 +45,3 @@ def run(options: argparse.Namespace) -> int:
     else:
         show(results, options)
     return exit_code(results)
-
-
-def _default_out(suites: str) -> str:
-    """The run directory of suites, and of folders of worlds by their names."""
-    names = (Path(name).resolve().name if "/" in name else name for name in suites.split(","))
-    return os.path.join("runs", ",".join(names))
