@@ -26,8 +26,14 @@ def run(options: argparse.Namespace) -> int:
     for path in options.episodes:
         episode = load_episode(path)
         if options.json:
-            ended = {"episode": path, "success": episode.success, "reason": episode.reason}
-            scored.append({**ended, "metrics": dict(compute(episode, options.metrics))})
+            scored.append(
+                {
+                    "episode": path,
+                    "success": episode.success,
+                    "reason": episode.reason,
+                    "metrics": dict(compute(episode, options.metrics)),
+                }
+            )
         else:
             say_scores(episode, options.metrics, f"{path}: ")
         if options.out:
