@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from pushplan.evaluation.jobs import JobSettings
-from pushplan.evaluation.limits import MEMORY_MB
 from pushplan.evaluation.policies import PolicySpec, parse_policy, policy_names
 from pushplan.scenarios.suite import distinct
 from pushplan.world import Deadline, SchemaError
@@ -66,9 +65,8 @@ def fields_of(data: object, folder: Path) -> dict[str, Any]:
         "only": only,
         "settings": JobSettings(**{name: data[name] for name in names if name in data}),
         "metrics": tuple(_beside(one, folder) for one in metrics),
-        "traces": data.get("traces", "all"),
         "allow_misfits": choice("misfits", data.get("misfits", "refuse"), _MISFITS) == "skip",
-        "memory_limit_mb": data.get("memory_limit_mb", MEMORY_MB),
+        **{name: data[name] for name in ("traces", "memory_limit_mb") if name in data},
     }
 
 

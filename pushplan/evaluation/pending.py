@@ -25,19 +25,22 @@ def note_batch(
 ) -> None:
     """Note what a run directory is asked for; the jobs are `identified`."""
     store.note("configuration", {**settings_dict(settings), **(about or {})})
-    store.extend(
-        "policies", {job.policy.label: job.spec["policy"]["identity"] for job in jobs if job.spec}
-    )
-    stops = {job.policy.label: job.policy.options.get("stop") for job in jobs}
-    limits = {label: stop.seconds for label, stop in stops.items() if isinstance(stop, Stop)}
-    store.extend("deadlines", {k: v for k, v in limits.items() if math.isfinite(v)})
     factor = settings.latency_factor
     mode = "" if factor is None else f", latency-aware x {factor:g}"
-    titles = {}
+    policies: dict[str, str] = {}
+    deadlines: dict[str, float] = {}
+    titles: dict[str, str] = {}
     for job in jobs:
-        setting = setting_of(*job.key[1:])
+        assert job.spec is not None
+        label, setting = job.policy.label, setting_of(*job.key[1:])
+        policies[label] = job.spec["policy"]["identity"]
+        stop = job.policy.options.get("stop")
+        if isinstance(stop, Stop) and math.isfinite(stop.seconds):
+            deadlines[label] = stop.seconds
         named = "/" in job.key[1]  # scenarios of a suite have different variations
         titles[setting] = (setting if named else job.title) + mode
+    store.extend("policies", policies)
+    store.extend("deadlines", deadlines)
     store.extend("settings", titles)
 
 

@@ -123,9 +123,9 @@ def _motion(episode: Episode) -> dict[str, Any]:
 def _plans(episode: Episode) -> list[dict[str, Any]]:
     """When each plan was taken up, its path, and where it expects which objects at its end."""
     plans, found = episode.plans, []
-    count = 0 if plans is None else len(plans)
-    for index in thinned(count, FRAMES).tolist():
-        assert plans is not None
+    if plans is None:
+        return []
+    for index in thinned(len(plans), FRAMES).tolist():
         path, (moved, poses) = plans.path(index), plans.expected(index)
         kept = thinned(len(path), PATH)
         found.append(

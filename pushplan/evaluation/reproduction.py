@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from pushplan.evaluation.batch import run_batch
-from pushplan.evaluation.database import StoredResult, read_results, reading
+from pushplan.evaluation.database import read_results, reading
 from pushplan.evaluation.job_identity import differences, job_of, job_spec
 from pushplan.evaluation.rows import TIMING_COLUMNS, ResultRow, columns
 from pushplan.world import Episode, InvalidInputError, PushplanError, SchemaError
@@ -54,7 +54,15 @@ def reproduce(path: str | Path, job: str) -> Reproduction:
         SchemaError: if the stored episode cannot be read.
         UnknownNameError: if there is no such policy any more.
     """
-    stored = _find(Path(path), job)
+    with reading(path) as db:
+        found = [one for one in read_results(db) if one.row.job.startswith(job)]
+    if not job or len(found) != 1:
+        few = ", ".join(one.row.job[:12] for one in found[:3])
+        raise InvalidInputError(
+            f"job {job!r} must be the beginning of one job of {path} (column 'job' of "
+            f"results.csv), it is that of {len(found)}{f': {few}' if few and job else ''}"
+        )
+    (stored,) = found
     try:
         again, settings = job_of(stored.spec)
     except PushplanError:
@@ -64,22 +72,10 @@ def reproduce(path: str | Path, job: str) -> Reproduction:
     with tempfile.TemporaryDirectory(prefix="pushplan-") as folder:
         (row,) = run_batch([again], out=folder, workers=1, settings=settings)
         names = [name for name in columns() if name not in (*TIMING_COLUMNS, "job")]
-        found = [name for name in names if getattr(row, name) != getattr(stored.row, name)]
-        found += _differing_parts(_episode(Path(path), stored.row), _episode(Path(folder), row))
+        differing = [name for name in names if getattr(row, name) != getattr(stored.row, name)]
+        differing += _differing_parts(_episode(Path(path), stored.row), _episode(Path(folder), row))
     changed = differences(stored.spec, job_spec(again, settings))
-    return Reproduction(stored.row, row, tuple(found), changed)
-
-
-def _find(path: Path, job: str) -> StoredResult:
-    with reading(path) as db:
-        found = [one for one in read_results(db) if one.row.job.startswith(job)]
-    if not job or len(found) != 1:
-        few = ", ".join(one.row.job[:12] for one in found[:3])
-        raise InvalidInputError(
-            f"job {job!r} must be the beginning of one job of {path} (column 'job' of "
-            f"results.csv), it is that of {len(found)}{f': {few}' if few and job else ''}"
-        )
-    return found[0]
+    return Reproduction(stored.row, row, tuple(differing), changed)
 
 
 def _episode(path: Path, row: ResultRow) -> Episode | None:

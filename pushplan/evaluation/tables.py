@@ -9,7 +9,7 @@ import numpy as np
 
 from pushplan.evaluation.gaps import Gap
 from pushplan.evaluation.rows import ResultRow
-from pushplan.evaluation.statistics import Estimate, estimate
+from pushplan.evaluation.statistics import Estimate, Proportion, estimate
 from pushplan.evaluation.statistics_aggregate import (
     Aggregate,
     interquartile_mean,
@@ -116,9 +116,23 @@ def score_tables(
         shown = (*shown, *(("wall_time_s",) if wide else ()), *_TIMES)
         metrics = [name for name in shown if any(name in s.metrics for s in mine)]
         headings = ("policy", "runs", "success", *(heading(name) for name in metrics))
-        cells = tuple(_policy_cells(summary, metrics, wide) for summary in mine)
+        cells = []
+        for summary in mine:
+            failed = f"\n{summary.failed} failed" if summary.failed else ""
+            rate = summary.success
+            success = f"{rate.fraction:.2f}\n{_interval(rate, 2)}"
+            line = [summary.policy, f"{summary.episodes}{failed}", success]
+            for name in metrics:
+                value = summary.metrics.get(name)
+                text = "" if value is None else _estimate(value, _digits(name), wide=wide)
+                if value is not None and name in _TIMES:
+                    worst = summary.metrics.get(_TIMES[name])
+                    greatest = "" if worst is None else f"\nmax {milliseconds(worst.highest)}"
+                    text = milliseconds(value.median) + greatest
+                line.append(text)
+            cells.append(tuple(line))
         note = SCORE_NOTE + ("; med is the median" if wide else "")
-        tables.append(Table(titles.get(setting, setting), headings, cells, note))
+        tables.append(Table(titles.get(setting, setting), headings, tuple(cells), note))
     return tables
 
 
@@ -279,27 +293,6 @@ def aggregate_table(rows: Sequence[ResultRow], policies: Sequence[str]) -> Table
     return Table(title, tuple(headings), tuple(cells), AGGREGATE_NOTE.format(first=first))
 
 
-def _policy_cells(summary: PolicySummary, metrics: Sequence[str], wide: bool) -> tuple[str, ...]:
-    failed = f"\n{summary.failed} failed" if summary.failed else ""
-    rate = summary.success
-    cells = [
-        summary.policy,
-        f"{summary.episodes}{failed}",
-        f"{rate.fraction:.2f}\n[{rate.low:.2f}, {rate.high:.2f}]",
-    ]
-    for name in metrics:
-        value = summary.metrics.get(name)
-        if value is None:
-            cells.append("")
-        elif name in _TIMES:
-            worst = summary.metrics.get(_TIMES[name])
-            greatest = "" if worst is None else f"\nmax {milliseconds(worst.highest)}"
-            cells.append(milliseconds(value.median) + greatest)
-        else:
-            cells.append(_estimate(value, _digits(name), wide=wide))
-    return tuple(cells)
-
-
 def _digits(column: str) -> int:
     return METRICS[column].digits if column in METRICS else 3
 
@@ -310,7 +303,7 @@ def _estimate(value: Estimate, digits: int, *, wide: bool = True) -> str:
     return f"{spread}\n{_interval(value, digits)}{middle}"
 
 
-def _interval(value: Estimate | Aggregate, digits: int, *, sign: bool = False) -> str:
+def _interval(value: Estimate | Aggregate | Proportion, digits: int, *, sign: bool = False) -> str:
     return f"[{_number(value.low, digits, sign=sign)}, {_number(value.high, digits, sign=sign)}]"
 
 
