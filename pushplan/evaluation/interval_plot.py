@@ -62,17 +62,13 @@ def draw_intervals(run: Results) -> Figure:
 
 def _bar(axes: Any, summary: PolicySummary, names: Sequence[str], place: float, index: int) -> None:
     """Success, or the one of these scores that the policy has in the setting."""
-    share = summary.success
-    mean, low, high = share.fraction, share.low, share.high
-    if names:
-        scores = [summary.metrics[name] for name in names if name in summary.metrics]
-        if not scores:
-            return
-        mean, low, high = scores[0].mean, scores[0].low, scores[0].high
+    shown = [summary.metrics[name] for name in names if name in summary.metrics]
+    if names and not shown:
+        return
     bar = axes.errorbar(
-        mean,
+        shown[0].mean if shown else summary.success.fraction,
         place,
-        xerr=interval(mean, low, high),
+        xerr=interval(shown[0] if shown else summary.success),
         markersize=4.5,
         elinewidth=1.1,
         capsize=2,

@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 
 from pushplan.drawing.figure import COLUMN
 from pushplan.drawing.palette import DASHES, MARKERS, SERIES
+from pushplan.evaluation.statistics import Estimate, Proportion
 
 PANEL = (COLUMN, 2.9)
 """Width and height of one panel [inch]: a column of a paper, with letters of 8 points."""
@@ -36,9 +37,10 @@ def _style(index: int, name: str, kinds: Sequence[Any]) -> dict[str, Any]:
     return {"color": SERIES[colour], name: kinds[(index + turn) % len(kinds)]}
 
 
-def interval(mean: float, low: float, high: float) -> list[list[float]]:
+def interval(one: Estimate | Proportion) -> list[list[float]]:
     """An interval as Matplotlib's error bars take it."""
-    return [[max(0.0, mean - low)], [max(0.0, high - mean)]]
+    middle = one.mean if isinstance(one, Estimate) else one.fraction
+    return [[max(0.0, middle - one.low)], [max(0.0, one.high - middle)]]
 
 
 def wrapped(text: str, letters: int = NAME_LETTERS) -> str:

@@ -99,8 +99,8 @@ def _tradeoff(run: Results) -> Figure | None:
             bar = axes.errorbar(
                 across.mean,
                 up.mean,
-                xerr=interval(across.mean, across.low, across.high),
-                yerr=interval(up.mean, up.low, up.high),
+                xerr=interval(across),
+                yerr=interval(up),
                 markersize=6,
                 markeredgecolor="black",
                 ecolor="black",

@@ -202,8 +202,8 @@ def difference_tables(
         brief: dict[str, list[str]] = {}
         for pair in mine:
             names, digits = f"{pair.second} - {pair.first}", _digits(pair.metric)
-            mean = _number(pair.difference.mean, digits, sign=True)
-            interval = _interval(pair.difference, digits, sign=True)
+            mean = f"{pair.difference.mean:+.{digits}f}"
+            interval = _interval(pair.difference, digits, "+")
             star = " *" if pair.significant else ""
             line = brief.setdefault(names, [""] * len(metrics))
             line[metrics.index(pair.metric)] = f"{mean} {interval}{star}"
@@ -298,17 +298,13 @@ def _digits(column: str) -> int:
 
 
 def _estimate(value: Estimate, digits: int, *, wide: bool = True) -> str:
-    middle = f"\nmed {_number(value.median, digits)}" if wide else ""
-    spread = f"{_number(value.mean, digits)} ± {_number(value.sd, digits)}"
+    middle = f"\nmed {value.median:.{digits}f}" if wide else ""
+    spread = f"{value.mean:.{digits}f} ± {value.sd:.{digits}f}"
     return f"{spread}\n{_interval(value, digits)}{middle}"
 
 
-def _interval(value: Estimate | Aggregate | Proportion, digits: int, *, sign: bool = False) -> str:
-    return f"[{_number(value.low, digits, sign=sign)}, {_number(value.high, digits, sign=sign)}]"
-
-
-def _number(value: float, digits: int, *, sign: bool = False) -> str:
-    return f"{value:+.{digits}f}" if sign else f"{value:.{digits}f}"
+def _interval(value: Estimate | Aggregate | Proportion, digits: int, sign: str = "") -> str:
+    return f"[{value.low:{sign}.{digits}f}, {value.high:{sign}.{digits}f}]"
 
 
 def milliseconds(seconds: float) -> str:
