@@ -66,11 +66,16 @@ def _drive_leg(
             float(a[1]) + fraction * dy,
             float(a[2]) + fraction * turn,
         )
-        error = _error(simulator.robot_pose, reference)
-        late = math.hypot(error[0], error[1]) > _LATE * robot.circumscribed_radius
-        late |= abs(error[2]) > _LATE
+        x, y, theta = (float(value) for value in simulator.robot_pose)
+        ex, ey = reference[0] - x, reference[1] - y
+        c, s = math.cos(theta), math.sin(theta)
+        # where the reference is in the robot's frame
+        ahead, left = c * ex + s * ey, c * ey - s * ex
+        turned = math.remainder(reference[2] - theta, 2.0 * math.pi)
+        late = math.hypot(ahead, left) > _LATE * robot.circumscribed_radius
+        late |= abs(turned) > _LATE
         part = period if late else min(period, duration - done)
-        simulator.step(_command(robot, error, speed, rate), part)
+        simulator.step(_command(robot, (ahead, left, turned), speed, rate), part)
         if late:
             waited += part
             if waited > patience:
@@ -79,14 +84,6 @@ def _drive_leg(
             done += part
             waited = 0.0
     return True
-
-
-def _error(pose: FloatArray, reference: tuple[float, float, float]) -> tuple[float, float, float]:
-    """Where the reference is in the robot's frame: ahead, left [m], turned [rad]."""
-    x, y, theta = (float(value) for value in pose)
-    dx, dy = reference[0] - x, reference[1] - y
-    c, s = math.cos(theta), math.sin(theta)
-    return c * dx + s * dy, c * dy - s * dx, math.remainder(reference[2] - theta, 2.0 * math.pi)
 
 
 def _command(

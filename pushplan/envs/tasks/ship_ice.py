@@ -150,7 +150,11 @@ class ShipIceTask(Task):
         self.goal = GoalLine(np.array([0.5 * bounds[2], self._goal_y()]), np.array([0.0, 1.0]))
         self.reach = 2.0 * float(np.hypot(*self.preset.channel))
         self._file_ice = self._read_ice()
-        self._check_start_x()
+        x, width = self.variations.start_x, self.preset.channel[0]
+        if x is not None and not 0.0 <= x <= width:
+            raise ScenarioError(
+                f"ship_ice: start_x must lie in the channel, [0, {width:g}] m, got {x:g}"
+            )
         self._steps = 0
 
     def _lengthened(self, length: float) -> ShipPreset:
@@ -174,13 +178,6 @@ class ShipIceTask(Task):
                 f"channel, got {away:g}"
             )
         return start + away
-
-    def _check_start_x(self) -> None:
-        x, width = self.variations.start_x, self.preset.channel[0]
-        if x is not None and not 0.0 <= x <= width:
-            raise ScenarioError(
-                f"ship_ice: start_x must lie in the channel, [0, {width:g}] m, got {x:g}"
-            )
 
     def _read_ice(self) -> IceField | None:
         """The floes of the file, which must lie in the channel."""
@@ -223,12 +220,10 @@ class ShipIceTask(Task):
         )
 
     def _start_pose(self, rng: np.random.Generator) -> FloatArray:
-        margin = self.preset.side_margin
+        margin, wanted = self.preset.side_margin, self.variations
         anywhere = rng.uniform(margin, self.preset.channel[0] - margin)
-        x = self.variations.start_x
-        return np.array(
-            [anywhere if x is None else x, self.preset.start_y, self.variations.start_heading]
-        )
+        x = anywhere if wanted.start_x is None else wanted.start_x
+        return np.array([x, self.preset.start_y, wanted.start_heading])
 
     def _random_ice(self, rng: np.random.Generator, pose: FloatArray) -> IceField:
         fraction = self.variations.concentration
