@@ -33,17 +33,16 @@ def check_dataset(config: TrainingConfig, data: str | Path) -> None:
         InvalidInputError: naming both sides.
     """
     about = read_metadata(data)
+    observation: Any = dict(config.observation)
+    if builder_from_dict(observation) == builder_from_dict(about["observation"]):
+        observation = about["observation"]  # the same one, maybe written otherwise
     for name, mine, theirs in (
         ("task", config.task, about["task"]),
         ("action mode", config.action.mode, about["action_mode"]),
+        ("observation", observation, about["observation"]),
     ):
         if mine != theirs:
             raise InvalidInputError(f"the {name} is {mine!r}, that of the data set {theirs!r}")
-    if builder_from_dict(config.observation) != builder_from_dict(about["observation"]):
-        raise InvalidInputError(
-            f"the observation is {dict(config.observation)}, that of the data set "
-            f"{about['observation']}"
-        )
 
 
 def demonstrations(

@@ -144,10 +144,14 @@ class SquashedActor(nn.Module):
         super().__init__()
         self.is_image = is_image
         self.squash = hasattr(policy, "actor")
-        actor = policy.actor if self.squash else policy
-        self.features = actor.features_extractor if self.squash else policy.pi_features_extractor
-        self.body = actor.latent_pi if self.squash else policy.mlp_extractor.policy_net
-        self.mean = actor.mu if self.squash else policy.action_net
+        if self.squash:
+            self.features = policy.actor.features_extractor
+            self.body = policy.actor.latent_pi
+            self.mean = policy.actor.mu
+        else:
+            self.features = policy.pi_features_extractor
+            self.body = policy.mlp_extractor.policy_net
+            self.mean = policy.action_net
 
     def forward(self, observations: Tensor) -> Tensor:
         """(B, actions) in [-1, 1]."""

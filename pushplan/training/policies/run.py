@@ -293,12 +293,11 @@ def validate(
 def _same(old: TrainingConfig, new: TrainingConfig, folder: Path) -> None:
     """A training may be made longer, nothing else."""
     before, after = ({**c.to_dict(), "steps": 0} for c in (old, new))
-    differing = [key for key in after if before[key] != after[key]]
-    if differing:
-        key = differing[0]
-        raise InvalidInputError(
-            f"{folder} holds another training: its {key} is {before[key]!r}, not {after[key]!r}"
-        )
+    for key, wanted in after.items():
+        if before[key] != wanted:
+            raise InvalidInputError(
+                f"{folder} holds another training: its {key} is {before[key]!r}, not {wanted!r}"
+            )
 
 
 def _read_curve(path: Path) -> list[CurvePoint]:
