@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import importlib
 import inspect
+import math
 import pkgutil
 import re
 from collections.abc import Iterator
@@ -154,7 +155,7 @@ def _one(hint: Any) -> str:
         if isinstance(note, OneOf):
             return ", ".join(note.valid)
         if isinstance(note, Limits):
-            low = "" if note.low is None else f"{'>' if note.open_low else '≥'} {note.low:g}"
-            high = "" if note.high is None else f"≤ {note.high:g}"
+            low = "" if note.low == -math.inf else f"{'>' if note.open_low else '≥'} {note.low:g}"
+            high = "" if note.high == math.inf else f"≤ {note.high:g}"
             return f"{base.__name__} {' and '.join(part for part in (low, high) if part)}".strip()
     return getattr(base, "__name__", str(base))

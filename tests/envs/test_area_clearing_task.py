@@ -8,14 +8,17 @@ from pushplan.envs.tasks.area_clearing import LAYOUTS, PRESETS, AreaClearingTask
 from pushplan.envs.tasks.layout import rectangle
 from pushplan.world import ScenarioError, StaticMap, UnknownNameError, stream
 
+OTHERS = [pytest.param(name, marks=pytest.mark.slow) for name in PRESETS if name != "benchmark"]
+BY_DEFAULT = ["benchmark", *OTHERS]
+
 
 def task(preset="benchmark", action="velocity", **variations):
     return AreaClearingTask(preset=preset, variations=variations, action=action)
 
 
 @pytest.mark.parametrize("layout", LAYOUTS)
-@pytest.mark.parametrize("preset", PRESETS)
-@pytest.mark.parametrize("seeds", [12, pytest.param(200, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("preset", BY_DEFAULT)
+@pytest.mark.parametrize("seeds", [50, pytest.param(200, marks=pytest.mark.slow)])
 def test_starts_are_valid(preset, layout, seeds):
     clearing = task(preset, layout=layout, random_start=True)
     area = shapely.Polygon(clearing.goal.polygon)

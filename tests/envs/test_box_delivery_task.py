@@ -15,14 +15,17 @@ from pushplan.world import (
     stream,
 )
 
+OTHERS = [pytest.param(name, marks=pytest.mark.slow) for name in PRESETS if name != "benchmark"]
+BY_DEFAULT = ["benchmark", *OTHERS]
+
 
 def task(preset="benchmark", action="velocity", **variations):
     return BoxDeliveryTask(preset=preset, variations=variations, action=action)
 
 
 @pytest.mark.parametrize("layout", LAYOUTS)
-@pytest.mark.parametrize("preset", PRESETS)
-@pytest.mark.parametrize("seeds", [8, pytest.param(200, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("preset", BY_DEFAULT)
+@pytest.mark.parametrize("seeds", [25, pytest.param(200, marks=pytest.mark.slow)])
 def test_starts_are_valid(preset, layout, seeds):
     delivery = task(preset, layout=layout)
     goal = shapely.Polygon(delivery.goal.polygon)

@@ -63,6 +63,7 @@ def child(end, log):
                 time.sleep(0.01)
             os.write(log, b"braked\\n")
 
+signal.signal(signal.SIGHUP, signal.SIG_DFL)  # nohup has it ignored
 folder, *ends = sys.argv[1:]
 for end in ends:
     pid = os.fork()

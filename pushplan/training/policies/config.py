@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import json
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -101,7 +101,8 @@ class TrainingConfig(CheckedFields):
             SchemaError, InvalidInputError, UnknownNameError: if a key or a value is wrong.
         """
         kind = "the training configuration"
-        known_keys(kind, data, None, ("algorithm", "task", "scenarios", "observation", "action"))
+        needed = ("algorithm", "task", "scenarios", "observation", "action")
+        known_keys(kind, data, [field.name for field in fields(cls)], needed)
         algorithm = choice("algorithm", data["algorithm"], ALGORITHMS)
         for name in ("scenarios", "suites"):
             given = data.get(name, ())
