@@ -71,9 +71,14 @@ def test_the_commands_are_where_ci_looks_for_them() -> None:
 
 
 @pytest.mark.parametrize(
-    "size", [reduced, pytest.param(str, marks=pytest.mark.slow)], ids=["reduced", "whole"]
+    ("at", "size"),
+    [
+        pytest.param(0, reduced, marks=pytest.mark.slow),
+        (1, reduced),
+        pytest.param(1, str, marks=pytest.mark.slow),
+    ],
+    ids=["first-reduced", "own-reduced", "own-whole"],
 )
-@pytest.mark.parametrize("at", [0, 1])
 def test_a_bench_runs(at, size, folder) -> None:
     arguments = size(BENCHES[at]).split()
     text = run(["-m", *arguments], folder)
@@ -90,11 +95,9 @@ def test_a_bench_runs(at, size, folder) -> None:
         assert all(float(row["plan_time_median_s"]) > 0.0 for row in table)
 
 
-@pytest.mark.parametrize(
-    "size", [reduced, pytest.param(str, marks=pytest.mark.slow)], ids=["reduced", "whole"]
-)
-def test_five_lines_of_python_run(size, folder) -> None:
-    text = size(block("import bench"))
+@pytest.mark.slow
+def test_five_lines_of_python_run(folder) -> None:
+    text = reduced(block("import bench"))
     assert "kinodynamic-rrt" in run_script(text, folder)
     (out,) = re.findall(r'report\("(.*)"\)', text)
     assert (folder / out / "report.html").exists()

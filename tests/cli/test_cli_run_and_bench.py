@@ -66,14 +66,16 @@ def test_run_prints_scores_and_writes_what_was_asked(
     assert "E_nav" in capsys.readouterr().out
 
 
-def test_run_takes_a_task_with_variations(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+@pytest.mark.slow
+def test_run_takes_a_task_with_variations(tmp_path: Path) -> None:
     film = tmp_path / "film.gif"
     scene = ["--task", "maze", "--boxes", "2", "--shape", "z", "--set", "random_start=true"]
     assert main(["run", *scene, "--policy", "straight", "--render", str(film)]) == 0
     assert film.read_bytes().startswith(b"GIF8")
-    assert main(["run", *scene[:2], "--boxes", "900", "--policy", "straight"]) == 2
+
+
+def test_run_refuses_what_does_not_go_together(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["run", "--task", "maze", "--boxes", "900", "--policy", "straight"]) == 2
     assert main(["run", "smoke", "--boxes", "2", "--policy", "straight"]) == 2
     assert main(["run", "smoke", "--policy", "straight", "--render", "film.avi"]) == 2
     errors = capsys.readouterr().err

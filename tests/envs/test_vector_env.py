@@ -102,6 +102,7 @@ def test_requests_out_of_turn_are_refused():
         envs.recv()
 
 
+@pytest.mark.slow
 def test_a_mask_resets_some_of_them():
     envs = make_vector(MAZE, 3, workers=2, observation="state", autoreset_mode="Disabled")
     first, _ = envs.reset(seed=1)
@@ -117,6 +118,7 @@ def test_a_mask_resets_some_of_them():
     envs.close()
 
 
+@pytest.mark.slow
 def test_observations_stay_unless_that_is_not_wanted():
     for copy in (True, False):
         envs = make_vector(MAZE, 2, workers=1, observation="state", copy=copy)

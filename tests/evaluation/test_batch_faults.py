@@ -43,6 +43,7 @@ def test_texts_that_cannot_be_written_down_become_rows(tmp_path: Path) -> None:
         assert all(rows[name].status == "policy_error" for name in names.split()[:3])
 
 
+@pytest.mark.slow
 def test_limits_that_a_policy_sets_hold_nobody_else_up(tmp_path: Path) -> None:
     rows = run(tmp_path, "NoTemporaryFolder NoFiles Ahead")
     assert {row.status for row in rows.values()} == {"done"}
@@ -83,7 +84,7 @@ def test_one_policy_does_not_change_the_next_ones_results(tmp_path: Path) -> Non
     assert (after.metrics, after.reason) == (alone.metrics, alone.reason)
 
 
-@pytest.mark.parametrize("workers", [0, 1])
+@pytest.mark.parametrize("workers", [0, pytest.param(1, marks=pytest.mark.slow)])
 def test_scores_are_of_the_owners_world(tmp_path: Path, workers: int) -> None:
     rows = run(tmp_path, "Ahead Reweighs MovesTheGoal", workers=workers)
     for name in ("Reweighs", "MovesTheGoal"):
@@ -136,6 +137,7 @@ def test_a_fault_in_the_process_of_the_batch_is_a_row_too(
     assert row.status == STATUSES[name] and row.reason
 
 
+@pytest.mark.slow
 def test_a_policy_that_changes_the_working_folder_changes_it_for_nobody_else(
     tmp_path: Path,
 ) -> None:
@@ -193,6 +195,7 @@ def test_children_of_a_policy_end_with_its_worker(
     assert _gone(apart)
 
 
+@pytest.mark.slow
 def test_logs_and_notes_are_bounded(tmp_path: Path) -> None:
     row = run(tmp_path, "Floods")["Floods"]
     assert row.status == "policy_error" and len(row.reason) <= 300

@@ -126,10 +126,8 @@ def test_a_report_is_written_again_beside_the_first_one(whole: Path, tmp_path: P
     assert results.report(tmp_path / "out") == page
 
 
-@pytest.mark.parametrize("name", [*REPORT, "stress.md", ".lock", "episodes", "failures"])
-def test_links_in_a_run_directory_are_not_followed(name: str, whole: Path, tmp_path: Path) -> None:
-    folder, target = tmp_path / "run", tmp_path / "mine"
-    shutil.copytree(whole, folder)
+def link_to_own(folder: Path, name: str, target: Path) -> None:
+    """Put a link to a user's file, or folder, in the place of one of ours."""
     if (folder / name).is_dir():
         shutil.rmtree(folder / name)
         target.mkdir()
@@ -138,16 +136,30 @@ def test_links_in_a_run_directory_are_not_followed(name: str, whole: Path, tmp_p
         (folder / name).unlink(missing_ok=True)
         target.write_text("mine")
     (folder / name).symlink_to(target)
-    before = content(tmp_path / "mine") if target.is_dir() else target.read_bytes()
     with sqlite3.connect(folder / "results.db") as db:  # so that there is something to write
         db.execute("DELETE FROM results WHERE seed = 1")
-    if name in (".lock", "episodes", "failures"):
-        with pytest.raises(InvalidInputError, match=r"cannot use|is a link"):
-            run(folder)
-    else:
-        run(folder).report()
+
+
+def test_links_in_the_place_of_reports_are_not_followed(whole: Path, tmp_path: Path) -> None:
+    folder, names = tmp_path / "run", [*REPORT, "stress.md"]
+    shutil.copytree(whole, folder)
+    for number, name in enumerate(names):
+        link_to_own(folder, name, tmp_path / f"mine {number}")
+    run(folder).report()
+    for number, name in enumerate(names):
         write_atomic(folder / name, b"ours")
-    assert (content(tmp_path / "mine") if target.is_dir() else target.read_bytes()) == before
+        assert (tmp_path / f"mine {number}").read_text() == "mine"
+
+
+@pytest.mark.parametrize("name", [".lock", "episodes", "failures"])
+def test_links_in_a_run_directory_are_refused(name: str, whole: Path, tmp_path: Path) -> None:
+    folder, target = tmp_path / "run", tmp_path / "mine"
+    shutil.copytree(whole, folder)
+    link_to_own(folder, name, target)
+    before = content(target) if target.is_dir() else target.read_bytes()
+    with pytest.raises(InvalidInputError, match=r"cannot use|is a link"):
+        run(folder)
+    assert (content(target) if target.is_dir() else target.read_bytes()) == before
 
 
 def test_replays_are_not_written_through_a_link(whole: Path, tmp_path: Path) -> None:

@@ -107,6 +107,7 @@ def test_it_clears_the_area(layout):
     assert info["success"] and info["completed"].all()
 
 
+@pytest.mark.slow
 def test_it_delivers_most_boxes_and_the_same_each_time():
     _, info = run("box_delivery", "benchmark", 2, 2500)
     assert info["completed"].sum() >= 8

@@ -219,6 +219,7 @@ def test_a_walled_in_box_is_infeasible():
     assert {i for push in graph.pushes for i in push.delivers} == {1}
 
 
+@pytest.mark.slow
 def test_a_box_at_a_wall_is_relocated():
     here = scene([(0.0, -4.49, 0.0)])
     graph = build_push_graph(here, relocations=1)
