@@ -70,16 +70,16 @@ def test_a_study_of_endless_episodes_is_one_line(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", DOORS)
-def test_ten_thousand_mutations_in_a_process_of_their_own(name: str) -> None:
+def test_thousands_of_mutations_in_a_process_of_their_own(name: str) -> None:
     command = [sys.executable, "-W", "ignore", doors.__file__]
     done = subprocess.run(
-        [*command, name, "1000" if name == "experiment" else "10000"],
+        [*command, name, "500" if name == "experiment" else "4000"],
         capture_output=True,
         text=True,
     )
     assert done.returncode == 0, done.stderr[-4000:]
     cost = doors.Cost(**json.loads(done.stdout))
-    assert cost.worst < 2.0 and cost.grown < 500.0 and 0 < cost.accepted < 10_000
+    assert cost.worst < 2.0 and cost.grown < 500.0 and 0 < cost.accepted < 4000
 
 
 def refusal(name: str, folder: Path, content: bytes | None = None) -> str:

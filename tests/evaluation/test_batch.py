@@ -283,12 +283,12 @@ def wait_for_traces(out: Path, count: int, process: subprocess.Popen[bytes]) -> 
 
 
 @pytest.mark.slow
-def test_a_run_killed_fifty_times_ends_with_the_same_bytes(tmp_path: Path) -> None:
+def test_a_run_killed_many_times_ends_with_the_same_bytes(tmp_path: Path) -> None:
     undisturbed, disturbed = tmp_path / "whole", tmp_path / "killed"
     assert start(undisturbed).wait(300) == 0
     rng = np.random.default_rng(0)
     stored: set[ResultRow] = set()
-    for _ in range(50):
+    for _ in range(25):
         process = start(disturbed)
         try:
             process.wait(rng.uniform(0.2, 1.5))

@@ -120,9 +120,9 @@ def test_hundreds_of_random_worlds(name: str) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["quick", "published"])
-def test_thousands_of_random_worlds(name: str) -> None:
+def test_a_thousand_random_worlds(name: str) -> None:
     planner = ShipLattice(getattr(ShipLatticeConfig, name)())
-    for seed in range(1000, 4000):
+    for seed in range(1000, 2000):
         check_random_world(seed, planner)
 
 
