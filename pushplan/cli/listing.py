@@ -75,7 +75,7 @@ def names_of(kind: str) -> list[str]:
 
 
 def _at(place: str) -> Any:
-    """What is at a place ``"module:name"``."""
+    """The object at a place ``"module:name"``."""
     from pushplan.world.lazy_names import look_up
 
     return look_up("place", {place: place}, place)

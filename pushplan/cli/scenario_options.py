@@ -4,15 +4,11 @@ from __future__ import annotations
 
 import argparse
 import os
-import re
 from collections.abc import Collection, Sequence
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from pushplan.scenarios import Scenario
-
-_SCIENTIFIC = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)[eE][-+]?\d+")
-"""Numbers that YAML 1.1 takes for text, such as 1e-3."""
 
 
 def scenario_of(options: argparse.Namespace) -> Scenario:
@@ -78,6 +74,4 @@ def variation(text: str) -> tuple[str, Any]:
     name, equals, value = text.partition("=")
     if not equals or not name:
         raise InvalidInputError(f"--set takes NAME=VALUE, got {text!r:.80}")
-    if _SCIENTIFIC.fullmatch(value):
-        return name, float(value)
     return name, parse_yaml(value, f"{value!r:.60} of --set {name!r:.60}")

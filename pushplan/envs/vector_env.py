@@ -175,7 +175,7 @@ class WorkerVectorEnv(VectorEnv[Any, Any, Any]):
         return self._joined(self._ask("step", [each[share] for share in self._shares]))
 
     def _joined(self, answers: Sequence[Any]) -> _Batch:
-        """What `step` returns, of the answers of all workers."""
+        """The answers of all workers as `step` returns them."""
         *arrays, infos = zip(*answers, strict=True)
         rewards, terminated, truncated = map(np.concatenate, arrays)
         merged = _merged(infos, self._shares, self.num_envs)

@@ -38,7 +38,7 @@ _MEASURED = 200  # recorded episodes whose mean size is taken
 
 @dataclass(frozen=True)
 class Cost:
-    """What a batch is expected to cost.
+    """The expected cost of a batch.
 
     Attributes:
         jobs: all of them.
@@ -163,7 +163,7 @@ class Experiment:
         any_version: bool = False,
         shard: tuple[int, int] | None = None,
     ) -> Cost:
-        """How many jobs `run` has, about how long they take, and about what they store.
+        """Number of jobs of `run`, about how long they take, and about what they store.
 
         A job is expected to take the mean of its policy in its setting, else of its policy, else
         of all stored episodes.

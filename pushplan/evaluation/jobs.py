@@ -25,7 +25,7 @@ class BatchStoppedError(InvalidInputError):
 
 
 def batch_stopped(error: BaseException) -> BatchStoppedError:
-    """What to raise where files, processes or memory of a batch itself fail."""
+    """The error to raise where files, processes or memory of a batch itself fail."""
     return BatchStoppedError(
         f"no job can be run now ({describe(error)}); what was stored is kept, and the same command "
         "goes on"

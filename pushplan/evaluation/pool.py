@@ -36,7 +36,7 @@ PRELOAD = (
     "pushplan.envs.push_env",
     "pushplan.envs.simulators.pymunk_simulator",
 )
-"""What a worker imports before its first job, so that no job's time holds it."""
+"""Modules that a worker imports before its first job, so that no job's time holds it."""
 _STARTS = 2  # so many workers in a row may end before they are ready until a call gives up
 
 

@@ -222,7 +222,7 @@ def _conditions(
 def _judged(
     name: str, condition: Condition, rows: Sequence[ResultRow], calm: Mapping[int, ResultRow]
 ) -> StressRow:
-    """What became of a condition; ``calm`` are the undisturbed episodes by their seeds."""
+    """The outcome of a condition; ``calm`` are the undisturbed episodes by their seeds."""
     scores, kept = {}, {}
     for score in metric_names(Role.SCORE):
         pairs = [(getattr(row, score), getattr(calm[row.seed], score)) for row in rows]

@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-import time
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from pushplan.evaluation.episode import PolicyError, Recording
 from pushplan.evaluation.jobs import JobSettings
 from pushplan.evaluation.policies import PolicySpec, policy_names
 from pushplan.metrics import compute
 from pushplan.world import InvalidInputError, UnknownNameError
-
-if TYPE_CHECKING:
-    pass
 
 _OTHERS = ("observations", "metrics")
 
@@ -25,22 +21,18 @@ def names() -> tuple[str, ...]:
     return (*policy_names(), *_OTHERS)
 
 
-def warm_up(name: str) -> float:
+def warm_up(name: str) -> None:
     """Run a policy, or one of the other `names`, for a moment.
 
     "observations" are those that a network may have been trained on, "metrics" are all.
     A policy is warmed up as `pushplan.planners.warm_up` does it, and makes a few steps in every
     kind of start of the smoke suite that it is made for; networks only do that.
 
-    Returns:
-        How long it took [s].
-
     Raises:
         UnknownNameError: if there is no such name.
     """
     from pushplan.learned import FeatureObservation
 
-    begin = time.perf_counter()
     if name == "observations":
         for observation in ("image", "spatial", FeatureObservation()):
             _record("random", observation)
@@ -52,7 +44,6 @@ def warm_up(name: str) -> float:
             raise UnknownNameError("policy", name, names())
         PolicySpec(name, name).warm_up()
         _record(name)
-    return time.perf_counter() - begin
 
 
 def _record(policy: str, observation: Any = None) -> list[Recording]:

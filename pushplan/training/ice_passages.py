@@ -37,7 +37,7 @@ STEEPEST = math.radians(75.0)
 
 @dataclass(frozen=True)
 class PassageConfig(CheckedFields):
-    """What passages are drawn."""
+    """Settings of the passages that are drawn."""
 
     # of the ice, drawn from ``least_concentration`` to this
     greatest_concentration: Annotated[float, Limits(0.0, 0.5)] = 0.5

@@ -79,7 +79,7 @@ class _ObjectGoal(ArrayRecord, ABC):
     """A goal for objects."""
 
     def contains(self, outline: FloatArray) -> bool:
-        """Whether an object with this convex outline, (N, 2) corners [m], is where it should be."""
+        """True if an object with this convex outline, (N, 2) corners [m], is where it should be."""
         return bool(self.contains_each(outline, np.array([0, len(outline)]))[0])
 
     @abstractmethod

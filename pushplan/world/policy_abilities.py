@@ -17,10 +17,10 @@ Result = TypeVar("Result", covariant=True)
 
 
 class PendingResult(Protocol[Result]):
-    """What a planning call will return."""
+    """The result that a planning call will have."""
 
     def ready(self, time: float) -> bool:
-        """Whether it is there, or the call has failed, by the clock of the world [s]."""
+        """True if it is there, or the call has failed, by the clock of the world [s]."""
 
     def result(self) -> Result:
         """It.
@@ -38,7 +38,7 @@ class PlanningExecutor(Protocol):
 
     @property
     def takes_time(self) -> bool:
-        """Whether the robot drives on while a call runs."""
+        """True if the robot drives on while a call runs."""
 
     def expected(self, stop: Stop | None) -> float:
         """How long the next call will take by the clock of the world [s]; 0 if unknown.

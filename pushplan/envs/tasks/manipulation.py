@@ -361,7 +361,7 @@ class ManipulationTask(Task):
         return StepOutcome(reward, False, "no_progress" if idle else "", False, idle, done)
 
     def _is_still(self, before: World, after: World) -> bool:
-        """Whether the robot has not moved although it should."""
+        """True if the robot has not moved although it should."""
         return False
 
     def goal_distances(self, poses: FloatArray) -> FloatArray:

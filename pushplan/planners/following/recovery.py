@@ -106,7 +106,7 @@ class FruitlessCalls:
         self._count = 0
 
     def count(self, world: World) -> int:
-        """How many calls in a row have found no plan since the robot is at this place."""
+        """Number of calls in a row that have found no plan since the robot is at this place."""
         away = math.dist(world.robot_pose[:2].tolist(), self._place)
         return self._count if away <= _HERE * world.robot.circumscribed_radius else 0
 
