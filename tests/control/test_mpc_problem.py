@@ -20,7 +20,7 @@ from pushplan.control.mpc.kernels import (
     errors,
     locate,
 )
-from pushplan.control.mpc.qp_kernels import qp_memory, solve_program
+from pushplan.control.mpc.quadratic_program import ProgramSolver, quadratic_program
 
 CURVATURE = 0.4
 CENTRE = np.array([0.0, 1.0 / CURVATURE])
@@ -163,18 +163,18 @@ def random_problem(rng, blocks: int, horizon: int):
     return hessian, gradient, low, high
 
 
-class QuadraticProgram:
-    """`solve_program` with arrays in and out."""
+class Program:
+    """`ProgramSolver` with arrays in and out."""
 
     def __init__(self, blocks, horizon, tolerance=1e-6):
-        firsts = np.arange(blocks) * horizon
-        self.memory = qp_memory(blocks * horizon, horizon, firsts, tolerance, 2000)
+        self.memory = quadratic_program(blocks * horizon, horizon, np.arange(blocks) * horizon)
+        self.solver = ProgramSolver(self.memory, tolerance, 2000)
 
     def solve(self, hessian, gradient, low, high, start):
         memory = self.memory
         memory.hessian[:], memory.gradient[:] = hessian, gradient
         memory.low[:], memory.high[:], memory.x[:] = low, high, start
-        return memory.x.copy() if solve_program(memory) else None
+        return memory.x.copy() if self.solver.solve() else None
 
 
 @pytest.mark.parametrize("blocks", [1, 2])
@@ -182,7 +182,7 @@ def test_the_solver_agrees_with_an_active_set_method(blocks):
     rng = np.random.default_rng(blocks)
     horizon = 12
     n = blocks * horizon
-    program = QuadraticProgram(blocks, horizon, tolerance=1e-7)
+    program = Program(blocks, horizon, tolerance=1e-7)
     change = np.kron(np.eye(blocks), np.eye(horizon) - np.eye(horizon, k=-1))
     reference = casadi.conic(
         "reference",
@@ -203,7 +203,7 @@ def test_the_solver_agrees_with_an_active_set_method(blocks):
 
 
 def test_what_cannot_be_met_has_no_solution():
-    program = QuadraticProgram(1, 4)
+    program = Program(1, 4)
     low, high = -np.ones(8), np.ones(8)
     free = program.solve(np.eye(4), np.ones(4), low, high, np.zeros(4))
     assert free == pytest.approx(-np.ones(4), abs=1e-5)

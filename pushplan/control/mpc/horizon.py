@@ -10,7 +10,11 @@ import numpy as np
 
 from pushplan.compiled import copy_into, kernel, owned
 from pushplan.control.mpc.kernels import Track
-from pushplan.control.mpc.qp_kernels import QpMemory, qp_memory, solve_program
+from pushplan.control.mpc.quadratic_program import (
+    ProgramSolver,
+    QuadraticProgram,
+    quadratic_program,
+)
 from pushplan.world import Drive, Plan, RobotModel
 from pushplan.world.checks import FloatArray, IntArray
 
@@ -36,7 +40,7 @@ class Horizon(NamedTuple):
     limits: Limits
     units: FloatArray  # (2,) of speed [m/s] and turn rate [rad/s] in the program
     columns: IntArray  # (C,) what each block of variables is: 0 speed, 1 turn rate
-    program: QpMemory  # Over M commands of each, in units
+    program: QuadraticProgram  # Over M commands of each, in units
     steps: FloatArray  # (N,) how long each step is [s]
     solved: FloatArray  # (N,) the same when the last solution was found
     shifted: IntArray  # (N,) the step of then that each one lies in; N past the end
@@ -69,15 +73,7 @@ def limits_of(robot: RobotModel) -> Limits:
     )
 
 
-def make_horizon(
-    robot: RobotModel,
-    columns: Sequence[int],
-    count: int,
-    moves: int,
-    *,
-    tolerance: float,
-    iterations: int,
-) -> Horizon:
+def make_horizon(robot: RobotModel, columns: Sequence[int], count: int, moves: int) -> Horizon:
     """Memory for commands to a robot.
 
     Args:
@@ -85,8 +81,6 @@ def make_horizon(
         columns: the variables in their order: 0 speed, 1 turn rate.
         count: N, steps.
         moves: M, commands of each variable.
-        tolerance: of the solver, absolute and relative.
-        iterations: after which the solver gives up.
     """
     rates = (robot.max_acceleration, robot.max_turn_acceleration)
     limited = [math.isfinite(rates[column]) for column in columns]
@@ -95,7 +89,7 @@ def make_horizon(
         limits_of(robot),
         np.array([robot.max_speed, robot.max_turn_rate]),
         np.array(columns, dtype=np.int64),
-        qp_memory(len(columns) * moves, moves, blocks, tolerance, iterations),
+        quadratic_program(len(columns) * moves, moves, blocks),
         np.zeros(count),
         np.zeros(count),
         np.zeros(count, dtype=np.int64),
@@ -146,19 +140,14 @@ def set_bounds(horizon: Horizon, first: float, later: float) -> None:
             program.low[row + i], program.high[row + i] = before - reach, before + reach
 
 
-@kernel
-def solve_about(horizon: Horizon) -> bool:
+def solve_about(horizon: Horizon, solver: ProgramSolver) -> bool:
     """Solve the program from the nominal commands, and replace them; False if it is not solved."""
-    program, units = horizon.program, horizon.units
-    moves = program.moves
-    for i in range(program.x.shape[0]):
-        kind = horizon.columns[i // moves]
-        program.x[i] = horizon.nominal[i % moves, kind] / units[kind]
-    if not solve_program(program):
+    moves, columns = horizon.program.moves, horizon.columns
+    nominal = horizon.nominal[:, columns]
+    horizon.program.x[:] = (nominal / horizon.units[columns]).T.ravel()
+    if not solver.solve():
         return False
-    for i in range(program.x.shape[0]):
-        kind = horizon.columns[i // moves]
-        horizon.nominal[i % moves, kind] = program.x[i] * units[kind]
+    horizon.nominal[:, columns] = horizon.program.x.reshape(-1, moves).T * horizon.units[columns]
     return True
 
 

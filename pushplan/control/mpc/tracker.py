@@ -9,10 +9,17 @@ import numpy as np
 from pushplan.compiled import owned
 from pushplan.control.episode_clock import EpisodeClock
 from pushplan.control.limits import driven_twist
-from pushplan.control.mpc.horizon import FAILED, make_horizon, track_of
+from pushplan.control.mpc.horizon import FAILED, KNOWN, make_horizon, solve_about, track_of
 from pushplan.control.mpc.kernels import Tuning, assembly_memory
 from pushplan.control.mpc.mpc_config import MpcConfig
-from pushplan.control.mpc.tracker_kernels import TrackerMemory, begin_track, track_step
+from pushplan.control.mpc.quadratic_program import ProgramSolver
+from pushplan.control.mpc.tracker_kernels import (
+    TrackerMemory,
+    assemble_step,
+    begin_step,
+    begin_track,
+    finish_step,
+)
 from pushplan.control.stage_follower import StageFollower
 from pushplan.world import Drive, Plan, RobotModel, Twist, World
 from pushplan.world.checks import expect
@@ -78,6 +85,10 @@ class MpcTracker:
             self._robot, self._plan = world.robot, None
             self._earlier = self.fallbacks
             self._memory = tracker_memory(world.robot, self.config)
+            program = self._memory.horizon.program
+            self._solver = ProgramSolver(
+                program, self.config.tolerance, self.config.solver_iterations
+            )
             driven = driven_twist(world)
             self._memory.horizon.last[:] = driven.linear, driven.angular
         memory, out = self._memory, self._out
@@ -85,28 +96,29 @@ class MpcTracker:
         if plan is not self._plan:
             self._plan, self._track = plan, track_of(plan)
             begin_track(memory)
-        pose = owned(world.robot_pose)
-        track_step(memory, self._track, pose, world.time, self._clock.held, out)
+        pose, time, held = owned(world.robot_pose), world.time, self._clock.held
+        if begin_step(memory, self._track, pose, time, held, out):
+            finish_step(memory, self._track, pose, time, held, self._solve(memory), out)
         return Twist(float(out[0]), float(out[1]))
+
+    def _solve(self, memory: TrackerMemory) -> bool:
+        """Make the nominal commands a solution; False if the solver does not find one."""
+        config, known = self.config, memory.horizon.counts[KNOWN] == 1
+        for _ in range(config.iterations if known else config.first_iterations):
+            assemble_step(memory, self._track)
+            if not solve_about(memory.horizon, self._solver):
+                return False
+        return True
 
 
 def tracker_memory(robot: RobotModel, config: MpcConfig) -> TrackerMemory:
-    """Parameters and memory of `track_step` for one robot."""
+    """Parameters and memory of the kernels for one robot."""
     columns = (1, 0) if _optimises_speed(robot, config) else (1,)
     return TrackerMemory(
-        make_horizon(
-            robot,
-            columns,
-            config.horizon,
-            config.horizon,
-            tolerance=config.tolerance,
-            iterations=config.solver_iterations,
-        ),
+        make_horizon(robot, columns, config.horizon, config.horizon),
         _tuning(robot, config),
         config.reach * robot.circumscribed_radius / robot.max_speed,
         config.delay,
-        config.iterations,
-        config.first_iterations,
         np.zeros(3),
         np.zeros(1),
         assembly_memory(len(columns) * config.horizon),

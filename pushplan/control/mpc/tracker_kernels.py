@@ -19,7 +19,6 @@ from pushplan.control.mpc.horizon import (
     send,
     set_bounds,
     shift_steps,
-    solve_about,
 )
 from pushplan.control.mpc.kernels import (
     AssemblyMemory,
@@ -46,8 +45,6 @@ class TrackerMemory(NamedTuple):
     tuning: Tuning
     span: float  # Time that the steps reach, if none is shorter than the control period [s]
     delay: float  # Between a command and its effect [s]
-    rounds: int  # Programs of a call
-    first_rounds: int  # Those of the first call on a path
     pose: FloatArray  # (3,) where the robot is when the next command takes effect
     place: FloatArray  # (1,) path length of the place on the path [m]
     assembly: AssemblyMemory
@@ -61,15 +58,15 @@ def begin_track(memory: TrackerMemory) -> None:
 
 
 @kernel
-def track_step(
+def begin_step(
     memory: TrackerMemory,
     track: Track,
     pose: FloatArray,  # (3,) observed x, y [m], theta [rad]
     time: float,  # of it [s]
     held: float,  # from the last call to this one [s]
     out: FloatArray,  # (2,) the command
-) -> None:
-    """Fill the command for a pose: speed [m/s] and turn rate [rad/s]."""
+) -> bool:
+    """Look where the robot is on its path; False if the command is known, and filled, by that."""
     horizon, tuning, here = memory.horizon, memory.tuning, memory.pose
     lay_steps(horizon, memory.span, held)
     if horizon.counts[KNOWN] == 1:
@@ -83,18 +80,67 @@ def track_step(
     if tuning.stops and along >= track.lengths[-1] - 1e-9:
         horizon.counts[KNOWN] = 0
         send(horizon, 0.0, 0.0, held, True, out)
-    elif abs(error) > _turn_from(memory):
+        _remember(memory, time)
+        return False
+    if abs(error) > _turn_from(memory):
         # too far from the path's heading for a linear model: turn towards it first
         horizon.counts[KNOWN] = 0
         turn = -tuning.max_turn_rate if error > 0.0 else tuning.max_turn_rate
         send(horizon, _turning_speed(horizon), turn, held, True, out)
-    elif _solve(memory, track):
+        _remember(memory, time)
+        return False
+    set_bounds(horizon, horizon.steps[0], horizon.steps[1])
+    for i in range(horizon.steps.shape[0], horizon.program.x.shape[0]):
+        horizon.program.low[i] = 0.0  # a plan is driven forwards
+    if horizon.counts[KNOWN] == 0:
+        horizon.nominal[:] = np.nan
+    return True
+
+
+@kernel
+def assemble_step(memory: TrackerMemory, track: Track) -> None:
+    """Put up the program about the nominal commands."""
+    horizon = memory.horizon
+    assemble(
+        track,
+        memory.tuning,
+        memory.pose,
+        memory.place[0],
+        horizon.last,
+        horizon.steps,
+        horizon.nominal,
+        horizon.program.hessian,
+        horizon.program.gradient,
+        memory.assembly,
+    )
+
+
+@kernel
+def finish_step(
+    memory: TrackerMemory,
+    track: Track,
+    pose: FloatArray,
+    time: float,
+    held: float,
+    solved: bool,  # whether the nominal commands are a solution
+    out: FloatArray,
+) -> None:
+    """Fill the command: of the solution, or what is nearest to it without one."""
+    horizon = memory.horizon
+    if solved:
+        keep_solution(horizon)
         horizon.counts[MISSED] = 0
         send(horizon, horizon.solution[0, 0], horizon.solution[0, 1], held, False, out)
     else:
         _fall_back(memory, track, pose, held, out)
+    _remember(memory, time)
+
+
+@kernel
+def _remember(memory: TrackerMemory, time: float) -> None:
+    """Keep what was sent for as long as it has no effect yet."""
     if memory.delay > 0.0:
-        remember(horizon, time, time - memory.delay)
+        remember(memory.horizon, time, time - memory.delay)
 
 
 @kernel
@@ -121,37 +167,6 @@ def _shift(horizon: Horizon, held: float) -> None:
         for j in range(2):
             horizon.nominal[k, j] = horizon.solution[index, j] if index < count else np.nan
     keep_solution(horizon)
-
-
-@kernel
-def _solve(memory: TrackerMemory, track: Track) -> bool:
-    """Find the solution; False if the solver does not."""
-    horizon = memory.horizon
-    program, count = horizon.program, horizon.steps.shape[0]
-    rounds = memory.rounds
-    if horizon.counts[KNOWN] == 0:
-        rounds = memory.first_rounds
-        horizon.nominal[:] = np.nan
-    set_bounds(horizon, horizon.steps[0], horizon.steps[1])
-    for i in range(count, program.x.shape[0]):
-        program.low[i] = 0.0  # a plan is driven forwards
-    for _ in range(rounds):
-        assemble(
-            track,
-            memory.tuning,
-            memory.pose,
-            memory.place[0],
-            horizon.last,
-            horizon.steps,
-            horizon.nominal,
-            program.hessian,
-            program.gradient,
-            memory.assembly,
-        )
-        if not solve_about(horizon):
-            return False
-    keep_solution(horizon)
-    return True
 
 
 @kernel

@@ -10,7 +10,8 @@ import numpy as np
 from pushplan.compiled import owned
 from pushplan.control.episode_clock import EpisodeClock
 from pushplan.control.limits import driven_twist
-from pushplan.control.mpc.horizon import FAILED, remember, send, track_of
+from pushplan.control.mpc.horizon import FAILED, KNOWN, remember, send, solve_about, track_of
+from pushplan.control.mpc.quadratic_program import ProgramSolver
 from pushplan.geometry.obstacles import obstacles_of
 from pushplan.planners.pushing.model import PushModel, PushState
 from pushplan.planners.pushing.problem import pushing_horizon, pushing_memory
@@ -20,8 +21,12 @@ from pushplan.planners.pushing.push_kernels import (
     SLOWED,
     VALUE,
     PushingMemory,
+    assemble_push,
+    begin_commands,
     begin_push,
-    push_step,
+    drive_push,
+    observe_push,
+    send_push,
 )
 from pushplan.planners.pushing.pushing_config import PushingConfig
 from pushplan.world import Drive, InvalidInputError, Plan, RobotModel, Twist, World
@@ -133,6 +138,9 @@ class PushingMpc:
         if self._robot is not robot and self._robot != robot:
             self._robot, self._plan, self._memory = robot, None, None
             self._horizon = pushing_horizon(robot, config)
+            self._solver = ProgramSolver(
+                self._horizon.program, config.tolerance, config.solver_iterations
+            )
             driven = driven_twist(world)
             self._horizon.last[:] = driven.linear, driven.angular
 
@@ -146,10 +154,23 @@ class PushingMpc:
 
     def _step(self, world: World, pose: FloatArray, box: FloatArray) -> None:
         """Fill the command."""
-        assert self._memory is not None
-        obstacles = obstacles_of(world.static)
-        held, out = self._clock.held, self._out
-        push_step(self._memory, self._track, obstacles, pose, box, world.time, held, out)
+        memory, time, held, out = self._memory, world.time, self._clock.held, self._out
+        assert memory is not None
+        if observe_push(memory, self._track, pose, box, time):
+            solved = self._solve(memory)
+            drive_push(memory, obstacles_of(world.static), solved, time, held, out)
+        else:
+            send_push(memory, 0.0, 0.0, time, held, out)
+
+    def _solve(self, memory: PushingMemory) -> bool:
+        """Make the nominal commands a solution; False if the solver does not find one."""
+        config, held, known = self.config, self._clock.held, memory.horizon.counts[KNOWN] == 1
+        begin_commands(memory, self._track, held)
+        for _ in range(config.iterations if known else config.first_iterations):
+            assemble_push(memory, self._track, held)
+            if not solve_about(memory.horizon, self._solver):
+                return False
+        return True
 
     def _told(self, place: int) -> float:
         return math.nan if self._memory is None else float(self._memory.told[place])

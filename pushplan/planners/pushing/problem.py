@@ -61,20 +61,13 @@ def face_tables(models: Sequence[PushModel], scores: FloatArray, margin: float) 
 
 def pushing_horizon(robot: RobotModel, config: PushingConfig) -> Horizon:
     """Memory for commands, which outlasts a path."""
-    return make_horizon(
-        robot,
-        (0, 1),
-        config.horizon,
-        config.moves,
-        tolerance=config.tolerance,
-        iterations=config.solver_iterations,
-    )
+    return make_horizon(robot, (0, 1), config.horizon, config.moves)
 
 
 def pushing_memory(
     robot: RobotModel, outline: FloatArray, config: PushingConfig, horizon: Horizon
 ) -> tuple[PushingMemory, list[PushModel]]:
-    """Parameters and memory of `push_step`, and the contact model of each face.
+    """Parameters and memory of the kernels, and the contact model of each face.
 
     Args:
         robot: that pushes.
@@ -96,8 +89,6 @@ def pushing_memory(
         config.reach,
         config.delay,
         config.observer_gain,
-        config.iterations,
-        config.first_iterations,
         np.zeros(1, dtype=np.int64),
         np.array([0.0, 0.0, 1.0, 0.0, 0.0, 0.0]),
         *(np.zeros(count) for count in (6, 6, 6, 6, 3, 6)),

@@ -19,7 +19,6 @@ from pushplan.control.mpc.horizon import (
     send,
     set_bounds,
     shift_steps,
-    solve_about,
 )
 from pushplan.control.mpc.kernels import Track, locate
 from pushplan.geometry.angles import wrap_angle
@@ -68,8 +67,6 @@ class PushingMemory(NamedTuple):
     reach: float  # How far the steps reach at full speed [L]
     delay: float  # Between a command and its effect [s]
     gain: float  # Fraction by which an observation corrects what was predicted
-    rounds: int  # Programs of a call
-    first_rounds: int  # Those of the first call on a path
     face: IntArray  # (1,) the one that is pushed
     told: FloatArray  # (6,) along and lateral [m], fraction driven, cost, time [s], 1 if observed
     seen: FloatArray  # (6,) state as the poses show it
@@ -90,8 +87,13 @@ def contact_now(memory: PushingMemory) -> Contact:
 @kernel
 def observe_push(
     memory: PushingMemory, track: Track, pose: FloatArray, box: FloatArray, time: float
-) -> None:
-    """Estimate the state from poses (3,), and the one when a command of now takes effect."""
+) -> bool:
+    """Estimate the state from poses (3,), and the one when a command of now takes effect.
+
+    Returns:
+        False at the end of the path.
+    """
+    memory.told[SLOWED] = 1.0
     told, faces, at = memory.told, memory.faces, memory.box
     contact = contact_now(memory)
     observe(contact, faces.normals[memory.face[0]], pose, box, memory.seen)
@@ -109,6 +111,7 @@ def observe_push(
     told[ALONG] = min(along, track.lengths[-1])
     path = track.poses[min(index, track.poses.shape[0] - 1)]
     told[LATERAL] = (at[1] - path[1]) * np.cos(path[2]) - (at[0] - path[0]) * np.sin(path[2])
+    return bool(along < track.lengths[-1] - 1e-9)
 
 
 @kernel
@@ -206,21 +209,22 @@ def problem_now(memory: PushingMemory, track: Track, held: float) -> PushingProb
 
 
 @kernel
-def solve_push(memory: PushingMemory, track: Track, held: float) -> bool:
-    """Find nominal commands from the last solution; False if the solver does not."""
-    horizon, rounds = memory.horizon, memory.rounds
-    problem = problem_now(memory, track, held)
+def begin_commands(memory: PushingMemory, track: Track, held: float) -> None:
+    """Set the nominal commands to the last solution, moved on, or to full speed straight on."""
+    horizon = memory.horizon
+    problem_now(memory, track, held)
     if horizon.counts[KNOWN] == 1:
         _shift(memory, held)
     else:
-        rounds = memory.first_rounds
         for i in range(horizon.program.moves):
             horizon.nominal[i, 0], horizon.nominal[i, 1] = memory.weights.max_speed, 0.0
-    for _ in range(rounds):
-        memory.told[VALUE] = assemble(problem, horizon.nominal, memory.assembly)
-        if not solve_about(horizon):
-            return False
-    return True
+
+
+@kernel
+def assemble_push(memory: PushingMemory, track: Track, held: float) -> None:
+    """Put up the program about the nominal commands."""
+    problem = problem_now(memory, track, held)
+    memory.told[VALUE] = assemble(problem, memory.horizon.nominal, memory.assembly)
 
 
 @kernel
@@ -295,24 +299,3 @@ def begin_push(memory: PushingMemory, direction: float) -> None:
     memory.told[ALONG], memory.told[SLOWED] = 0.0, 1.0
     memory.horizon.counts[MISSED] = memory.horizon.counts[KNOWN] = 0
     take_face(memory, direction)
-
-
-@kernel
-def push_step(
-    memory: PushingMemory,
-    track: Track,
-    obstacles: Obstacles,
-    pose: FloatArray,  # (3,) of the robot, x, y [m], theta [rad]
-    box: FloatArray,  # (3,) of the box
-    time: float,  # of the poses [s]
-    held: float,  # from the last call to this one [s]
-    out: FloatArray,  # (2,) the command
-) -> None:
-    """Fill the command for poses: speed [m/s] and turn rate [rad/s]."""
-    memory.told[SLOWED] = 1.0
-    observe_push(memory, track, pose, box, time)
-    if memory.told[ALONG] >= track.lengths[-1] - 1e-9:
-        send_push(memory, 0.0, 0.0, time, held, out)
-    else:
-        solved = solve_push(memory, track, held)
-        drive_push(memory, obstacles, solved, time, held, out)

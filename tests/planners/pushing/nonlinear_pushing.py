@@ -22,7 +22,6 @@ from pushplan.planners.pushing.push_kernels import (
     observe_push,
     problem_now,
     send_push,
-    solve_push,
 )
 from pushplan.world import RobotModel, World
 from pushplan.world.checks import FloatArray, IntArray
@@ -54,11 +53,10 @@ class NonlinearPushingMpc(PushingMpc):
 
     def _step(self, world: World, pose: FloatArray, box: FloatArray) -> None:
         memory, held, out = self._memory, self._clock.held, self._out
-        observe_push(memory, self._track, pose, box, world.time)
-        if self.along >= self._track.lengths[-1] - 1e-9:
+        if not observe_push(memory, self._track, pose, box, world.time):
             send_push(memory, 0.0, 0.0, world.time, held, out)
             return
-        if not solve_push(memory, self._track, held):
+        if not self._solve(memory):
             memory.horizon.nominal[:] = [world.robot.max_speed, 0.0]
         memory.horizon.nominal[:] = self._refined(world.robot, memory.horizon.nominal.copy())
         memory.told[VALUE] = self.gain[1]

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from nonlinear_pushing import NonlinearPushingMpc
 from pushing_scenes import SQUARE, best_offset, make_simulator, make_world, run
 
+from pushplan.control.mpc.quadratic_program import ProgramSolver
 from pushplan.planners.pushing import (
     PushingConfig,
     PushingMpc,
@@ -191,9 +192,7 @@ def test_when_the_solver_fails_the_last_solution_is_driven_on():
     mpc, plan = PushingMpc(config), path.plan(AREA, 0)
     first = mpc.command(world, plan)
     assert first.linear > 0.5 * AREA.max_speed
-    memory = mpc._memory
-    program = memory.horizon.program._replace(iterations=1, tolerance=1e-300)
-    mpc._memory = memory._replace(horizon=memory.horizon._replace(program=program))
+    mpc._solver = ProgramSolver(mpc._memory.horizon.program, 1e-300, 1)
     later = [mpc.command(world.moved(time=0.2 * (i + 1)), plan) for i in range(30)]
     assert later[0].linear > 0.0 and later[-1] == Twist(0.0, 0.0)
     assert mpc.fallbacks == 30
