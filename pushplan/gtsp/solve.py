@@ -5,12 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pushplan.gtsp.checking import checked_clusters, checked_costs
 from pushplan.gtsp.exact import expected_seconds, solve_exactly, table_mb
+from pushplan.gtsp.graphs import graph_instance
 from pushplan.gtsp.gtsp_config import GtspConfig
 from pushplan.gtsp.large import best_choice, promising
 from pushplan.gtsp.problem import Problem, tour_cost, usable
@@ -20,6 +22,9 @@ from pushplan.gtsp.tour import Tour, TourStats, TourStatus
 from pushplan.world.checks import IntArray
 from pushplan.world.errors import InvalidInputError
 from pushplan.world.stop import MaxIterations, Stop, check_rules
+
+if TYPE_CHECKING:
+    import networkx as nx
 
 NODES_PER_ROOT_SECOND = 4000.0
 """A search holds no more nodes than this times the root of its seconds, so that it can begin."""
@@ -33,8 +38,8 @@ _DEFAULT = GtspConfig()
 
 
 def solve_gtsp(
-    costs: ArrayLike,
-    clusters: Sequence[Sequence[int]] | Sequence[NDArray[np.int64]],
+    costs: ArrayLike | nx.Graph[Any],
+    clusters: Sequence[Sequence[int]] | Sequence[NDArray[np.int64]] | None = None,
     *,
     stop: Stop | None = None,
     rng: np.random.Generator | None = None,
@@ -46,15 +51,17 @@ def solve_gtsp(
 
     Args:
         costs: (N, N) cost of the arc from each node (row) to each (column), of any sign; inf
-            forbids it. Arcs inside of clusters are not used.
-        clusters: the nodes of each cluster: a partition of 0 to N - 1.
+            forbids it. Arcs inside of clusters are not used. Or a NetworkX graph whose nodes have
+            the attribute ``cluster`` and whose edges have ``weight``; what is missing is forbidden.
+        clusters: the nodes of each cluster: a partition of 0 to N - 1. None for a graph.
         stop: when to return; `MaxIterations` counts rounds of the search, which makes results
             the same on every machine. Without a rule, ``config.iterations`` rounds.
         rng: of the search; the same numbers every time by default.
         config: parameters.
 
     Returns:
-        The tour, its status and what is known of the optimum.
+        The tour, its status and what is known of the optimum. Of a graph, the nodes of the tour
+        are its nodes.
 
     Raises:
         InvalidInputError: for input that breaks a rule, or where ``method="exact"`` would need
@@ -62,11 +69,17 @@ def solve_gtsp(
     """
     check_rules(stop, rng)
     budget = Budget.start(stop, config.iterations)
+    names: Sequence[Any] = ()
+    if clusters is None:
+        if not hasattr(costs, "edges"):
+            raise InvalidInputError("clusters must be given, or a NetworkX graph in place of costs")
+        names, costs, clusters = graph_instance(costs)
     matrix = checked_costs(costs)
     members = checked_clusters(clusters, len(matrix))
     seed = (np.random.default_rng(0) if rng is None else rng).integers(1, 2**63, 1)
     call = _Call(matrix, members, seed.astype(np.uint64), budget, stop, config)
-    return call.solve()
+    tour = call.solve()
+    return replace(tour, nodes=tuple(names[node] for node in tour.nodes)) if names else tour
 
 
 class _Call:

@@ -6,6 +6,7 @@ import enum
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Any
 
 from pushplan.world.errors import InvalidInputError
 
@@ -65,8 +66,8 @@ class Tour:
     """A closed tour through one node of every cluster.
 
     Args:
-        nodes: the nodes in visiting order, beginning with that of the first cluster; empty without
-            a tour.
+        nodes: the nodes in visiting order, beginning with that of the first cluster: numbers, or
+            those of a NetworkX graph; empty without a tour.
         cost: sum of the arcs, the one back to the first node included; infinite without a tour, 0
             for a single cluster.
         lower_bound: no tour is cheaper than this; -inf where nothing is known.
@@ -74,7 +75,7 @@ class Tour:
         stats: what it did.
     """
 
-    nodes: tuple[int, ...]
+    nodes: tuple[Any, ...]
     cost: float
     lower_bound: float
     status: TourStatus

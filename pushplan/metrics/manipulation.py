@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+import networkx as nx
 import numpy as np
 from scipy.spatial.distance import cdist
 
@@ -120,18 +121,13 @@ def spanning_tree_length(static: StaticMap | None, points: list[FloatArray]) -> 
     """
     walled = static is not None and (len(static.polygons) or len(static.segments))
     paths = VisibilityGraph(static) if static is not None and walled else None
-    lengths = np.zeros((len(points), len(points)))
+    graph: nx.Graph[int] = nx.empty_graph(len(points))
     for k, a in enumerate(points):
         for j, b in enumerate(points[:k]):
             length = math.dist(a, b) if paths is None else paths.shortest_path(a, b).length
-            lengths[j, k] = lengths[k, j] = length
-    to_tree, outside, total = lengths[0], list(range(1, len(points))), 0.0
-    while outside:  # Prim: the nearest point joins the tree
-        nearest = min(outside, key=to_tree.__getitem__)
-        outside.remove(nearest)
-        total += float(to_tree[nearest])
-        to_tree = np.minimum(to_tree, lengths[nearest])
-    return total
+            graph.add_edge(j, k, weight=length)
+    tree = nx.minimum_spanning_edges(graph, algorithm="prim")
+    return float(sum(edge["weight"] for _, _, edge in tree))
 
 
 def efficiency(tree_m: float, driven_m: float, *, everything: bool) -> float:

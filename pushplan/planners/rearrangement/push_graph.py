@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -14,15 +16,37 @@ from pushplan.planners.rearrangement.approach import (
     search_approaches,
 )
 from pushplan.planners.rearrangement.candidates import delivering_pushes, partial_pushes
+from pushplan.planners.rearrangement.cost_to_go_kernels import MAX_OBJECTS
+from pushplan.planners.rearrangement.gtsp_reduction import GtspReduction, reduce_to_gtsp
 from pushplan.planners.rearrangement.pose_search_kernels import least_costs
 from pushplan.planners.rearrangement.push import Push
 from pushplan.planners.rearrangement.push_scene import PushScene
 from pushplan.planners.rearrangement.push_simulator import PushSimulator
 from pushplan.planners.rearrangement.relocation import relocating_pushes
-from pushplan.world.checks import FloatArray
+from pushplan.world.checks import FloatArray, IntArray
+
+if TYPE_CHECKING:
+    import networkx as nx
 
 _MOST_APPROACHES = 150
 """Ends of pushes from which approaches are searched for; up to 50 objects have no more."""
+
+
+@dataclass(frozen=True, eq=False)
+class DeliverySets:
+    """What the pushes of a graph deliver, as sets in machine words.
+
+    Args:
+        objects: ids of the objects, in the order of the bits.
+        masks: (N,) sets.
+    """
+
+    objects: tuple[int, ...]
+    masks: IntArray
+
+    def mask(self, ids: tuple[int, ...]) -> int:
+        """The set of some objects; those that nothing delivers are left out."""
+        return sum(1 << b for b, i in enumerate(self.objects) if i in ids)
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,6 +65,41 @@ class PushGraph:
     costs: FloatArray
     approach: ApproachTree
     infeasible: dict[int, str]
+
+    @cached_property
+    def delivery_sets(self) -> DeliverySets:
+        """What its pushes deliver; an object that can only be relocated counts as delivered."""
+        reachable = [n for n in range(len(self.pushes)) if np.isfinite(self.costs[-1, n])]
+        objects = tuple(sorted({i for n in reachable for i in self.pushes[n].serves})[:MAX_OBJECTS])
+        sets = DeliverySets(objects, np.zeros(0, dtype=np.int64))
+        masks = np.array([sets.mask(push.serves) for push in self.pushes], dtype=np.int64)
+        return DeliverySets(objects, masks)
+
+    def to_gtsp(self) -> GtspReduction:
+        """The choice and the order of its pushes as a generalised travelling salesman problem."""
+        sets = self.delivery_sets
+        return reduce_to_gtsp(self.costs, sets.masks.tolist(), len(sets.objects))
+
+    def to_networkx(self) -> nx.DiGraph[int]:
+        """The same problem as a graph that `solve_gtsp` takes.
+
+        Node 0 is where the robot is. Each other node is a push, for one of the objects that it
+        takes along.
+
+        Returns:
+            A graph whose nodes have the attributes ``cluster``, an object's id or ``"robot"``, and
+            ``push``, a place in `pushes` or -1; the ``weight`` of an edge is its cost [m].
+        """
+        import networkx as nx
+
+        problem, objects = self.to_gtsp(), self.delivery_sets.objects
+        graph: nx.DiGraph[int] = nx.DiGraph()
+        for cluster, nodes in zip((*objects, "robot"), problem.clusters, strict=True):
+            for node in nodes:
+                graph.add_node(node, cluster=cluster, push=problem.pushes[node])
+        for a, b in np.argwhere(np.isfinite(problem.costs)).tolist():
+            graph.add_edge(a, b, weight=float(problem.costs[a, b]))
+        return graph
 
 
 def no_penalty(push: Push) -> float:

@@ -4,42 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 
 from pushplan.gtsp import solve_gtsp
-from pushplan.planners.rearrangement.cost_to_go_kernels import MAX_EXACT, MAX_OBJECTS, cost_to_go
-from pushplan.planners.rearrangement.gtsp_reduction import reduce_to_gtsp
+from pushplan.planners.rearrangement.cost_to_go_kernels import MAX_EXACT, cost_to_go
 from pushplan.planners.rearrangement.push_graph import PushGraph
 from pushplan.world import MaxIterations
 from pushplan.world.checks import FloatArray, IntArray
-
-
-@dataclass(frozen=True, eq=False)
-class DeliverySets:
-    """What the pushes of a graph deliver, as sets in machine words.
-
-    Args:
-        objects: ids of the objects, in the order of the bits.
-        masks: (N,) sets.
-    """
-
-    objects: tuple[int, ...]
-    masks: IntArray
-
-    def mask(self, ids: tuple[int, ...]) -> int:
-        """The set of some objects; those that nothing delivers are left out."""
-        return sum(1 << b for b, i in enumerate(self.objects) if i in ids)
-
-
-def delivery_sets(graph: PushGraph) -> DeliverySets:
-    """The sets of a graph; an object that can only be relocated counts as delivered by that."""
-    reachable = [n for n in range(len(graph.pushes)) if np.isfinite(graph.costs[-1, n])]
-    objects = tuple(sorted({i for n in reachable for i in graph.pushes[n].serves})[:MAX_OBJECTS])
-    sets = DeliverySets(objects, np.zeros(0, dtype=np.int64))
-    masks = np.array([sets.mask(push.serves) for push in graph.pushes], dtype=np.int64)
-    return DeliverySets(objects, masks)
 
 
 def _order_after(
@@ -59,7 +31,7 @@ def push_order(graph: PushGraph, iterations: int = 300) -> tuple[list[int], floa
     Objects without a push are left out. Up to `MAX_EXACT` objects the order is the cheapest there
     is; beyond, `solve_gtsp` searches for one on the reduced problem.
     """
-    sets = delivery_sets(graph)
+    sets = graph.delivery_sets
     count = len(sets.objects)
     if not count:
         return [], 0.0
@@ -67,7 +39,7 @@ def push_order(graph: PushGraph, iterations: int = 300) -> tuple[list[int], floa
         best, following = cost_to_go(graph.costs, sets.masks, count)
         start = len(graph.pushes)
         return _order_after(following, sets.masks, 0, start, []), float(best[0, start])
-    reduced = reduce_to_gtsp(graph.costs, sets.masks.tolist(), count)
+    reduced = graph.to_gtsp()
     tour = solve_gtsp(reduced.costs, reduced.clusters, stop=MaxIterations(iterations))
     if not tour.status.has_tour:
         return [], math.inf
@@ -90,7 +62,7 @@ def sequence_pushes(graph: PushGraph, simulated_cost: SimulatedCost, most: int) 
         simulated_cost: simulates a push.
         most: how many pushes are simulated at most.
     """
-    sets = delivery_sets(graph)
+    sets = graph.delivery_sets
     count = len(sets.objects)
     if not count:
         return []

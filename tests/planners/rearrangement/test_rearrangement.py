@@ -192,6 +192,20 @@ def test_set_covering_is_solved_as_by_brute_force():
             assert sum(costs[a, b] for a, b in steps) == pytest.approx(truth)
 
 
+def test_a_push_graph_is_a_networkx_graph_that_the_solver_takes():
+    boxes = [(-1.0, 1.0, 0.3), (0.5, -0.5, 0.0), (1.5, 2.0, 0.8)]
+    here = scene(boxes, ClearanceArea(AREA, [True] * 4))
+    pushes = build_push_graph(here)
+    graph = pushes.to_networkx()
+    order, cost = push_order(pushes)
+    tour = solve_gtsp(graph)
+    assert tour.cost == pytest.approx(cost) and math.isfinite(cost)
+    clusters = {graph.nodes[node]["cluster"] for node in tour.nodes}
+    assert clusters == {"robot", *here.world.movables.ids.tolist()}
+    delivered = {i for n in order for i in pushes.pushes[n].serves}
+    assert delivered == clusters - {"robot"}
+
+
 def test_a_push_stands_for_its_parts():
     assert parts_of(0b101) == [(0,), (2,), (0, 2)]
     assert parts_of(0b11111) == [(0, 1, 2, 3, 4), (0,), (1,), (2,), (3,), (4,)]
