@@ -1,8 +1,12 @@
 """The structure of the package in figures: size, kernels, imports between families, circles.
 
-    python benchmarks/structure.py [PACKAGE_FOLDER ...]
+    python benchmarks/structure.py [PACKAGE_FOLDER ...] [--check]
 
-Reads source code only. Given the folders of two versions it prints a column for each. A *name
+Reads source code only. Given the folders of two versions it prints a column for each. With
+``--check`` it fails where a figure is above its limit in ``reference/structure.yaml``, which may
+only be lowered; the package may have more syntax nodes if a line of the changelog that begins with
+*Size:* says why. A *node* is one of Python's syntax tree: neither comments nor the layout of lines
+change their number. A *name
 imported between families* is one name in an import statement from one planner family in another;
 files directly in ``planners/`` are the room's doors and belong to no family. A *circle* is a set of
 modules that import each other in a loop, imports inside functions counted too. A *kernel* is a
@@ -13,14 +17,20 @@ from __future__ import annotations
 
 import argparse
 import ast
+import re
+import tomllib
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import networkx as nx
+import yaml
 
 MANY_ARGUMENTS = 10
+ROOT = Path(__file__).resolve().parent.parent
+LIMITS = ROOT / "benchmarks" / "reference" / "structure.yaml"
 
 
 @dataclass(frozen=True)
@@ -30,6 +40,11 @@ class Module:
     name: str
     lines: int
     tree: ast.Module
+
+    @property
+    def nodes(self) -> int:
+        """Nodes of its syntax tree."""
+        return sum(1 for _ in ast.walk(self.tree))
 
     @property
     def family(self) -> str | None:
@@ -95,6 +110,49 @@ def between_families(modules: list[Module], root: str) -> Counter[tuple[str, str
     return found
 
 
+def mechanisms(modules: list[Module], folder: Path) -> dict[str, int]:
+    """How many there are of what a package needs one of, found by what the code calls and names."""
+    rules = yaml.safe_load(LIMITS.read_text())["mechanisms"]
+    classes = [n for m in modules for n in ast.walk(m.tree) if isinstance(n, ast.ClassDef)]
+    functions = [n for m in modules for n in ast.walk(m.tree) if isinstance(n, ast.FunctionDef)]
+    found = {}
+    for name, rule in rules.items():
+        if "calls" in rule:
+            calls = set(rule["calls"])
+            found[name] = sum(_loops_over(function, calls) for function in functions)
+        else:
+            kinds = classes if rule["kind"] == "class" else functions
+            found[name] = sum(re.search(rule["name"], one.name) is not None for one in kinds)
+    configs = [one for one in classes if one.name.endswith("Config")]
+    found["fields of configurations"] = sum(
+        isinstance(line, ast.AnnAssign) and "ClassVar" not in ast.unparse(line.annotation)
+        for config in configs
+        for line in config.body
+    )
+    options = folder / "cli" / "commands.toml"
+    if options.is_file():
+        found["options of the command line"] = _options(tomllib.loads(options.read_text()))
+    return found
+
+
+def _loops_over(function: ast.FunctionDef, calls: set[str]) -> bool:
+    """True if one of the functions is called in a loop."""
+    for loop in ast.walk(function):
+        if isinstance(loop, ast.While | ast.For):
+            for node in ast.walk(loop):
+                if isinstance(node, ast.Call) and ast.unparse(node.func).split(".")[-1] in calls:
+                    return True
+    return False
+
+
+def _options(value: Any) -> int:
+    """Entries of a table of commands that are options."""
+    if isinstance(value, dict):
+        own = str(value.get("name", "")).startswith("-")
+        return own + sum(map(_options, value.values()))
+    return sum(map(_options, value)) if isinstance(value, list) else 0
+
+
 def measure(folder: Path) -> tuple[dict[str, str], list[str]]:
     """Figures of one package, and what stands behind them in words."""
     modules = read(folder)
@@ -102,10 +160,13 @@ def measure(folder: Path) -> tuple[dict[str, str], list[str]]:
     compiled = [kernel for module in modules for kernel in kernels(module)]
     crossing, loops = between_families(modules, root), circles(modules, root)
     wide = sum(len(kernel.args.args) >= MANY_ARGUMENTS for kernel in compiled)
-    rooms: Counter[str] = Counter()
+    rooms, nodes = Counter[str](), Counter[str]()
     for module in modules:
-        rooms[module.name.split(".")[1] if "." in module.name else root] += module.lines
+        room = module.name.split(".")[1] if "." in module.name else root
+        rooms[room] += module.lines
+        nodes[room] += module.nodes
     figures = {
+        "syntax nodes": str(nodes.total()),
         "lines": str(sum(module.lines for module in modules)),
         "files": str(len(modules)),
         "longest file": str(max(module.lines for module in modules)),
@@ -115,19 +176,41 @@ def measure(folder: Path) -> tuple[dict[str, str], list[str]]:
         "names imported between planner families": str(sum(crossing.values())),
         "circles": str(len(loops)),
     }
-    figures |= {f"lines of {room}": str(lines) for room, lines in sorted(rooms.items())}
+    figures |= {name: str(count) for name, count in mechanisms(modules, folder).items()}
+    for room, lines in sorted(rooms.items()):
+        figures[f"{room}: syntax nodes"] = str(nodes[room])
+        figures[f"{room}: lines"] = str(lines)
     words = [f"{a} takes {count} names from {b}" for (a, b), count in sorted(crossing.items())]
     return figures, [*words, *("circle: " + ", ".join(loop) for loop in loops)]
 
 
-def main() -> None:
-    """Print the table."""
+def breaches(figures: dict[str, str]) -> list[str]:
+    """What is above its limit, and limits that can be lowered."""
+    limits = yaml.safe_load(LIMITS.read_text())
+    most = {name: rule["most"] for name, rule in limits["mechanisms"].items()} | limits["most"]
+    found = []
+    for name, limit in most.items():
+        value = int(figures[name])
+        if value > limit and not (name == "syntax nodes" and _growth_is_explained()):
+            found.append(f"{name}: {value}, at most {limit}")
+    return found
+
+
+def _growth_is_explained() -> bool:
+    """True if the changelog of the next version says why the package has grown."""
+    unreleased = (ROOT / "CHANGELOG.md").read_text().split("\n## ")[1]
+    return re.search(r"^- Size: .{20,}", unreleased, re.MULTILINE) is not None
+
+
+def main() -> int:
+    """Print the table, and look at the limits."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawTextHelpFormatter
     )
-    here = Path(__file__).resolve().parent.parent / "pushplan"
-    parser.add_argument("folders", nargs="*", type=Path, default=[here])
-    folders = parser.parse_args().folders
+    parser.add_argument("folders", nargs="*", type=Path, default=[ROOT / "pushplan"])
+    parser.add_argument("--check", action="store_true", help="fail where a limit is broken")
+    options = parser.parse_args()
+    folders = options.folders
     measured = [measure(folder.resolve()) for folder in folders]
     rows = dict.fromkeys(key for figures, _ in measured for key in figures)
     width = max(len(row) for row in rows)
@@ -137,7 +220,10 @@ def main() -> None:
         print(
             f"\n{folder}:", *(words or ["nothing crosses between families, no circles"]), sep="\n  "
         )
+    broken = breaches(measured[-1][0]) if options.check else []
+    print(*(f"above its limit: {line}" for line in broken), sep="\n", end="\n" if broken else "")
+    return 1 if broken else 0
 
 
 if __name__ == "__main__":
-    main()
+    raise SystemExit(main())
