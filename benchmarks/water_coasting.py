@@ -6,13 +6,13 @@ import math
 
 import numpy as np
 
-from pushplan.envs.tasks.ship_ice import PRESETS
+from pushplan.envs.tasks.ship_ice import ShipIceTask
 from pushplan.world import GoalLine, Movables, StaticMap, World
 from pushplan.world.checks import number
 
 RADII = (6.0, 10.0, 25.0)
 ENDS = (1.0, 0.5, 0.1)
-FULL_SCALE = PRESETS["full_scale"]
+SHIP = ShipIceTask(preset="full_scale")
 
 
 def coasting(
@@ -46,15 +46,15 @@ def main() -> None:
     octagon = np.stack([np.cos(angles), np.sin(angles)], axis=1) / np.sqrt(8.0**0.5 / np.pi)
     floes = [radius * octagon for radius in RADII]
     world = World(
-        robot=FULL_SCALE.robot(),
+        robot=SHIP.robot,
         robot_pose=np.zeros(3),
-        static=StaticMap.build(bounds=FULL_SCALE.bounds),
+        static=StaticMap.build(bounds=SHIP.static.bounds),
         movables=Movables.from_outlines(
-            floes, np.zeros((len(floes), 3)), density=FULL_SCALE.floe_density
+            floes, np.zeros((len(floes), 3)), density=SHIP.preset.floe_density
         ),
         goal=GoalLine(np.zeros(2), np.array([0.0, 1.0])),
     )
-    water = FULL_SCALE.materials.water
+    water = SHIP.materials.water
     assert water is not None
     rows = zip(
         ("ship", *(f"floe of {radius:g} m radius" for radius in RADII)),

@@ -31,7 +31,7 @@ ROOM = StaticMap.build(
 
 
 def mode(name, preset="testbed"):
-    robot = PRESETS[preset].robot(drive_of(name))
+    robot = PRESETS[preset].robot(*PRESETS[preset].robots, drive_of(name))
     task = SimpleNamespace(robot=robot, heading_step=0.5, waypoint_window=4.0, control_step=0.15)
     return look_up("action", ACTIONS, name)(task)
 

@@ -7,7 +7,6 @@ from manipulation_checks import check_reach, check_start, shapes
 
 from pushplan.envs import PushEnv
 from pushplan.envs.tasks.box_delivery import LAYOUTS, PRESETS, BoxDeliveryTask
-from pushplan.envs.tasks.manipulation import sample_at
 from pushplan.world import (
     ScenarioError,
     UnknownNameError,
@@ -276,9 +275,3 @@ def test_a_pushed_box_leaves_the_floor_of_the_environment():
     assert info["completed"].tolist() == [True, False] and not (terminated or truncated)
     per_metre = 3.0 * 0.2 / 0.2845  # towards the receptacle, at the scale of the testbed
     assert sum(rewards) == pytest.approx(10.0 + per_metre * 0.15, abs=0.01)
-
-
-def test_distances_where_there_is_no_way_are_the_farthest():
-    values = np.array([[0.0, 1.0, np.inf], [1.0, 1.5, np.inf]])
-    poses = np.array([(0.5, 0.5, 0.0), (2.5, 0.5, 0.0), (9.0, 9.0, 0.0)])
-    np.testing.assert_allclose(sample_at(values, 0.0, 0.0, 1.0, 7.0, poses), (0.0, 7.0, 7.0))

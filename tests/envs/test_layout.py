@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import shapely
 
-from pushplan.envs.tasks.layout import FreeSpace, squares, squares_overlap
+from pushplan.envs.tasks.layout import FreeSpace, squares
 from pushplan.world import ScenarioError, StaticMap
 
 
@@ -42,11 +42,3 @@ def test_dense_requests_are_met_and_impossible_ones_refused(random_yaw):
         with pytest.raises(ScenarioError, match=f"{count} boxes of 1 m do not fit"):
             free_space.place_squares(rng, count, 1.0, random_yaw=random_yaw)
     assert time.thread_time() - begin < 2.0
-
-
-def test_overlap_of_squares_agrees_with_shapely():
-    rng = np.random.default_rng(0)
-    poses = rng.uniform((-1, -1, -4), (1, 1, 4), (400, 3))
-    shapes = shapely.polygons(squares(poses, 0.8))
-    expected = shapely.intersects(shapes[0], shapes)
-    np.testing.assert_array_equal(squares_overlap(poses[0], poses, 0.8), expected)

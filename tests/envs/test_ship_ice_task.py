@@ -52,7 +52,7 @@ def test_starts(preset, concentration):
         world = ship.start(stream(seed, "layout"))
         hull = shapely.Polygon(world.robot_outline_world()[0])
         ice = floes(world)
-        x0, y0, x1, y1 = ship.preset.ice_bounds
+        x0, y0, x1, y1 = ship.ice_bounds
         area = (x1 - x0) * (y1 - y0)
         assert sum(floe.area for floe in ice) == pytest.approx(concentration * area, rel=1e-6)
         clearance = ship.preset.clearance

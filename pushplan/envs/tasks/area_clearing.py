@@ -12,44 +12,15 @@ import shapely
 from pushplan.envs.tasks.layout import FreeSpace, rectangle, squares, walls_around
 from pushplan.envs.tasks.manipulation import (
     START_TRIES,
-    ManipulationPreset,
     ManipulationTask,
     ManipulationVariations,
-    robot_makers,
 )
-from pushplan.envs.tasks.presets import build, read_presets
+from pushplan.envs.tasks.presets import read_presets
 from pushplan.envs.tasks.variations import Yaw
 from pushplan.world import ClearanceArea, ScenarioError, StaticMap, World
 from pushplan.world.checks import BoolArray, FloatArray
 
-
-@dataclass(frozen=True)
-class ClearingLayout:
-    """One room, with its middle and that of the clearance area at the origin."""
-
-    outer: tuple[float, float]  # half the width and half the length of the room [m]
-    area: tuple[float, float]  # half the width and half the length of the clearance area [m]
-    walls: float = 0.0  # distance of the walls beside the area from the middle [m]; 0 for none
-    columns: tuple[tuple[float, float], ...] = ()  # (x, y) of the middles of columns [m]
-
-
-@dataclass(frozen=True, kw_only=True)
-class AreaClearingPreset(ManipulationPreset):
-    """One set of dimensions."""
-
-    layouts: Mapping[str, ClearingLayout]  # by name
-    column: float  # side of the square columns [m]
-    inner_wall: float  # thickness of the walls beside the area [m]
-    box_margin: float  # least distance of a box's centre from the edge of the area at the start [m]
-    start_margin: float  # distance of the robot's start from the lower edge of the area [m]
-
-
-PRESETS: Mapping[str, AreaClearingPreset] = read_presets(
-    "area_clearing",
-    AreaClearingPreset,
-    robots=robot_makers,
-    layouts=lambda found: {name: build(ClearingLayout, one) for name, one in found.items()},
-)
+PRESETS = read_presets("area_clearing")
 LAYOUTS = tuple(PRESETS["benchmark"].boxes)
 
 
@@ -82,14 +53,13 @@ class AreaClearingTask(ManipulationTask):
     back_reward = -10.0
     end_reward = 50.0
 
-    preset: AreaClearingPreset
     preset_table = PRESETS
     variation_class = AreaClearingVariations
 
     def _furnish_room(self) -> None:
         self._room = self.preset.layouts[self.variations.layout]
         self.static = self._static()
-        half_x, half_y = self._room.area
+        half_x, half_y = self._room["area"]
         polygon = rectangle(-half_x, -half_y, half_x, half_y)
         edges = open_edges(self.static, polygon, self.box_size)
         if not edges.any():
@@ -98,20 +68,17 @@ class AreaClearingTask(ManipulationTask):
                 f"layout {self.variations.layout!r}; ask for smaller boxes"
             )
         self.goal: ClearanceArea = ClearanceArea(polygon, edges)
-        self.reach = 4.0 * float(np.hypot(*self._room.outer))
+        self.reach = 4.0 * float(np.hypot(*self._room["outer"]))
 
     def _static(self) -> StaticMap:
         """Walls around the room and beside the area, and columns; always the same."""
         room, column = self._room, 0.5 * self.preset.column
-        x, y = room.outer
+        x, y = room["outer"]
         parts = list(walls_around((-x, -y, x, y), self.preset.wall))
-        if room.walls:
-            half, top = 0.5 * self.preset.inner_wall, room.area[1]
-            parts += [
-                rectangle(side - half, -top, side + half, top) for side in (-room.walls, room.walls)
-            ]
+        half, top = 0.5 * self.preset.inner_wall, room["area"][1]
+        parts += [rectangle(side - half, -top, side + half, top) for side in room["walls"]]
         parts += [
-            rectangle(a - column, b - column, a + column, b + column) for a, b in room.columns
+            rectangle(a - column, b - column, a + column, b + column) for a, b in room["columns"]
         ]
         return StaticMap.build(polygons=parts, bounds=(-x, -y, x, y))
 
@@ -119,9 +86,9 @@ class AreaClearingTask(ManipulationTask):
         return self.static, False
 
     def _robot_poses(self, rng: np.random.Generator, static: StaticMap) -> FloatArray:
-        margin, half = self.preset.start_margin, self._room.area[0]
+        margin, half = self.preset.start_margin, self._room["area"][0]
         # lower where something stands in front, such as a column
-        y = margin * np.linspace(1.0, -1.0, 9) - self._room.area[1]
+        y = margin * np.linspace(1.0, -1.0, 9) - self._room["area"][1]
         x = np.zeros(1)
         if self.variations.random_start:
             x = rng.uniform(margin - half, half - margin, START_TRIES // len(y))
@@ -131,7 +98,7 @@ class AreaClearingTask(ManipulationTask):
 
     def _box_region(self) -> tuple[FloatArray, list[Any]]:
         margin = self.preset.box_margin
-        x, y = (half - margin for half in self._room.area)
+        x, y = (half - margin for half in self._room["area"])
         return np.array([-x, -y, x, y]), []
 
     def _measure(self, world: World) -> tuple[FloatArray, BoolArray]:

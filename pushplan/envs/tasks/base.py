@@ -11,10 +11,18 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 
 from pushplan.envs.simulators.base import Materials
+from pushplan.envs.tasks.presets import SOLIDS, Preset
 from pushplan.envs.tasks.variations import TaskVariations
 from pushplan.observation import ObservationBuilder, StateObservation
-from pushplan.world import Drive, RobotModel, UnknownNameError, World
-from pushplan.world.checks import BoolArray, FloatArray, IntArray
+from pushplan.world import (
+    Drive,
+    InvalidInputError,
+    RobotModel,
+    ScenarioError,
+    UnknownNameError,
+    World,
+)
+from pushplan.world.checks import BoolArray, FloatArray, IntArray, choice
 
 _FRICTIONS = {
     "bumper_friction": "robot_object",
@@ -40,10 +48,15 @@ class StepOutcome:
 
     reward: float
     success: bool
-    reason: str
-    terminated: bool
-    truncated: bool
+    reason: str = ""
+    terminated: bool = False
+    truncated: bool = False
     completed: BoolArray | None = None
+
+
+FAILURE_REWARD = -50.0
+"""Of a robot with a goal that runs into a wall, or leaves the map."""
+SUCCESS_REWARD = 200.0
 
 
 class Task(ABC):
@@ -63,7 +76,7 @@ class Task(ABC):
     name: ClassVar[str]
     goal_kind: Literal["robot", "objects"] = "robot"
     """Who has a goal: decides which metrics apply."""
-    preset_table: ClassVar[Mapping[str, Any]]
+    preset_table: ClassVar[Mapping[str, Preset]]
     """Dimensions by the name of the preset."""
     variation_class: ClassVar[type[TaskVariations]]
     presets: ClassVar[tuple[str, ...]]
@@ -90,7 +103,7 @@ class Task(ABC):
     waypoint_window: float = 0.0
     """Side of the square around the robot that waypoint actions reach [m], where it has them."""
 
-    preset: Any
+    preset: Preset
     """The dimensions, one of the values of `preset_table`."""
     variations: Any
 
@@ -107,8 +120,9 @@ class Task(ABC):
             raise UnknownNameError(f"preset of {self.name}", preset, self.preset_table)
         if self.action not in self.actions:
             raise UnknownNameError(f"action of task {self.name!r}", self.action, self.actions)
-        self.preset_name, self.preset = preset, self.preset_table[preset]
+        self.preset = self.preset_table[preset]
         self.variations = self.variation_class.read({} if variations is None else variations)
+        self._steps = 0
         self._prepare()
 
     @classmethod
@@ -119,6 +133,34 @@ class Task(ABC):
     def _prepare(self) -> None:
         """Set what is the same in every start: the robot, the materials, the times, the goal."""
         raise NotImplementedError(f"task {self.name!r} has neither __init__ nor _prepare")
+
+    def _make_robot(self) -> RobotModel:
+        """Set the robot of the preset, with what is asked for, and all that `_drive` sets.
+
+        Returns:
+            It with the preset's own limits.
+
+        Raises:
+            ScenarioError: if there is no such robot, or the bumper does not fit it.
+        """
+        preset, wanted = self.preset, self.variations
+        name, bumper = getattr(wanted, "robot", None), getattr(wanted, "bumper", None)
+        name = next(iter(preset.robots)) if name is None else name
+        try:
+            choice("robot", name, tuple(preset.robots))
+            if preset.bumper is None and bumper not in (None, "none"):
+                raise InvalidInputError(
+                    f"bumper {bumper!r} does not fit the robot of this preset: it has none, or "
+                    "one of its own (valid: none)"
+                )
+        except InvalidInputError as error:
+            raise ScenarioError(f"{self.name}: {error}") from error
+        options = {} if preset.bumper is None else {"bumper": bumper or preset.bumper}
+        robot = preset.robot(name, drive_of(self.action), **options)
+        self._drive(robot)
+        if self.materials.solids is not None and name in SOLIDS:
+            self.materials = replace(self.materials, solids=SOLIDS[name])
+        return robot
 
     def _drive(self, robot: RobotModel) -> None:
         """Set robot, materials, control step and slowness: the preset and what departs from it."""
@@ -132,12 +174,17 @@ class Task(ABC):
         self.slowness = max(1.0, speed / self.robot.max_speed, turn / self.robot.max_turn_rate)
 
     @property
-    def _max_steps(self) -> int:
-        """Control steps that last as long as those of the preset, or longer for a slower robot."""
-        limit = self.variations.time_limit
+    def _longest(self) -> float:
+        """How long an episode lasts unless said otherwise [s]: longer for a slower robot."""
         seconds: float = self.preset.max_steps * self.preset.control_step * self.slowness
-        seconds = seconds if limit is None else limit
-        return math.ceil(seconds / self.control_step - 1e-9)
+        return seconds
+
+    @property
+    def _max_steps(self) -> int:
+        """Control steps until an episode is cut off."""
+        limit = self.variations.time_limit
+        limit = self._longest if limit is None else limit
+        return math.ceil(limit / self.control_step - 1e-9)
 
     @abstractmethod
     def start(self, rng: np.random.Generator) -> World:
@@ -179,6 +226,23 @@ class Task(ABC):
             work: sum over the objects of mass times path length in this step [kg m].
             touched_static: whether the robot touched something static.
         """
+
+    def _driven(self, reward: float, after: World, *, failure: str = "") -> StepOutcome:
+        """The outcome of a step where the goal is one for the robot.
+
+        Args:
+            reward: for the motion.
+            after: the world when the step ended.
+            failure: why the episode has failed, even where the goal is reached at once.
+        """
+        self._steps += 1
+        if failure:
+            return StepOutcome(reward + FAILURE_REWARD, False, failure, True)
+        if after.navigation_goal.distance(*after.robot_pose[:2].tolist()) == 0.0:
+            return StepOutcome(reward + SUCCESS_REWARD, True, "goal", True)
+        if self._steps >= self._max_steps:
+            return StepOutcome(reward, False, "time_limit", truncated=True)
+        return StepOutcome(reward, False)
 
     def observation(self, name: str) -> ObservationBuilder:
         """The builder of an observation by name.

@@ -12,10 +12,8 @@ import shapely
 from pushplan.envs.tasks.layout import rectangle, those_inside, walls_around
 from pushplan.envs.tasks.manipulation import (
     START_TRIES,
-    ManipulationPreset,
     ManipulationTask,
     ManipulationVariations,
-    robot_makers,
 )
 from pushplan.envs.tasks.presets import read_presets
 from pushplan.envs.tasks.variations import Yaw
@@ -27,33 +25,7 @@ _STILL_TURN = 0.02
 _COLUMN_TRIES = 20
 
 
-@dataclass(frozen=True, kw_only=True)
-class BoxDeliveryPreset(ManipulationPreset):
-    """One set of dimensions. Rooms have their middle at the origin."""
-
-    # length along x and width along y of the room by layout [m]
-    rooms: Mapping[str, tuple[float, float]]
-    receptacle: float  # side of the square receptacle in the corner at +x, +y [m]
-    # pieces that fill the other corners: (3, 2) corners each about the room's corner, with the room
-    # at +x and +y [m]
-    corner: tuple[FloatArray, ...]
-    columns: Mapping[str, int]  # greatest number of columns by layout
-    column: float  # side of the square columns [m]
-    column_spacing: float  # least distance between the centres of two columns [m]
-    column_margin: float  # least way between a column and the walls [m]
-    # length, as a fraction of the room's, and thickness of the divider [m]
-    divider: tuple[float, float]
-    divider_margin: float  # least distance of its centre line from the walls along it [m]
-    start_margin: float  # distance of a fixed start from the wall at -x [m]
-    still: float  # a robot that moves less than this in an action has not moved [m]
-
-
-PRESETS: Mapping[str, BoxDeliveryPreset] = read_presets(
-    "box_delivery",
-    BoxDeliveryPreset,
-    robots=robot_makers,
-    corner=lambda pieces: tuple(map(np.array, pieces)),
-)
+PRESETS = read_presets("box_delivery")
 LAYOUTS = tuple(PRESETS["benchmark"].boxes)
 
 
@@ -86,7 +58,6 @@ class BoxDeliveryTask(ManipulationTask):
     end = "delivered"
     towards = 3.0
 
-    preset: BoxDeliveryPreset
     preset_table = PRESETS
     variation_class = BoxDeliveryVariations
 
@@ -109,7 +80,7 @@ class BoxDeliveryTask(ManipulationTask):
         """What keeps boxes from getting stuck in the corners without receptacle."""
         x, y = self.bounds[2:]
         return [
-            (np.array([x, y]) - piece) * (sx, sy)
+            (np.array([x, y]) - np.array(piece)) * (sx, sy)
             for sx, sy in ((-1.0, -1.0), (1.0, -1.0), (-1.0, 1.0))
             for piece in self.preset.corner
         ]
@@ -153,7 +124,11 @@ class BoxDeliveryTask(ManipulationTask):
         corners = ((np.array([x1, y + side * half]), side) for side in (1.0, -1.0))
         return [
             wall,
-            *(at - piece * (1.0, -side) for at, side in corners for piece in self.preset.corner),
+            *(
+                at - np.array(piece) * (1.0, -side)
+                for at, side in corners
+                for piece in self.preset.corner
+            ),
         ]
 
     def _robot_poses(self, rng: np.random.Generator, static: StaticMap) -> FloatArray:

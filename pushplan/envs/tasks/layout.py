@@ -12,6 +12,8 @@ import numpy as np
 import shapely
 from numpy.typing import ArrayLike, NDArray
 
+from pushplan.envs.tasks.presets import Preset
+from pushplan.geometry import GeodesicField
 from pushplan.world import Movables, Receptacle, RobotModel, ScenarioError, StaticMap
 from pushplan.world.checks import BoolArray, FloatArray, IntArray
 from pushplan.world.outline import transform, transform_outlines
@@ -122,56 +124,14 @@ class FreeSpace:
             f"{count} boxes of {size:g} m do not fit: {room}; ask for fewer or smaller boxes"
         )
 
-    def place_beside(
-        self,
-        rng: np.random.Generator,
-        count: int,
-        size: float,
-        robot: Sequence[Any],
-        *,
-        touching: bool,
-        keep_off: Sequence[tuple[Any, float]] = (),
-        **rules: Any,
-    ) -> FloatArray:
-        """`place_squares` off a robot, or in touch with it.
 
-        Args:
-            rng: the only source of randomness.
-            count: number of squares.
-            size: side [m].
-            robot: Shapely geometries.
-            touching: whether squares may touch the robot: they are placed as if it were not there,
-                and those that overlap it are moved straight away from its middle until they touch.
-            keep_off, rules: as `place_squares` takes them.
-
-        Raises:
-            ScenarioError: if there is no room for them.
-        """
-        body = shapely.union_all(list(robot))
-        box = np.asarray(rules.get("within", self.static.bounds))
-        allowed, spacing = rules.get("allowed"), rules.get("spacing", 0.0)
-        for _ in range(_TOUCH_TRIES if touching else 0):
-            poses = self.place_squares(rng, count, size, keep_off=keep_off, **rules)
-            moved = _moved_off(poses, size, body)
-            pushed = moved[(moved != poses).any(axis=1)]
-            inside = (pushed[:, :2] >= box[:2]).all() and (pushed[:, :2] <= box[2:]).all()
-            fits = self.is_free(shapely.polygons(squares(pushed, size)), 0.0, keep_off).all()
-            reached = allowed is None or not len(pushed) or allowed(pushed[:, :2]).all()
-            apart = all(
-                _keeps_off(pose, moved[k + 1 :], size, spacing) for k, pose in enumerate(moved)
-            )
-            if inside and fits and reached and apart:
-                return moved
-        off = [*keep_off, *((shape, 0.0) for shape in robot)]
-        return self.place_squares(rng, count, size, keep_off=off, **rules)
-
-
-def _moved_off(poses: FloatArray, size: float, body: Any) -> FloatArray:
-    """Poses (N, 3) of squares; those that overlap a body moved away from its middle, to touch."""
+def _moved_off(poses: FloatArray, size: float, body: Any) -> tuple[FloatArray, BoolArray]:
+    """Poses (N, 3) of squares, and which of them have been moved off a body, to touch it."""
     moved = poses.copy()
     middle = np.array([body.centroid.x, body.centroid.y])
     reach = size + math.dist(body.bounds[:2], body.bounds[2:])
-    for k in np.flatnonzero(shapely.intersects(shapely.polygons(squares(poses, size)), body)):
+    pushed: BoolArray = shapely.intersects(shapely.polygons(squares(poses, size)), body)
+    for k in np.flatnonzero(pushed):
         away = poses[k, :2] - middle
         length = float(np.hypot(*away))
         away = away / length if length > 0.0 else np.array([1.0, 0.0])
@@ -182,13 +142,17 @@ def _moved_off(poses: FloatArray, size: float, body: Any) -> FloatArray:
             hit = shapely.Polygon(squares(moved[k : k + 1], size)[0]).intersects(body)
             near, far = (half, far) if hit else (near, half)
         moved[k, :2] = poses[k, :2] + far * away
-    return moved
+    return moved, pushed
 
 
 def _keeps_off(pose: FloatArray, others: FloatArray, size: float, spacing: float) -> bool:
     """Whether a square overlaps none of others (N, 3), and their centres keep their spacing."""
-    near = np.hypot(*(others[:, :2] - pose[:2]).T) < spacing
-    return not (near.any() or squares_overlap(pose, others, size).any())
+    away = np.hypot(*(others[:, :2] - pose[:2]).T)
+    # squares whose centres are a diagonal apart do not meet
+    near = others[away < math.sqrt(2.0) * size]
+    shape, others_near = squares(pose[None], size), squares(near, size)
+    meets = shapely.intersects(shapely.polygons(shape), shapely.polygons(others_near))
+    return not ((away < spacing).any() or meets.any())
 
 
 def _throw(
@@ -267,11 +231,15 @@ def place_boxes(
     size: float,
     robot: Sequence[Any],
     *,
-    preset: Any,
+    preset: Preset,
     wanted: Any,
+    keep_off: Sequence[tuple[Any, float]],
     **rules: Any,
 ) -> Movables:
     """Square boxes on free floor, of which some stand on casters.
+
+    Boxes that may touch the robot are placed as if it were not there, and those that overlap it are
+    moved straight away from its middle until they touch.
 
     Args:
         free_space: the floor.
@@ -279,25 +247,25 @@ def place_boxes(
         count: number of boxes.
         size: side [m].
         robot: Shapely geometries of the robot.
-        preset: of a task with boxes: their mass [kg] (None: 1 kg/m² of their area) and contact
-            radius [m].
+        preset: of a task with boxes.
         wanted: the variations of that task: heading, fraction on casters, whether boxes may touch
             the robot.
-        rules: as `FreeSpace.place_squares` takes them.
+        keep_off, rules: as `FreeSpace.place_squares` takes them.
 
     Raises:
         ScenarioError: if there is no room for them.
     """
-    poses = free_space.place_beside(
-        rng,
-        count,
-        size + 2.0 * preset.contact_radius,
-        robot,
-        touching=preset.touching if wanted.touching is None else wanted.touching,
-        gap=GAP * size,
-        random_yaw=wanted.box_yaw == "random",
-        **rules,
-    )
+    side = size + 2.0 * preset.contact_radius
+    rules |= {"gap": GAP * size, "random_yaw": wanted.box_yaw == "random"}
+    touching = preset.touching if wanted.touching is None else wanted.touching
+    for _ in range(_TOUCH_TRIES if touching else 0):
+        poses = free_space.place_squares(rng, count, side, keep_off=keep_off, **rules)
+        poses, pushed = _moved_off(poses, side, shapely.union_all(list(robot)))
+        if _may_stay(poses, pushed, side, free_space, keep_off, **rules):
+            break
+    else:
+        off = [*keep_off, *((shape, 0.0) for shape in robot)]
+        poses = free_space.place_squares(rng, count, side, keep_off=off, **rules)
     on_casters = np.zeros(count, dtype=bool)
     on_casters[rng.permutation(count)[: round(wanted.wheeled * count)]] = True
     masses = None if preset.box_mass is None else np.full(count, preset.box_mass)
@@ -308,6 +276,39 @@ def place_boxes(
         wheeled=on_casters,
         contact_radii=preset.contact_radius,
     )
+
+
+def _may_stay(
+    poses: FloatArray,
+    pushed: BoolArray,
+    size: float,
+    free_space: FreeSpace,
+    keep_off: Sequence[tuple[Any, float]],
+    *,
+    spacing: float = 0.0,
+    within: ArrayLike | None = None,
+    allowed: Callable[[FloatArray], BoolArray] | None = None,
+    **others: Any,
+) -> bool:
+    """Whether squares (N, 3) keep the rules of `place_squares` where some have been pushed."""
+    box = np.asarray(free_space.static.bounds if within is None else within)
+    moved = poses[pushed]
+    return bool(
+        ((moved[:, :2] >= box[:2]) & (moved[:, :2] <= box[2:])).all()
+        and free_space.is_free(shapely.polygons(squares(moved, size)), 0.0, keep_off).all()
+        and (allowed is None or not len(moved) or allowed(moved[:, :2]).all())
+        and all(_keeps_off(pose, poses[k + 1 :], size, spacing) for k, pose in enumerate(poses))
+    )
+
+
+def goal_distances(field: GeodesicField, poses: FloatArray) -> FloatArray:
+    """(K,) shortest way of each object's centre to the goal [m], inf where there is none.
+
+    Args:
+        field: of the goal.
+        poses: (K, 3) of the objects.
+    """
+    return np.array([field.sample(x, y) for x, y in poses[:, :2].tolist()])
 
 
 def footprint_at(robot: RobotModel, pose: FloatArray) -> list[Any]:
@@ -340,21 +341,3 @@ def squares(poses: FloatArray, size: float) -> FloatArray:
     turn = np.stack([np.stack([c, -s], -1), np.stack([s, c], -1)], -2)  # (N, 2, 2)
     corners: FloatArray = np.einsum("nij,kj->nki", turn, _CORNERS * size) + poses[:, None, :2]
     return corners
-
-
-def squares_overlap(pose: FloatArray, others: FloatArray, size: float) -> BoolArray:
-    """(N,) whether a square overlaps each of others (N, 3) of the same side ``size`` [m].
-
-    Separating axes: the four edge normals, along which a square of heading ``phi`` reaches
-    ``size / 2 (|cos phi| + |sin phi|)``.
-    """
-    offset = others[:, :2] - pose[:2]
-    turn = others[:, 2] - pose[2]
-    reach = 0.5 * size * (1.0 + np.abs(np.cos(turn)) + np.abs(np.sin(turn)))
-    apart = np.zeros(len(others), dtype=bool)
-    for heading in (np.broadcast_to(pose[2], turn.shape), others[:, 2]):
-        c, s = np.cos(heading), np.sin(heading)
-        along = np.abs(c * offset[:, 0] + s * offset[:, 1])
-        across = np.abs(c * offset[:, 1] - s * offset[:, 0])
-        apart |= (along >= reach) | (across >= reach)
-    return ~apart

@@ -2,32 +2,25 @@
 
 from __future__ import annotations
 
-import math
 from abc import abstractmethod
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
-from functools import lru_cache, partial
-from pkgutil import resolve_name
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import lru_cache
 from typing import Annotated, Any, ClassVar, Self
 
 import numpy as np
 from scipy import ndimage
 
-from pushplan.compiled import kernel
-from pushplan.envs.simulators.base import Materials
-from pushplan.envs.tasks.base import StepOutcome, Task, drive_of
-from pushplan.envs.tasks.layout import GAP, FreeSpace, footprint_at, place_boxes
-from pushplan.envs.tasks.presets import SOLIDS
+from pushplan.envs.tasks.base import StepOutcome, Task
+from pushplan.envs.tasks.layout import GAP, FreeSpace, footprint_at, goal_distances, place_boxes
 from pushplan.envs.tasks.variations import TaskVariations, Yaw
 from pushplan.geometry import GeodesicField, Grid, clearance_field, geodesic_field
-from pushplan.geometry.distance_field import sample_values
 from pushplan.geometry.free_components import FreeComponents
 from pushplan.observation import ImageObservation
 from pushplan.world import (
     BUMPERS,
     InvalidInputError,
     ManipulationGoal,
-    RobotModel,
     ScenarioError,
     StaticMap,
     World,
@@ -41,24 +34,6 @@ from pushplan.world.checked_fields import (
 )
 from pushplan.world.checks import BoolArray, FloatArray, IntArray, choice
 
-
-@kernel(allocates=True)
-def sample_at(
-    values: FloatArray,  # (rows, columns) distances [m], inf where no path leads to the goal
-    ox: float,  # least x and y of the grid [m]
-    oy: float,
-    step: float,  # side of a cell [m]
-    farthest: float,  # in place of inf [m]
-    poses: FloatArray,  # (K, 3)
-) -> FloatArray:
-    """(K,) goal distance of each object [m], from a grid."""
-    out = np.empty(poses.shape[0])
-    for k in range(poses.shape[0]):
-        found = sample_values(values, ox, oy, step, poses[k, 0], poses[k, 1])
-        out[k] = found if found < math.inf else farthest
-    return out
-
-
 LEAST_SIZE = 0.01
 """Least size of boxes, as a fraction of the preset's."""
 _CHANNELS = ("occupancy", "footprint", "robot_distance", "goal_distance")
@@ -67,38 +42,6 @@ _LAYOUT_TRIES = 8
 START_TRIES = 2000
 STATIC_REWARD = -0.25
 STILL_REWARD = -0.25
-
-
-@dataclass(frozen=True, kw_only=True)
-class ManipulationPreset:
-    """Dimensions that both tasks have."""
-
-    # makers of the robots by name, called with ``drive`` and, where the preset has one, ``bumper``;
-    # the first is the default
-    robots: Mapping[str, Callable[..., RobotModel]]
-    bumper: str | None  # the bumper unless said otherwise; None where robots have one of their own
-    boxes: Mapping[str, int]  # number of boxes by layout
-    box_size: float  # side of the boxes [m]
-    box_mass: float | None  # [kg]; the area in m² if None, as the 2D benchmark's metric takes it
-    box_spacing: float  # least distance between the centres of two boxes at the start [m]
-    wall: float  # thickness of the walls [m]
-    materials: Materials  # friction; solids are filled in by robot where there are any
-    control_step: float  # time between two commands [s]
-    heading_step: float  # how far a heading action drives [m]
-    windows: Mapping[str, float]  # side of the observed square by layout [m]
-    field_resolution: float  # side of a cell of the distance field [m]
-    progress_reward: float  # for each metre by which the way of an object to its goal changes [1/m]
-    contact_radius: float = 0.0  # of the boxes [m]
-    touching: bool = False  # whether boxes may start in touch with the robot
-
-
-def robot_makers(robots: Mapping[str, Mapping[str, Any]]) -> dict[str, Callable[..., RobotModel]]:
-    """Makers of robots as `presets.yaml` has them."""
-    return {name: _maker(**entry) for name, entry in robots.items()}
-
-
-def _maker(make: str, **limits: float) -> Callable[..., RobotModel]:
-    return partial(resolve_name(make), **limits)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -196,15 +139,11 @@ class ManipulationTask(Task):
     end_reward: ClassVar[float] = 0.0
 
     goal: ManipulationGoal
-    preset: ManipulationPreset
     variations: ManipulationVariations
 
     def _prepare(self) -> None:
         dimensions, wanted = self.preset, self.variations
         robot = self._make_robot()
-        self._drive(robot)
-        if self.materials.solids is not None:
-            self.materials = replace(self.materials, solids=SOLIDS[self.robot_name])
         self.heading_step = dimensions.heading_step
         self.waypoint_window = dimensions.windows[wanted.layout]
         step_time = self.slowness * self.heading_step / robot.max_speed
@@ -225,22 +164,6 @@ class ManipulationTask(Task):
     @abstractmethod
     def _furnish_room(self) -> None:
         """Set `goal`, `reach` and whatever is the same in every start."""
-
-    def _make_robot(self) -> RobotModel:
-        preset, wanted = self.preset, self.variations
-        first = next(iter(preset.robots))
-        self.robot_name = first if wanted.robot is None else wanted.robot
-        try:
-            choice("robot", self.robot_name, tuple(preset.robots))
-            if preset.bumper is None and wanted.bumper is not None:
-                raise InvalidInputError(
-                    f"bumper {wanted.bumper!r}: the robot of this preset has one of its own"
-                )
-        except InvalidInputError as error:
-            raise ScenarioError(f"{self.name}: {error}") from error
-        bumper = wanted.bumper or preset.bumper
-        options = {} if bumper is None else {"bumper": bumper}
-        return preset.robots[self.robot_name](drive=drive_of(self.action), **options)
 
     @property
     def field(self) -> GeodesicField:
@@ -366,9 +289,8 @@ class ManipulationTask(Task):
 
     def goal_distances(self, poses: FloatArray) -> FloatArray:
         """(K,) shortest way of each box centre to the goal [m], from poses (K, 3)."""
-        grid = self.field.grid
-        ox, oy = grid.origin
-        return sample_at(self.field.filled, ox, oy, grid.resolution, self._farthest, poses)
+        found = goal_distances(self.field, poses)
+        return np.where(np.isinf(found), self._farthest, found)
 
     def _idle(self, world: World, progress: bool) -> bool:
         """Whether nothing has been achieved for too long, after a step that ended in ``world``."""

@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from pkgutil import resolve_name
 from typing import Annotated, ClassVar
 
 import numpy as np
 import shapely
 
-from pushplan.envs.simulators.base import Materials
-from pushplan.envs.tasks.base import StepOutcome, Task, drive_of
+from pushplan.envs.tasks.base import StepOutcome, Task
 from pushplan.envs.tasks.layout import (
     GAP,
     FreeSpace,
@@ -21,21 +18,11 @@ from pushplan.envs.tasks.layout import (
     rectangle,
     walls_around,
 )
-from pushplan.envs.tasks.presets import read_presets
+from pushplan.envs.tasks.presets import Preset, read_presets
 from pushplan.envs.tasks.variations import TaskVariations, Yaw
 from pushplan.geometry.distance_field import GeodesicField, geodesic_field
 from pushplan.observation import ImageObservation
-from pushplan.world import (
-    BUMPERS,
-    Drive,
-    GoalDisc,
-    InvalidInputError,
-    RobotModel,
-    ScenarioError,
-    StaticMap,
-    World,
-    turtlebot3_burger,
-)
+from pushplan.world import BUMPERS, GoalDisc, ScenarioError, StaticMap, World
 from pushplan.world.checked_fields import (
     Fraction,
     NonNegativeFloat,
@@ -43,95 +30,30 @@ from pushplan.world.checked_fields import (
     OneOf,
     PositiveFloat,
 )
-from pushplan.world.checks import FloatArray, choice
+from pushplan.world.checks import FloatArray
 
-WALL_REWARD = -50.0
-SUCCESS_REWARD = 200.0
 _IMAGE_CHANNELS = ("footprint", "movable", "static", "goal_distance")
 _START_TRIES = 2000
 
 
-@dataclass(frozen=True)
-class MazePreset:
-    """One set of dimensions. Mazes are rooms with their lower left corner at the origin."""
-
-    rooms: Mapping[str, tuple[float, float]]  # width and length of the room by shape [m]
-    wall: float  # half thickness of the walls [m]
-    # whether walls are rounded segments whose centre lines bound the room, or boxes around the free
-    # room
-    thick_lines: bool
-    starts: Mapping[str, tuple[float, float, float]]  # fixed start x, y [m], theta [rad], by shape
-    goals: Mapping[str, tuple[float, float]]  # goal point by shape [m]
-    goal_radius: float  # of the goal itself [m]
-    robot_radius: float  # added to it, as the robot's centre is what has to get there [m]
-    random_start: bool  # whether the start is random unless said otherwise
-    max_speed: float  # [m/s]
-    max_turn_rate: float  # [rad/s]
-    box_size: float  # side of the boxes [m]
-    box_mass: float | None  # [kg], or None for 1 kg/m² of their area
-    materials: Materials  # friction and rolling
-    control_step: float  # [s]
-    max_steps: int  # control steps until the episode is cut off
-    progress_reward: float  # for the whole way to the goal
-    work_reward: float  # per kg m of work on the boxes
-    window: float  # side of the image observation [m]
-    field_resolution: float  # cells of the goal distance field [m]
-    # makes the robot, which has no bumpers; None for the TurtleBot3 with one of them
-    body: Callable[..., RobotModel] | None = None
-    contact_radius: float = 0.0  # of the boxes [m]
-    touching: bool = False  # whether boxes may start in touch with the robot
-
-    def robot(self, drive: Drive, bumper: str | None = None) -> RobotModel:
-        """The robot; a differential drive may also reverse at full speed.
-
-        Args:
-            drive: how it may move.
-            bumper: one of `pushplan.world.BUMPERS`; the preset's own robot if None.
-
-        Raises:
-            InvalidInputError: if there is no such bumper, or the robot cannot carry one.
-        """
-        limits = {"max_speed": self.max_speed, "max_turn_rate": self.max_turn_rate}
-        if self.body is None:
-            return turtlebot3_burger("none" if bumper is None else bumper, drive, **limits)
-        if choice("bumper", "none" if bumper is None else bumper, BUMPERS) != "none":
-            raise InvalidInputError(
-                f"bumper {bumper!r} does not fit the robot of this preset (valid: none)"
-            )
-        return self.body(drive, **limits)
-
-    def static(self, shape: str) -> StaticMap:
-        """The walls of the room and inside it."""
-        width, length = self.rooms[shape]
-        inner = inner_walls(shape, width, length)
-        if self.thick_lines:
-            around = [
-                (0.0, 0.0, width, 0.0),
-                (width, 0.0, width, length),
-                (width, length, 0.0, length),
-                (0.0, length, 0.0, 0.0),
-            ]
-            return StaticMap.build(
-                segments=[*around, *inner], radii=self.wall, bounds=(0.0, 0.0, width, length)
-            )
-        bounds = (0.0, 0.0, width, length)
-        inside = [rectangle(x - self.wall, low, x + self.wall, high) for x, low, _, high in inner]
-        return StaticMap.build(
-            polygons=[*walls_around(bounds, 2.0 * self.wall), *inside], bounds=bounds
-        )
+PRESETS = read_presets("maze")
 
 
-def inner_walls(shape: str, width: float, length: float) -> list[tuple[float, float, float, float]]:
-    """Centre lines x1, y1, x2, y2 [m] of the walls that make the way a U or a Z."""
-    if shape == "u":
-        return [(width / 2, 0.0, width / 2, length * 2 / 3)]
-    return [
-        (width / 3, 0.0, width / 3, length * 2 / 3),
-        (width * 2 / 3, length / 3, width * 2 / 3, length),
-    ]
-
-
-PRESETS: Mapping[str, MazePreset] = read_presets("maze", MazePreset, body=resolve_name)
+def walls(preset: Preset, shape: str) -> StaticMap:
+    """The walls around the room and inside it, which make the way a U or a Z."""
+    width, length = preset.rooms[shape]
+    half, bounds = preset.wall, (0.0, 0.0, width, length)
+    if preset.thick_lines:
+        around = [
+            (0.0, 0.0, width, 0.0),
+            (width, 0.0, width, length),
+            (width, length, 0.0, length),
+            (0.0, length, 0.0, 0.0),
+        ]
+        lines = [(x, low, x, high) for x, low, high in preset.inner[shape]]
+        return StaticMap.build(segments=[*around, *lines], radii=half, bounds=bounds)
+    inside = [rectangle(x - half, low, x + half, high) for x, low, high in preset.inner[shape]]
+    return StaticMap.build(polygons=[*walls_around(bounds, 2.0 * half), *inside], bounds=bounds)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -150,7 +72,7 @@ class MazeVariations(TaskVariations):
     random_start: bool | None = None
     touching: bool | None = None  # whether boxes may start in touch with the robot
     # what the testbed's robot carries in front, one of `pushplan.world.BUMPERS`
-    bumper: str | None = None
+    bumper: Annotated[str, OneOf(BUMPERS)] | None = None
     bumper_friction: NonNegativeFloat | None = None  # friction coefficient between robot and boxes
     time_limit: PositiveFloat | None = None  # when the episode is cut off [s]
 
@@ -170,24 +92,18 @@ class MazeTask(Task):
     actions: ClassVar[tuple[str, ...]] = ("turn_rate", "wheels", "velocity")
     observations: ClassVar[tuple[str, ...]] = ("image", "state")
 
-    preset: MazePreset
     preset_table = PRESETS
     variations: MazeVariations
     variation_class = MazeVariations
 
     def _prepare(self) -> None:
-        try:
-            robot = self.preset.robot(drive_of(self.action), self.variations.bumper)
-        except InvalidInputError as error:
-            raise ScenarioError(f"maze, preset {self.preset_name!r}: {error}") from error
-        self._drive(robot)
-        self._steps = 0
+        self._make_robot()
         self._lay_out()
 
     def _lay_out(self) -> None:
         """Set the walls and the goal, which are the same in every start."""
         shape = self.variations.shape
-        self.static = self.preset.static(shape)
+        self.static = walls(self.preset, shape)
         self.goal = GoalDisc(
             np.array(self.preset.goals[shape]), self.preset.goal_radius + self.preset.robot_radius
         )
@@ -199,7 +115,7 @@ class MazeTask(Task):
     @property
     def box_size(self) -> float:
         """Side of the boxes [m]."""
-        return self.variations.box_size or self.preset.box_size
+        return float(self.variations.box_size or self.preset.box_size)
 
     @cached_property
     def field(self) -> GeodesicField:
@@ -276,17 +192,11 @@ class MazeTask(Task):
         self, before: World, after: World, *, work: float, touched_static: bool
     ) -> StepOutcome:
         """The reward above; a wall is a failure even where the goal is reached at once."""
-        self._steps += 1
         x0, y0, _ = before.robot_pose.tolist()
         x1, y1, _ = after.robot_pose.tolist()
         progress = (self.field.sample(x0, y0) - self.field.sample(x1, y1)) / self._farthest
         reward = self.preset.progress_reward * progress - self.preset.work_reward * work
-        if touched_static:
-            return StepOutcome(reward + WALL_REWARD, False, "wall", True, False)
-        if self.goal.distance(x1, y1) == 0.0:
-            return StepOutcome(reward + SUCCESS_REWARD, True, "goal", True, False)
-        late = self._steps >= self._max_steps
-        return StepOutcome(reward, False, "time_limit" if late else "", False, late)
+        return self._driven(reward, after, failure="wall" if touched_static else "")
 
     def _image(self, name: str) -> ImageObservation:
         window = self.preset.window

@@ -2,22 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from pkgutil import resolve_name
 from typing import Annotated, ClassVar
 
 import numpy as np
 
-from pushplan.envs.tasks.maze import MazePreset, MazeTask
+from pushplan.envs.tasks.maze import MazeTask
 from pushplan.envs.tasks.namo_layout import LAYOUTS, ROOM, NamoLayout, Opening, box_outline
 from pushplan.envs.tasks.namo_proof import proves
 from pushplan.envs.tasks.presets import read_presets
 from pushplan.envs.tasks.variations import TaskVariations
-from pushplan.world import GoalDisc, Movables, ScenarioError, World
+from pushplan.world import BUMPERS, GoalDisc, Movables, ScenarioError, World
 from pushplan.world.checked_fields import NonNegativeFloat, OneOf, PositiveFloat
 
-PRESETS: Mapping[str, MazePreset] = read_presets("namo", MazePreset, body=resolve_name)
+PRESETS = read_presets("namo")
 _TRIES = 500
 _ROOMS = 3  # at most
 
@@ -33,7 +31,8 @@ class NamoVariations(TaskVariations):
     # opposite of the truth
     movability: Annotated[str, OneOf(("known", "unknown", "wrong"))] = "known"
     box_size: PositiveFloat | None = None  # side of a plain box [m]
-    bumper: str | None = None  # of the testbed's robot, one of `pushplan.world.BUMPERS`
+    # of the testbed's robot, one of `pushplan.world.BUMPERS`
+    bumper: Annotated[str, OneOf(BUMPERS)] | None = None
     bumper_friction: NonNegativeFloat | None = None  # friction coefficient between robot and boxes
     time_limit: PositiveFloat | None = None  # when the episode is cut off [s]
 

@@ -1,17 +1,31 @@
-"""Presets of the tasks: `presets.yaml` has the numbers, a class beside each task their meaning."""
+"""Presets of the tasks: `presets.yaml` has the numbers and says what they mean."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from functools import cache, partial
+from collections.abc import Mapping
+from functools import cache
 from pathlib import Path
-from typing import Any, TypeVar
+from pkgutil import resolve_name
+from types import SimpleNamespace
+from typing import Any
 
 from pushplan.envs.simulators.base import Materials, Solids
 from pushplan.envs.simulators.water import Water
+from pushplan.world import Drive, RobotModel
 from pushplan.world.safe_files import read_data
 
-T = TypeVar("T")
+
+class Preset(SimpleNamespace):
+    """One set of dimensions of a task, under the names of the file."""
+
+    name: str
+    materials: Materials
+
+    def robot(self, name: str, drive: Drive, **options: Any) -> RobotModel:
+        """One of the ``robots`` of the file, with further options of its maker."""
+        entry = dict(self.robots[name])
+        robot: RobotModel = resolve_name(entry.pop("make"))(drive=drive, **entry, **options)
+        return robot
 
 
 @cache
@@ -20,38 +34,21 @@ def _table() -> Mapping[str, Any]:
     return table
 
 
-def read_presets(
-    task: str, kind: Callable[..., T], **readers: Callable[[Any], Any]
-) -> dict[str, T]:
-    """The presets of a task by name, in the order of the file.
-
-    Args:
-        task: its name.
-        kind: the class of the presets.
-        readers: make the value of a field of what the file has; else lists become tuples.
-    """
+def read_presets(task: str) -> dict[str, Preset]:
+    """The presets of a task by name, in the order of the file."""
     return {
-        name: build(kind, values, materials=_materials, **readers)
+        name: Preset(**{**values, "name": name, "materials": _materials(values["materials"])})
         for name, values in _table()[task].items()
     }
 
 
-def build(kind: Callable[..., T], values: Mapping[str, Any], **readers: Callable[[Any], Any]) -> T:
-    """An object of its fields in the file; arguments as in `read_presets`."""
-    return kind(**{name: readers.get(name, _plain)(value) for name, value in values.items()})
+def _materials(values: Mapping[str, Any]) -> Materials:
+    classes = {"solids": Solids, "water": Water}
+    layers = {name: kind(**values[name]) for name, kind in classes.items() if name in values}
+    return Materials(**{**values, **layers})
 
-
-def _plain(value: Any) -> Any:
-    if isinstance(value, list):
-        return tuple(map(_plain, value))
-    if isinstance(value, dict):
-        return {name: _plain(each) for name, each in value.items()}
-    return value
-
-
-_materials = partial(build, Materials, solids=partial(build, Solids), water=partial(build, Water))
 
 SOLIDS: Mapping[str, Solids] = {
-    name: build(Solids, values) for name, values in _table()["solids"].items()
+    name: Solids(**values) for name, values in _table()["solids"].items()
 }
 """The third dimension of the testbed, by robot."""

@@ -11,11 +11,9 @@ from typing import ClassVar, Literal
 import numpy as np
 import shapely
 
-from pushplan.envs.simulators.base import Materials
-from pushplan.envs.tasks.base import StepOutcome, Task
-from pushplan.envs.tasks.layout import FreeSpace
+from pushplan.envs.tasks.base import SUCCESS_REWARD, StepOutcome, Task
+from pushplan.envs.tasks.layout import FreeSpace, goal_distances, those_inside
 from pushplan.envs.tasks.presets import read_presets
-from pushplan.envs.tasks.room_goals import ObjectsGoal, RobotGoal
 from pushplan.envs.tasks.variations import TaskVariations
 from pushplan.geometry.distance_field import geodesic_field
 from pushplan.observation import ImageObservation
@@ -28,9 +26,14 @@ from pushplan.world import (
     load_world,
 )
 from pushplan.world.checked_fields import NonNegativeFloat, PositiveFloat
-from pushplan.world.checks import FloatArray, IntArray
-from pushplan.world.outline import transform
+from pushplan.world.checks import BoolArray, FloatArray, IntArray
+from pushplan.world.outline import grown_outline, transform
 
+DONE_REWARD = 10.0
+PROGRESS_REWARD = 150.0
+_LEAN = 0.02
+"""How far a corner may be outside a receptacle, as a fraction of the object's radius: an object
+that leans on a wall overlaps it a little."""
 _IMAGE_CHANNELS = ("footprint", "movable", "static", "goal_distance")
 _CELLS = 200
 """Of the goal distance field, along the longer side of the room."""
@@ -43,15 +46,7 @@ _WINDOW = 10.0
 """Side of the image observation, in robot lengths."""
 
 
-@dataclass(frozen=True)
-class RoomPreset:
-    """What a world file does not say."""
-
-    materials: Materials  # friction, rolling and heights
-    control_step: float = 0.1  # [s]
-
-
-PRESETS: Mapping[str, RoomPreset] = read_presets("room", RoomPreset)
+PRESETS = read_presets("room")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -79,8 +74,15 @@ class RoomVariations(TaskVariations):
 class RoomTask(Task):
     """The world of a file, with its robot and its goal, of any kind.
 
-    `RobotGoal` and `ObjectsGoal` say what the reward is and when an episode ends; goal distances
-    are shortest ways of a point around what is static.
+    A robot drives to a disc or over a line. Reward: 150 times the decrease of its goal distance,
+    minus 150 times the work on the objects over the robot's mass, both as fractions of the way from
+    the file's start; -50 at a wall or beyond the bounds of the map, +200 at the goal.
+
+    Every object goes into a receptacle, where it leaves the floor, or off an area. Reward: 150
+    times the decrease of the objects' goal distances, as a fraction of those at the file's start;
+    +10 for each object that is done and -10 for each that is no longer, +200 when all are.
+
+    Goal distances are shortest ways of a point around what is static.
     """
 
     name = "room"
@@ -89,7 +91,6 @@ class RoomTask(Task):
     actions: ClassVar[tuple[str, ...]] = ("velocity", "wheels")
     observations: ClassVar[tuple[str, ...]] = ("image", "state")
 
-    preset: RoomPreset
     preset_table = PRESETS
     variations: RoomVariations
     variation_class = RoomVariations
@@ -104,31 +105,54 @@ class RoomTask(Task):
                 raise InvalidInputError(f"robot {robot.name!r} has no wheels (valid: velocity)")
         except InvalidInputError as error:
             raise ScenarioError(f"room: {error}") from error
-        at_rest = world.movables.moved_to(world.movables.poses)
-        self._world = replace(world, robot=robot, movables=at_rest, robot_twist=None, time=0.0)
+        objects = world.movables.moved_to(world.movables.poses)  # at rest
+        self._world = replace(world, robot=robot, movables=objects, robot_twist=None, time=0.0)
         room = world.static.bounds[2:] - world.static.bounds[:2]
         self.reach = 2.0 * float(np.hypot(*room))
-        self.state_objects = max(self.state_objects, len(world.movables))
-        field = geodesic_field(world.static, world.goal, resolution=float(room.max()) / _CELLS)
-        of_objects = isinstance(world.goal, Receptacle | ClearanceArea)
-        goal_of = ObjectsGoal if of_objects else RobotGoal
-        self._goal: RobotGoal | ObjectsGoal = goal_of(self._world, field)
-        self.goal_kind = self._goal.kind
+        self.state_objects = max(self.state_objects, len(objects))
+        self._field = geodesic_field(
+            world.static, world.goal, resolution=float(room.max()) / _CELLS
+        )
+        self._far = float(self._field.values[np.isfinite(self._field.values)].max(initial=0.0))
+        self.goal = world.goal
         self.objects_leave = isinstance(world.goal, Receptacle)
-        way = self._goal.way
-        if self._goal.is_done or way == math.inf:
-            who = "every object starts" if of_objects else "the robot starts"
-            where = f"{who} in the goal" if self._goal.is_done else "no way leads to the goal"
+        if isinstance(world.goal, Receptacle | ClearanceArea):
+            self.goal_kind = "objects"
+            self._way, is_done = self._way_of_objects(), bool(world.completed.all())
+        else:
+            self._way = self._field.exact(*world.robot_pose[:2].tolist())
+            is_done = self._way == 0.0
+        if is_done or self._way == math.inf:
+            starts = "the robot starts" if self.goal_kind == "robot" else "every object starts"
+            where = f"{starts} in the goal" if is_done else "no way leads to the goal"
             raise ScenarioError(f"room: {where} in {path}")
-        limit = self.variations.time_limit
-        if limit is None:
-            limit = max(_SHORTEST_WAYS * way / robot.max_speed, _LEAST_TIME)
-        self._most = math.ceil(limit / self.control_step - 1e-9)
-        self._steps, self._idle_since, self._done = 0, 0, 0
+        self._idle_since = 0
+
+    def _way_of_objects(self) -> float:
+        """Summed goal distance of the objects at the file's start [m], inf where none has a way."""
+        objects = self._world.movables
+        if not len(objects):
+            raise ScenarioError("room: a goal for objects needs an object, the world has none")
+        if isinstance(self.goal, Receptacle):
+            lean = _LEAN * float(objects.radii.min())
+            self._mouth = Receptacle(grown_outline(self.goal.polygon, lean))
+        if not any(np.isfinite(self._field.exact(x, y)) for x, y in objects.poses[:, :2].tolist()):
+            return math.inf
+        # 1 m where all centres are there already, but not all corners
+        return self._distance(self._world) or 1.0
+
+    def _distance(self, world: World) -> float:
+        """Summed goal distance of the objects on the floor [m]."""
+        ways = goal_distances(self._field, world.movables.poses)
+        return float(np.minimum(ways, self._far).sum())
+
+    @property
+    def _longest(self) -> float:
+        return max(_SHORTEST_WAYS * self._way / self.robot.max_speed, _LEAST_TIME)
 
     def start(self, rng: np.random.Generator) -> World:
         """The world of the file, with the robot and the objects moved a little if asked for."""
-        self._steps, self._idle_since, self._done = 0, 0, 0
+        self._steps, self._idle_since = 0, 0
         return self._spread(rng) if self.variations.spread else self._world
 
     def _spread(self, rng: np.random.Generator) -> World:
@@ -142,6 +166,7 @@ class RoomTask(Task):
         outlines = [list(world.robot.contact_parts)]
         outlines += [[movables.outline(k)] for k in range(len(movables))]
         poses = np.vstack([world.robot_pose, movables.poses])
+        of_objects = self.goal_kind == "objects"
         radii = [world.robot.circumscribed_radius, *movables.radii]
         shapes = [_shape(pose, parts) for pose, parts in zip(poses, outlines, strict=True)]
         for k, parts in enumerate(outlines):
@@ -151,7 +176,7 @@ class RoomTask(Task):
                 shift = spread * math.sqrt(away) * np.array([np.cos(angle), np.sin(angle)])
                 pose = poses[k] + np.array([*shift, turn * spread / radii[k]])
                 shape = _shape(pose, parts)
-                if k == 0 and self._is_goal(pose):
+                if k == 0 and not of_objects and world.navigation_goal.distance(*pose[:2]) == 0.0:
                     continue
                 way = shapely.LineString([poses[k][:2], pose[:2]])  # it is not across a wall
                 if (
@@ -166,29 +191,48 @@ class RoomTask(Task):
     def score(
         self, before: World, after: World, *, work: float, touched_static: bool
     ) -> StepOutcome:
-        """What the goal says, and the limits of time."""
+        """The reward above; walls end it only where the robot has the goal."""
+        if self.goal_kind == "objects":
+            return self._score_objects(before, after)
+        near, far = (self._field.sample(*world.robot_pose[:2]) for world in (after, before))
+        reward = PROGRESS_REWARD * (far - near - work / self._world.robot.mass) / self._way
+        at, bounds = after.robot_pose[:2], self._world.static.bounds
+        failure = "wall" if touched_static else ""
+        if not failure and ((at < bounds[:2]).any() or (at > bounds[2:]).any()):
+            failure = "left_map"
+        return self._checked_for_time(self._driven(reward, after, failure=failure))
+
+    def _score_objects(self, before: World, after: World) -> StepOutcome:
         self._steps += 1
-        outcome = self._goal.score(before, after, work, touched_static)
-        done = 0 if outcome.completed is None else int(outcome.completed.sum())
-        if done > self._done:
+        was_done, done = self._done(before), self._done(after)
+        gained = int(done.sum()) - int(was_done.sum())
+        if gained > 0:
             self._idle_since = self._steps
-        self._done = done
-        if outcome.terminated:
-            return outcome
-        if self._steps >= self._most:
-            return replace(outcome, reason="time_limit", truncated=True)
+        closer = self._distance(before) - self._distance(after)
+        reward = PROGRESS_REWARD * closer / self._way + DONE_REWARD * gained
+        if done.all():
+            return StepOutcome(reward + SUCCESS_REWARD, True, "done", True, False, done)
+        late = self._steps >= self._max_steps
+        outcome = StepOutcome(reward, False, "time_limit" if late else "", False, late, done)
+        return self._checked_for_time(outcome)
+
+    def _done(self, world: World) -> BoolArray:
+        """Which objects of the start are done: those that have left the floor, or are off."""
+        done = ~np.isin(self._world.movables.ids, world.movables.ids)
+        if not self.objects_leave:
+            done[~done] = world.completed
+        return done
+
+    def _checked_for_time(self, outcome: StepOutcome) -> StepOutcome:
+        """The outcome, cut off after too long without progress."""
         idle, limit = self._steps - self._idle_since, self.variations.idle_limit
-        if limit is not None and idle * self.control_step >= limit * (1.0 - 1e-9):
-            return replace(outcome, reason="no_progress", truncated=True)
-        return outcome
+        if outcome.reason or limit is None or idle * self.control_step < limit * (1.0 - 1e-9):
+            return outcome
+        return replace(outcome, reason="no_progress", truncated=True)
 
     def leaving(self, ids: IntArray, poses: FloatArray) -> IntArray:
         """Objects in the receptacle, where the goal is one."""
-        assert isinstance(self._goal, ObjectsGoal)
-        return self._goal.leaving(ids, poses)
-
-    def _is_goal(self, pose: FloatArray) -> bool:
-        return isinstance(self._goal, RobotGoal) and self._goal.is_there(pose)
+        return those_inside(self._mouth, self._world.movables, ids, poses)
 
     @classmethod
     def goal_kind_of(cls, variations: Mapping[str, object]) -> Literal["robot", "objects"]:

@@ -3,26 +3,21 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
-from functools import partial
+from dataclasses import dataclass
 from typing import Annotated, ClassVar
 
 import numpy as np
 import shapely
 
-from pushplan.envs.simulators.base import Materials
 from pushplan.envs.tasks.base import StepOutcome, Task
-from pushplan.envs.tasks.presets import build, read_presets
+from pushplan.envs.tasks.presets import read_presets
 from pushplan.envs.tasks.variations import TaskVariations
 from pushplan.observation import ImageObservation
 from pushplan.scenarios.ice import FloeSizes, IceField, generate_ice, load_ice
 from pushplan.world import (
-    Drive,
     GoalLine,
     InvalidInputError,
     Movables,
-    RobotModel,
     ScenarioError,
     StaticMap,
     World,
@@ -31,8 +26,6 @@ from pushplan.world.checked_fields import Fraction, Limits, PositiveFloat
 from pushplan.world.checks import FloatArray
 from pushplan.world.outline import transform
 
-OUTSIDE_REWARD = -50.0
-SUCCESS_REWARD = 200.0
 CONCENTRATION = 0.1
 """Where none is asked for, and there is no file."""
 _IMAGE_CHANNELS = ("footprint", "movable", "goal_distance", "heading_line")
@@ -41,57 +34,7 @@ _START_TRIES = 500
 _UP = 0.5 * math.pi
 
 
-@dataclass(frozen=True)
-class ShipPreset:
-    """One set of dimensions. The channel has its lower left corner at the origin; +y is ahead."""
-
-    channel: tuple[float, float]  # width and length [m]. It has no walls.
-    ice: tuple[float, float]  # y from which and to which there is ice [m]
-    sizes: FloeSizes  # of the floes
-    floe_density: float  # mass of a floe over its area [kg/m²]
-    footprint: FloatArray  # (N, 2) corners of the ship about its origin [m]
-    ship_mass: float  # as the metrics count it [kg]
-    max_speed: float  # at which the ship always goes [m/s]
-    max_turn_rate: float  # [rad/s]
-    start_y: float  # of the ship's origin [m]
-    side_margin: float  # least distance of a random start from the sides of the channel [m]
-    clearance: float  # water around the hull that is free of ice at the start [m]
-    goal_y: float  # of the goal line [m]
-    materials: Materials  # friction, water and the third dimension
-    control_step: float  # [s]
-    max_steps: int  # control steps until the episode is cut off
-    work_reward: float  # per kg m of work on the floes
-    window: float  # side of the image observation [m]
-    shift: float  # how far its middle lies ahead of the ship's origin [m]
-    contact_radius: float = 0.0  # of the ship and the floes [m]
-    overlaps: bool = False  # whether floes from a file may overlap
-
-    def robot(self) -> RobotModel:
-        """The ship."""
-        return RobotModel.from_outline(
-            self.footprint,
-            mass=self.ship_mass,
-            drive=Drive.CONSTANT_SPEED,
-            max_speed=self.max_speed,
-            max_turn_rate=self.max_turn_rate,
-            contact_radius=self.contact_radius,
-            name="ship",
-        )
-
-    @property
-    def bounds(self) -> FloatArray:
-        """(4,) x_min, y_min, x_max, y_max of the channel [m]."""
-        return np.array([0.0, 0.0, *self.channel])
-
-    @property
-    def ice_bounds(self) -> FloatArray:
-        """(4,) those of the ice [m]."""
-        return np.array([0.0, self.ice[0], self.channel[0], self.ice[1]])
-
-
-PRESETS: Mapping[str, ShipPreset] = read_presets(
-    "ship_ice", ShipPreset, sizes=partial(build, FloeSizes), footprint=np.array
-)
+PRESETS = read_presets("ship_ice")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -136,48 +79,39 @@ class ShipIceTask(Task):
     actions: ClassVar[tuple[str, ...]] = ("turn_rate",)
     observations: ClassVar[tuple[str, ...]] = ("image", "state")
 
-    preset: ShipPreset
     preset_table = PRESETS
     variations: ShipIceVariations
     variation_class = ShipIceVariations
 
     def _prepare(self) -> None:
-        if self.variations.channel_length is not None:
-            self.preset = self._lengthened(self.variations.channel_length)
-        self._drive(self.preset.robot())
-        bounds = self.preset.bounds
-        self.static = StaticMap.build(bounds=bounds)
-        self.goal = GoalLine(np.array([0.5 * bounds[2], self._goal_y()]), np.array([0.0, 1.0]))
-        self.reach = 2.0 * float(np.hypot(*self.preset.channel))
-        self._file_ice = self._read_ice()
-        x, width = self.variations.start_x, self.preset.channel[0]
-        if x is not None and not 0.0 <= x <= width:
+        self._make_robot()
+        preset, wanted = self.preset, self.variations
+        self._width, length = preset.channel
+        first, last = preset.ice
+        beyond = length - last
+        longer, away, x = wanted.channel_length, wanted.goal_distance, wanted.start_x
+        least, start = preset.goal_y + beyond, preset.start_y
+        if longer is not None and longer < least:
             raise ScenarioError(
-                f"ship_ice: start_x must lie in the channel, [0, {width:g}] m, got {x:g}"
+                f"ship_ice: channel_length must be at least {least:g} m, got {longer:g}"
             )
-        self._steps = 0
-
-    def _lengthened(self, length: float) -> ShipPreset:
-        """The preset with a longer channel, or a shorter one as far as its goal allows."""
-        (width, before), (first, last) = self.preset.channel, self.preset.ice
-        least = self.preset.goal_y + before - last
-        if length < least:
-            raise ScenarioError(
-                f"ship_ice: channel_length must be at least {least:g} m, got {length:g}"
-            )
-        return replace(self.preset, channel=(width, length), ice=(first, length - (before - last)))
-
-    def _goal_y(self) -> float:
-        start, away = self.preset.start_y, self.variations.goal_distance
-        if away is None:
-            return self.preset.goal_y
-        room = self.preset.channel[1] - start
-        if away > room:
+        length = longer or length
+        room = length - start
+        if away is not None and away > room:
             raise ScenarioError(
                 f"ship_ice: goal_distance must be at most {room:g} m, which is the end of the "
                 f"channel, got {away:g}"
             )
-        return start + away
+        if x is not None and not 0.0 <= x <= self._width:
+            raise ScenarioError(
+                f"ship_ice: start_x must lie in the channel, [0, {self._width:g}] m, got {x:g}"
+            )
+        self.ice_bounds = np.array([0.0, first, self._width, length - beyond])
+        self.static = StaticMap.build(bounds=[0.0, 0.0, self._width, length])
+        goal_y = preset.goal_y if away is None else start + away
+        self.goal = GoalLine(np.array([0.5 * self._width, goal_y]), np.array([0.0, 1.0]))
+        self.reach = 2.0 * float(np.hypot(self._width, length))
+        self._file_ice = self._read_ice()
 
     def _read_ice(self) -> IceField | None:
         """The floes of the file, which must lie in the channel."""
@@ -189,7 +123,7 @@ class ShipIceTask(Task):
             field = load_ice(path, hull=self.variations.ice_hull, overlaps=overlaps)
         except InvalidInputError as error:
             raise ScenarioError(f"ship_ice: {error}") from error
-        low, high = self.preset.bounds[:2], self.preset.bounds[2:]
+        low, high = self.static.bounds[:2], self.static.bounds[2:]
         for i, corners in enumerate(field.polygons):
             if (corners < low - 1e-9).any() or (corners > high + 1e-9).any():
                 raise ScenarioError(
@@ -221,7 +155,7 @@ class ShipIceTask(Task):
 
     def _start_pose(self, rng: np.random.Generator) -> FloatArray:
         margin, wanted = self.preset.side_margin, self.variations
-        anywhere = rng.uniform(margin, self.preset.channel[0] - margin)
+        anywhere = rng.uniform(margin, self._width - margin)
         x = anywhere if wanted.start_x is None else wanted.start_x
         return np.array([x, self.preset.start_y, wanted.start_heading])
 
@@ -230,9 +164,9 @@ class ShipIceTask(Task):
         around = np.asarray(self._berth(pose).exterior.coords)[:-1]
         return generate_ice(
             rng,
-            bounds=self.preset.ice_bounds,
+            bounds=self.ice_bounds,
             concentration=CONCENTRATION if fraction is None else fraction,
-            sizes=self.preset.sizes,
+            sizes=FloeSizes(**self.preset.sizes),
             keep_off=[around],
             clumping=self.variations.clumping,
         )
@@ -251,23 +185,18 @@ class ShipIceTask(Task):
 
     def _berth(self, pose: FloatArray) -> shapely.Polygon:
         """The water that is free at the start: the hull and some room around it."""
-        hull = shapely.Polygon(transform(pose, self.preset.footprint))
+        hull = shapely.Polygon(transform(pose, self.robot.parts[0]))
         return hull.buffer(self.preset.clearance, join_style="mitre").convex_hull
 
     def score(
         self, before: World, after: World, *, work: float, touched_static: bool
     ) -> StepOutcome:
         """The reward above; to leave the channel is a failure even beyond the goal line."""
-        self._steps += 1
         x, y, heading = after.robot_pose.tolist()
         ahead = math.cos(heading) * self.goal.normal[0] + math.sin(heading) * self.goal.normal[1]
         reward = float(ahead) - self.preset.work_reward * work
-        if x < 0.0 or x > self.preset.channel[0] or y < 0.0:
-            return StepOutcome(reward + OUTSIDE_REWARD, False, "left_channel", True, False)
-        if self.goal.distance(x, y) == 0.0:
-            return StepOutcome(reward + SUCCESS_REWARD, True, "goal", True, False)
-        late = self._steps >= self._max_steps
-        return StepOutcome(reward, False, "time_limit" if late else "", False, late)
+        outside = x < 0.0 or x > self._width or y < 0.0
+        return self._driven(reward, after, failure="left_channel" if outside else "")
 
     def _image(self, name: str) -> ImageObservation:
         side, pixels = self.preset.window, (_PIXELS, _PIXELS)
