@@ -18,8 +18,8 @@ from pathlib import Path
 
 from pushplan.envs.registry import goal_kind
 from pushplan.evaluation import bench
-from pushplan.evaluation.results import Results
-from pushplan.evaluation.rows import Status
+from pushplan.evaluation.report.results import Results
+from pushplan.evaluation.store.rows import Status
 from pushplan.scenarios import suite
 from pushplan.scenarios.scenario import Variations
 

@@ -16,7 +16,7 @@ import sys
 from pathlib import Path
 
 from pushplan.evaluation import bench
-from pushplan.evaluation.policies import policy_names
+from pushplan.evaluation.run.policy_specs import policy_names
 from pushplan.scenarios import suite_names
 from pushplan.world import InvalidInputError
 

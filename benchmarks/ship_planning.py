@@ -26,7 +26,7 @@ import numpy as np
 from pushplan.drawing.palette import DASHES, SERIES
 from pushplan.envs.tasks.ship_ice import ShipIceTask
 from pushplan.evaluation import ResultRow, bench
-from pushplan.evaluation.statistics import estimate
+from pushplan.evaluation.statistics.estimates import estimate
 from pushplan.motion.speed_profile import turning_radius
 from pushplan.motion.state_lattice.lattice_builder import LatticeBuilder
 from pushplan.motion.state_lattice.lattice_search import open_search

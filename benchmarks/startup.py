@@ -29,7 +29,7 @@ from pushplan.compiled import watching
 kernels = set()
 with watching(lambda kernel, loaded: kernels.add(kernel)):
     if sys.argv[1] == "everything":
-        from pushplan.evaluation.warmup import names, warm_up
+        from pushplan.evaluation.run.warmup import names, warm_up
         for name in names():
             warm_up(name)
     else:
@@ -40,7 +40,7 @@ print(json.dumps([time.process_time() - busy, time.perf_counter() - began, len(k
 _KERNELS = """
 import json, sys
 from pushplan.compiled import watching
-from pushplan.evaluation.warmup import warm_up
+from pushplan.evaluation.run.warmup import warm_up
 kernels = set()
 with watching(lambda kernel, loaded: kernels.add(kernel)):
     warm_up(sys.argv[1])
@@ -64,7 +64,7 @@ def write_kernel_names(only: list[str]) -> None:
     Args:
         only: the names that are looked at; what is written of the others stays. All if empty.
     """
-    from pushplan.evaluation.warmup import names
+    from pushplan.evaluation.run.warmup import names
 
     kernels: dict[str, list[str]] = {name: [] for name in names()}
     for users, shared in json.loads(_MANIFEST.read_text()).items():

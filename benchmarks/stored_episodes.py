@@ -15,8 +15,8 @@ from typing import Any
 
 from pushplan.evaluation import ResultRow, Results
 from pushplan.evaluation.experiment_file import fields_of
-from pushplan.evaluation.provenance import code_in_words
-from pushplan.evaluation.rows import columns, csv_text, row_from_texts
+from pushplan.evaluation.store.provenance import code_in_words
+from pushplan.evaluation.store.rows import columns, csv_text, row_from_texts
 from pushplan.metrics import METRICS, Role, metric_names
 from pushplan.scenarios import Suite
 from pushplan.world import InvalidInputError

@@ -30,9 +30,9 @@ import numpy as np
 from stored_episodes import StoredEpisode, read, take
 
 from pushplan.evaluation import ResultRow
-from pushplan.evaluation.statistics import Estimate, estimate, wilson
-from pushplan.evaluation.summary import paired_differences, values_of
-from pushplan.evaluation.tables import heading, milliseconds
+from pushplan.evaluation.report.tables import heading, milliseconds
+from pushplan.evaluation.statistics.estimates import Estimate, estimate, wilson
+from pushplan.evaluation.statistics.summary import paired_differences, values_of
 from pushplan.metrics import METRICS, Role
 from pushplan.world import InvalidInputError, PushplanError, UnknownNameError
 from pushplan.world.checks import known_keys

@@ -16,7 +16,7 @@ import yaml
 from pushplan.cli import main
 from pushplan.envs import make
 from pushplan.evaluation import JobSettings, Results, run_episode
-from pushplan.evaluation.policies import parse_policy
+from pushplan.evaluation.run.policy_specs import parse_policy
 from pushplan.learned import learned_names
 from pushplan.metrics import compute
 from pushplan.planners import Deadline, MaxIterations, make_planner, make_policy, policy_names

@@ -35,7 +35,7 @@ import numpy as np
 import pushplan.control, pushplan.learned, pushplan.metrics, pushplan.perception
 from pushplan.cli import main
 from pushplan.control import TwistLimiter
-from pushplan.evaluation.policies import parse_policy
+from pushplan.evaluation.run.policy_specs import parse_policy
 from pushplan.planners import make_policy, policy_names
 from pushplan.runtime import Runner
 from pushplan.serving import PolicyServer

@@ -35,8 +35,8 @@ from pushplan.envs import PushEnv
 from pushplan.envs.simulators.pymunk_drive import PymunkOptions
 from pushplan.envs.simulators.pymunk_simulator import PymunkSimulator
 from pushplan.evaluation import run_episode
-from pushplan.evaluation.policies import parse_policies
-from pushplan.evaluation.statistics import estimate
+from pushplan.evaluation.run.policy_specs import parse_policies
+from pushplan.evaluation.statistics.estimates import estimate
 from pushplan.scenarios import Scenario
 from pushplan.world import Episode
 

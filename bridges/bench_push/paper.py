@@ -23,12 +23,12 @@ from published import ENOUGH, SETTINGS, PublishedRow, PublishedTable, Score, pub
 
 import pushplan
 from pushplan.evaluation import Results
-from pushplan.evaluation.policies import parse_policy
-from pushplan.evaluation.rows import ResultRow, setting_of
-from pushplan.evaluation.statistics import Estimate, estimate, wilson
-from pushplan.evaluation.summary import policies_of, values_of
-from pushplan.evaluation.table_formats import markdown, text
-from pushplan.evaluation.tables import Table
+from pushplan.evaluation.report.table_formats import markdown, text
+from pushplan.evaluation.report.tables import Table
+from pushplan.evaluation.run.policy_specs import parse_policy
+from pushplan.evaluation.statistics.estimates import Estimate, estimate, wilson
+from pushplan.evaluation.statistics.summary import policies_of, values_of
+from pushplan.evaluation.store.rows import ResultRow, setting_of
 from pushplan.learned.onnx_policy import read_specification
 from pushplan.metrics import Role, compute, metric_names
 from pushplan.scenarios import suite

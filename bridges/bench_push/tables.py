@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 from episodes import SCORES, WAITS, Run
 
-from pushplan.evaluation.statistics import Estimate, estimate
+from pushplan.evaluation.statistics.estimates import Estimate, estimate
 
 END = "<!-- end of the tables -->"
 TITLES = {

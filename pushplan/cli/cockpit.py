@@ -13,7 +13,7 @@ from scipy.interpolate import make_interp_spline
 from pushplan.cli.keyboard import HELP, Keyboard, twist_of
 from pushplan.cli.scoreboard import Scoreboard, closing_lines
 from pushplan.drawing import draw_world
-from pushplan.evaluation.episode import Recording
+from pushplan.evaluation.run.recording import Recording
 from pushplan.world import Episode, Policy, Twist, World
 from pushplan.world.checks import FloatArray, IntArray
 

@@ -13,8 +13,8 @@ _DEFAULT = "success<-0.0,E_nav<-0.0,I_nav<-0.0,S_manip<-0.0,E_manip<-0.0,I_manip
 def run(options: argparse.Namespace) -> int:
     """Judge, print the verdicts."""
     from pushplan.evaluation import compare_runs
-    from pushplan.evaluation.comparing import verdict_table
-    from pushplan.evaluation.table_formats import text
+    from pushplan.evaluation.report.comparing import verdict_table
+    from pushplan.evaluation.report.table_formats import text
 
     verdicts = compare_runs(options.old, options.new, options.fail_on or _DEFAULT)
     if options.json:

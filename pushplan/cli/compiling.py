@@ -15,8 +15,8 @@ def run(options: argparse.Namespace) -> int:
         from pushplan.planners import policy_names as known
         from pushplan.planners import warm_up
     else:
-        from pushplan.evaluation.warmup import names as known
-        from pushplan.evaluation.warmup import warm_up
+        from pushplan.evaluation.run.warmup import names as known
+        from pushplan.evaluation.run.warmup import warm_up
     wanted = options.names or known()
     with kernel_progress(*wanted) as progress:
         for name in wanted:

@@ -190,7 +190,7 @@ _KINDS: dict[str, _Kind] = {
     ),
     "policies": _Kind(
         "drive a robot: planners that are followed, controllers, trained networks",
-        "pushplan.evaluation.policies:policy_names",
+        "pushplan.evaluation.run.policy_specs:policy_names",
         _policy,
     ),
     "tasks": _Kind("what the robot has to do", "pushplan.envs.registry:TASKS", _task),

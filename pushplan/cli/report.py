@@ -12,7 +12,7 @@ from pushplan.cli.common import say, say_json
 
 if TYPE_CHECKING:
     from pushplan.evaluation import Results
-    from pushplan.evaluation.tables import Table
+    from pushplan.evaluation.report.tables import Table
 
 
 def run(options: argparse.Namespace) -> int:
@@ -43,8 +43,8 @@ def show(results: Results, options: argparse.Namespace, **written: Any) -> None:
         options: with the shared options "tables".
         written: as for `Results.report`.
     """
-    from pushplan.evaluation.endings import unsuccessful_lines
-    from pushplan.evaluation.tables import on_few_lines
+    from pushplan.evaluation.report.endings import unsuccessful_lines
+    from pushplan.evaluation.report.tables import on_few_lines
 
     tables = results.tables(settings=options.settings, pairs=options.pairs)
     _print(on_few_lines(tables))
@@ -70,7 +70,7 @@ def show_json(results: Results, pairs: str) -> None:
 
 def exit_code(results: Results) -> int:
     """1 where jobs of a run failed, with a line for each policy that says why; else 0."""
-    from pushplan.evaluation.endings import failure_lines
+    from pushplan.evaluation.report.endings import failure_lines
 
     lines = failure_lines(results)
     for line in lines:
@@ -82,7 +82,7 @@ def _print(tables: Sequence[Table]) -> None:
     """In colour and to the width of a terminal, or as plain text."""
     from rich.console import Console
 
-    from pushplan.evaluation.table_formats import rich_table, text
+    from pushplan.evaluation.report.table_formats import rich_table, text
 
     if not sys.stdout.isatty():
         say(text(tables))

@@ -26,7 +26,7 @@ def run(options: argparse.Namespace) -> int:
     """Run the episode, print its scores, write files."""
     from pushplan.cli.film import Camera
     from pushplan.evaluation import Job, JobSettings, PolicyError, parse_policy, run_episode
-    from pushplan.evaluation.execute import dry_run
+    from pushplan.evaluation.run.execute import dry_run
 
     scenario = scenario_of(options)
     check_episode_file(options.out)

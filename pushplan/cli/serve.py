@@ -15,7 +15,7 @@ def run(options: argparse.Namespace) -> int:
     import logging
     import warnings
 
-    from pushplan.evaluation.policies import parse_policy
+    from pushplan.evaluation.run.policy_specs import parse_policy
     from pushplan.serving import PROTOCOL, PolicyServer, ServerLimits
 
     spec = parse_policy(options.policy)

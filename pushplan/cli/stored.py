@@ -47,7 +47,7 @@ def merge_runs(options: argparse.Namespace) -> int:
 def rescore_run(options: argparse.Namespace) -> int:
     """Compute the metrics of stored episodes again."""
     from pushplan.evaluation import Results, rescore
-    from pushplan.evaluation.table_formats import text
+    from pushplan.evaluation.report.table_formats import text
 
     metrics = [name for name in options.metrics.split(",") if name]
     done = rescore(options.directory, metrics)

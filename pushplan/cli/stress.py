@@ -12,7 +12,7 @@ from pushplan.cli.progress import progress_of
 def run(options: argparse.Namespace) -> int:
     """Run the test, print the score sheet."""
     from pushplan.evaluation import stress
-    from pushplan.evaluation.table_formats import markdown, text
+    from pushplan.evaluation.report.table_formats import markdown, text
 
     check_directory(options.out)
     with progress_of(options.policy, out=options.out) as progress:

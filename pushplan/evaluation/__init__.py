@@ -10,30 +10,35 @@ from typing import TYPE_CHECKING
 from pushplan.world.lazy_names import lazy_names
 
 if TYPE_CHECKING:
-    from pushplan.evaluation.batch import run_batch
     from pushplan.evaluation.benchmark import bench
-    from pushplan.evaluation.comparing import Rule, Verdict, compare_runs
-    from pushplan.evaluation.database import DamagedResultsError
-    from pushplan.evaluation.episode import InvalidActionError, PolicyError, run_episode
     from pushplan.evaluation.experiment import Experiment
-    from pushplan.evaluation.jobs import Job, JobResult, JobSettings
-    from pushplan.evaluation.merging import Merged, merge
-    from pushplan.evaluation.policies import (
+    from pushplan.evaluation.report.comparing import Rule, Verdict, compare_runs
+    from pushplan.evaluation.report.results import Results
+    from pushplan.evaluation.run.batch import run_batch
+    from pushplan.evaluation.run.jobs import Job, JobResult, JobSettings
+    from pushplan.evaluation.run.policy_specs import (
         PolicySpec,
         UnusablePolicyError,
         parse_planner,
         parse_policies,
         parse_policy,
     )
-    from pushplan.evaluation.reproduction import Reproduction, reproduce
-    from pushplan.evaluation.rescoring import Rescored, rescore
-    from pushplan.evaluation.results import Results
-    from pushplan.evaluation.rows import TIMING_COLUMNS, ResultRow, Status, columns
-    from pushplan.evaluation.salvaging import Salvaged, salvage
-    from pushplan.evaluation.statistics import Estimate, Proportion, bootstrap_interval, wilson
-    from pushplan.evaluation.status import RunStatus, run_status
+    from pushplan.evaluation.run.recording import InvalidActionError, PolicyError, run_episode
+    from pushplan.evaluation.run.reproduction import Reproduction, reproduce
+    from pushplan.evaluation.statistics.estimates import (
+        Estimate,
+        Proportion,
+        bootstrap_interval,
+        wilson,
+    )
+    from pushplan.evaluation.statistics.summary import PairedDifference, PolicySummary
+    from pushplan.evaluation.store.database import DamagedResultsError
+    from pushplan.evaluation.store.merging import Merged, merge
+    from pushplan.evaluation.store.rescoring import Rescored, rescore
+    from pushplan.evaluation.store.rows import TIMING_COLUMNS, ResultRow, Status, columns
+    from pushplan.evaluation.store.salvaging import Salvaged, salvage
+    from pushplan.evaluation.store.status import RunStatus, run_status
     from pushplan.evaluation.stress_testing import CONDITIONS, Condition, ScoreSheet, stress
-    from pushplan.evaluation.summary import PairedDifference, PolicySummary
 
 __all__ = [
     "CONDITIONS",
@@ -84,23 +89,25 @@ __all__ = [
 __getattr__, __dir__ = lazy_names(
     __name__,
     {
-        "batch": "run_batch",
+        "run.batch": "run_batch",
         "benchmark": "bench",
-        "comparing": "Rule Verdict compare_runs",
-        "database": "DamagedResultsError",
-        "episode": "InvalidActionError PolicyError run_episode",
+        "report.comparing": "Rule Verdict compare_runs",
+        "store.database": "DamagedResultsError",
+        "run.recording": "InvalidActionError PolicyError run_episode",
         "experiment": "Experiment",
-        "jobs": "Job JobResult JobSettings",
-        "merging": "Merged merge",
-        "policies": "PolicySpec UnusablePolicyError parse_policies parse_policy parse_planner",
-        "reproduction": "Reproduction reproduce",
-        "rescoring": "Rescored rescore",
-        "results": "Results",
-        "rows": "TIMING_COLUMNS ResultRow Status columns",
-        "statistics": "Estimate Proportion bootstrap_interval wilson",
-        "salvaging": "Salvaged salvage",
-        "status": "RunStatus run_status",
+        "run.jobs": "Job JobResult JobSettings",
+        "store.merging": "Merged merge",
+        "run.policy_specs": (
+            "PolicySpec UnusablePolicyError parse_planner parse_policies parse_policy"
+        ),
+        "run.reproduction": "Reproduction reproduce",
+        "store.rescoring": "Rescored rescore",
+        "report.results": "Results",
+        "store.rows": "TIMING_COLUMNS ResultRow Status columns",
+        "statistics.estimates": "Estimate Proportion bootstrap_interval wilson",
+        "store.salvaging": "Salvaged salvage",
+        "store.status": "RunStatus run_status",
         "stress_testing": "CONDITIONS Condition ScoreSheet stress",
-        "summary": "PairedDifference PolicySummary",
+        "statistics.summary": "PairedDifference PolicySummary",
     },
 )

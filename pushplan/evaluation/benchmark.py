@@ -6,13 +6,13 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from pushplan.evaluation.batch import Progress
-from pushplan.evaluation.compatibility import read_policies
 from pushplan.evaluation.experiment import Experiment
-from pushplan.evaluation.jobs import JobSettings
-from pushplan.evaluation.limits import MEMORY_MB
-from pushplan.evaluation.policies import PolicySpec
-from pushplan.evaluation.results import Results
+from pushplan.evaluation.report.results import Results
+from pushplan.evaluation.run.batch import Progress
+from pushplan.evaluation.run.compatibility import read_policies
+from pushplan.evaluation.run.job_limits import MEMORY_MB
+from pushplan.evaluation.run.jobs import JobSettings
+from pushplan.evaluation.run.policy_specs import PolicySpec
 from pushplan.world import InvalidInputError
 
 if TYPE_CHECKING:

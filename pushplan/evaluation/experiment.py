@@ -14,17 +14,17 @@ from typing import Any
 
 import numpy as np
 
-from pushplan.evaluation.batch import TRACES, Progress, run_batch
-from pushplan.evaluation.compatibility import is_wanted, misfits, read_policies
-from pushplan.evaluation.database import DATABASE
-from pushplan.evaluation.job_identity import identified
-from pushplan.evaluation.jobs import Job, JobSettings
-from pushplan.evaluation.limits import MEMORY_MB
-from pushplan.evaluation.policies import PolicySpec
-from pushplan.evaluation.rescoring import rescore
-from pushplan.evaluation.results import Results
-from pushplan.evaluation.rows import setting_of
-from pushplan.evaluation.store import open_results
+from pushplan.evaluation.report.results import Results
+from pushplan.evaluation.run.batch import TRACES, Progress, run_batch
+from pushplan.evaluation.run.compatibility import is_wanted, misfits, read_policies
+from pushplan.evaluation.run.job_identity import identified
+from pushplan.evaluation.run.job_limits import MEMORY_MB
+from pushplan.evaluation.run.jobs import Job, JobSettings
+from pushplan.evaluation.run.policy_specs import PolicySpec
+from pushplan.evaluation.store.database import DATABASE
+from pushplan.evaluation.store.rescoring import rescore
+from pushplan.evaluation.store.rows import setting_of
+from pushplan.evaluation.store.run_directory import open_results
 from pushplan.metrics import metric_function
 from pushplan.scenarios.suite import Suite, distinct
 from pushplan.world import InvalidInputError, UnknownNameError
@@ -234,7 +234,7 @@ class Experiment:
             folder = Path(temporary if out is None else out)
             executor = None
             if dask is not None:
-                from pushplan.evaluation.cluster import dask_executor
+                from pushplan.evaluation.run.cluster import dask_executor
 
                 executor = stack.enter_context(dask_executor(dask, self.memory_limit_mb))
                 workers = executor.window

@@ -10,8 +10,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from pushplan.evaluation.jobs import JobSettings
-from pushplan.evaluation.policies import PolicySpec, parse_policy, policy_names
+from pushplan.evaluation.run.jobs import JobSettings
+from pushplan.evaluation.run.policy_specs import PolicySpec, parse_policy, policy_names
 from pushplan.scenarios.suite import distinct
 from pushplan.world import Deadline, SchemaError
 from pushplan.world.checks import choice, expect, integer, known_keys, number

@@ -13,14 +13,14 @@ from typing import Any
 import numpy as np
 
 from pushplan.envs.registry import variation_names
-from pushplan.evaluation.batch import Progress, run_batch
 from pushplan.evaluation.benchmark import suites_of
-from pushplan.evaluation.compatibility import misfits
-from pushplan.evaluation.jobs import Job, JobSettings
-from pushplan.evaluation.policies import PolicySpec, parse_policy
-from pushplan.evaluation.rows import ResultRow
-from pushplan.evaluation.statistics import wilson
-from pushplan.evaluation.tables import Table, heading
+from pushplan.evaluation.report.tables import Table, heading
+from pushplan.evaluation.run.batch import Progress, run_batch
+from pushplan.evaluation.run.compatibility import misfits
+from pushplan.evaluation.run.jobs import Job, JobSettings
+from pushplan.evaluation.run.policy_specs import PolicySpec, parse_policy
+from pushplan.evaluation.statistics.estimates import wilson
+from pushplan.evaluation.store.rows import ResultRow
 from pushplan.metrics import Role, metric_names
 from pushplan.runtime.disturbances import Disturbances
 from pushplan.runtime.disturbed_policy import DisturbedPolicy

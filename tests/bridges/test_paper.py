@@ -12,7 +12,7 @@ import pytest
 
 from pushplan.envs.registry import TASKS
 from pushplan.evaluation import Experiment, bench
-from pushplan.evaluation.policies import policy_names
+from pushplan.evaluation.run.policy_specs import policy_names
 from pushplan.learned.loading import weights_of
 from pushplan.scenarios import suite_names
 from pushplan.world import InvalidInputError

@@ -25,7 +25,7 @@ from pushplan.evaluation import (
     parse_policies,
     run_batch,
 )
-from pushplan.evaluation.job_identity import versions
+from pushplan.evaluation.run.job_identity import versions
 from pushplan.world import Episode, InvalidInputError
 
 SETTINGS = JobSettings(make_env=f"{HERE}:make_env", timeout_s=3.0, grace_s=0.5)

@@ -46,7 +46,7 @@ def test_the_same_bytes_as_without(tmp_path: Path) -> None:
 
 
 def test_each_job_is_alone_on_its_worker(tmp_path: Path) -> None:
-    from pushplan.evaluation.cluster import dask_executor
+    from pushplan.evaluation.run.cluster import dask_executor
 
     names = "Ahead Raises Sleeps HoldsGil Killed Segfaults Greedy"
     specs = parse_policies([f"{HERE}:{name}" for name in names.split()])
@@ -97,7 +97,7 @@ def slow_jobs(count: int) -> list[Job]:
 
 
 def test_a_lost_worker_costs_nothing(tmp_path: Path, cluster) -> None:
-    from pushplan.evaluation.cluster import dask_executor
+    from pushplan.evaluation.run.cluster import dask_executor
 
     address, _, workers = cluster
 
@@ -118,7 +118,7 @@ def test_a_lost_worker_costs_nothing(tmp_path: Path, cluster) -> None:
 
 
 def test_a_lost_scheduler_is_one_line_and_a_restart_finishes(tmp_path: Path, cluster) -> None:
-    from pushplan.evaluation.cluster import dask_executor
+    from pushplan.evaluation.run.cluster import dask_executor
 
     address, scheduler, _ = cluster
 
@@ -145,7 +145,7 @@ def test_a_lost_scheduler_is_one_line_and_a_restart_finishes(tmp_path: Path, clu
 
 
 def test_no_cluster_is_one_line() -> None:
-    from pushplan.evaluation import cluster
+    from pushplan.evaluation.run import cluster
 
     for where in ("local:0", "local:x", "nonsense", ""):
         with pytest.raises(InvalidInputError, match="'local:N' or the address"):
@@ -153,7 +153,7 @@ def test_no_cluster_is_one_line() -> None:
 
 
 def test_no_scheduler_is_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
-    from pushplan.evaluation import cluster
+    from pushplan.evaluation.run import cluster
 
     monkeypatch.setattr(cluster, "CONNECT_S", 1.0)
     with pytest.raises(InvalidInputError, match="no Dask scheduler at"):

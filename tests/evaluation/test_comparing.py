@@ -12,8 +12,8 @@ import pytest
 
 from pushplan.cli import main
 from pushplan.evaluation import ResultRow, compare_runs
-from pushplan.evaluation.comparing import read_rules
-from pushplan.evaluation.rows import rows_csv
+from pushplan.evaluation.report.comparing import read_rules
+from pushplan.evaluation.store.rows import rows_csv
 from pushplan.world import InvalidInputError, PushplanError, UnknownNameError
 
 

@@ -10,9 +10,9 @@ import pytest
 from pushplan.cli import main
 from pushplan.evaluation import Experiment
 from pushplan.evaluation.experiment import EPISODE_BYTES
-from pushplan.evaluation.job_identity import identified
-from pushplan.evaluation.rows import Status, blank_row
-from pushplan.evaluation.store import RunDirectory
+from pushplan.evaluation.run.job_identity import identified
+from pushplan.evaluation.store.rows import Status, blank_row
+from pushplan.evaluation.store.run_directory import RunDirectory
 
 DATA = {
     "schema": "pushplan-experiment/1",

@@ -105,7 +105,7 @@ def test_an_episode_that_does_not_fit_its_name_is_not_saved(run: Path) -> None:
 def test_a_locked_database_is_waited_for_and_then_one_line(
     run: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("pushplan.evaluation.database.WAIT_S", 0.1)
+    monkeypatch.setattr("pushplan.evaluation.store.database.WAIT_S", 0.1)
     with sqlite3.connect(run / "results.db", isolation_level=None) as db:
         db.execute("BEGIN IMMEDIATE")
         with pytest.raises(InvalidInputError, match="database is locked"):

@@ -14,7 +14,7 @@ from matplotlib.text import Text
 from synthetic_rows import many_rows
 
 from pushplan.evaluation import Results
-from pushplan.evaluation.plots import FIGURES
+from pushplan.evaluation.report.plots import FIGURES
 
 LONG = "a_very_long_policy_name@push_weight-0.25@clearance-0.125@sticks-x"
 

@@ -20,9 +20,9 @@ from evaluation_doubles import HERE, LineScenario
 import pushplan
 from pushplan.envs import registry
 from pushplan.evaluation import Job, JobSettings, PolicySpec, Results, parse_policy, run_batch
-from pushplan.evaluation.job_identity import UNSEEN, code_digest, job_spec, versions
-from pushplan.evaluation.jobs import job_id
-from pushplan.evaluation.provenance import PACKAGES
+from pushplan.evaluation.run.job_identity import UNSEEN, code_digest, job_spec, versions
+from pushplan.evaluation.run.jobs import job_id
+from pushplan.evaluation.store.provenance import PACKAGES
 from pushplan.evaluation.stress_testing import UNDISTURBED, stress
 from pushplan.scenarios import Scenario
 from pushplan.world import InvalidInputError
@@ -70,9 +70,9 @@ def package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 def test_any_file_of_ours_counts_that_an_episode_may_run_through(package: Path) -> None:
     for name in (
-        "evaluation/episode.py",
-        "evaluation/execute.py",
-        "evaluation/rows.py",
+        "evaluation/run/recording.py",
+        "evaluation/run/execute.py",
+        "evaluation/store/rows.py",
         "evaluation/stress_testing.py",
         "world/seeds.py",
         "runtime/disturbances.py",
@@ -82,8 +82,8 @@ def test_any_file_of_ours_counts_that_an_episode_may_run_through(package: Path) 
         "interaction/weights/ice_network.onnx",
     ):
         assert changes(package / name, of_package), name
-    (package / "evaluation" / "brand_new.py").touch()
-    assert changes(package / "evaluation" / "brand_new.py", of_package)
+    (package / "evaluation" / "run" / "brand_new.py").touch()
+    assert changes(package / "evaluation" / "run" / "brand_new.py", of_package)
 
 
 def test_reports_commands_and_caches_do_not_count(package: Path) -> None:
@@ -91,9 +91,9 @@ def test_reports_commands_and_caches_do_not_count(package: Path) -> None:
     cache.mkdir()
     (cache / "plan.nbc").touch()
     for name in (
-        "evaluation/tables.py",
-        "evaluation/plots.py",
-        "evaluation/page_files/page.css",
+        "evaluation/report/tables.py",
+        "evaluation/report/plots.py",
+        "evaluation/report/page_files/page.css",
         "cli/bench.py",
         "learned/weights/maze-ppo.md",
         "world/__pycache__/plan.nbc",
@@ -105,10 +105,10 @@ def test_reports_commands_and_caches_do_not_count(package: Path) -> None:
 def test_no_episode_imports_what_does_not_count() -> None:
     code = (
         "import importlib, sys\n"
-        "from pushplan.evaluation.pool import PRELOAD\n"
-        "for name in (*PRELOAD, 'pushplan.evaluation.worker'): importlib.import_module(name)\n"
+        "from pushplan.evaluation.run.pool import PRELOAD\n"
+        "for name in (*PRELOAD, 'pushplan.evaluation.run.worker'): importlib.import_module(name)\n"
         "from pushplan.evaluation import Job, JobSettings, parse_policy\n"
-        "from pushplan.evaluation.execute import execute\n"
+        "from pushplan.evaluation.run.execute import execute\n"
         "from pushplan.scenarios import Scenario\n"
         "for task, policy in (('maze', 'straight'), ('ship_ice', 'ship-predictive-network'),\n"
         "        ('box_delivery', 'greedy'), ('area_clearing', 'area-clearing-ppo')):\n"
@@ -119,7 +119,7 @@ def test_no_episode_imports_what_does_not_count() -> None:
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     seen = {name.removeprefix("pushplan.").replace(".", "/") for name in done.stdout.split()}
     rooms = {name.partition("/")[0] for name in seen}
-    assert "evaluation/episode" in seen
+    assert "evaluation/run/recording" in seen
     assert not UNSEEN & (seen | rooms)
 
 

@@ -82,7 +82,7 @@ def test_a_worker_that_cannot_be_started(
         raise FAILURES[lack]
 
     with monkeypatch.context() as patched:
-        patched.setattr("pushplan.evaluation.pool.WorkerProcess", fails)
+        patched.setattr("pushplan.evaluation.run.pool.WorkerProcess", fails)
         with pytest.raises(InvalidInputError, match=KEPT):
             batch(tmp_path)
     assert not Results.load(tmp_path).rows

@@ -7,7 +7,7 @@ import pytest
 
 from pushplan.envs import PushEnv
 from pushplan.evaluation import InvalidActionError, Job, JobSettings, parse_policy, run_episode
-from pushplan.evaluation.episode import Recording
+from pushplan.evaluation.run.recording import Recording
 from pushplan.learned import learned_names
 from pushplan.planners import PlanFollower, make_policy, policy_names
 from pushplan.scenarios import suite
@@ -90,7 +90,7 @@ def test_without_a_mode_that_fits_the_error_names_the_remedy():
 
 @pytest.mark.slow
 def test_a_job_of_such_a_policy_has_a_row():
-    from pushplan.evaluation.execute import execute
+    from pushplan.evaluation.run.execute import execute
 
     settings = JobSettings(dry_run=False)
     assert execute(Job(parse_policy(Straight), ROOM), settings).row.status == "done"

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pushplan
 from pushplan.evaluation import Results, bench
-from pushplan.evaluation.provenance import _checkout, in_words
+from pushplan.evaluation.store.provenance import _checkout, in_words
 
 
 def test_each_call_that_ran_jobs_is_noted(tmp_path: Path) -> None:

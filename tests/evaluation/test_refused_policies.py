@@ -12,8 +12,8 @@ import pytest
 
 from pushplan.cli import main
 from pushplan.evaluation import JobSettings, Results, bench
-from pushplan.evaluation.compatibility import incompatibility
-from pushplan.evaluation.policies import PolicySpec
+from pushplan.evaluation.run.compatibility import incompatibility
+from pushplan.evaluation.run.policy_specs import PolicySpec
 from pushplan.learned.loading import weights_of
 from pushplan.learned.onnx_policy import read_specification
 from pushplan.scenarios import suite

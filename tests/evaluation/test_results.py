@@ -10,7 +10,7 @@ import pytest
 
 from pushplan.cli import main
 from pushplan.evaluation import ResultRow, Results, bench
-from pushplan.evaluation.store import RunDirectory
+from pushplan.evaluation.store.run_directory import RunDirectory
 from pushplan.world import InvalidInputError
 
 

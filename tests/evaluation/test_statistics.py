@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pushplan.evaluation import bootstrap_interval, wilson
-from pushplan.evaluation.statistics import estimate
+from pushplan.evaluation.statistics.estimates import estimate
 from pushplan.world import InvalidInputError
 
 

@@ -6,18 +6,18 @@ import scipy.stats
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from pushplan.evaluation.statistics import (
+from pushplan.evaluation.statistics.aggregates import (
+    interquartile_mean,
+    performance_profile,
+    probability_of_improvement,
+)
+from pushplan.evaluation.statistics.estimates import (
     ENOUGH,
     MANY,
     bootstrap_interval,
     holm,
     pairs_needed,
     signed_rank_test,
-)
-from pushplan.evaluation.statistics_aggregate import (
-    interquartile_mean,
-    performance_profile,
-    probability_of_improvement,
 )
 from pushplan.world import InvalidInputError
 

@@ -15,7 +15,7 @@ from evaluation_doubles import stored_run
 
 from pushplan.cli import build_parser, main
 from pushplan.evaluation import Results
-from pushplan.evaluation.comparing import read_rules
+from pushplan.evaluation.report.comparing import read_rules
 from pushplan.world import InvalidInputError
 
 
@@ -272,7 +272,7 @@ def test_values_of_a_wrong_type_are_one_line(
 def test_a_value_has_a_greatest_length(
     run: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr("pushplan.evaluation.database.MAX_TEXT", 100_000)
+    monkeypatch.setattr("pushplan.evaluation.store.database.MAX_TEXT", 100_000)
     sql(run, "UPDATE results SET reason = hex(zeroblob(100000)) WHERE seed = 1")
     assert main(["report", str(run)]) == main(["rescore", str(run)]) == 2
     assert capsys.readouterr().err.count("\n") == 2

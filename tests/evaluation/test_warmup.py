@@ -9,16 +9,16 @@ import sys
 import pytest
 
 from pushplan.cli.kernel_progress import expected_kernels
-from pushplan.evaluation.policies import policy_names
-from pushplan.evaluation.warmup import names
+from pushplan.evaluation.run.policy_specs import policy_names
+from pushplan.evaluation.run.warmup import names
 
 EPISODES = """
 import json, sys
 from pushplan.compiled import watching
 from pushplan.evaluation import JobSettings, PolicySpec
-from pushplan.evaluation.compatibility import incompatibility
-from pushplan.evaluation.episode import Recording
-from pushplan.evaluation.warmup import warm_up
+from pushplan.evaluation.run.compatibility import incompatibility
+from pushplan.evaluation.run.recording import Recording
+from pushplan.evaluation.run.warmup import warm_up
 from pushplan.metrics import compute
 from pushplan.scenarios import suite
 
@@ -52,7 +52,7 @@ print(json.dumps([sorted(ready), later, ran]))
 EVERYTHING = """
 import gc, json
 from pushplan.compiled.dispatcher import KernelDispatcher
-from pushplan.evaluation.warmup import names, warm_up
+from pushplan.evaluation.run.warmup import names, warm_up
 
 for name in names():
     warm_up(name)

@@ -13,8 +13,8 @@ from policy_files import maze_specification
 from pushplan.cli import main
 from pushplan.envs import PushEnv
 from pushplan.evaluation import run_episode
-from pushplan.evaluation.jobs import JobSettings
-from pushplan.evaluation.policies import as_policy
+from pushplan.evaluation.run.jobs import JobSettings
+from pushplan.evaluation.run.policy_specs import as_policy
 from pushplan.learned import ObjectPolicy, Sb3Policy
 from pushplan.learned.sb3_policy import MEMBER, TRUST_VARIABLE, UntrustedError
 from pushplan.scenarios import Scenario

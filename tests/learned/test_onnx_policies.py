@@ -18,8 +18,8 @@ from policy_files import (
 
 from pushplan.envs import PushEnv
 from pushplan.evaluation import bench, parse_policy, run_episode
-from pushplan.evaluation.jobs import JobSettings
-from pushplan.evaluation.policies import policy_names
+from pushplan.evaluation.run.jobs import JobSettings
+from pushplan.evaluation.run.policy_specs import policy_names
 from pushplan.learned import OnnxPolicy, learned_names, load_policy, onnx_session
 from pushplan.learned.loading import weights_of
 from pushplan.learned.onnx_policy import read_specification

@@ -157,7 +157,7 @@ import sys
 for name in ("torch", "stable_baselines3", "onnx", "minari", "tensorboard"):
     sys.modules[name] = None
 from pushplan.evaluation import parse_policy, run_episode
-from pushplan.evaluation.jobs import JobSettings
+from pushplan.evaluation.run.jobs import JobSettings
 from pushplan.scenarios import Scenario
 policy = parse_policy("onnx:{path}").make()
 scenario = Scenario("maze", "pymunk", "benchmark", {{"boxes": 1}}, 3)

@@ -1,0 +1,1 @@
+"""Say what a run means: tables, figures, a page."""

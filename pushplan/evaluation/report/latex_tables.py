@@ -1,0 +1,144 @@
+# ruff: noqa: RUF001
+"""Tables for a LaTeX document that loads ``booktabs``: in ASCII, and no wider than a page."""
+
+from __future__ import annotations
+
+import re
+import textwrap
+import unicodedata
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+from pushplan.evaluation.report.tables import Table
+from pushplan.world.safe_files import read_data
+
+TEXT_WIDTH = 345.0
+"""Width of the text in the class ``article`` [pt]; most other classes have more."""
+_SEPARATION = 3.0  # on either side of a column [pt]
+_LETTERS = 26  # on a line of a cell
+_LINES = 36  # of a table on a page
+_PARTS = 3  # groups of columns on a page
+_FLOATS = 10  # tables that LaTeX is given before it has to place them
+_NARROW, _BROAD = frozenset("iljft.,:;'`|!()[]/ -1I"), frozenset("mwMW@%&<>=+~")
+_CHARACTERS = read_data(Path(__file__).with_name("latex_symbols.json"))
+_SYMBOLS: dict[str, str] = _CHARACTERS["symbols"]
+_ACCENTS: dict[str, str] = _CHARACTERS["accents"]
+
+
+def latex(tables: Sequence[Table]) -> str:
+    """The tables as floats, each `TEXT_WIDTH` wide at most.
+
+    Of a table that is wider, the further columns follow below, beside the first ones again. A
+    table that is longer than a page goes on in another one.
+    """
+    blocks = [r"% \usepackage{booktabs}"]
+    for table in tables:
+        keys = 2 if table.headings[1:2] == ("pair",) else 1
+        lines = [[_lines(cell) for cell in row] for row in (table.headings, *table.cells)]
+        parts = _parts([max(map(_width, column)) for column in zip(*lines, strict=True)], keys)
+        beside = [parts[i : i + _PARTS] for i in range(0, len(parts), _PARTS)]
+        pages = [(few, rows) for few in beside for rows in _pages(lines[1:], len(few))]
+        for number, (few, rows) in enumerate(pages):
+            more = " (continued)" if number else ""
+            block = [r"\begin{table}", r"\centering\footnotesize"]
+            block.append(rf"\setlength{{\tabcolsep}}{{{_SEPARATION:g}pt}}")
+            block.append(rf"\caption{{{_breakable(table.title)}{more}}}")
+            block += [_tabular([lines[0], *rows], part, keys) for part in few]
+            if table.note and number == len(pages) - 1:
+                block.append(rf"\par\smallskip\raggedright {_breakable(table.note)}.")
+            blocks.append("\n".join([*block, r"\end{table}"]))
+            if len(blocks) % _FLOATS == 0:
+                blocks.append(r"\clearpage")
+    return "\n\n".join(blocks) + "\n"
+
+
+def _lines(cell: str) -> list[str]:
+    spelled = "".join(code if (code := _character(c)).startswith("[U+") else c for c in cell)
+    return [part for line in spelled.split("\n") for part in textwrap.wrap(line, _LETTERS) or [""]]
+
+
+def _width(lines: Sequence[str]) -> float:
+    """Width of a column that holds a cell, in letters of 8 pt, never less than it is [pt]."""
+    widths = [
+        sum(
+            3.5
+            if c in _NARROW
+            else 8.0
+            if c in _BROAD or not c.isascii()
+            else 5.5
+            if c.isupper()
+            else 4.6
+            for c in line
+        )
+        for line in lines
+    ]
+    return max(widths) + 2.0 * _SEPARATION
+
+
+def _parts(widths: Sequence[float], keys: int) -> list[list[int]]:
+    """Columns that fit beside the first ``keys`` ones, group by group."""
+    parts = [list(range(keys))]
+    for column in range(keys, len(widths)):
+        shown = sum(widths[i] for i in parts[-1])
+        if shown + widths[column] > TEXT_WIDTH and len(parts[-1]) > keys:
+            parts.append(list(range(keys)))
+        parts[-1].append(column)
+    return parts
+
+
+def _pages(rows: Sequence[list[list[str]]], parts: int) -> Iterator[Sequence[list[list[str]]]]:
+    """The rows of a table, as many at a time as a page has room for."""
+    first, height = 0, 3 * parts  # of the headings
+    for i, row in enumerate(rows):
+        lines = parts * max(map(len, row))
+        if i > first and height + lines > _LINES:
+            yield rows[first:i]
+            first, height = i, 3 * parts
+        height += lines
+    yield rows[first:]
+
+
+def _tabular(rows: Sequence[list[list[str]]], columns: Sequence[int], keys: int) -> str:
+    """Some columns of rows, the first of which is the heading."""
+    head, *body = (" & ".join(_cell(row[i], i < keys) for i in columns) + r" \\" for row in rows)
+    body = [f"{{}}{line}" if line.startswith(("[", "*")) else line for line in body]
+    sides = "l" * keys + "r" * (len(columns) - keys)
+    lines = [rf"\begin{{tabular}}{{{sides}}}", r"\toprule", head, r"\midrule", *body]
+    return "\n".join([*lines, r"\bottomrule", r"\end{tabular}\par\medskip"])
+
+
+def _cell(lines: Sequence[str], left: bool) -> str:
+    if len(lines) == 1:
+        return escaped(lines[0])
+    # a line that begins with a bracket would be an argument of the line break before it
+    joined = r"\\{}".join(map(escaped, lines))
+    return rf"\begin{{tabular}}[t]{{@{{}}{'l' if left else 'r'}@{{}}}}{joined}\end{{tabular}}"
+
+
+def _breakable(text: str) -> str:
+    """An escaped text with places to break its long words at."""
+    words = (r"\allowbreak{}".join(map(escaped, textwrap.wrap(word, 8))) for word in text.split())
+    return " ".join(words)
+
+
+def escaped(text: str) -> str:
+    """A text in ASCII as LaTeX takes it."""
+    signed = re.sub(r"(?<![^\s\[])-(?=\d)", "−", text)  # the hyphen of a negative number
+    return "".join(map(_character, signed)).replace("--", "-{}-")
+
+
+def _character(character: str) -> str:
+    if character in _SYMBOLS:
+        return _SYMBOLS[character]
+    if character.isascii():
+        return character if character.isprintable() else " "
+    if unicodedata.combining(character):
+        return ""
+    kind, *codes = unicodedata.decomposition(character).split() or [""]
+    base, *marks = list(unicodedata.normalize("NFKD", character))
+    inner = "".join(map(_character, [base, *marks])) if codes else ""
+    if kind in ("<sub>", "<super>"):
+        return f"${'_' if kind == '<sub>' else '^'}{{{inner.replace('$', '')}}}$"
+    for mark in marks:
+        inner = rf"\{_ACCENTS[mark]}{{{inner}}}" if mark in _ACCENTS else inner
+    return inner or f"[U+{ord(character):04X}]"

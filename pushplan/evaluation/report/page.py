@@ -1,0 +1,182 @@
+"""One page about a run that needs nothing beside it: tables, figures, every episode, replays."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+import pushplan
+from pushplan.drawing.palette import FLOOR_PALETTE, SERIES
+from pushplan.evaluation.report.replays import chosen, packed, write_beside
+from pushplan.evaluation.report.results import Results
+from pushplan.evaluation.report.tables import Table, heading
+from pushplan.evaluation.store.provenance import in_words
+from pushplan.metrics import METRICS, Role, metric_names
+from pushplan.world import SchemaError
+from pushplan.world.libraries import need
+from pushplan.world.output_files import write_atomic
+from pushplan.world.safe_files import read_bytes
+
+PAGE = "report.html"
+REPLAYS = ("embed", "beside", "none")
+_FILES = files("pushplan.evaluation.report") / "page_files"
+_TIMES = ("plan_time_median_s", "decision_time_median_s", "wall_time_s")
+_DIGITS = 5
+_USUAL = {"make_env": "pushplan.envs:make", "observation": "auto"}
+"""Facts of a run that say nothing."""
+
+
+def write_page(
+    run: Results,
+    tables: Sequence[Table],
+    figures: Mapping[str, Path],
+    folder: Path,
+    *,
+    replays: str = "embed",
+    most: int = 40,
+) -> Path:
+    """Write ``report.html`` and return its path.
+
+    Args:
+        run: whose page it is.
+        tables: tables, scores first.
+        figures: caption -> SVG file; they are embedded.
+        folder: where the page goes; links are relative to it.
+        replays: one of `REPLAYS`: in the page, as files beside it, or not at all.
+        most: how many episodes have a replay.
+    """
+    from markupsafe import Markup
+
+    rows = [] if replays == "none" else chosen(run, most)
+    texts: list[str] = []
+    there: dict[str, int] = {}
+    if replays == "embed":
+        found = {row.job: text for row in rows if (text := packed(run, row)) is not None}
+        texts, there = list(found.values()), dict.fromkeys(found, 1)
+    elif replays == "beside":
+        there = dict.fromkeys(write_beside(run, rows, folder), 2)
+    pairs = [table for table in tables if table.title.startswith("Paired")]
+    configuration = run.about.get("configuration", {})
+    facts = {"episodes": len(run.rows), **configuration}
+    told = {key: value for key, value in facts.items() if value not in (None, _USUAL.get(key))}
+    drawn = []
+    for caption, file in figures.items():
+        picture = file.read_text(encoding="utf-8")
+        # without what stands before its root
+        drawn.append((caption, file.name, Markup(picture[picture.index("<svg") :])))
+    page = need("jinja2").Environment(autoescape=True, trim_blocks=True, lstrip_blocks=True)
+    text = page.from_string(_file("page.html")).render(
+        version=pushplan.__version__,
+        title=f"pushplan: {configuration.get('suite') or 'results'}",
+        facts=", ".join(f"{key} {value}" for key, value in told.items()),
+        style=Markup(_file("page.css")),
+        script=Markup(_file("page.js") + _file("replay.js") + "filter();\nchooseFirst();\n"),
+        scores=[table for table in tables if table not in pairs],
+        pairs=pairs,
+        figures=drawn,
+        sources=[(k, v) for k, v in run.about.get("policies", {}).items() if k != v],
+        runs=[in_words(one) for one in run.about.get("runs", ())],
+        data=Markup(_escaped(json.dumps(page_data(run, there), separators=(",", ":")))),
+        replays=[Markup(_escaped(one)) for one in texts],
+    )
+    path = folder / PAGE
+    write_atomic(path, text.encode())
+    return path
+
+
+def is_page(path: Path) -> bool:
+    """True if a file is a page that `write_page` wrote."""
+    try:
+        return b'name="generator" content="pushplan ' in read_bytes(path)[:400]
+    except SchemaError:
+        return False
+
+
+def page_data(run: Results, replays: Mapping[str, int]) -> dict[str, Any]:
+    """What the scripts of the page read: the rows, column by column, texts as numbers of a list.
+
+    Args:
+        run: the rows.
+        replays: job -> 1 for a replay in the page, 2 for one beside it.
+    """
+    policies, settings = run.policies, list(run.titles)
+    scenarios: dict[str, int] = {}
+    listed: list[tuple[str, int, int]] = []
+    for row in run.rows:
+        if row.scenario not in scenarios:
+            scenarios[row.scenario] = len(listed)
+            listed.append((row.scenario, settings.index(row.setting), row.seed))
+    reasons = {reason: i for i, reason in enumerate(dict.fromkeys(r.reason for r in run.rows))}
+    statuses = list(dict.fromkeys(row.status for row in run.rows))
+    values = _values(run)
+    headings = {name: heading(name) for name in values if name in METRICS}
+    headings |= {name: name.removesuffix("_s") + " [s]" for name in _TIMES}
+    outcomes = [
+        row.status if row.failed else "success" if row.success else row.reason for row in run.rows
+    ]
+    return {
+        "folder": str(run.path) if run.path is not None else "DIR",
+        "policies": policies,
+        "colours": _colours(),
+        "settings": list(run.titles.values()),
+        "scenarios": listed,
+        "statuses": statuses,
+        "reasons": list(reasons),
+        "measures": [
+            ("outcome", "outcome"),
+            *((name, headings.get(name, name)) for name in values),
+        ],
+        "rows": {
+            "policy": [policies.index(row.policy) for row in run.rows],
+            "scenario": [scenarios[row.scenario] for row in run.rows],
+            "status": [statuses.index(row.status) for row in run.rows],
+            "reason": [reasons[row.reason] for row in run.rows],
+            "success": [int(row.success) for row in run.rows],
+            "job": [row.job for row in run.rows],
+            "trace": [row.trace for row in run.rows],
+            "replay": [replays.get(row.job, 0) for row in run.rows],
+            "values": {"outcome": outcomes, **values},
+        },
+    }
+
+
+def _colours() -> dict[str, Any]:
+    """The palette of figures and films, for replays and the names of policies."""
+    names = ("wall", "robot", "trail", "plan", "ghost", "prediction", "robot_edge")
+    return {
+        "policies": SERIES,
+        **{name: getattr(FLOOR_PALETTE, name) for name in names},
+        "goal": FLOOR_PALETTE.goal[1],
+        "object": FLOOR_PALETTE.box[0],
+        "edge": FLOOR_PALETTE.box[1],
+    }
+
+
+def _values(run: Results) -> dict[str, list[float | None]]:
+    """Columns that have values, rounded, and metrics that are no columns."""
+    found = {}
+    for name in (*metric_names(Role.SCORE, Role.DETAIL, Role.FACT), *_TIMES):
+        column = [_rounded(getattr(row, name)) for row in run.rows]
+        if any(value is not None for value in column):
+            found[name] = column
+    for name in run.about.get("metrics", ()):
+        found[name] = [_rounded(run.measured.get(row.job, {}).get(name)) for row in run.rows]
+    return found
+
+
+def _rounded(value: float | None) -> float | None:
+    return None if value is None else float(f"{value:.{_DIGITS}g}")
+
+
+def _file(name: str) -> str:
+    return (_FILES / name).read_text(encoding="utf-8")
+
+
+def _escaped(text: str) -> str:
+    """JSON that ends no script element: the characters of tags as their codes."""
+    for character in "<>&\u2028\u2029":
+        text = text.replace(character, f"\\u{ord(character):04x}")
+    return text

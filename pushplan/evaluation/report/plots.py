@@ -1,0 +1,308 @@
+"""Pictures of a run, drawn without a screen."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib import rc_context
+from matplotlib.figure import Figure
+from matplotlib.ticker import LogLocator
+
+from pushplan.drawing.figure import STYLE, save_figure
+from pushplan.evaluation.report.interval_plot import draw_intervals
+from pushplan.evaluation.report.plot_style import (
+    LINE,
+    PANEL,
+    TITLE_LETTERS,
+    add_legend,
+    dots,
+    interval,
+    line,
+    tidy,
+    unclipped,
+    wrapped,
+)
+from pushplan.evaluation.report.results import Results
+from pushplan.evaluation.report.tables import heading
+from pushplan.evaluation.statistics.aggregates import performance_profile
+from pushplan.evaluation.statistics.estimates import estimate
+from pushplan.evaluation.statistics.summary import grouped, values_of
+from pushplan.evaluation.store.rows import ResultRow
+from pushplan.metrics import Role, metric_names
+
+_MANY = 300  # so many dots of a policy in a panel are drawn as an image
+_SETTINGS = 6  # of more, figures with a panel for each show all together
+_TRACES = 300  # of so many episodes every planning call is read from the trace
+
+
+def write_plots(run: Results, folder: Path, formats: Sequence[str] = ()) -> dict[str, Path]:
+    """Draw everything that the rows allow, with where the rows come from in the files.
+
+    Figures show how episodes differ: there are none if no policy has two in a setting.
+
+    Args:
+        run: the rows.
+        folder: where the files go.
+        formats: endings without the dot, of `FORMATS`, to write beside SVG.
+
+    Returns:
+        Caption -> path of an SVG file.
+    """
+    endings = [f".{one}" for one in formats]
+    source = json.dumps({"runs": run.about.get("runs", []), "policies": run.about.get("policies")})
+    plots: dict[str, Path] = {}
+    if max(map(len, grouped(run.rows).values()), default=0) < 2:
+        return plots
+    for name, (caption, _) in FIGURES.items():
+        if (figure := draw(run, name)) is None:
+            continue
+        plots[caption] = folder / f"{name}.svg"
+        for ending in dict.fromkeys((".svg", *endings)):
+            path = folder / f"{name}{ending}"
+            save_figure(path, figure, title=caption, source=source)
+    return plots
+
+
+def draw(run: Results, name: str) -> Figure | None:
+    """One of `FIGURES`; None if the rows have nothing for it."""
+    with rc_context(STYLE):
+        many = len(run.titles) > _SETTINGS and name in ("tradeoff", "scores", "planning_time")
+        figure: Figure | None = FIGURES[name][1](run.pooled if many else run)
+    return figure
+
+
+def _tradeoff(run: Results) -> Figure | None:
+    """E against I: one dot an episode, the mean with its intervals."""
+
+    def panel(axes: Any, rows: Sequence[ResultRow]) -> None:
+        kind = "nav" if values_of(rows, "E_nav") else "manip"
+        names = (f"I_{kind}", f"E_{kind}")
+        for i, label in enumerate(run.policies):
+            mine = [r for r in rows if r.policy == label]
+            points = [
+                (x, y)
+                for r in mine
+                if (x := getattr(r, names[0])) is not None
+                and (y := getattr(r, names[1])) is not None
+            ]
+            if not points:
+                continue
+            xy = np.array(points, dtype=float)
+            many = len(xy) > _MANY
+            cloud = axes.scatter(*xy.T, s=10, alpha=0.35, linewidths=0, rasterized=many, **dots(i))
+            across, up = estimate(xy[:, 0]), estimate(xy[:, 1])
+            bar = axes.errorbar(
+                across.mean,
+                up.mean,
+                xerr=interval(across),
+                yerr=interval(up),
+                markersize=6,
+                markeredgecolor="black",
+                ecolor="black",
+                elinewidth=1.0,
+                capsize=2,
+                linestyle="none",
+                label=label,
+                zorder=5,
+                **dots(i),
+            )
+            unclipped(cloud, bar.lines[0])
+        axes.margins(0.08)
+        axes.locator_params(nbins=4)
+
+    labels = ("effort I (1 = pushed nothing)", "efficiency E (1 = shortest path)")
+    figure = _panels(run, ("I_nav", "I_manip"), panel, labels)
+    if figure is not None:  # after all panels, which share their limits
+        figure.axes[0].set_xlim(right=1.02)
+        figure.axes[0].set_ylim(top=max(1.03, figure.axes[0].get_ylim()[1]))
+    return figure
+
+
+def _spread(run: Results) -> Figure | None:
+    """A box and all dots for each policy: a panel a metric, the settings below each other."""
+    metrics = [name for name in metric_names(Role.SCORE, Role.DETAIL) if values_of(run.rows, name)]
+    if not metrics:
+        return None
+    columns = {
+        setting: [name for name in metrics if values_of(run.rows_of(setting), name)]
+        for setting in run.titles
+    }
+    heights = []
+    for setting, names in columns.items():
+        lines = sum(wrapped(label).count("\n") + 1.3 for label in run.policies_in(setting))
+        heights.append(math.ceil(len(names) / 2) * (LINE * lines + 0.5) + 0.4)
+    figure = Figure(figsize=(2.0 * PANEL[0], sum(heights)), layout="constrained")
+    parts = figure.subfigures(len(columns), 1, squeeze=False, height_ratios=heights)[:, 0]
+    rng = np.random.default_rng(0)
+    for part, (setting, names) in zip(parts, columns.items(), strict=True):
+        part.suptitle(wrapped(run.titles[setting], 2 * TITLE_LETTERS), fontsize=8.0)
+        grid = _grid(part, len(names), sharex=False)
+        for axes, name in zip(grid, names, strict=False):
+            _boxes(axes, run.policies_in(setting), run.rows_of(setting), name, rng)
+            axes.set_xlabel(wrapped(heading(name), TITLE_LETTERS))
+    return figure
+
+
+def _grid(figure: Any, count: int, *, sharex: bool = True) -> Any:
+    """So many axes, two beside each other, with shared scores."""
+    columns = min(2, count)
+    grid = figure.subplots(
+        math.ceil(count / columns), columns, squeeze=False, sharex=sharex, sharey=True
+    ).ravel()
+    for axes in grid[count:]:
+        axes.set_visible(False)
+        grid[count - columns].tick_params(labelbottom=True)  # it has nothing below it
+    return grid
+
+
+def _boxes(
+    axes: Any, policies: Mapping[str, int], rows: Sequence[ResultRow], name: str, rng: Any
+) -> None:
+    """The values of a metric by policy; ``policies`` gives each its place in the palette."""
+    for i, (label, place) in enumerate(policies.items()):
+        values = np.array(values_of([r for r in rows if r.policy == label], name))
+        if len(values) == 0:
+            continue
+        colour = dots(place)["color"]
+        axes.boxplot(
+            [values],
+            positions=[i],
+            widths=0.55,
+            orientation="horizontal",
+            showfliers=False,
+            patch_artist=True,
+            boxprops={"facecolor": colour + "30", "edgecolor": colour},
+            medianprops={"color": colour, "linewidth": 2},
+            whiskerprops={"color": colour},
+            capprops={"color": colour},
+        )
+        places = i + rng.uniform(-0.18, 0.18, len(values))
+        many = len(values) > _MANY
+        cloud = axes.scatter(
+            *(values, places),
+            s=6,
+            **dots(place),
+            alpha=0.55,
+            linewidths=0,
+            zorder=3,
+            rasterized=many,
+        )
+        unclipped(cloud)
+    axes.set_yticks(range(len(policies)), list(map(wrapped, policies)), fontsize=7.0)
+    axes.set_ylim(len(policies) - 0.4, -0.6)
+    axes.locator_params(axis="x", nbins=3)
+    tidy(axes)
+
+
+def _profiles(run: Results) -> Figure | None:
+    """Performance profiles with bands (Agarwal et al., 2021), one panel a score."""
+    kinds = [name for name in metric_names(Role.SCORE) if values_of(run.rows, name)]
+    if not kinds:
+        return None
+    figure = _sheet(len(kinds))
+    thresholds = np.linspace(0.0, 1.0, 101)
+    for axes, name in zip(_grid(figure, len(kinds), sharex=False), kinds, strict=False):
+        for i, label in enumerate(run.policies):
+            strata = [
+                np.array(values)
+                for (_, policy), rows in grouped(run.rows).items()
+                if policy == label and (values := values_of(rows, name))
+            ]
+            if not strata:
+                continue
+            found = performance_profile(strata, thresholds)
+            axes.step(thresholds, found.fractions, where="post", label=label, **line(i))
+            band = {"step": "post", "color": line(i)["color"], "alpha": 0.18, "linewidth": 0}
+            axes.fill_between(thresholds, found.low, found.high, **band)
+        axes.set_xlabel(f"{heading(name)} above")
+        axes.set_ylim(0.0, 1.02)
+        axes.locator_params(axis="x", nbins=3)
+        tidy(axes)
+    figure.supylabel("fraction of episodes", fontsize=8.0)
+    add_legend(figure)
+    return figure
+
+
+def _planning_time(run: Results) -> Figure | None:
+    """Fraction of planning calls that took at most so long; deadlines are dotted.
+
+    Of long runs, each episode counts with its median and its slowest call.
+    """
+    read = len(run.rows) <= _TRACES
+
+    def panel(axes: Any, rows: Sequence[ResultRow]) -> None:
+        for i, label in enumerate(run.policies):
+            mine = [r for r in rows if r.policy == label and r.plan_time_median_s is not None]
+            times = np.sort(np.concatenate([_calls(run, row, read) for row in mine] or [[]]))
+            if len(times) == 0:
+                continue
+            fractions = np.arange(1, len(times) + 1) / len(times)
+            shown = np.unique(np.linspace(0, len(times) - 1, 500).round().astype(int))
+            axes.step(1e3 * times[shown], fractions[shown], where="post", label=label, **line(i))
+            if (deadline := run.about.get("deadlines", {}).get(label)) is not None:
+                axes.axvline(1e3 * deadline, color=line(i)["color"], linestyle=":", linewidth=1.0)
+        axes.set_xscale("log")
+        axes.xaxis.set_major_locator(LogLocator(numticks=4))
+        axes.xaxis.set_minor_formatter("")
+        axes.xaxis.set_major_formatter("{x:g}")
+        axes.set_ylim(0.0, 1.02)
+
+    labels = ("time of a planning call [ms]", "fraction of calls")
+    return _panels(run, ("plan_time_median_s",), panel, labels)
+
+
+def _calls(run: Results, row: ResultRow, read: bool) -> Any:
+    """Times of all planning calls of an episode [s], from its trace where there is one."""
+    if read and (episode := run.episode(row)) is not None:
+        return np.maximum(episode.plan_times_s, 1e-6)
+    times = (row.plan_time_median_s, row.plan_time_max_s)
+    return np.array([time for time in times if time is not None])
+
+
+def _panels(
+    run: Results,
+    names: Sequence[str],
+    draw: Callable[[Any, Sequence[ResultRow]], None],
+    labels: tuple[str, str],
+) -> Figure | None:
+    """One panel for each setting that has values of one of these columns, and a legend."""
+    settings = [
+        setting
+        for setting in run.titles
+        if any(values_of(run.rows_of(setting), name) for name in names)
+    ]
+    if not settings:
+        return None
+    figure = _sheet(len(settings))
+    panels = _grid(figure, len(settings))[: len(settings)]
+    for axes, setting in zip(panels, settings, strict=True):
+        draw(axes, run.rows_of(setting))
+        axes.set_title(wrapped(run.titles[setting], TITLE_LETTERS))
+        tidy(axes)
+    for axes in panels[-2:]:
+        axes.set_xlabel(wrapped(labels[0], TITLE_LETTERS))
+    figure.supylabel(labels[1], fontsize=8.0)
+    add_legend(figure)
+    return figure
+
+
+def _sheet(panels: int) -> Figure:
+    """An empty figure for so many panels, two beside each other."""
+    columns = min(2, panels)
+    size = (PANEL[0] * columns, PANEL[1] * math.ceil(panels / columns))
+    return Figure(figsize=size, layout="constrained")
+
+
+FIGURES = {
+    "intervals": ("Success and scores with 95 % intervals", draw_intervals),
+    "tradeoff": ("Efficiency against effort", _tradeoff),
+    "scores": ("Scores of every episode", _spread),
+    "profiles": ("Share of episodes above each score, all settings alike", _profiles),
+    "planning_time": ("Time of a planning call", _planning_time),
+}
+"""Name -> caption, and what draws it."""

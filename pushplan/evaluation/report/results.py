@@ -1,0 +1,297 @@
+"""The results of a run, read back from its directory."""
+
+from __future__ import annotations
+
+import functools
+import io
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any, Self
+
+from pushplan.evaluation.report.table_formats import differences_csv, markdown, summary_csv, text
+from pushplan.evaluation.report.tables import (
+    Table,
+    aggregate_table,
+    difference_tables,
+    gap_tables,
+    measured_tables,
+    on_few_lines,
+    score_tables,
+)
+from pushplan.evaluation.statistics.gaps import gaps
+from pushplan.evaluation.statistics.summary import (
+    PairedDifference,
+    PolicySummary,
+    natural,
+    paired_differences,
+    policies_of,
+    settings_of,
+    summarise,
+)
+from pushplan.evaluation.store.database import DATABASE
+from pushplan.evaluation.store.rescoring import metric_label, rescore
+from pushplan.evaluation.store.rows import ResultRow, columns, rows_csv
+from pushplan.evaluation.store.run_directory import open_results, remove_report
+from pushplan.scenarios.known_bounds import known_bounds
+from pushplan.world import Episode, InvalidInputError, UnknownNameError
+from pushplan.world.checks import choice, integer
+from pushplan.world.libraries import need
+from pushplan.world.output_files import check_folder, write_atomic
+
+
+@dataclass(frozen=True)
+class Results:
+    """What a run says: summaries, paired differences, tables and a report."""
+
+    rows: tuple[ResultRow, ...]  # by the titles of their settings, otherwise as given
+    # configuration, policies and titles of the settings
+    about: Mapping[str, Any] = field(default_factory=dict)
+    path: Path | None = None  # the run directory; None for rows that come from elsewhere
+    # job -> value by name of metrics that are no columns
+    measured: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        place = {setting: natural(title) for setting, title in self.titles.items()}
+        rows = sorted(self.rows, key=lambda row: place[row.setting])
+        object.__setattr__(self, "rows", tuple(rows))
+
+    @classmethod
+    def load(cls, path: str | Path) -> Results:
+        """Read a run directory.
+
+        Raises:
+            InvalidInputError: if it holds no results.
+        """
+        rows, about, measured = open_results(path)
+        return cls(tuple(rows), about, Path(path), measured)
+
+    @property
+    def policies(self) -> list[str]:
+        """Labels, in the order in which they were given."""
+        return policies_of(self.rows, list(self.about.get("policies", {})))
+
+    @property
+    def titles(self) -> dict[str, str]:
+        """Words for each setting."""
+        known = self.about.get("settings", {})
+        return {setting: known.get(setting, setting) for setting in settings_of(self.rows)}
+
+    @functools.cached_property
+    def pooled(self) -> Self:
+        """The rows of all settings as one setting."""
+        title = f"All {len(self.titles)} settings together"
+        rows = tuple(replace(row, pool=title) for row in self.rows)
+        return replace(self, rows=rows, about={**self.about, "settings": {}})
+
+    def rows_of(self, setting: str) -> list[ResultRow]:
+        """The rows of one setting."""
+        return [row for row in self.rows if row.setting == setting]
+
+    def policies_in(self, setting: str) -> dict[str, int]:
+        """Labels of the policies that ran in a setting -> their places in `policies`."""
+        ran = {row.policy for row in self.rows_of(setting)}
+        return {label: place for place, label in enumerate(self.policies) if label in ran}
+
+    def episode(self, row: ResultRow) -> Episode | None:
+        """The recorded episode of a row; None if none was kept.
+
+        Raises:
+            SchemaError: if it cannot be read.
+        """
+        if self.path is None or row.trace_file is None:
+            return None
+        path = self.path / row.trace_file
+        return Episode.load(path) if path.is_file() else None
+
+    def summary(self) -> list[PolicySummary]:
+        """What the rows say about each policy in each setting."""
+        return list(self._summaries)
+
+    @functools.cached_property
+    def _summaries(self) -> list[PolicySummary]:
+        return summarise(self.rows, self.policies)
+
+    def compare(self, pairs: str = "first") -> list[PairedDifference]:
+        """Paired differences of policies on the same scenarios.
+
+        Args:
+            pairs: ``"first"`` for the first policy with each other one, or ``"all"``.
+        """
+        if pairs not in self._differences:
+            self._differences[pairs] = paired_differences(self.rows, self.policies, pairs)
+        return list(self._differences[pairs])
+
+    @functools.cached_property
+    def _differences(self) -> dict[str, list[PairedDifference]]:
+        return {}  # of the calls of `compare` so far
+
+    def measure(self, metrics: Sequence[str]) -> list[Table]:
+        """Metrics that are no columns, from the stored episodes of jobs that did not fail.
+
+        They are kept in the run directory, where later reports show them; see `rescore`.
+
+        Args:
+            metrics: names of `pushplan.metrics`, or functions as ``"module:function"`` or
+                ``"file.py:function"``.
+
+        Raises:
+            UnknownNameError: if there is no such metric.
+            InvalidInputError: if these results have no run directory, or it holds no episodes.
+        """
+        if self.path is None:
+            raise InvalidInputError("metrics of stored episodes need a run directory")
+        done = rescore(self.path, metrics, columns=False)
+        measured = Results.load(self.path).measured
+        if done.unreadable or not measured:
+            raise InvalidInputError(
+                f"{self.path} has no readable episode of {len(done.unreadable) or 'any'} jobs"
+            )
+        names = [metric_label(metric) for metric in metrics]
+        return measured_tables(self.rows, measured, names, self.policies, self.titles)
+
+    def tables(
+        self, *, wide: bool = False, settings: bool = False, pairs: str = "first"
+    ) -> list[Table]:
+        """Scores of the policies, their gaps to what is known, then their paired differences.
+
+        Of several settings, the tables of all together come first.
+
+        Args:
+            wide: with medians and further columns, for files and pages.
+            settings: whether each of several settings has its own tables too.
+            pairs: as for `compare`.
+        """
+        titles = self.titles
+        found = self.pooled.tables(wide=wide, pairs=pairs) if len(titles) > 1 else []
+        if found and not settings:
+            return found
+        metrics = self.about.get("metrics", [])
+        together = aggregate_table(self.rows, self.policies) if wide else None
+        return [
+            *found,
+            *([together] if together else []),
+            *score_tables(self.summary(), titles, wide=wide),
+            *measured_tables(self.rows, self.measured, metrics, self.policies, titles),
+            *gap_tables(gaps(self.rows, self.policies, known_bounds()), titles),
+            *difference_tables(self.compare(pairs), titles, wide=wide),
+        ]
+
+    def table(self, width: int = 160, *, settings: bool = False, pairs: str = "first") -> str:
+        """Scores and paired differences as text of at most ``width`` characters a line.
+
+        Args:
+            width: of a line.
+            settings: as for `tables`.
+            pairs: as for `compare`.
+        """
+        return text(on_few_lines(self.tables(settings=settings, pairs=pairs)), width)
+
+    def figure(self, name: str) -> Any:
+        """One figure of the report, to show or to save.
+
+        Args:
+            name: ``"intervals"``, ``"tradeoff"``, ``"scores"``, ``"profiles"`` or
+                ``"planning_time"``.
+
+        Returns:
+            A `matplotlib.figure.Figure`; None if the rows have nothing for it.
+
+        Raises:
+            UnknownNameError: if there is no such figure.
+            MissingDependencyError: without Matplotlib.
+        """
+        plots = need("pushplan.evaluation.report.plots")
+        if name not in plots.FIGURES:
+            raise UnknownNameError("figure", name, plots.FIGURES)
+        return plots.draw(self, name)
+
+    def export(self, path: str | Path) -> int:
+        """Write all rows, and metrics that are no columns, as CSV or Parquet.
+
+        Args:
+            path: ends in ``.csv`` or ``.parquet``.
+
+        Returns:
+            How many rows there are.
+
+        Raises:
+            InvalidInputError: if the file ends otherwise, or its folder does not exist.
+            MissingDependencyError: for Parquet, without PyArrow.
+        """
+        path = Path(path)
+        if path.suffix not in (".csv", ".parquet"):
+            raise InvalidInputError(f"rows are written as .csv or .parquet, got {path.name!r}")
+        if not path.absolute().parent.is_dir():
+            raise InvalidInputError(f"there is no folder {path.parent} for {path.name!r}")
+        more = {
+            name: [self.measured.get(row.job, {}).get(name) for row in self.rows]
+            for name in self.about.get("metrics", [])
+        }
+        if path.suffix == ".csv":
+            data = rows_csv(self.rows, more).encode()
+        else:
+            named = {name: [getattr(row, name) for row in self.rows] for name in columns()}
+            buffer = io.BytesIO()
+            table = need("pyarrow").table({**named, **more})
+            need("pyarrow.parquet").write_table(table, buffer)
+            data = buffer.getvalue()
+        write_atomic(path, data)
+        return len(self.rows)
+
+    def report(
+        self,
+        out: str | Path | None = None,
+        *,
+        replays: str = "embed",
+        most: int = 40,
+        figures: Sequence[str] = (),
+        pairs: str = "first",
+    ) -> Path:
+        """Write ``report.html``, its figures, the summaries and ``results.csv``, all of these rows.
+
+        Args:
+            out: folder; the run directory by default.
+            replays: ``"embed"`` in the page, ``"beside"`` it as files, or ``"none"``.
+            most: how many episodes have a replay: whole scenarios, those with failures first.
+            figures: formats to write the figures in beside SVG: ``"pdf"``, ``"png"``.
+            pairs: as for `compare`.
+
+        Returns:
+            The path of the page.
+
+        Raises:
+            InvalidInputError: if the folder is the directory of a run with other rows.
+            MissingDependencyError: without Matplotlib and Jinja.
+        """
+        from pushplan.evaluation.report.page import PAGE, REPLAYS, is_page, write_page
+
+        plots = need("pushplan.evaluation.report.plots")
+        choice("replays", replays, REPLAYS)
+        integer("most", most, low=0)
+        for ending in figures:
+            choice("figures", f".{ending}", need("pushplan.drawing.figure").FORMATS)
+        compared = self.compare(pairs)
+        folder = Path(out) if out is not None else self.path or Path()
+        if not is_page(folder / PAGE):
+            check_folder(folder, "run directory", DATABASE)
+        there = open_results(folder)[0] if os.path.lexists(folder / DATABASE) else self.rows
+        if set(there) != set(self.rows):
+            raise InvalidInputError(
+                f"{folder} is the directory of a run with {len(there)} rows, which are not the "
+                f"{len(self.rows)} of these results: report to another folder, or report that run "
+                f"with Results.load({str(folder)!r}).report()"
+            )
+        folder.mkdir(parents=True, exist_ok=True)
+        if (folder / DATABASE).is_file() or (folder / PAGE).is_file():
+            remove_report(folder)
+        write_atomic(folder / "results.csv", rows_csv(self.rows).encode())
+        tables = self.tables(wide=True, settings=True, pairs=pairs)
+        write_atomic(folder / "summary.md", markdown(tables).encode())
+        write_atomic(folder / "summary.csv", summary_csv(self.summary(), self.titles).encode())
+        if len(self.titles) > 1:
+            compared = [*self.pooled.compare(pairs), *compared]
+        write_atomic(folder / "differences.csv", differences_csv(compared, self.titles).encode())
+        drawn = plots.write_plots(self, folder, figures)
+        return write_page(self, tables, drawn, folder, replays=replays, most=most)

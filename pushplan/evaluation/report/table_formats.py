@@ -1,0 +1,104 @@
+"""Tables as Markdown, LaTeX, CSV and text."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from pushplan.evaluation.report.latex_tables import latex as latex
+from pushplan.evaluation.report.tables import Table
+from pushplan.evaluation.statistics.estimates import Estimate
+from pushplan.evaluation.statistics.summary import PairedDifference, PolicySummary
+from pushplan.evaluation.store.rows import csv_text
+
+if TYPE_CHECKING:
+    from rich.table import Table as RichTable
+
+
+def markdown(tables: Sequence[Table]) -> str:
+    """The tables as a Markdown document."""
+    blocks = []
+    for table in tables:
+        lines = [f"## {table.title}", "", _line(table.headings)]
+        lines.append(_line(["---"] * len(table.headings)))
+        lines += [_line([cell.replace("\n", "<br>") for cell in row]) for row in table.cells]
+        if table.note:
+            lines += ["", f"{table.note[0].upper()}{table.note[1:]}."]
+        blocks.append("\n".join(lines))
+    return "\n\n".join(blocks) + "\n"
+
+
+def summary_csv(summaries: Sequence[PolicySummary], titles: dict[str, str]) -> str:
+    """One line for each setting, policy and metric, with all digits."""
+    lines: list[Sequence[object]] = []
+    for summary in summaries:
+        who = (titles.get(summary.setting, summary.setting), summary.policy)
+        rate = summary.success
+        lines.append((*who, "success", rate.count, rate.fraction, "", "", rate.low, rate.high))
+        lines += [(*who, name, *_numbers(value)) for name, value in summary.metrics.items()]
+    return csv_text("setting,policy,metric,count,mean,sd,median,low,high".split(","), lines)
+
+
+def differences_csv(pairs: Sequence[PairedDifference], titles: dict[str, str]) -> str:
+    """One line for each setting, metric and pair of policies, with all digits."""
+    names = (
+        "setting,metric,first,second,count,mean,sd,median,low,high,better,worse,p_value,"
+        "p_corrected,effect,needed,verdict"
+    )
+    lines = [
+        (
+            *(titles.get(pair.setting, pair.setting), pair.metric, pair.first, pair.second),
+            *_numbers(pair.difference),
+            *(pair.better, pair.worse, pair.p_value, pair.p_corrected, pair.effect),
+            *("" if pair.needed is None else pair.needed, pair.verdict),
+        )
+        for pair in pairs
+    ]
+    return csv_text(names.split(","), lines)
+
+
+def _numbers(value: Estimate) -> tuple[float, ...]:
+    return value.count, value.mean, value.sd, value.median, value.low, value.high
+
+
+def rich_table(table: Table) -> RichTable:
+    """The table for a terminal."""
+    from rich import box
+    from rich.table import Table as RichTable
+    from rich.text import Text
+
+    rich = RichTable(
+        title=Text(table.title),
+        box=box.SIMPLE_HEAD,
+        show_edge=False,
+        title_justify="left",
+        padding=(0, 1, 0, 0),
+    )
+    for i, heading in enumerate(table.headings):
+        rich.add_column(Text(heading), justify="left" if i == 0 else "right", no_wrap=i == 0)
+    for row in table.cells:
+        rich.add_row(*(Text(cell) for cell in row))
+    return rich
+
+
+def text(tables: Sequence[Table], width: int = 160) -> str:
+    """The tables as plain text."""
+    from rich.console import Console
+
+    console = Console(
+        file=io.StringIO(),
+        width=width,
+        force_terminal=False,
+        force_jupyter=False,
+        color_system=None,
+    )
+    with console.capture() as capture:
+        for table in tables:
+            console.print(rich_table(table))
+            console.print()
+    return "\n".join(line.rstrip() for line in capture.get().rstrip().splitlines()) + "\n"
+
+
+def _line(cells: Sequence[str]) -> str:
+    return "| " + " | ".join(cells) + " |"

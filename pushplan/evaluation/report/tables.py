@@ -1,0 +1,313 @@
+"""Tables of a run as plain data."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from pushplan.evaluation.statistics.aggregates import (
+    Aggregate,
+    interquartile_mean,
+    probability_of_improvement,
+)
+from pushplan.evaluation.statistics.estimates import Estimate, Proportion, estimate
+from pushplan.evaluation.statistics.gaps import Gap
+from pushplan.evaluation.statistics.summary import (
+    PairedDifference,
+    PolicySummary,
+    grouped,
+    settings_of,
+    values_of,
+)
+from pushplan.evaluation.store.rows import ResultRow
+from pushplan.metrics import METRICS, Role, metric_names
+from pushplan.world.checks import FloatArray
+
+_TIMING_HEADINGS = {
+    "plan_time_median_s": "plan [ms]",
+    "decision_time_median_s": "step [ms]",
+    "wall_time_s": "wall [s]",
+}
+_TIMES = {
+    "plan_time_median_s": "plan_time_max_s",
+    "decision_time_median_s": "decision_time_max_s",
+}
+
+
+_PAIR_HEADINGS: tuple[str, ...] = (
+    *("metric", "pair", "difference", "95 % interval"),
+    *("better / worse / of", "p", "effect", "more"),
+)
+MANY_PAIRS = 12
+"""From more lines on, a table of differences has one for each pair of policies."""
+MANY_POLICIES = 6
+"""From more rows on, a table for a screen has each on one line."""
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table of texts. A line break in a cell separates a value from its interval."""
+
+    title: str  # one line
+    headings: tuple[str, ...]  # one a column
+    cells: tuple[tuple[str, ...], ...]  # rows of as many texts
+    note: str = ""  # what the numbers are
+
+
+SCORE_NOTE = (
+    "mean ± standard deviation over episodes, 95 % bootstrap interval of the mean below; success "
+    "with its Wilson interval; a failed job counts as no success and E_nav = 0; path and work "
+    "include episodes that ended early, without success; plan is the median over episodes of each "
+    "episode's median planning call, its slowest call below; step is the same for the time from "
+    "world to action, without simulation"
+)
+MEASURED_NOTE = (
+    "mean ± standard deviation over the episodes that did not fail, 95 % bootstrap interval of "
+    "the mean below; med is the median"
+)
+PAIR_NOTE = (
+    "second policy minus first on the same scenarios, path and work only where both succeed: "
+    "mean, 95 % bootstrap interval; better and worse count the scenarios in which the second "
+    "policy has the better or worse value, by the metric's own direction; p is of the signed-rank"
+    " test (sign test for success), corrected by Holm over the pairs and settings of a metric; "
+    "effect is the rank-biserial correlation, 1 where the second is better every time; * where p "
+    "< 0.05 with 10 scenarios at least; more is how many further scenarios would separate the "
+    "pair, were the differences to go on like this (power 0.8)"
+)
+BRIEF_NOTE = (
+    "second policy minus first on the same scenarios: mean, 95 % bootstrap interval; * where p < "
+    "0.05, corrected by Holm, with 10 scenarios at least; 'differences.csv' has the rest"
+)
+GAP_NOTE = (
+    "work of robot and objects, m₀ l₀ + Σ mᵢ lᵢ, of the successful episodes: mean of how much it "
+    "is above the best known solution of the scenario, and above a proven bound ('pushplan "
+    "bounds'); of how many scenarios that is known"
+)
+AGGREGATE_NOTE = (
+    "interquartile mean over all episodes of all settings with its 95 % stratified bootstrap "
+    "interval; P is the probability that an episode of the policy has a better value than one of "
+    "{first} in the same setting, ties one half (Agarwal et al., 2021)"
+)
+
+
+def heading(column: str) -> str:
+    """The heading of a column in tables, with its unit."""
+    if column in METRICS:
+        return METRICS[column].heading or column
+    return _TIMING_HEADINGS[column]
+
+
+def score_tables(
+    summaries: Sequence[PolicySummary], titles: dict[str, str], *, wide: bool = False
+) -> list[Table]:
+    """One table a setting with a row for each policy.
+
+    Args:
+        summaries: of a run.
+        titles: text for each setting.
+        wide: with medians and further columns, for files and pages.
+    """
+    tables = []
+    for setting in dict.fromkeys(s.setting for s in summaries):
+        mine = [s for s in summaries if s.setting == setting]
+        shown = metric_names(Role.SCORE, Role.DETAIL) if wide else metric_names(Role.SCORE)
+        shown = (*shown, *(("wall_time_s",) if wide else ()), *_TIMES)
+        metrics = [name for name in shown if any(name in s.metrics for s in mine)]
+        headings = ("policy", "runs", "success", *(heading(name) for name in metrics))
+        cells = []
+        for summary in mine:
+            failed = f"\n{summary.failed} failed" if summary.failed else ""
+            rate = summary.success
+            success = f"{rate.fraction:.2f}\n{_interval(rate, 2)}"
+            line = [summary.policy, f"{summary.episodes}{failed}", success]
+            for name in metrics:
+                value = summary.metrics.get(name)
+                text = "" if value is None else _estimate(value, _digits(name), wide=wide)
+                if value is not None and name in _TIMES:
+                    worst = summary.metrics.get(_TIMES[name])
+                    greatest = "" if worst is None else f"\nmax {milliseconds(worst.highest)}"
+                    text = milliseconds(value.median) + greatest
+                line.append(text)
+            cells.append(tuple(line))
+        note = SCORE_NOTE + ("; med is the median" if wide else "")
+        tables.append(Table(titles.get(setting, setting), headings, tuple(cells), note))
+    return tables
+
+
+def gap_tables(found: Sequence[Gap], titles: Mapping[str, str]) -> list[Table]:
+    """One table a setting of how far its policies are from what is known to be possible."""
+    tables = []
+    for setting in dict.fromkeys(gap.setting for gap in found):
+        cells = tuple(
+            (
+                gap.policy,
+                f"{gap.to_best:+.1%}" if gap.with_best else "",
+                str(gap.with_best),
+                f"{gap.to_bound:+.1%}",
+                str(gap.count),
+            )
+            for gap in found
+            if gap.setting == setting
+        )
+        headings = ("policy", "above best known", "of", "above bound", "of")
+        tables.append(Table(titles.get(setting, setting), headings, cells, GAP_NOTE))
+    return tables
+
+
+def measured_tables(
+    rows: Sequence[ResultRow],
+    measured: Mapping[str, Mapping[str, float]],
+    metrics: Sequence[str],
+    policies: Sequence[str],
+    titles: Mapping[str, str],
+) -> list[Table]:
+    """One table a setting of metrics that were computed from stored episodes.
+
+    Args:
+        rows: of a run.
+        measured: job -> value by name of a metric.
+        metrics: columns, in order.
+        policies: rows, in order.
+        titles: text for each setting, in order.
+    """
+    groups = grouped(rows)
+    tables = []
+    for setting, title in titles.items():
+        cells = []
+        for policy in policies:
+            found = [measured.get(row.job, {}) for row in groups.get((setting, policy), [])]
+            line = []
+            for name in metrics:
+                values = [one[name] for one in found if name in one]
+                line.append(_estimate(estimate(values), _digits(name)) if values else "")
+            if any(line):
+                cells.append((policy, *line))
+        tables.append(Table(title, ("policy", *metrics), tuple(cells), MEASURED_NOTE))
+    return tables if any(table.cells for table in tables) else []
+
+
+def difference_tables(
+    pairs: Sequence[PairedDifference], titles: dict[str, str], *, wide: bool = False
+) -> list[Table]:
+    """One table a setting with a row for each pair of policies and metric."""
+    tables = []
+    if not wide:
+        pairs = [p for p in pairs if METRICS[p.metric].role is not Role.DETAIL]
+    for setting in dict.fromkeys(pair.setting for pair in pairs):
+        mine = [pair for pair in pairs if pair.setting == setting]
+        metrics = list(dict.fromkeys(pair.metric for pair in mine))
+        cells: list[tuple[str, ...]] = []
+        brief: dict[str, list[str]] = {}
+        for pair in mine:
+            names, digits = f"{pair.second} - {pair.first}", _digits(pair.metric)
+            mean = f"{pair.difference.mean:+.{digits}f}"
+            interval = _interval(pair.difference, digits, "+")
+            star = " *" if pair.significant else ""
+            line = brief.setdefault(names, [""] * len(metrics))
+            line[metrics.index(pair.metric)] = f"{mean} {interval}{star}"
+            cells.append(
+                (
+                    heading(pair.metric),
+                    names,
+                    mean + star,
+                    interval,
+                    f"{pair.better} / {pair.worse} / {pair.difference.count}",
+                    "< 0.001" if pair.p_corrected < 0.001 else f"{pair.p_corrected:.3f}",
+                    f"{pair.effect:+.2f}",
+                    _more(pair),
+                )
+            )
+        headings, note = _PAIR_HEADINGS, PAIR_NOTE
+        if not wide and len(cells) > MANY_PAIRS:
+            cells = [(names, *line) for names, line in brief.items()]
+            headings, note = ("pair", *map(heading, metrics)), BRIEF_NOTE
+        title = f"Paired differences: {titles.get(setting, setting)}"
+        tables.append(Table(title, headings, tuple(cells), note))
+    return tables
+
+
+def on_few_lines(tables: Sequence[Table]) -> list[Table]:
+    """The tables with a line for each row, where there are many."""
+    return [
+        replace(table, cells=tuple(tuple(c.replace("\n", " ") for c in row) for row in table.cells))
+        if len(table.cells) > MANY_POLICIES
+        else table
+        for table in tables
+    ]
+
+
+def _more(pair: PairedDifference) -> str:
+    """Further scenarios that the pair needs."""
+    if pair.significant:
+        return ""
+    if pair.needed is None:
+        return "-"
+    more = max(pair.needed - pair.difference.count, 1)
+    return f"{more}" if more <= 10_000 else "> 10000"
+
+
+def aggregate_table(rows: Sequence[ResultRow], policies: Sequence[str]) -> Table | None:
+    """Scores over all settings, one row for each policy that has a score in every one.
+
+    Args:
+        rows: of a run.
+        policies: labels in order; improvement is over the first of them.
+
+    Returns:
+        None if there is nothing to compare or only one setting.
+    """
+    groups, settings = grouped(rows), settings_of(rows)
+    if len(settings) < 2:
+        return None
+    strata: dict[tuple[str, str], list[FloatArray]] = {}
+    for label in policies:
+        for name in metric_names(Role.SCORE):
+            values = [values_of(groups.get((setting, label), []), name) for setting in settings]
+            if all(values):
+                strata[label, name] = [np.array(found) for found in values]
+    shown = [n for n in metric_names(Role.SCORE) if any(name == n for _, name in strata)]
+    if not shown:
+        return None
+    first = policies[0]
+    headings = ["policy"]
+    for name in shown:
+        headings += [heading(name), f"P({name})"]
+    cells = []
+    for label in policies:
+        line = [label]
+        for name in shown:
+            mine, base = strata.get((label, name)), strata.get((first, name))
+            middle, better = "", ""
+            if mine:
+                found = interquartile_mean(mine)
+                middle = f"{found.value:.3f}\n{_interval(found, 3)}"
+            if mine and base and label != first:
+                found = probability_of_improvement(mine, base)
+                better = f"{found.value:.2f}\n{_interval(found, 2)}"
+            line += [middle, better]
+        if any(line[1:]):
+            cells.append(tuple(line))
+    title = f"Interquartile means of all {len(settings)} settings"
+    return Table(title, tuple(headings), tuple(cells), AGGREGATE_NOTE.format(first=first))
+
+
+def _digits(column: str) -> int:
+    return METRICS[column].digits if column in METRICS else 3
+
+
+def _estimate(value: Estimate, digits: int, *, wide: bool = True) -> str:
+    middle = f"\nmed {value.median:.{digits}f}" if wide else ""
+    spread = f"{value.mean:.{digits}f} ± {value.sd:.{digits}f}"
+    return f"{spread}\n{_interval(value, digits)}{middle}"
+
+
+def _interval(value: Estimate | Aggregate | Proportion, digits: int, sign: str = "") -> str:
+    return f"[{value.low:{sign}.{digits}f}, {value.high:{sign}.{digits}f}]"
+
+
+def milliseconds(seconds: float) -> str:
+    """A time in milliseconds, as tables show it."""
+    value = 1e3 * seconds
+    return f"{value:.0f}" if value >= 100.0 else f"{value:.3g}"

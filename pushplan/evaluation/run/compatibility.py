@@ -1,0 +1,135 @@
+"""Whether a policy can be made at all, and whether it is made for a scenario."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+from pushplan.control import ImmediateExecutor
+from pushplan.evaluation.run.job_limits import EpisodeTimeout, soft_limit
+from pushplan.evaluation.run.jobs import Job, JobSettings
+from pushplan.evaluation.run.policy_specs import PolicySpec, UnusablePolicyError, parse_policies
+from pushplan.world import (
+    ChecksScenario,
+    InvalidInputError,
+    MaxIterations,
+    PlansBesideDriving,
+    Policy,
+    PushplanError,
+    stream,
+)
+
+if TYPE_CHECKING:
+    from pushplan.scenarios import Suite
+
+
+def misfits(
+    specs: Sequence[PolicySpec],
+    suites: Sequence[Suite],
+    settings: JobSettings,
+    *,
+    only: Mapping[str, Sequence[str]] | None = None,
+    allow_all: bool = False,
+) -> dict[tuple[str, str], str]:
+    """Make each policy once for each kind of scene, so that what cannot run is known before.
+
+    Args:
+        specs: the policies.
+        suites: what they are to run.
+        settings: of the environments.
+        only: labels of the policies that a suite, by name, is for; else for all of them.
+        allow_all: whether a policy may fit no suite at all.
+
+    Returns:
+        (suite, label) -> why that policy can run none of the suite's scenarios.
+
+    Raises:
+        UnusablePolicyError: if a policy cannot be made, or fits no suite.
+    """
+    known: dict[tuple[str, str], str | None] = {}
+    found: dict[tuple[str, str], str] = {}
+    for spec in specs:
+        first = ""
+        wanted = [one for one in suites if is_wanted(spec, one, only or {})]
+        for suite in wanted:
+            starts = {Job(spec, scenario).title: scenario for scenario in suite.scenarios}
+            for title, scenario in starts.items():
+                if (spec.label, title) not in known:
+                    known[spec.label, title] = incompatibility(spec, scenario, settings)
+                if (reason := known[spec.label, title]) is None:
+                    found.pop((suite.name, spec.label), None)
+                    break
+                found[suite.name, spec.label] = reason
+                first = first or f"{title}: {reason}"
+        if not allow_all and first and all((suite.name, spec.label) in found for suite in wanted):
+            raise UnusablePolicyError(f"policy {spec.label!r} cannot run {first}")
+    return found
+
+
+def is_wanted(spec: PolicySpec, suite: Suite, only: Mapping[str, Sequence[str]]) -> bool:
+    """Whether a policy is asked for in a suite; ``only`` as in `misfits`."""
+    return spec.label in only.get(suite.name, [spec.label])
+
+
+def read_policies(given: Any) -> list[PolicySpec]:
+    """`parse_policies`, with an error that says that nothing can run.
+
+    Raises:
+        UnknownNameError: if there is no policy of a name.
+        UnusablePolicyError: if a text or a file can be no policy.
+    """
+    try:
+        return parse_policies(given)
+    except InvalidInputError as error:
+        raise UnusablePolicyError(str(error)) from error
+
+
+def incompatibility(spec: PolicySpec, scenario: Any, settings: JobSettings) -> str | None:
+    """Why a policy cannot run a scenario; None if it can.
+
+    The policy is made, and so is its environment. A policy of ours and a network also take one
+    step; code of a user is not asked for any, as only a worker process can end it by force.
+
+    Raises:
+        UnusablePolicyError: if the policy cannot be made at all.
+    """
+    try:
+        with soft_limit(settings.timeout_s):
+            policy = spec.make()
+    except EpisodeTimeout:
+        raise UnusablePolicyError(
+            f"policy {spec.label!r} cannot be made: not done after {settings.timeout_s:g} s"
+        ) from None
+    if isinstance(policy, ChecksScenario) and (reason := policy.incompatibility(scenario)):
+        return reason
+    try:
+        env = settings.environment(scenario, policy)
+    except PushplanError as error:
+        return str(error)
+    with contextlib.closing(env):
+        if spec.is_ours:
+            reason = _first_step(policy, scenario, env)
+            if reason is None and settings.dry_run:
+                spec.warm_up()  # what is compiled here, workers find in the cache
+                env.warm_up()
+            return reason
+    return None
+
+
+def _first_step(policy: Policy, scenario: Any, env: Any) -> str | None:
+    """Why the policy refuses the start of a scenario; planning calls end after an iteration."""
+    try:
+        observation, _ = env.reset(seed=scenario.seed)
+    except Exception:
+        return None  # that is not the policy's fault
+    try:
+        policy.reset(env.world, stream(scenario.seed, "policy"))
+        if isinstance(policy, PlansBesideDriving):
+            policy.plan_with(ImmediateExecutor(MaxIterations(1)))
+        policy.act(env.world, observation)
+    except InvalidInputError as error:  # its way to refuse a world
+        return str(error)
+    except Exception:
+        return None  # whatever else goes wrong is for the episodes to tell
+    return None

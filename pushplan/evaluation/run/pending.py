@@ -1,0 +1,103 @@
+"""Which jobs of a batch have no result yet."""
+
+from __future__ import annotations
+
+import logging
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from pushplan.evaluation.run.job_identity import differences, same_but_versions, settings_dict
+from pushplan.evaluation.run.jobs import Job, JobSettings
+from pushplan.evaluation.store.database import DATABASE, StoredResult
+from pushplan.evaluation.store.rows import setting_of
+from pushplan.evaluation.store.run_directory import RunDirectory
+from pushplan.world import Stop
+
+_log = logging.getLogger(__name__)
+
+
+def note_batch(
+    store: RunDirectory,
+    jobs: Sequence[Job],
+    settings: JobSettings,
+    about: Mapping[str, Any] | None,
+) -> None:
+    """Note what a run directory is asked for; the jobs are `identified`."""
+    store.note("configuration", {**settings_dict(settings), **(about or {})})
+    factor = settings.latency_factor
+    mode = "" if factor is None else f", latency-aware x {factor:g}"
+    policies: dict[str, str] = {}
+    deadlines: dict[str, float] = {}
+    titles: dict[str, str] = {}
+    for job in jobs:
+        assert job.spec is not None
+        label, setting = job.policy.label, setting_of(*job.key[1:])
+        policies[label] = job.spec["policy"]["identity"]
+        stop = job.policy.options.get("stop")
+        if isinstance(stop, Stop) and math.isfinite(stop.seconds):
+            deadlines[label] = stop.seconds
+        named = "/" in job.key[1]  # scenarios of a suite have different variations
+        titles[setting] = (setting if named else job.title) + mode
+    store.extend("policies", policies)
+    store.extend("deadlines", deadlines)
+    store.extend("settings", titles)
+
+
+def pending_jobs(jobs: Sequence[Job], store: RunDirectory, any_version: bool) -> list[Job]:
+    """The `identified` jobs without a result; results of the others count from now on."""
+    stored = store.results()
+    _hide_outdated(jobs, stored, store, any_version)
+    done = {one.row.job: one.row.job for one in stored}
+    if any_version:
+        done |= {same_but_versions(one.spec): one.row.job for one in stored if one.spec}
+    shown, pending = [], []
+    for job in jobs:
+        names = [job.id, *([same_but_versions(job.spec)] if any_version and job.spec else [])]
+        if (there := next((done[name] for name in names if name in done), None)) is None:
+            pending.append(job)
+        else:
+            shown.append(there)
+    store.show(shown)
+    before = {
+        (one.row.policy, one.row.scenario, one.row.seed): one.spec
+        for one in sorted(stored, key=lambda one: one.current)
+    }
+    if changed := [one for one in pending if one.key in before]:
+        _log.warning(
+            "%d of %d jobs have results in %s from before a change: %s; they are run again, and "
+            "the old results stay in %s",
+            len(changed),
+            len(jobs),
+            store.path,
+            differences(before[changed[0].key], changed[0].spec or {}),
+            DATABASE,
+        )
+    return pending
+
+
+def _hide_outdated(
+    jobs: Sequence[Job], stored: Sequence[StoredResult], store: RunDirectory, any_version: bool
+) -> None:
+    """Let results of a policy that is another one now, or was run otherwise, count no more.
+
+    They would be averaged with those of now: a label is one policy, and a setting is run one way.
+    """
+    names = ("settings",) if any_version else ("settings", "versions")
+    policies: dict[str, str] = {}
+    ways: dict[tuple[str, str], list[Any]] = {}
+    for job in jobs:
+        assert job.spec is not None
+        policies[job.policy.label] = job.spec["policy"]["identity"]
+        setting = job.policy.label, setting_of(*job.key[1:])
+        ways[setting] = [job.spec[name] for name in names]
+    outdated = []
+    for one in stored:
+        if not one.spec:  # saved from a CSV file, which does not say how it came about
+            continue
+        row, identity = one.row, one.spec.get("policy", {}).get("identity")
+        way = [one.spec.get(name) for name in names]
+        changed = policies.get(row.policy, identity) != identity
+        if changed or ways.get((row.policy, setting_of(row.scenario, row.seed)), way) != way:
+            outdated.append(row.job)
+    store.hide(outdated)

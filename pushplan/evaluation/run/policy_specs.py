@@ -1,0 +1,366 @@
+"""Which policy a job runs: a name, a text that names a class, or a factory."""
+
+from __future__ import annotations
+
+import contextlib
+import functools
+import re
+from collections import Counter
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, is_dataclass
+from hashlib import sha256
+from pathlib import Path
+from typing import Any, cast
+
+import numpy as np
+
+from pushplan.evaluation.store.source_digests import (
+    code_digest,
+    file_digest,
+    libraries_of,
+    source_digest,
+)
+from pushplan.world import InvalidInputError, Planner, Policy, PushplanError, UnknownNameError
+from pushplan.world.errors import MOST_CHOICES, describe, place
+from pushplan.world.libraries import missing
+from pushplan.world.named_objects import load_object, objects_of_file
+
+_LABEL = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.+@-]{0,63}")
+
+
+class UnusablePolicyError(InvalidInputError):
+    """A policy cannot be made, or is made for nothing that it is asked to run."""
+
+
+@dataclass(frozen=True)
+class PolicySpec:
+    """How to make a policy, in whatever process the job runs.
+
+    Args:
+        label: what results call it: letters, digits and ``_ . + @ -``, 64 at most.
+        source: a name of `policy_names`, ``"onnx:FILE"`` or ``"sb3:FILE"``
+            (`pushplan.learned.load_policy`), ``"module:Class"``, ``"path/to/file.py:Class"``, or a
+            callable without required arguments. The class or callable gives a policy, a planner,
+            which is then wrapped in the default policy, or an object with ``predict``.
+        options: keyword arguments for it.
+    """
+
+    label: str
+    source: str | Callable[..., Any]
+    options: Mapping[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        if not _LABEL.fullmatch(self.label):
+            raise InvalidInputError(
+                "a policy's label is 1 to 64 letters, digits and '_.+@-', "
+                f"not beginning with '.+@-', got {self.label!r}"
+            )
+
+    @property
+    def identity(self) -> str:
+        """A text that tells sources apart, with a hash of the files that hold them.
+
+        A file that has been edited is another policy, one that was moved is not. What it imports
+        counts where it is local; see `source_digest`.
+        """
+        options = "".join(
+            f" {key}={described(value)}" for key, value in sorted(self.options.items())
+        )
+        if not isinstance(self.source, str):
+            return f"{described(self.source)}{options}"
+        if (file := self.network) is not None:
+            from pushplan.learned.sb3_policy import beside
+
+            return f"{file.name}{file_digest(file)}{file_digest(beside(file))}{options}"
+        where, _, name = self.source.rpartition(":")
+        shown = Path(where).name if where.endswith(".py") else where
+        return f"{shown}{':' if where else ''}{name}{source_digest(where)}{options}"
+
+    @property
+    def libraries(self) -> set[str]:
+        """Modules that its own code imports, by the first part of their names."""
+        source: Any = self.source
+        if isinstance(source, functools.partial):
+            inner = [one for one in source.args if isinstance(one, PolicySpec)]
+            parts = inner or [PolicySpec(self.label, source.func)]
+            return set().union(*(one.libraries for one in parts))
+        if not isinstance(source, str):
+            return libraries_of(
+                _module_of(source if hasattr(source, "__module__") else type(source))
+            )
+        if source.startswith("sb3:"):
+            return {"stable_baselines3", "torch"}
+        return set() if self.is_ours else libraries_of(source.rpartition(":")[0])
+
+    @property
+    def is_ours(self) -> bool:
+        """Whether it runs code of pushplan only: a name, or the file of a network."""
+        named = isinstance(self.source, str) and ":" not in self.source
+        return named or self.network is not None
+
+    @property
+    def group(self) -> str:
+        """What may share a process: code of ours, else this policy alone."""
+        ours = self.is_ours and not str(self.source).startswith("sb3:")  # such a file holds code
+        return "" if ours else self.label
+
+    @property
+    def network(self) -> Path | None:
+        """The file of the network, if it is one."""
+        from pushplan.learned.loading import (
+            LEARNED_PREFIXES,
+            learned_file,
+            learned_names,
+            weights_of,
+        )
+
+        if not isinstance(self.source, str):
+            return None
+        if self.source.startswith(LEARNED_PREFIXES):
+            return learned_file(self.source)
+        return weights_of(self.source) if self.source in learned_names() else None
+
+    def warm_up(self) -> None:
+        """Load, once in a process, what a planner of ours may need in any step of an episode."""
+        if self.is_ours and self.network is None:
+            from pushplan.planners import warm_up
+
+            warm_up(str(self.source))
+
+    def make(self) -> Policy:
+        """A fresh policy.
+
+        Raises:
+            UnusablePolicyError: if the source gives neither a policy nor a planner, or raises: with
+                what it raised and where.
+        """
+        with _saying_what_fails("policy", self.label):
+            if not self.is_ours:
+                return as_policy(self._made_object(), self.label)
+            if self.network is not None:
+                from pushplan.learned import load_policy
+
+                return load_policy(str(self.source), self.label, **self.options)
+            from pushplan.planners import make_policy
+
+            return make_policy(str(self.source), **self.options)
+
+    def make_planner(self) -> Planner:
+        """A fresh planner, of a source that `parse_planner` read.
+
+        Raises:
+            UnusablePolicyError: if the source gives no planner, or raises: with what it raised and
+                where.
+        """
+        with _saying_what_fails("planner", self.label):
+            if self.is_ours:
+                from pushplan.planners import make_planner
+
+                return make_planner(str(self.source), **self.options)
+            made = self._made_object()
+        if callable(getattr(made, "plan", None)):
+            return cast(Planner, made)
+        if callable(getattr(made, "act", None)):
+            raise UnusablePolicyError(_NO_PLANNER.format(self.label))
+        raise UnusablePolicyError(
+            f"planner {self.label!r} is a {type(made).__name__}, which has no method plan"
+        )
+
+    def _made_object(self) -> Any:
+        """What the callable gives that the source is or names."""
+        source = load_object(self.source) if isinstance(self.source, str) else self.source
+        return source(**self.options)
+
+
+def described(value: Any, depth: int = 8) -> str:
+    """A text that tells values apart in whatever process: with the content of code and files."""
+    if isinstance(value, PolicySpec):
+        return value.identity
+    if isinstance(value, str):
+        return repr(value) + file_digest(value)
+    if isinstance(value, np.ndarray):
+        return f"{value.dtype}{value.shape} sha256:{sha256(value.tobytes()).hexdigest()[:12]}"
+    if depth == 0:
+        return type(value).__name__  # an object may hold itself
+    if isinstance(value, functools.partial):
+        value = {"partial": value.func, **value.keywords, "args": value.args}
+    if isinstance(value, Mapping):
+        parts = [f"{key!r}: {described(one, depth - 1)}" for key, one in value.items()]
+        return f"{{{', '.join(parts)}}}"
+    if isinstance(value, list | tuple | set | frozenset):
+        parts = [described(one, depth - 1) for one in value]
+        if isinstance(value, set | frozenset):
+            parts.sort()  # their order is not the same in every process
+        return f"{type(value).__name__}({', '.join(parts)})"
+    if is_dataclass(value) or callable(value) or " object at 0x" in repr(value):
+        return _code_in_words(value, depth)
+    return re.sub(r"0x[0-9a-f]+", "0x", repr(value))
+
+
+def _code_in_words(thing: Any, depth: int) -> str:
+    """A class, a function or another object: the name of its code, a hash, and what it holds."""
+    kind = thing if hasattr(thing, "__qualname__") else type(thing)
+    module = _module_of(kind)
+    held = [cell.cell_contents for cell in getattr(thing, "__closure__", None) or ()]
+    held += [getattr(thing, name, None) for name in ("__defaults__", "__kwdefaults__", "__self__")]
+    if kind is not thing:
+        held.append(getattr(thing, "__dict__", None))
+    text = f"{module}:{kind.__qualname__}{source_digest(module)}"
+    if module.partition(".")[0] not in ("pushplan", "builtins"):
+        text += code_digest(kind)
+    return text + "".join(f" {described(one, depth - 1)}" for one in held if one is not None)
+
+
+def _module_of(thing: Any) -> str:
+    """The module of a class or a function; that of a script is ``__main__`` in workers, too."""
+    module = str(thing.__module__)
+    return "__main__" if module == "__mp_main__" else module
+
+
+_NO_PLANNER = "{!r} is a policy, not a planner: give it to 'pushplan run' or 'pushplan bench'"
+
+
+@contextlib.contextmanager
+def _saying_what_fails(kind: str, label: str) -> Iterator[None]:
+    """Raise one error for whatever goes wrong while something of a user's is made.
+
+    Raises:
+        UnusablePolicyError: with what was raised, and where in the user's code.
+    """
+    try:
+        yield
+    except (MemoryError, UnusablePolicyError):
+        raise
+    except (Exception, SystemExit) as error:
+        ours = None if place(error) else missing(error) or error
+        said = str(ours) if isinstance(ours, PushplanError) else describe(error)
+        raise UnusablePolicyError(f"{kind} {label!r} cannot be made: {said}") from error
+
+
+def as_policy(thing: Any, label: str) -> Policy:
+    """A policy as it is; a planner, or an object with ``predict``, wrapped as one.
+
+    Raises:
+        InvalidInputError: if it is neither.
+    """
+    if callable(getattr(thing, "act", None)) and callable(getattr(thing, "reset", None)):
+        return cast(Policy, thing)
+    if callable(getattr(thing, "plan", None)):
+        from pushplan.planners.following.plan_follower import policy_for
+
+        return policy_for(thing)
+    if callable(getattr(thing, "predict", None)):
+        from pushplan.learned import ObjectPolicy
+
+        return ObjectPolicy(thing, label)
+    raise InvalidInputError(
+        f"a {type(thing).__name__} has neither the methods of a policy (reset, act) nor of a "
+        "planner (plan) nor of a network (predict)"
+    )
+
+
+def policy_names() -> tuple[str, ...]:
+    """The names of all policies that come with pushplan: classical, then trained."""
+    from pushplan.learned import learned_names
+    from pushplan.planners import policy_names as classical_names
+
+    return (*classical_names(), *learned_names())
+
+
+def parse_policy(given: str | Callable[..., Any] | PolicySpec) -> PolicySpec:
+    """Read one policy as users give it.
+
+    A text may begin with ``label=``; without it the label is the name, or the class's name.
+
+    Raises:
+        UnknownNameError: if it looks like a name and is not one.
+        InvalidInputError: if it can be no policy at all.
+    """
+    if isinstance(given, PolicySpec):
+        return given
+    if isinstance(given, str):
+        return _parse_text(given, "policy", policy_names())
+    if not callable(given):
+        raise InvalidInputError(
+            "a policy is given as a name, 'onnx:FILE', 'sb3:FILE', 'module:Class', "
+            f"'file.py:Class' or a callable that makes one, got {type(given).__name__}"
+        )
+    name = getattr(given, "__name__", type(given).__name__)
+    return PolicySpec(re.sub(r"[^A-Za-z0-9_.-]", "", name) or "policy", given)
+
+
+def parse_planner(given: str) -> PolicySpec:
+    """Read one planner as users give it: a text as for `parse_policy`.
+
+    Raises:
+        UnknownNameError: if it looks like a name and is not one.
+        InvalidInputError: if it can be no planner at all, or is a policy's name.
+    """
+    from pushplan.planners import planner_names
+
+    names = planner_names()
+    source = given.rpartition("=")[2]
+    if source not in names and source in policy_names():
+        raise InvalidInputError(_NO_PLANNER.format(source))
+    return _parse_text(given, "planner", names)
+
+
+def _parse_text(given: str, kind: str, names: Sequence[str]) -> PolicySpec:
+    """Read a name, ``"onnx:FILE"``, ``"module:Class"`` ...; errors as `parse_policy`."""
+    from pushplan.learned.loading import LEARNED_PREFIXES, learned_file
+
+    label, equals, source = given.partition("=")
+    if not equals:
+        label, source = "", given
+    if source.startswith(LEARNED_PREFIXES):
+        path = learned_file(source)
+        name = re.sub(r"[^A-Za-z0-9_.+@-]", "_", path.stem).lstrip(".+@-")[:64]
+        return PolicySpec(label or name or "policy", f"{source.partition(':')[0]}:{path}")
+    where, colon, name = source.rpartition(":")
+    file = where if colon else source
+    if file.endswith(".py"):
+        path = Path(file).expanduser().resolve()
+        if not path.is_file():
+            raise InvalidInputError(f"{kind} {given!r}: there is no file {file}")
+        if not colon or not name:
+            raise InvalidInputError(f"{kind} {given!r} names no class: {_classes_to_give(file)}")
+        return PolicySpec(label or name, f"{path}:{name}")
+    if colon:
+        return PolicySpec(label or name, source)
+    if source not in names:
+        raise UnknownNameError(kind, source, names)
+    return PolicySpec(label or source, source)
+
+
+def _classes_to_give(file: str) -> str:
+    """What to give instead of a file alone: its classes that could be policies or planners."""
+    with _saying_what_fails("policy", file):
+        found = [
+            f"{file}:{name}"
+            for name, one in objects_of_file(file).items()
+            if isinstance(one, type) and {"act", "plan", "predict"} & {*dir(one)}
+        ]
+    if not found:
+        return f"{file} has no class with plan or act"
+    return f"give {' or '.join(found[:MOST_CHOICES])}"
+
+
+def parse_policies(
+    given: str | Sequence[str | Callable[..., Any] | PolicySpec],
+) -> list[PolicySpec]:
+    """Read several policies: a list, or one text with commas.
+
+    Raises:
+        InvalidInputError: if there is none, or two share a label.
+    """
+    items: Sequence[Any] = given.split(",") if isinstance(given, str) else given
+    stripped = [item.strip() if isinstance(item, str) else item for item in items]
+    specs = [parse_policy(item) for item in stripped if item != ""]
+    if not specs:
+        raise InvalidInputError("at least one policy is needed")
+    for label, count in Counter(spec.label for spec in specs).items():
+        if count > 1:
+            raise InvalidInputError(
+                f"two policies are labelled {label!r}: tell them apart as 'label=policy'"
+            )
+    return specs

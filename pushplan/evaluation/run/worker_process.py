@@ -1,0 +1,288 @@
+"""A worker process as its owner sees it."""
+
+from __future__ import annotations
+
+import contextlib
+import math
+import os
+import pickle
+import secrets
+import signal
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from typing import Any
+
+from pushplan.evaluation.run.channel import Channel, ChannelError
+from pushplan.evaluation.run.jobs import BatchStoppedError, JobResult
+from pushplan.evaluation.run.worker import THREAD_VARIABLES, WORKER_VARIABLE, WorkerSetup
+from pushplan.evaluation.store.rows import ResultRow, Status
+from pushplan.world import PushplanError
+from pushplan.world.file_locks import NO_FOLLOW
+from pushplan.world.named_objects import import_path
+
+_LOG_TAIL = 6000
+_LOG_MOST = 1_000_000
+_TRACE_S = 0.2  # time that a worker has to write where it hangs before it is ended
+_FAREWELL_S = 1.0
+_LOOKS = 3
+_BETWEEN_LOOKS_S = 0.002
+_ROUNDS = 200  # so often what a worker has started is looked for, while it starts others
+
+
+def _no_link(path: str, flags: int) -> int:
+    return os.open(path, flags | NO_FOLLOW, 0o666)
+
+
+class WorkerDiedError(PushplanError):
+    """The process that ran a call ended, or had to be ended.
+
+    Attributes:
+        log: what it had written to its standard error.
+        status: of the job that it ran.
+        from_outside: whether somebody else may have killed it.
+    """
+
+    def __init__(
+        self, message: str, log: str, status: Status = Status.CRASHED, *, from_outside: bool = False
+    ) -> None:
+        super().__init__(message)
+        self.log = log
+        self.status = status
+        self.from_outside = from_outside
+
+
+class WorkerProcess:
+    """A process that answers one call after the other, and writes into a log.
+
+    It leads a process group, which ends with it.
+
+    Args:
+        setup: what it is told first.
+        log: file for what it writes to standard output and error; discarded if None.
+    """
+
+    def __init__(self, setup: WorkerSetup, log: Path | None) -> None:
+        self.group: str | None = None  # of the calls that it answers; None before the first
+        self._setup = setup
+        self._log, self._log_start = log, 0
+        ours, theirs = socket.socketpair()
+        self._channel = Channel(ours)
+        self._mark = secrets.token_hex(16)
+        environment = {**os.environ, WORKER_VARIABLE: self._mark, "PYTHONUNBUFFERED": "1"}
+        environment.update(dict.fromkeys(THREAD_VARIABLES, "1"))
+        code = (
+            f"import sys; sys.path[:] = {import_path()!r}\n"
+            f"from pushplan.evaluation.run.worker import main; main({theirs.fileno()})"
+        )
+        with theirs, open(log or os.devnull, "ab", opener=_no_link) as output:
+            self._process = subprocess.Popen(
+                [sys.executable, "-c", code],
+                stdin=subprocess.DEVNULL,
+                stdout=output,
+                stderr=output,
+                env=environment,
+                pass_fds=(theirs.fileno(),),
+                start_new_session=True,
+            )
+
+    def begin(self) -> None:
+        """Wait until it is ready.
+
+        Raises:
+            WorkerDiedError: if it ends before.
+        """
+        with contextlib.suppress(OSError):  # it has died: `_receive` finds out how
+            self._channel.send({}, pickle.dumps(self._setup))
+        self._receive(math.inf)
+
+    def ask(self, payload: bytes, limit_s: float) -> JobResult:
+        """The answer to a call.
+
+        Raises:
+            InvalidInputError: if it cannot load what it was sent; it is well.
+            WorkerDiedError: if it has ended, or was ended.
+        """
+        self._log_start = self._trimmed_log()
+        begin = time.monotonic()
+        with contextlib.suppress(OSError):
+            self._channel.send({}, payload)
+        header, body = self._receive(limit_s)
+        if header.get("kind") == "running":
+            header, body = self._receive(limit_s + begin - time.monotonic(), limit_s)
+        if header.get("kind") == "refused":
+            raise BatchStoppedError(str(header.get("text")))
+        if header.get("kind") == "error":
+            raise self._died(str(header.get("text")))
+        if header.get("kind") == "out of memory":
+            raise self._died("an allocation failed", Status.OUT_OF_MEMORY)
+        try:  # who sends it is not trusted: the owner checks what it says
+            trace = body if header["traced"] else None
+            return JobResult(ResultRow(**header["row"]), trace, str(header["detail"]))
+        except (KeyError, TypeError) as error:
+            raise self._died(f"its message is no result: {error}") from error
+
+    def _receive(self, left_s: float, limit_s: float = math.inf) -> tuple[dict[str, Any], bytes]:
+        until = time.monotonic() + left_s + _TRACE_S
+        limit_mb = self._setup.memory_limit_mb
+
+        def waiting() -> None:
+            if self._has_ended():  # it may die without closing its socket
+                raise EOFError
+            if time.monotonic() > until:
+                raise self._died(f"not done after {min(limit_s, left_s):g} s", Status.TIMEOUT)
+            pids = (self._process.pid, *_descendants(self._process.pid))
+            if limit_mb is not None and (used := _memory_kb(pids) * 1024 / 1e6) > limit_mb:
+                text = f"{used:.0f} MB in use, the limit is {limit_mb:.0f} MB"
+                raise self._died(text, Status.OUT_OF_MEMORY)
+            self._trimmed_log()
+
+        try:
+            return self._channel.receive(waiting)
+        except ChannelError as error:
+            text = f"the worker process sent what is no message: {error}"
+            raise self._died(text) from error
+        except (EOFError, OSError):
+            code = self.end()
+            raise WorkerDiedError(
+                _describe_exit(code),
+                self._tail(),
+                from_outside=code in (-signal.SIGKILL, -signal.SIGTERM),
+            ) from None
+
+    def _died(self, reason: str, status: Status = Status.CRASHED) -> WorkerDiedError:
+        """End it for a reason."""
+        log = self._tail()
+        self.end(force=True)
+        return WorkerDiedError(reason, log, status)
+
+    def end(self, *, force: bool = False) -> int:
+        """Let it finish, or not, and end what it started; its log stays if it holds anything.
+
+        Returns:
+            Its exit code.
+        """
+        self._channel.close()
+        deadline = time.monotonic() + (0.0 if force else _FAREWELL_S)
+        while not self._has_ended() and time.monotonic() < deadline:
+            time.sleep(0.005)
+        self._end_others()
+        self.kill()
+        self._end_others()
+        code = self._process.wait()
+        self._trimmed_log()
+        if self._log is not None and self._log.exists() and self._log.stat().st_size == 0:
+            self._log.unlink()
+        return code
+
+    def _end_others(self) -> None:
+        """End what it started: until nothing is left, for such a process may start another one.
+
+        While it lives it adopts what its children leave behind. What was left behind when it
+        ended by itself bears its mark in the environment.
+        """
+        if not self._has_ended():
+            with contextlib.suppress(OSError):
+                os.kill(self._process.pid, signal.SIGSTOP)
+        empty = 0  # looks in a row that found none: one may miss what is just being started
+        for _ in range(_ROUNDS):
+            found = {*_descendants(self._process.pid), *_marked(self._mark)}
+            groups = {group for pid in found if (group := _group(pid)) is not None}
+            others = groups - {self._process.pid, os.getpgrp()}  # its own group ends with it
+            empty = 0 if others else empty + 1
+            if empty == _LOOKS:
+                return
+            for group in others:
+                with contextlib.suppress(OSError):
+                    os.killpg(group, signal.SIGKILL)  # before it can grow
+            time.sleep(_BETWEEN_LOOKS_S)
+
+    def kill(self) -> None:
+        """End its process group at once, from any thread."""
+        if self._process.returncode is None:  # not waited for yet, so that the number is its own
+            with contextlib.suppress(OSError):
+                os.killpg(self._process.pid, signal.SIGKILL)
+
+    def _has_ended(self) -> bool:
+        # without waiting for it, so that nothing else gets its number
+        how = os.WEXITED | os.WNOHANG | os.WNOWAIT
+        try:
+            return os.waitid(os.P_PID, self._process.pid, how) is not None
+        except ChildProcessError:
+            return True
+
+    def _trimmed_log(self) -> int:
+        """Bytes in the log, of which the beginning is dropped when they are too many."""
+        if self._log is None or not self._log.exists():
+            return 0
+        size = self._log.stat().st_size
+        if size > _LOG_MOST:
+            tail = self._tail()
+            os.truncate(self._log, 0)
+            with self._log.open("ab") as file:
+                file.write(tail.encode())
+            self._log_start, size = 0, len(tail)
+        return size
+
+    def _tail(self) -> str:
+        if self._log is None or not self._log.exists():
+            return ""
+        with self._log.open("rb") as file:
+            size = file.seek(0, os.SEEK_END)
+            file.seek(max(self._log_start, size - _LOG_TAIL))
+            return file.read(_LOG_TAIL).decode(errors="replace")
+
+
+def _descendants(pid: int) -> Iterator[int]:
+    """Processes that a process started, and those that they started (Linux)."""
+    for file in Path(f"/proc/{pid}/task").glob("*/children"):
+        with contextlib.suppress(OSError):
+            for child in map(int, file.read_text().split()):
+                yield child
+                yield from _descendants(child)
+
+
+def _marked(mark: str) -> Iterator[int]:
+    """Processes in whose environment a worker has begun (Linux)."""
+    entry = f"{WORKER_VARIABLE}={mark}".encode()
+    for file in Path("/proc").glob("[0-9]*/environ"):
+        with contextlib.suppress(OSError):
+            if entry in file.read_bytes():
+                yield int(file.parent.name)
+
+
+def _group(pid: int) -> int | None:
+    """The process group of a process that runs; None if it has ended."""
+    with contextlib.suppress(OSError):
+        state, _, group = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[:3]
+        return None if state in "ZX" else int(group)
+    return None
+
+
+def _memory_kb(pids: Iterable[int]) -> float:
+    """Memory of processes that is no file on a disk, shared or not [KiB].
+
+    Files in memory that they hold open count where they are more than what is mapped of such.
+    """
+    private = shared = 0
+    files: dict[tuple[int, int], float] = {}
+    for pid in pids:
+        with contextlib.suppress(OSError):
+            for line in Path(f"/proc/{pid}/status").read_text().splitlines():
+                private += int(line.split()[1]) if line.startswith("RssAnon") else 0
+                shared += int(line.split()[1]) if line.startswith("RssShmem") else 0
+            for handle in Path(f"/proc/{pid}/fd").iterdir():
+                if os.readlink(handle).startswith(("/memfd:", "/dev/shm/")):
+                    found = handle.stat()
+                    files[found.st_dev, found.st_ino] = found.st_blocks / 2
+    return private + max(shared, sum(files.values()))
+
+
+def _describe_exit(code: int) -> str:
+    if code >= 0:
+        return f"the worker process exited with code {code}"
+    known = {int(one): one.name for one in signal.Signals}
+    return f"the worker process was ended by {known.get(-code, f'signal {-code}')}"

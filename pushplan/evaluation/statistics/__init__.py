@@ -1,0 +1,1 @@
+"""Estimates, tests and summaries of the rows of a run."""

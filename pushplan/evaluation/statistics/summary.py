@@ -1,0 +1,224 @@
+"""What the rows of a run say about each policy, and about each pair of policies."""
+
+from __future__ import annotations
+
+import itertools
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from pushplan.evaluation.statistics.estimates import (
+    ENOUGH,
+    LEVEL,
+    Estimate,
+    Proportion,
+    estimate,
+    holm,
+    pairs_needed,
+    signed_rank_test,
+    wilson,
+)
+from pushplan.evaluation.store.rows import ResultRow
+from pushplan.metrics import METRICS, Role, metric_names
+from pushplan.world.checks import FloatArray, choice
+
+PAIRS = ("first", "all")
+"""Which policies are compared: the first one with each other one, or all."""
+TIMINGS = (
+    "plan_time_median_s",
+    "plan_time_max_s",
+    "decision_time_median_s",
+    "decision_time_mean_s",
+    "decision_time_max_s",
+    "wall_time_s",
+)
+
+
+@dataclass(frozen=True)
+class PolicySummary:
+    """One policy in one setting.
+
+    Attributes:
+        setting: the suite, or the scenarios without their seeds.
+        policy: label.
+        episodes: number of rows.
+        failed: rows that did not end by the rules of the task.
+        success: fraction of successes; failed rows count as none.
+        metrics: estimate of each column that has values.
+    """
+
+    setting: str
+    policy: str
+    episodes: int
+    failed: int
+    success: Proportion
+    metrics: dict[str, Estimate]
+
+
+@dataclass(frozen=True)
+class PairedDifference:
+    """How much more of a metric the second policy has than the first, scenario by scenario.
+
+    Attributes:
+        setting: the suite, or the scenarios without their seeds.
+        metric: column.
+        first: label of one policy.
+        second: label of the other.
+        difference: of second minus first, over the scenarios where both have a value.
+        better: scenarios in which the second has the better value, by the metric's direction.
+        worse: scenarios in which it has the worse one.
+        p_value: of `signed_rank_test`.
+        p_corrected: by `holm`, over the pairs and settings compared of the metric.
+        effect: rank-biserial correlation in [-1, 1], 1 where the second is better every time.
+        needed: scenarios with which the pair is separated, see `pairs_needed`; None if no number
+            does.
+    """
+
+    setting: str
+    metric: str
+    first: str
+    second: str
+    difference: Estimate
+    better: int
+    worse: int
+    p_value: float
+    p_corrected: float
+    effect: float
+    needed: int | None
+
+    @property
+    def significant(self) -> bool:
+        """Whether the corrected p value is below 0.05, with 10 scenarios at least."""
+        return self.difference.count >= ENOUGH and self.p_corrected < LEVEL
+
+    @property
+    def verdict(self) -> str:
+        """What the second policy is: "better", "worse", "equal" or "not separated"."""
+        if self.better == self.worse == 0:
+            return "equal"
+        if not self.significant:
+            return "not separated"
+        return "better" if self.effect > 0.0 else "worse"
+
+
+def summarise(rows: Sequence[ResultRow], order: Sequence[str] = ()) -> list[PolicySummary]:
+    """One summary for each setting and policy.
+
+    Args:
+        rows: of a run.
+        order: labels in the order in which policies are shown; others follow by name.
+    """
+    groups = grouped(rows)
+    shown = (*metric_names(Role.SCORE, Role.DETAIL, Role.FACT), *TIMINGS)
+    found = []
+    for setting, policy in itertools.product(settings_of(rows), policies_of(rows, order)):
+        if (setting, policy) not in groups:
+            continue
+        mine = groups[setting, policy]
+        columns = {name: values_of(mine, name) for name in shown}
+        found.append(
+            PolicySummary(
+                setting=setting,
+                policy=policy,
+                episodes=len(mine),
+                failed=sum(row.failed for row in mine),
+                success=wilson(sum(row.success for row in mine), len(mine)),
+                metrics={name: estimate(values) for name, values in columns.items() if values},
+            )
+        )
+    return found
+
+
+def paired_differences(
+    rows: Sequence[ResultRow], order: Sequence[str] = (), pairs: str = "first"
+) -> list[PairedDifference]:
+    """Pairs of policies on the scenarios that both ran, for success, scores and lengths.
+
+    Metrics of which neither direction is better are left out. Path and work are compared where
+    both succeed: who fails has driven and pushed less.
+
+    Args:
+        rows: of a run.
+        order: labels in the order of the policies; others follow by name.
+        pairs: ``"first"`` for the first policy with each other one, or ``"all"``.
+    """
+    compared = list(itertools.combinations(policies_of(rows, order), 2))
+    if choice("pairs", pairs, PAIRS) == "first":
+        compared = [pair for pair in compared if pair[0] == compared[0][0]]
+    groups, settings = grouped(rows), settings_of(rows)
+    found: list[PairedDifference] = []
+    for metric in ("success", *metric_names(Role.SCORE, Role.DETAIL)):
+        if (higher := METRICS[metric].higher_is_better) is None:
+            continue
+        every = METRICS[metric].role is not Role.DETAIL
+        values = {
+            key: by_scenario([row for row in mine if every or row.success], metric)
+            for key, mine in groups.items()
+        }
+        gaps: dict[tuple[str, str, str], FloatArray] = {}
+        for setting in settings:
+            for first, second in compared:
+                one, two = values.get((setting, first), {}), values.get((setting, second), {})
+                if common := sorted(one.keys() & two.keys()):
+                    gaps[setting, first, second] = np.array([two[k] - one[k] for k in common])
+        tested = [signed_rank_test(gap) for gap in gaps.values()]
+        corrected = holm([p_value for p_value, _ in tested])
+        sign = 1.0 if higher else -1.0
+        for i, ((setting, first, second), gap) in enumerate(gaps.items()):
+            found.append(
+                PairedDifference(
+                    setting=setting,
+                    metric=metric,
+                    first=first,
+                    second=second,
+                    difference=estimate(gap),
+                    better=int((sign * gap > 0.0).sum()),
+                    worse=int((sign * gap < 0.0).sum()),
+                    p_value=tested[i][0],
+                    p_corrected=corrected[i],
+                    effect=sign * tested[i][1],
+                    needed=pairs_needed(gap, len(tested)),
+                )
+            )
+    return sorted(found, key=lambda pair: settings.index(pair.setting))
+
+
+def grouped(rows: Sequence[ResultRow]) -> dict[tuple[str, str], list[ResultRow]]:
+    """The rows by setting and policy."""
+    groups: dict[tuple[str, str], list[ResultRow]] = {}
+    for row in rows:
+        groups.setdefault((row.setting, row.policy), []).append(row)
+    return groups
+
+
+def policies_of(rows: Sequence[ResultRow], order: Sequence[str] = ()) -> list[str]:
+    """Labels of the policies: in the given order, then by name."""
+    present = {row.policy for row in rows}
+    return [label for label in order if label in present] + sorted(present - set(order))
+
+
+def values_of(rows: Sequence[ResultRow], metric: str) -> list[float]:
+    """The values of a column, without empty fields."""
+    return [float(v) for row in rows if (v := getattr(row, metric)) is not None]
+
+
+def by_scenario(rows: Sequence[ResultRow], metric: str) -> dict[tuple[str, int], float]:
+    """Scenario and seed -> value of a column, without empty fields."""
+    return {
+        (row.scenario, row.seed): float(value)
+        for row in rows
+        if (value := getattr(row, metric)) is not None
+    }
+
+
+def settings_of(rows: Sequence[ResultRow]) -> list[str]:
+    """The settings that occur, in the order of the rows."""
+    return list(dict.fromkeys(row.setting for row in rows))
+
+
+def natural(title: str) -> list[tuple[int, int, str]]:
+    """Key that sorts texts with the numbers in them in their order."""
+    parts = re.split(r"(\d+)", title)
+    return [(0, int(p), "") if p.isdecimal() else (1, 0, p) for p in parts]

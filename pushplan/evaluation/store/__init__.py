@@ -1,0 +1,1 @@
+"""Keep what became of jobs: rows, the run directory, what a result depends on."""

@@ -1,0 +1,92 @@
+"""Where results come from: code, machine, packages and command of each call that ran jobs."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import platform
+import shlex
+import subprocess
+import sys
+from importlib import metadata
+from pathlib import Path
+from typing import Any
+
+import pushplan
+from pushplan.evaluation.store.rows import instant
+
+PACKAGES = (
+    *("casadi", "gymnasium", "llvmlite", "mujoco", "numba", "numpy", "ompl", "onnxruntime"),
+    *("osqp", "pymunk", "ruckig", "scipy", "shapely", "torch"),
+)
+"""Packages that results may depend on; those that are installed are named."""
+_GIT_S = 5.0
+
+
+def provenance(workers: int) -> dict[str, Any]:
+    """What to note about a run that begins now, as JSON values.
+
+    Args:
+        workers: processes that run the jobs.
+
+    Returns:
+        ``began`` (ISO 8601, UTC), ``command``, ``pushplan`` (version), ``commit`` and ``changed``
+        (whether files differ from it; both None outside of a checkout), ``python``, ``system``,
+        ``machine``, ``cores``, ``load`` (of the last minute, None if unknown), ``workers`` and
+        ``packages`` (name -> version).
+    """
+    root = Path(pushplan.__file__).resolve().parents[1]
+    commit, changed = _checkout(root) if (root / ".git").exists() else (None, None)
+    return {
+        "began": instant(),
+        "command": shlex.join([Path(sys.argv[0]).name, *sys.argv[1:]]) if sys.argv[0] else "",
+        "pushplan": pushplan.__version__,
+        "commit": commit,
+        "changed": changed,
+        "python": platform.python_version(),
+        "system": platform.platform(terse=True),
+        "machine": platform.machine(),
+        "cores": os.cpu_count(),
+        "load": round(os.getloadavg()[0], 2) if hasattr(os, "getloadavg") else None,
+        "workers": workers,
+        "packages": packages(),
+    }
+
+
+def in_words(run: dict[str, Any]) -> str:
+    """One line of what `provenance` gave."""
+    packages = ", ".join(f"{name} {version}" for name, version in run["packages"].items())
+    return (
+        f"{run['began']}: {run['command'] or 'Python'}; pushplan "
+        f"{code_in_words(run)}; {run['workers']} workers on "
+        f"{run['cores']} cores at load {run['load']}, {run['system']} {run['machine']}, Python "
+        f"{run['python']}; {packages}"
+    )
+
+
+def code_in_words(run: dict[str, Any]) -> str:
+    """Version and commit of the code of a run: of what `provenance` gave."""
+    commit = f" at {run['commit'][:12]}" if run["commit"] else ""
+    return f"{run['pushplan']}{commit}{' with changes' if run['changed'] else ''}"
+
+
+def packages() -> dict[str, str]:
+    """Versions of those of `PACKAGES` that are installed."""
+    found = {}
+    for name in PACKAGES:
+        with contextlib.suppress(metadata.PackageNotFoundError):
+            found[name] = metadata.version(name)
+    return found
+
+
+def _checkout(root: Path) -> tuple[str | None, bool | None]:
+    """Commit of the code that runs, and whether it has been changed."""
+    said = []
+    for words in (["rev-parse", "HEAD"], ["status", "--porcelain", "--untracked-files=no"]):
+        command = ["git", "-C", str(root), *words]
+        try:
+            done = subprocess.run(command, capture_output=True, check=True, timeout=_GIT_S)
+        except (OSError, subprocess.SubprocessError):
+            return None, None
+        said.append(done.stdout.decode().strip())
+    return said[0], bool(said[1])

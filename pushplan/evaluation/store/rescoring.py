@@ -1,0 +1,85 @@
+"""Metrics of stored episodes, without running them again."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from pushplan.evaluation.run.job_identity import code_digest
+from pushplan.evaluation.store.rows import scored_row
+from pushplan.evaluation.store.run_directory import RunDirectory, remove_report
+from pushplan.evaluation.store.source_digests import source_digest
+from pushplan.metrics import compute, metric_function
+from pushplan.world import Episode, SchemaError
+
+
+@dataclass(frozen=True)
+class Rescored:
+    """What `rescore` did.
+
+    Attributes:
+        episodes: how many recorded episodes were scored.
+        changed: jobs whose columns are others now.
+        unreadable: jobs whose episode is missing or damaged; their rows are as they were.
+    """
+
+    episodes: int
+    changed: tuple[str, ...]
+    unreadable: tuple[str, ...]
+
+
+def rescore(path: str | Path, metrics: Sequence[str] = (), *, columns: bool = True) -> Rescored:
+    """Compute the columns of a run again from its recorded episodes, and further metrics.
+
+    Args:
+        path: run directory.
+        metrics: further ones, kept beside the rows: names of `pushplan.metrics`, or functions as
+            ``"module:function"`` or ``"file.py:function"``. One that is there already and whose
+            file has not changed is not computed again.
+        columns: whether the columns are computed again, too.
+
+    Raises:
+        UnknownNameError: if there is no such metric.
+        InvalidInputError: if another process writes there.
+    """
+    wanted = {metric_label(metric): metric for metric in metrics}
+    sources = {}  # what tells versions of a metric apart: a hash of its file, or of our code
+    for label, metric in wanted.items():
+        metric_function(metric)
+        sources[label] = source_digest(metric.rpartition(":")[0]) or code_digest()
+    changed: list[str] = []
+    unreadable: list[str] = []
+    scored = 0
+    with RunDirectory(path, new=False) as store:
+        for stored in store.results():
+            known = {metric: source for metric, source, _ in stored.measured}
+            missing = [label for label in wanted if known.get(label) != sources[label]]
+            row = stored.row
+            if row.trace_file is None or row.failed or not (columns or missing):
+                continue
+            try:
+                episode = Episode.load(store.path / row.trace_file)
+            except SchemaError:
+                unreadable.append(row.job)
+                continue
+            scored += 1
+            if missing:
+                remove_report(store.path)
+            new = scored_row(row, episode, row.plan_calls) if columns else row
+            if new != row:
+                changed.append(row.job)
+                store.add(new, spec=stored.spec, show=stored.current)
+            values = compute(episode, [wanted[label] for label in missing])
+            store.measure(
+                (row.job, label, sources[label], values.get(wanted[label])) for label in missing
+            )
+        store.note("metrics", list({**dict.fromkeys(store.about().get("metrics", [])), **wanted}))
+        store.write_csv()
+    return Rescored(scored, tuple(changed), tuple(unreadable))
+
+
+def metric_label(metric: str) -> str:
+    """What a metric is called in results: its name, a file's without its folder."""
+    where, colon, name = metric.rpartition(":")
+    return f"{Path(where).name}{colon}{name}" if where.endswith(".py") else metric
