@@ -20,9 +20,9 @@ from numpy.typing import NDArray
 
 from pushplan.drawing import Panel, draw_figure, save_figure
 from pushplan.envs.registry import SIMULATORS, TASKS
+from pushplan.imports.on_demand import look_up
 from pushplan.world import GoalDisc, Movables, StaticMap, Twist, World, stream
 from pushplan.world.checks import FloatArray
-from pushplan.world.lazy_names import look_up
 
 PERIOD = 0.2
 HALF = 0.04

@@ -27,6 +27,7 @@ import numpy as np
 from pushplan.envs.registry import SIMULATORS
 from pushplan.envs.simulators.base import Materials, Simulator
 from pushplan.envs.tasks.presets import SOLIDS
+from pushplan.imports.on_demand import look_up
 from pushplan.planners.pushing import (
     PushingConfig,
     PushingMpc,
@@ -53,7 +54,6 @@ from pushplan.world import (
     turtlebot3_burger,
 )
 from pushplan.world.checks import FloatArray
-from pushplan.world.lazy_names import look_up
 
 SQUARE = 0.5 * np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
 OPEN = StaticMap.build(bounds=[-100.0, -100.0, 100.0, 100.0])

@@ -21,7 +21,7 @@ import numpy as np
 from pushplan.ros import McapLog
 from pushplan.runtime import Command, CommandStatus
 from pushplan.world import GoalDisc, Movables, Plan, StaticMap, Twist, World
-from pushplan.world.robots import turtlebot3_burger
+from pushplan.world.stored.robots import turtlebot3_burger
 
 
 def main() -> None:

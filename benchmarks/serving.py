@@ -22,6 +22,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "examples"))
 
 from serve_client import PolicyClient
 
+from pushplan.files.safe_files import parse_json
 from pushplan.planners import make_policy, warm_up
 from pushplan.serving import PolicyServer
 from pushplan.world import (
@@ -34,7 +35,6 @@ from pushplan.world import (
     world_from_dict,
     world_to_dict,
 )
-from pushplan.world.safe_files import parse_json
 
 SQUARE = np.array([[-0.2, -0.2], [0.2, -0.2], [0.2, 0.2], [-0.2, 0.2]])
 

@@ -17,11 +17,11 @@ from pushplan.evaluation import ResultRow, Results
 from pushplan.evaluation.experiment_file import fields_of
 from pushplan.evaluation.store.provenance import code_in_words
 from pushplan.evaluation.store.rows import columns, csv_text, row_from_texts
+from pushplan.files.output_files import write_atomic
+from pushplan.files.safe_files import read_data
 from pushplan.metrics import METRICS, Role, metric_names
 from pushplan.scenarios import Suite
 from pushplan.world import InvalidInputError
-from pushplan.world.output_files import write_atomic
-from pushplan.world.safe_files import read_data
 
 WHO = ("suite", "policy", "seed")
 ORIGIN = ("date", "pushplan", "machine", "load")

@@ -33,9 +33,9 @@ from pushplan.evaluation import ResultRow
 from pushplan.evaluation.report.tables import heading, milliseconds
 from pushplan.evaluation.statistics.estimates import Estimate, estimate, wilson
 from pushplan.evaluation.statistics.summary import paired_differences, values_of
+from pushplan.files.safe_files import known_keys
 from pushplan.metrics import METRICS, Role
 from pushplan.world import InvalidInputError, PushplanError, UnknownNameError
-from pushplan.world.checks import known_keys
 
 ROOT = Path(__file__).parents[1]
 EXPERIMENTS = Path("benchmarks/experiments")

@@ -107,7 +107,7 @@ def test_a_missing_library_is_one_line_that_names_the_extra(absent, arguments, e
 
 
 def test_another_missing_module_is_no_matter_of_extras():
-    from pushplan.world.libraries import need
+    from pushplan.imports.on_demand import need
 
     with pytest.raises(ModuleNotFoundError, match="nowhere"):
         need("nowhere")

@@ -29,11 +29,11 @@ from pushplan.evaluation.run.policy_specs import parse_policy
 from pushplan.evaluation.statistics.estimates import Estimate, estimate, wilson
 from pushplan.evaluation.statistics.summary import policies_of, values_of
 from pushplan.evaluation.store.rows import ResultRow, setting_of
+from pushplan.files.output_files import write_atomic
 from pushplan.learned.onnx_policy import read_specification
 from pushplan.metrics import Role, compute, metric_names
 from pushplan.scenarios import suite
 from pushplan.world import InvalidInputError, PushplanError
-from pushplan.world.output_files import write_atomic
 
 TO_GOAL_POINT = "E_nav_to_goal_point"
 _POINT = "E_nav to goal point"

@@ -31,7 +31,7 @@ from visualization_msgs.msg import MarkerArray
 from pushplan.ros import McapLog, Messages, RclpyTypes
 from pushplan.runtime import Motors
 from pushplan.world import InvalidInputError, Stop, StopCheck, Twist
-from pushplan.world.files import load_world
+from pushplan.world.stored.world_files import load_world
 
 
 class CancelRequest(Stop):

@@ -24,7 +24,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """
     parser = build_parser()
     if "_ARGCOMPLETE" in os.environ:  # the shell asks how a line may go on
-        from pushplan.world.libraries import need
+        from pushplan.imports.on_demand import need
 
         need("argcomplete").autocomplete(parser)
     try:
@@ -45,13 +45,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 1
     except Exception as error:
-        from pushplan.world.errors import (
+        from pushplan.errors import (
             InvalidInputError,
             MissingDependencyError,
             PushplanError,
             UnknownNameError,
         )
-        from pushplan.world.libraries import missing
+        from pushplan.imports.on_demand import missing
 
         error = missing(error) or error
         if not isinstance(error, PushplanError | OSError):

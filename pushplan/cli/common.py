@@ -21,7 +21,7 @@ def check_episode_file(path: str | None) -> None:
         MissingDependencyError: if it is to be MCAP and a library for that is missing.
     """
     from pushplan.cli.outputs import check_file
-    from pushplan.world.libraries import need
+    from pushplan.imports.on_demand import need
 
     check_file(path)
     if path is not None and is_mcap(path):

@@ -25,8 +25,8 @@ def run(options: argparse.Namespace) -> int:
 
     from pushplan.cli.report import exit_code
     from pushplan.evaluation import Job, Results, parse_policy, run_batch
+    from pushplan.imports.on_demand import need
     from pushplan.scenarios import suite
-    from pushplan.world.libraries import need
 
     check_directory(options.out)
     for library in ("gymnasium", "pymunk", "rich", "jinja2", "matplotlib"):

@@ -13,7 +13,7 @@ from typing import Any
 
 from pushplan import __version__
 from pushplan.cli.common import has_screen, say, say_json
-from pushplan.world.libraries import EXTRAS
+from pushplan.imports.on_demand import EXTRAS
 
 BASE = ("numba", "numpy", "ompl", "yaml", "ruckig", "scipy", "shapely")
 """Libraries that come with pushplan itself; Ruckig where it has a wheel."""

@@ -76,7 +76,7 @@ def names_of(kind: str) -> list[str]:
 
 def _at(place: str) -> Any:
     """The object at a place ``"module:name"``."""
-    from pushplan.world.lazy_names import look_up
+    from pushplan.imports.on_demand import look_up
 
     return look_up("place", {place: place}, place)
 

@@ -20,7 +20,7 @@ def check_file(path: str | None, endings: Sequence[str] = ()) -> None:
     """
     if path is None:
         return
-    from pushplan.world.errors import InvalidInputError
+    from pushplan.errors import InvalidInputError
 
     file = Path(path)
     if endings and file.suffix.lower() not in endings:
@@ -45,7 +45,7 @@ def check_picture(path: str | None, endings: Sequence[str] = (".png",)) -> None:
         MissingDependencyError: if the library that draws it is not installed.
     """
     if path is not None:
-        from pushplan.world.libraries import need
+        from pushplan.imports.on_demand import need
 
         check_file(path, endings)
         need("PIL")
@@ -59,7 +59,7 @@ def check_figure(path: str | None, films: Sequence[str] = ()) -> None:
         films: endings of films that may be written, too.
     """
     if path is not None:
-        from pushplan.world.libraries import need
+        from pushplan.imports.on_demand import need
 
         need("PIL")
         from pushplan.drawing.figure import FORMATS
@@ -84,8 +84,8 @@ def check_directory(
     """
     if path is None:
         return
-    from pushplan.world.errors import InvalidInputError
-    from pushplan.world.output_files import check_folder
+    from pushplan.errors import InvalidInputError
+    from pushplan.files.output_files import check_folder
 
     folder = Path(path).absolute()
     there = next(one for one in (folder, *folder.parents) if one.exists())

@@ -44,7 +44,7 @@ class CommandParser(argparse.ArgumentParser):
         """Refuse what is not known here, where it is known which options are."""
         found, unknown = super().parse_known_args(args, namespace)
         if unknown and unknown[0].startswith("-"):
-            from pushplan.world.errors import unknown_name_message
+            from pushplan.errors import unknown_name_message
 
             options = [name for name in self._option_string_actions if name.startswith("--")]
             self.error(unknown_name_message("option", unknown[0].partition("=")[0], options))
@@ -54,7 +54,7 @@ class CommandParser(argparse.ArgumentParser):
 
     def _check_value(self, action: argparse.Action, value: Any) -> None:
         if action.choices is not None and value not in action.choices:
-            from pushplan.world.errors import unknown_name_message
+            from pushplan.errors import unknown_name_message
 
             kind = "command" if action.metavar == "COMMAND" else "choice"
             text = unknown_name_message(kind, value, map(str, action.choices))
@@ -63,7 +63,7 @@ class CommandParser(argparse.ArgumentParser):
 
 def fail(message: str, code: int) -> int:
     """Say on one line why a command ends, and give its exit code."""
-    from pushplan.world.errors import one_line
+    from pushplan.errors import one_line
 
     sys.stderr.write(f"pushplan: {one_line(message)}\n")
     return code

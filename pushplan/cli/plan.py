@@ -19,6 +19,7 @@ SCHEMA = "pushplan-plan/1"
 
 def run(options: argparse.Namespace) -> int:
     """Plan, say what came of it, write files."""
+    from pushplan.errors import describe
     from pushplan.evaluation import parse_planner
     from pushplan.planners import warm_up
     from pushplan.world import (
@@ -30,7 +31,6 @@ def run(options: argparse.Namespace) -> int:
         stream,
     )
     from pushplan.world.checks import expect
-    from pushplan.world.errors import describe
 
     check_file(options.out)
     check_figure(options.render)

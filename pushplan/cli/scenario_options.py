@@ -68,8 +68,8 @@ def variation(text: str) -> tuple[str, Any]:
     Raises:
         InvalidInputError: if it has another form, or the value is no YAML.
     """
+    from pushplan.files.safe_files import parse_yaml
     from pushplan.world import InvalidInputError
-    from pushplan.world.safe_files import parse_yaml
 
     name, equals, value = text.partition("=")
     if not equals or not name:

@@ -33,7 +33,7 @@ def run(options: argparse.Namespace) -> int:
     if options.out is not None:
         from pathlib import Path
 
-        from pushplan.world.output_files import write_atomic
+        from pushplan.files.output_files import write_atomic
 
         write_atomic(Path(options.out) / "stress.md", markdown([table]).encode())
     say(text([table]).rstrip())

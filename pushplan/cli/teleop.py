@@ -43,8 +43,8 @@ def run(options: argparse.Namespace) -> int:
 def _environment(scenario: Scenario, action: str | None) -> Any:
     from pushplan.envs import make
     from pushplan.envs.registry import TASKS
+    from pushplan.imports.on_demand import look_up
     from pushplan.world import InvalidInputError
-    from pushplan.world.lazy_names import look_up
 
     known = look_up("task", TASKS, scenario.task).actions
     usable = [name for name in known if name in ACTIONS]

@@ -18,7 +18,7 @@ from numba.core.serialize import dumps
 from pushplan.compiled.cache_files import Folders, find_folders, read, remove, warn_once, write
 from pushplan.compiled.fingerprint import fingerprint, source_digest
 from pushplan.compiled.pipeline import rebuilt, reduced
-from pushplan.world.file_locks import is_locked, take_lock
+from pushplan.files.file_locks import is_locked, take_lock
 
 _PATIENCE = 300.0  # how long a process waits for another that compiles the same kernel [s]
 _POLL = 0.05  # [s]

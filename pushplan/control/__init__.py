@@ -16,7 +16,7 @@ from pushplan.control.recovery import Recovery
 from pushplan.control.retreat import Retreat
 from pushplan.control.tracking import Progress
 from pushplan.control.waiting import waiting_twist
-from pushplan.world.lazy_names import lazy_names
+from pushplan.imports.on_demand import lazy_names
 
 if TYPE_CHECKING:
     from pushplan.control.mpc import MpcConfig, MpcTracker

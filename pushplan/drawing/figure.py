@@ -16,10 +16,10 @@ from pushplan.drawing.ground import draw_ground
 from pushplan.drawing.legend import Entry, legend_of
 from pushplan.drawing.palette import SERIES, Color, palette_of
 from pushplan.drawing.scene import draw_moving, view_bounds
+from pushplan.files.output_files import write_atomic
+from pushplan.imports.on_demand import need
 from pushplan.world import InvalidInputError, Plan, World
 from pushplan.world.checks import FloatArray, array, number
-from pushplan.world.libraries import need
-from pushplan.world.output_files import write_atomic
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
+from pushplan.imports.on_demand import need
 from pushplan.world import InvalidInputError
 from pushplan.world.checks import number
-from pushplan.world.libraries import need
 
 Frame = NDArray[np.uint8]
 ENDINGS = (".png", ".gif", ".mp4")

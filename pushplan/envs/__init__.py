@@ -12,8 +12,7 @@ from __future__ import annotations
 from importlib.util import find_spec
 from typing import TYPE_CHECKING
 
-from pushplan.world.lazy_names import lazy_names
-from pushplan.world.libraries import need
+from pushplan.imports.on_demand import lazy_names, need
 
 if TYPE_CHECKING:
     from pushplan.envs.making import make, make_vector

@@ -20,6 +20,7 @@ from pushplan.envs.rendering import Renderer
 from pushplan.envs.simulators.base import Simulator, warm_up_simulator
 from pushplan.envs.tasks.base import StepOutcome, Task
 from pushplan.envs.trace import Trace
+from pushplan.imports.on_demand import look_up
 from pushplan.observation import ObservationBuilder
 from pushplan.world import (
     Action,
@@ -35,7 +36,6 @@ from pushplan.world import (
     stream,
 )
 from pushplan.world.checks import IntArray, frozen, integer, number
-from pushplan.world.lazy_names import look_up
 
 _SEED_LIMIT = 2**31
 _LONGEST = 5.0  # control steps for which a command stands that may touch something

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import fields
 
-from pushplan.world.lazy_names import look_up
+from pushplan.imports.on_demand import look_up
 
 TASKS: dict[str, str] = {
     "maze": "pushplan.envs.tasks.maze:MazeTask",

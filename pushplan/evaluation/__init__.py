@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from pushplan.world.lazy_names import lazy_names
+from pushplan.imports.on_demand import lazy_names
 
 if TYPE_CHECKING:
     from pushplan.evaluation.benchmark import bench

@@ -25,11 +25,11 @@ from pushplan.evaluation.store.database import DATABASE
 from pushplan.evaluation.store.rescoring import rescore
 from pushplan.evaluation.store.rows import setting_of
 from pushplan.evaluation.store.run_directory import open_results
+from pushplan.files.safe_files import read_data
 from pushplan.metrics import metric_function
 from pushplan.scenarios.suite import Suite, distinct
 from pushplan.world import InvalidInputError, UnknownNameError
 from pushplan.world.checks import choice, expect, integer
-from pushplan.world.safe_files import read_data
 
 EPISODE_BYTES = 20_000
 """A recorded episode in a maze or a small room (measured: 18 to 26 kB); larger scenes have more."""

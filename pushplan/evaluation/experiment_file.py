@@ -10,12 +10,18 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from pushplan.errors import short
 from pushplan.evaluation.run.jobs import JobSettings
 from pushplan.evaluation.run.policy_specs import PolicySpec, parse_policy, policy_names
+from pushplan.files.safe_files import known_keys
 from pushplan.scenarios.suite import distinct
 from pushplan.world import Deadline, SchemaError
-from pushplan.world.checks import choice, expect, integer, known_keys, number
-from pushplan.world.errors import short
+from pushplan.world.checks import (
+    choice,
+    expect,
+    integer,
+    number,
+)
 
 if TYPE_CHECKING:
     from pushplan.scenarios import Suite

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from pushplan.errors import InvalidInputError
 from pushplan.world.checks import IntArray
-from pushplan.world.errors import InvalidInputError
 
 LARGEST = 1e290
 """Finite costs stay below this, so that no sum of them overflows."""

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from pushplan.errors import InvalidInputError, short
 from pushplan.world.checks import FloatArray
-from pushplan.world.errors import InvalidInputError, short
 
 if TYPE_CHECKING:
     import networkx as nx

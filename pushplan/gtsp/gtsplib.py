@@ -14,11 +14,11 @@ from pathlib import Path
 
 import numpy as np
 
+from pushplan.errors import InvalidInputError, SchemaError, unknown_name_message
+from pushplan.files import safe_files
 from pushplan.gtsp.distances import COORDINATE_TYPES, LARGEST_DIMENSION
 from pushplan.gtsp.instance import GtspInstance
-from pushplan.world import safe_files
 from pushplan.world.checks import FloatArray
-from pushplan.world.errors import InvalidInputError, SchemaError, unknown_name_message
 
 TYPES = ("GTSP", "AGTSP", "TSP", "ATSP")
 FORMATS = (

@@ -7,11 +7,11 @@ from pathlib import Path
 
 import numpy as np
 
+from pushplan.errors import InvalidInputError
 from pushplan.gtsp.distances import LARGEST_DIMENSION
 from pushplan.gtsp.gtsplib import read_text
 from pushplan.gtsp.instance import GtspInstance
 from pushplan.world.checks import integer
-from pushplan.world.errors import InvalidInputError
 
 
 def write_gtsp(path: str | Path, instance: GtspInstance) -> None:

@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from pushplan.errors import InvalidInputError
 from pushplan.gtsp.checking import checked_clusters, checked_costs
 from pushplan.gtsp.distances import COORDINATE_TYPES, distances
 from pushplan.world.checks import ArrayRecord, FloatArray, array, choice, frozen
-from pushplan.world.errors import InvalidInputError
 
 
 @dataclass(frozen=True, eq=False)

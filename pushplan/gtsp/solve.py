@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from pushplan.errors import InvalidInputError
 from pushplan.gtsp.checking import checked_clusters, checked_costs
 from pushplan.gtsp.exact import expected_seconds, solve_exactly, table_mb
 from pushplan.gtsp.graphs import graph_instance
@@ -20,7 +21,6 @@ from pushplan.gtsp.proof import prove
 from pushplan.gtsp.search import Budget, search
 from pushplan.gtsp.tour import Tour, TourStats, TourStatus
 from pushplan.world.checks import IntArray
-from pushplan.world.errors import InvalidInputError
 from pushplan.world.stop import MaxIterations, Stop, check_rules
 
 if TYPE_CHECKING:

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from pushplan.world.errors import InvalidInputError
+from pushplan.errors import InvalidInputError
 
 
 class TourStatus(enum.Enum):

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pushplan.compiled import copy_into, kernel, owned
+from pushplan.errors import InvalidInputError
 from pushplan.geometry.transforms import transform_points
 from pushplan.interaction.advance import advance_objects
 from pushplan.interaction.ice_bodies import IceBodies, IceProblem, IceSettings, ice_problem
@@ -23,7 +24,6 @@ from pushplan.world.checked_fields import (
     PositiveInt,
 )
 from pushplan.world.checks import FloatArray, IntArray
-from pushplan.world.errors import InvalidInputError
 
 STILL = 0.03
 """Fraction of a step's motion that a body may be moved without a look at its neighbours."""

@@ -9,6 +9,8 @@ from typing import Any
 
 import numpy as np
 
+from pushplan.errors import InvalidInputError
+from pushplan.imports.on_demand import need
 from pushplan.interaction.occupancy import (
     CELLS_PER_LENGTH,
     CHANNELS,
@@ -18,8 +20,6 @@ from pushplan.interaction.occupancy import (
 )
 from pushplan.interaction.occupancy_kernels import Patch
 from pushplan.world.checks import FloatArray, integer
-from pushplan.world.errors import InvalidInputError
-from pushplan.world.libraries import need
 
 SHIPPED = "ice_network.onnx"
 _GREATEST_BATCH = 256

@@ -17,11 +17,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pushplan.compiled import owned
+from pushplan.errors import InvalidInputError
 from pushplan.interaction.occupancy_kernels import Patch, cover_objects, cover_sweep
 from pushplan.world import Movables, World
 from pushplan.world.checked_fields import CheckedFields, PositiveFloat, Shape
 from pushplan.world.checks import ArrayRecord, FloatArray, array
-from pushplan.world.errors import InvalidInputError
 from pushplan.world.outline import next_corner
 
 PATCH_CELLS = 40

@@ -6,10 +6,10 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from pushplan.errors import InvalidInputError
 from pushplan.interaction.model import InteractionModel
 from pushplan.interaction.occupancy import OccupancyForecast, PassageBatch, patch_after
 from pushplan.interaction.quasi_static import QuasiStatic
-from pushplan.world.errors import InvalidInputError
 
 ICE_FRICTION = 1.0
 """Coulomb coefficient between hull and ice in the two-dimensional Ship-Ice."""

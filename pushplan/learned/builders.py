@@ -8,10 +8,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import MISSING, asdict, fields
 from typing import Any
 
+from pushplan.files.safe_files import known_keys
 from pushplan.learned.features import FeatureObservation
 from pushplan.observation import ImageObservation, ObservationBuilder, StateObservation
 from pushplan.world import InvalidInputError, SchemaError
-from pushplan.world.checks import choice, known_keys
+from pushplan.world.checks import choice
 
 KINDS: dict[str, type[Any]] = {
     "image": ImageObservation,

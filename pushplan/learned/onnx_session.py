@@ -9,8 +9,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from pushplan.imports.on_demand import need
 from pushplan.learned.onnx_guard import NotOnnxError
-from pushplan.world.libraries import need
 
 GREATEST_MEMORY = 256 * 2**20
 """Bytes that all networks of a process may use for weights and values together."""

@@ -12,12 +12,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pushplan.errors import describe
+from pushplan.files.safe_files import read_bytes, read_text
+from pushplan.imports.on_demand import need
 from pushplan.learned.network_policy import NetworkPolicy
 from pushplan.learned.specification import METADATA_KEY, Specification
 from pushplan.world import InvalidInputError
-from pushplan.world.errors import describe
-from pushplan.world.libraries import need
-from pushplan.world.safe_files import read_bytes, read_text
 
 TRUST_VARIABLE = "PUSHPLAN_TRUST_PICKLES"
 """Set to 1 in the environment of the process, it says that pickles may be loaded."""

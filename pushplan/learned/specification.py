@@ -8,13 +8,12 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
+from pushplan.files.safe_files import known_keys, parse_json
 from pushplan.learned.builders import builder_from_dict, builder_to_dict, from_mapping
 from pushplan.learned.outputs import ActionSpec
 from pushplan.observation import ObservationBuilder
 from pushplan.world import InvalidInputError, RobotModel, SchemaError
 from pushplan.world.checked_fields import CheckedFields, NonNegativeFloat, PositiveFloat
-from pushplan.world.checks import known_keys
-from pushplan.world.safe_files import parse_json
 
 FORMAT = "pushplan-policy/1"
 METADATA_KEY = "pushplan"

@@ -8,9 +8,9 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Literal, cast
 
+from pushplan.errors import describe, short
+from pushplan.imports.named_objects import load_object
 from pushplan.world import ClearanceArea, Episode, InvalidInputError, Receptacle, UnknownNameError
-from pushplan.world.errors import describe, short
-from pushplan.world.named_objects import load_object
 
 GoalKind = Literal["robot", "objects"]
 

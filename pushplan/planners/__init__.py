@@ -1,8 +1,8 @@
 """Planners and the policies made of them. Imports no simulator and no learning library."""
 
+from pushplan.imports.on_demand import lazy_names
 from pushplan.planners.registry import make_planner, make_policy, planner_names, policy_names
 from pushplan.world import Deadline, MaxIterations, Planner, PlanResult, PlanStatus, Policy, World
-from pushplan.world.lazy_names import lazy_names
 
 __all__ = [
     "Deadline",

@@ -6,8 +6,8 @@ import inspect
 from dataclasses import fields, is_dataclass, replace
 from typing import Any, cast
 
+from pushplan.imports.on_demand import look_up
 from pushplan.world import Planner, Policy, UnknownNameError
-from pushplan.world.lazy_names import look_up
 
 PLANNERS: dict[str, str] = {
     "straight": "pushplan.planners.shortest_path:ShortestPath",

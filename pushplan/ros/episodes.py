@@ -11,6 +11,8 @@ from typing import Any
 
 import numpy as np
 
+from pushplan.files.safe_files import MAX_BYTES, parse_json, read_bytes
+from pushplan.imports.on_demand import need
 from pushplan.ros.mcap_writer import (
     COMMAND,
     DROPPED,
@@ -24,9 +26,7 @@ from pushplan.ros.mcap_writer import (
 from pushplan.ros.message_types import RosbagsTypes
 from pushplan.world import ClearanceArea, Episode, Receptacle, SchemaError
 from pushplan.world.checks import FloatArray
-from pushplan.world.files import world_from_dict
-from pushplan.world.libraries import need
-from pushplan.world.safe_files import MAX_BYTES, parse_json, read_bytes
+from pushplan.world.stored.world_files import world_from_dict
 
 _READ = (WORLD, STATE, COMMAND, EPISODE)
 _KEPT = ("completed", "actions", "rewards", "act_times_s", "plan_times_s")

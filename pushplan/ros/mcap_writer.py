@@ -10,14 +10,14 @@ from typing import Any
 
 import numpy as np
 
+from pushplan.imports.on_demand import need
 from pushplan.ros.markers import object_frame, object_markers, scene_markers, transforms
 from pushplan.ros.message_types import RosbagsTypes
 from pushplan.ros.messages import Messages
 from pushplan.runtime import Command
 from pushplan.world import InvalidInputError, Plan, World
 from pushplan.world.checks import FloatArray
-from pushplan.world.files import world_to_dict
-from pushplan.world.libraries import need
+from pushplan.world.stored.world_files import world_to_dict
 
 TOPICS = {
     "/pushplan/world": "pushplan_msgs/msg/World",

@@ -9,9 +9,9 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from pushplan.imports.on_demand import need
 from pushplan.world import MissingDependencyError, SchemaError, UnknownNameError
 from pushplan.world.checks import IntArray
-from pushplan.world.libraries import need
 
 OWN_MESSAGES = {
     "pushplan_msgs/msg/World": "std_msgs/Header header\nstring json",

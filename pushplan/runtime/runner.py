@@ -15,6 +15,7 @@ import numpy as np
 
 from pushplan.control import waiting_twist
 from pushplan.control.limits import driven_twist
+from pushplan.errors import describe
 from pushplan.planners.kernel_warmup import warm_up_policy
 from pushplan.runtime.command import Command, CommandStatus, RunLog
 from pushplan.runtime.held_actions import drivable
@@ -41,7 +42,6 @@ from pushplan.world import (
     World,
 )
 from pushplan.world.checks import choice, expect, number
-from pushplan.world.errors import describe
 
 PLAN_STOP = OwnBudget() | Deadline(1.0)
 """Stop rule of planning calls: the planner's own budget, and never more than a second."""

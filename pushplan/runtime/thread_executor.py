@@ -10,8 +10,8 @@ from traceback import format_tb
 from typing import Any, Generic, TypeVar
 
 from pushplan.control.executors import ExpectedTime
+from pushplan.errors import describe
 from pushplan.world import Cancellation, OwnBudget, PushplanError, Stop
-from pushplan.world.errors import describe
 
 T = TypeVar("T")
 

@@ -7,9 +7,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from pushplan.imports.on_demand import lazy_names
 from pushplan.scenarios.scenario import Scenario, load_scenarios, save_scenarios
 from pushplan.scenarios.suite import Suite, suite, suite_names, world_suite
-from pushplan.world.lazy_names import lazy_names
 
 if TYPE_CHECKING:
     from pushplan.scenarios.ice import FloeSizes, IceField, generate_ice, load_ice, save_ice

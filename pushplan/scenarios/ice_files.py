@@ -11,10 +11,16 @@ import numpy as np
 import shapely
 from numpy.typing import ArrayLike
 
+from pushplan.errors import short
+from pushplan.files.safe_files import known_keys, read_data, read_npy, read_npz
 from pushplan.scenarios.ice_field import IceField
 from pushplan.world import InvalidInputError, SchemaError
-from pushplan.world.checks import FloatArray, array, checked_bounds, expect, known_keys
-from pushplan.world.errors import short
+from pushplan.world.checks import (
+    FloatArray,
+    array,
+    checked_bounds,
+    expect,
+)
 from pushplan.world.outline import (
     NotConvexError,
     convex_hull,
@@ -23,7 +29,6 @@ from pushplan.world.outline import (
     flatten,
     unflatten,
 )
-from pushplan.world.safe_files import read_data, read_npy, read_npz
 
 SCHEMA = "pushplan-ice/1"
 """Name and version of the JSON form; files of another version are refused."""

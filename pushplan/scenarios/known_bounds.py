@@ -10,9 +10,9 @@ from functools import cache
 from pathlib import Path
 from types import MappingProxyType
 
+from pushplan.files.output_files import write_atomic
 from pushplan.world import InvalidInputError, SchemaError
 from pushplan.world.checked_fields import CheckedFields, NonNegativeFloat
-from pushplan.world.output_files import write_atomic
 
 BOUNDS_FILE = "data/bounds.csv"
 """Where the package keeps them."""

@@ -11,11 +11,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from pushplan.errors import short
+from pushplan.files.safe_files import known_keys, read_data
+from pushplan.files.safe_yaml import dump
 from pushplan.world import SchemaError
-from pushplan.world.checks import integer, known_keys
-from pushplan.world.errors import short
-from pushplan.world.safe_files import read_data
-from pushplan.world.safe_yaml import dump
+from pushplan.world.checks import integer
 
 SCHEMA = "pushplan-scenarios/1"
 """Name and version of the file format; files of another version are refused."""

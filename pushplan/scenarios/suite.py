@@ -10,11 +10,11 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+from pushplan.files.safe_files import read_data
 from pushplan.scenarios.scenario import Scenario
 from pushplan.world import SchemaError, UnknownNameError
 from pushplan.world.checks import integer
-from pushplan.world.files import SCHEMA
-from pushplan.world.safe_files import read_data
+from pushplan.world.stored.world_files import SCHEMA
 
 
 @dataclass(frozen=True)

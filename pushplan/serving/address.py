@@ -13,9 +13,9 @@ import time
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+from pushplan.errors import InvalidInputError, short
+from pushplan.files.file_locks import take_lock
 from pushplan.world.checks import word
-from pushplan.world.errors import InvalidInputError, short
-from pushplan.world.file_locks import take_lock
 
 _TCP = re.compile(r"tcp:(\[[^\]]+\]|[^:\[\]]+):(\d{1,5})")
 _LOCK_S = 5.0  # for how long another server may be starting in the same folder [s]

@@ -7,6 +7,7 @@ from dataclasses import asdict
 from typing import Any, ClassVar
 
 from pushplan.control import ImmediateExecutor
+from pushplan.files.safe_files import known_keys
 from pushplan.runtime import PLAN_STOP, Command, Runner
 from pushplan.runtime.held_actions import twist_of
 from pushplan.serving.messages import plan_fields
@@ -22,7 +23,7 @@ from pushplan.world import (
     World,
     stream,
 )
-from pushplan.world.checks import expect, known_keys, number
+from pushplan.world.checks import expect, number
 
 SETTINGS = (
     "planning_limit",

@@ -11,10 +11,9 @@ import struct
 from collections.abc import Mapping
 from typing import Any
 
+from pushplan.errors import one_line, short, unknown_name_message
+from pushplan.files.safe_files import known_keys, parse_json
 from pushplan.world import Plan, SchemaError
-from pushplan.world.checks import known_keys
-from pushplan.world.errors import one_line, short, unknown_name_message
-from pushplan.world.safe_files import parse_json
 
 PROTOCOL = "pushplan-serve/1"
 """Name and version; a client of another version is refused."""

@@ -12,6 +12,7 @@ from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace
 
+from pushplan.errors import short
 from pushplan.planners import make_policy
 from pushplan.planners.kernel_warmup import warm_up_policy
 from pushplan.runtime.held_actions import check_world_policy
@@ -20,7 +21,6 @@ from pushplan.serving.connection import Connection, RefusedError, ServerLimits
 from pushplan.serving.session import LOG, Session
 from pushplan.world import InvalidInputError, Policy
 from pushplan.world.checks import expect
-from pushplan.world.errors import short
 
 _GRACE_S = 5.0  # for how long planning calls may go on after the end of the server [s]
 _LOOK_S = 0.1  # how often it looks whether clients have left that wait for an answer [s]

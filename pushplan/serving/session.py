@@ -9,6 +9,9 @@ from traceback import format_tb
 from typing import Any, NamedTuple, TypeVar
 
 from pushplan import __version__
+from pushplan.errors import describe, one_line, short
+from pushplan.files.safe_files import MAX_VALUES
+from pushplan.files.safe_yaml import MAX_DEPTH
 from pushplan.runtime.held_actions import check_world_policy
 from pushplan.serving import messages
 from pushplan.serving.connection import ServerLimits
@@ -16,9 +19,7 @@ from pushplan.serving.episodes import LoopEpisode, StepEpisode, check_settings
 from pushplan.serving.world_feed import WorldFeed
 from pushplan.world import ChoosesActions, InvalidInputError, Policy, PushplanError, World
 from pushplan.world.checks import boolean, integer, number, word
-from pushplan.world.errors import describe, one_line, short
-from pushplan.world.files import SCHEMA
-from pushplan.world.safe_files import MAX_DEPTH, MAX_VALUES
+from pushplan.world.stored.world_files import SCHEMA
 
 LOG = logging.getLogger("pushplan.serving")
 _GOALS = {"robot": ("disc", "line"), "objects": ("receptacle", "clearance_area")}

@@ -9,12 +9,12 @@ from typing import Any
 
 import numpy as np
 
+from pushplan.errors import short
 from pushplan.serving.messages import CHANGES
 from pushplan.serving.scale import check_motion, check_scale, check_shapes
 from pushplan.world import InvalidInputError, Movables, SchemaError, World, world_from_dict
 from pushplan.world.checks import FloatArray, array
-from pushplan.world.errors import short
-from pushplan.world.files import movables_from_list, robot_from_dict
+from pushplan.world.stored.world_files import movables_from_list, robot_from_dict
 
 MAX_OBJECTS = 20_000
 """Most objects that one client may make known."""

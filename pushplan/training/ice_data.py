@@ -20,11 +20,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pushplan.files.output_files import replacing
+from pushplan.files.safe_files import read_npz
 from pushplan.training.ice_passages import SPLITS, voyage_passages
 from pushplan.world import InvalidInputError
 from pushplan.world.checks import choice, integer
-from pushplan.world.output_files import replacing
-from pushplan.world.safe_files import read_npz
 
 log = logging.getLogger(__name__)
 

@@ -15,6 +15,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from pushplan.imports.on_demand import need
 from pushplan.interaction.occupancy import CELLS_PER_LENGTH, CHANNELS, PATCH_CELLS
 from pushplan.training.ice_data import LEVELS, IcePairs, read_shards
 from pushplan.training.libraries import parameter_count, write_onnx
@@ -25,7 +26,6 @@ from pushplan.world.checked_fields import (
     PositiveFloat,
     PositiveInt,
 )
-from pushplan.world.libraries import need
 
 if TYPE_CHECKING:
     from pushplan.training.ice_unet import IceUNet

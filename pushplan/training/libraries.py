@@ -6,8 +6,8 @@ import warnings
 from pathlib import Path
 from typing import Any
 
+from pushplan.imports.on_demand import need
 from pushplan.world import InvalidInputError
-from pushplan.world.libraries import need
 
 OPSET = 17
 """Of the ONNX files that are written."""

@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+from pushplan.imports.on_demand import need
 from pushplan.learned.sb3_saving import describe_model, write_beside
-from pushplan.world.libraries import need
 
 
 def specification_callback(path: str | Path, *, env: Any = None, repeat: int = 1) -> Any:

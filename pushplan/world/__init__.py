@@ -1,8 +1,6 @@
-"""The ground floor: what a scene is, what a plan is, errors, stop rules, seeds."""
+"""The scene, the plan, the contracts between them, stop rules and seeds."""
 
-from pushplan.world.actions import Action, Twist, WheelSpeeds
-from pushplan.world.episode import Episode
-from pushplan.world.errors import (
+from pushplan.errors import (
     InvalidInputError,
     MissingDependencyError,
     PushplanError,
@@ -10,7 +8,7 @@ from pushplan.world.errors import (
     SchemaError,
     UnknownNameError,
 )
-from pushplan.world.files import load_world, save_world, world_from_dict, world_to_dict
+from pushplan.world.actions import Action, Twist, WheelSpeeds
 from pushplan.world.goals import (
     ClearanceArea,
     Goal,
@@ -21,7 +19,6 @@ from pushplan.world.goals import (
     Receptacle,
 )
 from pushplan.world.movables import Movables
-from pushplan.world.nav2_map import load_nav2_map
 from pushplan.world.plan import Plan, PlanResult, PlanStats, PlanStatus, Stage, SubTask
 from pushplan.world.policy_abilities import (
     ChecksEnvironment,
@@ -39,14 +36,6 @@ from pushplan.world.policy_abilities import (
 )
 from pushplan.world.protocols import Controller, Planner, Policy
 from pushplan.world.robot import Drive, RobotModel
-from pushplan.world.robots import (
-    BUMPERS,
-    area_clearing_robot,
-    box_delivery_robot,
-    jackal,
-    maze_robot,
-    turtlebot3_burger,
-)
 from pushplan.world.scene import World
 from pushplan.world.seeds import stream
 from pushplan.world.static_map import StaticMap
@@ -60,6 +49,17 @@ from pushplan.world.stop import (
     Stop,
     StopCheck,
 )
+from pushplan.world.stored.episode import Episode
+from pushplan.world.stored.nav2_map import load_nav2_map
+from pushplan.world.stored.robots import (
+    BUMPERS,
+    area_clearing_robot,
+    box_delivery_robot,
+    jackal,
+    maze_robot,
+    turtlebot3_burger,
+)
+from pushplan.world.stored.world_files import load_world, save_world, world_from_dict, world_to_dict
 
 __all__ = [
     "BUMPERS",

@@ -5,14 +5,14 @@ from __future__ import annotations
 import dataclasses
 import math
 import numbers
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from functools import cached_property
 from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
-from pushplan.world.errors import InvalidInputError, SchemaError, short, unknown_name_message
+from pushplan.errors import InvalidInputError, short, unknown_name_message
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -179,24 +179,6 @@ def frozen(values: NDArray[Any]) -> NDArray[Any]:
     """Mark an array that we own as read-only and return it."""
     values.flags.writeable = False
     return values
-
-
-def known_keys(
-    kind: str, data: object, valid: Sequence[str] | None, required: Sequence[str]
-) -> None:
-    """Check the keys of a mapping from a file, of which ``valid`` may be there; any if None.
-
-    Raises:
-        SchemaError: if it is no mapping, a required key is missing, or a key is unknown.
-    """
-    if not isinstance(data, Mapping):
-        raise SchemaError(f"{kind} must be a mapping, got {short(data)}")
-    for key in data:
-        if valid is not None and key not in valid:
-            raise SchemaError(unknown_name_message(f"key in {kind}", key, valid))
-    for key in required:
-        if key not in data:
-            raise SchemaError(f"{kind} lacks the required key {key!r}")
 
 
 def _shape_text(shape: tuple[int | None, ...]) -> str:

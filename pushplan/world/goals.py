@@ -8,9 +8,9 @@ from typing import Annotated
 
 import numpy as np
 
+from pushplan.errors import InvalidInputError
 from pushplan.world.checked_fields import CheckedFields, PositiveFloat, Shape
 from pushplan.world.checks import ArrayRecord, BoolArray, FloatArray, IntArray, array, frozen
-from pushplan.world.errors import InvalidInputError
 from pushplan.world.outline import convex_outline, next_corner, signed_area
 
 Point = Annotated[FloatArray, Shape(2)]

@@ -10,6 +10,7 @@ from typing import Annotated, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from pushplan.errors import InvalidInputError
 from pushplan.world.checked_fields import CheckedFields, Shape
 from pushplan.world.checks import (
     ArrayRecord,
@@ -21,7 +22,6 @@ from pushplan.world.checks import (
     frozen,
     number,
 )
-from pushplan.world.errors import InvalidInputError
 from pushplan.world.outline import (
     LARGEST_M,
     areas_and_centroids,

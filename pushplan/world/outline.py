@@ -8,8 +8,8 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import ArrayLike
 
+from pushplan.errors import InvalidInputError, short
 from pushplan.world.checks import BoolArray, FloatArray, IntArray, array, frozen
-from pushplan.world.errors import InvalidInputError, short
 
 LARGEST_M = 1e70
 """Greatest coordinate [m]: its fourth power is finite still."""

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 import numpy as np
 
+from pushplan.errors import InvalidInputError
 from pushplan.world.checked_fields import CheckedFields, NonNegativeFloat, Shape
 from pushplan.world.checks import ArrayRecord, FloatArray, frozen
-from pushplan.world.errors import InvalidInputError
 from pushplan.world.polyline import arc_lengths, path_length
 
 if TYPE_CHECKING:

@@ -11,6 +11,7 @@ from typing import Annotated
 import numpy as np
 from numpy.typing import ArrayLike
 
+from pushplan.errors import InvalidInputError
 from pushplan.world.checked_fields import (
     CheckedFields,
     Limits,
@@ -19,7 +20,6 @@ from pushplan.world.checked_fields import (
     PositiveFloat,
 )
 from pushplan.world.checks import ArrayRecord, FloatArray, IntArray, choice, frozen, number
-from pushplan.world.errors import InvalidInputError
 from pushplan.world.outline import convex_outline, flatten, grown_outline, inscribed_radius
 
 

@@ -9,9 +9,9 @@ from typing import Annotated, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from pushplan.errors import InvalidInputError
 from pushplan.world.checked_fields import CheckedFields, NonNegativeFloat, Shape
 from pushplan.world.checks import ArrayRecord, BoolArray, FloatArray
-from pushplan.world.errors import InvalidInputError
 from pushplan.world.goals import (
     ClearanceArea,
     Goal,

@@ -15,9 +15,9 @@ from typing import Protocol
 
 import numpy as np
 
+from pushplan.errors import InvalidInputError
 from pushplan.world.checked_fields import CheckedFields, NonNegativeFloat, NonNegativeInt
 from pushplan.world.checks import expect
-from pushplan.world.errors import InvalidInputError
 
 
 class StopCheck(Protocol):

@@ -12,8 +12,8 @@ import pytest
 from pushplan.cli import build_parser, main
 from pushplan.cli.doctor import BASE
 from pushplan.cli.kernel_progress import PendingKernels, expected_kernels
-from pushplan.world.errors import unknown_name_message
-from pushplan.world.libraries import EXTRAS
+from pushplan.errors import unknown_name_message
+from pushplan.imports.on_demand import EXTRAS
 
 ROOM = str(Path(__file__).parents[2] / "examples" / "room.yaml")
 USERS_MISTAKES = {

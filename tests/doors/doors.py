@@ -197,8 +197,8 @@ def _read_episode(path: Path) -> Any:
 
 
 def _read_specification(path: Path) -> Any:
+    from pushplan.files.safe_files import read_text
     from pushplan.learned.specification import Specification
-    from pushplan.world.safe_files import read_text
 
     return Specification.from_json(read_text(path, "specification"))
 
@@ -211,7 +211,7 @@ def _read_sb3(path: Path) -> Any:
 
 
 def _read_name(path: Path) -> Any:
-    from pushplan.world.named_objects import load_object
+    from pushplan.imports.named_objects import load_object
 
     return load_object(path.read_bytes().decode("utf-8", "surrogateescape"))
 

@@ -19,13 +19,13 @@ import yaml
 from doors import DOORS, check_message, feed, swapped
 
 from pushplan.cli.scenario_options import variation
+from pushplan.errors import LONGEST_MESSAGE, InvalidInputError, UnknownNameError, one_line
 from pushplan.evaluation import Experiment
+from pushplan.files.safe_files import parse_json, parse_yaml, read_bytes, read_npz
+from pushplan.files.safe_yaml import dump
 from pushplan.scenarios import load_scenarios
 from pushplan.world import Episode, PushplanError, SchemaError, load_nav2_map, load_world
-from pushplan.world.errors import LONGEST_MESSAGE, InvalidInputError, UnknownNameError, one_line
-from pushplan.world.nav2_map import read_nav2_grid
-from pushplan.world.safe_files import parse_json, parse_yaml, read_bytes, read_npz
-from pushplan.world.safe_yaml import dump
+from pushplan.world.stored.nav2_map import read_nav2_grid
 
 FILES = [name for name in DOORS if name not in ("policy-name", "variation")]
 

@@ -9,6 +9,7 @@ from pushplan.envs import PushEnv
 from pushplan.envs.registry import ACTIONS
 from pushplan.envs.tasks.base import drive_of
 from pushplan.envs.tasks.maze import PRESETS
+from pushplan.imports.on_demand import look_up
 from pushplan.world import (
     GoalDisc,
     InvalidInputError,
@@ -19,7 +20,6 @@ from pushplan.world import (
     WheelSpeeds,
     World,
 )
-from pushplan.world.lazy_names import look_up
 
 unit = st.floats(-1.0, 1.0, width=32)
 

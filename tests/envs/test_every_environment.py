@@ -17,9 +17,9 @@ from pushplan.envs import PushEnv
 from pushplan.envs import make as make_scenario
 from pushplan.envs.registry import ACTIONS, SIMULATORS, TASKS
 from pushplan.envs.tasks.base import drive_of
+from pushplan.imports.on_demand import look_up
 from pushplan.scenarios import suite, suite_names
 from pushplan.world import ClearanceArea, Drive, GoalDisc, Receptacle
-from pushplan.world.lazy_names import look_up
 
 LAYOUTS = {
     "maze": [

@@ -32,13 +32,13 @@ from pushplan.envs.simulators.mujoco_kernels import drag_damping, planar_rows, r
 from pushplan.envs.simulators.mujoco_options import MujocoOptions
 from pushplan.envs.simulators.mujoco_shapes import as_rectangle, prism_inertia
 from pushplan.envs.simulators.mujoco_simulator import MujocoSimulator
+from pushplan.imports.on_demand import look_up
 from pushplan.world import (
     InvalidInputError,
     Movables,
     PushplanError,
     Twist,
 )
-from pushplan.world.lazy_names import look_up
 
 
 def ice(count=12, seed=0):

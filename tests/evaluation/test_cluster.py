@@ -162,7 +162,7 @@ def test_no_scheduler_is_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_the_slurm_example_asks_for_what_it_says() -> None:
     pytest.importorskip("dask_jobqueue", reason="needs the extra 'cluster'")
-    from pushplan.world.named_objects import load_object
+    from pushplan.imports.named_objects import load_object
 
     example = Path(__file__).parents[2] / "examples" / "slurm_cluster.py"
     with load_object(f"{example}:cluster")() as nodes:

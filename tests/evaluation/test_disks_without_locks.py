@@ -13,8 +13,8 @@ from evaluation_doubles import SETTINGS, line_jobs
 
 from pushplan.cli import main
 from pushplan.evaluation import Results, merge, run_batch, run_status
+from pushplan.files.file_locks import is_locked, take_lock
 from pushplan.world import InvalidInputError
-from pushplan.world.file_locks import is_locked, take_lock
 
 JOBS = line_jobs(3, "Ahead")
 

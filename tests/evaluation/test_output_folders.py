@@ -13,8 +13,8 @@ from evaluation_doubles import SETTINGS, line_jobs, stored_run
 
 from pushplan.cli import main
 from pushplan.evaluation import Results, merge, run_batch, salvage
+from pushplan.files.output_files import write_atomic
 from pushplan.world import InvalidInputError
-from pushplan.world.output_files import write_atomic
 
 REPORT = ("report.html", "results.csv", "summary.md", "summary.csv", "differences.csv")
 

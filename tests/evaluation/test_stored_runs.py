@@ -235,7 +235,7 @@ def test_status_says_how_far_a_run_is(tmp_path: Path, capsys: pytest.CaptureFixt
 def test_an_episode_too_large_to_be_read_is_scored_and_not_kept(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
-    monkeypatch.setattr("pushplan.world.episode.MAX_BYTES", 10)
+    monkeypatch.setattr("pushplan.world.stored.episode.MAX_BYTES", 10)
     run(tmp_path / "run", range(1), "Ahead")
     (row,) = Results.load(tmp_path / "run").rows
     assert row.success and row.trace_file is None

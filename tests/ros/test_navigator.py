@@ -15,7 +15,7 @@ import pytest
 
 from pushplan.ros import Messages, path_from
 from pushplan.world import Cancellation, InvalidInputError, Twist
-from pushplan.world.robots import turtlebot3_burger
+from pushplan.world.stored.robots import turtlebot3_burger
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "examples" / "ros2"))
 from navigator import NavigationError, Navigator

@@ -179,7 +179,7 @@ def test_a_file_on_the_machine_of_the_server_is_never_read(tmp_path, monkeypatch
     def never(*_: Any, **__: Any) -> None:
         raise AssertionError("a file was opened")
 
-    monkeypatch.setattr("pushplan.world.files.load_nav2_map", never)
+    monkeypatch.setattr("pushplan.world.stored.world_files.load_nav2_map", never)
     for static in ({"map": str(tmp_path)}, {"map": "x", "bounds": [0, 0, 1, 1]}, {"map": None}):
         assert "names a file" in refused(
             HELLO, {"type": "reset", "world": maze_dict(static=static)}

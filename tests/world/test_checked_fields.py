@@ -8,6 +8,7 @@ import pytest
 
 import pushplan.evaluation
 import pushplan.planners
+from pushplan.imports.on_demand import look_up
 from pushplan.world import InvalidInputError, UnknownNameError
 from pushplan.world.checked_fields import (
     CheckedFields,
@@ -17,7 +18,6 @@ from pushplan.world.checked_fields import (
     OneOf,
     PositiveInt,
 )
-from pushplan.world.lazy_names import look_up
 
 
 @dataclass(frozen=True)

@@ -18,8 +18,8 @@ from pushplan.world import (
     world_from_dict,
     world_to_dict,
 )
-from pushplan.world.files import movables_from_list, robot_from_dict
 from pushplan.world.outline import grown_outline, grown_outlines
+from pushplan.world.stored.world_files import movables_from_list, robot_from_dict
 
 TRIANGLE = np.array([(0.4, 0.0), (-0.2, 0.3), (-0.2, -0.3)])
 HALF = 0.5 * np.ptp(SQUARE, axis=0)[0]

@@ -19,8 +19,8 @@ from pushplan.world import (
     load_world,
     occupancy,
 )
-from pushplan.world.nav2_map import read_nav2_grid
-from pushplan.world.occupancy import rectangle_cover
+from pushplan.world.stored.nav2_map import read_nav2_grid
+from pushplan.world.stored.occupancy import rectangle_cover
 
 SHAPES = st.tuples(st.integers(1, 12), st.integers(1, 12))
 CORNER = {"image": "map.pgm", "resolution": 0.5, "origin": [1.0, -2.0, 0.0]}

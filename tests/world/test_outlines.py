@@ -21,8 +21,8 @@ from pushplan.world import (
     Receptacle,
     StaticMap,
 )
-from pushplan.world.files import movables_from_list, robot_from_dict
 from pushplan.world.outline import convex_outline, signed_area, well_formed
+from pushplan.world.stored.world_files import movables_from_list, robot_from_dict
 
 HEXAGON = np.array([[2.0, 0.0], [1.0, 1.7], [-1.0, 1.7], [-2.0, 0.0], [-1.0, -1.7], [1.0, -1.7]])
 LIMITS = {"mass": 1, "drive": "differential", "max_speed": 1, "max_turn_rate": 1}

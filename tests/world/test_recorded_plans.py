@@ -13,7 +13,7 @@ from pushplan.evaluation import run_episode
 from pushplan.planners import make_policy
 from pushplan.scenarios import suite
 from pushplan.world import Episode, InvalidInputError, Plan, SchemaError
-from pushplan.world.recorded_plans import PlanRecorder, RecordedPlans
+from pushplan.world.stored.recorded_plans import PlanRecorder, RecordedPlans
 
 
 def plan(shift: float, count: int = 200) -> Plan:

@@ -33,7 +33,7 @@ from pushplan.world import (
     World,
     stream,
 )
-from pushplan.world.files import world_from_dict, world_to_dict
+from pushplan.world.stored.world_files import world_from_dict, world_to_dict
 
 NAN = float("nan")
 LIMITS = {"mass": 1.0, "drive": "differential", "max_speed": 1.0, "max_turn_rate": 1.0}

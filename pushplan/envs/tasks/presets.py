@@ -11,8 +11,8 @@ from typing import Any
 
 from pushplan.envs.simulators.base import Materials, Solids
 from pushplan.envs.simulators.water import Water
+from pushplan.files.safe_files import read_data
 from pushplan.world import Drive, RobotModel
-from pushplan.world.safe_files import read_data
 
 
 class Preset(SimpleNamespace):

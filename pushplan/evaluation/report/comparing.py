@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from pushplan.errors import describe, short
 from pushplan.evaluation.report.tables import Table
 from pushplan.evaluation.statistics.estimates import ENOUGH, estimate, pairs_needed
 from pushplan.evaluation.statistics.summary import by_scenario, grouped, policies_of, settings_of
@@ -25,7 +26,6 @@ from pushplan.evaluation.store.rows import (
 )
 from pushplan.evaluation.store.run_directory import open_results
 from pushplan.world import InvalidInputError, SchemaError, UnknownNameError
-from pushplan.world.errors import describe, short
 
 SHORT = {
     "plan_time": "plan_time_median_s",

@@ -10,7 +10,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from pushplan.evaluation.report.tables import Table
-from pushplan.world.safe_files import read_data
+from pushplan.files.safe_files import read_data
 
 TEXT_WIDTH = 345.0
 """Width of the text in the class ``article`` [pt]; most other classes have more."""

@@ -14,11 +14,11 @@ from pushplan.evaluation.report.replays import chosen, packed, write_beside
 from pushplan.evaluation.report.results import Results
 from pushplan.evaluation.report.tables import Table, heading
 from pushplan.evaluation.store.provenance import in_words
+from pushplan.files.output_files import write_atomic
+from pushplan.files.safe_files import read_bytes
+from pushplan.imports.on_demand import need
 from pushplan.metrics import METRICS, Role, metric_names
 from pushplan.world import SchemaError
-from pushplan.world.libraries import need
-from pushplan.world.output_files import write_atomic
-from pushplan.world.safe_files import read_bytes
 
 PAGE = "report.html"
 REPLAYS = ("embed", "beside", "none")

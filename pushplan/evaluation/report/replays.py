@@ -13,10 +13,10 @@ import numpy as np
 
 from pushplan.evaluation.report.results import Results
 from pushplan.evaluation.store.rows import ResultRow
+from pushplan.files.output_files import make_folder, write_atomic
 from pushplan.world import Episode, GoalDisc, GoalLine, SchemaError
 from pushplan.world.checks import FloatArray
-from pushplan.world.output_files import make_folder, write_atomic
-from pushplan.world.recorded_plans import thinned
+from pushplan.world.stored.recorded_plans import thinned
 
 FRAMES = 400
 """At most so many instants of an episode are kept."""

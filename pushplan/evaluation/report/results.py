@@ -34,11 +34,11 @@ from pushplan.evaluation.store.database import DATABASE
 from pushplan.evaluation.store.rescoring import metric_label, rescore
 from pushplan.evaluation.store.rows import ResultRow, columns, rows_csv
 from pushplan.evaluation.store.run_directory import open_results, remove_report
+from pushplan.files.output_files import check_folder, write_atomic
+from pushplan.imports.on_demand import need
 from pushplan.scenarios.known_bounds import known_bounds
 from pushplan.world import Episode, InvalidInputError, UnknownNameError
 from pushplan.world.checks import choice, integer
-from pushplan.world.libraries import need
-from pushplan.world.output_files import check_folder, write_atomic
 
 
 @dataclass(frozen=True)

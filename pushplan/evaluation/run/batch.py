@@ -28,9 +28,9 @@ from pushplan.evaluation.run.worker import WORKER_VARIABLE
 from pushplan.evaluation.store.provenance import provenance
 from pushplan.evaluation.store.rows import ResultRow, instant
 from pushplan.evaluation.store.run_directory import RunDirectory, remove_report
+from pushplan.files.output_files import make_folder
 from pushplan.world import InvalidInputError
 from pushplan.world.checks import choice, integer, number
-from pushplan.world.output_files import make_folder
 
 Progress = Callable[[int, int, ResultRow | None], None]
 """Called with jobs done, jobs in all, and the row just stored (None at the beginning)."""

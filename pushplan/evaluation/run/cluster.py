@@ -9,11 +9,11 @@ from concurrent.futures import CancelledError, Executor, Future
 from contextlib import contextmanager
 from typing import Any
 
+from pushplan.errors import describe
 from pushplan.evaluation.run.jobs import Job, JobResult, JobSettings
 from pushplan.evaluation.run.pool import WorkerPool, outcome_of
+from pushplan.imports.on_demand import need
 from pushplan.world import InvalidInputError
-from pushplan.world.errors import describe
-from pushplan.world.libraries import need
 
 CONNECT_S = 30.0
 """How long a scheduler may take to answer [s]."""

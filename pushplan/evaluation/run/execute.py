@@ -14,6 +14,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from pushplan.errors import describe
 from pushplan.evaluation.run.job_identity import check_unchanged
 from pushplan.evaluation.run.job_limits import EpisodeTimeout, hard_limit, is_ctrl_c, soft_limit
 from pushplan.evaluation.run.jobs import (
@@ -35,7 +36,6 @@ from pushplan.evaluation.run.recording import (
 )
 from pushplan.evaluation.store.rows import Status, blank_row, clean_reason, instant, scored_row
 from pushplan.world import InvalidInputError, MissingDependencyError
-from pushplan.world.errors import describe
 from pushplan.world.policy_abilities import (
     ChecksEnvironment,
     ChoosesActions,

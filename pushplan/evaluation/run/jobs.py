@@ -8,13 +8,13 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from pushplan.errors import describe
 from pushplan.evaluation.run.policy_specs import PolicySpec
 from pushplan.evaluation.run.recording import wanted_observation
 from pushplan.evaluation.store.rows import ResultRow, Status, blank_row, checked_row, clean_reason
+from pushplan.imports.named_objects import load_object
 from pushplan.world import ChecksEnvironment, ChoosesActions, InvalidInputError, Policy
 from pushplan.world.checked_fields import CheckedFields, NonNegativeFloat, PositiveFloat
-from pushplan.world.errors import describe
-from pushplan.world.named_objects import load_object
 
 DEFAULT_ENV = "pushplan.envs:make"
 DETAIL_HALF = 10_000  # characters of a traceback that are kept at its beginning and at its end

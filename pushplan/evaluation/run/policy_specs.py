@@ -14,16 +14,16 @@ from typing import Any, cast
 
 import numpy as np
 
+from pushplan.errors import MOST_CHOICES, describe, place
 from pushplan.evaluation.store.source_digests import (
     code_digest,
     file_digest,
     libraries_of,
     source_digest,
 )
+from pushplan.imports.named_objects import load_object, objects_of_file
+from pushplan.imports.on_demand import missing
 from pushplan.world import InvalidInputError, Planner, Policy, PushplanError, UnknownNameError
-from pushplan.world.errors import MOST_CHOICES, describe, place
-from pushplan.world.libraries import missing
-from pushplan.world.named_objects import load_object, objects_of_file
 
 _LABEL = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.+@-]{0,63}")
 

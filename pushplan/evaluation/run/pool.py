@@ -13,6 +13,7 @@ from concurrent.futures import BrokenExecutor, Future
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from pushplan.errors import describe
 from pushplan.evaluation.run.jobs import (
     DEFAULT_ENV,
     Job,
@@ -26,7 +27,6 @@ from pushplan.evaluation.run.worker import WorkerSetup
 from pushplan.evaluation.run.worker_process import WorkerDiedError, WorkerProcess
 from pushplan.evaluation.store.rows import Status
 from pushplan.world import InvalidInputError
-from pushplan.world.errors import describe
 
 PRELOAD = (
     "pushplan.evaluation.run.execute",

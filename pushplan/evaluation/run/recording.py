@@ -11,6 +11,7 @@ import numpy as np
 
 import pushplan
 from pushplan.control.executors import SimulatedExecutor
+from pushplan.errors import describe
 from pushplan.evaluation.run.job_limits import EpisodeTimeout, is_ctrl_c
 from pushplan.world import (
     ChoosesActions,
@@ -29,9 +30,8 @@ from pushplan.world import (
     stream,
 )
 from pushplan.world.checks import FloatArray, number
-from pushplan.world.errors import describe
 from pushplan.world.plan import Plan
-from pushplan.world.recorded_plans import PlanRecorder
+from pushplan.world.stored.recorded_plans import PlanRecorder
 
 Clock = Callable[[], float]
 """Returns seconds, like `time.perf_counter`."""

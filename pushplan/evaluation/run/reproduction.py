@@ -8,12 +8,12 @@ from pathlib import Path
 
 import numpy as np
 
+from pushplan.errors import describe
 from pushplan.evaluation.run.batch import run_batch
 from pushplan.evaluation.run.job_identity import differences, job_of, job_spec
 from pushplan.evaluation.store.database import read_results, reading
 from pushplan.evaluation.store.rows import TIMING_COLUMNS, ResultRow, columns
 from pushplan.world import Episode, InvalidInputError, PushplanError, SchemaError
-from pushplan.world.errors import describe
 
 _TIMES = ("act_times_s", "plan_times_s")
 _ARRAYS = ("times", "robot_poses", "object_poses", "completed", "actions", "rewards")

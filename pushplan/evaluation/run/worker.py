@@ -15,9 +15,9 @@ import sys
 import types
 from dataclasses import asdict, dataclass
 
+from pushplan.errors import describe
 from pushplan.evaluation.run.channel import Channel
 from pushplan.world import InvalidInputError
-from pushplan.world.errors import describe
 
 _DIE_WITH_OWNER = 1  # PR_SET_PDEATHSIG of Linux, however the owner ends
 _ADOPT_ORPHANS = 36  # PR_SET_CHILD_SUBREAPER: what a policy leaves behind can still be found

@@ -20,9 +20,9 @@ from pushplan.evaluation.run.channel import Channel, ChannelError
 from pushplan.evaluation.run.jobs import BatchStoppedError, JobResult
 from pushplan.evaluation.run.worker import THREAD_VARIABLES, WORKER_VARIABLE, WorkerSetup
 from pushplan.evaluation.store.rows import ResultRow, Status
+from pushplan.files.file_locks import NO_FOLLOW
+from pushplan.imports.named_objects import import_path
 from pushplan.world import PushplanError
-from pushplan.world.file_locks import NO_FOLLOW
-from pushplan.world.named_objects import import_path
 
 _LOG_TAIL = 6000
 _LOG_MOST = 1_000_000

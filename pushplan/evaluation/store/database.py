@@ -14,12 +14,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from pushplan.errors import describe, short
 from pushplan.evaluation.store.provenance import in_words
 from pushplan.evaluation.store.rows import ResultRow, checked_row, column_type, columns
+from pushplan.files.file_locks import is_locked
+from pushplan.files.safe_files import MAX_TEXT, parse_json
 from pushplan.world import InvalidInputError, PushplanError, SchemaError
-from pushplan.world.errors import describe, short
-from pushplan.world.file_locks import is_locked
-from pushplan.world.safe_files import MAX_TEXT, parse_json
 
 SCHEMA = "pushplan-run/2"
 DATABASE = "results.db"

@@ -16,10 +16,10 @@ from typing import Any
 import numpy as np
 
 from pushplan.envs.registry import goal_kind
+from pushplan.errors import one_line, short
+from pushplan.files.safe_files import read_bytes
 from pushplan.metrics import METRICS, Role, compute, metric_names
 from pushplan.world import Episode
-from pushplan.world.errors import one_line, short
-from pushplan.world.safe_files import read_bytes
 
 REASON_LENGTH = 300
 """A reason in the results is cut to this many characters; the detail file has all of it."""

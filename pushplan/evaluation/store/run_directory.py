@@ -31,10 +31,10 @@ from pushplan.evaluation.store.database import (
     reading,
 )
 from pushplan.evaluation.store.rows import ResultRow, Status, rows_csv
+from pushplan.files.file_locks import NO_FOLLOW, take_lock
+from pushplan.files.output_files import TEMPORARY, check_folder, make_folder, write_atomic
+from pushplan.files.safe_files import MAX_BYTES, read_bytes
 from pushplan.world import InvalidInputError, SchemaError
-from pushplan.world.file_locks import NO_FOLLOW, take_lock
-from pushplan.world.output_files import TEMPORARY, check_folder, make_folder, write_atomic
-from pushplan.world.safe_files import MAX_BYTES, read_bytes
 
 _log = logging.getLogger(__name__)
 _HIDE_OTHERS = (

@@ -15,9 +15,9 @@ from pathlib import Path
 from types import CodeType
 from typing import Any
 
-from pushplan.world.errors import PushplanError, is_a_users
-from pushplan.world.named_objects import import_path
-from pushplan.world.safe_files import read_data
+from pushplan.errors import PushplanError, is_a_users
+from pushplan.files.safe_files import read_data
+from pushplan.imports.named_objects import import_path
 
 _DATA = (".yaml", ".yml", ".json")
 _IMPORTERS = ("import_module", "__import__")

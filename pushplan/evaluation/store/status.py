@@ -7,11 +7,11 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 
+from pushplan.errors import one_line
 from pushplan.evaluation.store.database import LOCK, read_about, reading
 from pushplan.evaluation.store.rows import Status
+from pushplan.files.file_locks import is_locked
 from pushplan.world.checks import number
-from pushplan.world.errors import one_line
-from pushplan.world.file_locks import is_locked
 
 
 @dataclass(frozen=True)

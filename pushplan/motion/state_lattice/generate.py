@@ -7,9 +7,9 @@ import json
 import sys
 from pathlib import Path
 
+from pushplan.errors import InvalidInputError
 from pushplan.motion.state_lattice.primitive_set import PrimitiveConfig
 from pushplan.motion.state_lattice.primitives import generate
-from pushplan.world.errors import InvalidInputError
 
 SHIPPED = (PrimitiveConfig(8, 6.0, 1, 0), PrimitiveConfig(16, 6.0), PrimitiveConfig(16, 19.0))
 """The sets that ship with pushplan; others are made when they are needed."""

@@ -8,10 +8,17 @@ from dataclasses import asdict, dataclass
 import numpy as np
 
 from pushplan.compiled import kernel, owned
+from pushplan.errors import InvalidInputError, SchemaError
+from pushplan.files.safe_files import known_keys
 from pushplan.motion.dubins import sample_pieces
-from pushplan.world.checks import ArrayRecord, FloatArray, IntArray, frozen, integer, known_keys
+from pushplan.world.checks import (
+    ArrayRecord,
+    FloatArray,
+    IntArray,
+    frozen,
+    integer,
+)
 from pushplan.world.checks import number as checked_number
-from pushplan.world.errors import InvalidInputError, SchemaError
 
 DIRECTIONS: dict[int, tuple[tuple[int, int], ...]] = {
     8: ((1, 0), (1, 1)),

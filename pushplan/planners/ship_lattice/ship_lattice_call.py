@@ -9,6 +9,7 @@ from functools import partial
 import numpy as np
 
 from pushplan.compiled import owned
+from pushplan.imports.on_demand import need
 from pushplan.interaction import InteractionModel
 from pushplan.interaction.path_sweepers import path_sweeper
 from pushplan.motion.coarse_path import reachable
@@ -31,7 +32,6 @@ from pushplan.planners.ship_lattice.shortcut_proposals import ShortcutProblem
 from pushplan.search.astar import FOUND, PAUSED
 from pushplan.world import GoalLine, Plan, PlanStatus
 from pushplan.world.checks import FloatArray
-from pushplan.world.libraries import need
 from pushplan.world.planning_call import PlanningCall
 
 _SPREAD = 0.6  # typical sideways displacement of a shortcut [R]

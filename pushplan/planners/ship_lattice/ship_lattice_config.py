@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Annotated, Any, Self
 
+from pushplan.errors import InvalidInputError
 from pushplan.motion.state_lattice.lattice_config import LatticeConfig
 from pushplan.world.checked_fields import (
     Limits,
@@ -14,7 +15,6 @@ from pushplan.world.checked_fields import (
     PositiveInt,
 )
 from pushplan.world.checks import number
-from pushplan.world.errors import InvalidInputError
 
 FLOE_COSTS = ("displacement", "kinetic-energy")
 

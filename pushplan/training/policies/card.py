@@ -8,9 +8,9 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
+from pushplan.imports.on_demand import need
 from pushplan.training.policies.run import RECORD
 from pushplan.world import SchemaError
-from pushplan.world.libraries import need
 
 ScoreRow = Mapping[str, Any]
 """A suite's scores: ``suite``, ``episodes``, ``success`` with ``success_low`` and ``success_high``,

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Annotated, Any
 
 from pushplan.envs.registry import SIMULATORS, TASKS, default_preset
+from pushplan.files.safe_files import known_keys, read_data
 from pushplan.learned.builders import builder_from_dict, from_mapping
 from pushplan.learned.loading import shipped_files
 from pushplan.learned.outputs import OUTPUTS
@@ -22,8 +23,7 @@ from pushplan.world.checked_fields import (
     PositiveFloat,
     PositiveInt,
 )
-from pushplan.world.checks import choice, known_keys
-from pushplan.world.safe_files import read_data
+from pushplan.world.checks import choice
 
 ALGORITHMS = tuple(OPTIONS)
 IMITATING = ("bc", "flow")

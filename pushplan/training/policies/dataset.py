@@ -20,6 +20,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pushplan.envs import PushEnv
+from pushplan.files.safe_files import known_keys, read_data, read_npz
+from pushplan.imports.on_demand import need
 from pushplan.learned.builders import builder_from_dict, builder_to_dict
 from pushplan.learned.specification import RobotSpec
 from pushplan.observation import ObservationBuilder
@@ -32,9 +34,6 @@ from pushplan.world import (
     stream,
 )
 from pushplan.world.checked_fields import CheckedFields, Fraction, NonNegativeInt, PositiveInt
-from pushplan.world.checks import known_keys
-from pushplan.world.libraries import need
-from pushplan.world.safe_files import read_data, read_npz
 
 SCHEMA = "pushplan-dataset/1"
 METADATA = "metadata.json"

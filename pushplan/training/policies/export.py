@@ -10,13 +10,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pushplan.imports.on_demand import need
 from pushplan.learned import OnnxPolicy, Specification
 from pushplan.learned.onnx_session import NOISE
 from pushplan.learned.specification import METADATA_KEY
 from pushplan.training.libraries import write_onnx
 from pushplan.training.policies.environment import TrainingEnv
 from pushplan.world import InvalidInputError
-from pushplan.world.libraries import need
 
 PARITY = 1e-4
 """Greatest difference between PyTorch and ONNX Runtime, relative to the greatest output."""

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import Any
 
+from pushplan.imports.on_demand import need
 from pushplan.learned.loading import learned_file, learned_names, weights_of
 from pushplan.learned.onnx_guard import inspect
 from pushplan.world import InvalidInputError
-from pushplan.world.libraries import need
 
 
 def load_weights(network: Any, source: str) -> None:

@@ -17,12 +17,12 @@ from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
+from pushplan.files.output_files import check_folder, replacing, write_atomic
+from pushplan.files.safe_yaml import dump
+from pushplan.imports.on_demand import need
 from pushplan.training.policies.config import TrainingConfig, read_config
 from pushplan.training.policies.environment import TrainingEnv
 from pushplan.world import InvalidInputError
-from pushplan.world.libraries import need
-from pushplan.world.output_files import check_folder, replacing, write_atomic
-from pushplan.world.safe_yaml import dump
 
 CONFIG, CURVE, PICTURE = "config.yaml", "curve.csv", "curve.png"
 CHECKPOINT, BEST, POLICY, RECORD = "checkpoint.pt", "best.pt", "policy.onnx", "training.json"

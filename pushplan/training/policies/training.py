@@ -11,6 +11,7 @@ from typing import Any
 
 import pushplan
 from pushplan.drawing.figure import COLUMN, DPI, STYLE
+from pushplan.imports.on_demand import need
 from pushplan.learned.sb3_saving import attach
 from pushplan.learned.specification import Specification
 from pushplan.training.libraries import chosen_device, hardware, parameter_count
@@ -28,7 +29,6 @@ from pushplan.training.policies.run import (
     train,
 )
 from pushplan.world import InvalidInputError
-from pushplan.world.libraries import need
 
 
 def train_policy(

@@ -10,9 +10,9 @@ import numpy as np
 from pushplan.envs.registry import SIMULATORS
 from pushplan.envs.simulators.base import Materials, Simulator
 from pushplan.envs.tasks.presets import SOLIDS
+from pushplan.imports.on_demand import look_up
 from pushplan.planners.pushing import PushModel, PushPath, PushState, contact_kernels
 from pushplan.world import Episode, Movables, Receptacle, RobotModel, StaticMap, Twist, World
-from pushplan.world.lazy_names import look_up
 
 SQUARE = 0.5 * np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
 FAR = Receptacle([(90.0, 90.0), (91.0, 90.0), (91.0, 91.0), (90.0, 91.0)])

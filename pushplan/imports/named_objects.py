@@ -13,7 +13,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from pushplan.world.errors import InvalidInputError, is_a_users, unknown_name_message
+from pushplan.errors import InvalidInputError, is_a_users, unknown_name_message
 
 _imported: dict[str, tuple[str, tuple[int, int]]] = {}
 """Modules of users that `load_object` has brought along: their files, and versions of these."""

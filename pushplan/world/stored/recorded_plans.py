@@ -7,9 +7,9 @@ from typing import Annotated
 
 import numpy as np
 
+from pushplan.errors import InvalidInputError
 from pushplan.world.checked_fields import CheckedFields, Shape
 from pushplan.world.checks import ArrayRecord, FloatArray, IntArray
-from pushplan.world.errors import InvalidInputError
 from pushplan.world.plan import Plan
 
 _POSES = 48  # of a path, at most

@@ -10,17 +10,23 @@ from typing import Any
 
 import numpy as np
 
-from pushplan.world.checks import array, boolean, integer, known_keys, number, word
-from pushplan.world.errors import InvalidInputError, SchemaError, short, unknown_name_message
+from pushplan.errors import InvalidInputError, SchemaError, short, unknown_name_message
+from pushplan.files.safe_files import known_keys, read_data
+from pushplan.files.safe_yaml import dump
+from pushplan.world.checks import (
+    array,
+    boolean,
+    integer,
+    number,
+    word,
+)
 from pushplan.world.goals import ClearanceArea, Goal, GoalDisc, GoalLine, Receptacle
 from pushplan.world.movables import Movables
-from pushplan.world.nav2_map import load_nav2_map
 from pushplan.world.outline import convex_outline, signed_area, unflatten
 from pushplan.world.robot import Drive, RobotModel
-from pushplan.world.safe_files import read_data
-from pushplan.world.safe_yaml import dump
 from pushplan.world.scene import World
 from pushplan.world.static_map import StaticMap
+from pushplan.world.stored.nav2_map import load_nav2_map
 
 SCHEMA = "pushplan-world/1"
 """Name and version of the file format; files of another version are refused."""

@@ -15,15 +15,15 @@ import stat
 import sys
 import zipfile
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import IO, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pushplan.world.checks import known_keys
-from pushplan.world.errors import InvalidInputError, SchemaError, describe, short
+from pushplan.errors import InvalidInputError, SchemaError, describe, short, unknown_name_message
+from pushplan.files.safe_yaml import LONGEST_NUMBER, MAX_DEPTH, load
 
 MAX_BYTES = 200_000_000
 """Greatest size of a file, and of the arrays that are packed in it."""
@@ -31,10 +31,6 @@ MAX_TEXT = 32_000_000
 """Greatest size of a file of text [bytes]."""
 MAX_VALUES = 1_000_000
 """Most values in a JSON file."""
-MAX_DEPTH = 64
-"""Deepest nesting of lists and mappings, in JSON and YAML."""
-LONGEST_NUMBER = 400
-"""Most characters of a number in JSON and YAML: floats written out have 310."""
 _MEMBERS = 1000
 _TEXT = re.compile(rb'"[^"\\]*(?:\\.[^"\\]*)*(?:"|\\?\Z)', re.DOTALL)
 """A text in JSON; one that does not end reaches to the end of all, else searching is quadratic."""
@@ -117,13 +113,11 @@ def parse_json(text: str, what: str = "text") -> Any:
 
 
 def parse_yaml(text: str, what: str = "text") -> Any:
-    """Values of a text in YAML, of plain types; see `pushplan.world.safe_yaml`.
+    """Values of a text in YAML, of plain types; see `pushplan.files.safe_yaml`.
 
     Raises:
         SchemaError: if it is not YAML, names a key twice, or is over a limit.
     """
-    from pushplan.world.safe_yaml import load
-
     try:
         return load(text)
     except Exception as error:  # what PyYAML makes values with raises errors of many kinds
@@ -183,6 +177,24 @@ def read_npy(path: str | Path, what: str) -> NDArray[Any]:
         return _array(io.BytesIO(data), MAX_BYTES)
     except Exception as error:
         raise SchemaError(f"cannot read {what} {path}: {describe(error)}") from error
+
+
+def known_keys(
+    kind: str, data: object, valid: Sequence[str] | None, required: Sequence[str]
+) -> None:
+    """Check the keys of a mapping from a file, of which ``valid`` may be there; any if None.
+
+    Raises:
+        SchemaError: if it is no mapping, a required key is missing, or a key is unknown.
+    """
+    if not isinstance(data, Mapping):
+        raise SchemaError(f"{kind} must be a mapping, got {short(data)}")
+    for key in data:
+        if valid is not None and key not in valid:
+            raise SchemaError(unknown_name_message(f"key in {kind}", key, valid))
+    for key in required:
+        if key not in data:
+            raise SchemaError(f"{kind} lacks the required key {key!r}")
 
 
 def _array(file: IO[bytes], limit: int) -> NDArray[Any]:

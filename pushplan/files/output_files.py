@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import IO
 
-from pushplan.world.errors import InvalidInputError
+from pushplan.errors import InvalidInputError
 
 TEMPORARY = re.compile(r"\.pushplan-[0-9a-f]{16}\.tmp")
 """Names of files that are being written."""

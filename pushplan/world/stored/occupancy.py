@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from pushplan.errors import InvalidInputError
 from pushplan.world.checks import (
     BoolArray,
     FloatArray,
@@ -16,7 +17,6 @@ from pushplan.world.checks import (
     integer,
     number,
 )
-from pushplan.world.errors import InvalidInputError
 from pushplan.world.outline import transform
 
 UNKNOWN = ("obstacle", "free")

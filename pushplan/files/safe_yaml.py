@@ -13,8 +13,10 @@ from typing import Any
 import yaml
 from yaml.composer import Composer
 
-from pushplan.world.safe_files import LONGEST_NUMBER, MAX_DEPTH
-
+MAX_DEPTH = 64
+"""Deepest nesting of lists and mappings, in JSON and YAML."""
+LONGEST_NUMBER = 400
+"""Most characters of a number in JSON and YAML: floats written out have 310."""
 MAX_NODES = 60_000
 """Most values in a file, each counted as often as aliases repeat it."""
 _WHOLE, _REAL = "tag:yaml.org,2002:int", "tag:yaml.org,2002:float"

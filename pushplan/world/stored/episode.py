@@ -12,13 +12,18 @@ from typing import Annotated, Any
 
 import numpy as np
 
+from pushplan.errors import InvalidInputError, SchemaError
+from pushplan.files.safe_files import MAX_BYTES, known_keys, parse_json, read_npz
 from pushplan.world.checked_fields import CheckedFields, Shape
-from pushplan.world.checks import ArrayRecord, BoolArray, FloatArray, array, known_keys
-from pushplan.world.errors import InvalidInputError, SchemaError
-from pushplan.world.files import world_from_dict, world_to_dict
-from pushplan.world.recorded_plans import RecordedPlans
-from pushplan.world.safe_files import MAX_BYTES, parse_json, read_npz
+from pushplan.world.checks import (
+    ArrayRecord,
+    BoolArray,
+    FloatArray,
+    array,
+)
 from pushplan.world.scene import World
+from pushplan.world.stored.recorded_plans import RecordedPlans
+from pushplan.world.stored.world_files import world_from_dict, world_to_dict
 
 SCHEMA = "pushplan-episode/1"
 _ARRAYS = (

@@ -9,19 +9,18 @@ from typing import Any
 
 import numpy as np
 
+from pushplan.errors import InvalidInputError, SchemaError, describe, short
+from pushplan.files.safe_files import known_keys, read_bytes, read_data
+from pushplan.imports.on_demand import need
 from pushplan.world.checks import (
     BoolArray,
     FloatArray,
     IntArray,
     array,
     choice,
-    known_keys,
     number,
     word,
 )
-from pushplan.world.errors import InvalidInputError, SchemaError, describe, short
-from pushplan.world.libraries import need
-from pushplan.world.safe_files import read_bytes, read_data
 from pushplan.world.static_map import StaticMap
 
 _DEPTH = re.compile(rb"P[25](?:\s+(?:#.*\s+)*\d+){2}\s+(?:#.*\s+)*(\d+)")

@@ -17,10 +17,10 @@ from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
+from pushplan.errors import UnknownNameError
+from pushplan.files.safe_files import read_data
 from pushplan.world.checks import choice
-from pushplan.world.errors import UnknownNameError
 from pushplan.world.robot import Drive, RobotModel
-from pushplan.world.safe_files import read_data
 
 BUMPERS = ("none", "collector", "pusher", "navigation")
 """Inward-curved (keeps boxes in), straight edge, outward-curved (sheds boxes to the sides)."""

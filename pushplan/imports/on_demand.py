@@ -1,11 +1,13 @@
-"""Libraries of the extras: one line says what to install where one is missing."""
+"""Modules that are imported when they are first needed; one line says what a missing one needs."""
 
 from __future__ import annotations
 
+import sys
+from collections.abc import Callable, Mapping
 from importlib import import_module
 from typing import Any
 
-from pushplan.world.errors import MissingDependencyError
+from pushplan.errors import MissingDependencyError, UnknownNameError
 
 EXTRAS = {
     "PIL": "pictures",
@@ -57,3 +59,35 @@ def missing(error: BaseException) -> MissingDependencyError | None:
     return MissingDependencyError(
         f"this needs {library}: pip install 'pushplan[{EXTRAS[library]}]'"
     )
+
+
+def lazy_names(
+    package: str, homes: Mapping[str, str]
+) -> tuple[Callable[[str], Any], Callable[[], list[str]]]:
+    """Make a package's ``__getattr__`` and ``__dir__``, so that it costs what is asked of it.
+
+    Args:
+        package: the package's ``__name__``.
+        homes: module, below the package -> the names that live there, with spaces between.
+    """
+    modules = {name: home for home, names in homes.items() for name in names.split()}
+
+    def load(name: str) -> Any:
+        if name not in modules:
+            raise AttributeError(f"module {package!r} has no attribute {name!r}")
+        return getattr(need(f"{package}.{modules[name]}"), name)
+
+    return load, lambda: list(sys.modules[package].__all__)
+
+
+def look_up(kind: str, table: Mapping[str, str], name: object) -> Any:
+    """Import what a name stands for in a table of ``"module:name"`` texts.
+
+    Raises:
+        UnknownNameError: if it is not in the table; the message calls it a ``kind``.
+        MissingDependencyError: if a library that it needs is not installed.
+    """
+    if not isinstance(name, str) or name not in table:
+        raise UnknownNameError(kind, name, table)
+    module, _, attribute = table[name].partition(":")
+    return getattr(need(module), attribute)

@@ -14,7 +14,7 @@ MOST_CHOICES = 12
 NEAREST = 3
 _ALIKE = 0.55
 """Similarity above which the nearest choice may be meant: "circle" is no "receptacle"."""
-_OURS = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
+_OURS = os.path.dirname(os.path.abspath(__file__))
 _PYTHONS = os.path.dirname(os.__file__)
 _NOT_A_USERS = ("<", f"{_OURS}{os.sep}", f"{_PYTHONS}{os.sep}")
 _INSTALLED = {"site-packages", "dist-packages"}

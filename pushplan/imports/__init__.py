@@ -1,0 +1,1 @@
+"""Modules that are imported when they are needed, and objects that a text names."""

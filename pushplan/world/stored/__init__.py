@@ -1,0 +1,1 @@
+"""Worlds and their parts as files have them: scenes, maps, robots, recorded episodes."""
