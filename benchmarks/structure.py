@@ -1,6 +1,6 @@
 """The structure of the package in figures: size, kernels, imports between families, circles.
 
-    python benchmarks/structure.py [PACKAGE_FOLDER ...] [--check]
+    python -m benchmarks.structure [PACKAGE_FOLDER ...] [--check]
 
 Reads source code only. Given the folders of two versions it prints a column for each. With
 ``--check`` it fails where a figure is above its limit in ``reference/structure.yaml``, which may
@@ -15,7 +15,6 @@ function that Numba compiles.
 
 from __future__ import annotations
 
-import argparse
 import ast
 import re
 import tomllib
@@ -27,6 +26,8 @@ from typing import Any
 
 import networkx as nx
 import yaml
+
+from benchmarks.reporting import command_line
 
 MANY_ARGUMENTS = 10
 ROOT = Path(__file__).resolve().parent.parent
@@ -204,9 +205,7 @@ def _growth_is_explained() -> bool:
 
 def main() -> int:
     """Print the table, and look at the limits."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawTextHelpFormatter
-    )
+    parser = command_line(__doc__)
     parser.add_argument("folders", nargs="*", type=Path, default=[ROOT / "pushplan"])
     parser.add_argument("--check", action="store_true", help="fail where a limit is broken")
     options = parser.parse_args()

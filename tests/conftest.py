@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gc
 import os
+import sys
 import time
 from collections.abc import Callable
 from importlib.util import find_spec
@@ -15,6 +16,9 @@ import pytest
 
 import pushplan
 from pushplan.world import Drive, GoalDisc, Movables, PlanStatus, RobotModel, StaticMap, World
+
+# for tests of benchmarks; at the end, so that an installed pushplan comes before the checkout
+sys.path.append(str(Path(__file__).parents[1]))
 
 hypothesis.settings.register_profile("busy", deadline=None)  # a shared machine has no speed
 hypothesis.settings.load_profile("busy")

@@ -1,17 +1,15 @@
-"""Tables of the pages are those that `benchmarks/tables.py` makes of stored episodes."""
+"""Tables of the pages are those that `benchmarks/scores/tables.py` makes of stored episodes."""
 
 from __future__ import annotations
 
-import runpy
-from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import pytest
 
+from benchmarks.scores.tables import main
 from pushplan.evaluation import bench
 
 ROOT = Path(__file__).parents[1]
-Command = Callable[[Sequence[str]], int]
 EXPERIMENT = """\
 schema: pushplan-experiment/1
 suites: [maze-2d-3, {suite: maze-2d-5, policies: [random]}]
@@ -31,22 +29,12 @@ After.
 """
 
 
-@pytest.fixture
-def tables(monkeypatch: pytest.MonkeyPatch) -> Command:
-    """The command, in this process."""
-    monkeypatch.syspath_prepend(str(ROOT / "benchmarks"))
-    command: Command = runpy.run_path(str(ROOT / "benchmarks" / "tables.py"))["main"]
-    return command
-
-
-def test_the_pages_have_what_the_stored_episodes_give(
-    tables: Command, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert tables(["--check"]) == 0, capsys.readouterr().out
+def test_the_pages_have_what_the_stored_episodes_give(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["--check"]) == 0, capsys.readouterr().out
 
 
 def test_a_run_is_taken_written_and_checked(
-    tables: Command, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     stored = tmp_path / "benchmarks" / "experiments" / "small.csv"
     page = tmp_path / "docs" / "page.md"
@@ -56,7 +44,7 @@ def test_a_run_is_taken_written_and_checked(
     root = ["--root", str(tmp_path)]
 
     def call(*arguments: str) -> tuple[int, str]:
-        code = tables([*root, *arguments])
+        code = main([*root, *arguments])
         return code, capsys.readouterr().out
 
     code, said = call("--check")
@@ -99,7 +87,7 @@ def test_a_run_is_taken_written_and_checked(
 
 
 def test_scenarios_of_a_suite_that_share_a_seed_are_kept_apart(
-    tables: Command, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     stored = tmp_path / "benchmarks" / "experiments" / "doors.csv"
     stored.parent.mkdir(parents=True)
@@ -107,7 +95,7 @@ def test_scenarios_of_a_suite_that_share_a_seed_are_kept_apart(
     text = text.replace("episodes: 2", "episodes: 3").replace("FIXED", "namo-2d-fixed")
     stored.with_suffix(".yaml").write_text(text)
     bench("namo-2d-fixed", ["random"], episodes=3, seed=7, workers=0, out=tmp_path / "run")
-    assert tables(["--root", str(tmp_path), "--take", str(tmp_path / "run"), "doors"]) == 0
+    assert main(["--root", str(tmp_path), "--take", str(tmp_path / "run"), "doors"]) == 0
     assert "3 episodes taken, 3 stored" in capsys.readouterr().out
     names = [f"namo-2d-fixed[movability={name}]" for name in ("known", "unknown", "wrong")]
     assert [line.split(",")[0] for line in stored.read_text().splitlines()[1:]] == names
@@ -124,12 +112,12 @@ def test_scenarios_of_a_suite_that_share_a_seed_are_kept_apart(
     ],
 )
 def test_a_wrong_comment_is_named(
-    tables: Command, tmp_path: Path, capsys: pytest.CaptureFixture[str], marker: str, said: str
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], marker: str, said: str
 ) -> None:
     (tmp_path / "docs").mkdir()
     (tmp_path / "benchmarks").symlink_to(ROOT / "benchmarks")
     page = tmp_path / "docs" / "page.md"
     page.write_text(marker.replace("END", "<!-- end of the table -->"))
-    assert tables(["--root", str(tmp_path)]) == 1
+    assert main(["--root", str(tmp_path)]) == 1
     printed = capsys.readouterr().out
     assert "page.md" in printed and said in printed and len(printed.splitlines()) == 1

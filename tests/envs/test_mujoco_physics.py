@@ -1,9 +1,7 @@
 """Whether bodies in the MuJoCo simulator move as mechanics says."""
 
 import math
-import runpy
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -24,11 +22,9 @@ from mujoco_scenes import (
     without_drag,
 )
 
+from benchmarks.accuracy.water_coasting import coasting
 from pushplan.geometry.convex import convex_penetration
 from pushplan.world import Twist
-
-_TABLE = Path(__file__).parents[2] / "benchmarks" / "water_coasting.py"
-coasting = runpy.run_path(str(_TABLE))["coasting"]
 
 G = 9.81
 

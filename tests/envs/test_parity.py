@@ -1,17 +1,9 @@
 """The same scene and commands in both simulators end at the same places, within stated bounds."""
 
-import importlib.util
-import sys
-from pathlib import Path
-
 import numpy as np
 import pytest
 
-BENCHMARK = Path(__file__).parents[2] / "benchmarks" / "parity.py"
-_spec = importlib.util.spec_from_file_location("parity_benchmark", BENCHMARK)
-parity = importlib.util.module_from_spec(_spec)
-sys.modules["parity_benchmark"] = parity
-_spec.loader.exec_module(parity)
+from benchmarks.accuracy import parity
 
 
 @pytest.mark.parametrize("case", parity.CASES, ids=lambda case: case.name)

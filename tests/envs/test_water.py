@@ -1,12 +1,13 @@
 """How water brakes ships and floes, against the literature, brute force and the simulator."""
 
 import math
-import runpy
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from benchmarks.accuracy import water_coasting
+from benchmarks.accuracy.water_coasting import coasting
 from pushplan.envs.simulators.base import Materials
 from pushplan.envs.simulators.pymunk_simulator import PymunkSimulator
 from pushplan.envs.simulators.water import Water, flow_shapes
@@ -15,8 +16,6 @@ from pushplan.world import Movables, Twist, World, stream
 
 FULL_SCALE = PRESETS["full_scale"]
 ROOT = Path(__file__).parents[2]
-TABLE = str(ROOT / "benchmarks" / "water_coasting.py")
-coasting = runpy.run_path(TABLE)["coasting"]
 
 
 def open_water():
@@ -43,8 +42,9 @@ def test_the_ship_slows_down_as_the_cited_vessel():
     assert 0.75 * plate < turning * water.robot_yaw_time < plate
 
 
-def test_the_documented_table_of_coasting_is_what_the_command_prints(capsys):
-    runpy.run_path(TABLE, run_name="__main__")
+def test_the_documented_table_of_coasting_is_what_the_command_prints(capsys, monkeypatch):
+    monkeypatch.setattr("sys.argv", ["water_coasting"])
+    water_coasting.main()
     assert capsys.readouterr().out in (ROOT / "docs" / "tasks.md").read_text(encoding="utf-8")
 
 

@@ -78,7 +78,9 @@ def test_episodes_after_a_warm_up_compile_nothing_and_progress_knows_its_kernels
     ready, later, ran = output(EPISODES, name, *others)
     assert ran
     assert not later
-    assert expected_kernels(name, *others) == set(ready), "python -m benchmarks.startup --write"
+    assert expected_kernels(name, *others) == set(ready), (
+        "python -m benchmarks.speed.startup --write"
+    )
 
 
 @pytest.mark.slow

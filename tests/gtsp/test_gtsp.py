@@ -4,16 +4,15 @@ from __future__ import annotations
 
 import itertools
 import math
-import runpy
 import subprocess
 import sys
 import threading
 import time
-from pathlib import Path
 
 import numpy as np
 import pytest
 
+from benchmarks.accuracy.gtsp_instances import FAMILIES, instance
 from pushplan.compiled.cache import KernelCache
 from pushplan.gtsp import (
     GtspConfig,
@@ -38,7 +37,6 @@ from pushplan.gtsp.search import AnytimeSearch
 from pushplan.gtsp.segment_swap_kernels import improve_by_swaps
 from pushplan.world import Cancellation, Deadline, InvalidInputError, MaxIterations
 
-MADE = runpy.run_path(str(Path(__file__).parents[2] / "benchmarks" / "gtsp_instances.py"))
 SEARCH = GtspConfig(method="search")
 PROOF = GtspConfig(method="search", lower_bound=True)
 
@@ -357,9 +355,9 @@ def test_nodes_that_are_left_out_are_those_that_another_one_can_stand_for() -> N
     assert gone > 50
 
 
-@pytest.mark.parametrize("family", list(MADE["FAMILIES"]))
+@pytest.mark.parametrize("family", FAMILIES)
 def test_families_of_instances_are_the_same_for_a_seed(family: str) -> None:
-    made, again = MADE["instance"](family, 1000), MADE["instance"](family, 1000)
+    made, again = instance(family, 1000), instance(family, 1000)
     np.testing.assert_array_equal(made.costs, again.costs)
     assert made.clusters == again.clusters
     assert sorted(itertools.chain(*made.clusters)) == list(range(len(made.costs)))
@@ -549,6 +547,6 @@ def test_runs_begin_at_random_as_long_as_there_is_time_for_one(monkeypatch, each
         budget.used += each
 
     monkeypatch.setattr(AnytimeSearch, "run", run)
-    costs, clusters = MADE["instance"]("uniform", 1000)
+    costs, clusters = instance("uniform", 1000)
     solve_gtsp(costs, clusters, stop=MaxIterations(100), config=SEARCH)
     assert made == again

@@ -1,0 +1,1 @@
+"""Benchmarks of pushplan; README.md lists them."""
