@@ -17,7 +17,8 @@ if TYPE_CHECKING:
 
 def run(options: argparse.Namespace) -> int:
     """Print the table and write the files."""
-    from pushplan.evaluation import Results, table_formats
+    from pushplan.evaluation import Results
+    from pushplan.evaluation.report import table_formats
 
     results = Results.load(options.directory)
     if options.metrics is None and options.format is None:

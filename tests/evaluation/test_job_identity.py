@@ -20,9 +20,9 @@ from evaluation_doubles import HERE, LineScenario
 import pushplan
 from pushplan.envs import registry
 from pushplan.evaluation import Job, JobSettings, PolicySpec, Results, parse_policy, run_batch
-from pushplan.evaluation.run.job_identity import UNSEEN, code_digest, job_spec, versions
+from pushplan.evaluation.run.job_identity import job_spec
 from pushplan.evaluation.run.jobs import job_id
-from pushplan.evaluation.store.provenance import PACKAGES
+from pushplan.evaluation.store.provenance import PACKAGES, UNSEEN, package_digest, versions
 from pushplan.evaluation.stress_testing import UNDISTURBED, stress
 from pushplan.scenarios import Scenario
 from pushplan.world import InvalidInputError
@@ -32,10 +32,10 @@ SETTINGS = JobSettings(make_env=f"{HERE}:make_env", timeout_s=20.0, dry_run=Fals
 
 @pytest.fixture(autouse=True)
 def _no_memory() -> Iterator[None]:
-    for cached in (versions, code_digest):
+    for cached in (versions, package_digest):
         cached.cache_clear()
     yield
-    for cached in (versions, code_digest):
+    for cached in (versions, package_digest):
         cached.cache_clear()
 
 
@@ -53,7 +53,7 @@ def changes(path: Path, of: Callable[[], str]) -> bool:
 
 def of_package() -> str:
     versions.cache_clear()
-    code_digest.cache_clear()
+    package_digest.cache_clear()
     return identity()
 
 

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections import Counter
 
-from pushplan.evaluation.report.results import Results
+from pushplan.evaluation.statistics.stored_run import StoredRun
 
 MOST_LINES = 6
 
 
-def failure_lines(run: Results) -> list[str]:
+def failure_lines(run: StoredRun) -> list[str]:
     """A line for each policy with failed jobs: how many, the most frequent reason, a traceback."""
     lines = []
     for policy in run.policies:
@@ -27,7 +27,7 @@ def failure_lines(run: Results) -> list[str]:
     return lines
 
 
-def unsuccessful_lines(run: Results) -> list[str]:
+def unsuccessful_lines(run: StoredRun) -> list[str]:
     """A line for each policy with episodes that ended by the rules of their task without success.
 
     It says how many ended for each reason. More than `MOST_LINES` policies have one together.

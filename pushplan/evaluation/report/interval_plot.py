@@ -9,12 +9,12 @@ from matplotlib.figure import Figure
 
 from pushplan.drawing.figure import COLUMN
 from pushplan.evaluation.report.plot_style import LINE, dots, interval, tidy, unclipped, wrapped
-from pushplan.evaluation.report.results import Results
+from pushplan.evaluation.statistics.stored_run import StoredRun
 from pushplan.evaluation.statistics.summary import PolicySummary
 from pushplan.metrics import Role, metric_names
 
 
-def draw_intervals(run: Results) -> Figure:
+def draw_intervals(run: StoredRun) -> Figure:
     """A line for each policy in each setting, a panel for success and each kind of score.
 
     Success has Wilson's interval, a mean that of the bootstrap, as in the tables.

@@ -11,8 +11,8 @@ from typing import Any
 import pushplan
 from pushplan.drawing.palette import FLOOR_PALETTE, SERIES
 from pushplan.evaluation.report.replays import chosen, packed, write_beside
-from pushplan.evaluation.report.results import Results
 from pushplan.evaluation.report.tables import Table, heading
+from pushplan.evaluation.statistics.stored_run import StoredRun
 from pushplan.evaluation.store.provenance import in_words
 from pushplan.files.output_files import write_atomic
 from pushplan.files.safe_files import read_bytes
@@ -30,7 +30,7 @@ _USUAL = {"make_env": "pushplan.envs:make", "observation": "auto"}
 
 
 def write_page(
-    run: Results,
+    run: StoredRun,
     tables: Sequence[Table],
     figures: Mapping[str, Path],
     folder: Path,
@@ -95,7 +95,7 @@ def is_page(path: Path) -> bool:
         return False
 
 
-def page_data(run: Results, replays: Mapping[str, int]) -> dict[str, Any]:
+def page_data(run: StoredRun, replays: Mapping[str, int]) -> dict[str, Any]:
     """What the scripts of the page read: the rows, column by column, texts as numbers of a list.
 
     Args:
@@ -155,7 +155,7 @@ def _colours() -> dict[str, Any]:
     }
 
 
-def _values(run: Results) -> dict[str, list[float | None]]:
+def _values(run: StoredRun) -> dict[str, list[float | None]]:
     """Columns that have values, rounded, and metrics that are no columns."""
     found = {}
     for name in (*metric_names(Role.SCORE, Role.DETAIL, Role.FACT), *_TIMES):

@@ -27,10 +27,10 @@ from pushplan.evaluation.report.plot_style import (
     unclipped,
     wrapped,
 )
-from pushplan.evaluation.report.results import Results
 from pushplan.evaluation.report.tables import heading
 from pushplan.evaluation.statistics.aggregates import performance_profile
 from pushplan.evaluation.statistics.estimates import estimate
+from pushplan.evaluation.statistics.stored_run import StoredRun
 from pushplan.evaluation.statistics.summary import grouped, values_of
 from pushplan.evaluation.store.rows import ResultRow
 from pushplan.metrics import Role, metric_names
@@ -40,7 +40,7 @@ _SETTINGS = 6  # of more, figures with a panel for each show all together
 _TRACES = 300  # of so many episodes every planning call is read from the trace
 
 
-def write_plots(run: Results, folder: Path, formats: Sequence[str] = ()) -> dict[str, Path]:
+def write_plots(run: StoredRun, folder: Path, formats: Sequence[str] = ()) -> dict[str, Path]:
     """Draw everything that the rows allow, with where the rows come from in the files.
 
     Figures show how episodes differ: there are none if no policy has two in a setting.
@@ -68,7 +68,7 @@ def write_plots(run: Results, folder: Path, formats: Sequence[str] = ()) -> dict
     return plots
 
 
-def draw(run: Results, name: str) -> Figure | None:
+def draw(run: StoredRun, name: str) -> Figure | None:
     """One of `FIGURES`; None if the rows have nothing for it."""
     with rc_context(STYLE):
         many = len(run.titles) > _SETTINGS and name in ("tradeoff", "scores", "planning_time")
@@ -76,7 +76,7 @@ def draw(run: Results, name: str) -> Figure | None:
     return figure
 
 
-def _tradeoff(run: Results) -> Figure | None:
+def _tradeoff(run: StoredRun) -> Figure | None:
     """E against I: one dot an episode, the mean with its intervals."""
 
     def panel(axes: Any, rows: Sequence[ResultRow]) -> None:
@@ -123,7 +123,7 @@ def _tradeoff(run: Results) -> Figure | None:
     return figure
 
 
-def _spread(run: Results) -> Figure | None:
+def _spread(run: StoredRun) -> Figure | None:
     """A box and all dots for each policy: a panel a metric, the settings below each other."""
     metrics = [name for name in metric_names(Role.SCORE, Role.DETAIL) if values_of(run.rows, name)]
     if not metrics:
@@ -199,7 +199,7 @@ def _boxes(
     tidy(axes)
 
 
-def _profiles(run: Results) -> Figure | None:
+def _profiles(run: StoredRun) -> Figure | None:
     """Performance profiles with bands (Agarwal et al., 2021), one panel a score."""
     kinds = [name for name in metric_names(Role.SCORE) if values_of(run.rows, name)]
     if not kinds:
@@ -228,7 +228,7 @@ def _profiles(run: Results) -> Figure | None:
     return figure
 
 
-def _planning_time(run: Results) -> Figure | None:
+def _planning_time(run: StoredRun) -> Figure | None:
     """Fraction of planning calls that took at most so long; deadlines are dotted.
 
     Of long runs, each episode counts with its median and its slowest call.
@@ -256,7 +256,7 @@ def _planning_time(run: Results) -> Figure | None:
     return _panels(run, ("plan_time_median_s",), panel, labels)
 
 
-def _calls(run: Results, row: ResultRow, read: bool) -> Any:
+def _calls(run: StoredRun, row: ResultRow, read: bool) -> Any:
     """Times of all planning calls of an episode [s], from its trace where there is one."""
     if read and (episode := run.episode(row)) is not None:
         return np.maximum(episode.plan_times_s, 1e-6)
@@ -265,7 +265,7 @@ def _calls(run: Results, row: ResultRow, read: bool) -> Any:
 
 
 def _panels(
-    run: Results,
+    run: StoredRun,
     names: Sequence[str],
     draw: Callable[[Any, Sequence[ResultRow]], None],
     labels: tuple[str, str],

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from pushplan.evaluation.report.results import Results
+from pushplan.evaluation.statistics.stored_run import StoredRun
 from pushplan.evaluation.store.rows import ResultRow
 from pushplan.files.output_files import make_folder, write_atomic
 from pushplan.world import Episode, GoalDisc, GoalLine, SchemaError
@@ -26,7 +26,7 @@ _LENGTH, _ANGLE = 1e-3, 1e-3  # steps in which poses are kept [m], [rad]
 _MOST = 2**15 - 1
 
 
-def chosen(run: Results, most: int) -> list[ResultRow]:
+def chosen(run: StoredRun, most: int) -> list[ResultRow]:
     """The episodes to show: whole scenarios, those with failures first, ``most`` episodes at most.
 
     Args:
@@ -49,7 +49,7 @@ def chosen(run: Results, most: int) -> list[ResultRow]:
     return found
 
 
-def packed(run: Results, row: ResultRow) -> str | None:
+def packed(run: StoredRun, row: ResultRow) -> str | None:
     """The episode of a row as JSON text; None if there is none that can be read.
 
     Poses are kept in steps of 1 mm and 1 mrad as differences from frame to frame, deflated.
@@ -64,7 +64,7 @@ def packed(run: Results, row: ResultRow) -> str | None:
     return json.dumps({"job": row.job, **scene, **motion, "plans": _plans(episode)})
 
 
-def write_beside(run: Results, rows: Sequence[ResultRow], folder: Path) -> set[str]:
+def write_beside(run: StoredRun, rows: Sequence[ResultRow], folder: Path) -> set[str]:
     """Write ``replays/JOB.js`` for each row; a page on a disk may load scripts, but no data.
 
     Returns:

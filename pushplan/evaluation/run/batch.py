@@ -15,7 +15,7 @@ from typing import Any
 
 from pushplan.evaluation.run.execute import execute
 from pushplan.evaluation.run.job_identity import identified
-from pushplan.evaluation.run.job_limits import MEMORY_MB, check_limits
+from pushplan.evaluation.run.job_limits import MEMORY_MB, WORKER_VARIABLE, check_limits
 from pushplan.evaluation.run.jobs import (
     Job,
     JobResult,
@@ -24,7 +24,6 @@ from pushplan.evaluation.run.jobs import (
 )
 from pushplan.evaluation.run.pending import note_batch, pending_jobs
 from pushplan.evaluation.run.pool import WorkerPool, outcome_of
-from pushplan.evaluation.run.worker import WORKER_VARIABLE
 from pushplan.evaluation.store.provenance import provenance
 from pushplan.evaluation.store.rows import ResultRow, instant
 from pushplan.evaluation.store.run_directory import RunDirectory, remove_report

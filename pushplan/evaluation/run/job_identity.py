@@ -4,35 +4,22 @@ from __future__ import annotations
 
 import contextlib
 import functools
-import hashlib
 import importlib
-import platform
 import sys
 from collections.abc import Iterable, Mapping
 from dataclasses import fields, is_dataclass, replace
 from importlib import metadata
-from pathlib import Path
 from typing import Any
 
-import pushplan
 from pushplan.envs.registry import SIMULATORS, TASKS
 from pushplan.evaluation.run.jobs import BatchStoppedError, Job, JobSettings, job_id
 from pushplan.evaluation.run.policy_specs import PolicySpec, described
-from pushplan.evaluation.store.provenance import PACKAGES, packages
+from pushplan.evaluation.store.provenance import PACKAGES, versions
 from pushplan.evaluation.store.source_digests import file_digest, source_digest
 from pushplan.metrics import METRICS
 from pushplan.planners.registry import PLANNERS, POLICIES
 from pushplan.world import InvalidInputError
 
-_ENGINES = ("mujoco", "pymunk")
-UNSEEN = frozenset(
-    {
-        *("cli", "ros", "training", "evaluation/report", "evaluation/statistics"),
-        *("evaluation/store/merging", "evaluation/store/rescoring", "evaluation/store/salvaging"),
-        *("evaluation/store/status", "evaluation/run/reproduction"),
-    }
-)
-"""Rooms and files of the package that no episode runs through. All others count."""
 _MOST_DIFFERENCES = 4
 _OURS = "pushplan."
 
@@ -185,41 +172,6 @@ def job_of(spec: Mapping[str, Any]) -> tuple[Job, JobSettings]:
         Job(PolicySpec(policy["label"], policy["source"], options), scenario),
         JobSettings(**settings),
     )
-
-
-@functools.cache
-def versions(simulator: str) -> dict[str, str]:
-    """Versions that an episode's bytes may depend on: of our code and of what is below it.
-
-    Args:
-        simulator: name of the simulator; versions of other ones do not count.
-
-    Returns:
-        ``python``, ``pushplan``, ``code`` (a hash of the package without `UNSEEN`) and installed
-        packages by name.
-    """
-    others = {"torch", *_ENGINES} - {simulator}
-    return {
-        "python": platform.python_version(),
-        "pushplan": pushplan.__version__,
-        "code": code_digest(),
-        **{name: version for name, version in packages().items() if name not in others},
-    }
-
-
-@functools.cache
-def code_digest() -> str:
-    """A hash of the files of the package that episodes may depend on: code, data and weights."""
-    root = Path(pushplan.__file__).parent
-    digest = hashlib.sha256()
-    for path in sorted(root.rglob("*")):
-        where = path.relative_to(root)
-        name, rooms = where.as_posix(), {where.parts[0], "/".join(where.parts[:2])}
-        rooms |= {name.removesuffix(".py")}
-        left_out = rooms & UNSEEN or path.suffix == ".md" or name.startswith(".")
-        if path.is_file() and "__pycache__" not in where.parts and not left_out:
-            digest.update(f"{name}\0".encode() + path.read_bytes() + b"\0")
-    return digest.hexdigest()[:12]
 
 
 def _plain(value: Any) -> Any:

@@ -11,11 +11,12 @@ import threading
 from collections.abc import Iterator
 from types import FrameType
 
-from pushplan.evaluation.run.worker import WORKER_VARIABLE
 from pushplan.world import InvalidInputError
 
 MEMORY_MB = 4000.0
 """Memory of a worker beyond which a job fails, unless something else is asked for [MB]."""
+WORKER_VARIABLE = "PUSHPLAN_WORKER"
+"""Set in the environment of a worker process."""
 
 
 class EpisodeTimeout(BaseException):

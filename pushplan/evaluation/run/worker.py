@@ -32,9 +32,6 @@ THREAD_VARIABLES = (
 )
 """Set to 1 in a worker: parallel workers that each use all cores slow each other down."""
 
-WORKER_VARIABLE = "PUSHPLAN_WORKER"
-"""Set in the environment of a worker."""
-
 
 @dataclass(frozen=True)
 class WorkerSetup:

@@ -6,8 +6,8 @@ import itertools
 from collections.abc import Iterable, Mapping
 
 from pushplan.envs.making import make
-from pushplan.evaluation.report.results import Results
 from pushplan.evaluation.statistics.gaps import total_work
+from pushplan.evaluation.statistics.stored_run import StoredRun
 from pushplan.motion.transport_bound import transport_bound
 from pushplan.motion.work_bound import work_bound
 from pushplan.scenarios import Scenario
@@ -37,7 +37,7 @@ def scenario_bound(scenario: Scenario, *, most_nodes: int = 400) -> KnownBounds:
 
 
 def with_solutions(
-    bounds: Mapping[str, KnownBounds], runs: Iterable[Results]
+    bounds: Mapping[str, KnownBounds], runs: Iterable[StoredRun]
 ) -> dict[str, KnownBounds]:
     """The bounds, with the best solutions of some runs.
 

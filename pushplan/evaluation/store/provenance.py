@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import contextlib
+import functools
+import hashlib
 import os
 import platform
 import shlex
@@ -20,7 +22,16 @@ PACKAGES = (
     *("osqp", "pymunk", "ruckig", "scipy", "shapely", "torch"),
 )
 """Packages that results may depend on; those that are installed are named."""
+_ENGINES = ("mujoco", "pymunk")
 _GIT_S = 5.0
+UNSEEN = frozenset(
+    {
+        *("cli", "ros", "training", "evaluation/report", "evaluation/statistics"),
+        *("evaluation/store/merging", "evaluation/store/rescoring", "evaluation/store/salvaging"),
+        *("evaluation/store/status", "evaluation/run/reproduction"),
+    }
+)
+"""Rooms and files of the package that no episode runs through. All others count."""
 
 
 def provenance(workers: int) -> dict[str, Any]:
@@ -77,6 +88,41 @@ def packages() -> dict[str, str]:
         with contextlib.suppress(metadata.PackageNotFoundError):
             found[name] = metadata.version(name)
     return found
+
+
+@functools.cache
+def versions(simulator: str) -> dict[str, str]:
+    """Versions that an episode's bytes may depend on: of our code and of what is below it.
+
+    Args:
+        simulator: name of the simulator; versions of other ones do not count.
+
+    Returns:
+        ``python``, ``pushplan``, ``code`` (a hash of the package without `UNSEEN`) and installed
+        packages by name.
+    """
+    others = {"torch", *_ENGINES} - {simulator}
+    return {
+        "python": platform.python_version(),
+        "pushplan": pushplan.__version__,
+        "code": package_digest(),
+        **{name: version for name, version in packages().items() if name not in others},
+    }
+
+
+@functools.cache
+def package_digest() -> str:
+    """A hash of the files of the package that episodes may depend on: code, data and weights."""
+    root = Path(pushplan.__file__).parent
+    digest = hashlib.sha256()
+    for path in sorted(root.rglob("*")):
+        where = path.relative_to(root)
+        name, rooms = where.as_posix(), {where.parts[0], "/".join(where.parts[:2])}
+        rooms |= {name.removesuffix(".py")}
+        left_out = rooms & UNSEEN or path.suffix == ".md" or name.startswith(".")
+        if path.is_file() and "__pycache__" not in where.parts and not left_out:
+            digest.update(f"{name}\0".encode() + path.read_bytes() + b"\0")
+    return digest.hexdigest()[:12]
 
 
 def _checkout(root: Path) -> tuple[str | None, bool | None]:

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from pushplan.evaluation.run.job_identity import code_digest
+from pushplan.evaluation.store.provenance import package_digest
 from pushplan.evaluation.store.rows import scored_row
 from pushplan.evaluation.store.run_directory import RunDirectory, remove_report
 from pushplan.evaluation.store.source_digests import source_digest
@@ -47,7 +47,7 @@ def rescore(path: str | Path, metrics: Sequence[str] = (), *, columns: bool = Tr
     sources = {}  # what tells versions of a metric apart: a hash of its file, or of our code
     for label, metric in wanted.items():
         metric_function(metric)
-        sources[label] = source_digest(metric.rpartition(":")[0]) or code_digest()
+        sources[label] = source_digest(metric.rpartition(":")[0]) or package_digest()
     changed: list[str] = []
     unreadable: list[str] = []
     scored = 0
