@@ -126,8 +126,15 @@ def command_page() -> str:
     lines += ["", "## Exit codes", "", "| code | means |", "|---|---|"]
     codes = str(parser.epilog).partition("exit codes:\n")[2]
     lines += [f"| {code} | {text} |" for code, text in re.findall(r"^  (\d+) +(.*)$", codes, re.M)]
-    for name, one in commands.choices.items():
-        lines += ["", f"## pushplan {name}", "", str(one.description), "", *_options(one)]
+    waiting = list(commands.choices.items())
+    while waiting:
+        name, one = waiting.pop(0)
+        below = [a for a in one._actions if isinstance(a, argparse._SubParsersAction)]
+        waiting = [
+            (f"{name} {word}", leaf) for a in below for word, leaf in a.choices.items()
+        ] + waiting
+        lines += ["", f"## pushplan {name}", "", str(one.description)]
+        lines += [] if below else ["", *_options(one)]
         lines += ["", "```text", str(one.epilog).rstrip(), "```"]
     return "\n".join(lines) + "\n"
 

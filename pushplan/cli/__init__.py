@@ -6,7 +6,7 @@ import os
 import sys
 from collections.abc import Sequence
 
-from pushplan.cli.parser import build_parser, fail, named
+from pushplan.cli.parser import build_parser, current_spelling, fail, named
 
 __all__ = ["build_parser", "main"]
 
@@ -23,12 +23,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
         0, 1, 2 or 130: the exit codes that ``pushplan --help`` lists.
     """
     parser = build_parser()
+    given = sys.argv[1:] if arguments is None else arguments
     if "_ARGCOMPLETE" in os.environ:  # the shell asks how a line may go on
         from pushplan.imports.on_demand import need
 
         need("argcomplete").autocomplete(parser)
     try:
-        options = parser.parse_args(arguments)
+        options = parser.parse_args(current_spelling(given))
     except SystemExit as error:  # argparse has written why
         return error.code if isinstance(error.code, int) else 2
     if getattr(options, "trust_pickles", False):

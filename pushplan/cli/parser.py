@@ -7,7 +7,7 @@ import os
 import re
 import sys
 import tomllib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from importlib import import_module
 from importlib.resources import files
 from typing import Any, NoReturn
@@ -27,10 +27,12 @@ examples:
 
 exit codes:
   0    done
-  1    something that was run failed, or a gate says no: a job, a plan, an episode, 'compare'
+  1    something that was run failed, or a gate says no: a job, a plan, an episode, 'runs compare'
   2    the command cannot be carried out as it was given: an option, a name, a file, an extra
   130  interrupted by Ctrl-C
 """
+_MOVED = ("compare", "export", "merge", "reproduce", "rescore", "salvage", "status")
+"""Commands that stood beside ``runs`` up to version 0.3 and still work there."""
 
 
 class CommandParser(argparse.ArgumentParser):
@@ -78,10 +80,30 @@ def build_parser() -> argparse.ArgumentParser:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("--version", action="version", version=f"pushplan {__version__}")
-    commands = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
     text = files("pushplan.cli").joinpath("commands.toml").read_text(encoding="utf-8")
     described = tomllib.loads(text)
     shared = described.pop("shared")
+    _add_commands(parser, described, shared)
+    return parser
+
+
+def current_spelling(arguments: Sequence[str]) -> Sequence[str]:
+    """The words of a command line as they are spelt now; warns of an old spelling."""
+    if not arguments or arguments[0] not in _MOVED:
+        return arguments
+    name = arguments[0]
+    sys.stderr.write(
+        f"pushplan: 'pushplan {name}' is now 'pushplan runs {name}'; the old spelling goes with "
+        "the next release\n"
+    )
+    return ["runs", *arguments]
+
+
+def _add_commands(
+    parser: argparse.ArgumentParser, described: Mapping[str, Any], shared: Mapping[str, Any]
+) -> None:
+    """Add commands, and those below them, with their options."""
+    commands = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
     for name, about in described.items():
         summary = about["summary"]
         command = commands.add_parser(
@@ -91,6 +113,9 @@ def build_parser() -> argparse.ArgumentParser:
             epilog=f"examples:\n{about['examples']}",
             formatter_class=argparse.RawDescriptionHelpFormatter,
         )
+        if "commands" in about:
+            _add_commands(command, about["commands"], shared)
+            continue
         command.set_defaults(run=about["run"])
         for option in about["options"]:
             if "one_of" in option:
@@ -100,7 +125,6 @@ def build_parser() -> argparse.ArgumentParser:
             else:
                 for one in shared[option["shared"]] if "shared" in option else [option]:
                     _add_option(command, **one)
-    return parser
 
 
 def named(name: str) -> Any:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import argparse
 import json
 import re
 import sys
@@ -45,13 +46,13 @@ USERS_MISTAKES = {
     "list": [["things"]],
     "score": [["none.npz"], [ROOM], ["FOLDER"]],
     "report": [["FOLDER"]],
-    "compare": [["FOLDER", "FOLDER"]],
-    "status": [["FOLDER"]],
-    "merge": [["FILE/run", "FOLDER"]],
-    "rescore": [["FOLDER"]],
-    "reproduce": [["FOLDER", "--job", "3f"]],
-    "salvage": [["FOLDER", "FILE/new"]],
-    "export": [["FOLDER", "rows.csv"], ["FOLDER", "/no/such/folder/rows.csv"]],
+    "runs compare": [["FOLDER", "FOLDER"]],
+    "runs status": [["FOLDER"]],
+    "runs merge": [["FILE/run", "FOLDER"]],
+    "runs rescore": [["FOLDER"]],
+    "runs reproduce": [["FOLDER", "--job", "3f"]],
+    "runs salvage": [["FOLDER", "FILE/new"]],
+    "runs export": [["FOLDER", "rows.csv"], ["FOLDER", "/no/such/folder/rows.csv"]],
     "ice": [[], ["--concentration", "0.1", "--out", "/no/such/folder/field.json"]],
     "gtsp": [["none.gtsp"], ["none.gtsp", "--out", "/no/such/folder/tour"]],
     "train": [["ppo", "--task", "maze", "--out", "FILE/run"]],
@@ -63,13 +64,17 @@ USERS_MISTAKES = {
 }
 
 
-def commands() -> set[str]:
-    (action,) = (one for one in build_parser()._actions if one.metavar == "COMMAND")
-    return set(action.choices)
+def commands(parser: argparse.ArgumentParser) -> set[str]:
+    found = set()
+    for action in parser._actions:
+        if isinstance(action, argparse._SubParsersAction):
+            for name, one in action.choices.items():
+                found |= {f"{name} {below}".rstrip() for below in commands(one) or [""]}
+    return found
 
 
 def test_every_command_is_here() -> None:
-    assert set(USERS_MISTAKES) == commands()
+    assert set(USERS_MISTAKES) == commands(build_parser())
 
 
 @pytest.mark.parametrize("command", sorted(USERS_MISTAKES))
@@ -80,12 +85,20 @@ def test_a_users_mistake_is_code_2_and_no_work_is_done(
     (tmp_path / "FOLDER").mkdir()
     for given in USERS_MISTAKES[command]:
         arguments = [re.sub("^(FILE|FOLDER)", f"{tmp_path}/\\1", one) for one in given]
-        assert main([command, *arguments]) == 2, given
+        assert main([*command.split(), *arguments]) == 2, given
         said = capsys.readouterr()
         assert said.out == ""
         assert said.err.splitlines()[-1].startswith("pushplan")
         assert "Traceback" not in said.err
     assert not list((tmp_path / "FOLDER").iterdir())
+
+
+def test_an_old_spelling_works_with_a_warning(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["status", "/no/such/run"]) == 2
+    first, second = capsys.readouterr().err.splitlines()
+    assert first.startswith("pushplan: 'pushplan status' is now 'pushplan runs status'")
+    assert main(["runs", "status", "/no/such/run"]) == 2
+    assert capsys.readouterr().err.splitlines() == [second]
 
 
 def test_a_failed_run_is_code_1(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

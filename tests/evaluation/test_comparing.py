@@ -72,9 +72,9 @@ def test_a_verdict_needs_the_whole_interval(
     assert found.verdict == verdict, found
     assert found.low <= found.change <= found.high
     assert found.paired == (change.get("seeds", range(30)).start == 0)
-    code = main(["compare", str(old), str(new), "--fail-on", rule])
+    code = main(["runs", "compare", str(old), str(new), "--fail-on", rule])
     assert code == (1 if verdict == "regressed" else 0)
-    strict = main(["compare", str(old), str(new), "--fail-on", rule, "--strict"])
+    strict = main(["runs", "compare", str(old), str(new), "--fail-on", rule, "--strict"])
     assert strict == (0 if verdict == "ok" else 1)
 
 
@@ -82,13 +82,13 @@ def test_a_policy_that_is_gone_closes_the_gate(old: Path, tmp_path: Path) -> Non
     new = write(tmp_path / "new.csv", [replace(row, policy="other") for row in rows()])
     (found,) = compare_runs(old, new, "E_nav<-0.01")
     assert found.verdict == "missing" and math.isnan(found.new)
-    assert main(["compare", str(old), str(new), "--fail-on", "E_nav<-0.01"]) == 1
-    assert main(["compare", str(old), str(new)]) == 0
+    assert main(["runs", "compare", str(old), str(new), "--fail-on", "E_nav<-0.01"]) == 1
+    assert main(["runs", "compare", str(old), str(new)]) == 0
 
 
 def test_json_is_json(old: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     new = write(tmp_path / "new.csv", [replace(row, policy="other") for row in rows()])
-    main(["compare", str(old), str(new), "--fail-on", "E_nav<-0.01", "--json"])
+    main(["runs", "compare", str(old), str(new), "--fail-on", "E_nav<-0.01", "--json"])
     (found,) = json.loads(capsys.readouterr().out)
     assert found["rule"] == "E_nav<-0.01" and found["new"] is None
 
@@ -102,7 +102,7 @@ def test_rules_that_are_none(old: Path, capsys: pytest.CaptureFixture[str]) -> N
     with pytest.raises(PushplanError):
         compare_runs(old, old.parent / "none.csv", "E_nav<0")
     (old.parent / "bad.csv").write_text("a,b\n1,2\n")
-    assert main(["compare", str(old), str(old.parent / "bad.csv")]) == 2
+    assert main(["runs", "compare", str(old), str(old.parent / "bad.csv")]) == 2
     assert "no results.csv" in capsys.readouterr().err
     with pytest.raises(InvalidInputError, match="nothing can be compared"):
         compare_runs(old, old, "S_manip<0")

@@ -46,7 +46,7 @@ def test_a_batch_runs_with_one_warning_and_goes_on(
     assert len(Results.load(tmp_path / "run").rows) == 3
     assert merge(tmp_path / "all", [tmp_path / "run"]).added == 3
     assert run_status(tmp_path / "run").active is None
-    assert main(["status", str(tmp_path / "run")]) == 0
+    assert main(["runs", "status", str(tmp_path / "run")]) == 0
     assert "no file locks" in capsys.readouterr().out
 
 

@@ -82,7 +82,7 @@ def test_a_folder_of_a_users_own_files_is_left_as_it_is(
         ["train", "ppo", "--task", "maze", "--out"],
         ["demo", "--out"],
     ],
-    ids=lambda words: words[0],
+    ids=" ".join,
 )
 def test_commands_refuse_such_a_folder_before_they_begin(
     words: list[str],
@@ -195,9 +195,9 @@ def _umask() -> int:
     [
         ["plan", "world.yaml", "--planner", "straight", "--out"],
         ["run", "--task", "maze", "--policy", "straight", "--out"],
-        ["export", "run"],
+        ["runs", "export", "run"],
     ],
-    ids=lambda words: words[0],
+    ids=" ".join,
 )
 def test_a_file_to_write_is_no_link(
     words: list[str],

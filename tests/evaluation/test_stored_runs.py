@@ -98,7 +98,7 @@ class TestMerge:
         done = merge(tmp_path / "b", [tmp_path / "a"])
         assert done.incomplete == (first.job,)
         assert Results.load(tmp_path / "b").rows == (second,)
-        assert main(["merge", str(tmp_path / "c"), str(tmp_path / "a")]) == 1
+        assert main(["runs", "merge", str(tmp_path / "c"), str(tmp_path / "a")]) == 1
 
     def test_the_last_of_two_settings_counts(self, tmp_path: Path) -> None:
         run(tmp_path / "a", range(1), "Ahead")
@@ -140,7 +140,7 @@ class TestReproduce:
             db.execute("UPDATE results SET E_nav = 0.25, spec = ?", (json.dumps(spec),))
         found = reproduce(tmp_path, row.job)
         assert found.differing == ("E_nav",) and "numpy '0.9' ->" in found.changed
-        assert main(["reproduce", str(tmp_path), "--job", row.job]) == 1
+        assert main(["runs", "reproduce", str(tmp_path), "--job", row.job]) == 1
         assert "not the same: E_nav" in capsys.readouterr().err
 
     def test_what_cannot_be_made_again_is_said(self, tmp_path: Path) -> None:
@@ -177,7 +177,7 @@ class TestRescore:
         assert results.measured[row.job]["mine.py:steps"] == row.steps
         assert "mine.py:steps" in results.table()
         file.write_text("def steps(episode):\n    return 2 * len(episode.actions)\n")
-        assert main(["rescore", str(tmp_path / "run"), "--metrics", metric]) == 0
+        assert main(["runs", "rescore", str(tmp_path / "run"), "--metrics", metric]) == 0
         assert "6 episodes scored, 0 rows changed" in capsys.readouterr().out
         again = Results.load(tmp_path / "run").measured[row.job]["mine.py:steps"]
         assert row.steps is not None and again == 2 * row.steps
@@ -198,7 +198,7 @@ class TestExport:
         rescore(tmp_path / "run", ["E_nav_to_goal_point"])
         results = Results.load(tmp_path / "run")
         for name in ("rows.csv", "rows.parquet"):
-            assert main(["export", str(tmp_path / "run"), str(tmp_path / name)]) == 0
+            assert main(["runs", "export", str(tmp_path / "run"), str(tmp_path / name)]) == 0
         table = parquet.read_table(tmp_path / "rows.parquet").to_pylist()
         lines = list(csv.DictReader((tmp_path / "rows.csv").open()))
         for row, cells, line in zip(results.rows, table, lines, strict=True):
@@ -227,9 +227,9 @@ def test_status_says_how_far_a_run_is(tmp_path: Path, capsys: pytest.CaptureFixt
     assert seen[2].left_s is not None and seen[2].left_s > 0.0 and seen[2].per_minute > 0.0
     rest = run_status(tmp_path)
     assert (rest.active, rest.done, rest.failed, rest.running) == (False, 4, 2, ())
-    assert main(["status", str(tmp_path)]) == 0
+    assert main(["runs", "status", str(tmp_path)]) == 0
     assert "at rest: 4 of 4 jobs done" in capsys.readouterr().out
-    assert main(["status", str(tmp_path / "none")]) == 2
+    assert main(["runs", "status", str(tmp_path / "none")]) == 2
 
 
 def test_an_episode_too_large_to_be_read_is_scored_and_not_kept(

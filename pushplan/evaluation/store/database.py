@@ -105,7 +105,8 @@ def clear_errors(path: Path) -> Iterator[None]:
 
 def _damaged(path: Path, why: str) -> DamagedResultsError:
     return DamagedResultsError(
-        f"{path} is damaged ({why}): 'pushplan salvage {path.parent} NEW' saves what can be read"
+        f"{path} is damaged ({why}): 'pushplan runs salvage {path.parent} NEW' saves what can be "
+        "read"
     )
 
 

@@ -180,7 +180,7 @@ function choose(one, policy) {
   if (rows.trace[row]) files.push(make("a", "episode", { href: `episodes/${rows.trace[row]}.npz` }), " ");
   if (rank(row) === 2) files.push(make("a", "traceback", { href: `failures/${rows.job[row]}.txt` }));
   if (files.length) say("files", ...files);
-  say("again", make("code", `pushplan reproduce ${data.folder} --job ${rows.job[row].slice(0, 12)}`));
+  say("again", make("code", `pushplan runs reproduce ${data.folder} --job ${rows.job[row].slice(0, 12)}`));
   $("chosen").replaceChildren(list);
   return showReplays(one, policy);
 }

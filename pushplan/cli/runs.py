@@ -1,12 +1,16 @@
-"""Commands on run directories: ``status``, ``merge``, ``rescore``, ``reproduce``, ``salvage``..."""
+"""``pushplan runs``: commands on run directories."""
 
 from __future__ import annotations
 
 import argparse
 import sys
+from dataclasses import asdict
 
-from pushplan.cli.common import duration, say
+from pushplan.cli.common import duration, say, say_json
 from pushplan.cli.outputs import check_directory, check_file
+
+_NO_LOSS = "success<-0.0,E_nav<-0.0,I_nav<-0.0,S_manip<-0.0,E_manip<-0.0,I_manip<-0.0"
+"""Rules of 'compare' that judge without closing a gate."""
 
 
 def say_status(options: argparse.Namespace) -> int:
@@ -26,6 +30,25 @@ def say_status(options: argparse.Namespace) -> int:
     for title, seconds in now.slowest:
         say(f"took {duration(seconds)}: {title}")
     return 0
+
+
+def compare_runs(options: argparse.Namespace) -> int:
+    """Judge, print the verdicts."""
+    from pushplan import evaluation
+    from pushplan.evaluation.report.comparing import verdict_table
+    from pushplan.evaluation.report.table_formats import text
+
+    verdicts = evaluation.compare_runs(options.old, options.new, options.fail_on or _NO_LOSS)
+    if options.json:
+        say_json([{**asdict(one), "rule": str(one.rule)} for one in verdicts])
+    else:
+        for setting in dict.fromkeys(one.setting for one in verdicts):
+            say(setting)
+            say(text([verdict_table([one for one in verdicts if one.setting == setting])]))
+    if options.fail_on is None:
+        return 0
+    bad = [v for v in verdicts if v.failed or (options.strict and v.verdict == "unclear")]
+    return 1 if bad else 0
 
 
 def merge_runs(options: argparse.Namespace) -> int:
