@@ -58,7 +58,7 @@ def run(line: str) -> str:
     return done.stdout
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_the_code_blocks_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     monkeypatch.syspath_prepend(str(tmp_path))

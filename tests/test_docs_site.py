@@ -6,13 +6,16 @@ import doctest
 import importlib
 import importlib.util
 import re
+import shlex
 import sys
+from itertools import groupby
 from pathlib import Path
 from types import ModuleType
 
 import pytest
 
 from pushplan.cli import main
+from pushplan.cli.parser import build_parser
 
 ROOT = Path(__file__).parents[1]
 DOCS = ROOT / "docs"
@@ -110,7 +113,26 @@ def test_a_site_that_cannot_be_reached_is_left_out(tmp_path: Path) -> None:
     assert module.reachable({"one": there, "other": "file:///none/"}) == {"one": (there, None)}
 
 
-@pytest.mark.slow
+@pytest.mark.release
+@pytest.mark.parametrize("page", sorted(DOCS.glob("*.md")), ids=lambda page: page.stem)
+def test_code_blocks_are_python_and_commands_have_their_options(page: Path) -> None:
+    parser = build_parser()
+    text = page.read_text("utf-8").replace("$part", "1")
+    for language, block in re.findall(r"^```(\w+)\n(.*?)^```$", text, re.MULTILINE | re.DOTALL):
+        if language == "python":
+            compile(block, page.name, "exec")
+        elif language == "bash":
+            block = re.sub(r"\\\n|(?<!\S)#.*", "", block)
+            words = shlex.shlex(block, posix=True, punctuation_chars=";<>|&\n")
+            words.commenters, words.whitespace = "", " \t"
+            words.whitespace_split = True
+            for ends, command in groupby(words, lambda word: word[0] in ";<>|&\n"):
+                program, *arguments = command
+                if program == "pushplan" and not ends:
+                    parser.parse_args(arguments)
+
+
+@pytest.mark.release
 @pytest.mark.learn
 def test_the_training_script_of_the_page_on_networks_runs(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch

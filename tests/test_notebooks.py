@@ -32,7 +32,7 @@ def test_there_are_notebooks(render):
     assert {path.stem for path in NOTEBOOKS} == set(render.ORDER)
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize(
     "path", [path for path in NOTEBOOKS if path.stem != ALONE], ids=lambda path: path.stem
 )
@@ -43,7 +43,7 @@ def test_a_notebook_runs(path, render):
     assert pictures and all(len(picture) < 150_000 for picture in pictures)
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_the_control_loop_runs_without_a_simulator():
     command = [sys.executable, str(ROOT / "notebooks" / "render.py"), ALONE, "--check"]
     done = subprocess.run(command, capture_output=True, text=True, timeout=600)

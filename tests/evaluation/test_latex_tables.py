@@ -76,7 +76,7 @@ def test_columns_agree_and_no_table_is_wider_than_a_page(tables: list[Table]) ->
     assert text.count(r"\begin{table}") == text.count(r"\end{table}")
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.skipif(shutil.which("pdflatex") is None, reason="needs pdflatex")
 def test_the_tables_compile_and_nothing_is_cut_off(tables: list[Table], tmp_path: Path) -> None:
     every = [chr(code) for code in range(0x20, 0x2FF0) if unicodedata.name(chr(code), "")]
