@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import asyncio
 import itertools
 import os
 import signal
 import socket
 import threading
-import time
 from collections.abc import Callable
+from concurrent.futures import Future
 from contextlib import suppress
 from dataclasses import replace
+from functools import partial
+from typing import TypeVar
 
 from pushplan.errors import short
 from pushplan.planners import make_policy
@@ -24,17 +27,31 @@ from pushplan.world.checks import expect
 
 _GRACE_S = 5.0  # for how long planning calls may go on after the end of the server [s]
 _LOOK_S = 0.1  # how often it looks whether clients have left that wait for an answer [s]
-_PAUSE_S = 0.1  # after a connection that could not be accepted [s]
+_Result = TypeVar("_Result")
+_PAUSE_S = 0.01  # between two looks whether all clients have gone [s]
 _SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 _MOST_REFUSED = 32  # clients that are told at the same time why they are sent away
+
+
+async def in_thread(function: Callable[[], _Result], name: str) -> _Result:
+    """What a function returns that a new thread calls, while the loop goes on.
+
+    The thread is a daemon, which those of `concurrent.futures` are not: a policy that hangs does
+    not keep the process from ending.
+    """
+    future: Future[_Result] = Future()
+    future.set_running_or_notify_cancel()  # the end of the server does not cancel it
+    thread = threading.Thread(target=lambda: future.set_result(function()), name=name, daemon=True)
+    thread.start()
+    return await asyncio.wrap_future(future)
 
 
 class PolicyServer:
     """Serves a policy at a socket, by the protocol of docs/serve.md.
 
-    Each client has a policy, an episode and a thread of its own. What a client sends is checked; a
-    wrong message gets an error, and no other client notices. It is no sandbox: clients share the
-    processor, and whoever can reach the socket may use it.
+    Each client has a policy and an episode of its own, whose planning runs in threads. What a
+    client sends is checked; a wrong message gets an error, and no other client notices. It is no
+    sandbox: clients share the processor, and whoever can reach the socket may use it.
 
     Args:
         policy: the name of one of `pushplan.planners.policy_names()`, or a callable that makes a
@@ -76,10 +93,10 @@ class PolicyServer:
         self._limits = expect("limits", limits or ServerLimits(), ServerLimits)
         check_world_policy(self._policy())
         self._numbers = itertools.count(1)
-        self._present: dict[threading.Thread, tuple[Connection, Session]] = {}
-        self._places = threading.Semaphore(self._limits.clients)
-        self._refusals = threading.Semaphore(_MOST_REFUSED)
+        self._present: dict[int, tuple[Connection, Session]] = {}
+        self._refused = 0  # clients that are being told why
         self._warm = self._over = False
+        self._ended = True
         self._thread: threading.Thread | None = None
         self._inode = 0
 
@@ -125,8 +142,9 @@ class PolicyServer:
         else:
             self._address = replace(self._address, port=int(listener.getsockname()[1]))
         self._over = False
+        serving = self._accept(listener)
         self._thread = threading.Thread(
-            target=self._accept, args=(listener,), name="pushplan server", daemon=True
+            target=asyncio.run, args=(serving,), name="pushplan server", daemon=True
         )
         self._thread.start()
 
@@ -145,16 +163,7 @@ class PolicyServer:
             with suppress(OSError):  # another server may have put its own socket there
                 if os.lstat(self._address.path).st_ino == self._inode:
                     os.unlink(self._address.path)
-        present = self._present.copy()
-        for connection, session in present.values():
-            session.abandon()
-            connection.cut()
-        end = time.monotonic() + _GRACE_S
-        for thread in present:
-            thread.join(max(0.0, end - time.monotonic()))
-            if thread.is_alive():
-                LOG.warning("%s has not returned from its planning call", thread.name)
-        return not self._present
+        return self._ended
 
     def serve_forever(self, ready: Callable[[], object] = lambda: None) -> bool:
         """Load all kernels, and serve until SIGINT, SIGTERM or SIGHUP; called by the main thread.
@@ -185,66 +194,74 @@ class PolicyServer:
                 signal.signal(one, handler)
         return ended
 
-    def _accept(self, listener: socket.socket) -> None:
-        """Give each connection a thread, and look after the clients meanwhile."""
-        listener.settimeout(_LOOK_S)
-        with listener:
-            while not self._over:
-                self._look()
-                try:
-                    connected, _ = listener.accept()
-                    client = (connected, Connection(connected, self._limits))
-                    threading.Thread(target=self._attend, args=client, daemon=True).start()
-                except TimeoutError:
-                    continue
-                except (OSError, RuntimeError):  # without file handles, or threads
-                    time.sleep(_PAUSE_S)
+    async def _accept(self, listener: socket.socket) -> None:
+        """Attend to every client that connects, until the end of the server."""
+        server = await asyncio.start_server(self._attend, sock=listener)
+        while not self._over:
+            self._look()
+            await asyncio.sleep(_LOOK_S)
+        server.close()
+        for connection, session in self._present.values():
+            session.abandon()
+            connection.cut()
+        with suppress(TimeoutError):
+            async with asyncio.timeout(_GRACE_S):
+                while self._present:
+                    await asyncio.sleep(_PAUSE_S)
+        self._ended = not self._present
+        for number in self._present:
+            LOG.warning("client %d: the policy has not returned from its planning call", number)
 
     def _look(self) -> None:
         """End planning calls whose clients have left."""
-        for connection, session in self._present.copy().values():
+        for connection, session in self._present.values():
             if session.busy and connection.has_left():
                 session.abandon()
 
-    def _attend(self, connected: socket.socket, connection: Connection) -> None:
-        """Answer a client in its thread; who is sent away is told why when its place is free."""
-        with connected:
-            refusal = f"the server has {self._limits.clients} clients, which is its limit"
-            if self._places.acquire(blocking=False):
-                thread = threading.current_thread()
-                session = Session(self._policy, self._label, self._limits)
-                self._present[thread] = (connection, session)
-                try:
-                    refusal = self._serve(thread, connection, session)
-                finally:
-                    del self._present[thread]
-                    self._places.release()
-            if refusal and self._refusals.acquire(blocking=False):
-                connection.refuse(refusal)
-                self._refusals.release()
+    async def _attend(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        """Answer a client; who is sent away is told why when its place is free."""
+        connection = Connection(reader, writer, self._limits)
+        refusal = f"the server has {self._limits.clients} clients, which is its limit"
+        if self.clients < self._limits.clients:
+            number = next(self._numbers)
+            session = Session(self._policy, self._label, self._limits)
+            self._present[number] = (connection, session)
+            try:
+                refusal = await self._serve(number, connection, session)
+            finally:
+                del self._present[number]
+        if refusal and self._refused < _MOST_REFUSED:
+            self._refused += 1
+            await connection.refuse(refusal)
+            self._refused -= 1
+        connection.cut()
 
-    def _serve(self, thread: threading.Thread, connection: Connection, session: Session) -> str:
+    async def _serve(self, number: int, connection: Connection, session: Session) -> str:
         """Answer message after message, then end planning; why it is sent away, if it is."""
-        number = next(self._numbers)
-        thread.name = f"pushplan client {number}"
+        thread = f"pushplan client {number}"
         LOG.info("client %d has come", number)
         why, refusal, last = "closed", "", False
         try:
-            while not (last or self._over):
-                data, last = session.answer(connection.read())
+            while not last:
+                body = await connection.read()
+                if session.is_quick(body):  # a change of threads takes longer than the answer
+                    answer = session.answer(body)
+                else:
+                    answer = await in_thread(partial(session.answer, body), thread)
                 if session.abandoned:  # cut short, planning gives an action that nobody asked for
                     raise RefusedError(
                         "planning was ended: the client sends no more, or the server ends"
                     )
                 if session.greeted:
                     connection.greeted()
-                connection.write(data)
+                await connection.write(answer.data)
+                last = answer.last
         except OSError:
             why = "left"
         except RefusedError as error:
             why = refusal = str(error)
         if not refusal:
             connection.cut()
-        session.close()
+        await in_thread(session.close, thread)
         LOG.info("client %d has gone: %s", number, why)
         return refusal

@@ -22,6 +22,8 @@ from pushplan.world.checks import boolean, integer, number, word
 from pushplan.world.stored.world_files import SCHEMA
 
 LOG = logging.getLogger("pushplan.serving")
+QUICK_BYTES = 20_000
+"""Longest message that is answered without a thread; reading a longer one takes time."""
 _GOALS = {"robot": ("disc", "line"), "objects": ("receptacle", "clearance_area")}
 Fields = dict[str, Any]
 _Kind = TypeVar("_Kind", StepEpisode, LoopEpisode)
@@ -35,7 +37,7 @@ class Answer(NamedTuple):
 
 
 class Session:
-    """A client's policy and episode. All but `abandon` is called by one thread.
+    """A client's policy and episode. All but `abandon` is called one after another.
 
     Attributes:
         greeted: whether the client has said hello.
@@ -79,6 +81,15 @@ class Session:
             self.busy = False
         self._feed = before
         return Answer(messages.error(said, kind))
+
+    def is_quick(self, body: bytes) -> bool:
+        """True for a short message of a robot's loop, whose answer waits for nothing."""
+        if len(body) > QUICK_BYTES or not isinstance(self._episode, LoopEpisode):
+            return False
+        try:
+            return messages.decode(body)["type"] in ("update", "command", "cancel")
+        except PushplanError:
+            return True  # the answer says what is wrong
 
     def abandon(self) -> None:
         """End the planning call that runs, because the client has left; from any thread."""

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import asyncio
 import socket
 import struct
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Awaitable, Callable
 
 import pytest
 from served import (
@@ -97,53 +98,60 @@ def test_messages_are_bounded_in_length_before_they_are_read(tmp_path):
             client.request({"type": "cancel", "reason": "x" * 3_000_000})
 
 
-@pytest.fixture
-def pair() -> Iterator[tuple[Connection, socket.socket]]:
-    """The server's side of a connection, of short limits, and the client's."""
-    limits = ServerLimits(message_s=0.2, idle_s=0.1)
-    ours, theirs = socket.socketpair()
-    with ours, theirs:
-        yield Connection(ours, limits), theirs
+def connected(attend: Callable[[Connection, socket.socket], Awaitable[None]]) -> None:
+    """Run a test with the server's side of a connection, of short limits, and the client's."""
+
+    async def run() -> None:
+        ours, theirs = socket.socketpair()
+        with theirs:
+            limits = ServerLimits(message_s=0.2, idle_s=0.1)
+            connection = Connection(*await asyncio.open_connection(sock=ours), limits)
+            await attend(connection, theirs)
+            connection.cut()
+
+    asyncio.run(run())
 
 
-def test_a_byte_at_a_time_is_too_slow(pair):
-    connection, client = pair
-    connection.greeted()
-    over = threading.Event()
+def test_a_byte_at_a_time_is_too_slow():
+    async def attend(connection: Connection, client: socket.socket) -> None:
+        connection.greeted()
 
-    def dribble() -> None:
-        client.sendall(struct.pack(">I", 1_000_000))
-        while not over.wait(0.01):
-            client.sendall(b" ")
+        async def dribble() -> None:
+            client.sendall(struct.pack(">I", 1_000_000))
+            while True:
+                await asyncio.sleep(0.01)
+                client.sendall(b" ")
 
-    thread = threading.Thread(target=dribble)
-    thread.start()
-    try:
+        task = asyncio.create_task(dribble())
         with pytest.raises(RefusedError, match=r"whole 0\.2 s after its first byte"):
-            connection.read()
-    finally:
-        over.set()
-        thread.join()
+            await connection.read()
+        task.cancel()
+
+    connected(attend)
 
 
-def test_silence_has_a_limit_and_until_hello_another(pair):
-    connection, client = pair
-    client.sendall(b"\0\0\0\2{}")
-    assert connection.read() == b"{}"
-    time.sleep(0.2)
-    client.sendall(b"\0\0\0\2{}")
-    with pytest.raises(RefusedError, match=r"no valid hello came within 0\.2 s"):
-        connection.read()
-    connection.greeted()
-    assert connection.read() == b"{}"
-    with pytest.raises(RefusedError, match=r"no message came for 0\.1 s"):
-        connection.read()
+def test_silence_has_a_limit_and_until_hello_another():
+    async def attend(connection: Connection, client: socket.socket) -> None:
+        client.sendall(b"\0\0\0\2{}")
+        assert await connection.read() == b"{}"
+        await asyncio.sleep(0.2)
+        client.sendall(b"\0\0\0\2{}")
+        with pytest.raises(RefusedError, match=r"no valid hello came within 0\.2 s"):
+            await connection.read()
+        connection.greeted()
+        assert await connection.read() == b"{}"
+        with pytest.raises(RefusedError, match=r"no message came for 0\.1 s"):
+            await connection.read()
+
+    connected(attend)
 
 
-def test_a_client_that_does_not_read_has_left(pair):
-    connection, _ = pair
-    with pytest.raises(OSError):
-        connection.write(b" " * 50_000_000)
+def test_a_client_that_does_not_read_has_left():
+    async def attend(connection: Connection, client: socket.socket) -> None:
+        with pytest.raises(OSError):
+            await connection.write(b" " * 50_000_000)
+
+    connected(attend)
 
 
 @pytest.mark.parametrize("sent", [b"", b"\0", b"\0\0\0\2{}", b"\0\0\0\2{}" * 50])
