@@ -205,6 +205,11 @@ _KINDS: dict[str, _Kind] = {
         "pushplan.metrics:metric_names",
         lambda name: _first_line(_at("pushplan.metrics:metric_function")(name)),
     ),
+    "robots": _Kind(
+        "what is driven",
+        "pushplan.world.stored.robots:robots",
+        lambda name: _first_line(_at(_at("pushplan.world.stored.robots:robots")()[name])),
+    ),
     "simulators": _Kind(
         "what moves the bodies",
         "pushplan.envs.registry:SIMULATORS",

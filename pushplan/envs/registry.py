@@ -5,20 +5,26 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import fields
 
-from pushplan.imports.on_demand import look_up
+from pushplan.imports.on_demand import look_up, registered
 
-TASKS: dict[str, str] = {
-    "maze": "pushplan.envs.tasks.maze:MazeTask",
-    "namo": "pushplan.envs.tasks.namo:NamoTask",
-    "box_delivery": "pushplan.envs.tasks.box_delivery:BoxDeliveryTask",
-    "area_clearing": "pushplan.envs.tasks.area_clearing:AreaClearingTask",
-    "ship_ice": "pushplan.envs.tasks.ship_ice:ShipIceTask",
-    "room": "pushplan.envs.tasks.room:RoomTask",
-}
-SIMULATORS: Mapping[str, str] = {
-    "mujoco": "pushplan.envs.simulators.mujoco_simulator:MujocoSimulator",
-    "pymunk": "pushplan.envs.simulators.pymunk_simulator:PymunkSimulator",
-}
+TASKS = registered(
+    "pushplan.tasks",
+    {
+        "maze": "pushplan.envs.tasks.maze:MazeTask",
+        "namo": "pushplan.envs.tasks.namo:NamoTask",
+        "box_delivery": "pushplan.envs.tasks.box_delivery:BoxDeliveryTask",
+        "area_clearing": "pushplan.envs.tasks.area_clearing:AreaClearingTask",
+        "ship_ice": "pushplan.envs.tasks.ship_ice:ShipIceTask",
+        "room": "pushplan.envs.tasks.room:RoomTask",
+    },
+)
+SIMULATORS = registered(
+    "pushplan.simulators",
+    {
+        "mujoco": "pushplan.envs.simulators.mujoco_simulator:MujocoSimulator",
+        "pymunk": "pushplan.envs.simulators.pymunk_simulator:PymunkSimulator",
+    },
+)
 ACTIONS: Mapping[str, str] = {
     "turn_rate": "pushplan.envs.actions:TurnRateAction",
     "heading": "pushplan.envs.drive_actions:HeadingAction",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import sys
 from collections.abc import Callable, Mapping
 from importlib import import_module
@@ -78,6 +79,24 @@ def lazy_names(
         return getattr(need(f"{package}.{modules[name]}"), name)
 
     return load, lambda: list(sys.modules[package].__all__)
+
+
+def registered(group: str, own: Mapping[str, str]) -> dict[str, str]:
+    """A table of ``"module:name"`` texts, and after it what installed distributions add to it.
+
+    Args:
+        group: of their entry points, such as those of policies.
+        own: the table of this package; its names cannot be taken.
+    """
+    found = {point.name: point.value for point in _entry_points().select(group=group)}
+    return {**own, **{name: found[name] for name in sorted(found.keys() - own.keys())}}
+
+
+@functools.cache
+def _entry_points() -> Any:
+    from importlib.metadata import entry_points  # most programs need none of it
+
+    return entry_points()
 
 
 def look_up(kind: str, table: Mapping[str, str], name: object) -> Any:

@@ -10,6 +10,7 @@ from typing import Literal, cast
 
 from pushplan.errors import describe, short
 from pushplan.imports.named_objects import load_object
+from pushplan.imports.on_demand import registered
 from pushplan.world import ClearanceArea, Episode, InvalidInputError, Receptacle, UnknownNameError
 
 GoalKind = Literal["robot", "objects"]
@@ -65,7 +66,7 @@ _NAVIGATION = "pushplan.metrics.navigation"
 _MANIPULATION = "pushplan.metrics.manipulation"
 _FACTS = "pushplan.metrics.lengths"
 
-METRICS: dict[str, Metric] = {
+_METRICS: dict[str, Metric] = {
     "success": Metric(f"{_FACTS}:success", Role.ON_REQUEST),
     "E_nav": Metric(f"{_NAVIGATION}:e_nav", goal="robot", if_failed=0.0, high=1.0),
     "I_nav": Metric(f"{_NAVIGATION}:i_nav", goal="robot", high=1.0),
@@ -102,7 +103,13 @@ METRICS: dict[str, Metric] = {
         f"{_FACTS}:sim_time_s", Role.FACT, "time [s]", higher_is_better=None, until_failure=True
     ),
 }
-"""All metrics, in the order of the columns. A line here is all that a new one needs."""
+METRICS = {
+    name: _METRICS.get(name) or Metric(function, Role.DETAIL, higher_is_better=None)
+    for name, function in registered(
+        "pushplan.metrics", {name: metric.function for name, metric in _METRICS.items()}
+    ).items()
+}
+"""All metrics, in the order of the columns. A line above is all that a new one needs."""
 
 
 def metric_names(*roles: Role) -> tuple[str, ...]:

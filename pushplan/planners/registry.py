@@ -6,10 +6,10 @@ import inspect
 from dataclasses import fields, is_dataclass, replace
 from typing import Any, cast
 
-from pushplan.imports.on_demand import look_up
+from pushplan.imports.on_demand import look_up, registered
 from pushplan.world import Planner, Policy, UnknownNameError
 
-PLANNERS: dict[str, str] = {
+_PLANNERS = {
     "straight": "pushplan.planners.shortest_path:ShortestPath",
     "geometric-rrt": "pushplan.planners.rrt:GeometricRRT",
     "kinodynamic-rrt": "pushplan.planners.rrt:KinodynamicRRT",
@@ -23,12 +23,13 @@ PLANNERS: dict[str, str] = {
     "ship-predictive-network": "pushplan.planners.ship_predictive:PredictiveShipNetwork",
     "ship-predictive-published": "pushplan.planners.ship_predictive:PredictivePublished",
 }
+PLANNERS = registered("pushplan.planners", _PLANNERS)
 """Name -> "module:Class"; each is constructed without arguments by default."""
 
 OPEN_WATER = ("ship-predictive", "ship-predictive-network", "ship-predictive-published")
 """Planners that go to a goal line through water without obstacles, and nowhere else."""
 
-POLICIES: dict[str, str] = {
+_POLICIES = {
     "straight": "pushplan.planners.shortest_path:straight",
     "geometric-rrt": "pushplan.planners.rrt.policies:geometric_rrt",
     "kinodynamic-rrt": "pushplan.planners.rrt.policies:kinodynamic_rrt",
@@ -49,6 +50,7 @@ POLICIES: dict[str, str] = {
     "gtsp": "pushplan.planners.rearrangement:Gtsp",
     "gtsp-mpc": "pushplan.planners.rearrangement:GtspMpc",
 }
+POLICIES = registered("pushplan.policies", _POLICIES)
 """Name -> "module:callable" that makes a policy."""
 
 

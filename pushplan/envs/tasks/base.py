@@ -6,6 +6,7 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any, ClassVar, Literal
 
 import numpy as np
@@ -23,6 +24,7 @@ from pushplan.world import (
     World,
 )
 from pushplan.world.checks import BoolArray, FloatArray, IntArray, choice
+from pushplan.world.stored.robots import ROBOTS, make_robot, robots
 
 _FRICTIONS = {
     "bumper_friction": "robot_object",
@@ -146,8 +148,10 @@ class Task(ABC):
         preset, wanted = self.preset, self.variations
         name, bumper = getattr(wanted, "robot", None), getattr(wanted, "bumper", None)
         name = next(iter(preset.robots)) if name is None else name
+        solid = preset.materials.solids is not None  # then heights and wheels are asked for
+        others = () if solid else sorted(robots().keys() - ROBOTS)
         try:
-            choice("robot", name, tuple(preset.robots))
+            choice("robot", name, (*preset.robots, *others))
             if preset.bumper is None and bumper not in (None, "none"):
                 raise InvalidInputError(
                     f"bumper {bumper!r} does not fit the robot of this preset: it has none, or "
@@ -156,7 +160,8 @@ class Task(ABC):
         except InvalidInputError as error:
             raise ScenarioError(f"{self.name}: {error}") from error
         options = {} if preset.bumper is None else {"bumper": bumper or preset.bumper}
-        robot = preset.robot(name, drive_of(self.action), **options)
+        make = partial(make_robot, name) if name in others else partial(preset.robot, name)
+        robot = make(drive_of(self.action), **options)
         self._drive(robot)
         if self.materials.solids is not None and name in SOLIDS:
             self.materials = replace(self.materials, solids=SOLIDS[name])

@@ -19,6 +19,7 @@ from typing import Any
 
 from pushplan.errors import UnknownNameError
 from pushplan.files.safe_files import read_data
+from pushplan.imports.on_demand import look_up, registered
 from pushplan.world.checks import choice
 from pushplan.world.robot import Drive, RobotModel
 
@@ -26,6 +27,17 @@ BUMPERS = ("none", "collector", "pusher", "navigation")
 """Inward-curved (keeps boxes in), straight edge, outward-curved (sheds boxes to the sides)."""
 CONTACT_RADIUS = 0.02
 """Of robots, boxes and floes in the 2D benchmark's own code [m]."""
+ROBOTS = (
+    "turtlebot3_burger",
+    "jackal",
+    "maze_robot",
+    "box_delivery_robot",
+    "area_clearing_robot",
+    "original_maze_robot",
+    "original_area_clearing_robot",
+    "original_box_delivery_robot",
+)
+"""The functions of this module, which are names of robots."""
 _LIMITS = tuple(
     field.name
     for field in fields(RobotModel)
@@ -93,6 +105,27 @@ def original_box_delivery_robot(
     It turns by at most 1 rad/s where velocities are its actions.
     """
     return _robot("original box-delivery robot", drive, limits)
+
+
+@functools.cache
+def robots() -> dict[str, str]:
+    """Name -> "module:function" that makes a robot: ours, and those of installed distributions."""
+    return registered("pushplan.robots", {name: f"{__name__}:{name}" for name in ROBOTS})
+
+
+def make_robot(name: str, drive: Drive | str, **options: Any) -> RobotModel:
+    """A robot by name.
+
+    Args:
+        name: one of `robots()`.
+        drive: how it may move.
+        options: of the function that makes it, as limits.
+
+    Raises:
+        UnknownNameError: if there is no such robot.
+    """
+    robot: RobotModel = look_up("robot", robots(), name)(drive=drive, **options)
+    return robot
 
 
 @functools.cache
