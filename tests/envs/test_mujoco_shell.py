@@ -7,7 +7,7 @@ import pytest
 from mujoco_scenes import GROUND, JACKAL_GROUND, built, jackal, room, turtlebot
 
 from pushplan.envs.push_env import PushEnv
-from pushplan.envs.simulators import mujoco_model, mujoco_robot
+from pushplan.envs.simulators import mujoco_model
 from pushplan.world import Drive, RobotModel, Twist
 
 BOXES = [(0.25, 0.0, 0.2), (0.34, 0.03, 0.0), (-0.5, 0.5, 0.1), (0.2, 0.3, 0.7)]
@@ -37,8 +37,7 @@ def driven(robot: RobotModel, ground: object) -> list[bytes]:
 def test_the_shell_changes_no_bit_of_a_trajectory(monkeypatch, robot, ground):
     with_shell = driven(robot, ground)
     mujoco_model.scene_model.cache_clear()
-    for name in ("add_shell", "add_tyre"):
-        monkeypatch.setattr(mujoco_robot, name, lambda *arguments: None)
+    monkeypatch.setattr(mujoco_model, "add_shell", lambda *arguments: None)
     bare = driven(robot, ground)
     mujoco_model.scene_model.cache_clear()
     assert with_shell == bare
@@ -55,7 +54,7 @@ def test_the_house_of_a_ship_changes_no_bit_of_a_trajectory(monkeypatch):
         return env.world.robot_pose.tobytes() + env.world.movables.poses.tobytes()
 
     with_house = driven_ship()
-    monkeypatch.setattr(mujoco_robot, "add_superstructure", lambda *arguments: None)
+    monkeypatch.setattr(mujoco_model, "add_superstructure", lambda *arguments: None)
     assert driven_ship() == with_house
     mujoco_model.scene_model.cache_clear()
 

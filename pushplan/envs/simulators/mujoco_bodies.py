@@ -19,7 +19,7 @@ from pushplan.envs.simulators.mujoco_kernels import (
     rest_gap,
     sleep_lists,
 )
-from pushplan.envs.simulators.mujoco_model import SceneKey, scene_model
+from pushplan.envs.simulators.mujoco_model import scene_model
 from pushplan.envs.simulators.mujoco_options import MujocoOptions
 from pushplan.world import PushplanError, World
 from pushplan.world.checks import BoolArray, FloatArray, IntArray
@@ -38,6 +38,12 @@ def log_warnings() -> None:
         mujoco.set_mju_user_warning(lambda text: _LOG.debug("MuJoCo: %s", text))
 
 
+def scene_key(world: World, materials: Materials, options: MujocoOptions) -> tuple[Any, ...]:
+    """The arguments of `scene_model`; equal where only poses and the goal differ."""
+    objects = world.movables.moved_to(np.zeros((len(world.movables), 3)))
+    return world.robot, world.static, objects, materials, options
+
+
 class DivergedError(PushplanError, RuntimeError):
     """The engine's state is no longer finite."""
 
@@ -51,9 +57,10 @@ class MujocoBodies:
 
     def __init__(self, world: World, materials: Materials, options: MujocoOptions) -> None:
         log_warnings()
-        self.key = SceneKey.of(world, materials, options)
-        self.model = scene_model(self.key).__copy__()
+        self.key = scene_key(world, materials, options)
+        self.model = scene_model(*self.key).__copy__()
         self.data = mujoco.MjData(self.model)
+        self._water = materials.water
         self.afloat = materials.water is not None
         self.count = len(world.movables)
         solids = materials.solids
@@ -106,7 +113,7 @@ class MujocoBodies:
         Objects at rest are asleep until something touches them.
         """
         assert world.robot_twist is not None
-        model, water = self.model, self.key.materials.water
+        model, water = self.model, self._water
         self._drag = None if water is None else water.coefficients(world)
         qpos, qvel = np.array(model.qpos0), np.zeros(model.nv)
         poses, twists = world.movables.poses, world.movables.twists

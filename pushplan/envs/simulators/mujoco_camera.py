@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pushplan.drawing.palette import FLOOR_PALETTE
-from pushplan.envs.simulators.mujoco_shapes import color_of
+from pushplan.envs.simulators.mujoco_shapes import rgba
 from pushplan.world import ClearanceArea, GoalDisc, GoalLine, MissingDependencyError, World
 from pushplan.world.checks import FloatArray, integer
 
@@ -120,7 +120,7 @@ class MujocoCamera:
             self._mark_edge(a, b, thin)
 
     def _mark_disc(self, center: FloatArray, radius: float, thin: float) -> None:
-        kind, color = mujoco.mjtGeom.mjGEOM_CYLINDER, color_of(FLOOR_PALETTE.goal[0])
+        kind, color = mujoco.mjtGeom.mjGEOM_CYLINDER, FLOOR_PALETTE.goal[0]
         self._mark(kind, [radius, thin, 0.0], [*center, 0.0], np.eye(3), color)
 
     def _mark_edge(self, a: FloatArray, b: FloatArray, thin: float) -> None:
@@ -130,9 +130,9 @@ class MujocoCamera:
         turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
         size = [0.5 * length, 4.0 * thin, 2.0 * thin]
         middle = [*(0.5 * (a + b)), 0.0]
-        self._mark(mujoco.mjtGeom.mjGEOM_BOX, size, middle, turn, color_of(FLOOR_PALETTE.goal[1]))
+        self._mark(mujoco.mjtGeom.mjGEOM_BOX, size, middle, turn, FLOOR_PALETTE.goal[1])
 
-    def _mark(self, kind: Any, size: Any, pos: Any, turn: Any, rgb: Any) -> None:
+    def _mark(self, kind: Any, size: Any, pos: Any, turn: Any, color: str) -> None:
         scene = self._scene
         if scene.ngeom >= scene.maxgeom:
             return
@@ -143,7 +143,7 @@ class MujocoCamera:
             np.array(size, dtype=np.float64),
             np.array(pos, dtype=np.float64),
             np.asarray(turn, dtype=np.float64).ravel(),
-            np.array([*rgb, 1.0], dtype=np.float32),
+            np.array(rgba(color), dtype=np.float32),
         )
         scene.ngeom += 1
 

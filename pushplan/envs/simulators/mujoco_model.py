@@ -2,191 +2,220 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
 from functools import lru_cache
+from pathlib import Path
 from typing import Any
 
 import mujoco
 import numpy as np
 
+from pushplan.drawing.palette import FLOOR_PALETTE, WATER_PALETTE, Palette
 from pushplan.envs.simulators.base import Materials, Solids
 from pushplan.envs.simulators.mujoco_options import MujocoOptions
-from pushplan.envs.simulators.mujoco_robot import (
-    GRAVITY,
-    add_floating,
-    add_ship,
-    add_wheeled_robot,
-    palette_of,
-)
 from pushplan.envs.simulators.mujoco_shapes import (
-    FLOOR_BIT,
-    OBJECT_BIT,
-    STATIC_BIT,
-    WHEEL_BIT,
-    Surface,
+    add_geom,
     add_prism,
-    color_of,
     prism_inertia,
+    rgba,
     set_mass,
-    yaw_quaternion,
 )
-from pushplan.world import InvalidInputError, Movables, RobotModel, StaticMap, World
+from pushplan.envs.simulators.mujoco_shell import CONTACT_GROUP, add_shell, add_superstructure
+from pushplan.world import InvalidInputError, Movables, RobotModel, StaticMap
 from pushplan.world.checks import FloatArray
+from pushplan.world.outline import centroid, inscribed_radius
 
-_CASTER_BALL = (0.25, 0.25, 0.27)
+GRAVITY = 9.81
 _HOLDING = 1e7  # damping of a fixed object over its mass [1/s]
-
-
-@dataclass(frozen=True)
-class SceneKey:
-    """What a compiled model depends on: everything but poses and the goal."""
-
-    robot: RobotModel
-    static: StaticMap
-    materials: Materials
-    options: MujocoOptions
-    shapes: bytes  # what counts of the objects
-    movables: Movables = field(compare=False)
-
-    @classmethod
-    def of(cls, world: World, materials: Materials, options: MujocoOptions) -> SceneKey:
-        """The key of a scene."""
-        m = world.movables
-        shapes = (m.vertices + 0.0, m.offsets, m.masses, m.wheeled, m.fixed)
-        packed = b"".join(part.tobytes() for part in shapes)
-        return cls(world.robot, world.static, materials, options, packed, m)
+_WHEEL_MASS = 0.03  # of one wheel, in units of the robot's mass
+_CASTER = 0.25  # radius of the caster's ball, in units of the wheel radius
+_CLEARANCE = 0.35  # height of the chassis above ground, in units of the wheel radius
+_BALANCE = 0.4  # where the centre of mass is on the way from the axle to the caster
+_MASS_HEIGHT = 0.25  # of the centre of mass, in units of the robot's height
 
 
 @lru_cache(maxsize=8)
-def scene_model(key: SceneKey) -> Any:
+def scene_model(
+    robot: RobotModel,
+    static: StaticMap,
+    movables: Movables,
+    materials: Materials,
+    options: MujocoOptions,
+) -> Any:
     """The MjModel of a scene, to be copied; compiled anew where it is none of the last few.
+
+    Args:
+        robot: its footprint and limits.
+        static: what does not move.
+        movables: the objects; where they are does not matter.
+        materials: how bodies grip and float, and their heights.
+        options: settings.
 
     Raises:
         InvalidInputError: if the scene has no third dimension, or the robot neither wheels nor
             water.
     """
-    solids, robot, movables = key.materials.solids, key.robot, key.movables
+    solids = materials.solids
     if solids is None:
         raise InvalidInputError("MuJoCo needs materials.solids: the heights of everything")
-    afloat = key.materials.water is not None
+    afloat = materials.water is not None
     if not afloat and robot.wheel_separation == 0.0:
         raise InvalidInputError(
             f"robot {robot.name!r} needs wheels on dry ground: robot.wheel_separation must be > 0"
         )
-    spec = mujoco.MjSpec()
-    _set_options(spec, key, afloat)
-    _add_ground(spec, key)
-    _add_static(spec, key, solids)
-    if afloat:
-        add_ship(spec, robot, key.materials, solids, key.options)
-    else:
-        add_wheeled_robot(spec, robot, key.materials, solids, key.options)
+    palette = WATER_PALETTE if afloat else FLOOR_PALETTE
+    spec = mujoco.MjSpec.from_string(_description(robot, static, materials, solids, options))
+    spec.geom("ground").rgba = rgba(palette.floor)
+    _add_static(spec, static, solids, palette.wall, afloat)
+    _add_robot(spec, robot, solids, palette, afloat)
     for k in range(len(movables)):
-        _add_object(spec, k, movables, key.materials, solids)
-    _add_touch(spec)
+        _add_object(spec, k, movables, solids, palette, afloat)
     try:
         model = spec.compile()
     except ValueError as error:
         raise InvalidInputError(f"MuJoCo cannot build this scene: {error}") from error
     if not afloat:
-        _set_damping(model, movables, key.materials)
+        _set_damping(model, movables, materials)
     return model
 
 
-def _add_touch(spec: Any) -> None:
-    """Sensors that say how many contacts the hull has: with something static, and with anything."""
-    body = mujoco.mjtObj.mjOBJ_BODY
-    number_found = 1 << int(mujoco.mjtConDataField.mjCONDATA_FOUND)
-    hull = {"objtype": body, "objname": "robot", "intprm": [number_found, 0, 1]}
-    contact = mujoco.mjtSensor.mjSENS_CONTACT
-    spec.add_sensor(name="static", type=contact, reftype=body, refname="static", **hull)
-    spec.add_sensor(name="anything", type=contact, **hull)
-
-
-def _set_options(spec: Any, key: SceneKey, afloat: bool) -> None:
-    options = key.options
-    option = spec.option
-    option.timestep = options.water_time_step if afloat else options.time_step
-    option.integrator = mujoco.mjtIntegrator.mjINT_EULER
-    option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
-    option.solver = mujoco.mjtSolver.mjSOL_NEWTON
-    option.iterations = options.iterations
-    option.tolerance = options.tolerance
-    option.sleep_tolerance = 0.0  # who rests is decided between two steps of the simulator
-    option.enableflags |= mujoco.mjtEnableBit.mjENBL_SLEEP
-    option.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET
-    option.gravity = [0.0, 0.0, 0.0 if afloat else -GRAVITY]
-    spec.default.geom.solref = [max(options.contact_time, 2.0 * option.timestep), 1.0]
-    spec.default.geom.solimp = [options.impedance, options.impedance, 0.001, 0.5, 2.0]
-    low, high = key.static.bounds[:2], key.static.bounds[2:]
-    spec.stat.extent = float(np.hypot(*(high - low)))
-    spec.stat.center = [*(0.5 * (low + high)), 0.0]
-    spec.visual.headlight.ambient = [0.3, 0.3, 0.3]
-    spec.visual.headlight.diffuse = [0.2, 0.2, 0.2]
-    spec.visual.headlight.specular = [0.0, 0.0, 0.0]
-    spec.visual.quality.shadowsize = 4096
-    spec.visual.map.shadowclip = 2.0  # the default leaves specks at the edge of the light
-
-
-def _add_ground(spec: Any, key: SceneKey) -> None:
-    """The floor, which only the world's dry scenes can touch, and the lamp."""
-    afloat = key.materials.water is not None
-    low, high = key.static.bounds[:2], key.static.bounds[2:]
-    half = 0.5 * (high - low)
-    color = color_of(palette_of(key.materials).floor)
-    surface = Surface(FLOOR_BIT, 0, key.materials.object_ground, 1, color)
-    settings = surface.options()
-    if afloat:
-        settings["contype"] = 0
-    spec.worldbody.add_geom(
-        name="ground",
-        type=mujoco.mjtGeom.mjGEOM_PLANE,
-        pos=[*(0.5 * (low + high)), 0.0],
-        size=[0.0, 0.0, 0.1 * float(half.max())],  # without end
-        **settings,
+def _description(
+    robot: RobotModel,
+    static: StaticMap,
+    materials: Materials,
+    solids: Solids,
+    options: MujocoOptions,
+) -> str:
+    """The scene in MJCF, all but the prisms."""
+    afloat = materials.water is not None
+    x, y = 0.5 * (static.bounds[:2] + static.bounds[2:])
+    sides = static.bounds[2:] - static.bounds[:2]
+    half = 0.5 * float(sides.max())
+    time_step = options.water_time_step if afloat else options.time_step
+    frictions = {
+        "object_ground": materials.object_ground,
+        "object_static": materials.object_static,
+        "object_object": materials.object_object,
+        "robot_object": materials.robot_object,
+        "wheel_friction": options.wheel_friction,
+    }
+    # frictionless contacts have one dimension
+    grips = {
+        name: f'friction="{mu} 0 0" condim="3"' if mu else "" for name, mu in frictions.items()
+    }
+    return _filled(
+        "scene",
+        driven=_thrusters(robot, options) if afloat else _wheels(robot, solids, options),
+        time_step=time_step,
+        gravity=0.0 if afloat else -GRAVITY,
+        iterations=options.iterations,
+        tolerance=options.tolerance,
+        contact_time=max(options.contact_time, 2.0 * time_step),
+        impedance=options.impedance,
+        floor=0 if afloat else 1,
+        meets=6 if afloat else 7,
+        extent=float(np.hypot(*sides)),
+        x=x,
+        y=y,
+        plane=0.1 * half,  # without end
+        lamp=2.0 * half,
+        **grips,
     )
-    lamp = spec.worldbody.add_light(name="lamp")
-    lamp.type = mujoco.mjtLightType.mjLIGHT_DIRECTIONAL
-    lamp.pos = [*(0.5 * (low + high)), 2.0 * float(half.max())]
-    lamp.dir = [0.3, 0.45, -1.0]
-    lamp.diffuse = [0.5, 0.5, 0.5]
-    lamp.specular = [0.05, 0.05, 0.05]
 
 
-def _add_static(spec: Any, key: SceneKey, solids: Solids) -> None:
+def _filled(name: str, **values: object) -> str:
+    file = Path(__file__).with_name(f"mujoco_{name}.xml")
+    return file.read_text(encoding="utf-8").format(**values)
+
+
+def caster_position(robot: RobotModel) -> float:
+    """Where the caster's ball touches the ground, ahead of the axle [m].
+
+    At the rear, unless most of the chassis is ahead of the axle.
+    """
+    x = robot.contact_parts[0][:, 0]
+    rear, front = float(-x.min()), float(x.max())
+    return -0.85 * rear if rear >= 0.5 * front else 0.85 * front
+
+
+def _wheels(robot: RobotModel, solids: Solids, options: MujocoOptions) -> str:
+    radius, mass = solids.wheel_radius, robot.mass
+    wheel_mass, width, ball = _WHEEL_MASS * mass, 0.4 * radius, _CASTER * radius
+    # of the motor, as its wheel feels it through the gear [kg m²]
+    rotor = options.rotor_inertia * mass * radius**2
+    return _filled(
+        "wheels",
+        radius=radius,
+        caster=caster_position(robot),
+        caster_height=ball - radius,
+        ball=ball,
+        left=0.5 * robot.wheel_separation,
+        wheel_mass=wheel_mass,
+        across=wheel_mass * (3.0 * radius**2 + width**2) / 12.0,
+        along=0.5 * wheel_mass * radius**2,
+        rotor=rotor,
+        gain=(0.5 * mass * radius**2 + rotor) / options.motor_time,
+        torque=0.5 * options.motor_force * mass * GRAVITY * radius,
+    )
+
+
+def _thrusters(robot: RobotModel, options: MujocoOptions) -> str:
+    force = options.thrust * robot.mass
+    moment = 0.5 * float(np.ptp(robot.vertices[:, 0])) * options.thruster_lever * force
+    return _filled(
+        "thrusters",
+        force=force,
+        moment=moment,
+        ahead=force / (options.thrust_droop * robot.max_speed),
+        turning=moment / (options.thrust_droop * robot.max_turn_rate),
+    )
+
+
+def _add_robot(
+    spec: Any, robot: RobotModel, solids: Solids, palette: Palette, afloat: bool
+) -> None:
+    """The footprint's parts, chassis or hull first, then the bumper; and what one sees."""
+    body, hull, height = spec.body("robot"), robot.contact_parts[0], solids.robot_height
+    if afloat:
+        ground, low = 0.0, -0.5 * solids.object_height
+        mass, middle = robot.mass, [*centroid(hull), 0.0]
+    else:
+        ground = solids.wheel_radius  # height of the body's frame
+        low = _CLEARANCE * ground
+        mass = robot.mass - 2.0 * (_WHEEL_MASS * robot.mass)
+        ahead = _BALANCE * caster_position(robot)
+        middle = [ahead, centroid(hull)[1], _MASS_HEIGHT * height - ground]
+    set_mass(body, hull, height, mass, middle)
+    for i, part in enumerate(robot.contact_parts):
+        top = solids.bumper_height if i else height
+        color = palette.bumper if i else palette.robot
+        bottom = min(low, 0.5 * top)
+        add_prism(spec, body, f"robot {i}", part, bottom - ground, top - ground, "robot", color)
+    if afloat:
+        add_superstructure(spec, robot, solids)
+    else:
+        body.geoms[0].group = CONTACT_GROUP  # the shell is what one sees
+        add_shell(spec, robot, solids)
+
+
+def _add_static(spec: Any, static: StaticMap, solids: Solids, color: str, afloat: bool) -> None:
     """Walls and columns; rounded ends of thick segments are upright cylinders."""
-    static = key.static
-    color = color_of(palette_of(key.materials).wall)
-    surface = Surface(STATIC_BIT, OBJECT_BIT, key.materials.object_static, 1, color)
     top = solids.wall_height
-    bottom = -top if key.materials.water is not None else 0.0
-    # a body of their own, so that a sensor can tell them from the ground
-    world = spec.worldbody.add_body(name="static")
+    bottom = -top if afloat else 0.0
+    middle, half = 0.5 * (bottom + top), 0.5 * (top - bottom)
+    body = spec.body("static")
     for i, polygon in enumerate(static.polygons):
-        add_prism(spec, world, f"static {i}", polygon, bottom, top, surface)
+        add_prism(spec, body, f"static {i}", polygon, bottom, top, "static", color)
     thin = 1e-3 * float((static.bounds[2:] - static.bounds[:2]).max())
     for i, (line, radius) in enumerate(zip(static.segments, static.radii, strict=True)):
         a, b = line[:2], line[2:]
         r = float(radius) or thin
-        dx, dy = float(b[0] - a[0]), float(b[1] - a[1])
-        upright = (0.5 * (bottom + top), 0.5 * (top - bottom))
-        if dx or dy:
-            world.add_geom(
-                name=f"segment {i}",
-                type=mujoco.mjtGeom.mjGEOM_BOX,
-                pos=[*(0.5 * (a + b)), upright[0]],
-                size=[0.5 * float(np.hypot(dx, dy)), r, upright[1]],
-                quat=yaw_quaternion(float(np.arctan2(dy, dx))),
-                **surface.options(),
-            )
+        length, heading = float(np.hypot(*(b - a))), float(np.arctan2(*(b - a)[::-1]))
+        if length:
+            size, pos = [0.5 * length, r, half], [*(0.5 * (a + b)), middle]
+            add_geom(spec, body, f"segment {i}", "box", size, pos, "static", color, yaw=heading)
         for end, point in enumerate((a, b) if radius else ()):
-            world.add_geom(
-                name=f"segment {i} end {end}",
-                type=mujoco.mjtGeom.mjGEOM_CYLINDER,
-                pos=[*point, upright[0]],
-                size=[r, upright[1], 0.0],
-                **surface.options(),
-            )
+            size, pos = [r, half, 0.0], [*point, middle]
+            add_geom(spec, body, f"segment {i} end {end}", "cylinder", size, pos, "static", color)
 
 
 def ball_radius(outline: FloatArray, solids: Solids) -> float:
@@ -194,45 +223,33 @@ def ball_radius(outline: FloatArray, solids: Solids) -> float:
 
     Half of the 5 cm wheels of the testbed, or what fits under a small box.
     """
-    edges = np.roll(outline, -1, axis=0) - outline
-    inside = (edges[:, 1] * outline[:, 0] - edges[:, 0] * outline[:, 1]) / np.hypot(
-        edges[:, 0], edges[:, 1]
-    )
-    return min(0.025, 0.2 * solids.object_height, 0.3 * float(inside.min()))
+    return min(0.025, 0.2 * solids.object_height, 0.3 * inscribed_radius(outline))
 
 
 def _add_object(
-    spec: Any, k: int, movables: Movables, materials: Materials, solids: Solids
+    spec: Any, k: int, movables: Movables, solids: Solids, palette: Palette, afloat: bool
 ) -> None:
     """A floe, or a box: a free body whose frame is in the middle of its height."""
     outline, mass = movables.outline(k), float(movables.masses[k])
     half, name = 0.5 * solids.object_height, f"object {k}"
-    wheeled = bool(movables.wheeled[k]) and materials.water is None
-    meets = STATIC_BIT | OBJECT_BIT
-    if materials.water is None:
-        body = spec.worldbody.add_body(name=name, pos=[0.0, 0.0, half])
-        body.add_freejoint()
-        meets |= FLOOR_BIT
+    wheeled = bool(movables.wheeled[k]) and not afloat
+    body = spec.worldbody.add_body(name=name, pos=[0.0, 0.0, 0.0 if afloat else half])
+    if afloat:
+        slide, hinge = mujoco.mjtJoint.mjJNT_SLIDE, mujoco.mjtJoint.mjJNT_HINGE
+        for kind, axis in zip((slide, slide, hinge), np.eye(3), strict=True):
+            body.add_joint(type=kind, axis=axis)
     else:
-        body = add_floating(spec, name)
+        body.add_freejoint()
     set_mass(body, outline, solids.object_height, mass, [0.0, 0.0, 0.0])
-    palette = palette_of(materials)
-    color = color_of((palette.wheeled if wheeled else palette.box)[0])
     low = -half
     if wheeled:
         radius = ball_radius(outline, solids)
         low += 1.2 * radius
-        ball = Surface(WHEEL_BIT, FLOOR_BIT, 0.0, 3, _CASTER_BALL)
         for i, corner in enumerate(_caster_corners(outline)):
-            body.add_geom(
-                name=f"{name} caster {i}",
-                type=mujoco.mjtGeom.mjGEOM_SPHERE,
-                size=[radius, 0.0, 0.0],
-                pos=[*(0.75 * corner), radius - half],
-                **ball.options(),
-            )
-    surface = Surface(OBJECT_BIT, meets, materials.object_object, 0, color)
-    add_prism(spec, body, name, outline, low, half, surface)
+            ball, pos = f"{name} caster {i}", [*(0.75 * corner), radius - half]
+            add_geom(spec, body, ball, "sphere", [radius, 0.0, 0.0], pos, "caster")
+    color = (palette.wheeled if wheeled else palette.box)[0]
+    add_prism(spec, body, name, outline, low, half, "object", color)
 
 
 def _caster_corners(outline: FloatArray) -> FloatArray:

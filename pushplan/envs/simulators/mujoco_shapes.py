@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import mujoco
@@ -12,38 +11,6 @@ import numpy as np
 
 from pushplan.world.checks import FloatArray
 from pushplan.world.outline import centroid, signed_area
-
-Color = tuple[float, float, float]
-
-FLOOR_BIT, STATIC_BIT, OBJECT_BIT, ROBOT_BIT, WHEEL_BIT = 1, 2, 4, 8, 16
-"""Kinds of geoms, for MuJoCo's contact filter."""
-
-
-@dataclass(frozen=True)
-class Surface:
-    """What a geom collides with, and how it grips.
-
-    MuJoCo takes the friction of a pair from the geom of the higher priority, and from the greater
-    coefficient where priorities are equal.
-    """
-
-    kind: int  # what it is, one of the bits above
-    meets: int  # the kinds of geoms it collides with
-    friction: float  # sliding friction coefficient; contacts are frictionless where it is 0
-    priority: int  # the higher one decides the friction of a pair
-    color: Color  # red, green, blue in [0, 1]
-
-    def options(self) -> dict[str, Any]:
-        """Keyword arguments of ``add_geom``; the mass is stated on the body."""
-        return {
-            "contype": self.kind,
-            "conaffinity": self.meets,
-            "condim": 3 if self.friction > 0.0 else 1,
-            "friction": [self.friction, 0.0, 0.0],
-            "priority": self.priority,
-            "rgba": [*self.color, 1.0],
-            "mass": 0.0,
-        }
 
 
 def as_rectangle(outline: FloatArray) -> tuple[FloatArray, FloatArray, float] | None:
@@ -64,8 +31,51 @@ def yaw_quaternion(heading: float) -> FloatArray:
     return np.array([math.cos(0.5 * heading), 0.0, 0.0, math.sin(0.5 * heading)])
 
 
+def add_geom(
+    spec: Any,
+    body: Any,
+    name: str,
+    shape: str,
+    size: Sequence[float],
+    pos: Sequence[float],
+    kind: str,
+    color: str | None = None,
+    yaw: float = 0.0,
+) -> None:
+    """Give a body a geom.
+
+    Args:
+        spec: the model.
+        body: MjsBody that gets it.
+        name: of the geom.
+        shape: such as ``"box"``.
+        size: three half sides, or what MuJoCo takes for the shape [m].
+        pos: of its middle in the frame of the body [m].
+        kind: the class in ``mujoco_scene.xml`` that says how it touches and grips.
+        color: ``#rrggbb``; that of the class if None.
+        yaw: turn about the vertical axis [rad].
+    """
+    geom = body.add_geom(
+        spec.find_default(kind),
+        name=name,
+        type=getattr(mujoco.mjtGeom, f"mjGEOM_{shape.upper()}"),
+        pos=pos,
+        size=size,
+        quat=[math.cos(0.5 * yaw), 0.0, 0.0, math.sin(0.5 * yaw)],
+    )
+    if color is not None:
+        geom.rgba = rgba(color)
+
+
 def add_prism(
-    spec: Any, body: Any, name: str, outline: FloatArray, low: float, high: float, surface: Surface
+    spec: Any,
+    body: Any,
+    name: str,
+    outline: FloatArray,
+    low: float,
+    high: float,
+    kind: str,
+    color: str | None = None,
 ) -> None:
     """Give a body an upright prism.
 
@@ -76,19 +86,14 @@ def add_prism(
         outline: (N, 2) convex corners in the frame of the body [m].
         low: lower end in the frame of the body [m].
         high: upper end [m].
-        surface: contact and colour.
+        kind: as in `add_geom`.
+        color: likewise.
     """
     box = as_rectangle(outline)
     if box is not None:
         center, half, heading = box
-        body.add_geom(
-            name=name,
-            type=mujoco.mjtGeom.mjGEOM_BOX,
-            pos=[*center, 0.5 * (low + high)],
-            size=[*half, 0.5 * (high - low)],
-            quat=yaw_quaternion(heading),
-            **surface.options(),
-        )
+        size, pos = [*half, 0.5 * (high - low)], [*center, 0.5 * (low + high)]
+        add_geom(spec, body, name, "box", size, pos, kind, color, heading)
         return
     count = len(outline)
     corners = np.empty((2, count, 3))
@@ -96,7 +101,8 @@ def add_prism(
     corners[0, :, 2], corners[1, :, 2] = low, high
     mesh = spec.add_mesh(name=name, uservert=corners.ravel(), userface=_prism_faces(count))
     mesh.inertia = mujoco.mjtMeshInertia.mjMESH_INERTIA_CONVEX
-    body.add_geom(name=name, type=mujoco.mjtGeom.mjGEOM_MESH, meshname=name, **surface.options())
+    add_geom(spec, body, name, "mesh", [0.0, 0.0, 0.0], [0.0, 0.0, 0.0], kind, color)
+    body.geoms[-1].meshname = name
 
 
 def _prism_faces(count: int) -> FloatArray:
@@ -150,7 +156,6 @@ def set_mass(
     body.explicitinertial = True
 
 
-def color_of(color: str) -> Color:
+def rgba(color: str) -> list[float]:
     """A colour ``#rrggbb`` of the drawing room in MuJoCo's units."""
-    red, green, blue = bytes.fromhex(color[1:])
-    return red / 255.0, green / 255.0, blue / 255.0
+    return [value / 255.0 for value in bytes.fromhex(color[1:] + "ff")]

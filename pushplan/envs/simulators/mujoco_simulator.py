@@ -10,10 +10,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pushplan.envs.simulators.base import Materials, Simulator, SimulatorState, checked_path
-from pushplan.envs.simulators.mujoco_bodies import MujocoBodies
+from pushplan.envs.simulators.mujoco_bodies import MujocoBodies, scene_key
 from pushplan.envs.simulators.mujoco_camera import MujocoCamera
 from pushplan.envs.simulators.mujoco_follow import follow_path
-from pushplan.envs.simulators.mujoco_model import SceneKey
 from pushplan.envs.simulators.mujoco_options import MujocoOptions
 from pushplan.envs.trace import Trace
 from pushplan.interaction.model import Interaction
@@ -54,7 +53,7 @@ class MujocoSimulator(Simulator):
         Raises:
             InvalidInputError: if ``materials.solids`` is None, or the robot cannot drive.
         """
-        key = SceneKey.of(world, materials, self.options)
+        key = scene_key(world, materials, self.options)
         if self._bodies is None or self._bodies.key != key:
             self._camera = None
             self._bodies = MujocoBodies(world, materials, self.options)
