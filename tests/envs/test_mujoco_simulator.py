@@ -25,13 +25,13 @@ from mujoco_scenes import (
     turtlebot,
 )
 
-from pushplan.compiled import owned
 from pushplan.envs import PushEnv
 from pushplan.envs.registry import SIMULATORS
-from pushplan.envs.simulators.mujoco_kernels import drag_damping, planar_rows, rest_cycles
+from pushplan.envs.simulators.mujoco_bodies import drag_damping, planar_rows
 from pushplan.envs.simulators.mujoco_options import MujocoOptions
 from pushplan.envs.simulators.mujoco_shapes import as_rectangle, prism_inertia
 from pushplan.envs.simulators.mujoco_simulator import MujocoSimulator
+from pushplan.envs.simulators.mujoco_sleep import rest_cycles
 from pushplan.imports.on_demand import look_up
 from pushplan.world import (
     InvalidInputError,
@@ -349,8 +349,8 @@ def test_planar_rows_agree_with_numpy():
 
 def test_drag_damping_agrees_with_the_law():
     rng = np.random.default_rng(0)
-    v, drag, out = rng.normal(size=(5, 3)), rng.uniform(0, 9, (5, 4)), np.empty((5, 3))
-    drag_damping(v, drag, out)
+    v, drag = rng.normal(size=(5, 3)), rng.uniform(0, 9, (5, 4))
+    out = drag_damping(v, drag)
     speed = np.hypot(v[:, 0], v[:, 1])
     np.testing.assert_allclose(out[:, 0], drag[:, 0] + drag[:, 1] * speed)
     np.testing.assert_array_equal(out[:, 0], out[:, 1])
@@ -362,9 +362,8 @@ def test_objects_that_may_touch_sleep_together():
     at = [(0.0, 0.0, 0.0), (0.0802, 0.0, 0.0), (1.0, 0.0, 0.0), (2.0, 0.0, 0.0), (2.05, 0.06, 0.5)]
     movables = Movables.from_outlines([SQUARE] * 5, at)
     quiet = np.array([True, True, True, True, False])
-    asleep = np.full(6, -11, dtype=np.int32)
     shapes = (movables.vertices, movables.offsets, movables.radii)
-    rest_cycles(owned(movables.poses), *shapes, quiet, 0.0005, asleep)
+    asleep = rest_cycles(movables.poses, *shapes, quiet, 0.0005)
     assert asleep.tolist() == [-11, 2, 1, 3, -11, -11]
 
 

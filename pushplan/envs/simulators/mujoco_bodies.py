@@ -9,24 +9,38 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from pushplan.compiled import owned
+from pushplan.compiled import kernel
 from pushplan.envs.simulators.base import Materials
-from pushplan.envs.simulators.mujoco_kernels import (
-    drag_damping,
-    planar_rows,
+from pushplan.envs.simulators.mujoco_model import scene_model
+from pushplan.envs.simulators.mujoco_options import MujocoOptions
+from pushplan.envs.simulators.mujoco_sleep import (
+    AWAKE,
+    put_to_sleep,
     quiet_objects,
     rest_cycles,
     rest_gap,
-    sleep_lists,
 )
-from pushplan.envs.simulators.mujoco_model import scene_model
-from pushplan.envs.simulators.mujoco_options import MujocoOptions
 from pushplan.world import PushplanError, World
 from pushplan.world.checks import BoolArray, FloatArray, IntArray
 
 _LOG = logging.getLogger(__name__)
 _FASTEST = 1e8  # no velocity of a sane simulation exceeds this [m/s] or [rad/s]
-_AWAKE = -1 - 10  # what MuJoCo writes for a tree that has just been woken: -(1 + mjMINAWAKE)
+
+
+@kernel(allocates=True)
+def planar_rows(
+    qpos: FloatArray,  # (N, nq) one free body (x, y, z, quaternion w x y z), joints, free bodies
+    first: int,  # where the second free body begins
+    out: FloatArray,  # (N, B, 3) receives x, y [m] and theta [rad] of each free body
+) -> None:
+    """Planar poses of free bodies."""
+    for n in range(len(qpos)):
+        for b in range(out.shape[1]):
+            at = first + 7 * (b - 1) if b else 0
+            w, x = qpos[n, at + 3], qpos[n, at + 4]
+            y, z = qpos[n, at + 5], qpos[n, at + 6]
+            out[n, b, 0], out[n, b, 1] = qpos[n, at], qpos[n, at + 1]
+            out[n, b, 2] = math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
 
 
 def log_warnings() -> None:
@@ -72,7 +86,6 @@ class MujocoBodies:
         self._outlines = movables.vertices, movables.offsets, movables.radii
         self._options = options
         self._gap = rest_gap(movables.radii)
-        self._quiet = np.empty(self.count, dtype=np.bool_)
         self.accelerations = math.inf, math.inf  # up to speed well within a step
         """What the robot's motors can do on free ground: [m/s²] and [rad/s²]."""
         if self.afloat:
@@ -84,20 +97,6 @@ class MujocoBodies:
         self.qvel: FloatArray = data.qvel
         self.ctrl, self._damping = data.ctrl, model.dof_damping
         self._asleep, self._touch = data.tree_asleep, data.sensordata
-        # copied: compiled loops want arrays of one kind, and those of the model are read-only
-        self._tree = (
-            np.array(model.body_treeid),
-            np.array(model.body_parentid),
-            np.array(model.dof_treeid),
-        )
-        self._lists = (
-            data.tree_awake,
-            data.body_awake,
-            data.body_awake_ind,
-            data.parent_awake_ind,
-            data.dof_awake_ind,
-        )
-        self._all_awake = np.full(model.ntree, _AWAKE, dtype=np.int32)
         first = 3 if self.afloat else 9
         self._first_q, self._first_v = first, 3 if self.afloat else 8
         size_q, size_v = (3, 3) if self.afloat else (7, 6)
@@ -128,8 +127,7 @@ class MujocoBodies:
             rows[:, 4:6] = 0.0
             rates[:, :2], rates[:, 5] = twists[:, :2], twists[:, 2]
         quiet: BoolArray = np.logical_not(twists.any(axis=1))
-        asleep = self._all_awake.copy()
-        rest_cycles(owned(poses), *self._outlines, quiet, self._gap, asleep)
+        asleep = rest_cycles(poses, *self._outlines, quiet, self._gap)
         self._load(world.time, qpos, qvel, asleep)
 
     def _put_robot(
@@ -180,7 +178,7 @@ class MujocoBodies:
         """What `hidden` would return without some of the objects, given by index."""
         kept = np.delete(np.arange(self.count), gone)
         positions, velocities = self._objects_q[kept], self._objects_v[kept]
-        asleep = np.full(len(kept), _AWAKE)  # who rests is found out anew
+        asleep = np.full(len(kept), AWAKE)  # who rests is found out anew
         return np.concatenate(
             [
                 self.qpos[: self._first_q],
@@ -212,7 +210,7 @@ class MujocoBodies:
     def wake_all(self, time: float, hidden: FloatArray) -> None:
         """Go back to what `hidden` returned, with every object awake."""
         awake = hidden.copy()
-        awake[-self.model.ntree :] = _AWAKE
+        awake[-self.model.ntree :] = AWAKE
         self.load_hidden(time, awake)
 
     def settle(self, before: FloatArray, interval: float) -> None:
@@ -224,23 +222,19 @@ class MujocoBodies:
         """
         if self.count == 0:
             return
-        quiet_objects(
+        quiet = quiet_objects(
             self._objects_v,
             self._objects_q,
             before[self._first_q :].reshape(self._objects_q.shape),
             self._outlines[2],
             self._options.sleep_speed,
             interval,
-            self._quiet,
         )
-        quiet = self._quiet
         if not quiet[self._asleep[1:] < 0].any():
             return  # nobody new
-        asleep = self._all_awake.copy()
-        poses = self.poses()[1:]
-        rest_cycles(poses, *self._outlines, quiet, self._gap, asleep)
+        asleep = rest_cycles(self.poses()[1:], *self._outlines, quiet, self._gap)
         self._objects_v[asleep[1:] >= 0] = 0.0
-        self._put_to_sleep(asleep)
+        put_to_sleep(self.model, self.data, asleep)
 
     def _load(self, time: float, qpos: FloatArray, qvel: FloatArray, asleep: Any) -> None:
         model, data = self.model, self.data
@@ -252,15 +246,7 @@ class MujocoBodies:
         mujoco.mj_comPos(model, data)
         mujoco.mj_crb(model, data)
         mujoco.mj_factorM(model, data)
-        self._put_to_sleep(asleep)
-
-    def _put_to_sleep(self, asleep: Any) -> None:
-        """Set which trees sleep, and the lists that MuJoCo derives from that."""
-        data = self.data
-        self._asleep[:] = asleep
-        trees, bodies, parents, dofs = sleep_lists(self._asleep, *self._tree, *self._lists)
-        data.ntree_awake, data.nbody_awake = trees, bodies
-        data.nparent_awake, data.nv_awake = parents, dofs
+        put_to_sleep(model, data, asleep)
 
     # ---------------------------------------------------------------- stepping
 
@@ -277,7 +263,7 @@ class MujocoBodies:
         most = max(1, int(options.drag_interval / model.opt.timestep))
         velocities, damping = self.qvel.reshape(-1, 3), self._damping.reshape(-1, 3)
         while steps > 0:
-            drag_damping(velocities, self._drag, damping)
+            damping[:] = drag_damping(velocities, self._drag)
             mujoco.mj_step(model, data, min(most, steps))
             steps -= most
 
@@ -297,3 +283,18 @@ class MujocoBodies:
                 "the MuJoCo simulation has diverged: bodies may overlap deeply at the start, or "
                 "the time step be too long for the masses and forces of this scene"
             )
+
+
+def drag_damping(velocities: FloatArray, drag: FloatArray) -> FloatArray:
+    """Linear damping that equals combined linear and quadratic drag at the velocities now.
+
+    Args:
+        velocities: (B, 3) of floating bodies [m/s, m/s, rad/s].
+        drag: (B, 4) linear and quadratic coefficients of translation, then of rotation.
+
+    Returns:
+        (B, 3) b + c |v|, [N s/m] and [N m s].
+    """
+    x, y, w = velocities.T
+    along = drag[:, 0] + drag[:, 1] * np.sqrt(x * x + y * y)
+    return np.column_stack([along, along, drag[:, 2] + drag[:, 3] * np.abs(w)])
