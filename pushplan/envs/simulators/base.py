@@ -147,14 +147,15 @@ class Simulator(ABC):
         """Go back to a saved state of the same scene."""
 
     @property
-    @abstractmethod
     def robot_pose(self) -> FloatArray:
         """(3,) x, y [m], theta [rad] of the robot now; cheap."""
+        pose: FloatArray = self._motion()[1][0]
+        return pose
 
     @property
-    @abstractmethod
     def object_poses(self) -> FloatArray:
         """(K, 3) poses of the objects now; cheap."""
+        return np.ascontiguousarray(self._motion()[1][1:])
 
     @abstractmethod
     def remove(self, object_ids: Sequence[int]) -> None:

@@ -9,7 +9,6 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from pushplan.compiled import kernel
 from pushplan.envs.simulators.base import Materials
 from pushplan.envs.simulators.mujoco_model import scene_model
 from pushplan.envs.simulators.mujoco_options import MujocoOptions
@@ -25,22 +24,6 @@ from pushplan.world.checks import BoolArray, FloatArray, IntArray
 
 _LOG = logging.getLogger(__name__)
 _FASTEST = 1e8  # no velocity of a sane simulation exceeds this [m/s] or [rad/s]
-
-
-@kernel(allocates=True)
-def planar_rows(
-    qpos: FloatArray,  # (N, nq) one free body (x, y, z, quaternion w x y z), joints, free bodies
-    first: int,  # where the second free body begins
-    out: FloatArray,  # (N, B, 3) receives x, y [m] and theta [rad] of each free body
-) -> None:
-    """Planar poses of free bodies."""
-    for n in range(len(qpos)):
-        for b in range(out.shape[1]):
-            at = first + 7 * (b - 1) if b else 0
-            w, x = qpos[n, at + 3], qpos[n, at + 4]
-            y, z = qpos[n, at + 5], qpos[n, at + 6]
-            out[n, b, 0], out[n, b, 1] = qpos[n, at], qpos[n, at + 1]
-            out[n, b, 2] = math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
 
 
 def log_warnings() -> None:
@@ -148,12 +131,11 @@ class MujocoBodies:
 
     def planar(self, qpos: FloatArray) -> FloatArray:
         """(N, 1 + K, 3) poses of N stored positions (N, nq): robot, then objects."""
-        rows: FloatArray = np.empty((len(qpos), 1 + self.count, 3))
         if self.afloat:
-            rows[:] = qpos.reshape(rows.shape)
-        else:
-            planar_rows(qpos, self._first_q, rows)
-        return rows
+            return np.array(qpos).reshape(len(qpos), 1 + self.count, 3)
+        # the robot, two wheels, objects
+        free = np.concatenate([qpos[:, :7], qpos[:, 9:]], axis=1)
+        return planar_rows(free.reshape(len(qpos), 1 + self.count, 7))
 
     def poses(self) -> FloatArray:
         """(1 + K, 3) poses now."""
@@ -298,3 +280,15 @@ def drag_damping(velocities: FloatArray, drag: FloatArray) -> FloatArray:
     x, y, w = velocities.T
     along = drag[:, 0] + drag[:, 1] * np.sqrt(x * x + y * y)
     return np.column_stack([along, along, drag[:, 2] + drag[:, 3] * np.abs(w)])
+
+
+def planar_rows(bodies: FloatArray) -> FloatArray:
+    """(..., 3) planar poses of free bodies (..., 7): x, y, z [m] and a quaternion w, x, y, z."""
+    w, x, y, z = np.moveaxis(bodies[..., 3:], -1, 0)
+    sines, cosines = 2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z)
+    rows = np.empty((*bodies.shape[:-1], 3))
+    rows[..., :2] = bodies[..., :2]
+    # not by NumPy, whose last digit depends on the processor
+    angles = list(map(math.atan2, sines.ravel().tolist(), cosines.ravel().tolist()))
+    rows[..., 2] = np.reshape(angles, sines.shape)
+    return rows

@@ -171,17 +171,6 @@ class MujocoSimulator(Simulator):
         self._held = self._touched = False
         bodies.load_hidden(state.time, state.hidden)
 
-    @property
-    def robot_pose(self) -> FloatArray:
-        """(3,) pose of the robot now."""
-        pose: FloatArray = self._scene.poses()[0]
-        return pose
-
-    @property
-    def object_poses(self) -> FloatArray:
-        """(K, 3) poses of the objects now."""
-        return self._scene.poses()[1:]
-
     def remove(self, object_ids: Sequence[int]) -> None:
         """Take objects off the floor."""
         world, gone = self._without(object_ids)

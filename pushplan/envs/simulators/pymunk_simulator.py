@@ -276,16 +276,6 @@ class PymunkSimulator(Simulator):
         self._held = self._touched = False
         self._rows = np.concatenate([robot[None], objects])
 
-    @property
-    def robot_pose(self) -> FloatArray:
-        """(3,) pose of the robot now."""
-        return self._rows[0, :3].copy()
-
-    @property
-    def object_poses(self) -> FloatArray:
-        """(K, 3) poses of the objects now."""
-        return self._rows[1:, :3].copy()
-
     def remove(self, object_ids: Sequence[int]) -> None:
         """Take objects off the floor."""
         self.build(self._without(object_ids)[0], self._materials)
