@@ -19,7 +19,6 @@ EXTRAS = (
     "gymnasium",
     "pymunk",
     "mujoco",
-    "casadi",
     "onnxruntime",
     "matplotlib",
     "imageio_ffmpeg",

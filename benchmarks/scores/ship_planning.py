@@ -31,7 +31,7 @@ from pushplan.motion.speed_profile import turning_radius
 from pushplan.motion.state_lattice.lattice_builder import LatticeBuilder
 from pushplan.motion.state_lattice.lattice_search import open_search
 from pushplan.planners import make_planner, warm_up
-from pushplan.planners.ship_lattice import ShipLattice, ShipLatticeConfig
+from pushplan.planners.ship_lattice import ShipLatticeConfig
 from pushplan.planners.ship_lattice.floe_costs import floe_costs
 from pushplan.scenarios import Scenario
 from pushplan.world import World, stream
@@ -134,7 +134,7 @@ def ratio(first: dict[int, float | None], second: dict[int, float | None]) -> st
 
 
 def times(shares: Sequence[int], fields: int, seed: int) -> None:
-    """Times of planning calls and node rates, then of the refinement at full scale."""
+    """Times of planning calls and node rates."""
     warm_up(*TIMED)
     print("Times in ms: median of the first path; median / p95 / p99 / worst of whole calls.\n")
     print("| goal, ice | planner | first path | whole call | CPU median | nodes |")
@@ -153,12 +153,6 @@ def times(shares: Sequence[int], fields: int, seed: int) -> None:
         ("`ship-lattice-published`", ShipLatticeConfig.published()),
     ):
         print(f"| {title} | {rate(worlds, config)} |", flush=True)
-    print("\n| full scale, 30 %, goal at 1200 m | first path | whole call | CPU median | nodes |")
-    print("|---|---|---|---|---|")
-    worlds = starts(fields, seed, 30, {}, "full_scale")
-    for title, refinement in (("searches only", 0), ("searches and refinement", 30)):
-        planner = ShipLattice(ShipLatticeConfig(shortcuts=0, refinement=refinement))
-        print(f"| {title} | {row(planner, worlds)} |", flush=True)
 
 
 def starts(

@@ -17,7 +17,6 @@ EXTRAS = {
     "gymnasium": "sim",
     "mujoco": "sim",
     "pymunk": "sim",
-    "casadi": "ships",
     "onnxruntime": "learned",
     "imageio_ffmpeg": "plots",
     "jinja2": "plots",

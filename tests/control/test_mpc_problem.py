@@ -52,36 +52,44 @@ def tuning(**changes: object) -> Tuning:
     return Tuning(**{**fields, **changes})
 
 
-def residuals(z, pose, last, steps, tune):
-    """The square roots of the terms of the cost, on a circle, in plain Python."""
-    count = len(steps)
-    turns = z[:count] * TURN
-    speeds = z[count:] * SPEED if len(z) > count else np.full(count, SPEED)
+def reference(count, tune):
+    """The model and the cost on a circle in CasADi: square roots of terms, and their derivatives.
+
+    A function of the inputs as fractions, the pose, the turn rate before and the steps.
+    """
+    z = casadi.SX.sym("z", 2 * count if tune.optimise_speed else count)
+    pose, last, steps = (
+        casadi.SX.sym("pose", 3),
+        casadi.SX.sym("last"),
+        casadi.SX.sym("steps", count),
+    )
     unit = tune.size / tune.max_speed
-    x, y, theta = pose
+    x, y, theta = pose[0], pose[1], pose[2]
     found = []
     before = last
-    for k, dt in enumerate(steps):
+    for k in range(count):
+        turn = z[k] * TURN
+        speed = z[count + k] * SPEED if tune.optimise_speed else SPEED
+        part = steps[k] / 50
         for _ in range(50):  # many small steps instead of an exact arc
-            part = dt / 50
-            x += speeds[k] * part * math.cos(theta + 0.5 * turns[k] * part)
-            y += speeds[k] * part * math.sin(theta + 0.5 * turns[k] * part)
-            theta += turns[k] * part
-        away = np.array([x, y]) - CENTRE
-        offset = 1.0 / CURVATURE - np.hypot(*away)
-        heading = math.atan2(away[1], away[0]) + math.pi / 2
-        tau = dt / unit
+            x += speed * part * casadi.cos(theta + 0.5 * turn * part)
+            y += speed * part * casadi.sin(theta + 0.5 * turn * part)
+            theta += turn * part
+        offset = 1.0 / CURVATURE - casadi.hypot(x - CENTRE[0], y - CENTRE[1])
+        off = theta - casadi.atan2(y - CENTRE[1], x - CENTRE[0]) - math.pi / 2
+        error = casadi.atan2(casadi.sin(off), casadi.cos(off))
+        tau = steps[k] / unit
         weight = tau * (tune.terminal if k == count - 1 else 1.0)
-        error = math.remainder(theta - heading, 2.0 * math.pi)
-        found.append(math.sqrt(weight) * offset / tune.size)
-        found.append(math.sqrt(weight * tune.heading_weight) * error)
-        wanted = speeds[k] * CURVATURE if len(z) == count else SPEED * CURVATURE
-        found.append(math.sqrt(tau * tune.turn_weight) * unit * (turns[k] - wanted))
-        found.append(math.sqrt(tune.smoothness / tau) * unit * (turns[k] - before))
-        if len(z) > count:
-            found.append(math.sqrt(tau * tune.speed_weight) * (z[count + k] - 1.0))
-        before = turns[k]
-    return np.array(found)
+        found.append(casadi.sqrt(weight) * offset / tune.size)
+        found.append(casadi.sqrt(weight * tune.heading_weight) * error)
+        found.append(casadi.sqrt(tau * tune.turn_weight) * unit * (turn - SPEED * CURVATURE))
+        found.append(casadi.sqrt(tune.smoothness / tau) * unit * (turn - before))
+        if tune.optimise_speed:
+            found.append(casadi.sqrt(tau * tune.speed_weight) * (z[count + k] - 1.0))
+        before = turn
+    residuals = casadi.vertcat(*found)
+    made = casadi.Function("f", [z, pose, last, steps], [residuals, casadi.jacobian(residuals, z)])
+    return lambda *at: [part.full() for part in made(*at)]
 
 
 @pytest.mark.parametrize("optimise", [False, True])
@@ -104,18 +112,9 @@ def test_the_assembled_problem_is_the_linearised_one(seed, optimise):
     twist = np.array([SPEED, last])
     place = (pose, 0.3, twist, steps, nominal.copy())
     assemble(circle_track(), tune, *place, hessian, gradient, assembly_memory(n))
-    small = 1e-6
-    columns = [
-        (
-            residuals(z + small * unit, pose, last, steps, tune)
-            - residuals(z - small * unit, pose, last, steps, tune)
-        )
-        / (2 * small)
-        for unit in np.eye(n)
-    ]
-    jacobian = np.array(columns).T
+    residuals, jacobian = reference(count, tune)(z, pose, last, steps)
     expected = jacobian.T @ jacobian
-    slope = jacobian.T @ residuals(z, pose, last, steps, tune)
+    slope = (jacobian.T @ residuals).ravel()
     assert hessian == pytest.approx(expected, abs=2e-3 * np.abs(expected).max())
     assert hessian @ z + gradient == pytest.approx(slope, abs=2e-3 * np.abs(slope).max())
 
@@ -139,13 +138,17 @@ def test_repeated_it_solves_the_nonlinear_problem():
     steps = np.full(10, config.reach * size / SPEED / 10)
     steps[0] = 0.4
 
+    model = reference(10, tune)
+
     def cost(z):
-        return float((residuals(z, world.robot_pose, 0.0, steps, tune) ** 2).sum())
+        residuals, jacobian = model(z, world.robot_pose, 0.0, steps)
+        return float((residuals**2).sum()), 2.0 * (jacobian.T @ residuals).ravel()
 
     best = minimize(
         cost,
         np.zeros(10),
         bounds=[(-1, 1)] * 10,
+        jac=True,
         method="L-BFGS-B",
         options={"maxiter": 2000, "ftol": 1e-13, "gtol": 1e-9},
     )

@@ -1,12 +1,11 @@
 """One kinodynamic random tree, grown by OMPL's control-space RRT (LaValle and Kuffner 2001).
 
 OMPL owns the tree, the nearest-neighbour search and the loop; it calls back for targets, for the
-motion towards them, and for the goal. Its Python binding offers no constructor for a directed
-control sampler, so the sampling of several controls, of which the one that gets nearest to the
-target is kept, happens inside the propagator: OMPL's own sample is one of them, and the edges are
-written down here, because the control that OMPL stores is only the sample. OMPL counts from the
-start, in units in which its distance between two poses is that of `steer`: so its tree is the same
-wherever and however large the world is.
+motion towards them, and for the goal. A control is a curvature. Its Python binding (2.0.1) offers
+no constructor for a directed control sampler, so the propagator tries several curvatures and puts
+the one that gets nearest to the target in the place of OMPL's sample. The length of the arc, and
+how far the way leads back in all, are part of the state that it leads to, with no weight in the
+distance of two states, which is that of `steer`.
 """
 
 from __future__ import annotations
@@ -16,12 +15,12 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from ompl import base, control
+from ompl import base, control, util
 
 from pushplan.compiled import copy_into, kernel
 from pushplan.motion.collision import ConvexObstacles, Footprint, is_free
 from pushplan.motion.dubins import along_arc, step_along
-from pushplan.motion.random_tree.ompl_lock import own_state, seeded_ompl
+from pushplan.motion.random_tree.ompl_lock import ompl_alone, own_state, plane_bounds
 from pushplan.world import NavigationGoal
 from pushplan.world.checks import FloatArray
 
@@ -36,8 +35,8 @@ class TreeLimits(NamedTuple):
     backward: float  # how far a path may lead back in all [m]
 
 
-_OMPL_TURN_WEIGHT = 0.5  # what a radian is worth in the distance of its SE(2)
-_State = tuple[float, float, float]
+_PLACE, _HEADING, _DRIVEN = range(3)  # the parts of a state, of which the last is:
+_LENGTH, _BACK = range(2)  # length of the arc that led there, and of all that leads back [m]
 
 
 @kernel(allocates=True)
@@ -87,7 +86,7 @@ def steer(
 
 @dataclass(eq=False)
 class TreeGrowth:
-    """A tree that grows from ``start`` to ``goal``: the state behind OMPL's callbacks."""
+    """A tree that grows from ``start`` to ``goal``: what OMPL's callbacks need."""
 
     start: FloatArray  # (3,) pose
     goal: NavigationGoal
@@ -97,22 +96,9 @@ class TreeGrowth:
     among: ConvexObstacles  # what it must not touch
 
     def __post_init__(self) -> None:
-        self.start = np.array([self.start[0], self.start[1], _wrap(self.start[2])])
-        self.unit = self.limits.turn_weight / _OMPL_TURN_WEIGHT
-        self.root = self.state_of(self.start)
-        self.poses = {self.root: self.start}
-        self.backed = {self.root: 0.0}  # how far the way to each state leads back [m]
         self.scratch = np.empty_like(self.shape.vertices)
-        self.end, self.target = np.empty(3), np.empty(3)
+        self.origin, self.end, self.target = np.empty(3), np.empty(3), np.empty(3)
         self.moved = True  # OMPL asks whether the start is valid before anything moves
-        self.reached: _State | None = None
-        # end of each edge -> its start, length and curvature
-        self.edges: dict[_State, tuple[_State, float, float]] = {}
-
-    def state_of(self, pose: FloatArray) -> _State:
-        """A pose (3,) as OMPL has it."""
-        x, y, yaw = (float(value) for value in pose)
-        return (x - self.start[0]) / self.unit, (y - self.start[1]) / self.unit, yaw
 
     def grow(
         self, seed: int, done: Callable[[], bool], stopped: Callable[[], bool]
@@ -127,17 +113,12 @@ class TreeGrowth:
         Returns:
             (E, 2) length [m] and curvature [1/m] of the arcs from start to goal, or None.
         """
-        with seeded_ompl(seed, stopped) as ready:
-            return self._run(done) if ready else None
+        with ompl_alone(stopped) as ready:
+            return self._run(seed, done) if ready else None
 
-    def _run(self, done: Callable[[], bool]) -> FloatArray | None:
-        space = base.SE2StateSpace()
-        bounds = base.RealVectorBounds(2)
-        limits = (self.among.bounds - np.tile(self.start[:2], 2)) / self.unit
-        for axis in range(2):
-            bounds.setLow(axis, float(limits[axis]))
-            bounds.setHigh(axis, float(limits[axis + 2]))
-        space.setBounds(bounds)
+    def _run(self, seed: int, done: Callable[[], bool]) -> FloatArray | None:
+        space = _state_space(self.limits.turn_weight)
+        space.getSubspace(_PLACE).setBounds(plane_bounds(self.among.bounds))
         controls = control.RealVectorControlSpace(space, 1)
         curvatures = base.RealVectorBounds(1)
         curvatures.setLow(-self.limits.max_curvature)
@@ -145,44 +126,46 @@ class TreeGrowth:
         controls.setBounds(curvatures)
         info = control.SpaceInformation(space, controls)
         info.setStatePropagator(self._propagate)
-        info.setStateValidityChecker(self._is_valid)
+        info.setStateValidityChecker(lambda state: self.moved)
         info.setPropagationStepSize(1.0)
         info.setMinMaxControlDuration(1, 1)
         info.setup()
         problem = base.ProblemDefinition(info)
-        state = own_state(base.SE2StateSpace)
-        _write(self.root, state)
-        problem.addStartState(state)
+        start = own_state(_state_space)
+        _write(self.start, start)
+        start[_HEADING].value = _wrap(self.start[2])
+        start[_DRIVEN][_LENGTH] = start[_DRIVEN][_BACK] = 0.0
+        problem.addStartState(start)
         region = _Region(info, self)
         problem.setGoal(region)
         planner = control.RRT(info)
         planner.setGoalBias(1.0)  # every target comes from `targets`
         planner.setProblemDefinition(problem)
+        util.RNG.setSeed(seed)  # for the samplers, which are made from here on
         planner.setup()
-        finished = base.PlannerTerminationCondition(lambda: self.reached is not None or done())
-        planner.solve(finished)
-        return self._trace() if self.reached is not None else None
-
-    def sample(self) -> FloatArray:
-        """The next target, remembered for the propagation that follows."""
-        self.target[:] = self.targets()
-        return self.target
-
-    def distance(self, state: _State) -> float:
-        """Distance [m] of a state of the tree to the goal, which is then reached where it is 0."""
-        away = float(self.goal.distance(*self.poses[state][:2]))
-        if away == 0.0 and state in self.edges:
-            self.reached = state
-        return away
+        planner.solve(base.PlannerTerminationCondition(done))
+        if not problem.hasExactSolution():
+            return None
+        path = problem.getSolutionPath()
+        ends = path.getStates()[1:]
+        return np.array(
+            [
+                [end[_DRIVEN][_LENGTH], driven[0]]
+                for end, driven in zip(ends, path.getControls(), strict=True)
+            ]
+        )
 
     def _propagate(
         self, state: base.State, action: control.Control, duration: float, result: base.State
     ) -> None:
-        origin, limits = _read(state), self.limits
+        """Drive towards the target; the control becomes the curvature that was driven."""
+        limits, back = self.limits, state[_DRIVEN][_BACK]
         if limits.backward > 0.0:
-            limits = limits._replace(backward=limits.backward - self.backed[origin])
+            limits = limits._replace(backward=limits.backward - back)
+        self.origin[0], self.origin[1] = state[_PLACE][0], state[_PLACE][1]
+        self.origin[2] = state[_HEADING].value
         curvature, length = steer(
-            self.poses[origin],
+            self.origin,
             self.target,
             action[0],
             limits,
@@ -195,23 +178,10 @@ class TreeGrowth:
         if not self.moved:
             return
         self.end[2] = _wrap(self.end[2])
-        end = self.state_of(self.end)
-        _write(end, result)
-        if end not in self.poses:
-            self.poses[end] = self.end.copy()
-            self.edges[end] = (origin, length, curvature)
-            self.backed[end] = self.backed[origin] - min(length, 0.0)
-
-    def _is_valid(self, state: base.State) -> bool:
-        return self.moved
-
-    def _trace(self) -> FloatArray:
-        arcs: list[tuple[float, float]] = []
-        at = self.reached
-        while at is not None and at != self.root:
-            at, length, curvature = self.edges[at]
-            arcs.append((length, curvature))
-        return np.array(arcs[::-1]).reshape(-1, 2)
+        _write(self.end, result)
+        result[_DRIVEN][_LENGTH] = length
+        result[_DRIVEN][_BACK] = back - min(length, 0.0)
+        action[0] = curvature
 
 
 class _Region(base.GoalSampleableRegion):
@@ -220,25 +190,33 @@ class _Region(base.GoalSampleableRegion):
     def __init__(self, info: control.SpaceInformation, growth: TreeGrowth) -> None:
         super().__init__(info)
         self.growth = growth
+        self.setThreshold(np.finfo(np.float64).tiny)  # only a distance of 0 is below
 
     def sampleGoal(self, state: base.State) -> None:
-        _write(self.growth.state_of(self.growth.sample()), state)
+        self.growth.target[:] = self.growth.targets()
+        _write(self.growth.target, state)
 
     def maxSampleCount(self) -> int:
         return 1_000_000_000
 
     def distanceGoal(self, state: base.State) -> float:
-        return self.growth.distance(_read(state))
+        return float(self.growth.goal.distance(state[_PLACE][0], state[_PLACE][1]))
 
 
-def _read(state: base.State) -> _State:
-    return state.getX(), state.getY(), state.getYaw()
+def _state_space(turn_weight: float = 1.0) -> base.CompoundStateSpace:
+    space = base.CompoundStateSpace()
+    space.addSubspace(base.RealVectorStateSpace(2), 1.0)
+    space.addSubspace(base.SO2StateSpace(), turn_weight)
+    driven = base.RealVectorStateSpace(2)
+    driven.setBounds(plane_bounds(np.array([-1.0, -1.0, 1.0, 1.0])))  # OMPL wants some
+    space.addSubspace(driven, 0.0)
+    return space
 
 
-def _write(values: _State, state: base.State) -> None:
-    state.setX(values[0])
-    state.setY(values[1])
-    state.setYaw(values[2])
+def _write(pose: FloatArray, state: base.State) -> None:
+    state[_PLACE][0] = float(pose[0])
+    state[_PLACE][1] = float(pose[1])
+    state[_HEADING].value = float(pose[2])
 
 
 def _wrap(angle: float) -> float:

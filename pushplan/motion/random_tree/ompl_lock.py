@@ -11,28 +11,38 @@ from typing import Any
 
 from ompl import base, util
 
+from pushplan.world.checks import FloatArray
+
 _LOCK = threading.Lock()
 _POLL_S = 0.002
 
 
 @functools.cache
-def own_state(kind: type[base.StateSpace], *arguments: int) -> Any:
+def own_state(space: Callable[[], base.StateSpace]) -> Any:
     """The one state of a kind of space to hand values to OMPL with, which copies it.
 
     Its Python binding cannot free states (2.0.1), so one for each call would be lost.
     """
-    return kind(*arguments).allocState()
+    return space().allocState()
 
 
 atexit.register(own_state.cache_clear)  # else the binding complains about what is left
 
 
+def plane_bounds(bounds: FloatArray) -> base.RealVectorBounds:
+    """Bounds (4,) of a plane as OMPL has them."""
+    made = base.RealVectorBounds(2)
+    for axis in range(2):
+        made.setLow(axis, float(bounds[axis]))
+        made.setHigh(axis, float(bounds[axis + 2]))
+    return made
+
+
 @contextlib.contextmanager
-def seeded_ompl(seed: int, stopped: Callable[[], bool]) -> Iterator[bool]:
-    """Seed every generator that OMPL makes inside the block, and keep it from printing.
+def ompl_alone(stopped: Callable[[], bool]) -> Iterator[bool]:
+    """Keep other threads from seeding OMPL inside the block, and OMPL from printing.
 
     Args:
-        seed: positive.
         stopped: asked while another thread uses OMPL, so that waiting keeps to a stop rule.
 
     Yields:
@@ -44,7 +54,6 @@ def seeded_ompl(seed: int, stopped: Callable[[], bool]) -> Iterator[bool]:
     try:
         if ours:
             util.setLogLevel(util.LogLevel.LOG_NONE)
-            util.RNG.setSeed(seed)
         yield ours
     finally:
         if ours:

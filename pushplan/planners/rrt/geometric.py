@@ -5,14 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
-from ompl import base, geometric
+from ompl import base, geometric, util
 
 from pushplan.compiled import kernel, owned
 from pushplan.geometry import core_distance
 from pushplan.motion.collision import ConvexObstacles, obstacles
 from pushplan.motion.keep_out import keep_out
 from pushplan.motion.polyline import polyline_plan, polyline_status
-from pushplan.motion.random_tree.ompl_lock import own_state, seeded_ompl
+from pushplan.motion.random_tree.ompl_lock import ompl_alone, own_state, plane_bounds
 from pushplan.motion.speed_profile import goal_is_outside, start_margin
 from pushplan.world import MaxIterations, NavigationGoal, PlanResult, PlanStatus, Stop, World
 from pushplan.world.checked_fields import CheckedFields, Fraction, PositiveFloat, PositiveInt
@@ -107,15 +107,12 @@ class GeometricRRT:
             return used >= config.pass_iterations or check(before + used, np.inf)
 
         seed = int(rng.integers(1, 2**31))
-        with seeded_ompl(seed, lambda: check(before + used, np.inf)) as ready:
+        with ompl_alone(lambda: check(before + used, np.inf)) as ready:
             if not ready:
                 return None, used
-            space = base.RealVectorStateSpace(2)
-            bounds = base.RealVectorBounds(2)
-            for axis in range(2):
-                bounds.setLow(axis, float(among.bounds[axis]))
-                bounds.setHigh(axis, float(among.bounds[axis + 2]))
-            space.setBounds(bounds)
+            util.RNG.setSeed(seed)
+            space = _plane()
+            space.setBounds(plane_bounds(among.bounds))
             info = base.SpaceInformation(space)
             point = np.empty(2)
 
@@ -129,7 +126,7 @@ class GeometricRRT:
             info.setStateValidityCheckingResolution(min(step, 0.5))
             info.setup()
             problem = base.ProblemDefinition(info)
-            start = own_state(base.RealVectorStateSpace, 2)
+            start = own_state(_plane)
             start[0], start[1] = float(world.robot_pose[0]), float(world.robot_pose[1])
             problem.addStartState(start)
             region = _GoalRegion(info, world.navigation_goal, among.bounds, rng)
@@ -144,6 +141,10 @@ class GeometricRRT:
                 return None, used
             states = problem.getSolutionPath().getStates()
             return np.array([[state[0], state[1]] for state in states]), used
+
+
+def _plane() -> base.RealVectorStateSpace:
+    return base.RealVectorStateSpace(2)
 
 
 class _GoalRegion(base.GoalSampleableRegion):

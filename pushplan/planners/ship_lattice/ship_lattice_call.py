@@ -203,8 +203,6 @@ class ShipLatticeCall:
             self._search(builder, factor)
         if self.improver.best is None or not isinstance(self.goal, GoalLine):
             return
-        if config.refinement and not self.stopped():
-            self._refine(builder)
         # a path that touches nothing is not shortened: it would be until it grazes a floe
         while self.shortcuts < config.shortcuts and self.improver.best.works[-1] > 0.0:
             if self.stopped():
@@ -213,36 +211,6 @@ class ShipLatticeCall:
             self.shortcuts += 1
             self.iterations += 1
             self.cost = self.improver.best.cost
-
-    def _refine(self, builder: LatticeBuilder) -> None:
-        """Optimise the best path in continuous space; it is kept if the sweep says it is better."""
-        continuous = need("pushplan.planners.ship_lattice.continuous")
-        assert self.improver is not None and self.improver.best is not None
-        built, best = builder.build(), self.improver.best
-        lattice = built.lattice
-        cell = lattice.step / lattice.cells
-        hull = max(1, round(2.0 * self.world.robot.inscribed_radius / cell))
-        row, column, heading = built.start
-        origin = lattice.corner + np.array([row, column]) * lattice.cells
-        field = continuous.cost_field(
-            lattice.cost_sums, lattice.stride, lattice.cells, cell, hull, origin.astype(np.float64)
-        )
-        across = built.frame.from_world(best.poses[:, :2])[:, 1]
-        reach = 2.0 * self.size
-        arcs = continuous.refine(
-            field,
-            np.column_stack([np.diff(best.lengths), best.curvatures[1:]]),
-            heading,
-            radius=builder.radius,
-            goal=(lattice.goal[1] - row) * lattice.step,
-            sides=(float(across.min()) - reach, float(across.max()) + reach),
-            iterations=self.config.refinement,
-        )
-        self.iterations += 1
-        if arcs is not None:
-            poses, curvatures = lay_path(built, arcs, self.world, self.config)
-            if self._free(poses):
-                self._consider(poses, curvatures)
 
     def _consider(self, poses: FloatArray, curvatures: FloatArray) -> None:
         assert self.improver is not None

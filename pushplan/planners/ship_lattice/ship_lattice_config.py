@@ -35,8 +35,6 @@ class ShipLatticeConfig(LatticeConfig):
         batch: nodes expanded between two looks at the stop rule.
         searches: of the lattice, one after the other, as factors on ``push_weight``. The first path
             is there after the first one; the sweeps choose among all.
-        refinement: iterations of the continuous optimisation of the best path, which cannot be
-            interrupted; 0 for none.
         shortcuts: random changes of the path of the lattice that are tried, each with a sweep.
         sweep_horizon: how far along a path the sweeps look [R]. 0 for no sweeps: the plan is the
             first path, and predicts nothing.
@@ -50,7 +48,6 @@ class ShipLatticeConfig(LatticeConfig):
     side: NonNegativeFloat = 0.75
     batch: PositiveInt = 100
     searches: tuple[float, ...] = (1.0, 0.0, 0.5, 2.0, 4.0)
-    refinement: NonNegativeInt = 0
     shortcuts: NonNegativeInt = 60
     sweep_horizon: NonNegativeFloat = 10.0
 

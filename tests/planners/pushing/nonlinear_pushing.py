@@ -207,10 +207,10 @@ def _step_cost(contact: Contact, weights: Weights, x: Any, place: Any, v: Any, w
     return cost
 
 
-def step(contact: Contact, x: Any, v: Any, w: Any, dt: Any) -> Any:
+def step(contact: Contact, x: Any, v: Any, w: Any, dt: Any, substeps: int = _SUBSTEPS) -> Any:
     """`advance` of a box in contact, as an expression: (5,) state after ``dt``."""
-    h = dt / _SUBSTEPS
-    for _ in range(_SUBSTEPS):
+    h = dt / substeps
+    for _ in range(substeps):
         offset, angle = x[3], x[4]
         vn, vt, omega = _velocity(contact, offset, angle, v, w, h)
         ahead = _standoff(contact, offset, angle)[0]

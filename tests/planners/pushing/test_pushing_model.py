@@ -17,6 +17,7 @@ from pushplan.planners.pushing import (
     contact_kernels,
     face_towards,
     pressure_radius,
+    problem_kernels,
     spread_of,
     stable_curvature,
 )
@@ -257,6 +258,23 @@ def test_nonlinear_expressions_are_those_of_the_kernels():
                 contact_kernels._push(model.contact, row, c, s, v, w, 0.05, np.empty(6))
                 contact_kernels._drive(row, v, w, 0.05)
             assert found == pytest.approx(row[:5], abs=1e-9)
+
+
+@pytest.mark.parametrize("kind", ["pusher", "collector", "navigation"])
+def test_derivatives_of_the_program_are_those_of_the_reference(kind):
+    rng = np.random.default_rng(1)
+    model = PushModel(turtlebot3_burger(kind), 0.08 * SQUARE, PushParameters(0.3))
+    at = casadi.SX.sym("at", 4)  # offset, angle, speed, turn rate
+    start = casadi.vertcat(0.0, 0.0, 0.0, at[0], at[1])
+    dt = 0.04  # one substep of `advance`
+    after = nonlinear_pushing.step(model.contact, start, at[2], at[3], dt, substeps=1)[3:]
+    exact = casadi.Function("f", [at], [casadi.jacobian(after, at)])
+    slopes, scales = np.empty((2, 4)), np.full(4, 1e-6)
+    for _ in range(60):
+        point = np.array([0.06, 0.3, 0.05, 1.0]) * rng.uniform(-1.0, 1.0, 4)
+        point[2] += 0.15
+        problem_kernels.linearise(model.contact, *point, dt, scales, slopes, np.empty(12))
+        assert slopes == pytest.approx(exact(point).full(), abs=1e-4)
 
 
 def test_what_makes_no_sense_is_refused():
