@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import functools
-from dataclasses import replace
 from typing import Protocol, runtime_checkable
 
 import numpy as np
@@ -15,17 +14,8 @@ from pushplan.motion.path_search_config import PathSearchConfig
 from pushplan.planners.following.plan_follower import PlanFollower
 from pushplan.planners.following.renewing_follower import RenewingFollower
 from pushplan.planners.registry import make_policy, policy_names
-from pushplan.world import (
-    Drive,
-    GoalDisc,
-    GoalLine,
-    MaxIterations,
-    Movables,
-    Policy,
-    RobotModel,
-    StaticMap,
-    World,
-)
+from pushplan.planners.warm_up_worlds import warm_up_worlds
+from pushplan.world import MaxIterations, Policy, World
 from pushplan.world.policy_abilities import WarmsUp
 
 _ITERATIONS = 600
@@ -74,17 +64,19 @@ def warm_up_policy(policy: Policy) -> None:
     elif isinstance(policy, PlanFollower):
         warm_up_recovery()
         stop = policy.stop
-        for world in (_room(), _water()):
+        for world in warm_up_worlds("followers"):
             with contextlib.suppress(Exception):  # it may be made for other worlds than these
                 _plan_and_follow(policy, world)
         policy.stop = stop
+        _plan_in("doorway", policy, _ITERATIONS)
+        if isinstance(getattr(policy.planner, "config", None), PathSearchConfig):
+            _plan_in("no room ahead", policy, _BLOCKED_ITERATIONS)
+
+
+def _plan_in(worlds: str, policy: PlanFollower, iterations: int) -> None:
+    for world in warm_up_worlds(worlds):
         with contextlib.suppress(Exception):
-            policy.planner.plan(_doorway(), stop=MaxIterations(_ITERATIONS))
-        if not isinstance(getattr(policy.planner, "config", None), PathSearchConfig):
-            return
-        for drive in (Drive.DIFFERENTIAL, Drive.CAR):
-            with contextlib.suppress(Exception):
-                policy.planner.plan(_before_a_wall(drive), stop=MaxIterations(_BLOCKED_ITERATIONS))
+            policy.planner.plan(world, stop=MaxIterations(iterations))
 
 
 def _plan_and_follow(policy: PlanFollower, world: World) -> None:
@@ -101,52 +93,3 @@ def _plan_and_follow(policy: PlanFollower, world: World) -> None:
         waiting_twist(moved)
     if isinstance(policy, RenewingFollower):  # it compares plans, farther on than this
         policy.interaction.sweep(world, np.array(_POSES))
-
-
-def _room() -> World:
-    square = 0.5 * np.array([[1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0], [1.0, -1.0]])
-    corner = square + np.array([5.0, 6.3])  # for the straight way to go round
-    return World(
-        robot=RobotModel.from_outline(
-            square, mass=1.0, drive=Drive.CONSTANT_SPEED, max_speed=1.0, max_turn_rate=1.0
-        ),
-        robot_pose=np.array(_POSES[0]),
-        static=StaticMap.build(polygons=[square + 8.0, corner], bounds=[0.0, 0.0, 10.0, 10.0]),
-        movables=Movables.from_outlines([square, square], [[4.0, 5.0, 0.0], [5.2, 5.0, 0.0]]),
-        goal=GoalDisc(np.array([8.0, 5.0]), 0.5),
-    )
-
-
-def _doorway() -> World:
-    """A doorway that a coarse grid misses."""
-    wall = np.array([[5.9, 5.52], [6.1, 5.52], [6.1, 10.0], [5.9, 10.0]])
-    static = StaticMap.build(
-        polygons=[wall, wall * [1.0, -1.0] + [0.0, 10.0]], bounds=[0.0, 0.0, 10.0, 10.0]
-    )
-    return replace(_room(), static=static, movables=Movables.empty())
-
-
-def _before_a_wall(drive: Drive) -> World:
-    """A robot that has no room ahead; it may turn on the spot, or is a car that cannot."""
-    square = 0.5 * np.array([[1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0], [1.0, -1.0]])
-    angles = np.linspace(0.0, 2.0 * np.pi, 8, endpoint=False)
-    robot = RobotModel.from_outline(
-        0.5 * np.column_stack([np.cos(angles), np.sin(angles)]),
-        mass=1.0,
-        drive=drive,
-        max_speed=1.0,
-        max_turn_rate=1.0,
-        min_turning_radius=1.0 if drive is Drive.CAR else 0.0,
-    )
-    static = StaticMap.build(
-        polygons=[square + np.array([3.01, 5.0])], bounds=[0.0, 0.0, 10.0, 10.0]
-    )
-    return replace(_room(), robot=robot, static=static)
-
-
-def _water() -> World:
-    return replace(
-        _room(),
-        static=StaticMap.build(bounds=[0.0, 0.0, 10.0, 10.0]),
-        goal=GoalLine(np.array([8.0, 5.0]), np.array([1.0, 0.0])),
-    )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from collections import deque
 from typing import Any
@@ -21,6 +22,7 @@ from pushplan.planners.mppi.objectives import (
 )
 from pushplan.planners.mppi.rollout_model import step_length
 from pushplan.planners.mppi.target_choice import TargetChoice
+from pushplan.planners.warm_up_worlds import warm_up_worlds
 from pushplan.world import (
     GoalDisc,
     GoalLine,
@@ -87,9 +89,7 @@ class MppiPolicy:
 
     def warm_up(self) -> None:
         """Load the kernels that an episode may need."""
-        from pushplan.planners.mppi.kernel_warmup import warm_up_mppi
-
-        warm_up_mppi()
+        _warm_up()
 
     def act(self, world: World, observation: Any = None) -> Twist:
         """The velocity for this step.
@@ -150,3 +150,13 @@ def _objective(world: World, config: MppiConfig, targets: TargetChoice) -> Objec
     if isinstance(world.goal, GoalDisc | GoalLine):
         return navigation_objective(world, config)
     return manipulation_objective(world, config, targets.approach(world))
+
+
+@functools.cache
+def _warm_up() -> None:
+    """Decide a few times in a small world for each kind of goal."""
+    for world in warm_up_worlds("mppi"):
+        policy = MppiPolicy(Mppi(MppiConfig(samples=16)))
+        policy.reset(world, np.random.default_rng(0))
+        for step in range(2):
+            policy.act(world.moved(time=10.0 * step))

@@ -5,9 +5,8 @@ a predictive one that keeps the box on the bumper. See docs/pushing.md.
 """
 
 from pushplan.planners.pushing.bumper import Bumper, Face, face_towards
-from pushplan.planners.pushing.kernel_warmup import warm_up
 from pushplan.planners.pushing.model import PushModel, PushState
-from pushplan.planners.pushing.mpc import PushingMpc
+from pushplan.planners.pushing.mpc import PushingMpc, warm_up
 from pushplan.planners.pushing.parameters import (
     PushParameters,
     pressure_radius,

@@ -14,6 +14,7 @@ from pushplan.control.mpc.horizon import FAILED, KNOWN, remember, send, solve_ab
 from pushplan.control.mpc.quadratic_program import ProgramSolver
 from pushplan.geometry.obstacles import obstacles_of
 from pushplan.planners.pushing.model import PushModel, PushState
+from pushplan.planners.pushing.path import PushPath
 from pushplan.planners.pushing.problem import pushing_horizon, pushing_memory
 from pushplan.planners.pushing.push_kernels import (
     ALONG,
@@ -29,6 +30,7 @@ from pushplan.planners.pushing.push_kernels import (
     send_push,
 )
 from pushplan.planners.pushing.pushing_config import PushingConfig
+from pushplan.planners.warm_up_worlds import warm_up_worlds
 from pushplan.world import Drive, InvalidInputError, Plan, RobotModel, Twist, World
 from pushplan.world.checks import FloatArray, expect
 
@@ -174,3 +176,17 @@ class PushingMpc:
 
     def _told(self, place: int) -> float:
         return math.nan if self._memory is None else float(self._memory.told[place])
+
+
+def warm_up() -> None:
+    """Push a box for three steps.
+
+    Numba compiles a kernel on its first use after an installation (seconds) and loads it from its
+    cache on the first use in a process. A controller calls this once when it starts.
+    """
+    (world,) = warm_up_worlds("pushing")
+    plan = PushPath.arcs([0.0, 0.0, 0.0], [(1.0, 0.0), (1.0, 0.2)]).plan(world.robot, 0)
+    mpc = PushingMpc()
+    for i in range(3):
+        pose = [-1.25 + 0.02 * i, 0.0, 0.0]
+        mpc.command(world.moved(robot_pose=pose, time=0.1 * i), plan)
