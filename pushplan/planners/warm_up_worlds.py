@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from pushplan.world import World
-from pushplan.world.files import world_from_dict
-from pushplan.world.safe_files import read_data
+from pushplan.files.safe_files import read_data
+from pushplan.world import World, world_from_dict
 
 
 def warm_up_worlds(of: str) -> list[World]:

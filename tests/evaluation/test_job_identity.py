@@ -78,7 +78,7 @@ def test_any_file_of_ours_counts_that_an_episode_may_run_through(package: Path) 
         "runtime/disturbances.py",
         "control/executors.py",
         "metrics/navigation.py",
-        "motion/state_lattice/data/h8_r6_v1_s0.json",
+        "planners/warm_up_worlds.yaml",
         "interaction/weights/ice_network.onnx",
     ):
         assert changes(package / name, of_package), name

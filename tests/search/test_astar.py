@@ -1,6 +1,5 @@
 """The A* kernel and the primitives."""
 
-import json
 from typing import NamedTuple
 
 import numpy as np
@@ -12,12 +11,11 @@ from scipy.sparse.csgraph import dijkstra
 
 from pushplan.compiled import kernel
 from pushplan.motion.dubins import along_arc
-from pushplan.motion.state_lattice.generate import SHIPPED, main
 from pushplan.motion.state_lattice.lattice_builder import dubins_to_line
-from pushplan.motion.state_lattice.primitive_set import PrimitiveConfig, PrimitiveSet
+from pushplan.motion.state_lattice.primitive_set import PrimitiveConfig
 from pushplan.motion.state_lattice.primitives import generate, primitives
 from pushplan.search.astar import EXHAUSTED, FOUND, PAUSED, AStar, offer, register, take
-from pushplan.world import InvalidInputError, SchemaError
+from pushplan.world import InvalidInputError
 from pushplan.world.checks import BoolArray, FloatArray, IntArray
 
 
@@ -137,21 +135,10 @@ def test_primitives_join_lattice_states(headings: int, radius: float) -> None:
         assert abs((turn + np.pi) % (2 * np.pi) - np.pi) < 1e-6
 
 
-@pytest.mark.parametrize("config", SHIPPED)
-def test_shipped_sets_are_what_the_tool_makes(config: PrimitiveConfig) -> None:
-    stored, made = primitives(config), generate(config)
-    assert np.array_equal(stored.ends, made.ends)
-    assert stored.pieces == pytest.approx(made.pieces, abs=1e-9)
-
-
-def test_tool_writes_a_file_that_reads_back(tmp_path) -> None:  # type: ignore[no-untyped-def]
-    assert main(["--headings", "8", "--radius", "4", "--out", str(tmp_path)]) == 0
-    (file,) = tmp_path.iterdir()
-    data = json.loads(file.read_text())
-    assert PrimitiveSet.from_json(data) == generate(PrimitiveConfig(8, 4.0))
-    data["color"] = 1
-    with pytest.raises(SchemaError):
-        PrimitiveSet.from_json(data)
+def test_a_set_is_made_once() -> None:
+    made = primitives(PrimitiveConfig(8, 4.0))
+    assert made == generate(PrimitiveConfig(8, 4.0))
+    assert primitives(PrimitiveConfig(8, 4.0)) is made
 
 
 def test_config_is_checked() -> None:

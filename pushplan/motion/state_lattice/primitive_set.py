@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import functools
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 
 import numpy as np
 
 from pushplan.compiled import kernel, owned
-from pushplan.errors import InvalidInputError, SchemaError
-from pushplan.files.safe_files import known_keys
+from pushplan.errors import InvalidInputError
 from pushplan.motion.dubins import sample_pieces
 from pushplan.world.checks import (
     ArrayRecord,
@@ -30,7 +29,7 @@ DIRECTIONS: dict[int, tuple[tuple[int, int], ...]] = {
 
 @dataclass(frozen=True)
 class PrimitiveConfig:
-    """What a set of primitives is made from; a set is stored and cached under this.
+    """What a set of primitives is made from; a set is kept under this.
 
     Args:
         headings: 8, 16 or 32 in the whole turn.
@@ -53,11 +52,6 @@ class PrimitiveConfig:
         object.__setattr__(self, "radius", radius)
         integer("variants", self.variants, low=1)
         integer("shifts", self.shifts, low=0)
-
-    @property
-    def key(self) -> str:
-        """Name of the set, as in its file."""
-        return f"h{self.headings}_r{self.radius:g}_v{self.variants}_s{self.shifts}"
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,41 +88,6 @@ class PrimitiveSet(ArrayRecord):
     def heading_of(self, primitive: int) -> int:
         """Index of the heading at the start of a primitive."""
         return int(np.searchsorted(self.first, primitive, side="right")) - 1
-
-    def to_json(self) -> dict[str, object]:
-        """Plain values, as in the file."""
-        return {
-            "config": asdict(self.config),
-            "first": self.first.tolist(),
-            "ends": self.ends.tolist(),
-            "pieces": [[[float(f"{v:.17g}") for v in arc] for arc in p] for p in self.pieces],
-        }
-
-    @classmethod
-    def from_json(cls, data: object) -> PrimitiveSet:
-        """The inverse of `to_json`.
-
-        Raises:
-            SchemaError: if a key is missing or unknown, or shapes disagree.
-        """
-        keys = ("config", "first", "ends", "pieces")
-        known_keys("primitives", data, keys, keys)
-        assert isinstance(data, dict)
-        config = PrimitiveConfig(**data["config"])
-        first = np.array(data["first"], dtype=np.int64)
-        ends = np.array(data["ends"], dtype=np.int64)
-        pieces = np.array(data["pieces"], dtype=np.float64)
-        if len(first) != config.headings + 1 or ends.shape != (first[-1], 3):
-            raise SchemaError("primitives: the numbers of headings and ends do not fit together")
-        if pieces.shape != (len(ends), 3, 2):
-            raise SchemaError("primitives: every primitive needs three pieces")
-        arrays = (
-            frozen(lattice_angles(config.headings)),
-            frozen(first),
-            frozen(ends),
-            frozen(pieces),
-        )
-        return cls(config, *arrays)
 
 
 @kernel(allocates=True)

@@ -9,9 +9,7 @@ motion planning in state lattices", 2009).
 from __future__ import annotations
 
 import functools
-import json
 from collections.abc import Callable
-from importlib import resources
 
 import numpy as np
 
@@ -149,30 +147,20 @@ def generate(config: PrimitiveConfig) -> PrimitiveSet:
     return PrimitiveSet(config, *arrays)
 
 
+_SETS: dict[PrimitiveConfig, PrimitiveSet] = {}
+"""Those that have been made in this process."""
+
+
 def primitives(config: PrimitiveConfig, stopped: Callable[[], bool] = never) -> PrimitiveSet:
-    """The set for a configuration: from the file that ships with it, else made now.
+    """The set for a configuration, made where it is asked for first: in 4 to 60 ms.
 
     Raises:
         Stopped: if the stop rule fires before it is there; what is done is kept.
     """
-    stored = _stored(config)
-    if stored is not None:
-        return stored
-    for heading in range(config.headings // 4):
-        for target in range(config.headings):
-            go_on(stopped)
-            _turning(heading, target, config)
-    return _made(config)
-
-
-_made = functools.lru_cache(maxsize=32)(generate)
-
-
-@functools.lru_cache(maxsize=32)
-def _stored(config: PrimitiveConfig) -> PrimitiveSet | None:
-    file = resources.files("pushplan.motion.state_lattice") / "data" / f"{config.key}.json"
-    if file.is_file():
-        stored = PrimitiveSet.from_json(json.loads(file.read_text(encoding="utf-8")))
-        if stored.config == config:
-            return stored
-    return None
+    if config not in _SETS:
+        for heading in range(config.headings // 4):
+            for target in range(config.headings):
+                go_on(stopped)
+                _turning(heading, target, config)
+        _SETS[config] = generate(config)
+    return _SETS[config]

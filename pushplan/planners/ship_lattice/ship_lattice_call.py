@@ -9,7 +9,6 @@ from functools import partial
 import numpy as np
 
 from pushplan.compiled import owned
-from pushplan.imports.on_demand import need
 from pushplan.interaction import InteractionModel
 from pushplan.interaction.path_sweepers import path_sweeper
 from pushplan.motion.coarse_path import reachable
