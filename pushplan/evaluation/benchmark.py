@@ -9,10 +9,9 @@ from typing import TYPE_CHECKING, Any
 from pushplan.evaluation.experiment import Experiment
 from pushplan.evaluation.report.results import Results
 from pushplan.evaluation.run.batch import Progress
-from pushplan.evaluation.run.compatibility import read_policies
 from pushplan.evaluation.run.job_limits import MEMORY_MB
 from pushplan.evaluation.run.jobs import JobSettings
-from pushplan.evaluation.run.policy_specs import PolicySpec
+from pushplan.evaluation.run.policy_specs import PolicySpec, parse_policies
 from pushplan.world import InvalidInputError
 
 if TYPE_CHECKING:
@@ -112,7 +111,7 @@ def bench_experiment(
     return Experiment(
         ",".join(one.name for one in suites),
         suites,
-        tuple(read_policies(policies)),
+        tuple(parse_policies(policies)),
         JobSettings(observation=observation, timeout_s=timeout_s, latency_factor=latency_factor),
         memory_limit_mb=memory_limit_mb,
         about={

@@ -16,11 +16,11 @@ import numpy as np
 
 from pushplan.evaluation.report.results import Results
 from pushplan.evaluation.run.batch import TRACES, Progress, run_batch
-from pushplan.evaluation.run.compatibility import is_wanted, misfits, read_policies
+from pushplan.evaluation.run.compatibility import is_wanted, misfits
 from pushplan.evaluation.run.job_identity import identified
 from pushplan.evaluation.run.job_limits import MEMORY_MB
 from pushplan.evaluation.run.jobs import Job, JobSettings
-from pushplan.evaluation.run.policy_specs import PolicySpec
+from pushplan.evaluation.run.policy_specs import PolicySpec, parse_policies
 from pushplan.evaluation.store.database import DATABASE
 from pushplan.evaluation.store.rescoring import rescore
 from pushplan.evaluation.store.rows import setting_of
@@ -107,7 +107,7 @@ class Experiment:
         object.__setattr__(self, "suites", distinct(self.suites))
         for metric in self.metrics:
             metric_function(metric)
-        object.__setattr__(self, "policies", tuple(read_policies(self.policies)))
+        object.__setattr__(self, "policies", tuple(parse_policies(self.policies)))
         labels, names = [p.label for p in self.policies], [one.name for one in self.suites]
         for name, wanted in self.only.items():
             if name not in names:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from pushplan.control import ImmediateExecutor
 from pushplan.evaluation.run.job_limits import EpisodeTimeout, soft_limit
 from pushplan.evaluation.run.jobs import Job, JobSettings
-from pushplan.evaluation.run.policy_specs import PolicySpec, UnusablePolicyError, parse_policies
+from pushplan.evaluation.run.policy_specs import PolicySpec, UnusablePolicyError
 from pushplan.world import (
     ChecksScenario,
     InvalidInputError,
@@ -70,19 +70,6 @@ def misfits(
 def is_wanted(spec: PolicySpec, suite: Suite, only: Mapping[str, Sequence[str]]) -> bool:
     """Whether a policy is asked for in a suite; ``only`` as in `misfits`."""
     return spec.label in only.get(suite.name, [spec.label])
-
-
-def read_policies(given: Any) -> list[PolicySpec]:
-    """`parse_policies`, with an error that says that nothing can run.
-
-    Raises:
-        UnknownNameError: if there is no policy of a name.
-        UnusablePolicyError: if a text or a file can be no policy.
-    """
-    try:
-        return parse_policies(given)
-    except InvalidInputError as error:
-        raise UnusablePolicyError(str(error)) from error
 
 
 def incompatibility(spec: PolicySpec, scenario: Any, settings: JobSettings) -> str | None:

@@ -51,7 +51,7 @@ class PolicySpec:
 
     def __post_init__(self) -> None:
         if not _LABEL.fullmatch(self.label):
-            raise InvalidInputError(
+            raise UnusablePolicyError(
                 "a policy's label is 1 to 64 letters, digits and '_.+@-', "
                 f"not beginning with '.+@-', got {self.label!r}"
             )
@@ -274,14 +274,14 @@ def parse_policy(given: str | Callable[..., Any] | PolicySpec) -> PolicySpec:
 
     Raises:
         UnknownNameError: if it looks like a name and is not one.
-        InvalidInputError: if it can be no policy at all.
+        UnusablePolicyError: if it can be no policy at all.
     """
     if isinstance(given, PolicySpec):
         return given
     if isinstance(given, str):
         return _parse_text(given, "policy", policy_names())
     if not callable(given):
-        raise InvalidInputError(
+        raise UnusablePolicyError(
             "a policy is given as a name, 'onnx:FILE', 'sb3:FILE', 'module:Class', "
             f"'file.py:Class' or a callable that makes one, got {type(given).__name__}"
         )
@@ -294,14 +294,14 @@ def parse_planner(given: str) -> PolicySpec:
 
     Raises:
         UnknownNameError: if it looks like a name and is not one.
-        InvalidInputError: if it can be no planner at all, or is a policy's name.
+        UnusablePolicyError: if it can be no planner at all, or is a policy's name.
     """
     from pushplan.planners import planner_names
 
     names = planner_names()
     source = given.rpartition("=")[2]
     if source not in names and source in policy_names():
-        raise InvalidInputError(_NO_PLANNER.format(source))
+        raise UnusablePolicyError(_NO_PLANNER.format(source))
     return _parse_text(given, "planner", names)
 
 
@@ -321,9 +321,9 @@ def _parse_text(given: str, kind: str, names: Sequence[str]) -> PolicySpec:
     if file.endswith(".py"):
         path = Path(file).expanduser().resolve()
         if not path.is_file():
-            raise InvalidInputError(f"{kind} {given!r}: there is no file {file}")
+            raise UnusablePolicyError(f"{kind} {given!r}: there is no file {file}")
         if not colon or not name:
-            raise InvalidInputError(f"{kind} {given!r} names no class: {_classes_to_give(file)}")
+            raise UnusablePolicyError(f"{kind} {given!r} names no class: {_classes_to_give(file)}")
         return PolicySpec(label or name, f"{path}:{name}")
     if colon:
         return PolicySpec(label or name, source)
@@ -351,16 +351,16 @@ def parse_policies(
     """Read several policies: a list, or one text with commas.
 
     Raises:
-        InvalidInputError: if there is none, or two share a label.
+        UnusablePolicyError: if there is none, or two share a label.
     """
     items: Sequence[Any] = given.split(",") if isinstance(given, str) else given
     stripped = [item.strip() if isinstance(item, str) else item for item in items]
     specs = [parse_policy(item) for item in stripped if item != ""]
     if not specs:
-        raise InvalidInputError("at least one policy is needed")
+        raise UnusablePolicyError("at least one policy is needed")
     for label, count in Counter(spec.label for spec in specs).items():
         if count > 1:
-            raise InvalidInputError(
+            raise UnusablePolicyError(
                 f"two policies are labelled {label!r}: tell them apart as 'label=policy'"
             )
     return specs

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import base64
 import contextlib
 import ctypes
 import faulthandler
 import importlib
+import json
 import os
 import pickle
 import runpy
@@ -13,10 +15,13 @@ import signal
 import socket
 import sys
 import types
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
+from io import BufferedRWPair
+from typing import Any
 
 from pushplan.errors import describe
-from pushplan.evaluation.run.channel import Channel
+from pushplan.evaluation.run.job_limits import limit_memory
 from pushplan.world import InvalidInputError
 
 _DIE_WITH_OWNER = 1  # PR_SET_PDEATHSIG of Linux, however the owner ends
@@ -38,7 +43,7 @@ class WorkerSetup:
     """What a worker is told before its first call."""
 
     main: str | None  # file of the owner's ``__main__`` module, for what is defined there
-    preload: tuple[str, ...]  # modules to import before the first call, so that no call pays for it
+    preload: Sequence[str]  # modules to import before the first call, so that no call pays for it
     memory_limit_mb: float | None  # private memory at which allocations fail [MB]
     trace_after_s: float | None  # a call that takes this long has its stack written to the log [s]
 
@@ -51,27 +56,29 @@ def main(descriptor: int) -> None:
         with contextlib.suppress(OSError, AttributeError):
             ctypes.CDLL(None).prctl(option, value, 0, 0, 0)
     os.set_inheritable(descriptor, False)
-    channel = Channel(socket.socket(fileno=descriptor))
-    with contextlib.suppress(EOFError, OSError):
-        _, payload = channel.receive()
-        setup: WorkerSetup = pickle.loads(payload)
+    line = socket.socket(fileno=descriptor)
+    with contextlib.suppress(OSError, ValueError), line, line.makefile("rwb") as lines:
+        setup = WorkerSetup(**json.loads(lines.readline()))
         for name in setup.preload:
             with contextlib.suppress(ImportError):  # a job that needs it will say so
                 importlib.import_module(name)
-        from pushplan.evaluation.run.job_limits import limit_memory
-
         limit_memory(setup.memory_limit_mb)
-        channel.send({"kind": "ready"})
+        _say(lines, kind="ready")
         last = False
-        while not last:
-            _, payload = channel.receive()
-            last = _answer(channel, payload, setup)
+        while not last and (text := lines.readline()):
+            last = _answer(lines, base64.b64decode(json.loads(text)), setup)
             for stream in (sys.stdout, sys.stderr):
                 with contextlib.suppress(OSError):
                     stream.flush()
 
 
-def _answer(channel: Channel, payload: bytes, setup: WorkerSetup) -> bool:
+def _say(lines: BufferedRWPair, **message: Any) -> None:
+    """Send one message to the owner: a line of JSON, nothing that could run there."""
+    lines.write(json.dumps(message).encode() + b"\n")
+    lines.flush()
+
+
+def _answer(lines: BufferedRWPair, payload: bytes, setup: WorkerSetup) -> bool:
     """Run a job and send what became of it; whether this worker ends with it."""
     from pushplan.evaluation.run.execute import execute
 
@@ -87,23 +94,22 @@ def _answer(channel: Channel, payload: bytes, setup: WorkerSetup) -> bool:
                 f"a worker process cannot load what it was sent ({error}): define it at the top "
                 "level of a file, name it as 'file.py:Class', or use workers=0"
             )
-            channel.send({"kind": "refused", "text": text})
+            _say(lines, kind="refused", text=text)
             return False
         except InvalidInputError as error:
-            channel.send({"kind": "refused", "text": str(error)})
+            _say(lines, kind="refused", text=str(error))
             return False
-        channel.send({"kind": "running"})
+        _say(lines, kind="running")
         result = execute(job, settings)
-        row, traced = asdict(result.row), result.trace is not None
-        header = {"kind": "result", "row": row, "traced": traced, "detail": result.detail}
-        channel.send(header, result.trace or b"")
+        trace = None if result.trace is None else base64.b64encode(result.trace).decode()
+        _say(lines, kind="result", row=asdict(result.row), trace=trace, detail=result.detail)
         return result.tainted
     except InvalidInputError as error:  # `execute` lets through what is no policy's fault
-        channel.send({"kind": "refused", "text": str(error)})
+        _say(lines, kind="refused", text=str(error))
     except MemoryError:
-        channel.send({"kind": "out of memory"})
+        _say(lines, kind="out of memory")
     except BaseException as error:
-        channel.send({"kind": "error", "text": describe(error)})
+        _say(lines, kind="error", text=describe(error))
     finally:
         faulthandler.cancel_dump_traceback_later()
     return True

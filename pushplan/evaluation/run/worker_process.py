@@ -2,21 +2,22 @@
 
 from __future__ import annotations
 
+import base64
 import contextlib
+import json
 import math
 import os
-import pickle
 import secrets
 import signal
 import socket
 import subprocess
 import sys
 import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from pushplan.evaluation.run.channel import Channel, ChannelError
 from pushplan.evaluation.run.job_limits import WORKER_VARIABLE
 from pushplan.evaluation.run.jobs import BatchStoppedError, JobResult
 from pushplan.evaluation.run.worker import THREAD_VARIABLES, WorkerSetup
@@ -25,6 +26,9 @@ from pushplan.files.file_locks import NO_FOLLOW
 from pushplan.imports.named_objects import import_path
 from pushplan.world import PushplanError
 
+_POLL_S = 0.2
+_CHUNK = 2**18
+_LONGEST_MESSAGE = 2**30
 _LOG_TAIL = 6000
 _LOG_MOST = 1_000_000
 _TRACE_S = 0.2  # time that a worker has to write where it hangs before it is ended
@@ -71,7 +75,7 @@ class WorkerProcess:
         self._setup = setup
         self._log, self._log_start = log, 0
         ours, theirs = socket.socketpair()
-        self._channel = Channel(ours)
+        self._line, self._heard = ours, bytearray()
         self._mark = secrets.token_hex(16)
         environment = {**os.environ, WORKER_VARIABLE: self._mark, "PYTHONUNBUFFERED": "1"}
         environment.update(dict.fromkeys(THREAD_VARIABLES, "1"))
@@ -96,8 +100,7 @@ class WorkerProcess:
         Raises:
             WorkerDiedError: if it ends before.
         """
-        with contextlib.suppress(OSError):  # it has died: `_receive` finds out how
-            self._channel.send({}, pickle.dumps(self._setup))
+        self._send(asdict(self._setup))
         self._receive(math.inf)
 
     def ask(self, payload: bytes, limit_s: float) -> JobResult:
@@ -109,24 +112,30 @@ class WorkerProcess:
         """
         self._log_start = self._trimmed_log()
         begin = time.monotonic()
-        with contextlib.suppress(OSError):
-            self._channel.send({}, payload)
-        header, body = self._receive(limit_s)
-        if header.get("kind") == "running":
-            header, body = self._receive(limit_s + begin - time.monotonic(), limit_s)
-        if header.get("kind") == "refused":
-            raise BatchStoppedError(str(header.get("text")))
-        if header.get("kind") == "error":
-            raise self._died(str(header.get("text")))
-        if header.get("kind") == "out of memory":
+        self._send(base64.b64encode(payload).decode())
+        said = self._receive(limit_s)
+        if said.get("kind") == "running":
+            said = self._receive(limit_s + begin - time.monotonic(), limit_s)
+        if said.get("kind") == "refused":
+            raise BatchStoppedError(str(said.get("text")))
+        if said.get("kind") == "error":
+            raise self._died(str(said.get("text")))
+        if said.get("kind") == "out of memory":
             raise self._died("an allocation failed", Status.OUT_OF_MEMORY)
         try:  # who sends it is not trusted: the owner checks what it says
-            trace = body if header["traced"] else None
-            return JobResult(ResultRow(**header["row"]), trace, str(header["detail"]))
-        except (KeyError, TypeError) as error:
+            trace = None if said["trace"] is None else base64.b64decode(said["trace"])
+            return JobResult(ResultRow(**said["row"]), trace, str(said["detail"]))
+        except (KeyError, TypeError, ValueError) as error:
             raise self._died(f"its message is no result: {error}") from error
 
-    def _receive(self, left_s: float, limit_s: float = math.inf) -> tuple[dict[str, Any], bytes]:
+    def _send(self, message: Any) -> None:
+        """Send a line of JSON; if it has died, `_receive` finds out how."""
+        with contextlib.suppress(OSError):
+            self._line.settimeout(None)
+            self._line.sendall(json.dumps(message).encode() + b"\n")
+
+    def _receive(self, left_s: float, limit_s: float = math.inf) -> dict[str, Any]:
+        """The next message: a line of JSON, nothing that could run here."""
         until = time.monotonic() + left_s + _TRACE_S
         limit_mb = self._setup.memory_limit_mb
 
@@ -142,8 +151,11 @@ class WorkerProcess:
             self._trimmed_log()
 
         try:
-            return self._channel.receive(waiting)
-        except ChannelError as error:
+            message = json.loads(self._next_line(waiting))
+            if not isinstance(message, dict):
+                raise ValueError("it is no mapping")
+            return message
+        except (ValueError, RecursionError) as error:
             text = f"the worker process sent what is no message: {error}"
             raise self._died(text) from error
         except (EOFError, OSError):
@@ -153,6 +165,27 @@ class WorkerProcess:
                 self._tail(),
                 from_outside=code in (-signal.SIGKILL, -signal.SIGTERM),
             ) from None
+
+    def _next_line(self, waiting: Callable[[], None]) -> bytes:
+        """What it says next; ``waiting`` is called several times a second until all is there."""
+        self._line.settimeout(_POLL_S)
+        end = self._heard.find(b"\n")
+        while end < 0:
+            begin = len(self._heard)
+            if begin > _LONGEST_MESSAGE:
+                raise ValueError("it is too long")
+            try:
+                chunk = self._line.recv(_CHUNK)
+            except TimeoutError:
+                waiting()
+                continue
+            if not chunk:
+                raise EOFError
+            self._heard += chunk
+            end = self._heard.find(b"\n", begin)
+        line = bytes(self._heard[:end])
+        del self._heard[: end + 1]
+        return line
 
     def _died(self, reason: str, status: Status = Status.CRASHED) -> WorkerDiedError:
         """End it for a reason."""
@@ -166,7 +199,7 @@ class WorkerProcess:
         Returns:
             Its exit code.
         """
-        self._channel.close()
+        self._line.close()
         deadline = time.monotonic() + (0.0 if force else _FAREWELL_S)
         while not self._has_ended() and time.monotonic() < deadline:
             time.sleep(0.005)
