@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import argparse
 import sys
 import threading
 import time
@@ -16,8 +15,7 @@ from pushplan.cli.kernel_progress import PendingKernels, kernel_progress
 if TYPE_CHECKING:
     from rich.console import RenderableType
 
-    from pushplan.evaluation import Experiment, ResultRow, Results
-    from pushplan.evaluation.experiment import Cost
+    from pushplan.evaluation import ResultRow
 
     Progress = Callable[[int, int, ResultRow | None], None]
 
@@ -49,48 +47,6 @@ def progress_of(*policies: str, out: str | None = None) -> Iterator[Progress]:
         if out is not None:
             sys.stderr.write(_stopped(finished, out))
         raise
-
-
-def run_jobs(experiment: Experiment, out: str, options: argparse.Namespace) -> Results | None:
-    """Say what the jobs of an experiment will cost, and run them unless only that was asked for.
-
-    Args:
-        experiment: what to run.
-        out: run directory.
-        options: with the shared options "jobs".
-    """
-    names = ("workers", "retry_failed", "any_version", "shard")
-    chosen = {name: getattr(options, name) for name in names}
-    dask = options.dask
-    cost = experiment.cost(out, **chosen)
-    lines = _cost_lines(cost, "a cluster" if dask else f"{options.workers or 1} workers", out)
-    for line in lines:
-        (sys.stdout if options.check else sys.stderr).write(f"{line}\n")
-    if options.check:
-        return None
-    with progress_of(*(one.label for one in experiment.policies), out=out) as progress:
-        return experiment.run(out, progress=progress, dask=dask, **chosen)
-
-
-def _cost_lines(cost: Cost, workers: str, out: str) -> list[str]:
-    """Jobs, time and disk in words."""
-    if not cost.new:
-        return [f"{cost.jobs} jobs, all done"]
-    most = "" if cost.most_s is None else f"; at most {duration(cost.most_s)}, by the time limit"
-    time = "their time is not known before the first ones are done"
-    if cost.seconds is not None:
-        time = f"about {duration(cost.seconds)} of episodes, by {cost.stored} stored ones"
-    lines = [
-        f"{cost.jobs} jobs, {cost.new} to run on {workers}: {time}{most}",
-        f"about {_megabytes(cost.size)} in {out}, {_megabytes(cost.free)} are free",
-    ]
-    if cost.size > cost.free:
-        lines.append(f"the disk of {out} has too little room for that")
-    return lines
-
-
-def _megabytes(size: float) -> str:
-    return f"{size / 1e9:.3g} GB" if size >= 1e9 else f"{size / 1e6:.2g} MB"
 
 
 def _stopped(finished: int, out: str) -> str:

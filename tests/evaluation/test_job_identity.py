@@ -94,7 +94,7 @@ def test_reports_commands_and_caches_do_not_count(package: Path) -> None:
         "evaluation/report/tables.py",
         "evaluation/report/plots.py",
         "evaluation/report/page_files/page.css",
-        "cli/bench.py",
+        "cli/studies.py",
         "learned/weights/maze-ppo.md",
         "world/__pycache__/plan.nbc",
     ):

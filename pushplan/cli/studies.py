@@ -1,0 +1,141 @@
+"""``pushplan bench``, ``experiment`` and ``stress``: commands that run jobs."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from pushplan.cli.common import duration, say
+from pushplan.cli.outputs import check_directory
+from pushplan.cli.progress import progress_of
+
+if TYPE_CHECKING:
+    from pushplan.evaluation import Experiment
+    from pushplan.evaluation.experiment import Cost
+
+
+def bench(options: argparse.Namespace) -> int:
+    """Run the batch, print the table, write plots and page."""
+    from pushplan.evaluation.benchmark import bench_experiment
+    from pushplan.world import InvalidInputError
+
+    if options.policies is None:  # the parser would say so before it names a misspelt option
+        raise InvalidInputError(
+            "the following arguments are required: --policies; see 'pushplan bench --help'"
+        )
+    out = options.out
+    if not out:  # folders of worlds count by their names
+        names = [
+            Path(one).resolve().name if "/" in one else one for one in options.suite.split(",")
+        ]
+        out = os.path.join("runs", ",".join(names))
+    check_directory(out)
+    experiment = bench_experiment(
+        options.suite,
+        options.policies,
+        episodes=options.episodes,
+        observation=options.observation,
+        latency_factor=options.latency,
+        seed=options.seed,
+        timeout_s=options.timeout,
+        memory_limit_mb=options.memory,
+    )
+    return _run(experiment, out, options)
+
+
+def experiment(options: argparse.Namespace) -> int:
+    """Check the file, run its jobs, print the tables, write plots and page."""
+    from pushplan.evaluation import Experiment
+
+    found = Experiment.load(options.file)
+    jobs = found.jobs
+    for (title, label), why in found.skipped.items():
+        say(f"left out: {label} in {title}: {why}")
+    if options.check:
+        for suite in found.suites:
+            scenario = suite.scenarios[0]
+            labels = [job.policy.label for job in jobs if job.scenario == scenario]
+            say(f"{suite.name}: {len(suite.scenarios)} scenarios, {', '.join(labels)}")
+    out = options.out or os.path.join("runs", Path(options.file).stem)
+    check_directory(out)
+    return _run(found, out, options)
+
+
+def stress(options: argparse.Namespace) -> int:
+    """Run the test, print the score sheet."""
+    from pushplan import evaluation
+    from pushplan.evaluation.report.table_formats import markdown, text
+
+    check_directory(options.out)
+    with progress_of(options.policy, out=options.out) as progress:
+        sheet = evaluation.stress(
+            options.policy,
+            options.suite,
+            conditions=options.conditions,
+            episodes=options.episodes,
+            seed=options.seed,
+            rate=options.rate,
+            planning_time=options.planning_time,
+            workers=options.workers,
+            out=options.out,
+            timeout_s=options.timeout,
+            progress=progress,
+        )
+    table = sheet.table()
+    if options.out is not None:
+        from pushplan.files.output_files import write_atomic
+
+        write_atomic(Path(options.out) / "stress.md", markdown([table]).encode())
+    say(text([table]).rstrip())
+    say(table.note)
+    return 1 if sheet.missed else 0
+
+
+def _run(experiment: Experiment, out: str, options: argparse.Namespace) -> int:
+    """Say what the jobs will cost; unless only that was asked for, run them and show the results.
+
+    Args:
+        experiment: what to run.
+        out: run directory.
+        options: with the shared options "jobs" and "tables".
+    """
+    from pushplan.cli.report import exit_code, show, show_json
+
+    names = ("workers", "retry_failed", "any_version", "shard")
+    chosen = {name: getattr(options, name) for name in names}
+    workers = "a cluster" if options.dask else f"{options.workers or 1} workers"
+    for line in _cost_lines(experiment.cost(out, **chosen), workers, out):
+        (sys.stdout if options.check else sys.stderr).write(f"{line}\n")
+    if options.check:
+        return 0
+    with progress_of(*(one.label for one in experiment.policies), out=out) as progress:
+        results = experiment.run(out, progress=progress, dask=options.dask, **chosen)
+    if getattr(options, "json", False):
+        show_json(results, options.pairs)
+    else:
+        show(results, options)
+    return exit_code(results)
+
+
+def _cost_lines(cost: Cost, workers: str, out: str) -> list[str]:
+    """Jobs, time and disk in words."""
+    if not cost.new:
+        return [f"{cost.jobs} jobs, all done"]
+    most = "" if cost.most_s is None else f"; at most {duration(cost.most_s)}, by the time limit"
+    time = "their time is not known before the first ones are done"
+    if cost.seconds is not None:
+        time = f"about {duration(cost.seconds)} of episodes, by {cost.stored} stored ones"
+    lines = [
+        f"{cost.jobs} jobs, {cost.new} to run on {workers}: {time}{most}",
+        f"about {_megabytes(cost.size)} in {out}, {_megabytes(cost.free)} are free",
+    ]
+    if cost.size > cost.free:
+        lines.append(f"the disk of {out} has too little room for that")
+    return lines
+
+
+def _megabytes(size: float) -> str:
+    return f"{size / 1e9:.3g} GB" if size >= 1e9 else f"{size / 1e6:.2g} MB"
