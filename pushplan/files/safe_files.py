@@ -181,8 +181,10 @@ def read_npy(path: str | Path, what: str) -> NDArray[Any]:
 
 def known_keys(
     kind: str, data: object, valid: Sequence[str] | None, required: Sequence[str]
-) -> None:
-    """Check the keys of a mapping from a file, of which ``valid`` may be there; any if None.
+) -> Mapping[str, Any]:
+    """Check the keys of a mapping from a file, of which ``valid`` may be there, and return it.
+
+    Any key may be there if ``valid`` is None.
 
     Raises:
         SchemaError: if it is no mapping, a required key is missing, or a key is unknown.
@@ -195,6 +197,7 @@ def known_keys(
     for key in required:
         if key not in data:
             raise SchemaError(f"{kind} lacks the required key {key!r}")
+    return data
 
 
 def _array(file: IO[bytes], limit: int) -> NDArray[Any]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -12,10 +13,18 @@ from numpy.typing import ArrayLike
 from pushplan.compiled import kernel
 from pushplan.geometry.contours import segment_crossings
 from pushplan.world import ClearanceArea, Goal, GoalDisc, GoalLine, InvalidInputError, Receptacle
-from pushplan.world.checks import BoolArray, FloatArray, IntArray, array, frozen
+from pushplan.world.checks import ArrayRecord, BoolArray, FloatArray, IntArray, array, frozen
 from pushplan.world.outline import convex_outline, flatten
 
-Target = GoalDisc | GoalLine | Receptacle | ClearanceArea | tuple[FloatArray, ...]
+
+@dataclass(frozen=True, eq=False)
+class Polygons(ArrayRecord):
+    """Convex polygons (N, 2) and segments (2, 2) [m], any of which is to be reached."""
+
+    parts: tuple[FloatArray, ...]
+
+
+Target = GoalDisc | GoalLine | Receptacle | ClearanceArea | Polygons
 
 
 class Regions(NamedTuple):
@@ -49,7 +58,7 @@ def as_target(goal: Goal | Sequence[ArrayLike]) -> Target:
     for i, part in enumerate(goal):
         points: FloatArray = array(f"targets[{i}]", part, (None, 2))
         parts.append(points if len(points) == 2 else convex_outline(f"targets[{i}]", points))
-    return tuple(parts)
+    return Polygons(tuple(parts))
 
 
 def regions_of(target: Target, *, to_center: bool = False) -> Regions:
@@ -69,7 +78,7 @@ def regions_of(target: Target, *, to_center: bool = False) -> Regions:
         edges = np.stack([target.polygon, np.roll(target.polygon, -1, axis=0)], axis=1)
         parts = tuple(edges[target.open_edges])
     else:
-        parts = target
+        parts = target.parts
     corners, offsets = flatten(parts)
     return Regions(frozen(discs), frozen(lines), corners, offsets)
 

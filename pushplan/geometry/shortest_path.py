@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -185,9 +185,8 @@ class GoalDistances:
 
 @lru_cache(maxsize=128)
 def _distances(
-    static: StaticMap, clearance: float, key: tuple[object, ...], to_center: bool
+    static: StaticMap, clearance: float, target: Target, to_center: bool
 ) -> GoalDistances:
-    target: Any = key[0] if len(key) == 1 else tuple(_unpack(part) for part in key[1:])
     regions = regions_of(target, to_center=to_center)
     graph, shapes = _graph_of(static, clearance), obstacles_of(static, clearance)
     gap = gap_of(static)
@@ -239,18 +238,6 @@ def ends_on_rims(static: StaticMap, clearance: float, regions: Regions) -> Float
     return ends[free_points(ends, shapes, static.bounds, gap_of(static))]
 
 
-def _pack(target: Target) -> tuple[object, ...]:
-    """A hashable key: a goal itself, or the bytes of a list of polygons."""
-    if isinstance(target, tuple):
-        return ("polygons", *(part.tobytes() for part in target))
-    return (target,)
-
-
-def _unpack(part: object) -> FloatArray:
-    assert isinstance(part, bytes)
-    return frozen(np.frombuffer(part, dtype=np.float64).reshape(-1, 2).copy())
-
-
 def goal_distances(
     static: StaticMap,
     goal: Goal | Sequence[ArrayLike],
@@ -272,7 +259,7 @@ def goal_distances(
         InvalidInputError: if the goal is none of these, or the clearance is negative.
     """
     margin = number("clearance", clearance, low=0.0)
-    return _distances(static, margin, _pack(as_target(goal)), to_center)
+    return _distances(static, margin, as_target(goal), to_center)
 
 
 def leave_inflation(static: StaticMap, clearance: float, point: FloatArray) -> FloatArray | None:

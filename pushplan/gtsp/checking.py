@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Hashable, Sequence
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pushplan.errors import InvalidInputError
-from pushplan.world.checks import IntArray
+from pushplan.errors import InvalidInputError, short
+from pushplan.world.checks import FloatArray, IntArray
+
+if TYPE_CHECKING:
+    import networkx as nx
 
 LARGEST = 1e290
 """Finite costs stay below this, so that no sum of them overflows."""
@@ -109,3 +113,39 @@ def checked_clusters(
             f"{', ...' if missing.size > 8 else ''}"
         )
     return tuple(found)
+
+
+def graph_instance(graph: nx.Graph[Any]) -> tuple[list[Any], FloatArray, list[list[int]]]:
+    """Names, costs and clusters of a graph.
+
+    Args:
+        graph: its nodes have the attribute ``cluster``, its edges ``weight``. An edge that is
+            missing is forbidden; one of an undirected graph costs the same both ways.
+
+    Returns:
+        The N nodes in the order of the graph, (N, N) costs, and the positions of the nodes of each
+        cluster, clusters in the order in which they first occur.
+
+    Raises:
+        InvalidInputError: if it has parallel edges, or lacks a cluster or a weight.
+    """
+    import networkx  # whoever has a graph has loaded it
+
+    if graph.is_multigraph():
+        raise InvalidInputError("a graph must have one edge at most from node to node")
+    for a, b, weight in graph.edges(data="weight"):
+        if isinstance(weight, bool) or not isinstance(weight, int | float | np.number):
+            raise InvalidInputError(
+                f"the edge from {short(a)} to {short(b)} needs a number as weight, got "
+                f"{short(weight)}"
+            )
+    costs = networkx.to_numpy_array(graph, weight="weight", nonedge=np.inf)
+    clusters: dict[Hashable, list[int]] = {}
+    for place, (name, cluster) in enumerate(graph.nodes(data="cluster")):
+        if cluster is None or not isinstance(cluster, Hashable):
+            raise InvalidInputError(
+                f"node {short(name)} needs the name of its cluster as the attribute 'cluster', got "
+                f"{short(cluster)}"
+            )
+        clusters.setdefault(cluster, []).append(place)
+    return list(graph), costs, list(clusters.values())

@@ -5,30 +5,19 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
+from scipy.spatial.distance import cdist
 
 from pushplan.world.checks import FloatArray, choice, integer
 
 LARGEST_DIMENSION = 12_000
 """Most nodes: their costs take 1.2 GB, and the solver as much again."""
-_ROWS = 256  # rows at a time, as a step from node to node takes twice the memory of its length
+_ROWS = 256  # rows at a time, as a rule needs some arrays of that size
 EARTH_RADIUS_KM = 6378.388
 TSPLIB_PI = 3.141592
 
 
 def _nearest(values: FloatArray) -> FloatArray:
     result: FloatArray = np.floor(values + 0.5)
-    return result
-
-
-def _length(steps: FloatArray) -> FloatArray:
-    length: FloatArray = np.sqrt(steps[..., 0] ** 2 + steps[..., 1] ** 2)
-    return length
-
-
-def _att(steps: FloatArray) -> FloatArray:
-    exact = np.sqrt((steps**2).sum(-1) / 10.0)
-    rounded = _nearest(exact)
-    result: FloatArray = np.where(rounded < exact, rounded + 1.0, rounded)
     return result
 
 
@@ -50,15 +39,16 @@ def _radians(at: FloatArray) -> FloatArray:
     return angles
 
 
-_RULES: dict[str, Callable[[FloatArray], FloatArray]] = {
-    "ATT": _att,
-    "CEIL_2D": lambda steps: np.ceil(_length(steps)),
-    "EUC_2D": lambda steps: _nearest(_length(steps)),
-    "MAN_2D": lambda steps: _nearest(np.abs(steps).sum(-1)),
-    "MAX_2D": lambda steps: np.max(_nearest(np.abs(steps)), axis=-1),
+_RULES: dict[str, Callable[[FloatArray, FloatArray], FloatArray]] = {
+    "ATT": lambda at, others: np.ceil(np.sqrt(cdist(at, others, "sqeuclidean") / 10.0)),
+    "CEIL_2D": lambda at, others: np.ceil(cdist(at, others)),
+    "EUC_2D": lambda at, others: _nearest(cdist(at, others)),
+    "GEO": _geo,
+    "MAN_2D": lambda at, others: _nearest(cdist(at, others, "cityblock")),
+    "MAX_2D": lambda at, others: _nearest(cdist(at, others, "chebyshev")),
 }
-"""Rules for the steps (N, N, 2) from each point to each other."""
-COORDINATE_TYPES = tuple(sorted({*_RULES, "GEO"}))
+"""Rules for the distances (R, N) from some points to all."""
+COORDINATE_TYPES = tuple(sorted(_RULES))
 """The weight types that need coordinates."""
 
 
@@ -72,11 +62,8 @@ def distances(coordinates: FloatArray, weight_type: str) -> FloatArray:
     count = integer("the number of nodes", len(coordinates), low=1, high=LARGEST_DIMENSION)
     result = np.empty((count, count))
     for first in range(0, count, _ROWS):
-        at = coordinates[first : first + _ROWS]
-        if weight_type == "GEO":
-            result[first : first + _ROWS] = _geo(at, coordinates)
-        else:
-            result[first : first + _ROWS] = _RULES[weight_type](at[:, None] - coordinates[None])
+        some = slice(first, first + _ROWS)
+        result[some] = _RULES[weight_type](coordinates[some], coordinates)
     if weight_type == "GEO":
         np.fill_diagonal(result, 0.0)
     return result

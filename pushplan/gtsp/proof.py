@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from pushplan.gtsp.gtsp_config import GtspConfig
 from pushplan.gtsp.problem import Problem
 from pushplan.gtsp.walk_kernels import PathProblem, Paths, extend_paths
-from pushplan.gtsp.walks import CHUNK_ARCS, Stopped, Walks
+from pushplan.gtsp.walks import CHUNK_ARCS, StopFired, Walks
 from pushplan.world.checks import FloatArray, IntArray
 
 
@@ -138,7 +138,7 @@ def prove(
         done, nodes, paths = False, None, 0
         try:
             done, nodes, paths = _settle(walks, config)
-        except Stopped:
+        except StopFired:
             pass
         result.detail["paths"] += paths
         if nodes is not None:

@@ -11,9 +11,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pushplan.errors import InvalidInputError
-from pushplan.gtsp.checking import checked_clusters, checked_costs
+from pushplan.gtsp.checking import checked_clusters, checked_costs, graph_instance
 from pushplan.gtsp.exact import expected_seconds, solve_exactly, table_mb
-from pushplan.gtsp.graphs import graph_instance
 from pushplan.gtsp.gtsp_config import GtspConfig
 from pushplan.gtsp.large import best_choice, promising
 from pushplan.gtsp.problem import Problem, tour_cost, usable
@@ -77,12 +76,12 @@ def solve_gtsp(
     matrix = checked_costs(costs)
     members = checked_clusters(clusters, len(matrix))
     seed = (np.random.default_rng(0) if rng is None else rng).integers(1, 2**63, 1)
-    call = _Call(matrix, members, seed.astype(np.uint64), budget, stop, config)
+    call = _SolverCall(matrix, members, seed.astype(np.uint64), budget, stop, config)
     tour = call.solve()
     return replace(tour, nodes=tuple(names[node] for node in tour.nodes)) if names else tour
 
 
-class _Call:
+class _SolverCall:
     """One call of the solver."""
 
     def __init__(

@@ -21,7 +21,7 @@ CHUNK_ARCS = 2_000_000
 """Arcs that are looked at between two looks at the stop rule."""
 
 
-class Stopped(Exception):
+class StopFired(Exception):
     """The stop rule has fired."""
 
 
@@ -35,7 +35,7 @@ class Walks:
         members: list[IntArray],  # nodes of each other cluster
         lists: IntArray,  # (n, n - 1) the other clusters by distance from each
         limit: float,  # only tours below this cost matter; may be infinite
-        # asked every few milliseconds; `Stopped` is raised where it says so
+        # asked every few milliseconds; `StopFired` is raised where it says so
         stopped: Callable[[], bool],
     ) -> None:
         finite = costs[np.isfinite(costs)]
@@ -70,7 +70,7 @@ class Walks:
     def look(self) -> None:
         """Ask the stop rule."""
         if self._stopped():
-            raise Stopped
+            raise StopFired
 
     def size_with(self, bits: int) -> tuple[float, float]:
         """Numbers in the table, and arcs to look at, with a memory of so many clusters."""

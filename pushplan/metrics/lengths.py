@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pushplan.world import Episode
 from pushplan.world.checks import FloatArray
-from pushplan.world.polyline import path_lengths
+from pushplan.world.polyline import path_length, path_lengths
 
 
 def success(episode: Episode) -> float:
@@ -20,11 +20,6 @@ def steps(episode: Episode) -> float:
 def sim_time_s(episode: Episode) -> float:
     """Simulated time from start to end [s]."""
     return float(episode.times[-1] - episode.times[0])
-
-
-def path_length(poses: FloatArray) -> float:
-    """Length [m] of the polyline through (T, 2 or 3) recorded poses; headings do not count."""
-    return float(path_lengths(poses[:, None])[0])
 
 
 def object_path_lengths(episode: Episode) -> FloatArray:

@@ -72,6 +72,8 @@ class CheckedFields:
             value = values[name]
             if optional and value is None:
                 continue
+            if check is number and type(value) is float and math.isfinite(value):
+                continue  # most commands: a call of `number` takes as long as all the rest
             if shape is None:
                 values[name] = check(called, value)
             else:
@@ -116,6 +118,6 @@ def _check(base: Any, note: Any) -> Callable[..., Any] | None:
         bool: boolean,
         str: word,
         int: partial(integer, low=note.low, high=note.high),
-        float: partial(number, **vars(note)),
+        float: number if note == Limits() else partial(number, **vars(note)),
     }
     return plain.get(base)

@@ -13,8 +13,8 @@ from numpy.typing import ArrayLike
 from pushplan.errors import InvalidInputError
 from pushplan.world.checked_fields import CheckedFields, Shape
 from pushplan.world.checks import ArrayRecord, FloatArray, array, checked_bounds, frozen
+from pushplan.world.occupancy_grid import occupancy_polygons, occupied_cells
 from pushplan.world.outline import convex_outlines
-from pushplan.world.stored.occupancy import occupancy_polygons, occupied_cells
 
 CAP_CORNERS = 9
 """Corners of each half circle where a thick segment is turned into a polygon."""

@@ -489,7 +489,7 @@ def test_large_instances_keep_promising_nodes() -> None:
         (np.zeros((3, 3)), [[0, 1], [-1]], "cluster 1 has node -1"),
         (np.zeros((3, 3)), [[0.5], [1], [2]], "whole numbers"),
         (np.zeros((3, 3)), "abc", "sequence of node lists"),
-        (np.zeros((3, 3)), None, "sequence of node lists"),
+        (np.zeros((3, 3)), None, "clusters must be given"),
     ],
 )
 def test_hostile_input_is_one_clear_error(costs: object, clusters: object, words: str) -> None:

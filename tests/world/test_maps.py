@@ -17,10 +17,10 @@ from pushplan.world import (
     StaticMap,
     load_nav2_map,
     load_world,
-    occupancy,
+    occupancy_grid,
 )
+from pushplan.world.occupancy_grid import rectangle_cover
 from pushplan.world.stored.nav2_map import read_nav2_grid
-from pushplan.world.stored.occupancy import rectangle_cover
 
 SHAPES = st.tuples(st.integers(1, 12), st.integers(1, 12))
 CORNER = {"image": "map.pgm", "resolution": 0.5, "origin": [1.0, -2.0, 0.0]}
@@ -215,10 +215,10 @@ def test_keys_that_nav2_does_not_know_are_ignored(tmp_path):
 
 def test_a_map_of_single_cells_is_refused_in_one_line(monkeypatch):
     board = np.indices((60, 60)).sum(axis=0) % 2 == 1
-    monkeypatch.setattr(occupancy, "MOST_RECTANGLES", 1800)
+    monkeypatch.setattr(occupancy_grid, "MOST_RECTANGLES", 1800)
     assert len(StaticMap.from_occupancy(board, 0.05).polygons) == 1800
     board[0, 0] = True  # still one rectangle with its neighbours
-    monkeypatch.setattr(occupancy, "MOST_RECTANGLES", 1700)
+    monkeypatch.setattr(occupancy_grid, "MOST_RECTANGLES", 1700)
     with pytest.raises(InvalidInputError, match="more than 1,700 rectangles"):
         StaticMap.from_occupancy(board, 0.05)
 

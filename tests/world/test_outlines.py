@@ -72,7 +72,7 @@ DOORS = {
     "static": lambda c: StaticMap.build([c]).polygons[0],
     "robot": on_a_robot,
     "receptacle": lambda c: Receptacle(c).polygon,
-    "target": lambda c: as_target([c])[0],
+    "target": lambda c: as_target([c]).parts[0],
     "ice": lambda c: IceField((c,), [-9, -9, 9, 9]).polygons[0],
     "tracker": seen,
 }  # fmt: skip

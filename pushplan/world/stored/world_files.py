@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -13,17 +14,11 @@ import numpy as np
 from pushplan.errors import InvalidInputError, SchemaError, short, unknown_name_message
 from pushplan.files.safe_files import known_keys, read_data
 from pushplan.files.safe_yaml import dump
-from pushplan.world.checks import (
-    array,
-    boolean,
-    integer,
-    number,
-    word,
-)
+from pushplan.world.checks import FloatArray, array, boolean, integer, number, word
 from pushplan.world.goals import ClearanceArea, Goal, GoalDisc, GoalLine, Receptacle
 from pushplan.world.movables import Movables
 from pushplan.world.outline import convex_outline, signed_area, unflatten
-from pushplan.world.robot import Drive, RobotModel
+from pushplan.world.robot import RobotModel
 from pushplan.world.scene import World
 from pushplan.world.static_map import StaticMap
 from pushplan.world.stored.nav2_map import load_nav2_map
@@ -117,13 +112,12 @@ def world_from_dict(data: object, folder: str | Path = ".") -> World:
         SchemaError: an unknown or missing key, or another schema version.
         InvalidInputError: a value that the types of `pushplan.world` refuse.
     """
-    known_keys(
+    data = known_keys(
         "world file",
         data,
         ("schema", "time", "margin", "robot", "static", "movables", "goal"),
         ("schema", "robot", "goal"),
     )
-    assert isinstance(data, Mapping)
     if data["schema"] != SCHEMA:
         raise SchemaError(f"this pushplan reads schema {SCHEMA!r}, got {short(data['schema'])}")
     robot, pose, twist = robot_from_dict(data["robot"])
@@ -134,7 +128,7 @@ def world_from_dict(data: object, folder: str | Path = ".") -> World:
         static=_static(data.get("static", {}), Path(folder)),
         movables=movables_from_list(data.get("movables", [])),
         goal=_goal(data["goal"]),
-        time=number("time", data.get("time", 0.0)),
+        time=data.get("time", 0.0),
         margin=data.get("margin", 0.0),
     )
 
@@ -176,22 +170,15 @@ def robot_from_dict(data: object) -> tuple[RobotModel, Any, Any]:
     Raises:
         SchemaError, InvalidInputError: as `world_from_dict`.
     """
-    known_keys("robot", data, (*_ROBOT_KEYS, "pose", "twist"), _ROBOT_NEEDS)
-    assert isinstance(data, Mapping)
-    fields = {key: value for key, value in data.items() if key not in ("pose", "twist")}
-    if not isinstance(fields["parts"], list):
-        raise SchemaError("robot.parts must be a list of convex outlines")
-    fields["parts"] = tuple(fields["parts"])
-    if fields["drive"] not in [drive.value for drive in Drive]:
-        raise SchemaError(unknown_name_message("drive", fields["drive"], [d.value for d in Drive]))
-    pose = array("robot.pose", data["pose"], (3,))
-    twist = data.get("twist")
-    return RobotModel(**fields), pose, None if twist is None else array("robot.twist", twist, (3,))
+    fields = dict(known_keys("robot", data, (*_ROBOT_KEYS, "pose", "twist"), _ROBOT_NEEDS))
+    pose, twist = fields.pop("pose"), fields.pop("twist", None)
+    robot = RobotModel(**fields)
+    checked = array("robot.pose", pose, (3,))
+    return robot, checked, None if twist is None else array("robot.twist", twist, (3,))
 
 
 def _static(data: object, folder: Path) -> StaticMap:
-    known_keys("static", data, ("bounds", "polygons", "segments", "map", "unknown"), ())
-    assert isinstance(data, Mapping)
+    data = known_keys("static", data, ("bounds", "polygons", "segments", "map", "unknown"), ())
     polygons = _list("static.polygons", data.get("polygons", []))
     bounds = data.get("bounds")
     if "map" in data:
@@ -207,18 +194,20 @@ def _static(data: object, folder: Path) -> StaticMap:
         ends = [_list(f"static.segments[{i}].{end}", segment[end]) for end in ("from", "to")]
         lines.append(array(f"static.segments[{i}]", [*ends[0], *ends[1]], (4,)))
         radii.append(number(f"static.segments[{i}].radius", segment.get("radius", 0.0), low=0.0))
-    return StaticMap.build(
-        polygons=polygons,
-        segments=lines,
-        radii=radii,
-        bounds=bounds,
-    )
+    return StaticMap.build(polygons, lines, radii, bounds)
 
 
-_MOVABLE_KEYS = (
-    *("id", "pose", "twist", "outline", "polygon"),
-    *("mass", "wheeled", "fixed", "contact_radius"),
-)
+_COLUMNS: dict[str, Callable[[str, Any], Any]] = {
+    "pose": partial(array, shape=(3,)),
+    "twist": partial(array, shape=(3,)),
+    "mass": partial(number, low=0.0, open_low=True),
+    "wheeled": boolean,
+    "fixed": boolean,
+    "contact_radius": partial(number, low=0.0),
+    "id": partial(integer, low=-(2**63), high=2**63 - 1),
+}
+"""Checks of what a file says of an object, beside its outline."""
+_AT_REST = {"twist": [0.0, 0.0, 0.0], "wheeled": False, "fixed": False, "contact_radius": 0.0}
 
 
 def movables_from_list(data: object) -> Movables:
@@ -227,51 +216,38 @@ def movables_from_list(data: object) -> Movables:
     Raises:
         SchemaError, InvalidInputError: as `world_from_dict`.
     """
-    rows = []
+    outlines: list[FloatArray] = []
+    columns: dict[str, list[Any]] = {key: [] for key in _COLUMNS}
     for i, item in enumerate(_list("movables", data)):
         name = f"movables[{i}]"
-        known_keys(name, item, _MOVABLE_KEYS, ())
+        known_keys(name, item, (*_COLUMNS, "outline", "polygon"), ())
         if ("polygon" in item) == ("outline" in item) or ("outline" in item) != ("pose" in item):
             raise SchemaError(
                 f"{name} needs either 'polygon' (world frame) or 'outline' (body frame) and 'pose'"
             )
+        given = {"id": i, **_AT_REST, **item}
         if "polygon" in item:
             corners = convex_outline(f"{name}.polygon", item["polygon"])
             shape = Movables.from_polygons([corners])
-            outline, pose = shape.outline(0), shape.poses[0]
+            outline, given["pose"] = shape.outline(0), shape.poses[0]
         else:
             outline = convex_outline(f"{name}.outline", item["outline"])
-            pose = array(f"{name}.pose", item["pose"], (3,))
-        mass = item.get("mass")
-        rows.append(
-            (
-                outline,
-                pose,
-                array(f"{name}.twist", item.get("twist", [0.0, 0.0, 0.0]), (3,)),
-                number(
-                    f"{name}.mass",
-                    signed_area(outline) if mass is None else mass,
-                    low=0.0,
-                    open_low=True,
-                ),
-                boolean(f"{name}.wheeled", item.get("wheeled", False)),
-                boolean(f"{name}.fixed", item.get("fixed", False)),
-                number(f"{name}.contact_radius", item.get("contact_radius", 0.0), low=0.0),
-                integer(f"{name}.id", item.get("id", i), low=-(2**63), high=2**63 - 1),
-            )
-        )
-    if not rows:
+        if given.get("mass") is None:
+            given["mass"] = signed_area(outline)
+        outlines.append(outline)
+        for key, check in _COLUMNS.items():
+            columns[key].append(check(f"{name}.{key}", given[key]))
+    if not outlines:
         return Movables.empty()
-    outlines, poses, twists, masses, wheeled, fixed, radii, ids = zip(*rows, strict=True)
     return Movables.from_outlines(
         outlines,
-        poses,
-        masses=masses,
-        wheeled=wheeled,
-        twists=twists,
-        ids=ids,
-        contact_radii=radii,
-        fixed=fixed,
+        columns["pose"],
+        masses=columns["mass"],
+        wheeled=columns["wheeled"],
+        twists=columns["twist"],
+        ids=columns["id"],
+        contact_radii=columns["contact_radius"],
+        fixed=columns["fixed"],
     )
 
 
