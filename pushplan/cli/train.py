@@ -129,7 +129,7 @@ def export(options: argparse.Namespace) -> int:
     """Run the policy and write its episodes."""
     from pushplan.evaluation import parse_policy
     from pushplan.training.policies.config import config_named, read_config
-    from pushplan.training.policies.dataset import DatasetRequest, read_metadata, record, to_minari
+    from pushplan.training.policies.dataset import read_metadata, record, to_minari
     from pushplan.world import InvalidInputError
 
     check_directory(options.out)
@@ -139,22 +139,15 @@ def export(options: argparse.Namespace) -> int:
         raise InvalidInputError(f"{given} is for task {config.task!r}, not {options.task!r}")
     spec = parse_policy(options.policy)
     driver = None if options.driver is None else parse_policy(options.driver)
-    request = DatasetRequest(
-        task=config.task,
-        scenarios=config.scenarios,
-        observation=config.observation,
-        episodes=options.episodes,
-        simulator=config.simulator,
-        preset=config.preset,
-        noise=options.noise,
-        hold=options.hold,
-        **({} if options.first_seed is None else {"first_seed": options.first_seed}),
-    )
     folder = record(
-        request,
+        config,
         spec.make(),
         spec.label,
         options.out,
+        episodes=options.episodes,
+        noise=options.noise,
+        hold=options.hold,
+        **({} if options.first_seed is None else {"first_seed": options.first_seed}),
         driver=None if driver is None else driver.make(),
         driver_label=None if driver is None else driver.label,
     )

@@ -24,7 +24,6 @@ from pushplan.training.policies.config import (
     shipped_configs,
 )
 from pushplan.training.policies.dataset import (
-    DatasetRequest,
     episodes,
     read_metadata,
     record,
@@ -107,8 +106,7 @@ def data(tmp_path_factory: pytest.TempPathFactory) -> Path:
     from pushplan.planners import make_policy
 
     folder = tmp_path_factory.mktemp("data") / "maze"
-    request = DatasetRequest("maze", ({"boxes": 1},), SMALL, 3, noise=0.05)
-    return record(request, make_policy("straight"), "straight", folder)
+    return record(tiny("bc"), make_policy("straight"), "straight", folder, episodes=3, noise=0.05)
 
 
 def trained(config: TrainingConfig, folder: Path, data: Path, **options: object) -> Path | None:
@@ -364,8 +362,8 @@ class TestDataset:
     def test_the_same_again(self, data, tmp_path):
         from pushplan.planners import make_policy
 
-        request = DatasetRequest("maze", ({"boxes": 1},), SMALL, 1, noise=0.05)
-        folder = record(request, make_policy("straight"), "straight", tmp_path / "again")
+        straight = make_policy("straight")
+        folder = record(tiny("bc"), straight, "straight", tmp_path / "x", episodes=1, noise=0.05)
         first, again = next(episodes(data)), next(episodes(folder))
         for entry in dataclasses.fields(first):
             assert np.array_equal(getattr(first, entry.name), getattr(again, entry.name))
@@ -381,11 +379,9 @@ class TestDataset:
                 self.steps += 1
                 return np.array([0.01 * self.steps])
 
-        request = DatasetRequest("maze", ({"boxes": 1},), SMALL, 1, noise=0.2, hold=3)
+        options = {"driver": Turning(), "driver_label": "turning", "noise": 0.2, "hold": 3}
         straight = make_policy("straight")
-        folder = record(
-            request, straight, "straight", tmp_path / "x", driver=Turning(), driver_label="turning"
-        )
+        folder = record(tiny("bc"), straight, "straight", tmp_path / "x", episodes=1, **options)
         about, found = read_metadata(folder), next(episodes(folder))
         assert (about["driver"], about["hold"]) == ("turning", 3)
         driven = np.flatnonzero(found.executed != found.actions)
@@ -409,7 +405,7 @@ class TestDataset:
 
     def test_damage_is_said(self, data, tmp_path):
         with pytest.raises(InvalidInputError, match="not empty"):
-            record(DatasetRequest("maze", ({},), SMALL, 1), None, "x", data)
+            record(tiny("bc"), None, "x", data, episodes=1)
         with pytest.raises(SchemaError, match="data set"):
             read_metadata(tmp_path)
         (tmp_path / "data").mkdir()

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import json
 import warnings
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -25,6 +25,7 @@ from pushplan.imports.on_demand import need
 from pushplan.learned.builders import builder_from_dict, builder_to_dict
 from pushplan.learned.specification import RobotSpec
 from pushplan.observation import ObservationBuilder
+from pushplan.training.policies.config import TrainingConfig
 from pushplan.training.policies.environment import TRAINING_SEEDS, environments
 from pushplan.world import (
     ChoosesActions,
@@ -33,7 +34,7 @@ from pushplan.world import (
     SchemaError,
     stream,
 )
-from pushplan.world.checked_fields import CheckedFields, Fraction, NonNegativeInt, PositiveInt
+from pushplan.world.checks import integer, number
 
 SCHEMA = "pushplan-dataset/1"
 METADATA = "metadata.json"
@@ -45,31 +46,6 @@ _KEYS = (
     *("robot", "control_step", "total_episodes", "total_steps", "successes", "first_seed", "noise"),
 )
 _LATER_KEYS = ("driver", "hold")
-
-
-@dataclass(frozen=True)
-class DatasetRequest(CheckedFields):
-    """What is recorded."""
-
-    task: str  # name of the task
-    scenarios: tuple[Mapping[str, Any], ...]  # variations of it; the episodes take them in turn
-    observation: Mapping[str, Any]  # what is recorded as observed, as in a specification
-    episodes: PositiveInt  # how many
-    simulator: str = "pymunk"  # name of the simulator
-    preset: str | None = None  # of the task
-    # of the first layout; by default beyond all that scores are made on
-    first_seed: NonNegativeInt = TRAINING_SEEDS
-    # probability for each action that another one is carried out instead, for a few steps: a random
-    # one, or those of a driver. The one that the policy wanted is recorded all the same, so that a
-    # learner sees how to come back.
-    noise: Fraction = 0.0
-    # for how many steps a random action stands, or a driver drives
-    hold: PositiveInt = 4
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        if not self.scenarios:
-            raise InvalidInputError("scenarios must hold at least one mapping of variations")
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,21 +61,32 @@ class EpisodeData:
 
 
 def record(
-    request: DatasetRequest,
+    config: TrainingConfig,
     policy: Any,
     label: str,
     folder: str | Path,
     *,
+    episodes: int,
+    first_seed: int = TRAINING_SEEDS,
+    noise: float = 0.0,
+    hold: int = 4,
     driver: Any = None,
     driver_label: str | None = None,
 ) -> Path:
     """Run a policy and write what it saw and wanted.
 
     Args:
-        request: what is recorded.
+        config: of a training that learns from it: task, observation, and scenarios, which the
+            episodes take in turn.
         policy: whose actions are recorded.
         label: what the data set calls it.
         folder: a new one.
+        episodes: how many.
+        first_seed: of the first layout; by default beyond all that scores are made on.
+        noise: probability for each action that another one is carried out instead, for a few steps:
+            a random one, or those of a driver. The one that the policy wanted is recorded all the
+            same, so that a learner sees how to come back.
+        hold: for how many steps a random action stands, or a driver drives.
         driver: a policy with the same actions that observes by itself, such as a network that is
             learning. It drives where else random actions are carried out, so that the data set
             shows what ``policy`` does where the driver gets to (DAgger, Ross et al. 2011, arXiv
@@ -107,41 +94,45 @@ def record(
         driver_label: what the data set calls it.
 
     Raises:
-        InvalidInputError: if the folder holds something, or the request makes no sense.
+        InvalidInputError: if the folder holds something, or a number makes no sense.
     """
+    integer("episodes", episodes, low=1)
+    integer("first_seed", first_seed, low=0)
+    number("noise", noise, low=0.0, high=1.0)
+    integer("hold", hold, low=1)
     folder = Path(folder)
     if folder.exists() and any(folder.iterdir()):
         raise InvalidInputError(f"{folder} is not empty")
-    builder = builder_from_dict(request.observation)
+    builder = builder_from_dict(config.observation)
     wanted = policy.observation if isinstance(policy, ChoosesObservation) else "state"
     mode = policy.actions if isinstance(policy, ChoosesActions) else None
-    envs = environments(request, wanted, mode)
+    envs = environments(config, wanted, mode)
     (folder / "data").mkdir(parents=True, exist_ok=True)
     steps = successes = 0
-    for number_ in range(request.episodes):
-        env = envs[number_ % len(envs)]
-        arrays, success = _run(env, policy, driver, builder, request, request.first_seed + number_)
+    for index in range(episodes):
+        env = envs[index % len(envs)]
+        arrays, success = _run(env, policy, driver, builder, noise, hold, first_seed + index)
         steps += len(arrays["actions"])
         successes += success
-        np.savez_compressed(folder / "data" / f"episode_{number_:05d}.npz", **arrays)
+        np.savez_compressed(folder / "data" / f"episode_{index:05d}.npz", **arrays)
     env = envs[0]
     about = {
         "format": SCHEMA,
-        "task": request.task,
-        "simulator": request.simulator,
-        "preset": request.preset,
-        "scenarios": [dict(v) for v in request.scenarios],
+        "task": config.task,
+        "simulator": config.simulator,
+        "preset": config.preset,
+        "scenarios": [dict(v) for v in config.scenarios],
         "policy": label,
         "action_mode": env.action_mode,
         "observation": builder_to_dict(builder),
         "robot": vars(RobotSpec.of(env.task.robot)),
         "control_step": env.task.control_step,
-        "total_episodes": request.episodes,
+        "total_episodes": episodes,
         "total_steps": steps,
         "successes": successes,
-        "first_seed": request.first_seed,
-        "noise": request.noise,
-        "hold": request.hold,
+        "first_seed": first_seed,
+        "noise": noise,
+        "hold": hold,
         "driver": driver_label,
     }
     (folder / METADATA).write_text(json.dumps(about, indent=2) + "\n", encoding="utf-8")
@@ -155,7 +146,8 @@ def _run(
     policy: Any,
     driver: Any,
     builder: ObservationBuilder,
-    request: DatasetRequest,
+    noise: float,
+    hold: int,
     seed: int,
 ) -> tuple[dict[str, Any], bool]:
     """The arrays of an episode, and its success."""
@@ -167,8 +159,8 @@ def _run(
     held, disturbed, over = 0, np.zeros(0), False
     while not over:
         action = env.encode(policy.act(env.world, seen))
-        if held == 0 and request.noise and rng.random() < request.noise:
-            held, disturbed = request.hold, rng.uniform(-1.0, 1.0, action.shape)
+        if held == 0 and noise and rng.random() < noise:
+            held, disturbed = hold, rng.uniform(-1.0, 1.0, action.shape)
             if driver is not None:
                 driver.reset(env.world, stream(seed, "driver"))
         executed: NDArray[Any] = action
@@ -208,8 +200,8 @@ def episodes(folder: str | Path) -> Iterator[EpisodeData]:
         SchemaError: if one cannot be read, or one is missing.
     """
     about = read_metadata(folder)
-    for number_ in range(int(about["total_episodes"])):
-        path = Path(folder) / "data" / f"episode_{number_:05d}.npz"
+    for index in range(int(about["total_episodes"])):
+        path = Path(folder) / "data" / f"episode_{index:05d}.npz"
         found = read_npz(path, "episode of a data set", ARRAYS, (_EXECUTED,))
         arrays: dict[str, Any] = {_EXECUTED: found.get("actions"), **found}
         lengths = {len(arrays[name]) for name in (*ARRAYS[1:], _EXECUTED)}

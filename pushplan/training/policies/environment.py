@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import gymnasium
 import numpy as np
@@ -17,9 +17,6 @@ from pushplan.learned.specification import Specification
 from pushplan.observation import ObservationBuilder
 from pushplan.training.policies.config import TrainingConfig
 from pushplan.world import InvalidInputError, World, stream
-
-if TYPE_CHECKING:
-    from pushplan.training.policies.dataset import DatasetRequest
 
 TRAINING_SEEDS = 2**20
 """Layouts of training have seeds from here on; those below are for validation and scoring."""
@@ -42,10 +39,8 @@ class _Blank:
         return self._nothing
 
 
-def environments(
-    config: TrainingConfig | DatasetRequest, observation: Any, action: Any
-) -> list[PushEnv]:
-    """An environment for each scenario of a training or of a data set."""
+def environments(config: TrainingConfig, observation: Any, action: Any) -> list[PushEnv]:
+    """An environment for each scenario of a training or of its data set."""
     return [
         PushEnv(
             task=config.task,
