@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-import contextlib
 import multiprocessing
-import pickle
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from copy import deepcopy
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
 from itertools import pairwise
-from multiprocessing.connection import Connection, wait
-from multiprocessing.reduction import ForkingPickler
 from typing import Any
 
 import numpy as np
@@ -17,9 +14,7 @@ from gymnasium.vector import AutoresetMode, SyncVectorEnv, VectorEnv
 from gymnasium.vector.utils import (
     CloudpickleWrapper,
     batch_space,
-    concatenate,
     create_shared_memory,
-    iterate,
     read_from_shared_memory,
 )
 from numpy.typing import ArrayLike, NDArray
@@ -29,7 +24,6 @@ from pushplan.world.checks import integer
 
 _Batch = tuple[Any, NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]]
 """Observations, rewards, terminated, truncated and information of some environments."""
-_PATIENCE_S = 5.0  # for which a worker may take to close its environments
 
 
 class VectorWorkerError(PushplanError):
@@ -52,7 +46,7 @@ class WorkerVectorEnv(VectorEnv[Any, Any, Any]):
     Worker processes are spawned: a script needs its ``if __name__ == "__main__":``.
 
     Args:
-        env_fns: make the environments; all have the same spaces.
+        env_fns: make the environments; all have the same spaces, whose elements are arrays.
         workers: processes among which the environments are divided; no more than there are
             environments.
         copy: whether `step` and `reset` return observations of their own, which later steps do not
@@ -99,27 +93,18 @@ class WorkerVectorEnv(VectorEnv[Any, Any, Any]):
         )
         ends = [n * self.num_envs // workers for n in range(workers + 1)]
         self._shares = [slice(first, end) for first, end in pairwise(ends)]
-        self._action_spaces = [
-            batch_space(self.single_action_space, share.stop - share.start)
+        self._pending: dict[Future[Any], int] = {}  # what workers owe, by the order of requests
+        self._pools = [
+            ProcessPoolExecutor(
+                1,
+                context,
+                _keep,
+                (list(map(CloudpickleWrapper, env_fns[share])), mode, memory, self.num_envs, share),
+            )
             for share in self._shares
         ]
-        self._pending: list[int] = []  # workers that owe a batch, the one asked first at the front
-        self._connections: list[Connection] = []
-        self._processes = []
-        for share in self._shares:
-            ours, theirs = context.Pipe()
-            made = [CloudpickleWrapper(env_fn) for env_fn in env_fns[share]]
-            process = context.Process(
-                target=_work,
-                args=(theirs, made, mode, memory, self.num_envs, share),
-                daemon=True,
-            )
-            process.start()
-            theirs.close()
-            self._connections.append(ours)
-            self._processes.append(process)
         try:
-            self._answers(range(workers))  # of `__init__`
+            self._ask(_make, [()] * workers)
         except BaseException:
             self.close()
             raise
@@ -136,7 +121,7 @@ class WorkerVectorEnv(VectorEnv[Any, Any, Any]):
             seed: of the first environment, the others count on from there; or one for each.
             options: for each environment; ``"reset_mask"`` (num_envs,) bool says which.
         """
-        answers = self._ask("reset", self._reset_arguments(seed, options))
+        answers = self._ask(_reset, self._reset_arguments(seed, options))
         observations, *_, infos = self._joined(answers)
         return observations, infos
 
@@ -171,8 +156,8 @@ class WorkerVectorEnv(VectorEnv[Any, Any, Any]):
 
     def step(self, actions: Any) -> _Batch:
         """One step of every environment; see `gymnasium.vector.SyncVectorEnv.step`."""
-        each = list(iterate(self.action_space, actions))
-        return self._joined(self._ask("step", [each[share] for share in self._shares]))
+        each = np.asarray(actions)
+        return self._joined(self._ask(_step, [(each[share],) for share in self._shares]))
 
     def _joined(self, answers: Sequence[Any]) -> _Batch:
         """The answers of all workers as `step` returns them."""
@@ -194,9 +179,8 @@ class WorkerVectorEnv(VectorEnv[Any, Any, Any]):
             options: likewise.
         """
         self._check_idle("async_reset")
-        arguments = self._reset_arguments(seed, options)
-        self._request("reset", dict(enumerate(arguments)))
-        self._pending = list(range(self.workers))
+        for n, each in enumerate(self._reset_arguments(seed, options)):
+            self._pending[self._pools[n].submit(_reset, *each)] = n
 
     def recv(
         self,
@@ -218,10 +202,10 @@ class WorkerVectorEnv(VectorEnv[Any, Any, Any]):
             raise InvalidInputError(
                 "recv: no environment has been asked for anything: call async_reset() or send()"
             )
-        ready = wait([self._connections[n] for n in self._pending])
-        n = next(n for n in self._pending if self._connections[n] in ready)
-        self._pending.remove(n)
-        ((rewards, terminated, truncated, infos),) = self._answers([n])
+        ready, _ = wait(self._pending, return_when=FIRST_COMPLETED)
+        future = next(future for future in self._pending if future in ready)
+        n = self._pending.pop(future)
+        rewards, terminated, truncated, infos = self._answer(future, n)
         share = self._shares[n]
         infos = {**infos, "env_id": np.arange(share.start, share.stop)}
         return self._seen(share), rewards, terminated, truncated, infos
@@ -246,19 +230,17 @@ class WorkerVectorEnv(VectorEnv[Any, Any, Any]):
                 "env_id must name the environments of one worker, as info['env_id'] of recv does "
                 f"({', '.join(f'{share[0]} to {share[-1]}' for share in shares)}), got {wanted}"
             )
-        if n in self._pending:
+        if n in self._pending.values():
             raise InvalidInputError(f"send: environments {wanted} are still busy: call recv()")
-        each = list(iterate(self._action_spaces[n], actions))
-        if len(each) != len(wanted):
+        if len(actions) != len(wanted):
             raise InvalidInputError(
-                f"actions must be one for each of {len(wanted)} environments, got {len(each)}"
+                f"actions must be one for each of {len(wanted)} environments, got {len(actions)}"
             )
-        self._request("step", {n: each})
-        self._pending.append(n)
+        self._pending[self._pools[n].submit(_step, np.asarray(actions))] = n
 
     def call(self, name: str, *args: Any, **kwargs: Any) -> tuple[Any, ...]:
         """What a method of every environment returns, or the value of an attribute."""
-        answers = self._ask("call", [(name, args, kwargs)] * self.workers)
+        answers = self._ask(_call, [(name, args, kwargs)] * self.workers)
         return tuple(value for values in answers for value in values)
 
     def get_attr(self, name: str) -> tuple[Any, ...]:
@@ -272,7 +254,7 @@ class WorkerVectorEnv(VectorEnv[Any, Any, Any]):
             raise InvalidInputError(
                 f"values must be one for each of {self.num_envs} environments, got {len(each)}"
             )
-        self._ask("set_attr", [(name, list(each[share])) for share in self._shares])
+        self._ask(_set_attr, [(name, list(each[share])) for share in self._shares])
 
     def render(self) -> tuple[Any, ...]:
         """The picture of every environment."""
@@ -280,21 +262,25 @@ class WorkerVectorEnv(VectorEnv[Any, Any, Any]):
 
     def close_extras(self, **kwargs: Any) -> None:
         """End the worker processes."""
-        for connection in getattr(self, "_connections", ()):
-            with contextlib.suppress(OSError):
-                connection.send(("close", None))
-            connection.close()
-        for process in getattr(self, "_processes", ()):
-            process.join(_PATIENCE_S)
-            if process.is_alive():
-                process.kill()
-                process.join()
+        for pool in getattr(self, "_pools", ()):
+            pool.shutdown(cancel_futures=True)
 
-    def _ask(self, request: str, arguments: Sequence[Any]) -> list[Any]:
-        """What the workers answer to a request, with an argument for each."""
-        self._check_idle(request)
-        self._request(request, dict(enumerate(arguments)))
-        return self._answers(range(self.workers))
+    def _ask(self, function: Callable[..., Any], arguments: Sequence[tuple[Any, ...]]) -> list[Any]:
+        """What a function gives in each worker, with arguments for each."""
+        self._check_idle(function.__name__.strip("_"))
+        futures = [self._pools[n].submit(function, *each) for n, each in enumerate(arguments)]
+        wait(futures)  # all of them: after an error no worker is busy
+        return [self._answer(future, n) for n, future in enumerate(futures)]
+
+    def _answer(self, future: Future[Any], n: int) -> Any:
+        try:
+            return future.result()
+        except BrokenProcessPool as error:
+            share = self._shares[n]
+            raise VectorWorkerError(
+                f"the worker process of environments {share.start} to {share.stop - 1} has "
+                "ended: close this vector environment, make another"
+            ) from error
 
     def _check_open(self, name: str) -> None:
         if self.closed:
@@ -308,49 +294,10 @@ class WorkerVectorEnv(VectorEnv[Any, Any, Any]):
                 f"{len(self._pending)} times first"
             )
 
-    def _request(self, request: str, arguments: Mapping[int, Any]) -> None:
-        """Send a request to some workers, with an argument for each."""
-        # All are pickled before one is sent: after an error no worker has a request.
-        messages = {n: ForkingPickler.dumps((request, each)) for n, each in arguments.items()}
-        for n, message in messages.items():
-            with contextlib.suppress(OSError):  # it has ended: `_answers` says so
-                self._connections[n].send_bytes(message)
-
-    def _answers(self, workers: Iterable[int]) -> list[Any]:
-        """What some workers answer, in order."""
-        values: list[Any] = []
-        errors: list[Exception] = []
-        for n in workers:
-            try:
-                is_well, value = self._connections[n].recv()
-            except (EOFError, OSError):
-                self._processes[n].join(_PATIENCE_S)
-                share, code = self._shares[n], self._processes[n].exitcode
-                is_well = False
-                value = VectorWorkerError(
-                    f"the worker process of environments {share.start} to {share.stop - 1} has "
-                    f"ended with exit code {code}: close this vector environment, make another"
-                )
-            except Exception as error:  # what it sent cannot be read here; the next can
-                is_well, value = False, error
-            (values if is_well else errors).append(value)
-        if errors:
-            raise errors[0]
-        return values
-
     def _seen(self, share: slice = slice(None)) -> Any:
         """The observations of a share in shared memory, or a copy of them."""
-        seen = _part(self._observations, share)
-        return deepcopy(seen) if self.copy else seen
-
-
-def _part(values: Any, part: slice) -> Any:
-    """A part of a batch, of any space, in the same memory."""
-    if isinstance(values, Mapping):
-        return {key: _part(value, part) for key, value in values.items()}
-    if isinstance(values, tuple):
-        return tuple(_part(value, part) for value in values)
-    return values[part]
+        seen = self._observations[share]
+        return seen.copy() if self.copy else seen
 
 
 def _merged(
@@ -372,63 +319,42 @@ def _merged(
     return out
 
 
-def _work(
-    connection: Connection,
-    env_fns: Sequence[CloudpickleWrapper],
-    mode: AutoresetMode,
-    memory: Any,
-    count: int,
-    share: slice,
-) -> None:
-    """Answer requests until told to close, or until the other process has ended."""
-    try:
-        envs = SyncVectorEnv(env_fns, copy=False, autoreset_mode=mode)
-        everything = read_from_shared_memory(envs.single_observation_space, memory, count)
-        shared = _part(everything, share)
-        connection.send((True, None))
-    except Exception as error:
-        connection.send((False, _portable(error)))
-        return
-    with contextlib.suppress(EOFError, KeyboardInterrupt, BrokenPipeError):
-        while True:
-            request, argument = connection.recv()
-            if request == "close":
-                break
-            try:
-                answer = ForkingPickler.dumps((True, _do(envs, request, argument, shared)))
-            except Exception as error:
-                answer = ForkingPickler.dumps((False, _portable(error)))
-            connection.send_bytes(answer)
-    envs.close()
+_kept: list[Any] = []
+"""In a worker process: what its environments are made of."""
 
 
-def _do(envs: SyncVectorEnv, request: str, argument: Any, shared: Any) -> Any:
-    """Carry out a request; observations go to their share of what all processes see."""
-    if request == "set_attr":
-        return envs.set_attr(*argument)
-    if request == "call":
-        name, args, kwargs = argument
-        return envs.call(name, *args, **kwargs)
-    if request == "step":
-        observations, *answer = envs.step(argument)
-    else:
-        seeds, options, mask = argument
-        still = np.zeros(envs.num_envs, dtype=np.bool_)
-        answer = [np.zeros(envs.num_envs), still, still.copy(), {}]
-        if mask is not None and not mask.any():
-            return answer
+def _keep(*kept: Any) -> None:
+    _kept[:] = kept
+
+
+def _make() -> None:
+    """Make the environments of this process; they and their observations are then what is kept."""
+    env_fns, mode, memory, count, share = _kept
+    envs = SyncVectorEnv(env_fns, copy=False, autoreset_mode=mode)
+    _keep(envs, read_from_shared_memory(envs.single_observation_space, memory, count)[share])
+
+
+def _reset(seeds: list[int | None], options: dict[str, Any] | None, mask: Any) -> list[Any]:
+    """Reset the environments, or those of a mask; the answer is that of a step."""
+    envs, shared = _kept
+    still = np.zeros(envs.num_envs, dtype=np.bool_)
+    infos: dict[str, Any] = {}
+    if mask is None or mask.any():
         if mask is not None:
             options = {**(options or {}), "reset_mask": mask}
-        observations, answer[-1] = envs.reset(seed=seeds, options=options)
-    each = list(iterate(envs.observation_space, observations))
-    concatenate(envs.single_observation_space, each, shared)
+        shared[:], infos = envs.reset(seed=seeds, options=options)
+    return [np.zeros(envs.num_envs), still, still.copy(), infos]
+
+
+def _step(actions: Any) -> list[Any]:
+    envs, shared = _kept
+    shared[:], *answer = envs.step(actions)
     return answer
 
 
-def _portable(error: Exception) -> Exception:
-    """The error itself where it can be sent, else one with its text."""
-    try:
-        pickle.loads(pickle.dumps(error))
-    except Exception:
-        return VectorWorkerError(f"{type(error).__name__}: {error}")
-    return error
+def _call(name: str, args: tuple[Any, ...], kwargs: dict[str, Any]) -> Any:
+    return _kept[0].call(name, *args, **kwargs)
+
+
+def _set_attr(name: str, values: list[Any]) -> None:
+    _kept[0].set_attr(name, values)

@@ -17,6 +17,10 @@ MAZE = Scenario("maze", variations={"boxes": 3, "time_limit": 4.0})
 CLEARING = Scenario("area_clearing", variations={"boxes": 2, "idle_limit": 3})
 
 
+def process_of(envs, n):
+    return envs._pools[n].submit(os.getpid).result()
+
+
 def episodes(envs, steps=9):
     """All that some steps return, with resets on the way."""
     envs.action_space.seed(3)
@@ -92,8 +96,9 @@ def test_requests_out_of_turn_are_refused():
     envs.recv()
     envs.recv()
     assert envs.step(envs.action_space.sample())[1].shape == (3,)
+    process = process_of(envs, 1)
     envs.async_reset(seed=0)
-    os.kill(envs._processes[1].pid, signal.SIGKILL)
+    os.kill(process, signal.SIGKILL)
     with pytest.raises(VectorWorkerError, match="environments 1 to 2"):
         for _ in range(2):
             envs.recv()
@@ -145,8 +150,8 @@ def test_errors_of_a_worker_arrive_here_and_harm_nothing():
     for seed in ([1], [1, 2, 3]):
         with pytest.raises(InvalidInputError, match="seed must have one value for each"):
             envs.reset(seed=seed)
-    os.kill(envs._processes[1].pid, signal.SIGKILL)
-    with pytest.raises(VectorWorkerError, match="environments 1 to 1 has ended with exit code -9"):
+    os.kill(process_of(envs, 1), signal.SIGKILL)
+    with pytest.raises(VectorWorkerError, match="environments 1 to 1 has ended"):
         envs.step(envs.action_space.sample())
     envs.close()
     with pytest.raises(InvalidInputError, match="closed"):
