@@ -88,7 +88,7 @@ class WorkerVectorEnv(VectorEnv[Any, Any, Any]):
         self.action_space = batch_space(self.single_action_space, self.num_envs)
         context: Any = multiprocessing.get_context("spawn")
         memory = create_shared_memory(self.single_observation_space, self.num_envs, context)
-        self._observations = read_from_shared_memory(
+        self._observations: Any = read_from_shared_memory(
             self.single_observation_space, memory, self.num_envs
         )
         ends = [n * self.num_envs // workers for n in range(workers + 1)]
@@ -348,8 +348,9 @@ def _reset(seeds: list[int | None], options: dict[str, Any] | None, mask: Any) -
 
 def _step(actions: Any) -> list[Any]:
     envs, shared = _kept
-    shared[:], *answer = envs.step(actions)
-    return answer
+    observations, *answer = envs.step(actions)
+    shared[:] = observations
+    return list(answer)
 
 
 def _call(name: str, args: tuple[Any, ...], kwargs: dict[str, Any]) -> Any:
