@@ -8,11 +8,13 @@ from pushplan.world.checked_fields import (
     CheckedFields,
     Fraction,
     NonNegativeFloat,
-    NonNegativeInt,
     PositiveFloat,
     PositiveFraction,
     PositiveInt,
 )
+
+LEAST_GAIN = 0.001
+"""Fraction of its cost that a path must lose over `shortcuts` of them to be worked on further."""
 
 
 @dataclass(frozen=True)
@@ -29,16 +31,7 @@ class PathSearchConfig(CheckedFields):
         inset: how far into the goal a plan ends [R].
         spacing: distance between the poses of a path [R].
         edge: longest edge of a tree [R].
-        coarse_path_fraction: fraction of targets near the coarse shortest path; the rest are
-            uniform.
-        coarse_path_spread: standard deviation of those targets about it [R].
-        avoid_iterations: tree iterations that treat objects as obstacles, before they count as
-            things that may be pushed.
-        tree_iterations: iterations after which a tree is given up for a new one; both numbers are
-            for paths of up to 30 edges and grow with the length of the coarse path beyond.
         shortcuts: shortcuts tried on a path before its gain is looked at.
-        least_gain: fraction of its cost that a path must lose over ``shortcuts`` of them to be
-            worked on further; otherwise new trees are grown.
         batch: shortcuts between two looks at the stop rule, fewer among many objects.
         default_iterations: budget where no stop rule is given; three times as much while there is
             no plan.
@@ -50,11 +43,6 @@ class PathSearchConfig(CheckedFields):
     inset: Fraction = 0.05
     spacing: PositiveFloat = 0.15
     edge: PositiveFloat = 1.6
-    coarse_path_fraction: Fraction = 0.8
-    coarse_path_spread: PositiveFloat = 0.5
-    avoid_iterations: NonNegativeInt = 200
-    tree_iterations: PositiveInt = 1500
     shortcuts: PositiveInt = 400
-    least_gain: Fraction = 0.001
     batch: PositiveInt = 10
     default_iterations: PositiveInt = 4000

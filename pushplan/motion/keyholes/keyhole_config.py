@@ -36,7 +36,6 @@ class KeyholeConfig(CheckedFields):
             close.
         rank_cost: added to the priority of a state each time that it is expanded again, with
             objects that matter less [R].
-        most_objects: among more, no keyholes are looked for.
         default_pushes: simulated at most where no stop rule is given.
     """
 
@@ -52,7 +51,6 @@ class KeyholeConfig(CheckedFields):
     closing_cost: NonNegativeFloat = 20.0
     closed_cost: NonNegativeFloat = 3.0
     rank_cost: NonNegativeFloat = 3.0
-    most_objects: PositiveInt = 40
     default_pushes: PositiveInt = 600
 
     def __post_init__(self) -> None:

@@ -21,6 +21,7 @@ from pushplan.world import Drive, World
 from pushplan.world.checks import FloatArray
 from pushplan.world.polyline import path_length, path_lengths
 
+_MOST_OBJECTS = 40  # among more, no keyholes are looked for
 _MOST_CELLS = 400_000  # of the configuration space
 _LEAVING = 2.5  # how far the robot drives straight to where its disc is free [circumscribed radii]
 
@@ -35,7 +36,6 @@ class KeyholeEnd:
         before: the scene before the last push; None at the start.
         drive: (N, 2) corners of the drive from there to the start of the push [m].
         path: (N, 3) the push, or how the robot got free at the start; ahead, then back.
-        pushed: index of the object that was pushed, -1 at the start.
     """
 
     state: DiscState
@@ -43,7 +43,6 @@ class KeyholeEnd:
     before: KeyholeEnd | None
     drive: FloatArray
     path: FloatArray
-    pushed: int
 
     def chain(self) -> list[KeyholeEnd]:
         """The scenes that have led to this one, from the start on."""
@@ -75,7 +74,7 @@ def suits_keyholes(world: World, config: KeyholeConfig) -> bool:
     return (
         robot.drive is Drive.DIFFERENTIAL
         and robot.min_speed < 0.0
-        and 0 < len(world.movables) <= config.most_objects
+        and 0 < len(world.movables) <= _MOST_OBJECTS
         and bool(static.convex_parts)
         and float(np.prod(sides)) <= _MOST_CELLS
     )
@@ -181,7 +180,7 @@ class KeyholeSearch:
             if length < 0.0 or self.interaction.sweep(self.world, path).work == 0.0:
                 state.robot = path[-1]
                 cost = abs(length) * self._size
-                return KeyholeEnd(state, cost, None, robot[None, :2], path, -1)
+                return KeyholeEnd(state, cost, None, robot[None, :2], path)
         return None
 
     def _hits_wall(self, path: FloatArray) -> bool:
@@ -276,7 +275,6 @@ class KeyholeSearch:
                 end,
                 end.state.path_to(push.start[:2]),
                 np.concatenate([path, away]),
-                push.object_index,
             )
         return None
 

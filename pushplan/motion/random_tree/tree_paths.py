@@ -23,6 +23,10 @@ from pushplan.world.checks import FloatArray
 from pushplan.world.outline import unflatten
 from pushplan.world.polyline import path_length
 
+_COARSE_PATH_FRACTION = 0.8  # of the targets, that are near the coarse path at first
+_COARSE_PATH_SPREAD = 0.5  # standard deviation of those about it [R]
+_AVOID_ITERATIONS = 200  # of the tree that takes objects as obstacles
+_TREE_ITERATIONS = 1500  # of the tree that may push them
 _BACKWARD = 2.0  # how far a car may go back at first [turning radii]
 _EDGES = 30
 """Edges along a coarse path up to which a tree gets its budget; in proportion more beyond."""
@@ -35,7 +39,7 @@ class TreePaths:
         self,
         improver: PathImprover,  # of this planning call
     ) -> None:
-        self._improver, self._fraction = improver, improver.config.coarse_path_fraction
+        self._improver, self._fraction = improver, _COARSE_PATH_FRACTION
         self._exact: FloatArray | None = None
         self.trees = 0
         self.sealed = False
@@ -84,10 +88,9 @@ class TreePaths:
 
     def grow_two(self, push_weight: float) -> Iterator[Candidate]:
         """Paths of two trees, around the objects and among them, until the stop rule fires."""
-        config = self._improver.config
         for weight, budget in (
-            (np.inf, config.avoid_iterations),
-            (push_weight, config.tree_iterations),
+            (np.inf, _AVOID_ITERATIONS),
+            (push_weight, _TREE_ITERATIONS),
         ):
             if self._improver.stopped():
                 return
@@ -138,7 +141,7 @@ class TreePaths:
             turn_weight=0.5 * size,
             backward=improver.backward,
         )
-        spread = config.coarse_path_spread * size
+        spread = _COARSE_PATH_SPREAD * size
         targets = Targets(coarse, self._fraction, spread, world.static.bounds, improver.rng)
         growth = TreeGrowth(improver.lead.pose, improver.goal, targets, limits, shape, among)
         arcs = growth.grow(int(improver.rng.integers(1, 2**31)), done, improver.stopped)

@@ -38,12 +38,8 @@ class PushAwareConfig(PathSearchConfig):
         memory: of the objects' poses in one search at most [MiB].
         expansions: half the arcs driven at most between two looks at the stop rule, fewer among
             many objects.
-        first_search: arcs driven in a search at most; a quarter more after each that took them
-            all.
         slack: how much more than the best plan so far a path of the search may cost before it is
             shortcut, as a fraction.
-        cost_sigma: perturbation of the costs of the objects from one search to the next, as the
-            standard deviation of their logarithm; plans always have the true ones.
         random_fraction: fraction of the iterations that go into a random tree over poses and costs,
             which finds, in the end, what the search cannot represent.
     """
@@ -60,7 +56,5 @@ class PushAwareConfig(PathSearchConfig):
     nodes: Annotated[int, Limits(2)] = 100_000
     memory: PositiveFloat = 48.0
     expansions: PositiveInt = 30
-    first_search: PositiveInt = 1000
     slack: NonNegativeFloat = 0.05
-    cost_sigma: NonNegativeFloat = 0.7
     random_fraction: NonNegativeFloat = 0.03

@@ -11,6 +11,7 @@ from pushplan.motion.dubins_warm_start import warm_start
 from pushplan.motion.keep_out import keep_out
 from pushplan.motion.length_bound import length_bound
 from pushplan.motion.path_improver import Candidate, PathImprover
+from pushplan.motion.path_search_config import LEAST_GAIN
 from pushplan.motion.random_tree.tree_paths import TreePaths
 from pushplan.motion.start_turn import start_turn
 from pushplan.planners.push_aware.best_first import Branching, make_search
@@ -22,6 +23,11 @@ from pushplan.planners.push_aware.random_tree import DRAWS, grow
 from pushplan.search.astar import EXHAUSTED, FOUND
 from pushplan.world import PlanStatus
 from pushplan.world.checks import FloatArray
+
+_FIRST_SEARCH = 1000.0
+"""Arcs driven in a search at most; a quarter more after each that took them all."""
+_COST_SIGMA = 0.7
+"""Perturbation of objects' costs from one search to the next: deviation of their logarithm."""
 
 _RANDOM_NODES = 20_000  # nodes of a random tree at most; then another is begun
 _SIGNATURES = 4  # ways to have pushed the objects that some searches tell apart in each cell
@@ -54,7 +60,7 @@ class PushAwareSearch:
         self.bound = 0.0
         """What no plan can cost less than [kg m]."""
         self._radius = improver.problem.turning_radius
-        self._patience = float(config.first_search)
+        self._patience = _FIRST_SEARCH
         self._nodes: PushTree | None = None
         self._tree: PushTree | None = None
 
@@ -152,7 +158,7 @@ class PushAwareSearch:
             curvatures=int(rng.integers(1, 4)) * 2 + 1,
             inflation=float(rng.uniform(0.98 * config.heuristic_inflation, most)),
             signatures=_SIGNATURES if rng.random() < 0.1 else 1,
-            masses=masses * np.exp(config.cost_sigma * rng.standard_normal(len(masses))),
+            masses=masses * np.exp(_COST_SIGMA * rng.standard_normal(len(masses))),
         )
 
     def _cost_ratio(self, table: CostToGo) -> float:
@@ -249,18 +255,19 @@ class PushAwareSearch:
 
     def _one_round(self) -> None:
         """Paths of two trees: around the objects, and among them at a weight that varies."""
-        sigma = self.config.cost_sigma
-        factor = float(np.exp(sigma * self.rng.standard_normal())) if self.trees.trees else 1.0
+        factor = (
+            float(np.exp(_COST_SIGMA * self.rng.standard_normal())) if self.trees.trees else 1.0
+        )
         for candidate in self.trees.grow_two(self.config.push_weight * factor):
             self._finish(candidate)
 
     def _finish(self, candidate: Candidate) -> None:
         """Shortcut a path for as long as that pays, and it may still become the best."""
-        improver, config = self.improver, self.config
+        improver = self.improver
         while not improver.stopped():
             before = candidate.cost
             improver.shortcut(candidate)
             gain = before - candidate.cost
             behind = candidate.cost - improver.best_cost
-            if gain <= config.least_gain * before or behind > 5.0 * gain:
+            if gain <= LEAST_GAIN * before or behind > 5.0 * gain:
                 return

@@ -20,6 +20,8 @@ from pushplan.world import ClearanceArea
 from pushplan.world.checks import FloatArray
 from pushplan.world.polyline import path_length
 
+_HARD_OBJECTS = 3
+"""So many objects that no simple push gets home, the nearest ones, are looked at closely."""
 _ADVANCE = 0.6
 """By how much of the way that the robot drives an object has to get on, to be pushed at all."""
 
@@ -34,12 +36,11 @@ def delivering_pushes(simulator: PushSimulator, objects: Sequence[int]) -> list[
     ids = simulator.scene.world.movables.ids.tolist()
     found: list[Push] = []
     counts: Counter[int] = Counter()
-    hard = simulator.scene.config.hard_objects
     for row in simulator.scene.config.primitives:
         if row.controller == "arc":
             continue
         few = [k for k in objects if counts[ids[k]] < row.below]
-        for k in few[:hard] if row.below == 1 and found else few:
+        for k in few[:_HARD_OBJECTS] if row.below == 1 and found else few:
             pushes = list(pushes_with(simulator, k, row))
             found += pushes
             counts.update(i for push in pushes for i in push.delivers)

@@ -11,6 +11,8 @@ from pushplan.planners.rearrangement.geometric_pusher import GeometricPusher
 from pushplan.planners.rearrangement.push_scene import PushScene
 from pushplan.world import Twist
 
+_TURN_PATIENCE = 0.15  # turn in the time of which an object has to get on [rad]
+
 
 class PathPush:
     """Pushes an object along a path while it stays on the bumper and gets on.
@@ -27,7 +29,7 @@ class PathPush:
     ) -> None:
         robot, config = scene.world.robot, scene.config
         self._plan, self._pusher = path.plan(robot, target), pusher
-        patience = max(scene.size / robot.max_speed, config.turn_patience / robot.max_turn_rate)
+        patience = max(scene.size / robot.max_speed, _TURN_PATIENCE / robot.max_turn_rate)
         self._progress = ProgressChecker(config.progress * scene.size, patience)
 
     def command(self, scene: PushScene) -> Twist | None:

@@ -22,6 +22,8 @@ from pushplan.world import PendingResult, PlanningExecutor, Twist, World
 from pushplan.world.checks import FloatArray
 
 _ALIGNED = math.radians(0.4)  # error of a heading that is left where a push begins
+_MPC_HEADING = math.radians(20.0)
+"""A push that begins farther off the object's path is left to the geometric controller."""
 _NEAR = 0.004  # the same of the place [circumscribed radii]
 
 
@@ -181,7 +183,7 @@ def suits_mpc(scene: PushScene, push: Push) -> bool:
     if push.relocates or push.delivers != (push.target,):
         return False
     away = initial_heading(push.object_path, 0.5 * scene.size) - float(scene.world.robot_pose[2])
-    return abs(math.remainder(away, math.tau)) < math.radians(scene.config.mpc_heading)
+    return abs(math.remainder(away, math.tau)) < _MPC_HEADING
 
 
 def _line_turn(start: FloatArray, pose: FloatArray, size: float) -> float:

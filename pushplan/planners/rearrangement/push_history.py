@@ -9,6 +9,10 @@ from collections import Counter
 from pushplan.planners.rearrangement.push import Push, signature
 from pushplan.planners.rearrangement.rearrangement_config import RearrangementConfig
 
+_FAILURE_COST = 3.0  # of a push, for each time that it has failed [circumscribed radii]
+_RELOCATION_COST = 1.0
+"""Of a relocation, for each one of its object since something was done [circumscribed radii]."""
+
 
 class PushHistory:
     """What has been tried since something was done last, and what that adds to costs.
@@ -53,7 +57,7 @@ class PushHistory:
         relocations = self._relocations[push.target] if push.relocates else 0
         if failures >= config.max_failures or relocations >= config.max_relocations:
             return math.inf
-        return (failures * config.failure_cost + relocations * config.relocation_cost) * size
+        return (failures * _FAILURE_COST + relocations * _RELOCATION_COST) * size
 
     def count_failure(self, push: Push) -> None:
         """A push did not do what it was for, or was a relocation: another one comes next."""

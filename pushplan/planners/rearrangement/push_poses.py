@@ -18,9 +18,7 @@ def heading_axes(heading: float) -> tuple[FloatArray, FloatArray]:
     return np.array([c, s]), np.array([-s, c])
 
 
-def pose_behind(
-    scene: PushScene, k: int, heading: float, shift: float, pose: FloatArray | None = None
-) -> FloatArray:
+def pose_behind(scene: PushScene, k: int, heading: float, shift: float) -> FloatArray:
     """(3,) a pose behind object ``k`` from which to push it along a heading.
 
     Args:
@@ -28,12 +26,10 @@ def pose_behind(
         k: index of the object.
         heading: [rad].
         shift: how far the robot's middle is to the left of the object [m].
-        pose: (3,) of the object, if it is not where it is now.
     """
     outline = scene.world.movables.outline(k)
     distance = scene.front + scene.config.slack * scene.size
-    at = scene.poses[k] if pose is None else pose
-    return pose_behind_outline(np.array(at), outline, heading, shift, distance)
+    return pose_behind_outline(np.array(scene.poses[k]), outline, heading, shift, distance)
 
 
 def initial_heading(path: FloatArray, ahead: float) -> float:

@@ -39,6 +39,11 @@ from pushplan.world import ClearanceArea, Goal, Receptacle, RobotModel, StaticMa
 from pushplan.world.checks import BoolArray, FloatArray, IntArray, frozen
 from pushplan.world.outline import outward_normals
 
+_GOAL_SLACK = 0.012
+"""By how much an object has to be clear of its goal's edge [circumscribed radii]."""
+_COARSE_CELL = 0.3
+"""Side of a cell of the lattice for approaches between pushes [circumscribed radii]."""
+
 
 @functools.lru_cache(maxsize=8)
 def _fit_of(
@@ -195,7 +200,7 @@ class PushScene:
     @cached_property
     def object_goal(self) -> ObjectGoal:
         """When objects are done."""
-        slack = self.config.goal_slack * self.size + 2.0 * self.config.position_noise
+        slack = _GOAL_SLACK * self.size + 2.0 * self.config.position_noise
         return make_object_goal(self.world.goal, self.world.static, slack)
 
     @cached_property
@@ -249,7 +254,7 @@ class PushScene:
     @cached_property
     def coarse(self) -> ContactGrid:
         """The lattice on which the cost of approaches between pushes is computed."""
-        step = self._step(self.config.coarse_cell)
+        step = self._step(_COARSE_CELL)
         return self._contact_grid(step, self.config.margin * self.size)
 
     def _step(self, cell: float) -> float:
@@ -285,19 +290,16 @@ class PushScene:
         """Shortest paths of the objects to their goal."""
         return object_paths(self.world.static, self.world.goal)
 
-    def object_path(
-        self, k: int, clearance: float, deep: bool = False, pose: FloatArray | None = None
-    ) -> FloatArray | None:
+    def object_path(self, k: int, clearance: float, deep: bool = False) -> FloatArray | None:
         """(M, 2) path of object ``k`` to where it is done, and on; None if there is none.
 
         Args:
             k: index of the object.
             clearance: distance that its middle keeps from what is static [m].
             deep: to the middle of a receptacle instead of its nearest place.
-            pose: (3,) where it is instead of where it is now.
         """
-        point = (self.poses[k] if pose is None else pose)[:2]
-        return self.object_paths.path(point, float(self.world.movables.radii[k]), clearance, deep)
+        radius = float(self.world.movables.radii[k])
+        return self.object_paths.path(self.poses[k, :2], radius, clearance, deep)
 
     def push_cost_to_go(self, radius: float) -> PushCostToGo:
         """What it costs to push objects of a radius [m] to their goal."""

@@ -32,9 +32,7 @@ class RearrangementConfig(CheckedFields):
         gyration_scale: see `QuasiStatic`.
         step: distance between two commands of a predicted push.
         curvature: of the robot's path where it steers most [1 / circumscribed radius].
-        goal_slack: by how much an object has to be clear of its goal's edge.
         cell: side of a cell of the lattice on which approaches are planned.
-        coarse_cell: the same for the cost of approaches between pushes.
         later_fraction: of the cost of contacts in those, as objects will have gone by then.
         far: cost of getting to what cannot be got to later [diagonals of the map].
         contact_cost: least cost of carrying an object along on an approach, however light it is.
@@ -47,8 +45,6 @@ class RearrangementConfig(CheckedFields):
         early: how far before something goes wrong a push ends that does not get home.
         detour: how much farther than the nearest edge of an area one may be that an object is
             pushed across [times the distance].
-        hard_objects: so many objects that no simple push gets home, the nearest ones, are looked at
-            closely.
         per_object: how many pushes are kept for each object.
         max_pushes: how many are kept for all together, by which the time of a plan is bounded.
         max_steps: how many steps a predicted push has at most.
@@ -60,16 +56,10 @@ class RearrangementConfig(CheckedFields):
             robot's delay.
         mpc: whether a push of one object along its path is driven by `PushingMpc`; else by the
             controller of its prediction, as all other pushes are.
-        mpc_heading: a push that begins farther off the object's path is left to the latter
-            [degrees].
         progress: by which an object has to get on in the time in which the robot could drive a
-            radius, or turn by the angle below.
-        turn_patience: that angle [rad].
+            radius, or turn by 0.15 rad.
         retreat: how far the robot backs off where it is stuck.
-        failure_cost: what is added to the cost of a push for each time that it has failed.
         max_failures: after so many a push waits until something else has been done.
-        relocation_cost: what is added to that of a relocation for each one that its object has had
-            since something was done.
         max_relocations: after so many an object waits until something else has been done.
         position_noise: standard deviation of the places that are seen, after filtering [m]; the
             robot is not placed more precisely, and objects have to be clear of the goal's edge by
@@ -87,9 +77,7 @@ class RearrangementConfig(CheckedFields):
     gyration_scale: Annotated[float, Limits(0.0, 1e3, open_low=True)] = 1.0
     step: PositiveFraction = 0.08
     curvature: PositiveFloat = 1.5
-    goal_slack: Fraction = 0.012
     cell: Annotated[float, Limits(0.05, 2.0)] = 0.2
-    coarse_cell: Annotated[float, Limits(0.05, 2.0)] = 0.3
     later_fraction: Fraction = 0.5
     far: PositiveFloat = 5.0
     contact_cost: Annotated[float, Limits(0.0, 1e6)] = 1.0
@@ -101,7 +89,6 @@ class RearrangementConfig(CheckedFields):
     turn_cost: Annotated[float, Limits(0.0, 1e6)] = 0.03
     early: NonNegativeFloat = 0.6
     detour: Annotated[float, Limits(1.0)] = 1.3
-    hard_objects: PositiveInt = 3
     per_object: Annotated[int, Limits(1, 1000)] = 16
     max_pushes: Annotated[int, Limits(1, 10_000)] = 80
     max_steps: Annotated[int, Limits(1, 100_000)] = 5000
@@ -110,13 +97,9 @@ class RearrangementConfig(CheckedFields):
     max_searches: PositiveInt = 6
     response: Annotated[float, Limits(0.0, 1e3, open_low=True)] = 0.2
     mpc: bool = True
-    mpc_heading: Annotated[float, Limits(0.0, 180.0)] = 20.0
     progress: PositiveFloat = 0.05
-    turn_patience: PositiveFloat = 0.15
     retreat: PositiveFloat = 0.3
-    failure_cost: NonNegativeFloat = 3.0
     max_failures: PositiveInt = 3
-    relocation_cost: NonNegativeFloat = 1.0
     max_relocations: PositiveInt = 12
     position_noise: NonNegativeFloat = 0.0
     heading_noise: NonNegativeFloat = 0.0

@@ -37,6 +37,7 @@ from pushplan.planners.rearrangement.route import RoutePlanner
 from pushplan.world.checks import FloatArray
 
 _Cell = tuple[float, ...]
+_ARC_LENGTH = 1.6  # of one arc [circumscribed radii]
 _LITTLE = 0.25  # part of the gain that helps too where nothing else does
 _DRAWS = 10  # so many places are looked at for each start
 _PLACE, _TURN = 0.2, 0.5  # sides of a box of like poses of the object [circumscribed radii, rad]
@@ -141,9 +142,7 @@ class _RelocationSearch:
         self._horizon = self._config.horizon * scene.size
         self._cost_to_go = scene.push_cost_to_go(float(scene.world.movables.radii[k]))
         self._arcs = _arcs(scene)
-        self._steps = max(
-            2, math.ceil(self._config.arc_length * scene.size / scene.controller.step)
-        )
+        self._steps = max(2, math.ceil(_ARC_LENGTH * scene.size / scene.controller.step))
         self._open: list[tuple[float, int, _State]] = []
         self._seen: set[_Cell] = set()
         self._states: list[_State] = []

@@ -24,7 +24,6 @@ class RelocationConfig(CheckedFields):
             in metres pushed.
         starts: from how many places round the object a drive may begin, those of the table of
             primitives not counted.
-        arc_length: length of an arc.
         curvatures: of the arcs, times the robot's circumscribed radius.
         depth: how many arcs follow one another at most.
         expansions: how many states are driven on from, starts not counted.
@@ -47,7 +46,6 @@ class RelocationConfig(CheckedFields):
     cell: PositiveFloat = 0.125
     drag_cost: PositiveFloat = 10.0
     starts: PositiveInt = 300
-    arc_length: PositiveFloat = 1.6
     curvatures: tuple[float, ...] = (0.0, 0.7, -0.7, 1.6, -1.6)
     depth: PositiveInt = 3
     expansions: PositiveInt = 400

@@ -15,9 +15,11 @@ from pushplan.motion.polyline import polyline_plan, polyline_status
 from pushplan.motion.random_tree.ompl_lock import ompl_alone, own_state, plane_bounds
 from pushplan.motion.speed_profile import goal_is_outside, start_margin
 from pushplan.world import MaxIterations, NavigationGoal, PlanResult, PlanStatus, Stop, World
-from pushplan.world.checked_fields import CheckedFields, Fraction, PositiveFloat, PositiveInt
+from pushplan.world.checked_fields import CheckedFields, PositiveFloat, PositiveInt
 from pushplan.world.checks import FloatArray, expect
 from pushplan.world.planning_call import PlanningCall
+
+_GOAL_BIAS = 0.1  # fraction of samples that are drawn from the goal
 
 
 @dataclass(frozen=True)
@@ -28,7 +30,6 @@ class GeometricRRTConfig(CheckedFields):
         clearance: distance kept between the robot's centre and obstacles [R], as far as there is
             room; the reference grows its robot by about as much.
         step: longest edge of the tree [R].
-        goal_bias: fraction of samples drawn from the goal.
         resolution: distance between collision checks along an edge [R].
         pass_iterations: samples in each pass.
         spacing: distance between the poses of the plan [R].
@@ -36,7 +37,6 @@ class GeometricRRTConfig(CheckedFields):
 
     clearance: PositiveFloat = 1.9
     step: PositiveFloat = 1.0
-    goal_bias: Fraction = 0.1
     resolution: PositiveFloat = 0.1
     pass_iterations: PositiveInt = 20_000
     spacing: PositiveFloat = 0.15
@@ -133,7 +133,7 @@ class GeometricRRT:
             problem.setGoal(region)
             planner = geometric.RRT(info)
             planner.setRange(config.step * size)
-            planner.setGoalBias(config.goal_bias)
+            planner.setGoalBias(_GOAL_BIAS)
             planner.setProblemDefinition(problem)
             planner.setup()
             planner.solve(base.PlannerTerminationCondition(done))

@@ -9,7 +9,7 @@ import numpy as np
 from pushplan.interaction import InteractionModel, QuasiStatic
 from pushplan.motion.dubins_warm_start import is_far, warm_start
 from pushplan.motion.path_improver import Candidate, PathImprover
-from pushplan.motion.path_search_config import PathSearchConfig
+from pushplan.motion.path_search_config import LEAST_GAIN, PathSearchConfig
 from pushplan.motion.random_tree.tree_paths import TreePaths
 from pushplan.motion.speed_profile import turning_radius
 from pushplan.world import PlanResult, PlanStatus, Stop, World
@@ -100,5 +100,5 @@ def _one_round(improver: PathImprover, trees: TreePaths) -> None:
     while cheaper is not None and not improver.stopped():
         before = cheaper.cost
         improver.shortcut(cheaper)
-        if cheaper.cost > (1.0 - config.least_gain) * before:
+        if cheaper.cost > (1.0 - LEAST_GAIN) * before:
             return
