@@ -4,8 +4,9 @@ Usage::
 
     python docs/pictures.py [NAME ...]
 
-Writes into docs/images: `box-delivery-layouts`, `area-clearing-layouts`, `namo-order`, `mujoco`;
-all of them without a name. The last one needs OpenGL (docs/simulators-mujoco.md).
+Writes into docs/images: `box-delivery-layouts`, `area-clearing-layouts`, `namo-order`, `mujoco`,
+`gtsp-mpc`, `push-aware`, `ship-planners`; all of them without a name.
+`mujoco` needs OpenGL (docs/simulators-mujoco.md).
 """
 
 from __future__ import annotations
@@ -16,11 +17,15 @@ from pathlib import Path
 import numpy as np
 
 from pushplan.drawing import Panel, draw_figure, save_figure, save_image
-from pushplan.envs import PushEnv, make
+from pushplan.drawing.palette import DASHES, SERIES
+from pushplan.envs import PushEnv, RolloutInteraction, make
 from pushplan.envs.simulators.mujoco_simulator import MujocoSimulator
+from pushplan.envs.tasks.ship_ice import ShipIceTask
 from pushplan.evaluation import run_episode
-from pushplan.planners import make_policy
+from pushplan.planners import make_planner, make_policy
+from pushplan.planners.rearrangement import GtspMpc
 from pushplan.scenarios import Scenario, suite
+from pushplan.world import GoalDisc, Movables, RobotModel, StaticMap, World, stream
 
 IMAGES = Path(__file__).parent / "images"
 LAYOUTS = {
@@ -70,11 +75,91 @@ def mujoco() -> None:
     save_image(IMAGES / "mujoco.png", np.concatenate(pictures[:-1], axis=1))
 
 
+def first_pushes() -> None:
+    """First plans of `gtsp-mpc` in two suites, side by side."""
+    panels = []
+    for name in ("area-clearing-2d-10", "box-delivery-2d-small-columns-10"):
+        scenario = suite(name, episodes=1).scenarios[0]
+        env = make(scenario, observation="state", action=("velocity",))
+        env.reset(seed=scenario.seed)
+        policy = GtspMpc()
+        policy.act(env.world)
+        panels.append(Panel(env.world, pushes=[push.poses for push in policy.plan], title=name))
+        env.close()
+    save_figure(IMAGES / "gtsp-mpc.png", draw_figure(*panels, width_in=7.0))
+
+
+def door() -> None:
+    """A plan through the only door, in which a box stands, as the simulator drives it."""
+    square = np.array([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]])
+    walls = [[0, 0, 16, 0], [0, 8, 16, 8], [0, 0, 0, 8], [16, 0, 16, 8]]
+    gap = [[7, 0, 7, 2.9], [7, 5.1, 7, 8]]
+    boxes = np.array([[7.0, 4.3, 0.3], [9.2, 3.2, 0.2], [8.9, 5.2, 0.5]])
+    world = World(
+        robot=RobotModel.from_outline(
+            1.4 * square, mass=1.0, drive="constant_speed", max_speed=0.15, max_turn_rate=0.3
+        ),
+        robot_pose=[2.0, 4.0, 0.0],
+        static=StaticMap.build(segments=[*walls, *gap], radii=0.2, bounds=[0, 0, 16, 8]),
+        movables=Movables.from_outlines([square] * 3, boxes),
+        goal=GoalDisc([14.0, 4.0], 0.8),
+    )
+    plan = make_planner("push-aware").plan(world).plan
+    assert plan is not None
+    driven = RolloutInteraction().sweep(world, plan.poses)
+    panels = []
+    for share in (0.0, 0.5, 1.0):
+        at = int(share * (len(plan.poses) - 1))
+        now = world.moved(robot_pose=plan.poses[at], movable_poses=driven.object_poses[at])
+        trails = driven.object_poses[: at + 1]
+        path = plan.poses[: at + 1]
+        driving = {"trail": path, "object_trails": trails} if at else {"plan": plan}
+        panels.append(Panel(now, **driving))
+    save_figure(IMAGES / "push-aware.png", draw_figure(*panels, width_in=3.8, columns=1))
+
+
+def ship_plans() -> None:
+    """First plan of every ship planner on one field of 30 %."""
+    import matplotlib.pyplot as plt
+    from matplotlib.collections import PolyCollection
+
+    task = ShipIceTask(variations={"concentration": 0.3})
+    world = task.start(stream(1003, "layout"))
+    figure, axes = plt.subplots(figsize=(6.4, 5.4), dpi=110)
+    outlines = [world.movables.outline_world(k) for k in range(len(world.movables))]
+    floes = PolyCollection(outlines, facecolor="#dce6ee", edgecolor="#9fb2c0", linewidth=0.5)
+    axes.add_collection(floes)
+    hulls = PolyCollection(world.robot_outline_world(), facecolor="#444444", zorder=5)
+    axes.add_collection(hulls)
+    names = (
+        "straight",
+        "skeleton",
+        "ship-lattice-published",
+        "ship-lattice-quick",
+        "ship-lattice",
+        "ship-predictive",
+    )
+    for name, color, dashes in zip(names, SERIES, DASHES, strict=False):
+        plan = make_planner(name).plan(world).plan
+        if plan is not None:
+            line = {"color": color, "linestyle": dashes, "linewidth": 1.8}
+            axes.plot(*plan.poses[:, :2].T, label=name, **line)
+    axes.axhline(9.0, color="#666666", linestyle="--", linewidth=0.8)
+    axes.set(aspect="equal", xlim=world.static.bounds[[0, 2]], ylim=(0.0, 9.6))
+    axes.set_xlabel("x [m]")
+    axes.set_ylabel("y [m]")
+    axes.legend(fontsize=7, loc="upper center", bbox_to_anchor=(0.5, 1.13), ncols=3, frameon=False)
+    figure.savefig(IMAGES / "ship-planners.png", bbox_inches="tight")
+
+
 DRAWN = {
     "box-delivery-layouts": lambda: layouts("box_delivery"),
     "area-clearing-layouts": lambda: layouts("area_clearing"),
     "namo-order": namo_order,
     "mujoco": mujoco,
+    "gtsp-mpc": first_pushes,
+    "push-aware": door,
+    "ship-planners": ship_plans,
 }
 
 if __name__ == "__main__":

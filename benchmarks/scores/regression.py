@@ -1,11 +1,9 @@
 """Every policy on every suite: are the scores those of another version, to the last digit?
 
-    python -m benchmarks.scores.regression FOLDER [--episodes 10] [--suites A,B] [--policies A,B]
-    python -m benchmarks.scores.regression FOLDER --against OTHER_FOLDER
+    pushplan experiment benchmarks/experiments/every_policy.yaml --out RUN    # with each version
+    python -m benchmarks.scores.regression RUN OTHER_RUN
 
-The first runs each policy on each suite that it is made for, into one run folder each; what is
-there already is not run again. The second compares the rows of two such folders, times aside, and
-prints every row that differs, column by column. Run the first with each of the two versions.
+Compares the rows of two runs, times aside, and prints every row that differs, column by column.
 """
 
 from __future__ import annotations
@@ -15,39 +13,14 @@ import sys
 from pathlib import Path
 
 from benchmarks.reporting import command_line
-from pushplan.evaluation import bench
-from pushplan.evaluation.run.policy_specs import policy_names
-from pushplan.scenarios import suite_names
-from pushplan.world import InvalidInputError
 
 KEY = ("policy", "scenario", "seed")
 
 
-def run(folder: Path, suites: list[str], policies: list[str], episodes: int, workers: int) -> None:
-    """Run what is not there yet; a line for each pair of suite and policy."""
-    for suite in suites:
-        for policy in policies:
-            out = folder / f"{suite}__{policy}"
-            if (out / "results.csv").exists():
-                continue
-            try:
-                results = bench(
-                    suite, [policy], episodes=episodes, workers=workers, out=out, timeout_s=900.0
-                )
-            except InvalidInputError as error:
-                print(f"{suite} {policy}: not run, {error}", flush=True)
-            else:
-                print(f"{suite} {policy}: {len(results.rows)} episodes", flush=True)
-
-
-def rows_of(folder: Path) -> dict[tuple[str, ...], dict[str, str]]:
-    """All rows below a folder."""
-    found = {}
-    for file in sorted(folder.glob("*__*/results.csv")):
-        with file.open() as stream:
-            for row in csv.DictReader(stream):
-                found[tuple(row[name] for name in KEY)] = row
-    return found
+def rows_of(run: Path) -> dict[tuple[str, ...], dict[str, str]]:
+    """All rows of a run directory."""
+    with (run / "results.csv").open() as stream:
+        return {tuple(row[name] for name in KEY): row for row in csv.DictReader(stream)}
 
 
 def is_time(column: str) -> bool:
@@ -73,18 +46,12 @@ def compare(folder: Path, other: Path) -> int:
 
 
 def main() -> None:
-    """Run or compare."""
-    parser = command_line(__doc__, episodes=10, workers=2)
-    parser.add_argument("folder", type=Path)
-    parser.add_argument("--against", type=Path)
-    every = ",".join(name for name in suite_names() if name != "smoke")
-    parser.add_argument("--suites", default=every)
-    parser.add_argument("--policies", default=",".join(policy_names()))
+    """Compare; 1 if a row differs."""
+    parser = command_line(__doc__)
+    parser.add_argument("run", type=Path)
+    parser.add_argument("other", type=Path)
     given = parser.parse_args()
-    if given.against is not None:
-        sys.exit(compare(given.folder, given.against) > 0)
-    suites, policies = given.suites.split(","), given.policies.split(",")
-    run(given.folder, suites, policies, given.episodes, given.workers)
+    sys.exit(compare(given.run, given.other) > 0)
 
 
 if __name__ == "__main__":

@@ -4,6 +4,8 @@
     python -m benchmarks.scores.tables --check                # say which differ from the episodes
     python -m benchmarks.scores.tables --take runs/mppi mppi  # store a run's episodes, then write
 
+    python -m benchmarks.scores.tables --show runs/mine "columns: success, E, I"  # of any run
+
 ``benchmarks/experiments/NAME.yaml`` says what runs, for ``pushplan experiment``, and ``NAME.csv``
 beside it has one line for each episode. A table of a page stands between two comments::
 
@@ -27,9 +29,9 @@ from textwrap import fill
 
 import numpy as np
 
-from benchmarks.reporting import command_line
+from benchmarks.reporting import command_line, write
 from benchmarks.scores.stored_episodes import StoredEpisode, read, take
-from pushplan.evaluation import ResultRow
+from pushplan.evaluation import ResultRow, Results
 from pushplan.evaluation.report.tables import heading, milliseconds
 from pushplan.evaluation.statistics.estimates import Estimate, estimate, wilson
 from pushplan.evaluation.statistics.summary import paired_differences, values_of
@@ -83,32 +85,33 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser = command_line(__doc__)
     parser.add_argument("--check", action="store_true", help="write nothing; 1 if a page differs")
     parser.add_argument("--take", nargs=2, metavar=("RUN", "NAME"), help="store a run's episodes")
+    shown = ("RUN", "TABLE")
+    parser.add_argument("--show", nargs=2, metavar=shown, help="print a table of a run")
     parser.add_argument("--root", type=Path, default=ROOT, help="folder with docs and benchmarks")
     given = parser.parse_args(arguments)
     if given.check and given.take:
         parser.error("--check writes nothing, so it cannot --take")
     try:
+        if given.show:
+            run, text = given.show
+            write(markdown(Results.load(run).rows, Wanted.parse(f"{run}; {text}")))
+            return 0
         if given.take:
             run, name = given.take
-            say(take(Path(run), given.root / EXPERIMENTS / f"{name}.yaml"))
+            write(take(Path(run), given.root / EXPERIMENTS / f"{name}.yaml"))
         differences = [
             line
             for page in sorted((given.root / "docs").glob("*.md"))
             for line in renewed(page, given.root, write=not given.check)
         ]
     except PushplanError as error:
-        say(str(error))
+        write(str(error))
         return 1
     for line in differences:
-        say(line)
+        write(line)
     if given.check and differences:
-        say("python -m benchmarks.scores.tables writes what the stored episodes give")
+        write("python -m benchmarks.scores.tables writes what the stored episodes give")
     return 1 if given.check and differences else 0
-
-
-def say(text: str) -> None:
-    """Print."""
-    sys.stdout.write(text + "\n")
 
 
 def renewed(page: Path, root: Path, *, write: bool) -> list[str]:
@@ -149,17 +152,21 @@ def table(wanted: Wanted, episodes: Sequence[StoredEpisode]) -> str:
         raise UnknownNameError("suite of the stored episodes", wanted.suites, tuple(suites))
     rows = [one.row for one in chosen]
     if wanted.differences:
-        headings, lines = _difference_cells(rows, wanted)
         note = "Paired differences on the same scenarios: mean with its 95 % bootstrap interval."
     else:
-        headings, lines = _score_cells(rows, wanted)
         note = "Success has Wilson's interval, a mean its bootstrap interval, both of 95 %."
         if TIMES.keys() & set(wanted.columns):
             note += " Times are the median over episodes of each one's median, and the longest."
-    body = [headings, ("---",) * len(headings), *lines]
-    text = "".join(f"| {' | '.join(cells)} |\n" for cells in body)
     above = fill(f"{_origin(wanted, chosen)} {note}", WIDTH, break_on_hyphens=False)
-    return f"\n{above}\n\n{text}\n"  # an empty line ends a table
+    return f"\n{above}\n\n{markdown(rows, wanted)}\n"  # an empty line ends a table
+
+
+def markdown(rows: Sequence[ResultRow], wanted: Wanted) -> str:
+    """A table of rows."""
+    cells = _difference_cells if wanted.differences else _score_cells
+    headings, lines = cells(rows, wanted)
+    body = [headings, ("---",) * len(headings), *lines]
+    return "".join(f"| {' | '.join(line)} |\n" for line in body)
 
 
 def _origin(wanted: Wanted, episodes: Sequence[StoredEpisode]) -> str:
