@@ -93,7 +93,7 @@ def specification_of(
     task: Any, observation: ObservationBuilder, action: ActionSpec, training: Mapping[str, Any]
 ) -> Specification:
     """The specification of a network that learns a task."""
-    preset = getattr(task, "preset_name", None)
+    preset = getattr(getattr(task, "preset", None), "name", None)
     return Specification(
         tasks=(task.name,),
         presets=() if preset is None else (preset,),
