@@ -73,6 +73,8 @@ class FreeSpace:
         spacing: float = 0.0,
         within: ArrayLike | None = None,
         allowed: Callable[[FloatArray], BoolArray] | None = None,
+        robot: Sequence[Any] = (),
+        touching: bool = False,
     ) -> FloatArray:
         """Poses of squares that overlap nothing: (count, 3) x, y [m], theta [rad].
 
@@ -91,6 +93,10 @@ class FreeSpace:
             spacing: least distance between two centres [m].
             within: (4,) x_min, y_min, x_max, y_max of the centres [m]; the map's bounds if None.
             allowed: which centres (N, 2) [m] may be used, beyond all that.
+            robot: Shapely geometries that squares stay off, too.
+            touching: whether squares may touch the robot instead: they are placed as if it were not
+                there, and those that overlap it are moved straight away from its middle until they
+                touch.
 
         Raises:
             ScenarioError: if there is no room for them.
@@ -99,30 +105,57 @@ class FreeSpace:
             return np.zeros((0, 3))
         box = np.asarray(self.static.bounds if within is None else within, dtype=np.float64)
         low, high = box[:2], box[2:]
+        if not touching:
+            keep_off = [*keep_off, *((shape, 0.0) for shape in robot)]
 
-        def fits(poses: FloatArray) -> BoolArray:
+        def fits(poses: FloatArray, gap: float = gap) -> BoolArray:
             found = self.is_free(shapely.polygons(squares(poses, size)), gap, keep_off)
             if allowed is not None and found.any():
                 found[found] = allowed(poses[found, :2])
             return found
 
-        if (high >= low).all() and count * size * size < float(np.prod(high - low + size)):
-            placed = _throw(rng, count, box, fits, size + gap, spacing, random_yaw)
-            if len(placed) == count:
-                return placed
-            cells = _lattice(rng, count, box, fits, max(size + gap, spacing))
-            if len(cells) >= count:
-                poses = np.zeros((count, 3))
-                poses[:, :2] = rng.permutation(cells)[:count]
-                if random_yaw:
-                    poses[:, 2] = rng.integers(0, 4, count) * (np.pi / 2.0)
+        for _ in range(_TOUCH_TRIES if touching else 0):
+            poses = _place(rng, count, box, fits, size, gap, spacing, random_yaw)
+            poses, pushed = _moved_off(poses, size, shapely.union_all(list(robot)))
+            centres = poses[pushed, :2]
+            inside = ((centres >= low) & (centres <= high)).all()
+            others = (poses[k + 1 :] for k in range(count))
+            apart = (_keeps_off(*pair, size, spacing) for pair in zip(poses, others, strict=True))
+            if inside and fits(poses[pushed], 0.0).all() and all(apart):
                 return poses
-            room = f"room for {len(cells)} was found"
-        else:
-            room = "the floor has {:g} x {:g} m for their centres".format(*(high - low))
-        raise ScenarioError(
-            f"{count} boxes of {size:g} m do not fit: {room}; ask for fewer or smaller boxes"
-        )
+        keep_off = [*keep_off, *((shape, 0.0) for shape in robot if touching)]
+        return _place(rng, count, box, fits, size, gap, spacing, random_yaw)
+
+
+def _place(
+    rng: np.random.Generator,
+    count: int,
+    box: FloatArray,
+    fits: Callable[[FloatArray], BoolArray],
+    size: float,
+    gap: float,
+    spacing: float,
+    random_yaw: bool,
+) -> FloatArray:
+    """Squares at random, or on a lattice where that fails."""
+    low, high = box[:2], box[2:]
+    if (high >= low).all() and count * size * size < float(np.prod(high - low + size)):
+        placed = _throw(rng, count, box, fits, size + gap, spacing, random_yaw)
+        if len(placed) == count:
+            return placed
+        cells = _lattice(rng, count, box, fits, max(size + gap, spacing))
+        if len(cells) >= count:
+            poses = np.zeros((count, 3))
+            poses[:, :2] = rng.permutation(cells)[:count]
+            if random_yaw:
+                poses[:, 2] = rng.integers(0, 4, count) * (np.pi / 2.0)
+            return poses
+        room = f"room for {len(cells)} was found"
+    else:
+        room = "the floor has {:g} x {:g} m for their centres".format(*(high - low))
+    raise ScenarioError(
+        f"{count} boxes of {size:g} m do not fit: {room}; ask for fewer or smaller boxes"
+    )
 
 
 def _moved_off(poses: FloatArray, size: float, body: Any) -> tuple[FloatArray, BoolArray]:
@@ -233,13 +266,9 @@ def place_boxes(
     *,
     preset: Preset,
     wanted: Any,
-    keep_off: Sequence[tuple[Any, float]],
     **rules: Any,
 ) -> Movables:
     """Square boxes on free floor, of which some stand on casters.
-
-    Boxes that may touch the robot are placed as if it were not there, and those that overlap it are
-    moved straight away from its middle until they touch.
 
     Args:
         free_space: the floor.
@@ -250,22 +279,21 @@ def place_boxes(
         preset: of a task with boxes.
         wanted: the variations of that task: heading, fraction on casters, whether boxes may touch
             the robot.
-        keep_off, rules: as `FreeSpace.place_squares` takes them.
+        rules: as `FreeSpace.place_squares` takes them.
 
     Raises:
         ScenarioError: if there is no room for them.
     """
-    side = size + 2.0 * preset.contact_radius
-    rules |= {"gap": GAP * size, "random_yaw": wanted.box_yaw == "random"}
-    touching = preset.touching if wanted.touching is None else wanted.touching
-    for _ in range(_TOUCH_TRIES if touching else 0):
-        poses = free_space.place_squares(rng, count, side, keep_off=keep_off, **rules)
-        poses, pushed = _moved_off(poses, side, shapely.union_all(list(robot)))
-        if _may_stay(poses, pushed, side, free_space, keep_off, **rules):
-            break
-    else:
-        off = [*keep_off, *((shape, 0.0) for shape in robot)]
-        poses = free_space.place_squares(rng, count, side, keep_off=off, **rules)
+    poses = free_space.place_squares(
+        rng,
+        count,
+        size + 2.0 * preset.contact_radius,
+        robot=robot,
+        touching=preset.touching if wanted.touching is None else wanted.touching,
+        gap=GAP * size,
+        random_yaw=wanted.box_yaw == "random",
+        **rules,
+    )
     on_casters = np.zeros(count, dtype=bool)
     on_casters[rng.permutation(count)[: round(wanted.wheeled * count)]] = True
     masses = None if preset.box_mass is None else np.full(count, preset.box_mass)
@@ -275,29 +303,6 @@ def place_boxes(
         masses=masses,
         wheeled=on_casters,
         contact_radii=preset.contact_radius,
-    )
-
-
-def _may_stay(
-    poses: FloatArray,
-    pushed: BoolArray,
-    size: float,
-    free_space: FreeSpace,
-    keep_off: Sequence[tuple[Any, float]],
-    *,
-    spacing: float = 0.0,
-    within: ArrayLike | None = None,
-    allowed: Callable[[FloatArray], BoolArray] | None = None,
-    **others: Any,
-) -> bool:
-    """Whether squares (N, 3) keep the rules of `place_squares` where some have been pushed."""
-    box = np.asarray(free_space.static.bounds if within is None else within)
-    moved = poses[pushed]
-    return bool(
-        ((moved[:, :2] >= box[:2]) & (moved[:, :2] <= box[2:])).all()
-        and free_space.is_free(shapely.polygons(squares(moved, size)), 0.0, keep_off).all()
-        and (allowed is None or not len(moved) or allowed(moved[:, :2]).all())
-        and all(_keeps_off(pose, poses[k + 1 :], size, spacing) for k, pose in enumerate(poses))
     )
 
 
@@ -337,7 +342,6 @@ def walls_around(
 
 def squares(poses: FloatArray, size: float) -> FloatArray:
     """(N, 4, 2) corners [m] of squares of side ``size`` at poses (N, 3)."""
-    c, s = np.cos(poses[:, 2]), np.sin(poses[:, 2])
-    turn = np.stack([np.stack([c, -s], -1), np.stack([s, c], -1)], -2)  # (N, 2, 2)
-    corners: FloatArray = np.einsum("nij,kj->nki", turn, _CORNERS * size) + poses[:, None, :2]
-    return corners
+    count = len(poses)
+    corners = np.tile(_CORNERS * size, (count, 1))
+    return transform_outlines(poses, corners, np.arange(0, 4 * count + 1, 4)).reshape(count, 4, 2)
