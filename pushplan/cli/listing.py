@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from functools import partial
+import tomllib
+from collections.abc import Sequence
+from importlib.resources import files
 from itertools import zip_longest
 from typing import Any
 
@@ -42,11 +42,11 @@ def _say_kinds(options: argparse.Namespace) -> None:
     """What can be listed: one line a kind, with the number of its names."""
     counts = {kind: len(names_of(kind)) for kind in _KINDS}
     if options.json:
-        say_json([{"kind": k, "count": n, "what": _KINDS[k].what} for k, n in counts.items()])
+        say_json([{"kind": k, "count": n, "what": _KINDS[k]["what"]} for k, n in counts.items()])
     elif options.names:
         say("\n".join(counts))
     else:
-        _say_rows([(kind, f"{n:3d}", _KINDS[kind].what) for kind, n in counts.items()])
+        _say_rows([(kind, f"{n:3d}", _KINDS[kind]["what"]) for kind, n in counts.items()])
         say("'pushplan list KIND' lists one kind, 'pushplan list all' everything")
 
 
@@ -62,15 +62,19 @@ def _facts(kind: str, name: str) -> dict[str, str]:
     """The columns beside a name; one that says what to install, where something is missing."""
     from pushplan.world import MissingDependencyError
 
+    about = _KINDS[kind]
     try:
-        return _KINDS[kind].facts(name)
+        if "described_by" in about:
+            return _documented(about["described_by"], name)
+        facts: dict[str, str] = _at(about["facts"])(name)
+        return facts
     except MissingDependencyError as error:
         return {"missing": str(error)}
 
 
 def names_of(kind: str) -> list[str]:
     """The names of one kind."""
-    names = _at(_KINDS[kind].home)
+    names = _at(_KINDS[kind]["names"])
     return list(names() if callable(names) else names)
 
 
@@ -82,15 +86,17 @@ def _at(place: str) -> Any:
 
 
 def _documented(table: str, name: str) -> dict[str, str]:
-    """The first line of the documentation of what a table, at a place, names."""
-    return _first_line(_at(_at(table)[name]))
+    """The first line of the documentation of what a table, or a function, at a place names."""
+    found = _at(table)
+    thing = found(name) if callable(found) else found[name]
+    return _first_line(_at(thing) if isinstance(thing, str) else thing)
 
 
 def _first_line(thing: object) -> dict[str, str]:
     return {"description": (thing.__doc__ or "").partition("\n")[0]}
 
 
-def _policy(name: str) -> dict[str, str]:
+def policy_facts(name: str) -> dict[str, str]:
     """Tasks, action modes in order of preference, description."""
     from pushplan.learned.loading import learned_names, weights_of
     from pushplan.planners.registry import OPEN_WATER, make_policy
@@ -127,7 +133,7 @@ def _actions_of(task: str) -> list[str]:
     return list(_at(TASKS[task]).actions)
 
 
-def _suite(name: str) -> dict[str, str]:
+def suite_facts(name: str) -> dict[str, str]:
     """Task, simulator, default action mode, episodes and variations of the first start."""
     from pushplan.scenarios import suite
 
@@ -143,18 +149,26 @@ def _suite(name: str) -> dict[str, str]:
     }
 
 
-def _task(name: str) -> dict[str, str]:
+def task_facts(name: str) -> dict[str, str]:
+    """Action modes, description."""
     described = _documented("pushplan.envs.registry:TASKS", name)
     return {"actions": ",".join(_actions_of(name)), **described}
 
 
-def _action(name: str) -> dict[str, str]:
+def action_facts(name: str) -> dict[str, str]:
     """Tasks that have it, description."""
     tasks = [task for task in names_of("tasks") if name in _actions_of(task)]
     return {"tasks": ",".join(tasks), **_documented("pushplan.envs.registry:ACTIONS", name)}
 
 
-def _condition(name: str) -> dict[str, str]:
+def robot_facts(name: str) -> dict[str, str]:
+    """The first line of the documentation of what makes it."""
+    from pushplan.world.stored.robots import robots
+
+    return _first_line(_at(robots()[name]))
+
+
+def condition_facts(name: str) -> dict[str, str]:
     """What it disturbs, and what is asked of a policy."""
     from dataclasses import fields
 
@@ -173,55 +187,9 @@ def _condition(name: str) -> dict[str, str]:
     return {"disturbance": " ".join(disturbed) or "nothing", "asked": asked}
 
 
-@dataclass(frozen=True)
-class _Kind:
-    """One kind of things that have names."""
-
-    what: str
-    home: str  # "module:name" of the names, or of a function that gives them
-    facts: Callable[[str], dict[str, str]]  # heading -> what stands in that column beside a name
-
-
-_KINDS: dict[str, _Kind] = {
-    "planners": _Kind(
-        "find a plan for a World",
-        "pushplan.planners:planner_names",
-        partial(_documented, "pushplan.planners.registry:PLANNERS"),
-    ),
-    "policies": _Kind(
-        "drive a robot: planners that are followed, controllers, trained networks",
-        "pushplan.evaluation.run.policy_specs:policy_names",
-        _policy,
-    ),
-    "tasks": _Kind("what the robot has to do", "pushplan.envs.registry:TASKS", _task),
-    "suites": _Kind("lists of starts to run policies on", "pushplan.scenarios:suite_names", _suite),
-    "conditions": _Kind(
-        "disturbances of 'pushplan stress'",
-        "pushplan.evaluation.stress_testing:CONDITIONS",
-        _condition,
-    ),
-    "metrics": _Kind(
-        "scores of an episode",
-        "pushplan.metrics:metric_names",
-        lambda name: _first_line(_at("pushplan.metrics:metric_function")(name)),
-    ),
-    "robots": _Kind(
-        "what is driven",
-        "pushplan.world.stored.robots:robots",
-        lambda name: _first_line(_at(_at("pushplan.world.stored.robots:robots")()[name])),
-    ),
-    "simulators": _Kind(
-        "what moves the bodies",
-        "pushplan.envs.registry:SIMULATORS",
-        partial(_documented, "pushplan.envs.registry:SIMULATORS"),
-    ),
-    "actions": _Kind("how a policy commands the robot", "pushplan.envs.registry:ACTIONS", _action),
-    "channels": _Kind(
-        "of image observations",
-        "pushplan.observation:CHANNELS",
-        lambda name: _first_line(_at("pushplan.observation:CHANNELS")[name]),
-    ),
-}
-"""What there is."""
+_KINDS: dict[str, dict[str, str]] = tomllib.loads(
+    files("pushplan.cli").joinpath("kinds.toml").read_text(encoding="utf-8")
+)
+"""What there is: what each kind is for, and where its names and facts are found."""
 CHOICES = (*sorted(_KINDS), "all")
 """Words of `pushplan list`."""
