@@ -228,6 +228,8 @@ class PolicyServer:
             self._present[number] = (connection, session)
             try:
                 refusal = await self._serve(number, connection, session)
+            except asyncio.CancelledError:  # the server has ended before the policy returned
+                return
             finally:
                 del self._present[number]
         if refusal and self._refused < _MOST_REFUSED:

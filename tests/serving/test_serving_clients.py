@@ -245,3 +245,28 @@ def test_a_policy_that_cannot_be_interrupted_keeps_its_place_until_it_returns(tm
         go.set()
         until(lambda: server.clients == 0)
         PolicyClient(server.address).close()
+
+
+def test_a_policy_that_hangs_does_not_keep_the_server_from_ending(tmp_path, monkeypatch, caplog):
+    monkeypatch.setattr("pushplan.serving.server._GRACE_S", 0.2)
+    inside, go = threading.Event(), threading.Event()
+
+    class Hangs(Still):
+        def act(self, world, observation):
+            inside.set()
+            go.wait(60.0)
+            return super().act(world, observation)
+
+    go.set()
+    server = PolicyServer(Hangs, f"unix:{tmp_path / 's'}")
+    server.start()
+    go.clear()
+    inside.clear()
+    with Raw(server) as raw:
+        raw.send(HELLO, {"type": "reset", "world": maze_dict()}, ACT)
+        assert inside.wait(60.0)
+        assert not server.close()
+    go.set()
+    assert [one.message for one in caplog.records if one.levelname != "INFO"] == [
+        "client 1: the policy has not returned from its planning call"
+    ]
