@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import sys
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
@@ -13,6 +14,9 @@ from pushplan.cli.common import say, say_json
 if TYPE_CHECKING:
     from pushplan.evaluation import Results
     from pushplan.evaluation.report.tables import Table
+
+_MOST_LINES = 6
+"""From more policies on, one line says why episodes did not succeed."""
 
 
 def run(options: argparse.Namespace) -> int:
@@ -44,12 +48,11 @@ def show(results: Results, options: argparse.Namespace, **written: Any) -> None:
         options: with the shared options "tables".
         written: as for `Results.report`.
     """
-    from pushplan.evaluation.report.endings import unsuccessful_lines
     from pushplan.evaluation.report.tables import on_few_lines
 
     tables = results.tables(settings=options.settings, pairs=options.pairs)
     _print(on_few_lines(tables))
-    for line in unsuccessful_lines(results):
+    for line in _unsuccessful_lines(results):
         say(line)
     if len(results.titles) > 1 and not options.settings:
         say(f"each of the {len(results.titles)} settings: --settings, and on the page")
@@ -70,13 +73,44 @@ def show_json(results: Results, pairs: str) -> None:
 
 
 def exit_code(results: Results) -> int:
-    """1 where jobs of a run failed, with a line for each policy that says why; else 0."""
-    from pushplan.evaluation.report.endings import failure_lines
+    """1 where jobs of a run failed, with a line for each policy that says why; else 0.
 
-    lines = failure_lines(results)
-    for line in lines:
+    A line has the number of failures, the most frequent reason and the file of a traceback.
+    """
+    code = 0
+    for policy in results.policies:
+        rows = [row for row in results.rows if row.policy == policy]
+        failed = [row for row in rows if row.failed]
+        if not failed:
+            continue
+        code = 1
+        ((reason, count),) = Counter(row.reason for row in failed).most_common(1)
+        most = "" if count == len(failed) else f", {count} of these"
+        line = f"{policy}: {len(failed)} of {len(rows)} failed{most}: {reason}"
+        path = results.path
+        files = (path / row.detail_file for row in failed if path and row.reason == reason)
+        if (file := next((one for one in files if one.is_file()), None)) is not None:
+            line += f"; traceback: {file}"
         sys.stderr.write(f"{line}\n")
-    return 1 if lines else 0
+    return code
+
+
+def _unsuccessful_lines(run: Results) -> list[str]:
+    """A line for each policy with episodes that ended by the rules of their task without success.
+
+    It says how many ended for each reason. More than `_MOST_LINES` policies have one together.
+    """
+    ended = [row for row in run.rows if not row.failed and not row.success]
+    groups = {policy: [row for row in ended if row.policy == policy] for policy in run.policies}
+    if len(groups) > _MOST_LINES:
+        groups = {f"all {len(groups)} policies": ended}
+    lines = []
+    for policy, rows in groups.items():
+        if rows:
+            reasons = Counter(row.reason for row in rows).most_common()
+            listed = ", ".join(f"{count} {reason}" for reason, count in reasons)
+            lines.append(f"{policy} without success: {listed}")
+    return lines
 
 
 def _print(tables: Sequence[Table]) -> None:
