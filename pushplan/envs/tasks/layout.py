@@ -181,11 +181,14 @@ def _moved_off(poses: FloatArray, size: float, body: Any) -> tuple[FloatArray, B
 def _keeps_off(pose: FloatArray, others: FloatArray, size: float, spacing: float) -> bool:
     """Whether a square overlaps none of others (N, 3), and their centres keep their spacing."""
     away = np.hypot(*(others[:, :2] - pose[:2]).T)
+    if (away < spacing).any():
+        return False
     # squares whose centres are a diagonal apart do not meet
     near = others[away < math.sqrt(2.0) * size]
-    shape, others_near = squares(pose[None], size), squares(near, size)
-    meets = shapely.intersects(shapely.polygons(shape), shapely.polygons(others_near))
-    return not ((away < spacing).any() or meets.any())
+    if not len(near):
+        return True
+    shape, *shapes = shapely.polygons(squares(np.vstack([pose, near]), size))
+    return not shapely.intersects(shape, shapes).any()
 
 
 def _throw(
