@@ -74,10 +74,9 @@ def test_the_commands_are_where_ci_looks_for_them() -> None:
     ("at", "size"),
     [
         pytest.param(0, reduced, marks=pytest.mark.slow),
-        (1, reduced),
         pytest.param(1, str, marks=pytest.mark.slow),
     ],
-    ids=["first-reduced", "own-reduced", "own-whole"],
+    ids=["first-reduced", "own-whole"],
 )
 def test_a_bench_runs(at, size, folder) -> None:
     arguments = size(BENCHES[at]).split()

@@ -44,7 +44,8 @@ def test_the_same_as_in_one_process(scenario, observation, mode):
     assert any(step[3].any() for step in here[1:])  # episodes end, and others begin
 
 
-def test_workers_that_do_not_wait_for_each_other_run_the_same_episodes():
+@pytest.mark.parametrize("copy", [pytest.param(True, marks=pytest.mark.slow), False])
+def test_workers_that_do_not_wait_for_each_other_run_the_same_episodes(copy):
     one, steps, count = partial(make, MAZE, observation="state"), 9, 3
     actions = np.random.default_rng(0).uniform(-1, 1, (steps, count, 1)).astype(np.float32)
     envs = SyncVectorEnv([one] * count)
@@ -54,24 +55,23 @@ def test_workers_that_do_not_wait_for_each_other_run_the_same_episodes():
         for i in range(count):
             here[i].append((observations[i], rewards[i], terminated[i], truncated[i]))
     envs.close()
-    for copy in (True, False):
-        envs = make_vector(MAZE, count, workers=2, observation="state", copy=copy)
-        envs.async_reset(seed=5)
-        there, owed = [[] for _ in range(count)], 2
-        while owed:
-            observations, rewards, terminated, truncated, infos = envs.recv()
-            owed -= 1
-            batch = infos["env_id"]
-            for n, i in enumerate(batch):
-                seen = observations[n].copy()
-                row = (seen, rewards[n], terminated[n], truncated[n])
-                there[i].append(row if there[i] else seen)
-            done = len(there[batch[0]]) - 1
-            if done < steps:
-                envs.send(actions[done, batch], batch)
-                owed += 1
-        assert data_equivalence(here, there, exact=True)
-        envs.close()
+    envs = make_vector(MAZE, count, workers=2, observation="state", copy=copy)
+    envs.async_reset(seed=5)
+    there, owed = [[] for _ in range(count)], 2
+    while owed:
+        observations, rewards, terminated, truncated, infos = envs.recv()
+        owed -= 1
+        batch = infos["env_id"]
+        for n, i in enumerate(batch):
+            seen = observations[n].copy()
+            row = (seen, rewards[n], terminated[n], truncated[n])
+            there[i].append(row if there[i] else seen)
+        done = len(there[batch[0]]) - 1
+        if done < steps:
+            envs.send(actions[done, batch], batch)
+            owed += 1
+    assert data_equivalence(here, there, exact=True)
+    envs.close()
 
 
 def test_requests_out_of_turn_are_refused():

@@ -247,7 +247,7 @@ def test_no_robot_touches_what_comes_into_its_way_where_it_could_brake(
 
 
 @pytest.mark.warm("straight")
-@pytest.mark.parametrize("name", ["straight", "push-aware"])
+@pytest.mark.parametrize("name", ["straight", pytest.param("push-aware", marks=pytest.mark.slow)])
 def test_a_robot_drives_around_a_pillar_that_has_come_into_its_way(name: str) -> None:
     driven = DrivenRobot(name, room())
     pillar = square_at(4.3, 3.0)
@@ -276,7 +276,7 @@ def test_before_a_door_that_shuts_the_robot_waits_with_a_reason_until_it_opens()
 
 
 @pytest.mark.warm("push-aware")
-@pytest.mark.parametrize("name", ["push-aware", "straight"])
+@pytest.mark.parametrize("name", [pytest.param("push-aware", marks=pytest.mark.slow), "straight"])
 def test_an_object_that_turns_out_fixed_is_an_obstacle(name: str) -> None:
     objects = Movables.from_outlines([SQUARE], [[5.0, 3.0, 0.0]], masses=[0.01])
     driven = DrivenRobot(name, room(objects=objects))
