@@ -104,8 +104,9 @@ class MpcTracker:
     def _solve(self, memory: TrackerMemory) -> bool:
         """Make the nominal commands a solution; False if the solver does not find one."""
         config, known = self.config, memory.horizon.counts[KNOWN] == 1
-        for _ in range(config.iterations if known else config.first_iterations):
-            assemble_step(memory, self._track)
+        for i in range(config.iterations if known else config.first_iterations):
+            if i:  # the first is there
+                assemble_step(memory, self._track)
             if not solve_about(memory.horizon, self._solver):
                 return False
         return True

@@ -66,7 +66,7 @@ def begin_step(
     held: float,  # from the last call to this one [s]
     out: FloatArray,  # (2,) the command
 ) -> bool:
-    """Look where the robot is on its path; False if the command is known, and filled, by that."""
+    """Put up the program for where the robot is; False if the command is known, and filled."""
     horizon, tuning, here = memory.horizon, memory.tuning, memory.pose
     lay_steps(horizon, memory.span, held)
     if horizon.counts[KNOWN] == 1:
@@ -94,6 +94,7 @@ def begin_step(
         horizon.program.low[i] = 0.0  # a plan is driven forwards
     if horizon.counts[KNOWN] == 0:
         horizon.nominal[:] = np.nan
+    assemble_step(memory, track)
     return True
 
 

@@ -23,7 +23,6 @@ from pushplan.planners.pushing.push_kernels import (
     VALUE,
     PushingMemory,
     assemble_push,
-    begin_commands,
     begin_push,
     drive_push,
     observe_push,
@@ -158,7 +157,7 @@ class PushingMpc:
         """Fill the command."""
         memory, time, held, out = self._memory, world.time, self._clock.held, self._out
         assert memory is not None
-        if observe_push(memory, self._track, pose, box, time):
+        if observe_push(memory, self._track, pose, box, time, held):
             solved = self._solve(memory)
             drive_push(memory, obstacles_of(world.static), solved, time, held, out)
         else:
@@ -167,9 +166,9 @@ class PushingMpc:
     def _solve(self, memory: PushingMemory) -> bool:
         """Make the nominal commands a solution; False if the solver does not find one."""
         config, held, known = self.config, self._clock.held, memory.horizon.counts[KNOWN] == 1
-        begin_commands(memory, self._track, held)
-        for _ in range(config.iterations if known else config.first_iterations):
-            assemble_push(memory, self._track, held)
+        for i in range(config.iterations if known else config.first_iterations):
+            if i:  # the first is there
+                assemble_push(memory, self._track, held)
             if not solve_about(memory.horizon, self._solver):
                 return False
         return True

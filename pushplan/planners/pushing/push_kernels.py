@@ -86,9 +86,9 @@ def contact_now(memory: PushingMemory) -> Contact:
 
 @kernel
 def observe_push(
-    memory: PushingMemory, track: Track, pose: FloatArray, box: FloatArray, time: float
+    memory: PushingMemory, track: Track, pose: FloatArray, box: FloatArray, time: float, held: float
 ) -> bool:
-    """Estimate the state from poses (3,), and the one when a command of now takes effect.
+    """Estimate the state from poses (3,), and put up the program for when a command takes effect.
 
     Returns:
         False at the end of the path.
@@ -111,7 +111,11 @@ def observe_push(
     told[ALONG] = min(along, track.lengths[-1])
     path = track.poses[min(index, track.poses.shape[0] - 1)]
     told[LATERAL] = (at[1] - path[1]) * np.cos(path[2]) - (at[0] - path[0]) * np.sin(path[2])
-    return bool(along < track.lengths[-1] - 1e-9)
+    if not along < track.lengths[-1] - 1e-9:
+        return False
+    begin_commands(memory, track, held)
+    assemble_push(memory, track, held)
+    return True
 
 
 @kernel

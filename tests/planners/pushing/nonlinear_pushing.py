@@ -53,7 +53,7 @@ class NonlinearPushingMpc(PushingMpc):
 
     def _step(self, world: World, pose: FloatArray, box: FloatArray) -> None:
         memory, held, out = self._memory, self._clock.held, self._out
-        if not observe_push(memory, self._track, pose, box, world.time):
+        if not observe_push(memory, self._track, pose, box, world.time, held):
             send_push(memory, 0.0, 0.0, world.time, held, out)
             return
         if not self._solve(memory):
