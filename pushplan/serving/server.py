@@ -187,7 +187,8 @@ class PolicyServer:
         try:
             self.start()
             ready()
-            over.wait()
+            while not over.wait(_LOOK_S):  # a signal does not always interrupt a longer wait
+                pass
         finally:
             ended = self.close()
             for one, handler in before.items():
