@@ -19,7 +19,7 @@ import itertools
 
 from evaluation_doubles import HERE, LineScenario
 
-from benchmarks.reporting import command_line
+from benchmarks.reporting import command_line, resident_mb
 from pushplan.evaluation import Job, JobSettings, ResultRow, bench, parse_policies, run_batch
 
 
@@ -72,11 +72,6 @@ def scaling(suite: str, policy: str, episodes: int) -> None:
     one, two = (min(times) for times in took.values())
     print("| suite | policy | episodes | 1 worker | 2 workers | ratio |\n|---|---|---|---|---|---|")
     print(f"| {suite} | {policy} | {episodes} | {one:.1f} s | {two:.1f} s | {one / two:.2f} |")
-
-
-def resident_mb() -> float:
-    """Memory of this process [MB]."""
-    return int(Path("/proc/self/statm").read_text().split()[1]) * 4096 / 1e6
 
 
 if __name__ == "__main__":

@@ -7,8 +7,6 @@
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -16,7 +14,7 @@ from typing import Any
 import numpy as np
 from PIL import Image
 
-from benchmarks.reporting import command_line
+from benchmarks.reporting import command_line, median_ms
 from pushplan.envs import make
 from pushplan.geometry import distance_field, shadows
 from pushplan.observation import ImageObservation, channels
@@ -43,16 +41,6 @@ CASES: dict[str, tuple[str, str, dict[str, Any]]] = {
 }
 
 
-def milliseconds(call: Callable[[], object], repeats: int = 300) -> float:
-    """Median time of a call [ms]."""
-    times = []
-    for _ in range(repeats):
-        start = time.perf_counter()
-        call()
-        times.append(time.perf_counter() - start)
-    return 1e3 * float(np.median(times))
-
-
 def first_time(view: ImageObservation, world: World) -> float:
     """Median time of an observation of a map that was never seen before [ms]."""
 
@@ -66,7 +54,7 @@ def first_time(view: ImageObservation, world: World) -> float:
             cache.cache_clear()
         view.observe(world)
 
-    return milliseconds(call, 9)
+    return median_ms(call, 9)
 
 
 def main() -> None:
@@ -80,12 +68,12 @@ def main() -> None:
         assert isinstance(view, ImageObservation)
         world = env.world
         image = view.observe(world)
-        whole = milliseconds(lambda view=view, world=world: view.observe(world))
+        whole = median_ms(lambda view=view, world=world: view.observe(world), 300)
         new = first_time(view, world)
         print(f"{title} {view.shape}: {whole:.3f} ms, {new:.1f} ms for a new map")
         for channel in view.channels:
             one = replace(view, channels=(channel,))
-            span = milliseconds(lambda one=one, world=world: one.observe(world))
+            span = median_ms(lambda one=one, world=world: one.observe(world), 300)
             print(f"  {channel:16}{span:8.3f} ms")
         if folder is not None:
             tiles = [np.pad(layer, 2, constant_values=90) for layer in image]

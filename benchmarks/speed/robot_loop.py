@@ -28,7 +28,7 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.reporting import command_line
+from benchmarks.reporting import command_line, resident_mb
 from pushplan.compiled import watching
 from pushplan.runtime import Runner
 from pushplan.runtime.runner import PLAN_STOP
@@ -196,12 +196,6 @@ class Killer(Stop):
             self.killed += 1
             raise SystemExit("ended from outside")
         return False
-
-
-def resident_mb() -> float:
-    """Memory of this process [MB]."""
-    pages = int(Path("/proc/self/statm").read_text().split()[1])
-    return 4096.0 * pages / 1e6
 
 
 if __name__ == "__main__":

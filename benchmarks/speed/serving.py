@@ -13,7 +13,6 @@ import os
 import sys
 import tempfile
 import time
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +22,7 @@ sys.path.insert(0, str(Path(__file__).parents[2] / "examples"))
 
 from serve_client import PolicyClient
 
-from benchmarks.reporting import command_line
+from benchmarks.reporting import command_line, median_ms
 from pushplan.files.safe_files import parse_json
 from pushplan.planners import make_policy, warm_up
 from pushplan.serving import PolicyServer
@@ -100,27 +99,18 @@ def message_costs(objects: int) -> None:
     print(f"\n{f'message of {objects} objects':40} {'bytes':>8} {'write':>9} {'read':>9} ms")
     for name, data in (("whole world", whole), ("poses", poses)):
         text = json.dumps(data)
-        wrote, read = median(lambda d=data: json.dumps(d)), median(lambda t=text: parse_json(t))
+        wrote = median_ms(lambda d=data: json.dumps(d))
+        read = median_ms(lambda t=text: parse_json(t))
         print(f"{f'{name}, JSON':40} {len(text):8,} {wrote:9.3f} {read:9.3f}")
         try:
             import msgpack
         except ImportError:
             continue
         packed = msgpack.packb(data)
-        wrote = median(lambda d=data: msgpack.packb(d))
-        read = median(lambda p=packed: msgpack.unpackb(p))
+        wrote = median_ms(lambda d=data: msgpack.packb(d))
+        read = median_ms(lambda p=packed: msgpack.unpackb(p))
         print(f"{f'{name}, MessagePack':40} {len(packed):8,} {wrote:9.3f} {read:9.3f}")
-    print(f"{'World from a whole world read':60} {median(lambda: world_from_dict(whole)):9.3f}")
-
-
-def median(call: Callable[[], object], times: int = 200) -> float:
-    """Median time of a call [ms]."""
-    took = []
-    for _ in range(times):
-        began = time.perf_counter()
-        call()
-        took.append(time.perf_counter() - began)
-    return 1e3 * float(np.median(took))
+    print(f"{'World from a whole world read':60} {median_ms(lambda: world_from_dict(whole)):9.3f}")
 
 
 def main() -> None:

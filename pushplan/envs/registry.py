@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import fields
 
-from pushplan.imports.on_demand import look_up, registered
+from pushplan.imports.on_demand import Registered, look_up
 
-TASKS = registered(
+TASKS = Registered(
     "pushplan.tasks",
     {
         "maze": "pushplan.envs.tasks.maze:MazeTask",
@@ -18,7 +18,7 @@ TASKS = registered(
         "room": "pushplan.envs.tasks.room:RoomTask",
     },
 )
-SIMULATORS = registered(
+SIMULATORS = Registered(
     "pushplan.simulators",
     {
         "mujoco": "pushplan.envs.simulators.mujoco_simulator:MujocoSimulator",

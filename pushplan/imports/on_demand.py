@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from importlib import import_module
 from typing import Any
 
@@ -80,15 +80,33 @@ def lazy_names(
     return load, lambda: list(sys.modules[package].__all__)
 
 
-def registered(group: str, own: Mapping[str, str]) -> dict[str, str]:
+class Registered(Mapping[str, str]):
     """A table of ``"module:name"`` texts, and after it what installed distributions add to it.
+
+    They are searched when a name is asked for that is not of the package's own table, or all are.
 
     Args:
         group: of their entry points, such as those of policies.
         own: the table of this package; its names cannot be taken.
     """
-    found = {point.name: point.value for point in _entry_points().select(group=group)}
-    return {**own, **{name: found[name] for name in sorted(found.keys() - own.keys())}}
+
+    def __init__(self, group: str, own: Mapping[str, str]) -> None:
+        self._group, self._own = group, own
+
+    @functools.cached_property
+    def _all(self) -> Mapping[str, str]:
+        points = _entry_points().select(group=self._group)
+        found = {point.name: point.value for point in points if point.name not in self._own}
+        return {**self._own, **dict(sorted(found.items()))}
+
+    def __getitem__(self, name: str) -> str:
+        return self._own[name] if name in self._own else self._all[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._all)
+
+    def __len__(self) -> int:
+        return len(self._all)
 
 
 @functools.cache

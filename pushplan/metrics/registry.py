@@ -10,7 +10,7 @@ from typing import Literal, cast
 
 from pushplan.errors import describe, short
 from pushplan.imports.named_objects import load_object
-from pushplan.imports.on_demand import registered
+from pushplan.imports.on_demand import Registered
 from pushplan.world import ClearanceArea, Episode, InvalidInputError, Receptacle, UnknownNameError
 
 GoalKind = Literal["robot", "objects"]
@@ -105,7 +105,7 @@ _METRICS: dict[str, Metric] = {
 }
 METRICS = {
     name: _METRICS.get(name) or Metric(function, Role.DETAIL, higher_is_better=None)
-    for name, function in registered(
+    for name, function in Registered(
         "pushplan.metrics", {name: metric.function for name, metric in _METRICS.items()}
     ).items()
 }
@@ -123,7 +123,7 @@ def compute(episode: Episode, names: Iterable[str] | None = None) -> Mapping[str
     Args:
         episode: the recorded run.
         names: metrics by name, or functions as ``"module:function"`` or
-            ``"file.py:function"``; all registered ones if None.
+            ``"file.py:function"``; all Registered ones if None.
 
     Raises:
         UnknownNameError: if there is no such metric.

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import inspect
+from collections.abc import Mapping
 from dataclasses import fields, is_dataclass, replace
 from typing import Any, cast
 
-from pushplan.imports.on_demand import look_up, registered
+from pushplan.imports.on_demand import Registered, look_up
 from pushplan.world import Planner, Policy, UnknownNameError
 
 _PLANNERS = {
@@ -23,7 +24,7 @@ _PLANNERS = {
     "ship-predictive-network": "pushplan.planners.ship_predictive:PredictiveShipNetwork",
     "ship-predictive-published": "pushplan.planners.ship_predictive:PredictivePublished",
 }
-PLANNERS = registered("pushplan.planners", _PLANNERS)
+PLANNERS = Registered("pushplan.planners", _PLANNERS)
 """Name -> "module:Class"; each is constructed without arguments by default."""
 
 OPEN_WATER = ("ship-predictive", "ship-predictive-network", "ship-predictive-published")
@@ -50,7 +51,7 @@ _POLICIES = {
     "gtsp": "pushplan.planners.rearrangement:Gtsp",
     "gtsp-mpc": "pushplan.planners.rearrangement:GtspMpc",
 }
-POLICIES = registered("pushplan.policies", _POLICIES)
+POLICIES = Registered("pushplan.policies", _POLICIES)
 """Name -> "module:callable" that makes a policy."""
 
 
@@ -98,7 +99,7 @@ def make_policy(name: str, **options: Any) -> Policy:
     return cast(Policy, _made("policy", name, POLICIES, options))
 
 
-def _made(kind: str, name: str, table: dict[str, str], options: dict[str, Any]) -> Any:
+def _made(kind: str, name: str, table: Mapping[str, str], options: dict[str, Any]) -> Any:
     factory = look_up(kind, table, name)
     known = inspect.signature(factory).parameters
     if any(p.kind is p.VAR_KEYWORD for p in known.values()):  # it knows its settings

@@ -13,13 +13,14 @@ and wheels.
 from __future__ import annotations
 
 import functools
+from collections.abc import Mapping
 from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
 from pushplan.errors import UnknownNameError
 from pushplan.files.safe_files import read_data
-from pushplan.imports.on_demand import look_up, registered
+from pushplan.imports.on_demand import Registered, look_up
 from pushplan.world.checks import choice
 from pushplan.world.robot import Drive, RobotModel
 
@@ -108,9 +109,9 @@ def original_box_delivery_robot(
 
 
 @functools.cache
-def robots() -> dict[str, str]:
+def robots() -> Mapping[str, str]:
     """Name -> "module:function" that makes a robot: ours, and those of installed distributions."""
-    return registered("pushplan.robots", {name: f"{__name__}:{name}" for name in ROBOTS})
+    return Registered("pushplan.robots", {name: f"{__name__}:{name}" for name in ROBOTS})
 
 
 def make_robot(name: str, drive: Drive | str, **options: Any) -> RobotModel:
