@@ -11,6 +11,7 @@ import re
 import shlex
 import subprocess
 import sys
+import tomllib
 from pathlib import Path
 
 import pytest
@@ -72,6 +73,8 @@ def test_the_code_blocks_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
             first, _, rest = text.partition("\n")
             if language == "bash":
                 said += map(run, text.splitlines())
+            elif language == "toml":
+                assert tomllib.loads(text)
             elif first.startswith("# ") and first.endswith(".py"):
                 Path(first[2:]).write_text(rest, encoding="utf-8")
             else:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 import sys
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, MutableMapping
 from importlib import import_module
 from typing import Any
 
@@ -80,7 +80,7 @@ def lazy_names(
     return load, lambda: list(sys.modules[package].__all__)
 
 
-class Registered(Mapping[str, str]):
+class Registered(MutableMapping[str, str]):
     """A table of ``"module:name"`` texts, and after it what installed distributions add to it.
 
     They are searched when a name is asked for that is not of the package's own table, or all are.
@@ -91,22 +91,32 @@ class Registered(Mapping[str, str]):
     """
 
     def __init__(self, group: str, own: Mapping[str, str]) -> None:
-        self._group, self._own = group, own
+        self._group: str | None = group  # None once it has been searched
+        self._known = dict(own)
 
-    @functools.cached_property
-    def _all(self) -> Mapping[str, str]:
-        points = _entry_points().select(group=self._group)
-        found = {point.name: point.value for point in points if point.name not in self._own}
-        return {**self._own, **dict(sorted(found.items()))}
+    def _all(self) -> dict[str, str]:
+        if self._group is not None:
+            for point in sorted(
+                _entry_points().select(group=self._group), key=lambda one: one.name
+            ):
+                self._known.setdefault(point.name, point.value)
+            self._group = None
+        return self._known
 
     def __getitem__(self, name: str) -> str:
-        return self._own[name] if name in self._own else self._all[name]
+        return self._known[name] if name in self._known else self._all()[name]
+
+    def __setitem__(self, name: str, value: str) -> None:
+        self._known[name] = value
+
+    def __delitem__(self, name: str) -> None:
+        del self._all()[name]
 
     def __iter__(self) -> Iterator[str]:
-        return iter(self._all)
+        return iter(self._all())
 
     def __len__(self) -> int:
-        return len(self._all)
+        return len(self._all())
 
 
 @functools.cache
