@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -140,7 +140,32 @@ def set_bounds(horizon: Horizon, first: float, later: float) -> None:
             program.low[row + i], program.high[row + i] = before - reach, before + reach
 
 
-def solve_about(horizon: Horizon, solver: ProgramSolver) -> bool:
+def solve_rounds(
+    horizon: Horizon,
+    solver: ProgramSolver,
+    rounds: int,
+    first_rounds: int,
+    assemble: Callable[[], object],
+) -> bool:
+    """Make the nominal commands a solution; False if the solver does not find one.
+
+    Args:
+        horizon: its memory, with the program put up about the nominal commands.
+        solver: of that program.
+        rounds: how many programs are solved.
+        first_rounds: the same where there is no solution yet.
+        assemble: puts the program up about the commands that the one before has given.
+    """
+    known = horizon.counts[KNOWN] == 1
+    for i in range(rounds if known else first_rounds):
+        if i:
+            assemble()
+        if not _solve_about(horizon, solver):
+            return False
+    return True
+
+
+def _solve_about(horizon: Horizon, solver: ProgramSolver) -> bool:
     """Solve the program from the nominal commands, and replace them; False if it is not solved."""
     moves, columns = horizon.program.moves, horizon.columns
     nominal = horizon.nominal[:, columns]

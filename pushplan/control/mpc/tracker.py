@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import partial
 
 import numpy as np
 
 from pushplan.compiled import owned
 from pushplan.control.episode_clock import EpisodeClock
 from pushplan.control.limits import driven_twist
-from pushplan.control.mpc.horizon import FAILED, KNOWN, make_horizon, solve_about, track_of
+from pushplan.control.mpc.horizon import FAILED, make_horizon, solve_rounds, track_of
 from pushplan.control.mpc.kernels import Tuning, assembly_memory
 from pushplan.control.mpc.mpc_config import MpcConfig
 from pushplan.control.mpc.quadratic_program import ProgramSolver
@@ -98,18 +99,15 @@ class MpcTracker:
             begin_track(memory)
         pose, time, held = owned(world.robot_pose), world.time, self._clock.held
         if begin_step(memory, self._track, pose, time, held, out):
-            finish_step(memory, self._track, pose, time, held, self._solve(memory), out)
+            solved = solve_rounds(
+                memory.horizon,
+                self._solver,
+                self.config.iterations,
+                self.config.first_iterations,
+                partial(assemble_step, memory, self._track),
+            )
+            finish_step(memory, self._track, pose, time, held, solved, out)
         return Twist(float(out[0]), float(out[1]))
-
-    def _solve(self, memory: TrackerMemory) -> bool:
-        """Make the nominal commands a solution; False if the solver does not find one."""
-        config, known = self.config, memory.horizon.counts[KNOWN] == 1
-        for i in range(config.iterations if known else config.first_iterations):
-            if i:  # the first is there
-                assemble_step(memory, self._track)
-            if not solve_about(memory.horizon, self._solver):
-                return False
-        return True
 
 
 def tracker_memory(robot: RobotModel, config: MpcConfig) -> TrackerMemory:

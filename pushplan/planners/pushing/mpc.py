@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from functools import partial
 
 import numpy as np
 
 from pushplan.compiled import owned
 from pushplan.control.episode_clock import EpisodeClock
 from pushplan.control.limits import driven_twist
-from pushplan.control.mpc.horizon import FAILED, KNOWN, remember, send, solve_about, track_of
+from pushplan.control.mpc.horizon import FAILED, remember, send, solve_rounds, track_of
 from pushplan.control.mpc.quadratic_program import ProgramSolver
 from pushplan.geometry.obstacles import obstacles_of
 from pushplan.planners.pushing.model import PushModel, PushState
@@ -164,14 +165,13 @@ class PushingMpc:
             send_push(memory, 0.0, 0.0, time, held, out)
 
     def _solve(self, memory: PushingMemory) -> bool:
-        """Make the nominal commands a solution; False if the solver does not find one."""
-        config, held, known = self.config, self._clock.held, memory.horizon.counts[KNOWN] == 1
-        for i in range(config.iterations if known else config.first_iterations):
-            if i:  # the first is there
-                assemble_push(memory, self._track, held)
-            if not solve_about(memory.horizon, self._solver):
-                return False
-        return True
+        return solve_rounds(
+            memory.horizon,
+            self._solver,
+            self.config.iterations,
+            self.config.first_iterations,
+            partial(assemble_push, memory, self._track, self._clock.held),
+        )
 
     def _told(self, place: int) -> float:
         return math.nan if self._memory is None else float(self._memory.told[place])

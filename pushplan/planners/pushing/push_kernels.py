@@ -113,8 +113,9 @@ def observe_push(
     told[LATERAL] = (at[1] - path[1]) * np.cos(path[2]) - (at[0] - path[0]) * np.sin(path[2])
     if not along < track.lengths[-1] - 1e-9:
         return False
-    begin_commands(memory, track, held)
-    assemble_push(memory, track, held)
+    problem = problem_now(memory, track, held)
+    _begin_commands(memory, held)
+    memory.told[VALUE] = assemble(problem, memory.horizon.nominal, memory.assembly)
     return True
 
 
@@ -213,10 +214,9 @@ def problem_now(memory: PushingMemory, track: Track, held: float) -> PushingProb
 
 
 @kernel
-def begin_commands(memory: PushingMemory, track: Track, held: float) -> None:
+def _begin_commands(memory: PushingMemory, held: float) -> None:
     """Set the nominal commands to the last solution, moved on, or to full speed straight on."""
     horizon = memory.horizon
-    problem_now(memory, track, held)
     if horizon.counts[KNOWN] == 1:
         _shift(memory, held)
     else:
