@@ -186,7 +186,7 @@ def measure(folder: Path) -> tuple[dict[str, str], list[str]]:
 
 
 def breaches(figures: dict[str, str]) -> list[str]:
-    """What is above its limit, and limits that can be lowered."""
+    """Figures above their limits, and limits that can be lowered."""
     limits = yaml.safe_load(LIMITS.read_text())
     most = {name: rule["most"] for name, rule in limits["mechanisms"].items()} | limits["most"]
     found = []

@@ -266,7 +266,7 @@ class WorkerVectorEnv(VectorEnv[Any, Any, Any]):
             pool.shutdown(cancel_futures=True)
 
     def _ask(self, function: Callable[..., Any], arguments: Sequence[tuple[Any, ...]]) -> list[Any]:
-        """What a function gives in each worker, with arguments for each."""
+        """The results of a function in each worker, with arguments for each."""
         self._check_idle(function.__name__.strip("_"))
         futures = [self._pools[n].submit(function, *each) for n, each in enumerate(arguments)]
         wait(futures)  # all of them: after an error no worker is busy

@@ -34,7 +34,7 @@ _MOST_REFUSED = 32  # clients that are told at the same time why they are sent a
 
 
 async def in_thread(function: Callable[[], _Result], name: str) -> _Result:
-    """What a function returns that a new thread calls, while the loop goes on.
+    """Call a function in a new thread while the loop goes on, and return its result.
 
     The thread is a daemon, which those of `concurrent.futures` are not: a policy that hangs does
     not keep the process from ending.

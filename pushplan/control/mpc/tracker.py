@@ -35,7 +35,7 @@ class MpcTracker:
     (IEEE Trans. Control Syst. Technol. 15(3), 2007), with exact arcs for the motion. Because it
     looks ahead it begins to turn before a bend, keeps the limits of turn rate and turn
     acceleration without overshoot, and takes a known delay into account. Use `PathFollower` where
-    commands act at once and the pose is exact; it is several times as fast.
+    commands act at once and the pose is exact; it takes about 0.6 of the time.
 
     A solution is used only if the solver says that it is one. Otherwise the last solution is
     followed for the rest of its horizon, then pure pursuit takes over; `fallbacks` counts both.

@@ -128,7 +128,7 @@ def _filled(name: str, **values: object) -> str:
 
 
 def caster_position(robot: RobotModel) -> float:
-    """Where the caster's ball touches the ground, ahead of the axle [m].
+    """Distance of the caster's contact with the ground ahead of the axle [m].
 
     At the rear, unless most of the chassis is ahead of the axle.
     """

@@ -1,4 +1,4 @@
-"""Which objects of a MuJoCo scene rest, and what the engine is told of it."""
+"""Resting objects of a MuJoCo scene, and the engine's record of who sleeps."""
 
 from __future__ import annotations
 

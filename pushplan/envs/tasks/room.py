@@ -217,7 +217,7 @@ class RoomTask(Task):
         return self._checked_for_time(outcome)
 
     def _done(self, world: World) -> BoolArray:
-        """Which objects of the start are done: those that have left the floor, or are off."""
+        """Flags of the objects of the start that are done: that have left the floor, or are off."""
         done = ~np.isin(self._world.movables.ids, world.movables.ids)
         if not self.objects_leave:
             done[~done] = world.completed

@@ -167,7 +167,7 @@ class WorkerProcess:
             ) from None
 
     def _next_line(self, waiting: Callable[[], None]) -> bytes:
-        """What it says next; ``waiting`` is called several times a second until all is there."""
+        """Its next message; ``waiting`` is called several times a second until all is there."""
         self._line.settimeout(_POLL_S)
         end = self._heard.find(b"\n")
         while end < 0:

@@ -87,7 +87,7 @@ class StoredRun:
         return Episode.load(path) if path.is_file() else None
 
     def summary(self) -> list[PolicySummary]:
-        """What the rows say about each policy in each setting."""
+        """Summaries of the rows, of each policy in each setting."""
         return list(self._summaries)
 
     @functools.cached_property

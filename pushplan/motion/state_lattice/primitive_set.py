@@ -29,7 +29,7 @@ DIRECTIONS: dict[int, tuple[tuple[int, int], ...]] = {
 
 @dataclass(frozen=True)
 class PrimitiveConfig:
-    """What a set of primitives is made from; a set is kept under this.
+    """The arguments that a set of primitives is made from; a set is kept under this.
 
     Args:
         headings: 8, 16 or 32 in the whole turn.
