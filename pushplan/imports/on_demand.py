@@ -51,7 +51,7 @@ def need(module: str) -> Any:
 
 
 def missing(error: BaseException) -> MissingDependencyError | None:
-    """Our error in place of one that says that a library of an extra is missing; None for others."""
+    """Our error in place of one about a missing library of an extra; None for others."""
     name = error.name if isinstance(error, ModuleNotFoundError) else None
     library = (name or "").partition(".")[0]
     if library not in EXTRAS:
