@@ -110,7 +110,7 @@ def test_only_regular_files_below_a_size_are_read(name: str, tmp_path: Path) -> 
         with pytest.raises(SchemaError, match=words) as caught:
             DOORS[name].read(path)
         check_message(caught.value)
-        assert time.process_time() - begin < 0.5
+        assert time.process_time() - begin < 2.0
         (path.rmdir if stat.S_ISDIR(path.stat().st_mode) else path.unlink)()
     with pytest.raises(SchemaError, match="No such file"):
         DOORS[name].read(path)

