@@ -38,7 +38,7 @@ from pushplan.planners.pushing import (
     spread_of,
     warm_up,
 )
-from pushplan.planners.rearrangement.geometric_pusher import GeometricPusher
+from pushplan.planners.rearrangement.push_execution import GeometricPusher
 from pushplan.planners.rearrangement.push_scene import PushScene
 from pushplan.planners.rearrangement.rearrangement_config import RearrangementConfig
 from pushplan.world import (

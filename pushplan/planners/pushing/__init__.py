@@ -8,13 +8,13 @@ from pushplan.planners.pushing.bumper import Bumper, Face, face_towards
 from pushplan.planners.pushing.model import PushModel, PushState
 from pushplan.planners.pushing.mpc import PushingMpc, warm_up
 from pushplan.planners.pushing.parameters import (
+    PushingConfig,
     PushParameters,
     pressure_radius,
     spread_of,
     stable_curvature,
 )
 from pushplan.planners.pushing.path import PushPath
-from pushplan.planners.pushing.pushing_config import PushingConfig
 
 __all__ = [
     "Bumper",

@@ -5,23 +5,22 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import ClassVar
 
 import numpy as np
 
-from pushplan.planners.pushing.contact_kernels import Contact
-from pushplan.planners.pushing.parameters import PushParameters, pressure_radius
 from pushplan.world import InvalidInputError, RobotModel
+from pushplan.world.checked_fields import CheckedFields, PositiveFloat
 from pushplan.world.checks import FloatArray, expect, number
 from pushplan.world.outline import convex_outline
 
 _SAMPLES = 401
 _STEEP = 0.8  # |dx/dy| from which an edge is a flank and no longer part of the front
 _FLAT = 0.02  # depth of a front, as a fraction of its half width, below which it counts as straight
-_BENT = 0.7  # greatest curvature times depth of a box: a box fits into the bumper's hollow
 
 
 @dataclass(frozen=True)
-class Bumper:
+class Bumper(CheckedFields):
     """The front of a robot: x = front + curvature y² / 2 for |y| <= half, body frame [m].
 
     Args:
@@ -31,14 +30,11 @@ class Bumper:
             negative for a nose. A V-shaped front is replaced by the parabola nearest to it.
     """
 
-    front: float
-    half: float
+    front: PositiveFloat
+    half: PositiveFloat
     curvature: float
 
-    def __post_init__(self) -> None:
-        for name in ("front", "half"):
-            number(f"bumper {name}", getattr(self, name), low=0.0, open_low=True)
-        number("bumper curvature", self.curvature)
+    field_prefix: ClassVar[str] = "bumper "
 
     @classmethod
     def of(cls, robot: RobotModel) -> Bumper:
@@ -47,7 +43,7 @@ class Bumper:
 
 
 @dataclass(frozen=True)
-class Face:
+class Face(CheckedFields):
     """A side of a box.
 
     Args:
@@ -58,14 +54,14 @@ class Face:
     """
 
     normal: float
-    depth: float
+    depth: PositiveFloat
     low: float
     high: float
 
+    field_prefix: ClassVar[str] = "face "
+
     def __post_init__(self) -> None:
-        number("face normal", self.normal)
-        number("face depth", self.depth, low=0.0, open_low=True)
-        number("face low", self.low)
+        super().__post_init__()
         number("face high", self.high, low=self.low, open_low=True)
 
 
@@ -103,36 +99,6 @@ def face_towards(outline: FloatArray, direction: float) -> Face:
     faces, scores = faces_of(outline)
     facing = scores @ np.array([math.cos(direction), math.sin(direction), 1.0])
     return faces[int(np.argmax(facing))]
-
-
-def contact_of(
-    bumper: Bumper, outline: FloatArray, face: Face, parameters: PushParameters
-) -> Contact:
-    """Bumper, face and friction as the kernels read them.
-
-    Args:
-        bumper: the robot's front.
-        outline: (N, 2) corners of the box [m].
-        face: of the box.
-        parameters: friction.
-    """
-    spread = parameters.spread * _radius(outline.tobytes())
-    curvature = min(bumper.curvature, _BENT / face.depth)
-    return Contact(
-        bumper.front,
-        bumper.half,
-        curvature,
-        face.depth,
-        face.low,
-        face.high,
-        spread,
-        parameters.friction,
-    )
-
-
-@lru_cache(maxsize=256)
-def _radius(outline: bytes) -> float:
-    return pressure_radius(np.frombuffer(outline).reshape(-1, 2))
 
 
 @lru_cache(maxsize=64)

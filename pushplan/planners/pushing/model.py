@@ -3,21 +3,35 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
+from typing import Annotated, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from pushplan.planners.pushing import contact_kernels
-from pushplan.planners.pushing.bumper import Bumper, Face, contact_of, face_towards
+from pushplan.planners.pushing.bumper import Bumper, Face, face_towards
 from pushplan.planners.pushing.contact_kernels import Contact
-from pushplan.planners.pushing.parameters import PushParameters, stable_curvature
+from pushplan.planners.pushing.parameters import (
+    PushParameters,
+    pressure_radius,
+    stable_curvature,
+)
 from pushplan.world import InvalidInputError, RobotModel
+from pushplan.world.checked_fields import CheckedFields, Shape
 from pushplan.world.checks import ArrayRecord, FloatArray, array, expect, number
 from pushplan.world.outline import centroid, convex_outline
 
+_BENT = 0.7  # greatest curvature times depth of a box: a box fits into the bumper's hollow
+
+
+@lru_cache(maxsize=256)
+def _radius(outline: bytes) -> float:
+    return pressure_radius(np.frombuffer(outline).reshape(-1, 2))
+
 
 @dataclass(frozen=True, eq=False)
-class PushState(ArrayRecord):
+class PushState(ArrayRecord, CheckedFields):
     """Robot and box while the box is in front of the bumper.
 
     Args:
@@ -27,16 +41,12 @@ class PushState(ArrayRecord):
         gap: between bumper and box along the robot's x axis [m].
     """
 
-    robot_pose: FloatArray
+    robot_pose: Annotated[FloatArray, Shape(3)]
     offset: float
     angle: float
     gap: float = 0.0
 
-    def __post_init__(self) -> None:
-        put = object.__setattr__
-        put(self, "robot_pose", array("push state robot_pose", self.robot_pose, (3,)))
-        for name in ("offset", "angle", "gap"):
-            put(self, name, number(f"push state {name}", getattr(self, name)))
+    field_prefix: ClassVar[str] = "push state "
 
     def row(self) -> FloatArray:
         """(6,) as the kernels read it."""
@@ -79,7 +89,16 @@ class PushModel:
         expect("parameters", self.parameters, PushParameters)
         self.face = face_towards(self.outline, 0.0) if face is None else face
         expect("face", self.face, Face)
-        self.contact: Contact = contact_of(self.bumper, self.outline, self.face, self.parameters)
+        self.contact = Contact(
+            self.bumper.front,
+            self.bumper.half,
+            min(self.bumper.curvature, _BENT / self.face.depth),
+            self.face.depth,
+            self.face.low,
+            self.face.high,
+            self.parameters.spread * _radius(self.outline.tobytes()),
+            self.parameters.friction,
+        )
 
     @property
     def reach(self) -> float:

@@ -11,17 +11,29 @@ import numpy as np
 from pushplan.compiled import owned
 from pushplan.control.episode_clock import EpisodeClock
 from pushplan.control.limits import driven_twist
-from pushplan.control.mpc.horizon import FAILED, remember, send, solve_rounds, track_of
+from pushplan.control.mpc.horizon import (
+    FAILED,
+    Horizon,
+    make_horizon,
+    remember,
+    send,
+    solve_rounds,
+    track_of,
+)
 from pushplan.control.mpc.quadratic_program import ProgramSolver
 from pushplan.geometry.obstacles import obstacles_of
+from pushplan.planners.pushing.bumper import faces_of
+from pushplan.planners.pushing.clearance_kernels import clearance_problem
+from pushplan.planners.pushing.cost_kernels import Weights, assembly_memory
 from pushplan.planners.pushing.model import PushModel, PushState
+from pushplan.planners.pushing.parameters import PushingConfig
 from pushplan.planners.pushing.path import PushPath
-from pushplan.planners.pushing.problem import pushing_horizon, pushing_memory
 from pushplan.planners.pushing.push_kernels import (
     ALONG,
     LATERAL,
     SLOWED,
     VALUE,
+    Faces,
     PushingMemory,
     assemble_push,
     begin_push,
@@ -29,10 +41,12 @@ from pushplan.planners.pushing.push_kernels import (
     observe_push,
     send_push,
 )
-from pushplan.planners.pushing.pushing_config import PushingConfig
 from pushplan.planners.warm_up_worlds import warm_up_worlds
 from pushplan.world import Drive, InvalidInputError, Plan, RobotModel, Twist, World
-from pushplan.world.checks import FloatArray, expect
+from pushplan.world.checks import FloatArray, IntArray, expect
+from pushplan.world.outline import convex_outline
+
+_NEARER = 1e-6  # what is nearer than the clearance already may come this much nearer [R]
 
 
 @dataclass
@@ -139,7 +153,7 @@ class PushingMpc:
             )
         if self._robot is not robot and self._robot != robot:
             self._robot, self._plan, self._memory = robot, None, None
-            self._horizon = pushing_horizon(robot, config)
+            self._horizon = make_horizon(robot, (0, 1), config.horizon, config.moves)
             self._solver = ProgramSolver(
                 self._horizon.program, config.tolerance, config.solver_iterations
             )
@@ -149,7 +163,7 @@ class PushingMpc:
     def _begin(self, world: World, plan: Plan, k: int) -> None:
         """A new path: which face is pushed, and memory for the problem."""
         self._plan, self._track = plan, track_of(plan)
-        self._memory, self._models = pushing_memory(
+        self._memory, self._models = _pushing_memory(
             world.robot, world.movables.outline(k), self.config, self._horizon
         )
         begin_push(self._memory, float(world.robot_pose[2] - world.movables.poses[k, 2]))
@@ -175,6 +189,66 @@ class PushingMpc:
 
     def _told(self, place: int) -> float:
         return math.nan if self._memory is None else float(self._memory.told[place])
+
+
+def groups_of(horizon: int, moves: int) -> IntArray:
+    """(N,) which command holds in each step: the first ones for one step, later ones for more."""
+    ends = horizon * (np.arange(1, moves + 1) / moves) ** (1.6 if moves < horizon else 1.0)
+    ends = np.maximum(np.round(ends), np.arange(1, moves + 1)).astype(np.int64)
+    ends = np.minimum(ends, horizon - np.arange(moves - 1, -1, -1))
+    return np.searchsorted(ends, np.arange(horizon), side="right").astype(np.int64)
+
+
+def _pushing_memory(
+    robot: RobotModel, outline: FloatArray, config: PushingConfig, horizon: Horizon
+) -> tuple[PushingMemory, list[PushModel]]:
+    """Parameters and memory of the kernels, and the contact model of each face.
+
+    Args:
+        robot: that pushes.
+        outline: (N, 2) convex, counter-clockwise corners of the box, origin at the centroid [m].
+        config: parameters.
+        horizon: memory for commands, which outlasts a path.
+    """
+    faces, scores = faces_of(convex_outline("outline", outline))
+    models = [PushModel(robot, outline, config.parameters, face) for face in faces]
+    size = robot.circumscribed_radius
+    stable = [(model.stable_curvature(), model.reach) for model in models]
+    memory = PushingMemory(
+        horizon,
+        Weights(  # length and curvature come with the path
+            length=0.0,
+            max_speed=robot.max_speed,
+            half=models[0].bumper.half,
+            curvature=-1.0,
+            heading=config.heading,
+            offset=config.offset,
+            rim=config.rim,
+            safe=config.safe,
+            angle=config.angle,
+            grip=config.grip,
+            turn=config.turn,
+            speed=config.speed,
+            smoothness=config.smoothness,
+            terminal=config.terminal,
+        ),
+        Faces(
+            scores,
+            np.array([model.contact for model in models]),
+            np.array([model.face.normal for model in models]),
+            np.array([config.margin * k if k * reach > 0.02 else -1.0 for k, reach in stable]),
+        ),
+        assembly_memory(config.horizon, horizon.program.hessian, horizon.program.gradient),
+        clearance_problem(robot, models[0].outline, config.clearance * size, _NEARER * size),
+        groups_of(config.horizon, config.moves),
+        config.reach,
+        config.delay,
+        config.observer_gain,
+        np.zeros(1, dtype=np.int64),
+        np.array([0.0, 0.0, 1.0, 0.0, 0.0, 0.0]),
+        *(np.zeros(count) for count in (6, 6, 6, 6, 3, 6)),
+    )
+    return memory, models
 
 
 def warm_up() -> None:

@@ -1,15 +1,25 @@
-"""What friction does to a push: the bumper's grip, and how the ground resists turning."""
+"""Friction of a push and what it does to it, and the parameters of the pushing controller."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from pushplan.world import InvalidInputError
-from pushplan.world.checks import choice, number
+from pushplan.world.checked_fields import (
+    CheckedFields,
+    Fraction,
+    Limits,
+    NonNegativeFloat,
+    PositiveFloat,
+    PositiveFraction,
+    PositiveInt,
+)
+from pushplan.world.checks import choice, integer, number
 from pushplan.world.outline import centroid, convex_outline
 
 SUPPORTS = ("uniform", "inertia", "corners")
@@ -18,7 +28,7 @@ _RINGS = 64
 
 
 @dataclass(frozen=True)
-class PushParameters:
+class PushParameters(CheckedFields):
     """Friction of a push.
 
     Args:
@@ -28,13 +38,77 @@ class PushParameters:
             1.07 (`spread_of`), a box that stands on its corners 1.85.
     """
 
-    friction: float = 0.0
-    spread: float = 1.0
+    friction: Annotated[float, Limits(0.0, 10.0)] = 0.0
+    spread: Annotated[float, Limits(0.05, 20.0)] = 1.0
+
+
+@dataclass(frozen=True)
+class PushingConfig(CheckedFields):
+    """Parameters of `PushingMpc`.
+
+    L is the distance from the robot's axle to the centre of the box on its bumper, T = L / speed.
+    The cost is the integral over time, in units of T, of the squares below, with the box's
+    distance from its path in L and turn rates in 1 / T.
+
+    Args:
+        horizon: N, steps that are looked ahead.
+        moves: commands that are chosen freely; each but the first holds for some steps. At most
+            ``horizon``.
+        reach: how far the steps reach at full speed [L]; they are equally long, but never shorter
+            than the control period, and the first is the control period itself.
+        heading: cost of a wrong direction of the push [1/rad²].
+        offset: cost of the box's offset, per square of the fraction of half the bumper.
+        rim: cost of an offset beyond ``safe``, the same.
+        safe: fraction of half the bumper within which an offset costs no more than ``offset``.
+        angle: cost of a box that does not lie on the bumper [1/rad²].
+        grip: cost of a curvature beyond ``margin`` times the stable one.
+        margin: fraction of the stable curvature that is used; light boxes in MuJoCo need 0.6
+            to 0.7.
+        turn: cost of turning otherwise than the path does.
+        speed: cost of another speed than the path's, per square, as a fraction of ``max_speed``.
+        smoothness: cost of changing speed and turn rate.
+        terminal: factor on the cost of the last step.
+        parameters: friction.
+        delay: known time between a command and its effect [s].
+        period: time for which the first command is held [s]; later ones are held for as long as
+            the clock of the world shows.
+        observer_gain: fraction by which a new pose corrects the predicted one; 1 where poses are
+            exact, about 0.3 where they are off by some percent of the box.
+        clearance: least distance of robot and box from static things [R, the robot's
+            circumscribed radius]; what is nearer comes no nearer.
+        iterations: quadratic programs solved in each call; 1 is the real-time iteration.
+        first_iterations: those of the first call on a path.
+        tolerance: of the solver, absolute and relative.
+        solver_iterations: after which the solver gives up.
+    """
+
+    horizon: Annotated[int, Limits(2, 200)] = 20
+    moves: Annotated[int, Limits(2)] = 10
+    reach: PositiveFloat = 3.0
+    heading: NonNegativeFloat = 0.2
+    offset: NonNegativeFloat = 0.02
+    rim: NonNegativeFloat = 4.0
+    safe: Fraction = 0.6
+    angle: NonNegativeFloat = 0.1
+    grip: NonNegativeFloat = 0.03
+    margin: PositiveFraction = 0.7
+    turn: NonNegativeFloat = 0.02
+    speed: PositiveFloat = 1.0
+    smoothness: PositiveFloat = 0.01
+    terminal: Annotated[float, Limits(1.0)] = 3.0
+    parameters: PushParameters = field(default_factory=PushParameters)
+    delay: NonNegativeFloat = 0.0
+    period: PositiveFloat = 0.1
+    observer_gain: PositiveFraction = 1.0
+    clearance: NonNegativeFloat = 0.02
+    iterations: PositiveInt = 1
+    first_iterations: PositiveInt = 4
+    tolerance: PositiveFloat = 1e-5
+    solver_iterations: PositiveInt = 1000
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "friction", number("friction", self.friction, low=0.0, high=10.0))
-        spread = number("spread", self.spread, low=0.05, high=20.0)
-        object.__setattr__(self, "spread", spread)
+        super().__post_init__()
+        integer("moves", self.moves, high=self.horizon)
 
 
 def pressure_radius(outline: ArrayLike, support: str = "uniform") -> float:

@@ -3,10 +3,10 @@
 from pushplan.planners.rearrangement.gtsp_mpc import GtspMpc
 from pushplan.planners.rearrangement.gtsp_policy import Gtsp
 from pushplan.planners.rearrangement.push import Push
-from pushplan.planners.rearrangement.push_graph import PushGraph, build_push_graph
+from pushplan.planners.rearrangement.push_choice import build_push_graph
+from pushplan.planners.rearrangement.push_graph import PushGraph, push_order
 from pushplan.planners.rearrangement.push_scene import PushScene
 from pushplan.planners.rearrangement.rearrangement_config import RearrangementConfig
-from pushplan.planners.rearrangement.sequencing import push_order
 
 __all__ = [
     "Gtsp",

@@ -7,15 +7,19 @@ import math
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from typing import Any, NamedTuple
 
 import numpy as np
 
 from pushplan.planners.rearrangement.goal_kernels import REMOVED
-from pushplan.planners.rearrangement.primitives import PushPrimitive
 from pushplan.planners.rearrangement.push import Push
-from pushplan.planners.rearrangement.push_poses import heading_axes, initial_heading, pose_behind
-from pushplan.planners.rearrangement.push_simulator import PushSimulator
+from pushplan.planners.rearrangement.push_scene import (
+    PushScene,
+    heading_axes,
+    initial_heading,
+    open_edges,
+)
+from pushplan.planners.rearrangement.push_simulator import PushAttempt, end_of, simulate
+from pushplan.planners.rearrangement.rearrangement_config import PushPrimitive
 from pushplan.world import ClearanceArea
 from pushplan.world.checks import FloatArray
 from pushplan.world.polyline import path_length
@@ -24,144 +28,139 @@ _HARD_OBJECTS = 3
 """So many objects that no simple push gets home, the nearest ones, are looked at closely."""
 _ADVANCE = 0.6
 """By how much of the way that the robot drives an object has to get on, to be pushed at all."""
+_EARLY = 0.6
+"""How far before something goes wrong a push ends that does not get home
+[circumscribed radii]."""
+_DETOUR = 1.3
+"""How many times as far as the nearest edge of an area one may be that an object is pushed
+across."""
+GAIN = 1.0
+"""By how much less has to be left to be done for a push to help that does not get its object home
+[circumscribed radii]."""
 
 
-def delivering_pushes(simulator: PushSimulator, objects: Sequence[int]) -> list[Push]:
+def delivering_pushes(scene: PushScene, objects: Sequence[int]) -> list[Push]:
     """Pushes after which an object is where it belongs, row by row of the table.
 
     Args:
-        simulator: for the scene.
+        scene: the scene.
         objects: indices of those to push, the most urgent first.
     """
-    ids = simulator.scene.world.movables.ids.tolist()
+    ids = scene.world.movables.ids.tolist()
     found: list[Push] = []
     counts: Counter[int] = Counter()
-    for row in simulator.scene.config.primitives:
+    for row in scene.config.primitives:
         if row.controller == "arc":
             continue
         few = [k for k in objects if counts[ids[k]] < row.below]
         for k in few[:_HARD_OBJECTS] if row.below == 1 and found else few:
-            pushes = list(pushes_with(simulator, k, row))
-            found += pushes
-            counts.update(i for push in pushes for i in push.delivers)
+            for attempt in _attempts(scene, k, row):
+                if scene.budget.is_used_up:
+                    break
+                pushes = simulate(scene, attempt)
+                if all(
+                    simulate(scene, replace(attempt, friction=friction))
+                    for friction in (row.frictions if pushes else ())
+                ):
+                    found += pushes
+                    counts.update(i for push in pushes for i in push.delivers)
     return found
 
 
-def can_be_pushed(simulator: PushSimulator, k: int, horizon: float) -> bool:
+def can_be_pushed(scene: PushScene, k: int, horizon: float) -> bool:
     """Whether some push gets object ``k`` home, or on towards its goal where that is far away.
 
     Args:
-        simulator: for the scene.
+        scene: the scene.
         k: index of the object.
         horizon: how far the robot drives at most to see that [m].
     """
-    scene, target = simulator.scene, int(simulator.scene.world.movables.ids[k])
+    target = int(scene.world.movables.ids[k])
     costs = scene.push_cost_to_go(float(scene.world.movables.radii[k]))
     now = costs.at(scene.poses[k])
 
-    def gets_on(attempt: _Attempt, friction: float | None) -> bool:
-        start, how = attempt
+    def gets_on(attempt: PushAttempt) -> bool:
         if now <= horizon:
-            pushes = simulator.simulate(start, k, friction=friction, **how)
-            return any(target in push.delivers for push in pushes)
-        how = {**how, "limit": min(how["limit"], horizon)}
-        end = simulator.end_of(start, k, friction=friction, **how)
+            return any(target in push.delivers for push in simulate(scene, attempt))
+        end = end_of(scene, replace(attempt, limit=min(attempt.limit, horizon)))
         return bool(end[0] >= 0.5 * REMOVED or costs.at(end) <= now - _ADVANCE * horizon)
 
     return any(
         not scene.budget.is_over
-        and all(gets_on(attempt, friction) for friction in (None, *row.frictions))
+        and all(gets_on(replace(attempt, friction=one)) for one in (None, *row.frictions))
         for row in scene.config.primitives
         if row.controller != "arc" and not row.deep and not row.partners
-        for attempt in _attempts(simulator, k, row)
+        for attempt in _attempts(scene, k, row)
     )
 
 
-def pushes_with(simulator: PushSimulator, k: int, row: PushPrimitive) -> Iterator[Push]:
-    """The pushes of one object by one row of the table that deliver something."""
-    for start, how in _attempts(simulator, k, row):
-        if simulator.scene.budget.is_used_up:
-            return
-        found = simulator.simulate(start, k, **how)
-        if found and all(
-            simulator.simulate(start, k, friction=friction, **how) for friction in row.frictions
-        ):
-            yield from found
-
-
-def partial_pushes(simulator: PushSimulator, k: int) -> Iterator[Push]:
+def partial_pushes(scene: PushScene, k: int) -> Iterator[Push]:
     """Pushes of an object along its path that end before something goes wrong, and what is left.
 
     Each costs what is left to be done, and a radius or two for another push.
     """
-    scene = simulator.scene
     costs = scene.push_cost_to_go(float(scene.world.movables.radii[k]))
     now = costs.at(scene.poses[k])
     for row in scene.config.primitives:
         if row.controller != "path" or row.deep or row.partners:
             continue
-        for start, how in _attempts(simulator, k, row):
+        for attempt in _attempts(scene, k, row):
             if scene.budget.is_used_up:
                 return
-            for whole in simulator.simulate(start, k, relocates=True, **how):
-                how["limit"] = whole.length - scene.config.early * scene.size
-                for push in simulator.simulate(start, k, relocates=True, **how):
+            for whole in simulate(scene, replace(attempt, relocates=True)):
+                limit = whole.length - _EARLY * scene.size
+                for push in simulate(scene, replace(attempt, relocates=True, limit=limit)):
                     left = costs.at(push.object_poses[k])
-                    if left < now - scene.config.relocation.gain * scene.size:
+                    if left < now - GAIN * scene.size:
                         yield replace(push, cost=push.cost + left + 2.0 * scene.size)
 
 
-class _Attempt(NamedTuple):
-    """A push to simulate."""
-
-    start: FloatArray  # (3,)
-    how: dict[str, Any]  # Arguments of `PushSimulator.simulate`
-
-
-def _attempts(simulator: PushSimulator, k: int, row: PushPrimitive) -> Iterator[_Attempt]:
+def _attempts(scene: PushScene, k: int, row: PushPrimitive) -> Iterator[PushAttempt]:
     """The pushes of one object by one row of the table."""
     if row.controller == "line":
-        yield from _line_attempts(simulator, k, row)
+        yield from _line_attempts(scene, k, row)
         return
-    for path, shift, wanted in _paths(simulator, k, row):
-        yield from _path_attempts(simulator, k, row, path, shift, wanted)
+    for path, shift, wanted in _paths(scene, k, row):
+        towards = initial_heading(path, 0.5 * scene.size)
+        limit = 1.5 * path_length(path) + (6.0 if row.leans[0] else 4.0) * scene.size
+        shifts = [fraction * scene.half for fraction in row.shifts] if shift is None else [shift]
+        for lean, aside in itertools.product(row.leans, shifts):
+            start = scene.pose_behind(k, towards + math.radians(lean), aside)
+            if scene.fits(start):
+                for gain in row.gains:
+                    yield PushAttempt(start, k, limit, path, aside, wanted, gain)
 
 
-def _line_attempts(simulator: PushSimulator, k: int, row: PushPrimitive) -> Iterator[_Attempt]:
+def _line_attempts(scene: PushScene, k: int, row: PushPrimitive) -> Iterator[PushAttempt]:
     """Straight pushes across the open edges of an area that are not much farther than others."""
-    scene = simulator.scene
     goal, box, nearest = scene.world.goal, scene.poses[k, :2], scene.remaining_now[k]
     if not isinstance(goal, ClearanceArea):
         return
-    ends = zip(goal.polygon, np.roll(goal.polygon, -1, axis=0), goal.open_edges, strict=True)
-    for a, b, is_open in ends:
-        along = (b - a) / np.hypot(*(b - a))
-        normal = np.array([along[1], -along[0]])
+    for a, along, normal, length in open_edges(goal):
         far = float((a - box) @ normal)
-        if not is_open or far > scene.config.detour * nearest + 2.0 * scene.size:
+        if far > _DETOUR * nearest + 2.0 * scene.size:
             continue
         for lean in row.leans:
             heading = math.atan2(normal[1], normal[0]) + math.radians(lean)
             u, v = heading_axes(heading)
             out = box + far / float(u @ normal) * u - a
-            if not 0.0 <= float(out @ along) <= float(np.hypot(*(b - a))):
+            if not 0.0 <= float(out @ along) <= length:
                 continue
             tried: list[list[int]] = []
             for shift in row.shifts:
-                start = pose_behind(scene, k, heading, shift * scene.half)
+                start = scene.pose_behind(k, heading, shift * scene.half)
                 ahead, left = ((scene.poses[:, :2] - box) @ axis for axis in (u, v))
                 swept = (ahead > -1e-9) & (np.abs(left - shift * scene.half) < scene.half)
-                wanted = [j for j in simulator.left.tolist() if j == k or swept[j]]
+                wanted = [j for j in scene.left if j == k or swept[j]]
                 if tried.count(wanted) < 2 and scene.fits(start):
                     tried.append(wanted)
-                    yield _Attempt(start, {"wanted": wanted, "limit": simulator.longest})
+                    yield PushAttempt(start, k, scene.longest, wanted=wanted)
 
 
 def _paths(
-    simulator: PushSimulator, k: int, row: PushPrimitive
+    scene: PushScene, k: int, row: PushPrimitive
 ) -> Iterator[tuple[FloatArray, float | None, tuple[int, ...]]]:
     """Paths of object ``k``, with the shift where it is given [m] and what is to be delivered."""
-    scene = simulator.scene
     radius = float(scene.world.movables.radii[k])
     away = row.clearance * scene.half if row.clearance > 0.0 else 0.75 * radius
     path = scene.object_path(k, away, row.deep)
@@ -177,7 +176,7 @@ def _paths(
         return
     movables, length = scene.world.movables, path_length(path)
     far = np.hypot(*(scene.poses[:, :2] - scene.poses[k, :2]).T)
-    others = sorted((j for j in simulator.left.tolist() if j != k), key=lambda j: (far[j], j))
+    others = sorted((j for j in scene.left if j != k), key=lambda j: (far[j], j))
     for j in others[: row.partners]:
         other = scene.object_path(j, away)
         width = 0.75 * float(movables.radii[j] + movables.radii[k])
@@ -196,24 +195,3 @@ def _paths(
             if abs(math.remainder(turn, math.tau)) <= 1.0:
                 points = np.array([scene.poses[k, :2], beside, *other[1:]])
                 yield np.ascontiguousarray(points), side * 0.5 * width, (k, j)
-
-
-def _path_attempts(
-    simulator: PushSimulator,
-    k: int,
-    row: PushPrimitive,
-    path: FloatArray,
-    shift: float | None,
-    wanted: tuple[int, ...],
-) -> Iterator[_Attempt]:
-    """Pushes along a path, from each of the starts that the row allows."""
-    scene = simulator.scene
-    towards = initial_heading(path, 0.5 * scene.size)
-    limit = 1.5 * path_length(path) + (6.0 if row.leans[0] else 4.0) * scene.size
-    shifts = [fraction * scene.half for fraction in row.shifts] if shift is None else [shift]
-    for lean, aside in itertools.product(row.leans, shifts):
-        start = pose_behind(scene, k, towards + math.radians(lean), aside)
-        if scene.fits(start):
-            for gain in row.gains:
-                how = {"path": path, "shift": aside, "limit": limit, "gain": gain, "wanted": wanted}
-                yield _Attempt(start, how)

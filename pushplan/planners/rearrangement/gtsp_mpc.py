@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from pushplan.control import EpisodeClock, ImmediateExecutor, PoseFollower, Retreat
-from pushplan.planners.rearrangement.push import Push
+from pushplan.planners.rearrangement.push import Push, PushHistory, push_plan, signature
 from pushplan.planners.rearrangement.push_choice import (
     PendingChoice,
     PushChoice,
@@ -18,13 +18,13 @@ from pushplan.planners.rearrangement.push_choice import (
 )
 from pushplan.planners.rearrangement.push_execution import ExecutionEnd, PushExecution
 from pushplan.planners.rearrangement.push_graph import PushGraph
-from pushplan.planners.rearrangement.push_history import PushHistory
-from pushplan.planners.rearrangement.push_plan import push_plan
-from pushplan.planners.rearrangement.push_scene import PushScene, check_world
+from pushplan.planners.rearrangement.push_scene import PushScene
 from pushplan.planners.rearrangement.rearrangement_config import RearrangementConfig
 from pushplan.planners.rearrangement.rollout_cache import RolloutCache
 from pushplan.world import InvalidInputError, Plan, PlanningExecutor, Stop, Twist, World
 from pushplan.world.checks import FloatArray, expect
+
+_RETREAT = 0.3  # how far the robot backs off where it is stuck [circumscribed radii]
 
 
 class GtspMpc:
@@ -73,7 +73,7 @@ class GtspMpc:
         self._shown: Push | None = None
         self._away: Retreat | PoseFollower | None = None
         self._cache = RolloutCache()
-        self._history = PushHistory(self.config)
+        self._history = PushHistory()
         self._left, self._rounds, self._stuck = -1, 0, 0
         self._way_at_end = math.inf
         self._recovered_from: FloatArray | None = None
@@ -113,16 +113,15 @@ class GtspMpc:
         Raises:
             InvalidInputError: if the goal is one for the robot, or the robot cannot stop.
         """
-        check_world(world)
         return self._clock.command_for(world, self._act)
 
     def _act(self, world: World) -> Twist:
         scene = PushScene(world, self.config, self._cache)
-        left = int((~scene.done).sum())
+        left = len(scene.left)
         if left != self._left:  # something was done, or has come back
             self._left, self._rounds, self._stopped_at = left, 0, None
             self._way_at_end = math.inf
-            self._history.count_progress()
+            self._history.count_progress(self.config)
         if not left:
             self._execution, self.given_up, self.plan, self.current_plan = None, {}, (), None
             self._forget_choice()
@@ -193,18 +192,16 @@ class GtspMpc:
 
     def _begin(self, scene: PushScene, choice: PushChoice) -> bool:
         """Take up the best push, or else leave a tight place; whether there is anything to do."""
-        chosen = choice.selection
-        self.graph, self.plan = chosen.graph, chosen.plan
-        self.given_up = dict(chosen.graph.infeasible)
-        if chosen.first is not None:
-            push = chosen.first.push
+        self.graph, self.plan = choice.graph, choice.plan
+        self.given_up = dict(choice.graph.infeasible)
+        if choice.first is not None:
+            push = choice.first.push
             self._execution = PushExecution(
-                scene.world,
+                scene,
                 push,
-                chosen.first.route,
-                self.config,
+                choice.first.route,
                 self._executor,
-                predictive=self.config.mpc and not self._history.failed_before(push),
+                predictive=self.config.mpc and signature(push) not in self._history.failures,
             )
             return True
         here, before = scene.world.robot_pose, self._recovered_from
@@ -216,8 +213,8 @@ class GtspMpc:
             return True
         if choice.interrupted:  # the next search begins with what is known by now
             return False
-        if self._history.has_failures and self._rounds < self.config.max_rounds:
-            self._history.forget_failures()
+        if self._history.failures and self._rounds < self.config.max_rounds:
+            self._history.failures.clear()
             self._rounds += 1
             return True
         if choice.searches < self.config.max_searches:  # else the search goes on
@@ -229,13 +226,13 @@ class GtspMpc:
         if self._cache.is_from_elsewhere(scene.robot_cell):
             self._cache = RolloutCache()
             return True
-        remaining = scene.remaining_now[~scene.done]
+        remaining = scene.remaining_now[scene.left]
         way = float(remaining[np.isfinite(remaining)].sum())
-        if self._history.is_empty or way >= self._way_at_end - scene.size:
+        if self._history == PushHistory() or way >= self._way_at_end - scene.size:
             self._stopped_at = scene
             return False
         self._way_at_end, self._rounds = way, 0
-        self._history = PushHistory(self.config)
+        self._history = PushHistory()
         return True
 
     def _close(self, scene: PushScene, execution: PushExecution, end: ExecutionEnd) -> None:
@@ -245,12 +242,12 @@ class GtspMpc:
             self._stuck = 0
             return
         if end is not ExecutionEnd.OBSOLETE:  # also a relocation, so that another comes next
-            self._history.count_failure(push)
+            self._history.failures[signature(push)] += 1
         if end is ExecutionEnd.DONE:
             self._history.count_relocation(push)
         if end is ExecutionEnd.STUCK:
             robot, pose = scene.world.robot, scene.world.robot_pose
-            self._away = Retreat(robot, pose, self.config.retreat * scene.size, self._stuck)
+            self._away = Retreat(robot, pose, _RETREAT * scene.size, self._stuck)
             self._stuck += 1
 
 

@@ -7,14 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from pushplan.control import EpisodeClock, LegFollower, clamp_twist
+from pushplan.control import EpisodeClock, LegFollower, Legs, clamp_twist
 from pushplan.geometry import VisibilityGraph
 from pushplan.gtsp import solve_gtsp
 from pushplan.motion.keep_out import keep_out
-from pushplan.planners.rearrangement.push_poses import pose_behind
-from pushplan.planners.rearrangement.push_scene import PushScene, check_world
+from pushplan.planners.rearrangement.push_scene import PushScene, open_edges
 from pushplan.planners.rearrangement.rearrangement_config import RearrangementConfig
-from pushplan.planners.rearrangement.route import Route
 from pushplan.world import ClearanceArea, MaxIterations, Receptacle, Twist, World
 from pushplan.world.checks import FloatArray, expect
 
@@ -59,7 +57,6 @@ class Gtsp:
         Raises:
             InvalidInputError: if the goal is one for the robot, or the robot cannot stop.
         """
-        check_world(world)
         return self._clock.command_for(world, self._act)
 
     def _act(self, world: World) -> Twist:
@@ -74,13 +71,13 @@ class Gtsp:
             command = follower.command(pose, world.time, self._clock.held)
         return clamp_twist(world.robot, 0.0, 0.0) if command is None else command
 
-    def _path(self, world: World) -> Route:
+    def _path(self, world: World) -> Legs:
         """The whole path: for each object of the tour, behind it and then to the edge."""
         scene = PushScene(world, self.config)
-        nodes = [node for k in np.flatnonzero(~scene.done) for node in _pushes(scene, int(k))]
+        nodes = [node for k in scene.left for node in _pushes(scene, k)]
         heading = float(world.robot_pose[2])
         if not nodes:
-            return Route(np.zeros((0, 2)), np.zeros(0), np.zeros(1), heading, 0.0)
+            return Legs(np.zeros((0, 2)), np.zeros(0), np.zeros(1), heading)
         count = len(nodes)
         costs = np.full((count + 1, count + 1), np.inf)
         for m, (_, start, end) in enumerate(nodes):
@@ -99,9 +96,7 @@ class Gtsp:
             _, start, end = nodes[int(n)]
             path = graph.shortest_path(points[-1], start)
             points += [*(path.points[1:] if len(path.points) > 1 else [start]), end]
-        legs = np.array(points[1:])
-        ahead, either = np.ones(len(legs)), np.zeros(len(legs) + 1)
-        return Route(legs, ahead, either, heading, float(tour.cost))
+        return Legs.ahead(np.array(points[1:]), heading)
 
 
 def _pushes(scene: PushScene, k: int) -> list[tuple[int, FloatArray, FloatArray]]:
@@ -109,19 +104,12 @@ def _pushes(scene: PushScene, k: int) -> list[tuple[int, FloatArray, FloatArray]
     goal, box = scene.world.goal, scene.poses[k, :2]
     radius = float(scene.world.movables.radii[k])
     if isinstance(goal, ClearanceArea):
-        found = []
-        ends = zip(goal.polygon, np.roll(goal.polygon, -1, axis=0), goal.open_edges, strict=True)
-        for a, b, is_open in ends:
-            along = (b - a) / np.hypot(*(b - a))
-            normal = np.array([along[1], -along[0]])
-            if is_open:
-                found.append(box + (float((a - box) @ normal) + radius) * normal)
+        moves = [
+            (box + (float((a - box) @ normal) + radius) * normal) - box
+            for a, _, normal, _ in open_edges(goal)
+        ]
     else:
         assert isinstance(goal, Receptacle)
-        found = [goal.polygon.mean(axis=0)]
-    pushes = []
-    for target in found:
-        move = target - box
-        start = pose_behind(scene, k, math.atan2(move[1], move[0]), 0.0)
-        pushes.append((k, start[:2], start[:2] + move))
-    return pushes
+        moves = [goal.polygon.mean(axis=0) - box]
+    starts = [scene.pose_behind(k, math.atan2(move[1], move[0]), 0.0)[:2] for move in moves]
+    return [(k, start, start + move) for start, move in zip(starts, moves, strict=True)]

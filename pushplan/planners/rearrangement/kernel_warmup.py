@@ -15,7 +15,6 @@ from pushplan.planners.pushing import warm_up as warm_up_pushing
 from pushplan.planners.rearrangement.approach import approach_tree
 from pushplan.planners.rearrangement.controller_kernels import steer_push
 from pushplan.planners.rearrangement.push_scene import PushScene
-from pushplan.planners.rearrangement.push_simulator import PushSimulator
 from pushplan.planners.rearrangement.rearrangement_config import RearrangementConfig
 from pushplan.planners.rearrangement.relocation import relocating_pushes
 from pushplan.planners.warm_up_worlds import warm_up_worlds
@@ -31,7 +30,7 @@ def warm_up_rearrangement() -> None:
     warm_up_solver(proof=False)
     warm_up_pushing()
     scene = _small_scene()
-    relocating_pushes(PushSimulator(scene), 0, approach_tree(scene))
+    relocating_pushes(scene, 0, approach_tree(scene))
     warm_up_recovery()
 
 

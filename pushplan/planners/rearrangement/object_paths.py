@@ -1,23 +1,33 @@
-"""`ObjectPaths`: the shortest paths of objects to their goal on one map, worked out once."""
+"""The way of objects to their goal on one map, worked out once: its length, course and cost."""
 
 from __future__ import annotations
 
 import functools
 import math
+from typing import Any
 
 import numpy as np
+import shapely
+from scipy.ndimage import distance_transform_edt, map_coordinates
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import dijkstra
 
 from pushplan.geometry import GoalDistances, goal_distances
+from pushplan.motion.collision import footprint, obstacles
 from pushplan.motion.done_places import done_places
-from pushplan.world import ClearanceArea, Goal, Receptacle, StaticMap
-from pushplan.world.checks import FloatArray
+from pushplan.planners.rearrangement.pose_grid_kernels import LENGTHS, MOVES
+from pushplan.planners.rearrangement.push_pose_kernels import pushable_moves
+from pushplan.planners.rearrangement.rearrangement_config import SHIFTS, RelocationConfig
+from pushplan.world import ClearanceArea, Goal, Receptacle, RobotModel, StaticMap
+from pushplan.world.checks import BoolArray, FloatArray
 
 _INSET = 1.05  # distance of an object from the edges of a receptacle when it is done [radii]
-_MOST = 20_000  # how many lengths and paths are kept
+_KEPT = 20_000  # how many lengths and paths are kept
+_MOST_CELLS = 160  # along the longer side of a map
 
 
 class ObjectPaths:
-    """Paths on one map to one goal for objects.
+    """Shortest paths on one map to one goal for objects.
 
     Args:
         static: walls and columns.
@@ -28,18 +38,13 @@ class ObjectPaths:
         assert isinstance(goal, Receptacle | ClearanceArea)
         self._static, self._goal = static, goal
         self._plain = goal_distances(static, goal)
-        self._lengths: dict[tuple[float, float], float] = {}
-        self._paths: dict[object, FloatArray | None] = {}
-        self._distances: dict[tuple[float, float, bool], GoalDistances | None] = {}
+        self._distances = functools.cache(self._towards)
+        self.length = functools.lru_cache(_KEPT)(self._length)
+        """Shortest path of a point (x, y) to the goal [m]; inf if there is none."""
+        self._paths = functools.lru_cache(_KEPT)(self._path)
 
-    def length(self, x: float, y: float) -> float:
-        """Shortest path of a point to the goal [m]; inf if there is none."""
-        length = self._lengths.get((x, y))
-        if length is None:
-            if len(self._lengths) >= _MOST:
-                self._lengths.clear()
-            length = self._lengths[x, y] = self._plain.path_from((x, y)).length
-        return length
+    def _length(self, x: float, y: float) -> float:
+        return self._plain.path_from((x, y)).length
 
     def path(
         self, point: FloatArray, radius: float, clearance: float, deep: bool = False
@@ -52,21 +57,15 @@ class ObjectPaths:
             clearance: distance that its middle keeps from what is static [m].
             deep: to the middle of a receptacle instead of its nearest place.
         """
-        key = (round(radius, 9), clearance, deep)
-        asked = (*point.tolist(), *key)
-        if asked not in self._paths:
-            if len(self._paths) >= _MOST:
-                self._paths.clear()
-            self._paths[asked] = self._path(point, key)
-        return self._paths[asked]
+        return self._paths(*point.tolist(), round(radius, 9), clearance, deep)
 
-    def _path(self, point: FloatArray, key: tuple[float, float, bool]) -> FloatArray | None:
-        if key not in self._distances:
-            self._distances[key] = self._towards(*key)
-        distances = self._distances[key]
+    def _path(
+        self, x: float, y: float, radius: float, clearance: float, deep: bool
+    ) -> FloatArray | None:
+        distances = self._distances(radius, clearance, deep)
         if distances is None:
             return None
-        path = distances.path_from(point)
+        path = distances.path_from((x, y))
         if not math.isfinite(path.length):
             return None
         points = path.points
@@ -74,7 +73,7 @@ class ObjectPaths:
             middle, last = self._goal.polygon.mean(axis=0), points[-1]
             points = np.concatenate([points, (middle + 0.6 * (middle - last))[None]])
         steps = np.hypot(*np.diff(points, axis=0).T)
-        points = points[np.concatenate([[True], steps > 1e-6 * key[0]])]
+        points = points[np.concatenate([[True], steps > 1e-6 * radius])]
         return np.ascontiguousarray(points) if len(points) > 1 else None
 
     def _towards(self, radius: float, clearance: float, deep: bool) -> GoalDistances | None:
@@ -89,3 +88,111 @@ class ObjectPaths:
 def object_paths(static: StaticMap, goal: Goal) -> ObjectPaths:
     """The paths on a map; kept for the maps used last."""
     return ObjectPaths(static, goal)
+
+
+class PushCostToGo:
+    """Cost of the cheapest way of an object to its goal [m], by the place of its middle.
+
+    The way leads from cell to cell in sixteen directions. A metre of it costs a metre where the
+    robot fits behind the object among what is static, and more where the object has to be brought
+    on in another way: out of corners and gaps, and away from walls. Other objects do not count.
+
+    Args:
+        robot: which pushes.
+        static: walls and columns.
+        goal: of the object.
+        radius: of the object [m].
+        half_width: of the bumper [m].
+        slack: clearance between bumper and object [m].
+        margin: that the robot keeps from what is static [m].
+        config: side of a cell, and the cost where the robot does not fit.
+    """
+
+    def __init__(
+        self,
+        robot: RobotModel,
+        static: StaticMap,
+        goal: Goal,
+        *,
+        radius: float,
+        half_width: float,
+        slack: float,
+        margin: float,
+        config: RelocationConfig,
+    ) -> None:
+        self._drag_cost = config.drag_cost
+        low, high = static.bounds[:2], static.bounds[2:]
+        sides = high - low
+        self._step = max(config.cell * robot.circumscribed_radius, float(sides.max()) / _MOST_CELLS)
+        cols, rows = (int(side) for side in np.floor(sides / self._step) + 1)
+        self._low = low + 0.5 * (sides - self._step * np.array([cols - 1, rows - 1]))
+        x = self._low[0] + self._step * np.arange(cols)
+        y = self._low[1] + self._step * np.arange(rows)
+        middles = shapely.points(*np.meshgrid(x, y))
+        walls = shapely.union_all([shapely.Polygon(part) for part in static.convex_parts])
+        open_cells = np.ones((rows, cols), dtype=np.bool_)
+        if not walls.is_empty:
+            shapely.prepare(walls)
+            open_cells = shapely.distance(walls, middles) > 0.5 * radius
+        pushable = pushable_moves(
+            np.stack(np.meshgrid(x, y), axis=2),
+            open_cells,
+            np.array(SHIFTS) * half_width,
+            float(robot.vertices[:, 0].max()) + slack + 0.85 * radius,
+            footprint(robot, margin),
+            obstacles(static),
+        )
+        costs = self._search(open_cells, pushable, _is_goal(goal, radius, middles, self._step))
+        away, (i, j) = distance_transform_edt(~np.isfinite(costs), return_indices=True)
+        self._costs: FloatArray = costs[i, j] + self._drag_cost * self._step * away
+
+    def _search(self, is_open: BoolArray, pushable: BoolArray, goal: BoolArray) -> FloatArray:
+        """(rows, cols) cost of the way from each cell [m]."""
+        rows, cols = is_open.shape
+        i, j = np.nonzero(is_open)
+        starts, ends, costs = [], [], []
+        for t, (dx, dy) in enumerate(MOVES.tolist()):
+            inside = (0 <= i + dy) & (i + dy < rows) & (0 <= j + dx) & (j + dx < cols)
+            a, b = i[inside], j[inside]
+            there = is_open[a + dy, b + dx]
+            a, b = a[there], b[there]
+            starts.append(a * cols + b)
+            ends.append((a + dy) * cols + b + dx)
+            length = LENGTHS[t] * self._step
+            costs.append(np.where(pushable[t, a, b], length, self._drag_cost * length))
+        # backward: from the goal against the moves
+        where = np.concatenate(ends), np.concatenate(starts)
+        graph = csr_array((np.concatenate(costs), where), shape=(rows * cols, rows * cols))
+        seeds = np.flatnonzero(goal & is_open)
+        if not len(seeds):
+            return np.zeros((rows, cols))
+        out: FloatArray = dijkstra(graph, indices=seeds, min_only=True).reshape(rows, cols)
+        return out
+
+    def at(self, pose: FloatArray) -> float:
+        """Cost from a pose (3,) of the object [m]."""
+        return float(self.along(pose[None])[0])
+
+    def along(self, poses: FloatArray) -> FloatArray:
+        """(N,) cost from poses (N, 3) of the object [m]."""
+        cells = (poses[:, :2] - self._low) / self._step
+        out: FloatArray = map_coordinates(
+            self._costs, cells[:, ::-1].T, order=1, mode="nearest", prefilter=False
+        )
+        return out
+
+
+def _is_goal(goal: Goal, radius: float, middles: Any, step: float) -> BoolArray:
+    """(rows, cols) in which cells an object is done, or about to be."""
+    places = done_places(goal, radius, 1.0)
+    if places is None:
+        assert isinstance(goal, Receptacle)
+        places = [goal.polygon.mean(axis=0)[None]]
+    shapes = shapely.union_all([shapely.MultiPoint(place).convex_hull for place in places])
+    shapely.prepare(shapes)
+    out: BoolArray = shapely.distance(shapes, middles) <= 0.75 * step
+    return out
+
+
+push_cost_to_go = functools.lru_cache(maxsize=16)(PushCostToGo)
+"""`PushCostToGo`, kept for the maps used last."""

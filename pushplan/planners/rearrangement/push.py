@@ -1,13 +1,26 @@
-"""`Push`: one candidate push, with what it is predicted to do."""
+"""`Push`: one candidate push, what it is predicted to do, and which ones have been tried."""
 
 from __future__ import annotations
 
 import math
+from collections import Counter
 from dataclasses import dataclass, field
 
 import numpy as np
 
+from pushplan.control import Legs
+from pushplan.geometry.angles import wrap_angle
+from pushplan.planners.rearrangement.goal_kernels import REMOVED
+from pushplan.planners.rearrangement.rearrangement_config import RearrangementConfig
+from pushplan.world import Plan, SubTask, World
 from pushplan.world.checks import ArrayRecord, FloatArray
+from pushplan.world.polyline import arc_lengths, goes_back, step_lengths
+
+_FAILURE_COST = 3.0  # of a push, for each time that it has failed [circumscribed radii]
+_RELOCATION_COST = 1.0
+"""Of a relocation, for each one of its object since something was done [circumscribed radii]."""
+_INSIDE = 0.7  # inscribed over circumscribed radius of a box
+_STILL = 1e-6  # a step that is shorter turns on the spot [circumscribed radii]
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,3 +81,94 @@ def signature(push: Push) -> tuple[object, ...]:
     if push.controller == "arc":
         return push.target, push.controller, round(heading / 0.6)
     return push.target, push.controller, round(heading / 0.3), round(push.shift, 2), push.gain
+
+
+@dataclass
+class PushHistory:
+    """What has been tried since something was done last, and what that adds to costs.
+
+    Args:
+        failures: how often a push has failed, or was a relocation that is not to come next again,
+            by `signature`.
+        relocations: how often an object has been relocated, by id.
+    """
+
+    failures: Counter[tuple[object, ...]] = field(default_factory=Counter)
+    relocations: Counter[int] = field(default_factory=Counter)
+
+    def penalty(self, push: Push, config: RearrangementConfig) -> float:
+        """What is added to the cost of a push [circumscribed radii]."""
+        failures = self.failures[signature(push)]
+        relocations = self.relocations[push.target] if push.relocates else 0
+        if failures >= config.max_failures or relocations >= config.max_relocations:
+            return math.inf
+        return failures * _FAILURE_COST + relocations * _RELOCATION_COST
+
+    def count_relocation(self, push: Push) -> None:
+        """An object was relocated: what has failed with it before may succeed from there."""
+        self.relocations[push.target] += 1
+        for key in list(self.failures):
+            if key[0] == push.target and key[1] != push.controller:
+                del self.failures[key]
+
+    def count_progress(self, config: RearrangementConfig) -> None:
+        """Something was done, or has come back: what was ruled out is tried once more."""
+        for key, count in self.failures.items():
+            self.failures[key] = min(count, config.max_failures - 1)
+        self.relocations.clear()
+
+
+def push_plan(world: World, route: Legs | None, push: Push) -> Plan:
+    """The way to a push and the push itself, at full speed and turn rate.
+
+    A push is predicted at its end only: in between, ``object_poses`` follow the straight line from
+    where the objects are, as far as the robot has pushed. An object that leaves the world ends in
+    front of the robot.
+
+    Args:
+        world: the snapshot from which the robot starts, with the objects that the push knows.
+        route: to the start of the push; None if the robot is there.
+        push: the push.
+    """
+    robot, way = world.robot, _way(world, route)
+    poses = np.concatenate([way, push.poses])
+    along, first = arc_lengths(poses), len(way)
+    lengths, turns = step_lengths(poses), wrap_angle(np.diff(poses[:, 2]))
+    fastest = np.where(goes_back(poses, robot.circumscribed_radius), -1.0, 1.0) * robot.max_speed
+    on_spot = lengths < _STILL * robot.circumscribed_radius
+    steps = np.maximum(lengths / robot.max_speed, np.abs(turns) / robot.max_turn_rate)
+    moving = steps > 0.0
+    speeds, turn_rates = fastest, np.zeros(len(poses))
+    speeds[:-1][moving] = np.sign(fastest[:-1][moving]) * lengths[moving] / steps[moving]
+    speeds[:-1][on_spot] = 0.0
+    turn_rates[:-1][moving] = turns[moving] / steps[moving]
+    done = np.maximum(along - along[first], 0.0) / max(float(along[-1] - along[first]), 1e-12)
+    start = world.movables.poses
+    ends = np.array(push.object_poses)
+    gone = ends[:, 0] >= 0.5 * REMOVED
+    ahead = np.max(robot.vertices[:, 0]) + _INSIDE * world.movables.radii[gone]
+    x, y, theta = poses[-1]
+    ends[gone, 0], ends[gone, 1] = x + ahead * np.cos(theta), y + ahead * np.sin(theta)
+    moves = ends - start
+    moves[:, 2] = wrap_angle(moves[:, 2])
+    return Plan(
+        times=np.concatenate([[0.0], np.cumsum(steps)]),
+        poses=poses,
+        speeds=speeds,
+        turn_rates=turn_rates,
+        travel_cost=robot.mass * float(along[-1]),
+        interaction_cost=push.work,
+        object_poses=start + done[:, None, None] * moves,
+        subtasks=(SubTask(push.serves, first, len(poses) - 1),),
+    )
+
+
+def _way(world: World, route: Legs | None) -> FloatArray:
+    """(N, 3) poses before and after each turn on the spot of a route, from where the robot is."""
+    poses = [np.array(world.robot_pose)]
+    if route is not None:
+        for point, sign in zip(route.points, route.signs, strict=True):
+            move = point - poses[-1][:2]
+            heading = np.arctan2(move[1], move[0]) + (np.pi if sign < 0.0 else 0.0)
+            poses += [np.array([*poses[-1][:2], heading]), np.array([*point, heading])]
+    return np.array(poses)

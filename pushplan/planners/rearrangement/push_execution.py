@@ -4,27 +4,121 @@ from __future__ import annotations
 
 import enum
 import math
+from collections.abc import Callable
 
 import numpy as np
 
-from pushplan.control import LegFollower, PoseFollower, StallChecker
+from pushplan.control import EpisodeClock, LegFollower, PoseFollower, ProgressChecker, StallChecker
 from pushplan.control.limits import arc_twist
 from pushplan.planners.pushing import PushingConfig, PushingMpc, PushParameters, PushPath
-from pushplan.planners.rearrangement.geometric_pusher import GeometricPusher
-from pushplan.planners.rearrangement.path_push import PathPush
+from pushplan.planners.rearrangement.approach import Route
+from pushplan.planners.rearrangement.controller_kernels import (
+    PushingController,
+    is_on_bumper,
+    steer_push,
+)
 from pushplan.planners.rearrangement.push import Push
-from pushplan.planners.rearrangement.push_poses import initial_heading
-from pushplan.planners.rearrangement.push_scene import PushScene
-from pushplan.planners.rearrangement.push_simulator import PushSimulator
-from pushplan.planners.rearrangement.rearrangement_config import RearrangementConfig
-from pushplan.planners.rearrangement.route import Route
-from pushplan.world import PendingResult, PlanningExecutor, Twist, World
-from pushplan.world.checks import FloatArray
+from pushplan.planners.rearrangement.push_scene import PushScene, initial_heading
+from pushplan.planners.rearrangement.push_simulator import resimulate
+from pushplan.world import PendingResult, Plan, PlanningExecutor, Twist, World
+from pushplan.world.checks import FloatArray, expect
 
 _ALIGNED = math.radians(0.4)  # error of a heading that is left where a push begins
 _MPC_HEADING = math.radians(20.0)
 """A push that begins farther off the object's path is left to the geometric controller."""
-_NEAR = 0.004  # the same of the place [circumscribed radii]
+_NEAR = 0.004  # error of the place that is left where a push begins [circumscribed radii]
+_PROGRESS = 0.05
+"""By so much an object has to get on in the time in which the robot could drive a radius, or turn
+by `_TURN_PATIENCE` [circumscribed radii]."""
+_TURN_PATIENCE = 0.15  # [rad]
+
+
+class GeometricPusher:
+    """Pushes the object of a plan along its path, as fast as the robot can turn that way.
+
+    It heads for a point ahead on the path, turned towards the side to which the object has slipped
+    on the bumper. An object that has gone from the world was delivered: the robot drives straight
+    on then, for what rides along.
+
+    Args:
+        controller: parameters.
+        shift: how far the robot's middle is meant to be to the left of the object [m].
+
+    Attributes:
+        along: length of the path that the object has been pushed [m].
+    """
+
+    def __init__(self, controller: PushingController, shift: float = 0.0) -> None:
+        self._controller, self._shift = controller, shift
+        self._clock = EpisodeClock(1.0)
+        self._plan: Plan | None = None
+        self.along = 0.0
+
+    def reset(self, world: World) -> None:
+        """See `pushplan.world.Controller`."""
+        self._clock.reset()
+        self._plan = None
+
+    def command(self, world: World, plan: Plan) -> Twist:
+        """See `pushplan.world.Controller`; the plan is one of `PushPath.plan`."""
+        expect("plan", plan, Plan)
+        world = expect("world", world, World)
+        return self._clock.command_for(world, lambda _: self._follow(world, plan))
+
+    def _follow(self, world: World, plan: Plan) -> Twist:
+        if plan is not self._plan:
+            self._plan, self.along = plan, 0.0
+            self._path = np.ascontiguousarray(plan.poses[:, :2])
+        found = np.flatnonzero(world.movables.ids == plan.subtasks[0].object_ids[0])
+        step, turn = self._controller.step, 0.0
+        if len(found):
+            step, turn, self.along, _ = steer_push(
+                np.array(world.robot_pose),
+                np.array(world.movables.poses[found[0]]),
+                self._path,
+                self.along,
+                self._shift,
+                self._controller,
+            )
+        return arc_twist(world.robot, step, turn)
+
+
+class PathPush:
+    """Pushes an object along a path while it stays on the bumper and gets on.
+
+    Args:
+        scene: as the push begins.
+        target: id of the object.
+        path: of its middle.
+        pusher: chooses the velocities.
+    """
+
+    def __init__(
+        self, scene: PushScene, target: int, path: PushPath, pusher: GeometricPusher | PushingMpc
+    ) -> None:
+        robot = scene.world.robot
+        self._plan, self._pusher = path.plan(robot, target), pusher
+        patience = max(scene.size / robot.max_speed, _TURN_PATIENCE / robot.max_turn_rate)
+        self._progress = ProgressChecker(_PROGRESS * scene.size, patience)
+
+    def command(self, scene: PushScene, held: float) -> Twist | None:
+        """The velocity to drive now; None where the object has been lost or does not get on.
+
+        It goes on with an object that is done, for what rides along.
+        """
+        world = scene.world
+        twist = self._pusher.command(world, self._plan)
+        target = self._plan.subtasks[0].object_ids[0]
+        remaining = self._plan.length - self._pusher.along
+        for k in np.flatnonzero((world.movables.ids == target) & ~scene.done):
+            holds = is_on_bumper(np.array(world.robot_pose), scene.poses[k], scene.controller)
+            if not (holds and self._progress.update(remaining, world.time)):
+                return None
+        return twist
+
+
+Pusher = Callable[[PushScene, float], Twist | None]
+"""From the scene and for how long a command is held [s] to the velocity; None at the end."""
 
 
 class ExecutionEnd(enum.Enum):
@@ -44,10 +138,9 @@ class PushExecution:
     """Carries out one push.
 
     Args:
-        world: the snapshot in which it begins.
+        scene: the scene in which it begins.
         push: the push.
         route: to its start.
-        config: settings.
         executor: runs the prediction of the push from where the route has led to.
         predictive: whether to push by predictive control where that suits.
 
@@ -61,28 +154,27 @@ class PushExecution:
 
     def __init__(
         self,
-        world: World,
+        scene: PushScene,
         push: Push,
         route: Route,
-        config: RearrangementConfig,
         executor: PlanningExecutor,
         *,
         predictive: bool = True,
     ) -> None:
         self.push, self.route, self.pushing = push, route, False
-        self.ids, self.asked_for_next = world.movables.ids, False
+        self.ids, self.asked_for_next = scene.world.movables.ids, False
         self._executor, self._predictive = executor, predictive
         self._prediction: PendingResult[list[Push]] | None = None
+        robot, config = scene.world.robot, scene.config
         self._route_follower = LegFollower(
-            world.robot,
+            robot,
             route,
-            near=_NEAR * world.robot.circumscribed_radius + config.position_noise,
+            near=_NEAR * scene.size + config.position_noise,
             aligned=_ALIGNED + config.heading_noise,
             response=config.response,
         )
-        self._path_push: PathPush | None = None
-        self._pose_follower: PoseFollower | None = None
-        self._stall = StallChecker(world.robot)
+        self._pusher: Pusher | None = None
+        self._stall = StallChecker(robot)
         self._driven = 0.0
         self._sent_at = self._speed = 0.0
 
@@ -106,7 +198,7 @@ class PushExecution:
             if self._prediction is None:
                 self.ids = world.movables.ids
                 self._prediction = self._executor.submit(
-                    lambda stop: PushSimulator(scene).resimulate(self.push, world.robot_pose),
+                    lambda stop: resimulate(scene, self.push, world.robot_pose),
                     world.time,
                 )
             if not self._prediction.ready(world.time):
@@ -133,49 +225,48 @@ class PushExecution:
 
     def _begin(self, scene: PushScene, ends: list[Push], held: float) -> bool:
         """Take the push as it is predicted from here; whether it is good for anything."""
-        push, world = self.push, scene.world
+        push = self.push
         good = [end for end in ends if push.relocates or set(push.delivers) & set(end.delivers)]
         if not good:
             return False
         self.push = max(
             good, key=lambda end: (len(set(end.delivers) & set(push.delivers)), -end.length)
         )
-        self.pushing = True
-        if self.push.controller == "arc":
-            self._pose_follower = PoseFollower(world.robot, self.push.poses, scene.config.response)
-        if self.push.controller == "path":
-            self._path_push = self._choose_pusher(scene, held)
+        self.pushing, self._pusher = True, self._choose_pusher(scene, held)
         return True
 
-    def _choose_pusher(self, scene: PushScene, held: float) -> PathPush:
-        """Predictive control where that suits, else the controller of the prediction."""
-        push, config = self.push, scene.config
+    def _choose_pusher(self, scene: PushScene, held: float) -> Pusher:
+        """What drives the push: along its poses, its line or the path of its object."""
+        push, config, robot = self.push, scene.config, scene.world.robot
+        if push.controller == "arc":
+            follower = PoseFollower(robot, push.poses, config.response)
+            return lambda now, held: follower.command(now.world.robot_pose, now.world.time, held)
+        if push.controller == "line":
+            return lambda now, _: arc_twist(robot, now.controller.step, _line_turn(push.start, now))
         if self._predictive and suits_mpc(scene, push):
             path = PushPath.through(push.object_path, radius=scene.size)
             parameters = PushParameters(config.friction)
             mpc = PushingMpc(PushingConfig(parameters=parameters, period=held))
-            return PathPush(scene, push.target, path, mpc)
+            return PathPush(scene, push.target, path, mpc).command
         controller = scene.controller._replace(gain=push.gain)
         path = PushPath.through(push.object_path)
-        return PathPush(scene, push.target, path, GeometricPusher(controller, push.shift))
+        pusher = GeometricPusher(controller, push.shift)
+        return PathPush(scene, push.target, path, pusher).command
 
     def _push(self, scene: PushScene, held: float) -> Twist | ExecutionEnd:
-        push, world, pose = self.push, scene.world, scene.world.robot_pose
-        ids = world.movables.ids
-        left = np.isin(ids, push.delivers) & ~scene.done
+        push, time = self.push, scene.world.time
+        left = np.isin(scene.world.movables.ids, push.delivers) & ~scene.done
         if not push.relocates and not left.any():
             return ExecutionEnd.DONE
-        if self._pose_follower is not None:
-            return self._pose_follower.command(pose, world.time, held) or ExecutionEnd.DONE
-        self._driven += (world.time - self._sent_at) * self._speed
-        self._sent_at, self._speed = world.time, 0.0
+        assert self._pusher is not None
+        if push.controller == "arc":
+            return self._pusher(scene, held) or ExecutionEnd.DONE
+        self._driven += (time - self._sent_at) * self._speed
+        self._sent_at, self._speed = time, 0.0
         longest = push.length if push.relocates else 1.1 * push.length + 0.4 * scene.size
         if self._driven > longest - 1e-6:
             return ExecutionEnd.DONE if push.relocates else ExecutionEnd.FAILED
-        if self._path_push is not None:
-            return self._path_push.command(scene) or ExecutionEnd.FAILED
-        turn = _line_turn(push.start, pose, scene.size)
-        return arc_twist(world.robot, scene.controller.step, turn)
+        return self._pusher(scene, held) or ExecutionEnd.FAILED
 
 
 def suits_mpc(scene: PushScene, push: Push) -> bool:
@@ -186,9 +277,10 @@ def suits_mpc(scene: PushScene, push: Push) -> bool:
     return abs(math.remainder(away, math.tau)) < _MPC_HEADING
 
 
-def _line_turn(start: FloatArray, pose: FloatArray, size: float) -> float:
+def _line_turn(start: FloatArray, scene: PushScene) -> float:
     """The turn [rad] that keeps the robot on the line of a push."""
+    pose = scene.world.robot_pose
     error = math.remainder(float(start[2] - pose[2]), 2.0 * math.pi)
     away = pose[:2] - start[:2]
     left = float(math.cos(start[2]) * away[1] - math.sin(start[2]) * away[0])
-    return 0.5 * error - 0.3 * left / size
+    return 0.5 * error - 0.3 * left / scene.size

@@ -5,8 +5,10 @@ from __future__ import annotations
 import copy
 import functools
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -21,28 +23,117 @@ from pushplan.motion.collision import (
     obstacles,
 )
 from pushplan.planners.arguments import check_pusher
-from pushplan.planners.rearrangement.controller_kernels import PushingController
+from pushplan.planners.rearrangement.controller_kernels import PushingController, along_path
 from pushplan.planners.rearrangement.goal_kernels import ObjectGoal, all_done
-from pushplan.planners.rearrangement.object_paths import ObjectPaths, object_paths
-from pushplan.planners.rearrangement.pose_grid import make_pose_grid
+from pushplan.planners.rearrangement.object_paths import (
+    ObjectPaths,
+    PushCostToGo,
+    object_paths,
+    push_cost_to_go,
+)
 from pushplan.planners.rearrangement.pose_grid_kernels import (
+    HEADINGS,
     Layers,
     PoseGrid,
-    add_layers,
+    block_moves,
+    block_poses,
     contact_depths,
 )
-from pushplan.planners.rearrangement.push_cost_to_go import PushCostToGo, push_cost_to_go
+from pushplan.planners.rearrangement.push_pose_kernels import pose_behind_outline
 from pushplan.planners.rearrangement.rearrangement_config import RearrangementConfig
 from pushplan.planners.rearrangement.rollout_cache import RolloutCache
-from pushplan.planners.rearrangement.search_budget import SearchBudget
-from pushplan.world import ClearanceArea, Goal, Receptacle, RobotModel, StaticMap, World
-from pushplan.world.checks import BoolArray, FloatArray, IntArray, frozen
+from pushplan.world import ClearanceArea, Goal, Receptacle, RobotModel, StaticMap, Stop, World
+from pushplan.world.checks import BoolArray, FloatArray, frozen
 from pushplan.world.outline import outward_normals
 
+# Lengths are in circumscribed radii of the robot.
 _GOAL_SLACK = 0.012
-"""By how much an object has to be clear of its goal's edge [circumscribed radii]."""
+"""By how much an object has to be clear of its goal's edge."""
 _COARSE_CELL = 0.3
-"""Side of a cell of the lattice for approaches between pushes [circumscribed radii]."""
+"""Side of a cell of the lattice for approaches between pushes."""
+_CELL = 0.2
+"""The same of the lattice for the next approach."""
+_LEAST_CELL = 0.012
+"""Side of a cell that is not too small for the map, as a fraction of its longer side."""
+_STEP = 0.08
+"""Distance between two commands of a predicted push."""
+_MOST_STEPS = 5000
+"""How many of them a predicted push has at most."""
+_CURVATURE = 1.5
+"""Of the robot's path where it steers most [1 / circumscribed radius]."""
+_ARM = 0.8
+"""How far a turn by one radian carries an object along."""
+_SLACK = 0.05
+"""Clearance between the bumper and the object where a push begins."""
+MARGIN = 0.03
+"""Distance that approaches keep from what is static."""
+_LEAST_MARGIN = 0.3 * MARGIN
+"""Distance from what is static that the robot keeps wherever it is placed."""
+_TURN_COST = 0.03
+"""Cost of a turn by one radian on the spot, so that needless ones are left out."""
+_HARDEST = 10
+"""Budgets after which the search is over, which only searches for relocations come to."""
+
+
+class SearchBudget:
+    """Counts simulated pushes of one decision; ends the search between two of them.
+
+    Args:
+        stop: the stop rule; None for no end.
+        most: after so many simulated pushes no further ones are looked for; after `_HARDEST` times
+            as many the search is over.
+
+    Attributes:
+        used: simulated pushes so far.
+        cost: of the best order so far [m]; infinite while there is none.
+        interrupted: whether something was left out because of the budget.
+    """
+
+    def __init__(self, stop: Stop | None = None, most: float = math.inf) -> None:
+        self._check = None if stop is None else stop.start()
+        self._most, self._over = most, False
+        self.used, self.cost, self.interrupted = 0, math.inf, False
+
+    @property
+    def is_over(self) -> bool:
+        """Whether the search has to return."""
+        stopped = self._check is not None and self._check(self.used, self.cost)
+        if stopped or self.used >= _HARDEST * self._most:
+            self._over = self.interrupted = True
+        return self._over
+
+    @property
+    def is_used_up(self) -> bool:
+        """Whether to choose among the pushes that are known."""
+        if self.is_over or self.used >= self._most:
+            self.interrupted = True
+            return True
+        return False
+
+
+@functools.lru_cache(maxsize=8)
+def make_pose_grid(robot: RobotModel, static: StaticMap, step: float, margin: float) -> PoseGrid:
+    """The lattice for a robot among what is static; kept for the maps used last.
+
+    Args:
+        robot: its footprint.
+        static: walls and columns.
+        step: side of a cell [m].
+        margin: distance to keep from what is static [m].
+    """
+    x0, y0, x1, y1 = static.bounds.tolist()
+    cols, rows = int((x1 - x0) / step) + 1, int((y1 - y0) / step) + 1
+    grid = PoseGrid(
+        x0 + 0.5 * ((x1 - x0) - (cols - 1) * step),
+        y0 + 0.5 * ((y1 - y0) - (rows - 1) * step),
+        step,
+        np.empty((len(HEADINGS), rows, cols), dtype=np.bool_),
+        np.zeros((2, len(HEADINGS), rows, cols), dtype=np.bool_),
+    )
+    shape, among = _fit_of(robot, static, margin)
+    block_poses(grid, shape, among)
+    block_moves(grid, shape, among)
+    return grid._replace(blocked=frozen(grid.blocked), blocked_moves=frozen(grid.blocked_moves))
 
 
 @functools.lru_cache(maxsize=8)
@@ -50,11 +141,6 @@ def _fit_of(
     robot: RobotModel, static: StaticMap, margin: float
 ) -> tuple[Footprint, ConvexObstacles]:
     return footprint(robot, margin), obstacles(static)
-
-
-def check_world(world: World) -> None:
-    """Refuse what no push can be made for; see `check_pusher`."""
-    check_pusher(world, "pushing objects")
 
 
 @functools.lru_cache(maxsize=8)
@@ -74,38 +160,39 @@ def make_object_goal(goal: Goal, static: StaticMap, slack: float) -> ObjectGoal:
     )
 
 
-@dataclass(frozen=True, eq=False)
-class ContactGrid:
-    """A lattice with the objects on it.
+def heading_axes(heading: float) -> tuple[FloatArray, FloatArray]:
+    """Unit vectors (2,) along a heading [rad] and to the left of it."""
+    c, s = math.cos(heading), math.sin(heading)
+    return np.array([c, s]), np.array([-s, c])
 
-    Args:
-        grid: the lattice.
-        layers: (K, 16, rows, columns) depth in each object [m].
-        weights: (K,) cost of carrying each object along.
-        around_cost: what is added to that of an object that is not to be moved.
-    """
+
+def initial_heading(path: FloatArray, ahead: float) -> float:
+    """Heading [rad] from the start of a path to a point some distance along it [m]."""
+    x, y, _, _ = along_path(path[0, 0], path[0, 1], path, 0.0, ahead)
+    return math.atan2(y - path[0, 1], x - path[0, 0])
+
+
+def pose_distance(pose: FloatArray, other: FloatArray, size: float) -> float:
+    """How far two poses (3,) of an object are apart, turns included, in units of ``size``."""
+    turn = math.remainder(float(pose[2] - other[2]), 2.0 * math.pi)
+    return math.dist(pose[:2], other[:2]) / size + 0.2 * abs(turn)
+
+
+def open_edges(area: ClearanceArea) -> Iterator[tuple[FloatArray, FloatArray, FloatArray, float]]:
+    """The edges that can be crossed: first corner, unit vectors along it and out, length [m]."""
+    ends = zip(area.polygon, np.roll(area.polygon, -1, axis=0), area.open_edges, strict=True)
+    for a, b, is_open in ends:
+        if is_open:
+            length = np.hypot(*(b - a))
+            along = (b - a) / length
+            yield a, along, np.array([along[1], -along[0]]), float(length)
+
+
+class ContactGrid(NamedTuple):
+    """A lattice with the objects on it."""
 
     grid: PoseGrid
     layers: Layers
-    weights: FloatArray
-    around_cost: float
-
-    def contacts(
-        self, fraction: float = 1.0, without: IntArray | None = None, target: int = -1
-    ) -> tuple[FloatArray, FloatArray]:
-        """(16, rows, columns) depth in the objects [m] at each pose, and their weights.
-
-        Args:
-            fraction: factor on the weights.
-            without: indices of objects that are not there any more.
-            target: index of an object that is not to be moved; -1 if none.
-        """
-        weights = fraction * self.weights
-        if without is not None:
-            weights[without] = 0.0
-        if target >= 0:
-            weights[target] += self.around_cost
-        return add_layers(self.layers, weights)
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,29 +212,26 @@ class PushScene:
     budget: SearchBudget = field(default_factory=SearchBudget)
 
     def __post_init__(self) -> None:
-        check_world(self.world)
+        check_pusher(self.world, "pushing objects")
 
-    def with_budget(self, budget: SearchBudget) -> PushScene:
-        """The same for a decision with a stop rule."""
+    def changed(self, **values: Any) -> PushScene:
+        """The same with other fields, or with other values of what is worked out from them."""
         other = copy.copy(self)
-        other.__dict__["budget"] = budget
+        other.__dict__.update(values)
         return other
 
     def on_finer_lattice(self) -> PushScene:
         """The same with approaches on half the cells, that keep little distance from walls."""
-        other = copy.copy(self)
-        other.__dict__["fine"] = self._contact_grid(0.5 * self.fine.grid.step, self._least_margin)
-        return other
+        return self.changed(fine=self._contact_grid(0.5 * self.fine.grid.step, _LEAST_MARGIN))
 
     def with_objects_at(self, poses: FloatArray) -> PushScene:
         """The same with the objects at poses (K, 3), as far as rolling out pushes goes.
 
         The world, and with it where the robot is, stays as it is.
         """
-        moved = copy.copy(self)
+        moved = self.changed(poses=np.ascontiguousarray(poses), cache=None)
         for name in ("done", "remaining_now", "fine", "coarse"):
             moved.__dict__.pop(name, None)
-        moved.__dict__.update(poses=np.ascontiguousarray(poses), cache=None)
         return moved
 
     @property
@@ -178,13 +262,11 @@ class PushScene:
 
     @cached_property
     def _model(self) -> QuasiStatic:
-        config = self.config
         return QuasiStatic(
-            config.friction,
-            config.gyration_scale,
+            self.config.friction,
             step=0.25,
             iterations=10,
-            static_friction=config.static_friction,
+            static_friction=self.config.static_friction,
         )
 
     @cached_property
@@ -206,10 +288,10 @@ class PushScene:
     @cached_property
     def controller(self) -> PushingController:
         """Parameters of the pushing controller for this robot."""
-        step = self.config.step * self.size
+        step = _STEP * self.size
         return PushingController(
             step=step,
-            turn=self.config.curvature * step / self.size,
+            turn=_CURVATURE * step / self.size,
             size=self.size,
             half=self.half,
             front=self.front,
@@ -225,12 +307,12 @@ class PushScene:
     @property
     def turn_cost(self) -> float:
         """Cost of a turn on the spot [m/rad]."""
-        return self.config.turn_cost * self.size
+        return _TURN_COST * self.size
 
     @property
     def arm(self) -> float:
         """How far a turn carries an object along [m/rad]."""
-        return self.config.arm * self.size
+        return _ARM * self.size
 
     @cached_property
     def weights(self) -> FloatArray:
@@ -249,30 +331,39 @@ class PushScene:
     @cached_property
     def fine(self) -> ContactGrid:
         """The lattice on which the next approach is planned."""
-        return self._contact_grid(self._step(self.config.cell), self.config.margin * self.size)
+        return self._contact_grid(self._step(_CELL), MARGIN)
 
     @cached_property
     def coarse(self) -> ContactGrid:
         """The lattice on which the cost of approaches between pushes is computed."""
-        step = self._step(_COARSE_CELL)
-        return self._contact_grid(step, self.config.margin * self.size)
+        return self._contact_grid(self._step(_COARSE_CELL), MARGIN)
 
     def _step(self, cell: float) -> float:
         """Side of a cell that is not too small for the map [m]."""
         sides = self.world.static.bounds[2:] - self.world.static.bounds[:2]
-        return max(cell, 0.012 * float(sides.max()) / self.size) * self.size
-
-    @property
-    def _least_margin(self) -> float:
-        """Distance from what is static that the robot keeps wherever it is placed [m]."""
-        return 0.3 * self.config.margin * self.size
+        return max(cell, _LEAST_CELL * float(sides.max()) / self.size) * self.size
 
     def _contact_grid(self, step: float, margin: float) -> ContactGrid:
-        world = self.world
-        grid = make_pose_grid(world.robot, world.static, step, margin)
-        shape = footprint(world.robot, margin)
-        layers = contact_depths(grid, shape, self.poses, self.bodies)
-        return ContactGrid(grid, layers, self.contact_weights, self.config.around_cost)
+        robot, static, away = self.world.robot, self.world.static, margin * self.size
+        grid = make_pose_grid(robot, static, step, away)
+        shape, _ = _fit_of(robot, static, away)
+        return ContactGrid(grid, contact_depths(grid, shape, self.poses, self.bodies))
+
+    @cached_property
+    def longest(self) -> float:
+        """Greatest length of a predicted push [m]."""
+        sides = self.world.static.bounds[2:] - self.world.static.bounds[:2]
+        return min(2.0 * float(sides.sum()), _MOST_STEPS * self.controller.step)
+
+    @property
+    def left(self) -> list[int]:
+        """Indices of the objects that are not done."""
+        found: list[int] = np.flatnonzero(~self.done).tolist()
+        return found
+
+    def index_of(self, number: int) -> int:
+        """The index of the object with an id."""
+        return int(np.flatnonzero(self.world.movables.ids == number)[0])
 
     def remaining(self, poses: FloatArray) -> FloatArray:
         """(K,) shortest path [m] of each object's middle to the goal from poses (K, 3)."""
@@ -303,28 +394,37 @@ class PushScene:
 
     def push_cost_to_go(self, radius: float) -> PushCostToGo:
         """What it costs to push objects of a radius [m] to their goal."""
-        world, config = self.world, self.config
+        world = self.world
         return push_cost_to_go(
             world.robot,
             world.static,
             world.goal,
             radius=round(radius, 6),
             half_width=self.half,
-            slack=config.slack * self.size,
-            margin=self._least_margin,
-            config=config.relocation,
+            slack=_SLACK * self.size,
+            margin=_LEAST_MARGIN * self.size,
+            config=self.config.relocation,
         )
 
+    def pose_behind(self, k: int, heading: float, shift: float) -> FloatArray:
+        """(3,) a pose behind object ``k`` from which to push it along a heading.
+
+        Args:
+            k: index of the object.
+            heading: [rad].
+            shift: how far the robot's middle is to the left of the object [m].
+        """
+        outline, distance = self.world.movables.outline(k), self.front + _SLACK * self.size
+        return pose_behind_outline(np.array(self.poses[k]), outline, heading, shift, distance)
+
     @cached_property
-    def fit(self) -> tuple[Footprint, ConvexObstacles, FloatArray]:
-        """Footprint, obstacles and memory for `is_free`."""
-        shape, among = _fit_of(self.world.robot, self.world.static, self._least_margin)
-        return shape, among, np.empty_like(shape.vertices)
+    def _fit(self) -> tuple[Footprint, ConvexObstacles]:
+        return _fit_of(self.world.robot, self.world.static, _LEAST_MARGIN * self.size)
 
     def fits(self, pose: FloatArray) -> bool:
         """Whether the robot fits at a pose (3,) among what is static."""
-        shape, among, scratch = self.fit
-        return bool(is_free(pose, shape, among, scratch))
+        shape, among = self._fit
+        return bool(is_free(pose, shape, among, np.empty_like(shape.vertices)))
 
     def is_clear(self, pose: FloatArray) -> bool:
         """Whether the robot at a pose (3,) overlaps no object."""

@@ -1,12 +1,10 @@
-"""Settings of the manipulation policies."""
+"""Settings of the manipulation policies, and the table of pushes that they try."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
 from typing import Annotated, Any, ClassVar
 
-from pushplan.planners.rearrangement.primitives import PRIMITIVES, PushPrimitive
-from pushplan.planners.rearrangement.relocation_config import RELOCATION, RelocationConfig
 from pushplan.world import UnknownNameError
 from pushplan.world.checked_fields import (
     CheckedFields,
@@ -14,10 +12,109 @@ from pushplan.world.checked_fields import (
     Limits,
     NonNegativeFloat,
     NonNegativeInt,
+    OneOf,
     PositiveFloat,
-    PositiveFraction,
     PositiveInt,
 )
+
+SHIFTS = (0.0, 0.4, -0.4, 0.75, -0.75)
+"""Places of the robot's middle beside the object, in half widths of the bumper."""
+
+
+@dataclass(frozen=True)
+class PushPrimitive(CheckedFields):
+    """Pushes of one object: every combination of lean, shift and gain.
+
+    Args:
+        controller: ``"line"`` drives straight ahead, across an open edge of a clearance area;
+            ``"path"`` steers the object along its shortest path to the goal; ``"arc"`` drives short
+            arcs, ahead and back, that only relocate the object.
+        leans: headings of the robot against the edge's normal, or the start of the path [deg].
+        shifts: places of the robot's middle left of the object's [half widths of the bumper].
+        gains: of the pushing controller that follows the path.
+        clearance: distance that the path keeps from what is static [half widths of the bumper]; 0
+            for 0.75 radii of the object.
+        deep: whether the path goes to the middle of a receptacle instead of its nearest place.
+        partners: by how many of its neighbours, the nearest ones, the path leads past, to take one
+            along.
+        frictions: coefficients between robot and object with which it has to succeed as well, see
+            `RearrangementConfig`.
+        below: an object that has so many pushes already is left out.
+    """
+
+    controller: Annotated[str, OneOf(("line", "path", "arc"))]
+    leans: tuple[float, ...] = (0.0,)
+    shifts: tuple[float, ...] = SHIFTS
+    gains: tuple[float, ...] = (1.5,)
+    clearance: NonNegativeFloat = 1.08
+    deep: bool = False
+    partners: NonNegativeInt = 0
+    frictions: tuple[float, ...] = ()
+    below: NonNegativeInt = 2
+
+    field_prefix: ClassVar[str] = "push primitive "
+
+
+_ANY = 1000
+
+PRIMITIVES = (
+    PushPrimitive("line", below=_ANY),
+    PushPrimitive("line", leans=(20.0, -20.0, 40.0, -40.0), shifts=(0.0,), below=_ANY),
+    PushPrimitive("path"),
+    PushPrimitive("path", clearance=0.0),
+    PushPrimitive("path", deep=True, shifts=(0.0,), below=_ANY),
+    PushPrimitive("path", partners=4, below=_ANY),
+    *(
+        PushPrimitive(
+            "path",
+            (lean, -lean),
+            gains=(0.5, 1.5),
+            clearance=clearance,
+            frictions=(0.0, 0.4),
+            below=1,
+        )
+        for lean in (20.0, 40.0, 60.0, 80.0)
+        for clearance in (1.08, 0.0)
+    ),
+    PushPrimitive(
+        "arc",
+        leans=(0.0, *(sign * lean for lean in range(15, 151, 15) for sign in (1.0, -1.0))),
+        shifts=(*SHIFTS, 1.1, -1.1, 1.35, -1.35),
+        below=1,
+    ),
+)
+"""The table, simplest first."""
+
+
+@dataclass(frozen=True)
+class RelocationConfig(CheckedFields):
+    """Settings of the search for relocations. Lengths are in circumscribed radii of the robot.
+
+    Args:
+        cell: side of a cell of `PushCostToGo`.
+        drag_cost: what a metre of an object's way costs on which the robot does not fit behind it,
+            in metres pushed.
+        curvatures: of the arcs, times the robot's circumscribed radius.
+        depth: how many arcs follow one another at most.
+        expansions: how many states are driven on from, starts not counted.
+        errors: of the prediction, that a push home afterwards has to stand: along x and y
+            [circumscribed radii], and in heading [rad].
+        margins: factors on them; a drive costs a radius more for each that it does not stand.
+    """
+
+    cell: PositiveFloat = 0.125
+    drag_cost: PositiveFloat = 10.0
+    curvatures: tuple[float, ...] = (0.0, 0.7, -0.7, 1.6, -1.6)
+    depth: PositiveInt = 3
+    expansions: PositiveInt = 400
+    errors: tuple[tuple[float, float, float], ...] = (
+        (0.08, 0.08, 0.15),
+        (-0.08, 0.08, -0.15),
+        (0.0, -0.1, 0.0),
+    )
+    margins: tuple[float, ...] = (1.0, 2.0, 3.0)
+
+    field_prefix: ClassVar[str] = "relocation "
 
 
 @dataclass(frozen=True)
@@ -29,25 +126,12 @@ class RearrangementConfig(CheckedFields):
             an object as heavy as the robot: the w of J = l_0 + w sum(m_i l_i) / m_0.
         friction: Coulomb coefficient between robot and objects, for the prediction.
         static_friction: the same between objects and walls.
-        gyration_scale: see `QuasiStatic`.
-        step: distance between two commands of a predicted push.
-        curvature: of the robot's path where it steers most [1 / circumscribed radius].
-        cell: side of a cell of the lattice on which approaches are planned.
         later_fraction: of the cost of contacts in those, as objects will have gone by then.
-        far: cost of getting to what cannot be got to later [diagonals of the map].
         contact_cost: least cost of carrying an object along on an approach, however light it is.
         target_cost: what is added to it for the object that is to be pushed.
         around_cost: the same where that has spoilt the push, so that the route leads around it.
-        arm: how far a turn by one radian carries an object along.
-        slack: clearance between the bumper and the object where a push begins.
-        margin: distance that approaches keep from what is static.
-        turn_cost: cost of a turn by one radian on the spot, so that needless ones are left out.
-        early: how far before something goes wrong a push ends that does not get home.
-        detour: how much farther than the nearest edge of an area one may be that an object is
-            pushed across [times the distance].
         per_object: how many pushes are kept for each object.
         max_pushes: how many are kept for all together, by which the time of a plan is bounded.
-        max_steps: how many steps a predicted push has at most.
         max_simulations: how many pushes are simulated before one is chosen.
         max_rollouts: after how many simulated pushes a choice is made among those that are known,
             unless a stop rule is given; searches for relocations have limits of their own.
@@ -56,9 +140,6 @@ class RearrangementConfig(CheckedFields):
             robot's delay.
         mpc: whether a push of one object along its path is driven by `PushingMpc`; else by the
             controller of its prediction, as all other pushes are.
-        progress: by which an object has to get on in the time in which the robot could drive a
-            radius, or turn by 0.15 rad.
-        retreat: how far the robot backs off where it is stuck.
         max_failures: after so many a push waits until something else has been done.
         max_relocations: after so many an object waits until something else has been done.
         position_noise: standard deviation of the places that are seen, after filtering [m]; the
@@ -74,38 +155,24 @@ class RearrangementConfig(CheckedFields):
     work_weight: Annotated[float, Limits(0.0, 1e6)] = 12.0
     friction: Annotated[float, Limits(0.0, 1e6)] = 0.2
     static_friction: Annotated[float, Limits(0.0, 1e6)] = 0.0
-    gyration_scale: Annotated[float, Limits(0.0, 1e3, open_low=True)] = 1.0
-    step: PositiveFraction = 0.08
-    curvature: PositiveFloat = 1.5
-    cell: Annotated[float, Limits(0.05, 2.0)] = 0.2
     later_fraction: Fraction = 0.5
-    far: PositiveFloat = 5.0
     contact_cost: Annotated[float, Limits(0.0, 1e6)] = 1.0
     target_cost: NonNegativeFloat = 5.0
     around_cost: NonNegativeFloat = 50.0
-    arm: NonNegativeFloat = 0.8
-    slack: Fraction = 0.05
-    margin: Fraction = 0.03
-    turn_cost: Annotated[float, Limits(0.0, 1e6)] = 0.03
-    early: NonNegativeFloat = 0.6
-    detour: Annotated[float, Limits(1.0)] = 1.3
     per_object: Annotated[int, Limits(1, 1000)] = 16
     max_pushes: Annotated[int, Limits(1, 10_000)] = 80
-    max_steps: Annotated[int, Limits(1, 100_000)] = 5000
     max_simulations: Annotated[int, Limits(1, 1000)] = 30
     max_rollouts: PositiveInt = 1000
     max_searches: PositiveInt = 6
     response: Annotated[float, Limits(0.0, 1e3, open_low=True)] = 0.2
     mpc: bool = True
-    progress: PositiveFloat = 0.05
-    retreat: PositiveFloat = 0.3
     max_failures: PositiveInt = 3
     max_relocations: PositiveInt = 12
     position_noise: NonNegativeFloat = 0.0
     heading_noise: NonNegativeFloat = 0.0
     max_rounds: NonNegativeInt = 6
     primitives: tuple[PushPrimitive, ...] = PRIMITIVES
-    relocation: RelocationConfig = RELOCATION
+    relocation: RelocationConfig = RelocationConfig()
 
     field_prefix: ClassVar[str] = "rearrangement "
 

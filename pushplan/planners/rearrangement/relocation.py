@@ -19,61 +19,73 @@ from functools import cached_property
 
 import numpy as np
 
-from pushplan.planners.rearrangement.approach import ApproachTree, approach_tree, arrival_poses
+from pushplan.planners.rearrangement.approach import (
+    ApproachTree,
+    RoutePlanner,
+    approach_tree,
+    arrival_poses,
+)
 from pushplan.planners.rearrangement.arc_kernels import sweep_arcs
-from pushplan.planners.rearrangement.candidates import can_be_pushed
-from pushplan.planners.rearrangement.forward_simulation import simulate_route
+from pushplan.planners.rearrangement.candidates import GAIN, can_be_pushed
 from pushplan.planners.rearrangement.goal_kernels import REMOVED
 from pushplan.planners.rearrangement.push import Push
-from pushplan.planners.rearrangement.push_poses import (
-    initial_heading,
-    pose_behind,
-    pose_distance,
-)
-from pushplan.planners.rearrangement.push_scene import PushScene
-from pushplan.planners.rearrangement.push_simulator import PushSimulator
-from pushplan.planners.rearrangement.rollout_cache import Primitive
-from pushplan.planners.rearrangement.route import RoutePlanner
+from pushplan.planners.rearrangement.push_scene import PushScene, initial_heading, pose_distance
+from pushplan.planners.rearrangement.push_simulator import simulate_primitive
+from pushplan.planners.rearrangement.rollout_cache import Asked, Primitive
 from pushplan.world.checks import FloatArray
 
 _Cell = tuple[float, ...]
-_ARC_LENGTH = 1.6  # of one arc [circumscribed radii]
+
+# Lengths are in circumscribed radii of the robot.
+_ARC_LENGTH = 1.6  # of one arc
 _LITTLE = 0.25  # part of the gain that helps too where nothing else does
-_DRAWS = 10  # so many places are looked at for each start
+_STARTS = 300
+"""From so many places round the object a drive may begin, besides those of the table."""
+_DRAWS = 10  # so many places are looked at for each of them
 _PLACE, _TURN = 0.2, 0.5  # sides of a box of like poses of the object [circumscribed radii, rad]
 _SPREAD = np.array([0.8191725134, 0.6710436067, 0.5497004779])
 """Steps of an additive recurrence that fills a cube evenly (Roberts 2018)."""
+_MOST_ALIKE = 3  # so many states with the object in the same place are driven on from
+_DEARER = 2.0
+"""How much more than the best drive found others may cost that are still looked for."""
+_ENOUGH = 24
+"""Margins, over all sides from which a drive helps, after which the search ends."""
+_MOST_SIDES = 20  # so many drives are kept, each from another side
+_HORIZON = 3.0
+"""How far a push goes by which it is seen that the object can be pushed home."""
+_LEAST_MOVE = 0.15  # by so much an object has to be moved for it to count
+_SPACING = 0.05  # how far an object moves on until it is looked at anew
+_NEAR = 8.0  # what is farther from the object does not count for the search
 
 
 def relocating_pushes(
-    simulator: PushSimulator, k: int, approach: ApproachTree, thorough: bool = False
+    scene: PushScene, k: int, approach: ApproachTree, thorough: bool = False
 ) -> list[Push]:
     """Drives after which object ``k`` can be pushed home, or else lies better than now.
 
     Args:
-        simulator: for the scene.
+        scene: the scene.
         k: index of the object.
         approach: from where the robot is.
         thorough: whether to look for drives that cost much more than the best one too.
     """
-    scene, found = simulator.scene, None
-    movables, cache = scene.world.movables, scene.cache
-    away = np.hypot(*(scene.poses[:, :2] - scene.poses[k, :2]).T)
-    near = away < scene.config.relocation.near * scene.size
-    robot = scene.robot_cell
-    around = movables.ids[near].tobytes() + scene.poses[near].tobytes()
+    movables, cache, found = scene.world.movables, scene.cache, None
+    near = np.hypot(*(scene.poses[:, :2] - scene.poses[k, :2]).T) < _NEAR * scene.size
+    asked = Asked(
+        movables.ids[near].tobytes() + scene.poses[near].tobytes(), scene.robot_cell, thorough
+    )
     if cache is not None:
-        found = cache.primitives(int(movables.ids[k]), around, robot, thorough)
+        found = cache.relocations(int(movables.ids[k]), asked)
         if found is None and cache.searches >= scene.config.max_searches:
             return []
     if found is None:
         found = _RelocationSearch(scene, k, approach, thorough).run()
         if cache is not None and not scene.budget.interrupted:
-            cache.keep_primitives(int(movables.ids[k]), around, robot, thorough, found)
+            cache.keep_relocations(int(movables.ids[k]), asked, found)
     return [
         replace(push, cost=push.cost + extra)
         for path, extra, moved in found
-        for push in simulator.simulate_primitive(path, k, _with_moved(scene, moved))
+        for push in simulate_primitive(scene, path, k, _with_moved(scene, moved))
     ]
 
 
@@ -138,8 +150,8 @@ class _RelocationSearch:
     ) -> None:
         self._scene, self._k, self._approach = scene, k, approach
         self._config, self._thorough = scene.config.relocation, thorough
-        self._slack = math.inf if thorough else self._config.slack * scene.size
-        self._horizon = self._config.horizon * scene.size
+        self._slack = math.inf if thorough else _DEARER * scene.size
+        self._horizon = _HORIZON * scene.size
         self._cost_to_go = scene.push_cost_to_go(float(scene.world.movables.radii[k]))
         self._arcs = _arcs(scene)
         self._steps = max(2, math.ceil(_ARC_LENGTH * scene.size / scene.controller.step))
@@ -151,10 +163,9 @@ class _RelocationSearch:
 
     def run(self) -> list[Primitive]:
         """Drives, each with the cost of what it leaves to be done [m]."""
-        simulator = PushSimulator(self._scene)
-        if can_be_pushed(simulator, self._k, self._horizon):  # but not all the way
-            self._horizon = simulator.longest
         scene, k, config = self._scene, self._k, self._config
+        if can_be_pushed(scene, k, self._horizon):  # but not all the way
+            self._horizon = scene.longest
         now = float(self._rest(scene.poses[[k]])[0])
         for start in itertools.chain(self._behind(), self._around()):
             away = self._approach_cost(start)
@@ -162,7 +173,7 @@ class _RelocationSearch:
                 self._put(_State(None, start[None], scene.poses, 0, away, now))
         most, best = len(config.margins), math.inf
         expansions, sides, alike = Counter[bool](), Counter[_Cell](), Counter[_Cell]()
-        while self._open and expansions[True] < config.expansions and sides.total() < config.enough:
+        while self._open and expansions[True] < config.expansions and sides.total() < _ENOUGH:
             if scene.budget.is_over:
                 break
             state = heapq.heappop(self._open)[2]
@@ -183,7 +194,7 @@ class _RelocationSearch:
                 sides[side] = max(sides[side], stands)
                 if stands:
                     best = min(best, state.cost + (most - stands) * scene.size)
-                if stands or state.depth == config.depth or alike[place] >= config.alike:
+                if stands or state.depth == config.depth or alike[place] >= _MOST_ALIKE:
                     continue
                 alike[place] += 1
             expansions[state.depth > 0] += 1
@@ -209,7 +220,7 @@ class _RelocationSearch:
 
     def _better(self, now: float) -> list[tuple[float, _State]]:
         """Ends of drives after which less is left to be done than there is now [m]."""
-        size, gain = self._scene.size, self._config.gain * (_LITTLE if self._thorough else 1.0)
+        size, gain = self._scene.size, GAIN * (_LITTLE if self._thorough else 1.0)
         found: list[tuple[float, _State]] = []
         for state in self._states:
             if state.rest < now - gain * size:
@@ -224,13 +235,13 @@ class _RelocationSearch:
             side = self._side(state)
             if side not in sides:
                 sides[side] = state.path(), extra, self._moved_before(state.first)
-            if len(sides) == self._config.sides:
+            if len(sides) == _MOST_SIDES:
                 break
         return list(sides.values())
 
     def _approach_cost(self, start: FloatArray) -> float:
         """What it costs to get to a start (3,) [m]."""
-        nodes, extra = arrival_poses(self._scene.fine, start)
+        nodes, extra = arrival_poses(self._scene.fine.grid, start)
         return float((self._approach.costs[nodes] + extra).min()) if len(nodes) else math.inf
 
     def _moved_before(self, start: _State) -> dict[int, FloatArray]:
@@ -243,7 +254,7 @@ class _RelocationSearch:
         """A start as the route to it leaves robot and objects; None if there is none."""
         for tree in (self._approach, self._around_object):
             route = self._routes.route(tree, state.start, self._k)
-            driven = None if route is None else simulate_route(self._routes, route)
+            driven = None if route is None else self._routes.simulate(route)
             if driven is not None:
                 path, objects = driven
                 return replace(state, track=path[-1:], poses=objects[-1].copy())
@@ -270,7 +281,7 @@ class _RelocationSearch:
             self._steps,
             k,
             scene.size,
-            self._config.spacing,
+            _SPACING,
             scene.bodies,
             scene.settings,
         )
@@ -301,7 +312,7 @@ class _RelocationSearch:
 
     def _has_moved(self, state: _State) -> bool:
         scene, k = self._scene, self._k
-        return pose_distance(state.poses[k], scene.poses[k], scene.size) >= self._config.least
+        return pose_distance(state.poses[k], scene.poses[k], scene.size) >= _LEAST_MOVE
 
     def _failing_margins(self, state: _State) -> int:
         """How many of the margins a push home from where a state has the object does not stand."""
@@ -322,7 +333,7 @@ class _RelocationSearch:
         after = scene.with_objects_at(poses)
         if after.done[k]:
             return True
-        return can_be_pushed(PushSimulator(after), k, self._horizon)
+        return can_be_pushed(after, k, self._horizon)
 
     def _side(self, state: _State) -> _Cell:
         """The box of poses that a drive begins in."""
@@ -348,7 +359,7 @@ class _RelocationSearch:
             if row.controller == "arc":
                 for lean, shift in itertools.product(row.leans, row.shifts):
                     heading = towards + math.radians(lean)
-                    pose = pose_behind(scene, k, heading, shift * scene.half)
+                    pose = scene.pose_behind(k, heading, shift * scene.half)
                     if scene.fits(pose) and scene.is_clear(pose):
                         yield pose
 
@@ -356,15 +367,13 @@ class _RelocationSearch:
         """Poses (3,) round the object that touch nothing, evenly spread."""
         scene = self._scene
         box, radius = scene.poses[self._k], float(scene.world.movables.radii[self._k])
-        fraction = np.mod(
-            0.5 + np.outer(np.arange(1, _DRAWS * self._config.starts + 1), _SPREAD), 1.0
-        )
+        fraction = np.mod(0.5 + np.outer(np.arange(1, _DRAWS * _STARTS + 1), _SPREAD), 1.0)
         away = 0.3 * radius + scene.size * (0.2 + 1.1 * fraction[:, 0])
         bearing, heading = 2.0 * np.pi * fraction[:, 1], 2.0 * np.pi * fraction[:, 2] - np.pi
         x, y = box[0] + away * np.cos(bearing), box[1] + away * np.sin(bearing)
         poses = np.column_stack([x, y, heading])
         free = (pose for pose in poses if scene.fits(pose) and scene.is_clear(pose))
-        return itertools.islice(free, self._config.starts)
+        return itertools.islice(free, _STARTS)
 
 
 def _arcs(scene: PushScene) -> FloatArray:

@@ -48,13 +48,12 @@ class _Entry:
     age: int = 0
 
 
-class _Relocations(NamedTuple):
-    """What a search for relocations of an object has found."""
+class Asked(NamedTuple):
+    """What a search for relocations of an object depends on."""
 
-    around: bytes
-    robot: bytes
+    around: bytes  # Objects near it, and where they are
+    robot: bytes  # About where the robot is
     thorough: bool
-    found: list[Primitive]
 
 
 class RolloutCache:
@@ -68,32 +67,28 @@ class RolloutCache:
 
     def __init__(self) -> None:
         self._entries: dict[object, _Entry] = {}
-        self._primitives: dict[int, _Relocations] = {}
+        self._relocations: dict[int, tuple[Asked, list[Primitive]]] = {}
         self.searches = 0
 
-    def primitives(
-        self, target: int, around: bytes, robot: bytes, thorough: bool
-    ) -> list[Primitive] | None:
+    def relocations(self, target: int, asked: Asked) -> list[Primitive] | None:
         """Drives found for an object, if that was with the same around it.
 
         That there are none counts only for the robot in the same place: it may get to others. What
         a thorough search has found counts for every other one too.
         """
-        known = self._primitives.get(target)
-        if known is None or known.around != around or thorough > known.thorough:
+        known, found = self._relocations.get(target, (None, []))
+        if known is None or known.around != asked.around or asked.thorough > known.thorough:
             return None
-        return known.found if known.found or known.robot == robot else None
+        return found if found or known.robot == asked.robot else None
 
-    def keep_primitives(
-        self, target: int, around: bytes, robot: bytes, thorough: bool, found: list[Primitive]
-    ) -> None:
+    def keep_relocations(self, target: int, asked: Asked, found: list[Primitive]) -> None:
         """Keep the drives found for an object."""
-        self._primitives[target] = _Relocations(around, robot, thorough, found)
+        self._relocations[target] = asked, found
         self.searches += 1
 
     def is_from_elsewhere(self, robot: bytes) -> bool:
         """Whether drives were searched when the robot was in another place."""
-        return any(known.robot != robot for known in self._primitives.values())
+        return any(known.robot != robot for known, _ in self._relocations.values())
 
     def __len__(self) -> int:
         return len(self._entries)

@@ -18,7 +18,7 @@ from pushplan.planners.pushing import (
     PushPath,
     warm_up,
 )
-from pushplan.planners.pushing.problem import groups_of
+from pushplan.planners.pushing.mpc import groups_of
 from pushplan.world import (
     Controller,
     InvalidInputError,

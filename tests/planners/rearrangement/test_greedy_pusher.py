@@ -6,10 +6,8 @@ from conftest import make_boxes, make_u_maze
 
 from pushplan.envs import PushEnv
 from pushplan.planners import make_policy
-from pushplan.planners.rearrangement.greedy import GreedyPusher
-from pushplan.planners.rearrangement.line_up import line_up, shortest_path
-from pushplan.planners.rearrangement.push_poses import initial_heading
-from pushplan.planners.rearrangement.push_scene import PushScene
+from pushplan.planners.rearrangement.greedy import GreedyPusher, line_up, shortest_path
+from pushplan.planners.rearrangement.push_scene import PushScene, initial_heading
 from pushplan.planners.rearrangement.rearrangement_config import RearrangementConfig
 from pushplan.world import (
     ClearanceArea,

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from pushplan.planners.rearrangement.push_cost_to_go import PushCostToGo
-from pushplan.planners.rearrangement.relocation_config import RelocationConfig
+from pushplan.planners.rearrangement.object_paths import PushCostToGo
+from pushplan.planners.rearrangement.rearrangement_config import RelocationConfig
 from pushplan.world import InvalidInputError, Receptacle, StaticMap, box_delivery_robot
 
 ROBOT = box_delivery_robot()

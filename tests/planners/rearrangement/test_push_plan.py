@@ -9,8 +9,7 @@ from conftest import make_u_maze
 from pushplan.envs import make
 from pushplan.planners import make_policy
 from pushplan.planners.rearrangement.goal_kernels import REMOVED
-from pushplan.planners.rearrangement.push import Push
-from pushplan.planners.rearrangement.push_plan import push_plan
+from pushplan.planners.rearrangement.push import Push, push_plan
 from pushplan.scenarios import suite
 from pushplan.world import ShowsPlan
 

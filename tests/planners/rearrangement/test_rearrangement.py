@@ -24,13 +24,18 @@ from pushplan.planners.rearrangement.approach import approach_tree
 from pushplan.planners.rearrangement.candidates import partial_pushes
 from pushplan.planners.rearrangement.cost_to_go_kernels import cost_to_go
 from pushplan.planners.rearrangement.goal_kernels import all_done
-from pushplan.planners.rearrangement.gtsp_reduction import parts_of, reduce_to_gtsp
-from pushplan.planners.rearrangement.pose_grid_kernels import LENGTHS, MOVES, TURNS, near_poses
+from pushplan.planners.rearrangement.pose_grid_kernels import (
+    LENGTHS,
+    MOVES,
+    TURNS,
+    add_layers,
+    near_poses,
+)
 from pushplan.planners.rearrangement.pose_search_kernels import PoseSearchProblem, search_poses
 from pushplan.planners.rearrangement.push import signature
-from pushplan.planners.rearrangement.push_graph import candidate_pushes, no_penalty
-from pushplan.planners.rearrangement.push_selection import select_push
-from pushplan.planners.rearrangement.push_simulator import PushSimulator
+from pushplan.planners.rearrangement.push_choice import candidate_pushes, select_push
+from pushplan.planners.rearrangement.push_graph import parts_of, reduce_to_gtsp
+from pushplan.planners.rearrangement.push_simulator import resimulate, simulate_primitive
 from pushplan.planners.rearrangement.relocation import relocating_pushes
 from pushplan.planners.rearrangement.rollout_cache import RolloutCache
 from pushplan.world import (
@@ -242,13 +247,13 @@ def test_a_box_at_a_wall_is_relocated():
 
 def test_a_relocation_that_leaves_its_object_behind_is_none():
     here = scene([(0.0, 0.5, 0.4)])
-    simulator, push = PushSimulator(here), next(partial_pushes(PushSimulator(here), 0))
-    [again] = simulator.resimulate(push, push.start)
+    push = next(partial_pushes(here, 0))
+    [again] = resimulate(here, push, push.start)
     assert np.array_equal(again.object_poses, push.object_poses)
     aside = here.poses + np.array([0.0, 3.0 * here.size, 0.0])
-    assert simulator.resimulate(push, push.start, poses=aside) == []
-    other = PushSimulator(scene([(0.0, 0.5, 0.4), (4.0, -4.0, 0.0)]))
-    assert other.resimulate(push, push.start) == []  # among other objects
+    assert resimulate(here, push, push.start, poses=aside) == []
+    other = scene([(0.0, 0.5, 0.4), (4.0, -4.0, 0.0)])
+    assert resimulate(other, push, push.start) == []  # among other objects
 
 
 @pytest.mark.slow
@@ -261,9 +266,9 @@ def test_boxes_wedged_between_columns_are_nudged_where_nothing_else_is_left():
     room = scene(boxes, extra=columns, pose=(3.9, 3.0, 1.1)).world
     small = Movables.from_outlines([0.44 * SQUARE] * 2, boxes)
     here = PushScene(replace(room, movables=small), RearrangementConfig())
-    simulator, approach = PushSimulator(here), approach_tree(here)
+    approach = approach_tree(here)
     few, many = (
-        [push for k in (0, 1) for push in relocating_pushes(simulator, k, approach, thorough)]
+        [push for k in (0, 1) for push in relocating_pushes(here, k, approach, thorough)]
         for thorough in (False, True)
     )
     assert not few and many
@@ -296,7 +301,7 @@ def test_a_box_in_a_tight_place_is_brought_out_of_it(pose, extra, drive_back):
     if not drive_back:
         ahead = replace(here.world.robot, min_speed=0.0)
         here = PushScene(replace(here.world, robot=ahead), here.config)
-    found = relocating_pushes(PushSimulator(here), 0, approach_tree(here))
+    found = relocating_pushes(here, 0, approach_tree(here))
     assert found or not drive_back
     walls = [shapely.Polygon(part).buffer(-0.01) for part in here.world.static.convex_parts]
     for push in found:
@@ -310,7 +315,7 @@ def test_a_box_in_a_tight_place_is_brought_out_of_it(pose, extra, drive_back):
             moves = np.diff(push.poses[:, :2], axis=0)
             ahead = np.column_stack([np.cos(push.poses[:-1, 2]), np.sin(push.poses[:-1, 2])])
             assert ((moves * ahead).sum(axis=1) > -1e-9).all()
-        [again] = PushSimulator(here).resimulate(push, push.start)
+        [again] = resimulate(here, push, push.start)
         assert np.array_equal(again.object_poses, push.object_poses)
 
 
@@ -318,7 +323,7 @@ def test_the_recovery_path_of_a_gap_touches_nothing():
     tight = small_box((0.0, 0.25, 0.0), GAP, robot=(0.0, -0.35, -0.5 * math.pi))
     path = way_out(tight)
     assert path is not None and path[-1, 1] < -0.8
-    assert PushSimulator(tight).simulate_primitive(path, 0)[0].work == 0.0
+    assert simulate_primitive(tight, path, 0)[0].work == 0.0
     assert way_out(small_box((0.0, 0.8, 0.0), GAP)) is None
 
 
@@ -357,7 +362,7 @@ def test_the_recovery_path_pushes_what_closes_the_only_way_out():
         tight = scene([box], extra=walls, pose=(-0.2, 0.0, 0.0))
         path = way_out(tight)
         assert path is not None and path[-1, 0] > 0.8
-        work = PushSimulator(tight).simulate_primitive(path, 0)[0].work
+        work = simulate_primitive(tight, path, 0)[0].work
         assert (work > 0.0) == pushes
 
 
@@ -371,7 +376,7 @@ def test_a_route_leads_around_the_box_that_it_would_push_away():
         [*room, *columns],
         pose=(0.929, 1.708, -0.438),
     )
-    first = select_push(here, no_penalty).first
+    first = select_push(here).first
     assert first is not None and first.push.delivers
     assert first.route.cost > 6.0
 
@@ -452,10 +457,7 @@ def test_what_is_remembered_comes_to_the_same():
         fresh = PushScene(first.world.moved(movable_poses=boxes), first.config)
         kept = replace(fresh, cache=cache)
         before = len(cache)
-        one, other = (
-            candidate_pushes(here, PushSimulator(here), approach_tree(here))
-            for here in (fresh, kept)
-        )
+        one, other = (candidate_pushes(here, approach_tree(here)) for here in (fresh, kept))
         known += len(one) > len(cache) - before
         assert len(one) == len(other)
         for a, b in zip(one, other, strict=True):
@@ -468,8 +470,8 @@ def test_what_is_remembered_comes_to_the_same():
 
 def test_the_search_is_that_of_dijkstra():
     here, _ = example("clearing")
-    contact_grid = here.coarse
-    grid, (depths, touch) = contact_grid.grid, contact_grid.contacts()
+    grid, layers = here.coarse
+    depths, touch = add_layers(layers, here.contact_weights)
     starts, costs = near_poses(grid, owned(here.world.robot_pose), 1.5)
     none = np.zeros(0, dtype=np.int64)
     problem = PoseSearchProblem(starts, costs, grid, depths, touch, 0.02, 0.5, none)
@@ -509,8 +511,8 @@ def test_the_search_is_that_of_dijkstra():
     [
         {"work_weight": -1.0},
         {"work_weight": math.nan},
-        {"cell": 0.0},
-        {"slack": 2.0},
+        {"later_fraction": 2.0},
+        {"max_searches": 0},
         {"per_object": 0},
         {"max_simulations": 2.5},
         {"response": "soon"},

@@ -10,9 +10,7 @@ from conftest import make_boxes
 
 from pushplan.control import LegFollower
 from pushplan.planners.rearrangement import PushScene, RearrangementConfig
-from pushplan.planners.rearrangement.approach import approach_tree
-from pushplan.planners.rearrangement.forward_simulation import simulate_route
-from pushplan.planners.rearrangement.route import RoutePlanner
+from pushplan.planners.rearrangement.approach import RoutePlanner, approach_tree
 from pushplan.world import Receptacle, StaticMap, World, box_delivery_robot
 from pushplan.world.outline import transform
 from pushplan.world.polyline import path_lengths
@@ -135,6 +133,6 @@ def test_a_robot_drives_off_the_box_that_it_has_pushed_before_it_turns(heading, 
     world = replace(alone.world, movables=make_boxes([(*at, heading)]))
     planner = RoutePlanner(PushScene(world, RearrangementConfig()))
     route = planner.route(approach_tree(planner.scene), np.array(to))
-    simulated = simulate_route(planner, route)
+    simulated = planner.simulate(route)
     assert simulated is not None
     assert path_lengths(simulated[1]).max() < 0.02
