@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections import OrderedDict
+import functools
 from collections.abc import Callable
 from functools import cached_property
 
@@ -12,7 +12,7 @@ from pushplan.geometry import Grid, clearance_field
 from pushplan.geometry.free_components import FreeComponents, object_clearance
 from pushplan.motion.time_slicing import go_on, never
 from pushplan.search.grid_dijkstra import grid_dijkstra
-from pushplan.world import World
+from pushplan.world import Movables, World
 from pushplan.world.checks import BoolArray, FloatArray, IntArray
 
 _KEPT = 200  # distances to objects that are kept
@@ -42,7 +42,10 @@ class DiscSpace:
         self.grid = Grid.cover(world.static.bounds, cell)
         x, y = np.meshgrid(self.grid.x, self.grid.y)
         self.goal: BoolArray = world.navigation_goal.contains(np.stack([x, y], axis=-1))
-        self._objects: OrderedDict[tuple[int, bytes], FloatArray] = OrderedDict()
+        clearance_at = functools.partial(
+            _clearance_at, world.movables, self.grid, self.radius + self.cell
+        )
+        self._clearance = functools.lru_cache(_KEPT)(clearance_at)
 
     @cached_property
     def static(self) -> FloatArray:
@@ -56,15 +59,7 @@ class DiscSpace:
 
         Infinite where that is farther than the disc and a cell.
         """
-        key = k, pose.tobytes()
-        if key not in self._objects:
-            self._objects[key] = object_clearance(
-                self.world.movables, k, pose, self.grid, self.radius + self.cell
-            )
-            if len(self._objects) > _KEPT:
-                self._objects.popitem(last=False)
-        self._objects.move_to_end(key)
-        return self._objects[key]
+        return self._clearance(k, *pose.tolist())
 
     def cell_of(self, point: FloatArray) -> tuple[int, int]:
         """Row and column of the cell of a point (2,), or of the nearest one."""
@@ -76,6 +71,12 @@ class DiscSpace:
         """(N, 2) middles of cells (N,), counted row by row [m]."""
         rows, cols = np.divmod(cells, self.grid.shape[1])
         return np.column_stack([self.grid.x[cols], self.grid.y[rows]])
+
+
+def _clearance_at(
+    movables: Movables, grid: Grid, reach: float, k: int, x: float, y: float, theta: float
+) -> FloatArray:
+    return object_clearance(movables, k, np.array([x, y, theta]), grid, reach)
 
 
 class DiscState:

@@ -6,7 +6,7 @@ import heapq
 import itertools
 import math
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -15,7 +15,6 @@ from pushplan.interaction import InteractionModel
 from pushplan.motion.collision import first_blocked, footprint, obstacles, static_depth
 from pushplan.motion.keyholes.disc_space import DiscSpace, DiscState
 from pushplan.motion.keyholes.keyhole_config import KeyholeConfig
-from pushplan.motion.keyholes.line_push import CONTACT, SPACING, LinePush, line_pushes, straight
 from pushplan.motion.time_slicing import go_on, never
 from pushplan.world import Drive, World
 from pushplan.world.checks import FloatArray
@@ -23,6 +22,11 @@ from pushplan.world.polyline import path_length, path_lengths
 
 _MOST_OBJECTS = 40  # among more, no keyholes are looked for
 _MOST_CELLS = 400_000  # of the configuration space
+_NARROW = 0.3  # faces narrower than this are not pushed [circumscribed radii]
+_SPACING = 0.1
+"""Distance between the poses of a push [circumscribed radii]."""
+_CONTACT = 5
+"""Index of the pose of a push in which the robot touches the face."""
 _LEAVING = 2.5  # how far the robot drives straight to where its disc is free [circumscribed radii]
 
 
@@ -46,20 +50,68 @@ class KeyholeEnd:
 
     def chain(self) -> list[KeyholeEnd]:
         """The scenes that have led to this one, from the start on."""
-        found: list[KeyholeEnd] = []
-        at: KeyholeEnd | None = self
-        while at is not None:
-            found.append(at)
-            at = at.before
-        return found[::-1]
+        return [self] if self.before is None else [*self.before.chain(), self]
 
 
-@dataclass(order=True)
-class _Entry:
-    priority: float
-    number: int
-    rank: int = field(compare=False)
-    end: KeyholeEnd = field(compare=False)
+@dataclass(frozen=True)
+class LinePush:
+    """Where a push begins.
+
+    Args:
+        object_index: of the object that is pushed.
+        start: (3,) pose of the robot, whose disc touches the face.
+        lead: distance from there to the contact [m].
+    """
+
+    object_index: int
+    start: FloatArray
+    lead: float
+
+    def path(self, length: float, size: float) -> FloatArray:
+        """(N, 3) poses from the start to the contact, which has index `_CONTACT`, and on.
+
+        Args:
+            length: of the push itself [m].
+            size: circumscribed radius of the robot [m].
+        """
+        lead = np.linspace(0.0, self.lead, _CONTACT + 1)
+        on = self.lead + np.arange(1, round(length / (_SPACING * size)) + 1) * _SPACING * size
+        return straight(self.start, np.concatenate([lead, on]))
+
+
+def straight(pose: FloatArray, along: FloatArray) -> FloatArray:
+    """(N, 3) poses ahead of one (3,), by some distances (N,) [m], negative for behind."""
+    heading = np.array([np.cos(pose[2]), np.sin(pose[2])])
+    places = pose[:2] + along[:, None] * heading
+    return np.column_stack([places, np.full(len(along), pose[2])])
+
+
+def line_pushes(
+    world: World, k: int, pose: FloatArray, clearance: float, offsets: tuple[float, ...]
+) -> Iterator[LinePush]:
+    """The pushes of object ``k`` at a pose (3,): at each face, in its middle and beside it.
+
+    Args:
+        world: whose robot and objects they are.
+        k: index of the object.
+        pose: of the object.
+        clearance: of the robot's middle from the face at the start [m].
+        offsets: how far beside the middle, as fractions of half the face.
+    """
+    size = world.robot.circumscribed_radius
+    front = float(world.robot.vertices[:, 0].max())
+    c, s = np.cos(pose[2]), np.sin(pose[2])
+    corners = world.movables.outline(k) @ np.array([[c, s], [-s, c]]) + pose[:2]
+    for a, b in zip(corners, np.roll(corners, -1, axis=0), strict=True):
+        edge = b - a
+        length = float(np.hypot(*edge))
+        if length < _NARROW * size:
+            continue
+        out = np.array([edge[1], -edge[0]]) / length
+        heading = float(np.arctan2(-out[1], -out[0]))
+        for beside in offsets:
+            place = 0.5 * (a + b) + 0.5 * beside * edge + clearance * out
+            yield LinePush(k, np.array([*place, heading]), clearance - front)
 
 
 def suits_keyholes(world: World, config: KeyholeConfig) -> bool:
@@ -133,7 +185,8 @@ class KeyholeSearch:
         self._bare = footprint(world.robot)
         self._walls = obstacles(world.static)
         self._numbers = itertools.count()
-        self._open: list[_Entry] = []
+        self._open: list[tuple[float, int, int, KeyholeEnd]] = []
+        """Priority, running number, rank and scene."""
         self._seen: set[bytes] = set()
 
     @property
@@ -152,18 +205,16 @@ class KeyholeSearch:
             return None
         self._put(start)
         while self._open:
-            entry = heapq.heappop(self._open)
-            if entry.end.state.is_open:
-                return entry.end
+            priority, _, rank, end = heapq.heappop(self._open)
+            if end.state.is_open:
+                return end
             self.expansions += 1
-            for end in self._expand(entry.end, entry.rank):
-                self._put(end)
+            for new in self._expand(end, rank):
+                self._put(new)
             go_on(self._space.stopped)
-            if entry.rank < 2:
-                later = entry.priority + self.config.rank_cost * self._size
-                heapq.heappush(
-                    self._open, _Entry(later, next(self._numbers), entry.rank + 1, entry.end)
-                )
+            if rank < 2:
+                later = priority + self.config.rank_cost * self._size
+                heapq.heappush(self._open, (later, next(self._numbers), rank + 1, end))
         return None
 
     def _start(self) -> KeyholeEnd | None:
@@ -173,7 +224,7 @@ class KeyholeSearch:
         steps = np.arange(0.0, _LEAVING, self.config.cell)
         for length in sorted([*steps, *-steps[1:]], key=abs):
             go_on(self._space.stopped)
-            along = np.linspace(0.0, length * self._size, 2 + int(abs(length) / SPACING))
+            along = np.linspace(0.0, length * self._size, 2 + int(abs(length) / _SPACING))
             path = straight(robot, along)
             if not state.is_free(path[-1]) or self._hits_wall(path):
                 continue
@@ -198,7 +249,7 @@ class KeyholeSearch:
         self._seen.add(key)
         left, _ = state.relaxed
         if math.isfinite(left):
-            heapq.heappush(self._open, _Entry(end.cost + left, next(self._numbers), 0, end))
+            heapq.heappush(self._open, (end.cost + left, next(self._numbers), 0, end))
 
     def _expand(self, end: KeyholeEnd, rank: int) -> Iterator[KeyholeEnd]:
         """The scenes that one push leads to, of the objects of a rank."""
@@ -236,8 +287,8 @@ class KeyholeSearch:
         scene = self.world.moved(robot_pose=path[0], movable_poses=end.state.poses)
         swept = self.interaction.sweep(scene, path[: max(free, 1)])
         last = free - 1 if swept.jammed_at < 0 else swept.jammed_at - 1
-        step = max(1, round(config.step / SPACING))
-        ends = list(range(CONTACT + step, last + 1, step))
+        step = max(1, round(config.step / _SPACING))
+        ends = list(range(_CONTACT + step, last + 1, step))
         left = 2  # the first place that is open, and one beyond
         for n in ends:
             go_on(self._space.stopped)

@@ -13,7 +13,12 @@ from pushplan.control.recovery import warm_up_recovery
 from pushplan.geometry import VisibilityGraph
 from pushplan.planners.pushing import PushPath
 from pushplan.planners.rearrangement.push_execution import GeometricPusher, PathPush
-from pushplan.planners.rearrangement.push_scene import PushScene, heading_axes, initial_heading
+from pushplan.planners.rearrangement.push_scene import (
+    PushScene,
+    check_world,
+    heading_axes,
+    initial_heading,
+)
 from pushplan.planners.rearrangement.rearrangement_config import RearrangementConfig
 from pushplan.world import StaticMap, Twist, World
 from pushplan.world.checks import FloatArray, expect
@@ -91,6 +96,7 @@ class GreedyPusher:
         Raises:
             InvalidInputError: if the goal is one for the robot, or the robot cannot stop.
         """
+        check_world(world)
         return self._clock.command_for(world, self._act)
 
     def _act(self, world: World) -> Twist:

@@ -18,7 +18,7 @@ from pushplan.planners.rearrangement.push_choice import (
 )
 from pushplan.planners.rearrangement.push_execution import ExecutionEnd, PushExecution
 from pushplan.planners.rearrangement.push_graph import PushGraph
-from pushplan.planners.rearrangement.push_scene import PushScene
+from pushplan.planners.rearrangement.push_scene import PushScene, check_world
 from pushplan.planners.rearrangement.rearrangement_config import RearrangementConfig
 from pushplan.planners.rearrangement.rollout_cache import RolloutCache
 from pushplan.world import InvalidInputError, Plan, PlanningExecutor, Stop, Twist, World
@@ -113,6 +113,7 @@ class GtspMpc:
         Raises:
             InvalidInputError: if the goal is one for the robot, or the robot cannot stop.
         """
+        check_world(world)
         return self._clock.command_for(world, self._act)
 
     def _act(self, world: World) -> Twist:

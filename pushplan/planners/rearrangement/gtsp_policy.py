@@ -11,7 +11,7 @@ from pushplan.control import EpisodeClock, LegFollower, Legs, clamp_twist
 from pushplan.geometry import VisibilityGraph
 from pushplan.gtsp import solve_gtsp
 from pushplan.motion.keep_out import keep_out
-from pushplan.planners.rearrangement.push_scene import PushScene, open_edges
+from pushplan.planners.rearrangement.push_scene import PushScene, check_world, open_edges
 from pushplan.planners.rearrangement.rearrangement_config import RearrangementConfig
 from pushplan.world import ClearanceArea, MaxIterations, Receptacle, Twist, World
 from pushplan.world.checks import FloatArray, expect
@@ -57,6 +57,7 @@ class Gtsp:
         Raises:
             InvalidInputError: if the goal is one for the robot, or the robot cannot stop.
         """
+        check_world(world)
         return self._clock.command_for(world, self._act)
 
     def _act(self, world: World) -> Twist:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import math
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -36,15 +37,11 @@ class ObjectPaths:
 
     def __init__(self, static: StaticMap, goal: Goal) -> None:
         assert isinstance(goal, Receptacle | ClearanceArea)
-        self._static, self._goal = static, goal
-        self._plain = goal_distances(static, goal)
-        self._distances = functools.cache(self._towards)
-        self.length = functools.lru_cache(_KEPT)(self._length)
+        plain = goal_distances(static, goal)
+        self.length = functools.lru_cache(_KEPT)(lambda x, y: plain.path_from((x, y)).length)
         """Shortest path of a point (x, y) to the goal [m]; inf if there is none."""
-        self._paths = functools.lru_cache(_KEPT)(self._path)
-
-    def _length(self, x: float, y: float) -> float:
-        return self._plain.path_from((x, y)).length
+        distances = functools.cache(functools.partial(_distances, static, goal))
+        self._paths = functools.lru_cache(_KEPT)(functools.partial(_path, goal, distances))
 
     def path(
         self, point: FloatArray, radius: float, clearance: float, deep: bool = False
@@ -59,29 +56,37 @@ class ObjectPaths:
         """
         return self._paths(*point.tolist(), round(radius, 9), clearance, deep)
 
-    def _path(
-        self, x: float, y: float, radius: float, clearance: float, deep: bool
-    ) -> FloatArray | None:
-        distances = self._distances(radius, clearance, deep)
-        if distances is None:
-            return None
-        path = distances.path_from((x, y))
-        if not math.isfinite(path.length):
-            return None
-        points = path.points
-        if isinstance(self._goal, Receptacle):  # on to its far side, where it may be pushed
-            middle, last = self._goal.polygon.mean(axis=0), points[-1]
-            points = np.concatenate([points, (middle + 0.6 * (middle - last))[None]])
-        steps = np.hypot(*np.diff(points, axis=0).T)
-        points = points[np.concatenate([[True], steps > 1e-6 * radius])]
-        return np.ascontiguousarray(points) if len(points) > 1 else None
 
-    def _towards(self, radius: float, clearance: float, deep: bool) -> GoalDistances | None:
-        goals = done_places(self._goal, radius, _INSET)
-        if isinstance(self._goal, Receptacle) and (deep or goals is None):
-            middle = self._goal.polygon.mean(axis=0)
-            goals = [np.stack([middle, middle])]
-        return None if goals is None else goal_distances(self._static, goals, clearance=clearance)
+def _distances(
+    static: StaticMap, goal: Goal, radius: float, clearance: float, deep: bool
+) -> GoalDistances | None:
+    places = done_places(goal, radius, _INSET)
+    if isinstance(goal, Receptacle) and (deep or places is None):
+        middle = goal.polygon.mean(axis=0)
+        places = [np.stack([middle, middle])]
+    return None if places is None else goal_distances(static, places, clearance=clearance)
+
+
+def _path(
+    goal: Goal,
+    distances: Callable[[float, float, bool], GoalDistances | None],
+    x: float,
+    y: float,
+    radius: float,
+    clearance: float,
+    deep: bool,
+) -> FloatArray | None:
+    towards = distances(radius, clearance, deep)
+    path = None if towards is None else towards.path_from((x, y))
+    if path is None or not math.isfinite(path.length):
+        return None
+    points = path.points
+    if isinstance(goal, Receptacle):  # on to its far side, where it may be pushed
+        middle, last = goal.polygon.mean(axis=0), points[-1]
+        points = np.concatenate([points, (middle + 0.6 * (middle - last))[None]])
+    steps = np.hypot(*np.diff(points, axis=0).T)
+    points = points[np.concatenate([[True], steps > 1e-6 * radius])]
+    return np.ascontiguousarray(points) if len(points) > 1 else None
 
 
 @functools.lru_cache(maxsize=8)

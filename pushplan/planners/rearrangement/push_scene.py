@@ -143,6 +143,11 @@ def _fit_of(
     return footprint(robot, margin), obstacles(static)
 
 
+def check_world(world: World) -> None:
+    """Refuse what no push can be made for; see `check_pusher`."""
+    check_pusher(world, "pushing objects")
+
+
 @functools.lru_cache(maxsize=8)
 def make_object_goal(goal: Goal, static: StaticMap, slack: float) -> ObjectGoal:
     """The goal for kernels. Sides of a receptacle that lie on the bounds do not count."""
@@ -212,7 +217,7 @@ class PushScene:
     budget: SearchBudget = field(default_factory=SearchBudget)
 
     def __post_init__(self) -> None:
-        check_pusher(self.world, "pushing objects")
+        check_world(self.world)
 
     def changed(self, **values: Any) -> PushScene:
         """The same with other fields, or with other values of what is worked out from them."""

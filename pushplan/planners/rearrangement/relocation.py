@@ -122,23 +122,14 @@ class _State:
         """Of the drive, and of what it leaves to be done [m]."""
         return self.driven + self.rest
 
-    def path(self) -> FloatArray:
-        """(N, 3) poses of the robot from the start on."""
-        tracks, state = [self.track], self.before
-        while state is not None:
-            tracks.append(state.track)
-            state = state.before
-        return np.concatenate(tracks[::-1])
-
-    @property
-    def first(self) -> _State:
-        """Where the drive begins."""
-        return self if self.before is None else self.before.first
+    def chain(self) -> list[_State]:
+        """The states that have led here, from the start on."""
+        return [self] if self.before is None else [*self.before.chain(), self]
 
     @property
     def start(self) -> FloatArray:
         """(3,) where the robot begins."""
-        start: FloatArray = self.first.track[0]
+        start: FloatArray = self.chain()[0].track[0]
         return start
 
 
@@ -153,8 +144,17 @@ class _RelocationSearch:
         self._slack = math.inf if thorough else _DEARER * scene.size
         self._horizon = _HORIZON * scene.size
         self._cost_to_go = scene.push_cost_to_go(float(scene.world.movables.radii[k]))
-        self._arcs = _arcs(scene)
-        self._steps = max(2, math.ceil(_ARC_LENGTH * scene.size / scene.controller.step))
+        step, turn = scene.controller.step, scene.controller.turn
+        signs = (1.0, -1.0) if scene.world.robot.min_speed != 0.0 else (1.0,)
+        arcs = [
+            (sign * step, curvature * step / scene.size)
+            for sign in signs
+            for curvature in self._config.curvatures
+        ]
+        self._arcs = np.array([*arcs, (0.0, 0.1), (0.0, -0.1)])
+        """(A, 2) distance [m], negative backward, and turn [rad] of one step of each arc."""
+        self._arcs[:, 1] = np.clip(self._arcs[:, 1], -turn, turn)
+        self._steps = max(2, math.ceil(_ARC_LENGTH * scene.size / step))
         self._open: list[tuple[float, int, _State]] = []
         self._seen: set[_Cell] = set()
         self._states: list[_State] = []
@@ -168,7 +168,8 @@ class _RelocationSearch:
             self._horizon = scene.longest
         now = float(self._rest(scene.poses[[k]])[0])
         for start in itertools.chain(self._behind(), self._around()):
-            away = self._approach_cost(start)
+            nodes, extra = arrival_poses(scene.fine.grid, start)
+            away = float((self._approach.costs[nodes] + extra).min()) if len(nodes) else math.inf
             if math.isfinite(away):
                 self._put(_State(None, start[None], scene.poses, 0, away, now))
         most, best = len(config.margins), math.inf
@@ -184,9 +185,9 @@ class _RelocationSearch:
                 if arrived is None:
                     continue
                 state = arrived
-            if state.depth and not self._has_moved(state):
-                continue
             if state.depth:
+                if pose_distance(state.poses[k], scene.poses[k], scene.size) < _LEAST_MOVE:
+                    continue
                 side, place = self._side(state), self._place(state)
                 if sides[side] < most and place not in self._failing:
                     self._failing[place] = self._failing_margins(state)
@@ -199,34 +200,24 @@ class _RelocationSearch:
                 alike[place] += 1
             expansions[state.depth > 0] += 1
             self._expand(state)
-        found = self._delivering()
-        if self._thorough or not found:
-            found += self._better(now)
+        found = [
+            (self._failing[self._place(state)] * scene.size, state)
+            for state in self._states
+            if state.depth and self._failing.get(self._place(state), most) < most
+        ]
+        """Ends of drives after which the object can be pushed home, with what that costs [m]."""
+        if self._thorough or not found:  # also those after which less is left to be done than now
+            gain = GAIN * (_LITTLE if self._thorough else 1.0)
+            found += [
+                (state.rest - float(scene.remaining(state.poses[[k]])[0]) + 2.0 * scene.size, state)
+                for state in self._states
+                if state.rest < now - gain * scene.size
+            ]
         return self._from_all_sides(found)
 
     def _put(self, state: _State) -> None:
         heapq.heappush(self._open, (state.cost, len(self._states), state))
         self._states.append(state)
-
-    def _delivering(self) -> list[tuple[float, _State]]:
-        """Ends of drives after which the object can be pushed home, with what that costs [m]."""
-        most = len(self._config.margins)
-        found: list[tuple[float, _State]] = []
-        for state in self._states:
-            failing = self._failing.get(self._place(state), most)
-            if state.depth and failing < most:
-                found.append((failing * self._scene.size, state))
-        return found
-
-    def _better(self, now: float) -> list[tuple[float, _State]]:
-        """Ends of drives after which less is left to be done than there is now [m]."""
-        size, gain = self._scene.size, GAIN * (_LITTLE if self._thorough else 1.0)
-        found: list[tuple[float, _State]] = []
-        for state in self._states:
-            if state.rest < now - gain * size:
-                left = float(self._scene.remaining(state.poses[[self._k]])[0])
-                found.append((state.rest - left + 2.0 * size, state))
-        return found
 
     def _from_all_sides(self, found: list[tuple[float, _State]]) -> list[Primitive]:
         """The best drives that begin in different places, of states with their extra cost [m]."""
@@ -234,21 +225,18 @@ class _RelocationSearch:
         for extra, state in sorted(found, key=lambda entry: entry[0] + entry[1].cost):
             side = self._side(state)
             if side not in sides:
-                sides[side] = state.path(), extra, self._moved_before(state.first)
+                chain = state.chain()
+                path = np.concatenate([one.track for one in chain])
+                sides[side] = path, extra, self._moved_before(chain[0].poses)
             if len(sides) == _MOST_SIDES:
                 break
         return list(sides.values())
 
-    def _approach_cost(self, start: FloatArray) -> float:
-        """What it costs to get to a start (3,) [m]."""
-        nodes, extra = arrival_poses(self._scene.fine.grid, start)
-        return float((self._approach.costs[nodes] + extra).min()) if len(nodes) else math.inf
-
-    def _moved_before(self, start: _State) -> dict[int, FloatArray]:
-        """Where the route to a start has moved objects to, by id."""
-        moved = np.flatnonzero((start.poses != self._scene.poses).any(axis=1))
+    def _moved_before(self, poses: FloatArray) -> dict[int, FloatArray]:
+        """Where the route to a start has moved objects to, by id, from their poses (K, 3) there."""
+        moved = (poses != self._scene.poses).any(axis=1)
         ids = self._scene.world.movables.ids[moved].tolist()
-        return dict(zip(ids, start.poses[moved], strict=True))
+        return dict(zip(ids, poses[moved], strict=True))
 
     def _arrived(self, state: _State) -> _State | None:
         """A start as the route to it leaves robot and objects; None if there is none."""
@@ -310,10 +298,6 @@ class _RelocationSearch:
         gone = poses[:, 0] >= 0.5 * REMOVED
         return np.where(gone, 0.0, self._cost_to_go.along(poses))
 
-    def _has_moved(self, state: _State) -> bool:
-        scene, k = self._scene, self._k
-        return pose_distance(state.poses[k], scene.poses[k], scene.size) >= _LEAST_MOVE
-
     def _failing_margins(self, state: _State) -> int:
         """How many of the margins a push home from where a state has the object does not stand."""
         config = self._config
@@ -374,15 +358,3 @@ class _RelocationSearch:
         poses = np.column_stack([x, y, heading])
         free = (pose for pose in poses if scene.fits(pose) and scene.is_clear(pose))
         return itertools.islice(free, _STARTS)
-
-
-def _arcs(scene: PushScene) -> FloatArray:
-    """(A, 2) distance [m], negative backward, and turn [rad] of one step of each arc."""
-    step, curvatures = scene.controller.step, scene.config.relocation.curvatures
-    signs = (1.0, -1.0) if scene.world.robot.min_speed != 0.0 else (1.0,)
-    arcs = [
-        (sign * step, curvature * step / scene.size) for sign in signs for curvature in curvatures
-    ]
-    out = np.array([*arcs, (0.0, 0.1), (0.0, -0.1)])
-    out[:, 1] = np.clip(out[:, 1], -scene.controller.turn, scene.controller.turn)
-    return out
