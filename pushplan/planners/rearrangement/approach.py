@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -12,10 +11,7 @@ import numpy as np
 from pushplan.control import Legs
 from pushplan.control.leg_follower import turn_to
 from pushplan.interaction.kernels import sweep_path
-from pushplan.motion.collision import footprint, obstacles
-from pushplan.motion.keep_out import keep_out
 from pushplan.planners.rearrangement.pose_grid_kernels import (
-    HEADINGS,
     PoseGrid,
     add_layers,
     near_poses,
@@ -26,7 +22,7 @@ from pushplan.planners.rearrangement.pose_search_kernels import (
     search_poses,
 )
 from pushplan.planners.rearrangement.push import Push
-from pushplan.planners.rearrangement.push_scene import MARGIN, ContactGrid, PushScene
+from pushplan.planners.rearrangement.push_scene import ContactGrid, PushScene
 from pushplan.planners.rearrangement.route_kernels import RouteProblem, cheapest_legs
 from pushplan.world.checks import FloatArray, IntArray
 
@@ -129,94 +125,76 @@ class Route(Legs):
     cost: float
 
 
-class RoutePlanner:
-    """Plans routes in one scene."""
+def find_route(
+    scene: PushScene, approach: ApproachTree, start: FloatArray, target: int = -1
+) -> Route | None:
+    """The route from the robot to the start of a push; None if there is none.
 
-    def __init__(self, scene: PushScene) -> None:
-        self.scene = scene
-        margin = MARGIN * scene.size
-        robot = scene.world.robot
-        self._problem = RouteProblem(
-            step=0.1 * scene.size,
-            turn_cost=scene.turn_cost,
-            arm=scene.arm,
-            shape=footprint(robot, margin),
-            tight=footprint(robot, 0.5 * margin),
-            among=obstacles(keep_out(scene.world)),
-            poses=scene.poses,
-            bodies=scene.bodies,
-            weights=scene.contact_weights,
-        )
-
-    def route(self, approach: ApproachTree, start: FloatArray, target: int = -1) -> Route | None:
-        """The route from the robot to the start (3,) of a push; None if there is none.
-
-        Args:
-            approach: from where the robot is.
-            start: (3,) where to get to.
-            target: index of the object that is to be pushed and must not be moved before; -1 if
-                none.
-        """
-        scene = self.scene
-        nodes, extra = arrival_poses(scene.fine.grid, start)
-        if not len(nodes):
-            return None
-        total = approach.costs[nodes] + extra
-        best = int(np.argmin(total))
-        if not math.isfinite(float(total[best])):
-            return None
-        chain = [int(nodes[best])]
-        while approach.before[chain[-1]] >= 0:
-            chain.append(int(approach.before[chain[-1]]))
-        poses = [_pose_at(scene.fine.grid, node) for node in reversed(chain)]
-        here, end = scene.world.robot_pose, float(start[2])
-        ahead = scene.size * np.array([math.cos(here[2]), math.sin(here[2])])
-        near = [here[:2], *(here[:2] + fraction * ahead for fraction in _AWAY)]
-        corners, every = _corners(poses), _places(poses)
-        around = target >= 0 and approach.target == target
-        problem = self._problem_with(target, around)
-        expected = _MORE * float(total[best]) + scene.size if around else math.inf
-        cheapest: Route | None = None
-        for last in ([start[:2]], []):  # it may be too near to a wall to turn there
-            for points, longest in ((corners, len(corners) + 1), (every, _LONGEST), (every, 1)):
-                through = np.array([*near, *points, *last])
-                found = _cheapest(through, float(here[2]), end, len(near), longest, problem)
-                if found is None or (cheapest is not None and found.cost >= cheapest.cost):
-                    continue
-                cheapest = found
-                if found.cost <= expected:  # else it has left the lattice's path for a worse one
-                    return found
-        return cheapest
-
-    def poses_along(self, route: Route) -> FloatArray:
-        """(N, 3) poses on the route, close enough together for a prediction."""
-        here: FloatArray = self.scene.world.robot_pose
-        found = [here[None]]
-        for point, sign, turn in zip(route.points, route.signs, route.turns[:-1], strict=True):
-            dx, dy = (sign * (point - here[:2])).tolist()
-            if math.hypot(dx, dy) > 1e-9:
-                found.append(_turned(here, math.atan2(dy, dx), turn))
-                here = np.array([point[0], point[1], found[-1][-1, 2]])
-                found.append(here[None])
-        assert route.heading is not None
-        found.append(_turned(here, route.heading, float(route.turns[-1])))
-        return np.concatenate(found)
-
-    def simulate(self, route: Route) -> tuple[FloatArray, FloatArray] | None:
-        """Poses of the robot (N, 3) and of the objects (N, K, 3) on a route; None if it jams."""
-        scene, path = self.scene, self.poses_along(route)
-        poses = scene.poses.copy()
-        out = np.empty((len(path), len(poses), 3))
-        jammed = sweep_path(path, poses, scene.bodies, scene.settings, out)
-        return None if jammed >= 0 else (path, out)
-
-    def _problem_with(self, target: int, around: bool) -> RouteProblem:
-        """The problem where object ``target`` must not be moved, or rather not."""
-        if target < 0:
-            return self._problem
-        weights, config = self._problem.weights.copy(), self.scene.config
+    Args:
+        scene: the scene.
+        approach: from where the robot is.
+        start: (3,) where to get to.
+        target: index of the object that is to be pushed and must not be moved before; -1 if
+            none.
+    """
+    grid, problem, config = scene.fine.grid, scene.route_problem, scene.config
+    nodes, extra = arrival_poses(grid, start)
+    if not len(nodes):
+        return None
+    total = approach.costs[nodes] + extra
+    best = int(np.argmin(total))
+    if not math.isfinite(float(total[best])):
+        return None
+    chain = [int(nodes[best])]
+    while approach.before[chain[-1]] >= 0:
+        chain.append(int(approach.before[chain[-1]]))
+    _, rows, columns = np.unravel_index(chain[::-1], grid.blocked.shape)
+    places = np.column_stack([grid.x + columns * grid.step, grid.y + rows * grid.step])
+    every = places[np.concatenate([[True], (places[1:] != places[:-1]).any(axis=1)])]
+    corners = _corners(places)
+    here, end = scene.world.robot_pose, float(start[2])
+    ahead = scene.size * np.array([math.cos(here[2]), math.sin(here[2])])
+    near = [here[:2], *(here[:2] + fraction * ahead for fraction in _AWAY)]
+    around = target >= 0 and approach.target == target
+    if target >= 0:
+        weights = problem.weights.copy()
         weights[target] += config.around_cost if around else config.target_cost
-        return self._problem._replace(weights=weights)
+        problem = problem._replace(weights=weights)
+    expected = _MORE * float(total[best]) + scene.size if around else math.inf
+    cheapest: Route | None = None
+    for last in ([start[:2]], []):  # it may be too near to a wall to turn there
+        for points, longest in ((corners, len(corners) + 1), (every, _LONGEST), (every, 1)):
+            through = np.array([*near, *points, *last])
+            found = _cheapest(through, float(here[2]), end, len(near), longest, problem)
+            if found is None or (cheapest is not None and found.cost >= cheapest.cost):
+                continue
+            cheapest = found
+            if found.cost <= expected:  # else it has left the lattice's path for a worse one
+                return found
+    return cheapest
+
+
+def poses_along(scene: PushScene, route: Route) -> FloatArray:
+    """(N, 3) poses on a route, close enough together for a prediction."""
+    here: FloatArray = scene.world.robot_pose
+    found = [here[None]]
+    for point, sign, turn in zip(route.points, route.signs, route.turns[:-1], strict=True):
+        dx, dy = (sign * (point - here[:2])).tolist()
+        if math.hypot(dx, dy) > 1e-9:
+            found.append(_turned(here, math.atan2(dy, dx), turn))
+            here = np.array([point[0], point[1], found[-1][-1, 2]])
+            found.append(here[None])
+    assert route.heading is not None
+    found.append(_turned(here, route.heading, float(route.turns[-1])))
+    return np.concatenate(found)
+
+
+def simulate_route(scene: PushScene, route: Route) -> tuple[FloatArray, FloatArray] | None:
+    """Poses of the robot (N, 3) and of the objects (N, K, 3) on a route; None if it jams."""
+    path, poses = poses_along(scene, route), scene.poses.copy()
+    out = np.empty((len(path), len(poses), 3))
+    jammed = sweep_path(path, poses, scene.bodies, scene.settings, out)
+    return None if jammed >= 0 else (path, out)
 
 
 def _cheapest(
@@ -245,12 +223,6 @@ def _cheapest(
     )
 
 
-def _pose_at(grid: PoseGrid, node: int) -> FloatArray:
-    """(3,) the pose of a flat index."""
-    t, i, j = np.unravel_index(node, grid.blocked.shape)
-    return np.array([grid.x + j * grid.step, grid.y + i * grid.step, HEADINGS[t]])
-
-
 def _turned(here: FloatArray, to: float, turn: float) -> FloatArray:
     """Poses (N, 3) of a turn on the spot after ``here``, close enough for a prediction."""
     angle = turn_to(float(here[2]), to, turn)
@@ -260,26 +232,17 @@ def _turned(here: FloatArray, to: float, turn: float) -> FloatArray:
     return poses
 
 
-def _places(poses: list[FloatArray]) -> list[FloatArray]:
-    """The points that the lattice's path comes by."""
-    points = [pose[:2] for pose in poses]
-    return points[:1] + [
-        point for before, point in itertools.pairwise(points) if (before != point).any()
-    ]
-
-
-def _corners(poses: list[FloatArray]) -> list[FloatArray]:
-    """The corners of the lattice's path, and the middles of long legs."""
-    points = [poses[0][:2]]
-    for before, here, after in zip(poses, poses[1:], poses[2:], strict=False):
-        one, two = here[:2] - before[:2], after[:2] - here[:2]
-        if not one.any() or not two.any():
-            if np.hypot(*(here[:2] - points[-1])) > 0.0:
-                points.append(here[:2])
-        elif abs(one[0] * two[1] - one[1] * two[0]) > 1e-9 or float(one @ two) < 0.0:
-            points.append(here[:2])
-    if np.hypot(*(poses[-1][:2] - points[-1])) > 0.0:
-        points.append(poses[-1][:2])
+def _corners(places: FloatArray) -> list[FloatArray]:
+    """The corners of the lattice's path through places (N, 2), and the middles of long legs."""
+    points = [places[0]]
+    for before, here, after in zip(places, places[1:], places[2:], strict=False):
+        one, two = here - before, after - here
+        bends = abs(one[0] * two[1] - one[1] * two[0]) > 1e-9 or float(one @ two) < 0.0
+        stands = not one.any() or not two.any()
+        if (bends or stands) and (here != points[-1]).any():
+            points.append(here)
+    if (places[-1] != points[-1]).any():
+        points.append(places[-1])
     while len(points) > _MOST:
         points = points[:1] + points[1:-1:2] + points[-1:]
     return points

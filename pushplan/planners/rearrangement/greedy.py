@@ -4,24 +4,22 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
-from pushplan.control import EpisodeClock, LegFollower, Legs, Recovery
+from pushplan.control import LegFollower, Legs, Recovery
 from pushplan.control.recovery import warm_up_recovery
 from pushplan.geometry import VisibilityGraph
 from pushplan.planners.pushing import PushPath
+from pushplan.planners.rearrangement.object_policy import ObjectPolicy
 from pushplan.planners.rearrangement.push_execution import GeometricPusher, PathPush
 from pushplan.planners.rearrangement.push_scene import (
     PushScene,
-    check_world,
     heading_axes,
     initial_heading,
 )
-from pushplan.planners.rearrangement.rearrangement_config import RearrangementConfig
 from pushplan.world import StaticMap, Twist, World
-from pushplan.world.checks import FloatArray, expect
+from pushplan.world.checks import FloatArray
 
 _OPTIONS = 8  # how many places to push a box from are tried before the first comes again
 _RETREAT = 0.6  # how far the robot backs off after a push [circumscribed radii]
@@ -53,7 +51,7 @@ class _Attempt:
     pushing: bool = False
 
 
-class GreedyPusher:
+class GreedyPusher(ObjectPolicy):
     """Takes the nearest box that is not done, drives behind it and pushes until it is done.
 
     Behind means opposite to the box's shortest path around static things to its goal; where the
@@ -65,23 +63,12 @@ class GreedyPusher:
         config: settings; of these, ``response`` counts.
     """
 
-    actions = ("velocity",)
-    goal_kind = "objects"
-
-    def __init__(self, config: RearrangementConfig | None = None) -> None:
-        self.config = expect("config", config or RearrangementConfig(), RearrangementConfig)
-        self._forget()
-
     def _forget(self) -> None:
+        super()._forget()
         self._attempt: _Attempt | None = None
         self._failures: dict[int, int] = {}
         self._away: Recovery | None = None
         self._wait_until = -math.inf
-        self._clock = EpisodeClock(self.config.response)
-
-    def reset(self, world: World, rng: np.random.Generator) -> None:
-        """Forget the last episode."""
-        self._forget()
 
     def warm_up(self) -> None:
         """Load the kernels that an episode may need."""
@@ -89,15 +76,6 @@ class GreedyPusher:
 
         warm_up_recovery()
         kernel_warmup.drive_in_small_worlds(GreedyPusher)
-
-    def act(self, world: World, observation: Any = None) -> Twist:
-        """The velocity for this step; stops when every box is done.
-
-        Raises:
-            InvalidInputError: if the goal is one for the robot, or the robot cannot stop.
-        """
-        check_world(world)
-        return self._clock.command_for(world, self._act)
 
     def _act(self, world: World) -> Twist:
         command = self._retreat(world) or self._work(PushScene(world, self.config))

@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from pushplan.control import EpisodeClock, ImmediateExecutor, PoseFollower, Retreat
+from pushplan.control import ImmediateExecutor, PoseFollower, Retreat
+from pushplan.planners.rearrangement.object_policy import ObjectPolicy
 from pushplan.planners.rearrangement.push import Push, PushHistory, push_plan, signature
 from pushplan.planners.rearrangement.push_choice import (
     PendingChoice,
@@ -18,7 +19,7 @@ from pushplan.planners.rearrangement.push_choice import (
 )
 from pushplan.planners.rearrangement.push_execution import ExecutionEnd, PushExecution
 from pushplan.planners.rearrangement.push_graph import PushGraph
-from pushplan.planners.rearrangement.push_scene import PushScene, check_world
+from pushplan.planners.rearrangement.push_scene import PushScene
 from pushplan.planners.rearrangement.rearrangement_config import RearrangementConfig
 from pushplan.planners.rearrangement.rollout_cache import RolloutCache
 from pushplan.world import InvalidInputError, Plan, PlanningExecutor, Stop, Twist, World
@@ -27,7 +28,7 @@ from pushplan.world.checks import FloatArray, expect
 _RETREAT = 0.3  # how far the robot backs off where it is stuck [circumscribed radii]
 
 
-class GtspMpc:
+class GtspMpc(ObjectPolicy):
     """Clears or delivers objects: which next, from which side, together with which others.
 
     After every push the push graph is built anew from what is seen, and the order of pushes
@@ -48,9 +49,6 @@ class GtspMpc:
         graph: the graph that they come from.
     """
 
-    actions = ("velocity",)
-    goal_kind = "objects"
-
     def __init__(
         self,
         config: RearrangementConfig | None = None,
@@ -62,11 +60,11 @@ class GtspMpc:
             raise InvalidInputError("give either a config or fields of one, not both")
         if config is None:
             config = RearrangementConfig.of(**overrides)
-        self.config = expect("config", config, RearrangementConfig)
         self.stop = None if stop is None else expect("stop", stop, Stop)  # type: ignore[type-abstract]
-        self._forget()
+        super().__init__(config)
 
     def _forget(self) -> None:
+        super()._forget()
         self._executor: PlanningExecutor = ImmediateExecutor()
         self._choosing: PendingChoice | None = None
         self._execution: PushExecution | None = None
@@ -78,7 +76,6 @@ class GtspMpc:
         self._way_at_end = math.inf
         self._recovered_from: FloatArray | None = None
         self._stopped_at: PushScene | None = None
-        self._clock = EpisodeClock(self.config.response)
         self.given_up: dict[int, str] = {}
         self.plan: tuple[Push, ...] = ()
         self.current_plan: Plan | None = None
@@ -89,7 +86,7 @@ class GtspMpc:
         self._forget_choice()
         if self._execution is not None:
             self._execution.abandon()
-        self._forget()
+        super().reset(world, rng)
 
     def plan_with(self, executor: PlanningExecutor) -> None:
         """See `pushplan.world.PlansBesideDriving`."""
@@ -106,15 +103,6 @@ class GtspMpc:
         kernel_warmup.warm_up_rearrangement()
         kernel_warmup.warm_up_steering()
         kernel_warmup.drive_in_small_worlds(GtspMpc)
-
-    def act(self, world: World, observation: Any = None) -> Twist:
-        """The velocity for this step; stops when nothing is left to be done.
-
-        Raises:
-            InvalidInputError: if the goal is one for the robot, or the robot cannot stop.
-        """
-        check_world(world)
-        return self._clock.command_for(world, self._act)
 
     def _act(self, world: World) -> Twist:
         scene = PushScene(world, self.config, self._cache)

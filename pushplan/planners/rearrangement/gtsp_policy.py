@@ -3,21 +3,20 @@
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
 
-from pushplan.control import EpisodeClock, LegFollower, Legs, clamp_twist
+from pushplan.control import LegFollower, Legs, clamp_twist
 from pushplan.geometry import VisibilityGraph
 from pushplan.gtsp import solve_gtsp
 from pushplan.motion.keep_out import keep_out
-from pushplan.planners.rearrangement.push_scene import PushScene, check_world, open_edges
-from pushplan.planners.rearrangement.rearrangement_config import RearrangementConfig
+from pushplan.planners.rearrangement.object_policy import ObjectPolicy
+from pushplan.planners.rearrangement.push_scene import PushScene, open_edges
 from pushplan.world import ClearanceArea, MaxIterations, Receptacle, Twist, World
-from pushplan.world.checks import FloatArray, expect
+from pushplan.world.checks import FloatArray
 
 
-class Gtsp:
+class Gtsp(ObjectPolicy):
     """Plans once and follows its path, as the policy of the Bench-Push paper does.
 
     Every object is a cluster; a node is a straight push of it across one open edge of the area, or
@@ -29,20 +28,9 @@ class Gtsp:
         config: settings; of the cost, nothing is used.
     """
 
-    actions = ("velocity",)
-    goal_kind = "objects"
-
-    def __init__(self, config: RearrangementConfig | None = None) -> None:
-        self.config = expect("config", config or RearrangementConfig(), RearrangementConfig)
-        self._forget()
-
     def _forget(self) -> None:
+        super()._forget()
         self._route_follower: LegFollower | None = None
-        self._clock = EpisodeClock(self.config.response)
-
-    def reset(self, world: World, rng: np.random.Generator) -> None:
-        """Forget the last episode."""
-        self._forget()
 
     def warm_up(self) -> None:
         """Load the kernels that an episode may need."""
@@ -50,15 +38,6 @@ class Gtsp:
 
         kernel_warmup.warm_up_rearrangement()
         kernel_warmup.drive_in_small_worlds(Gtsp)
-
-    def act(self, world: World, observation: Any = None) -> Twist:
-        """The velocity for this step; stops at the end of the path.
-
-        Raises:
-            InvalidInputError: if the goal is one for the robot, or the robot cannot stop.
-        """
-        check_world(world)
-        return self._clock.command_for(world, self._act)
 
     def _act(self, world: World) -> Twist:
         if self._route_follower is None:

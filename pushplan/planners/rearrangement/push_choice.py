@@ -13,10 +13,11 @@ from pushplan.motion.recovery_path import recovery_path
 from pushplan.planners.rearrangement.approach import (
     ApproachTree,
     Route,
-    RoutePlanner,
     approach_tree,
     arrivals_at,
+    find_route,
     search_approaches,
+    simulate_route,
 )
 from pushplan.planners.rearrangement.candidates import delivering_pushes, partial_pushes
 from pushplan.planners.rearrangement.goal_kernels import REMOVED
@@ -191,18 +192,17 @@ def _select(scene: PushScene, graph: PushGraph, penalty: Callable[[Push], float]
     """
     known: dict[int, SimulatedPush] = {}
     around: dict[int, ApproachTree] = {}
-    planner = RoutePlanner(scene)
 
     def simulated_cost(n: int) -> tuple[float, tuple[int, ...]] | None:
         if scene.budget.is_used_up and any(math.isfinite(one.cost) for one in known.values()):
             return None
         push = graph.pushes[n]
         target = scene.index_of(push.target)
-        found = _simulated(planner, graph.approach, push, target)
+        found = _simulated(scene, graph.approach, push, target)
         if found is None or not math.isfinite(found.cost):
             if target not in around:
                 around[target] = approach_tree(scene, target)
-            found = _simulated(planner, around[target], push, target) or found
+            found = _simulated(scene, around[target], push, target) or found
         if found is None:
             return math.inf, ()
         known[n] = found
@@ -215,17 +215,17 @@ def _select(scene: PushScene, graph: PushGraph, penalty: Callable[[Push], float]
 
 
 def _simulated(
-    planner: RoutePlanner, approach: ApproachTree, push: Push, target: int
+    scene: PushScene, approach: ApproachTree, push: Push, target: int
 ) -> SimulatedPush | None:
     """A push as the route to it leaves robot and objects; None if there is no route."""
-    route = planner.route(approach, push.start, target)
+    route = find_route(scene, approach, push.start, target)
     if route is None:
         return None
-    driven = planner.simulate(route)
+    driven = simulate_route(scene, route)
     if driven is not None:
         path, objects = driven
         spent = path_lengths(objects)
-        ends = resimulate(planner.scene, push, path[-1], objects[-1].copy(), spent)
+        ends = resimulate(scene, push, path[-1], objects[-1].copy(), spent)
         for end in ends:
             if push.relocates or set(push.delivers) <= set(end.delivers):
                 return SimulatedPush(path_length(path[:, :2]) + end.cost, route, end)

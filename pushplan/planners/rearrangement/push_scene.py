@@ -22,6 +22,7 @@ from pushplan.motion.collision import (
     is_free,
     obstacles,
 )
+from pushplan.motion.keep_out import keep_out
 from pushplan.planners.arguments import check_pusher
 from pushplan.planners.rearrangement.controller_kernels import PushingController, along_path
 from pushplan.planners.rearrangement.goal_kernels import ObjectGoal, all_done
@@ -42,6 +43,7 @@ from pushplan.planners.rearrangement.pose_grid_kernels import (
 from pushplan.planners.rearrangement.push_pose_kernels import pose_behind_outline
 from pushplan.planners.rearrangement.rearrangement_config import RearrangementConfig
 from pushplan.planners.rearrangement.rollout_cache import RolloutCache
+from pushplan.planners.rearrangement.route_kernels import RouteProblem
 from pushplan.world import ClearanceArea, Goal, Receptacle, RobotModel, StaticMap, Stop, World
 from pushplan.world.checks import BoolArray, FloatArray, frozen
 from pushplan.world.outline import outward_normals
@@ -235,7 +237,7 @@ class PushScene:
         The world, and with it where the robot is, stays as it is.
         """
         moved = self.changed(poses=np.ascontiguousarray(poses), cache=None)
-        for name in ("done", "remaining_now", "fine", "coarse"):
+        for name in ("done", "remaining_now", "fine", "coarse", "route_problem"):
             moved.__dict__.pop(name, None)
         return moved
 
@@ -353,6 +355,22 @@ class PushScene:
         grid = make_pose_grid(robot, static, step, away)
         shape, _ = _fit_of(robot, static, away)
         return ContactGrid(grid, contact_depths(grid, shape, self.poses, self.bodies))
+
+    @cached_property
+    def route_problem(self) -> RouteProblem:
+        """The costs of legs and turns on the way to a push."""
+        robot, margin = self.world.robot, MARGIN * self.size
+        return RouteProblem(
+            step=0.1 * self.size,
+            turn_cost=self.turn_cost,
+            arm=self.arm,
+            shape=footprint(robot, margin),
+            tight=footprint(robot, 0.5 * margin),
+            among=obstacles(keep_out(self.world)),
+            poses=self.poses,
+            bodies=self.bodies,
+            weights=self.contact_weights,
+        )
 
     @cached_property
     def longest(self) -> float:

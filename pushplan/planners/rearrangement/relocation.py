@@ -21,9 +21,10 @@ import numpy as np
 
 from pushplan.planners.rearrangement.approach import (
     ApproachTree,
-    RoutePlanner,
     approach_tree,
     arrival_poses,
+    find_route,
+    simulate_route,
 )
 from pushplan.planners.rearrangement.arc_kernels import sweep_arcs
 from pushplan.planners.rearrangement.candidates import GAIN, can_be_pushed
@@ -241,16 +242,12 @@ class _RelocationSearch:
     def _arrived(self, state: _State) -> _State | None:
         """A start as the route to it leaves robot and objects; None if there is none."""
         for tree in (self._approach, self._around_object):
-            route = self._routes.route(tree, state.start, self._k)
-            driven = None if route is None else self._routes.simulate(route)
+            route = find_route(self._scene, tree, state.start, self._k)
+            driven = None if route is None else simulate_route(self._scene, route)
             if driven is not None:
                 path, objects = driven
                 return replace(state, track=path[-1:], poses=objects[-1].copy())
         return None
-
-    @cached_property
-    def _routes(self) -> RoutePlanner:
-        return RoutePlanner(self._scene)
 
     @cached_property
     def _around_object(self) -> ApproachTree:

@@ -10,7 +10,12 @@ from conftest import make_boxes
 
 from pushplan.control import LegFollower
 from pushplan.planners.rearrangement import PushScene, RearrangementConfig
-from pushplan.planners.rearrangement.approach import RoutePlanner, approach_tree
+from pushplan.planners.rearrangement.approach import (
+    approach_tree,
+    find_route,
+    poses_along,
+    simulate_route,
+)
 from pushplan.world import Receptacle, StaticMap, World, box_delivery_robot
 from pushplan.world.outline import transform
 from pushplan.world.polyline import path_lengths
@@ -80,7 +85,7 @@ def test_ways_among_columns_touch_nothing():
         if not (scene.fits(pose) and scene.is_clear(pose) and scene.fits(target)):
             continue
         asked += 1
-        route = RoutePlanner(scene).route(approach_tree(scene), target)
+        route = find_route(scene, approach_tree(scene), target)
         if route is None:
             continue
         found += 1
@@ -97,7 +102,7 @@ def test_ways_among_columns_touch_nothing():
 def test_where_there_is_room_to_turn_one_way_only_it_is_taken(y, heading, to, turn):
     """Near a wall, or a column: its wide bumper cannot pass on the side that is near."""
     scene = among_columns((-0.1, y, heading))
-    route = RoutePlanner(scene).route(approach_tree(scene), np.array([-0.1, y, to]))
+    route = find_route(scene, approach_tree(scene), np.array([-0.1, y, to]))
     assert np.ptp(route.points, axis=0).max() < 0.1
     assert route.turns[-1] in (0, turn)
     poses = driven(scene, route)
@@ -107,9 +112,8 @@ def test_where_there_is_room_to_turn_one_way_only_it_is_taken(y, heading, to, tu
 
 def test_the_way_that_is_predicted_is_the_one_that_is_driven():
     scene = among_columns((-0.1, -1.94, 0.0))
-    router = RoutePlanner(scene)
-    route = router.route(approach_tree(scene), np.array([-0.1, -1.94, -3.0]))
-    predicted, poses = router.poses_along(route), driven(scene, route)
+    route = find_route(scene, approach_tree(scene), np.array([-0.1, -1.94, -3.0]))
+    predicted, poses = poses_along(scene, route), driven(scene, route)
     assert np.abs(predicted[-1] - poses[-1]).max() < 0.05
 
 
@@ -118,7 +122,7 @@ def test_out_of_a_wall_but_not_into_it():
     robot = box_delivery_robot()
     reach = float(robot.vertices[:, 0].max())
     scene = among_columns((-0.1, 0.5 + reach - 0.005, -0.5 * math.pi))
-    route = RoutePlanner(scene).route(approach_tree(scene), np.array([-0.1, 2.5, 0.0]))
+    route = find_route(scene, approach_tree(scene), np.array([-0.1, 2.5, 0.0]))
     poses = driven(scene, route)
     assert touched(scene, poses) <= touched(scene, poses[:1]) + 1e-9
     assert touched(scene, poses[-1:]) == 0.0
@@ -131,8 +135,8 @@ def test_a_robot_drives_off_the_box_that_it_has_pushed_before_it_turns(heading, 
     alone = among_columns((0.0, 2.0, heading))
     at = alone.world.robot_pose[:2] + (alone.front + 0.5) * ahead
     world = replace(alone.world, movables=make_boxes([(*at, heading)]))
-    planner = RoutePlanner(PushScene(world, RearrangementConfig()))
-    route = planner.route(approach_tree(planner.scene), np.array(to))
-    simulated = planner.simulate(route)
+    scene = PushScene(world, RearrangementConfig())
+    route = find_route(scene, approach_tree(scene), np.array(to))
+    simulated = simulate_route(scene, route)
     assert simulated is not None
     assert path_lengths(simulated[1]).max() < 0.02

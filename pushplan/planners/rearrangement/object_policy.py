@@ -1,0 +1,50 @@
+"""`ObjectPolicy`: what the policies for goals of objects have in common."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from typing import Any
+
+import numpy as np
+
+from pushplan.control import EpisodeClock
+from pushplan.planners.rearrangement.push_scene import check_world
+from pushplan.planners.rearrangement.rearrangement_config import RearrangementConfig
+from pushplan.world import Twist, World
+from pushplan.world.checks import expect
+
+
+class ObjectPolicy(ABC):
+    """Refuses what no push can be made for, and chooses one command for each instant.
+
+    Args:
+        config: settings.
+    """
+
+    actions = ("velocity",)
+    goal_kind = "objects"
+
+    def __init__(self, config: RearrangementConfig | None = None) -> None:
+        self.config = expect("config", config or RearrangementConfig(), RearrangementConfig)
+        self._forget()
+
+    def reset(self, world: World, rng: np.random.Generator) -> None:
+        """Forget the last episode."""
+        self._forget()
+
+    def act(self, world: World, observation: Any = None) -> Twist:
+        """The velocity for this step; stops when nothing is left to be done.
+
+        Raises:
+            InvalidInputError: if the goal is one for the robot, or the robot cannot stop.
+        """
+        check_world(world)
+        return self._clock.command_for(world, self._act)
+
+    def _forget(self) -> None:
+        """Begin an episode."""
+        self._clock = EpisodeClock(self.config.response)
+
+    @abstractmethod
+    def _act(self, world: World) -> Twist:
+        """The velocity for an instant."""
