@@ -22,6 +22,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+import shapely
 
 from benchmarks.reporting import command_line
 from pushplan.envs.registry import SIMULATORS
@@ -188,6 +189,7 @@ def drive(
     model = PushModel(setting.robot, setting.side * SQUARE, setting.parameters)
     length, half = model.reach, model.bumper.half
     path = PushPath.arcs(np.zeros(3), [(a * length, b / length) for a, b in CURVES[pieces]])
+    way = shapely.LineString(path.poses[:, :2])
     world, simulator = scene(setting, off, path, rng)
     plan, controller = path.plan(setting.robot, 0), make(setting, off, world)
     before, lost, driven = Twist(0.0, 0.0), True, 0.0
@@ -209,8 +211,8 @@ def drive(
         simulator.step(twist, PERIOD - (DELAY if off.late else 0.0))
         robot, box = simulator.robot_pose, simulator.object_poses[0]
         driven += float(np.hypot(*(robot - was)[:2])) / length
-        along, away = path.nearest(box[:2])
-        errors.append(away / length)
+        along = way.project(shapely.Point(box[:2]))
+        errors.append(way.distance(shapely.Point(box[:2])) / length)
         state = model.state(robot, box)
         lost = along < path.length - 0.02 * length
         if not lost or abs(state.offset) > half or state.gap > 0.4 * length:

@@ -30,9 +30,7 @@ from pushplan.planners.pushing.parameters import PushingConfig
 from pushplan.planners.pushing.path import PushPath
 from pushplan.planners.pushing.push_kernels import (
     ALONG,
-    LATERAL,
     SLOWED,
-    VALUE,
     Faces,
     PushingMemory,
     assemble_push,
@@ -81,19 +79,9 @@ class PushingMpc:
         return self._told(ALONG)
 
     @property
-    def lateral(self) -> float:
-        """Distance of the box from its path, left positive [m]."""
-        return self._told(LATERAL)
-
-    @property
     def slowed(self) -> float:
         """Fraction of the last command that was driven, for the sake of what is static."""
         return self._told(SLOWED)
-
-    @property
-    def value(self) -> float:
-        """Cost of the nominal commands of the last call, see `PushingConfig`."""
-        return self._told(VALUE)
 
     @property
     def fallbacks(self) -> int:

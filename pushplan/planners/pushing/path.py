@@ -111,17 +111,6 @@ class PushPath(ArrayRecord):
         """[m]."""
         return float(self.lengths[-1])
 
-    def nearest(self, point: ArrayLike) -> tuple[float, float]:
-        """Length [m] up to the point of the path nearest to (2,) a point, and its distance [m]."""
-        at = array("point", point, (2,))
-        a = self.poses[:-1, :2]
-        edges = self.poses[1:, :2] - a
-        square = np.maximum((edges**2).sum(axis=1), 1e-18)
-        fraction = np.clip(((at - a) * edges).sum(axis=1) / square, 0.0, 1.0)
-        away = np.hypot(*(a + fraction[:, None] * edges - at).T)
-        i = int(np.argmin(away))
-        return float(self.lengths[i] + fraction[i] * np.sqrt(square[i])), float(away[i])
-
     def plan(self, robot: RobotModel, box_id: int, speed: float | None = None) -> Plan:
         """The path as a `pushplan.world.Plan` for `PushingMpc`.
 

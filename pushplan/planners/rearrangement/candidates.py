@@ -46,7 +46,7 @@ def delivering_pushes(scene: PushScene, objects: Sequence[int]) -> list[Push]:
         scene: the scene.
         objects: indices of those to push, the most urgent first.
     """
-    ids = scene.world.movables.ids.tolist()
+    ids = scene.movables.ids.tolist()
     found: list[Push] = []
     counts: Counter[int] = Counter()
     for row in scene.config.primitives:
@@ -75,8 +75,8 @@ def can_be_pushed(scene: PushScene, k: int, horizon: float) -> bool:
         k: index of the object.
         horizon: how far the robot drives at most to see that [m].
     """
-    target = int(scene.world.movables.ids[k])
-    costs = scene.push_cost_to_go(float(scene.world.movables.radii[k]))
+    target = int(scene.movables.ids[k])
+    costs = scene.push_cost_to_go(k)
     now = costs.at(scene.poses[k])
 
     def gets_on(attempt: PushAttempt) -> bool:
@@ -99,7 +99,7 @@ def partial_pushes(scene: PushScene, k: int) -> Iterator[Push]:
 
     Each costs what is left to be done, and a radius or two for another push.
     """
-    costs = scene.push_cost_to_go(float(scene.world.movables.radii[k]))
+    costs = scene.push_cost_to_go(k)
     now = costs.at(scene.poses[k])
     for row in scene.config.primitives:
         if row.controller != "path" or row.deep or row.partners:
@@ -161,7 +161,7 @@ def _paths(
     scene: PushScene, k: int, row: PushPrimitive
 ) -> Iterator[tuple[FloatArray, float | None, tuple[int, ...]]]:
     """Paths of object ``k``, with the shift where it is given [m] and what is to be delivered."""
-    radius = float(scene.world.movables.radii[k])
+    radius = float(scene.movables.radii[k])
     away = row.clearance * scene.half if row.clearance > 0.0 else 0.75 * radius
     path = scene.object_path(k, away, row.deep)
     if path is None:
@@ -174,7 +174,7 @@ def _paths(
                     return
         yield path, None, ()
         return
-    movables, length = scene.world.movables, path_length(path)
+    movables, length = scene.movables, path_length(path)
     far = np.hypot(*(scene.poses[:, :2] - scene.poses[k, :2]).T)
     others = sorted((j for j in scene.left if j != k), key=lambda j: (far[j], j))
     for j in others[: row.partners]:

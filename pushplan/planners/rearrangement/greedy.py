@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from dataclasses import dataclass
 
 import numpy as np
@@ -66,7 +67,7 @@ class GreedyPusher(ObjectPolicy):
     def _forget(self) -> None:
         super()._forget()
         self._attempt: _Attempt | None = None
-        self._failures: dict[int, int] = {}
+        self._failures: Counter[int] = Counter()
         self._away: Recovery | None = None
         self._wait_until = -math.inf
 
@@ -91,7 +92,7 @@ class GreedyPusher(ObjectPolicy):
         command = None if done else self._drive(attempt, scene)
         if command is None:
             if not done:  # it is the box's fault, which comes last from now on
-                self._failures[attempt.box] = self._failures.get(attempt.box, 0) + 1
+                self._failures[attempt.box] += 1
             self._attempt = None
             self._away = Recovery(world, _RETREAT * scene.size, response=response, looks=False)
         return command
@@ -113,14 +114,14 @@ class GreedyPusher(ObjectPolicy):
             return None
         away = np.hypot(*(scene.poses[:, :2] - world.robot_pose[:2]).T)
         ids = world.movables.ids.tolist()
-        for k in sorted(scene.left, key=lambda k: (failures.get(ids[k], 0), away[k], k)):
-            skip = failures.get(ids[k], 0) % _OPTIONS
+        for k in sorted(scene.left, key=lambda k: (failures[ids[k]], away[k], k)):
+            skip = failures[ids[k]] % _OPTIONS
             place = line_up(scene, k, skip)
             if place is not None:
                 driver = LegFollower(world.robot, place.legs, response=self.config.response)
                 pusher = GeometricPusher(scene.controller, place.shift)
                 return _Attempt(ids[k], driver, PathPush(scene, ids[k], place.path, pusher))
-            failures[ids[k]] = failures.get(ids[k], 0) + 1
+            failures[ids[k]] += 1
         self._wait_until = world.time + _WAIT
         return None
 
@@ -152,7 +153,7 @@ def shortest_path(scene: PushScene, k: int) -> FloatArray | None:
 
     It keeps about half the object's width from static things where it can.
     """
-    radius = float(scene.world.movables.radii[k])
+    radius = float(scene.movables.radii[k])
     found = (scene.object_path(k, clearance * radius, deep) for clearance, deep in _PATHS)
     return next((path for path in found if path is not None), None)
 
@@ -174,7 +175,7 @@ def line_up(scene: PushScene, k: int, skip: int = 0) -> LineUp | None:
     if path is None:
         return None
     robot, static = scene.world.robot, scene.world.static
-    outline = scene.world.movables.outline_world(k)
+    outline = scene.movables.outline_world(k)
     around = StaticMap((*static.polygons, outline), static.segments, static.radii, static.bounds)
     towards = initial_heading(path, scene.controller.ahead)
     found = []

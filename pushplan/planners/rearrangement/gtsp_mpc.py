@@ -151,7 +151,7 @@ class GtspMpc(ObjectPolicy):
 
     def _choose_ahead(self, scene: PushScene, execution: PushExecution) -> None:
         """Ask for the next push while one is driven, where that takes time."""
-        ids = scene.world.movables.ids
+        ids = scene.movables.ids
         if not (self._executor.takes_time and execution.pushing) or execution.asked_for_next:
             return
         execution.asked_for_next = True
@@ -217,7 +217,8 @@ class GtspMpc(ObjectPolicy):
             return True
         remaining = scene.remaining_now[scene.left]
         way = float(remaining[np.isfinite(remaining)].sum())
-        if self._history == PushHistory() or way >= self._way_at_end - scene.size:
+        tried = self._history.failures or self._history.relocations
+        if not tried or way >= self._way_at_end - scene.size:
             self._stopped_at = scene
             return False
         self._way_at_end, self._rounds = way, 0

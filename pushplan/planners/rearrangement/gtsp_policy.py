@@ -60,17 +60,17 @@ class Gtsp(ObjectPolicy):
             return Legs(np.zeros((0, 2)), np.zeros(0), np.zeros(1), heading)
         count = len(nodes)
         costs = np.full((count + 1, count + 1), np.inf)
+        robot = world.robot_pose[:2]
+        costs[:-1, -1] = 0.0
         for m, (_, start, end) in enumerate(nodes):
             length = math.dist(start, end)
-            costs[-1, m] = math.dist(world.robot_pose[:2], start) + length
-            costs[m, -1] = 0.0
-            for n, (_, _, before) in enumerate(nodes):
+            for n, before in enumerate([*(before for _, _, before in nodes), robot]):
                 costs[n, m] = math.dist(before, start) + length
         boxes = sorted({k for k, _, _ in nodes})
         clusters = [[n for n in range(count) if nodes[n][0] == k] for k in boxes]
         tour = solve_gtsp(costs, [*clusters, [count]], stop=MaxIterations(300))
         at = list(tour.nodes).index(count)
-        points = [world.robot_pose[:2]]
+        points = [robot]
         graph = VisibilityGraph(keep_out(world), clearance=world.robot.inscribed_radius)
         for n in [*tour.nodes[at + 1 :], *tour.nodes[:at]]:
             _, start, end = nodes[int(n)]
@@ -82,7 +82,7 @@ class Gtsp(ObjectPolicy):
 def _pushes(scene: PushScene, k: int) -> list[tuple[int, FloatArray, FloatArray]]:
     """The object, where the robot's middle begins and where it ends, for every straight push."""
     goal, box = scene.world.goal, scene.poses[k, :2]
-    radius = float(scene.world.movables.radii[k])
+    radius = float(scene.movables.radii[k])
     if isinstance(goal, ClearanceArea):
         moves = [
             (box + (float((a - box) @ normal) + radius) * normal) - box

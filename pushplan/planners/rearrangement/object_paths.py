@@ -155,19 +155,15 @@ class PushCostToGo:
         """(rows, cols) cost of the way from each cell [m]."""
         rows, cols = is_open.shape
         i, j = np.nonzero(is_open)
-        starts, ends, costs = [], [], []
-        for t, (dx, dy) in enumerate(MOVES.tolist()):
-            inside = (0 <= i + dy) & (i + dy < rows) & (0 <= j + dx) & (j + dx < cols)
-            a, b = i[inside], j[inside]
-            there = is_open[a + dy, b + dx]
-            a, b = a[there], b[there]
-            starts.append(a * cols + b)
-            ends.append((a + dy) * cols + b + dx)
-            length = LENGTHS[t] * self._step
-            costs.append(np.where(pushable[t, a, b], length, self._drag_cost * length))
+        a, b = i + MOVES[:, 1:], j + MOVES[:, :1]  # (16, cells)
+        leads_on = (0 <= a) & (a < rows) & (0 <= b) & (b < cols)
+        leads_on[leads_on] = is_open[a[leads_on], b[leads_on]]
+        t, at = np.nonzero(leads_on)
+        lengths = LENGTHS[t] * self._step
+        costs = np.where(pushable[t, i[at], j[at]], lengths, self._drag_cost * lengths)
         # backward: from the goal against the moves
-        where = np.concatenate(ends), np.concatenate(starts)
-        graph = csr_array((np.concatenate(costs), where), shape=(rows * cols, rows * cols))
+        where = (a * cols + b)[leads_on], (i * cols + j)[at]
+        graph = csr_array((costs, where), shape=(rows * cols, rows * cols))
         seeds = np.flatnonzero(goal & is_open)
         if not len(seeds):
             return np.zeros((rows, cols))

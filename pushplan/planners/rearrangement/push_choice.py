@@ -100,8 +100,8 @@ class PendingChoice:
         if not self.ahead:
             return True
         then, now, size = self.scene, scene, scene.size
-        ids = now.world.movables.ids[~now.done]
-        if not np.array_equal(ids, then.world.movables.ids[~then.done]):
+        ids = now.movables.ids[~now.done]
+        if not np.array_equal(ids, then.movables.ids[~then.done]):
             return False
         if pose_distance(then.world.robot_pose, now.world.robot_pose, size) > _ROBOT:
             return False
@@ -263,7 +263,7 @@ def build_push_graph(
     delivered = {i for n, push in enumerate(pushes) if np.isfinite(row[n]) for i in push.serves}
     infeasible = {
         i: "no push for it was found that the robot can get to"
-        for i in scene.world.movables.ids[scene.left].tolist()
+        for i in scene.movables.ids[scene.left].tolist()
         if i not in delivered
     }
     return PushGraph(tuple(pushes), costs, approach, infeasible)
@@ -300,7 +300,7 @@ def _best(scene: PushScene, pushes: Sequence[Push], row: FloatArray) -> list[int
         key=lambda n: (pushes[n].cost / shares[n], n),
     )
     near = sorted(order, key=lambda n: (row[n] + pushes[n].cost) / shares[n])
-    ids = scene.world.movables.ids[scene.left].tolist()
+    ids = scene.movables.ids[scene.left].tolist()
     count = min(scene.config.per_object, max(2, scene.config.max_pushes // max(1, len(ids))))
     for i in ids:
         keep.update([n for n in order if i in pushes[n].serves][:count])
@@ -314,7 +314,7 @@ def _between(scene: PushScene, pushes: Sequence[Push]) -> FloatArray:
     What cannot be got to from there, as far as one can say now, is put off rather than ruled out:
     otherwise one object would be enough for there to be no order at all.
     """
-    grid, ids, bounds = scene.coarse.grid, scene.world.movables.ids, scene.world.static.bounds
+    grid, ids, bounds = scene.coarse.grid, scene.movables.ids, scene.world.static.bounds
     far = _FAR * float(np.hypot(*(bounds[2:] - bounds[:2])))
     arrivals = arrivals_at(grid, pushes)
     out = np.full((len(pushes), len(pushes)), far)

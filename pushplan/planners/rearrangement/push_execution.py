@@ -162,7 +162,7 @@ class PushExecution:
         predictive: bool = True,
     ) -> None:
         self.push, self.route, self.pushing = push, route, False
-        self.ids, self.asked_for_next = scene.world.movables.ids, False
+        self.ids, self.asked_for_next = scene.movables.ids, False
         self._executor, self._predictive = executor, predictive
         self._prediction: PendingResult[list[Push]] | None = None
         robot, config = scene.world.robot, scene.config
@@ -187,7 +187,8 @@ class PushExecution:
         """
         world = scene.world
         if not self.pushing:
-            if self._is_obsolete(scene):
+            target = world.movables.ids == self.push.target
+            if not target.any() or scene.done[target][0]:
                 return ExecutionEnd.OBSOLETE
             approach = self._route_follower
             twist = approach.command(world.robot_pose, world.time, held)
@@ -218,11 +219,6 @@ class PushExecution:
         if self._prediction is not None:
             self._prediction.abandon()
 
-    def _is_obsolete(self, scene: PushScene) -> bool:
-        """Whether the object to be pushed has gone, or is where it belongs already."""
-        target = np.flatnonzero(scene.world.movables.ids == self.push.target)
-        return not len(target) or bool(scene.done[target[0]])
-
     def _begin(self, scene: PushScene, ends: list[Push], held: float) -> bool:
         """Take the push as it is predicted from here; whether it is good for anything."""
         push = self.push
@@ -237,13 +233,17 @@ class PushExecution:
 
     def _choose_pusher(self, scene: PushScene, held: float) -> Pusher:
         """What drives the push: along its poses, its line or the path of its object."""
-        push, config, robot = self.push, scene.config, scene.world.robot
+        push, config, world = self.push, scene.config, scene.world
         if push.controller == "arc":
-            follower = PoseFollower(robot, push.poses, config.response)
+            follower = PoseFollower(world.robot, push.poses, config.response)
             return lambda now, held: follower.command(now.world.robot_pose, now.world.time, held)
         if push.controller == "line":
-            return lambda now, _: arc_twist(robot, now.controller.step, _line_turn(push.start, now))
-        if self._predictive and suits_mpc(scene, push):
+            return lambda now, _: _along_line(now, push.start)
+        away = initial_heading(push.object_path, 0.5 * scene.size) - float(world.robot_pose[2])
+        straight = abs(math.remainder(away, math.tau)) < _MPC_HEADING
+        # the contact model of `PushingMpc` is that of one object, along its path
+        alone = not push.relocates and push.delivers == (push.target,)
+        if self._predictive and alone and straight:
             path = PushPath.through(push.object_path, radius=scene.size)
             parameters = PushParameters(config.friction)
             mpc = PushingMpc(PushingConfig(parameters=parameters, period=held))
@@ -255,7 +255,7 @@ class PushExecution:
 
     def _push(self, scene: PushScene, held: float) -> Twist | ExecutionEnd:
         push, time = self.push, scene.world.time
-        left = np.isin(scene.world.movables.ids, push.delivers) & ~scene.done
+        left = np.isin(scene.movables.ids, push.delivers) & ~scene.done
         if not push.relocates and not left.any():
             return ExecutionEnd.DONE
         assert self._pusher is not None
@@ -269,18 +269,11 @@ class PushExecution:
         return self._pusher(scene, held) or ExecutionEnd.FAILED
 
 
-def suits_mpc(scene: PushScene, push: Push) -> bool:
-    """Whether the contact model of `PushingMpc` describes a push: of one object, along its path."""
-    if push.relocates or push.delivers != (push.target,):
-        return False
-    away = initial_heading(push.object_path, 0.5 * scene.size) - float(scene.world.robot_pose[2])
-    return abs(math.remainder(away, math.tau)) < _MPC_HEADING
-
-
-def _line_turn(start: FloatArray, scene: PushScene) -> float:
-    """The turn [rad] that keeps the robot on the line of a push."""
+def _along_line(scene: PushScene, start: FloatArray) -> Twist:
+    """The velocity that keeps the robot on the line of a push that began at a pose (3,)."""
     pose = scene.world.robot_pose
     error = math.remainder(float(start[2] - pose[2]), 2.0 * math.pi)
     away = pose[:2] - start[:2]
     left = float(math.cos(start[2]) * away[1] - math.sin(start[2]) * away[0])
-    return 0.5 * error - 0.3 * left / scene.size
+    turn = 0.5 * error - 0.3 * left / scene.size
+    return arc_twist(scene.world.robot, scene.controller.step, turn)

@@ -44,7 +44,16 @@ from pushplan.planners.rearrangement.push_pose_kernels import pose_behind_outlin
 from pushplan.planners.rearrangement.rearrangement_config import RearrangementConfig
 from pushplan.planners.rearrangement.rollout_cache import RolloutCache
 from pushplan.planners.rearrangement.route_kernels import RouteProblem
-from pushplan.world import ClearanceArea, Goal, Receptacle, RobotModel, StaticMap, Stop, World
+from pushplan.world import (
+    ClearanceArea,
+    Goal,
+    Movables,
+    Receptacle,
+    RobotModel,
+    StaticMap,
+    Stop,
+    World,
+)
 from pushplan.world.checks import BoolArray, FloatArray, frozen
 from pushplan.world.outline import outward_normals
 
@@ -229,7 +238,7 @@ class PushScene:
 
     def on_finer_lattice(self) -> PushScene:
         """The same with approaches on half the cells, that keep little distance from walls."""
-        return self.changed(fine=self._contact_grid(0.5 * self.fine.grid.step, _LEAST_MARGIN))
+        return self.changed(fine=self._contact_grid(_CELL, _LEAST_MARGIN, 0.5))
 
     def with_objects_at(self, poses: FloatArray) -> PushScene:
         """The same with the objects at poses (K, 3), as far as rolling out pushes goes.
@@ -245,6 +254,11 @@ class PushScene:
     def size(self) -> float:
         """Circumscribed radius of the robot [m]."""
         return self.world.robot.circumscribed_radius
+
+    @property
+    def movables(self) -> Movables:
+        """The objects."""
+        return self.world.movables
 
     @property
     def robot_cell(self) -> bytes:
@@ -265,7 +279,7 @@ class PushScene:
     @cached_property
     def poses(self) -> FloatArray:
         """(K, 3) poses of the objects; a copy that kernels may read."""
-        return np.ascontiguousarray(self.world.movables.poses)
+        return np.ascontiguousarray(self.movables.poses)
 
     @cached_property
     def _model(self) -> QuasiStatic:
@@ -338,21 +352,19 @@ class PushScene:
     @cached_property
     def fine(self) -> ContactGrid:
         """The lattice on which the next approach is planned."""
-        return self._contact_grid(self._step(_CELL), MARGIN)
+        return self._contact_grid(_CELL, MARGIN)
 
     @cached_property
     def coarse(self) -> ContactGrid:
         """The lattice on which the cost of approaches between pushes is computed."""
-        return self._contact_grid(self._step(_COARSE_CELL), MARGIN)
+        return self._contact_grid(_COARSE_CELL, MARGIN)
 
-    def _step(self, cell: float) -> float:
-        """Side of a cell that is not too small for the map [m]."""
-        sides = self.world.static.bounds[2:] - self.world.static.bounds[:2]
-        return max(cell, _LEAST_CELL * float(sides.max()) / self.size) * self.size
-
-    def _contact_grid(self, step: float, margin: float) -> ContactGrid:
+    def _contact_grid(self, cell: float, margin: float, part: float = 1.0) -> ContactGrid:
+        """A lattice of a part of a cell that is not too small for the map."""
         robot, static, away = self.world.robot, self.world.static, margin * self.size
-        grid = make_pose_grid(robot, static, step, away)
+        sides = static.bounds[2:] - static.bounds[:2]
+        side = max(cell, _LEAST_CELL * float(sides.max()) / self.size) * self.size
+        grid = make_pose_grid(robot, static, part * side, away)
         shape, _ = _fit_of(robot, static, away)
         return ContactGrid(grid, contact_depths(grid, shape, self.poses, self.bodies))
 
@@ -386,7 +398,7 @@ class PushScene:
 
     def index_of(self, number: int) -> int:
         """The index of the object with an id."""
-        return int(np.flatnonzero(self.world.movables.ids == number)[0])
+        return int(np.flatnonzero(self.movables.ids == number)[0])
 
     def remaining(self, poses: FloatArray) -> FloatArray:
         """(K,) shortest path [m] of each object's middle to the goal from poses (K, 3)."""
@@ -412,17 +424,17 @@ class PushScene:
             clearance: distance that its middle keeps from what is static [m].
             deep: to the middle of a receptacle instead of its nearest place.
         """
-        radius = float(self.world.movables.radii[k])
+        radius = float(self.movables.radii[k])
         return self.object_paths.path(self.poses[k, :2], radius, clearance, deep)
 
-    def push_cost_to_go(self, radius: float) -> PushCostToGo:
-        """What it costs to push objects of a radius [m] to their goal."""
+    def push_cost_to_go(self, k: int) -> PushCostToGo:
+        """What it costs to push objects of the size of object ``k`` to their goal."""
         world = self.world
         return push_cost_to_go(
             world.robot,
             world.static,
             world.goal,
-            radius=round(radius, 6),
+            radius=round(float(self.movables.radii[k]), 6),
             half_width=self.half,
             slack=_SLACK * self.size,
             margin=_LEAST_MARGIN * self.size,
@@ -437,7 +449,7 @@ class PushScene:
             heading: [rad].
             shift: how far the robot's middle is to the left of the object [m].
         """
-        outline, distance = self.world.movables.outline(k), self.front + _SLACK * self.size
+        outline, distance = self.movables.outline(k), self.front + _SLACK * self.size
         return pose_behind_outline(np.array(self.poses[k]), outline, heading, shift, distance)
 
     @cached_property
@@ -451,7 +463,7 @@ class PushScene:
 
     def is_clear(self, pose: FloatArray) -> bool:
         """Whether the robot at a pose (3,) overlaps no object."""
-        movables, robot = self.world.movables, self.world.robot
+        movables, robot = self.movables, self.world.robot
         c, s = math.cos(pose[2]), math.sin(pose[2])
         away = np.hypot(*(self.poses[:, :2] - pose[:2]).T)
         for k in np.flatnonzero(away < self.size + movables.radii).tolist():

@@ -106,7 +106,7 @@ def end_of(scene: PushScene, attempt: PushAttempt) -> FloatArray:
 
 def _roll_out(scene: PushScene, attempt: PushAttempt, poses: FloatArray | None) -> Rollout:
     """Roll out a push, unless it is known what comes of it."""
-    movables, settings, count = scene.world.movables, scene.settings, len(scene.poses)
+    movables, settings, count = scene.movables, scene.settings, len(scene.poses)
     wanted = np.zeros(count, dtype=np.bool_)
     wanted[list(attempt.wanted) or [attempt.target]] = True
     if attempt.friction is not None:
@@ -214,7 +214,7 @@ def _push(
     Its cost is that of the drive and of the work, and what the objects that are left behind have
     farther or less far to go [m].
     """
-    movables = scene.world.movables
+    movables = scene.movables
     effort = float(scene.weights @ lengths)
     moved = np.flatnonzero((lengths > 1e-9) & ~done)
     if len(moved):
@@ -251,7 +251,7 @@ def resimulate(
         poses: see `simulate`.
         spent: see `simulate`.
     """
-    ids, target = scene.world.movables.ids, scene.index_of(push.target)
+    ids, target = scene.movables.ids, scene.index_of(push.target)
     if push.controller == "arc":
         path = np.vstack([start, push.poses[1:]])
         path[:, 2] = np.unwrap(path[:, 2])

@@ -13,7 +13,7 @@ import heapq
 import itertools
 import math
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -70,7 +70,7 @@ def relocating_pushes(
         approach: from where the robot is.
         thorough: whether to look for drives that cost much more than the best one too.
     """
-    movables, cache, found = scene.world.movables, scene.cache, None
+    movables, cache, found = scene.movables, scene.cache, None
     near = np.hypot(*(scene.poses[:, :2] - scene.poses[k, :2]).T) < _NEAR * scene.size
     asked = Asked(
         movables.ids[near].tobytes() + scene.poses[near].tobytes(), scene.robot_cell, thorough
@@ -83,19 +83,14 @@ def relocating_pushes(
         found = _RelocationSearch(scene, k, approach, thorough).run()
         if cache is not None and not scene.budget.interrupted:
             cache.keep_relocations(int(movables.ids[k]), asked, found)
-    return [
-        replace(push, cost=push.cost + extra)
-        for path, extra, moved in found
-        for push in simulate_primitive(scene, path, k, _with_moved(scene, moved))
-    ]
-
-
-def _with_moved(scene: PushScene, moved: Mapping[int, FloatArray]) -> FloatArray:
-    """(K, 3) poses of the objects, with those in other places that a route moves."""
-    poses = scene.poses.copy()
-    for number, pose in moved.items():
-        poses[scene.world.movables.ids == number] = pose
-    return poses
+    pushes = []
+    for path, extra, moved in found:
+        poses = scene.poses.copy()
+        for number, pose in moved.items():
+            poses[movables.ids == number] = pose
+        for push in simulate_primitive(scene, path, k, poses):
+            pushes.append(replace(push, cost=push.cost + extra))
+    return pushes
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,7 +139,7 @@ class _RelocationSearch:
         self._config, self._thorough = scene.config.relocation, thorough
         self._slack = math.inf if thorough else _DEARER * scene.size
         self._horizon = _HORIZON * scene.size
-        self._cost_to_go = scene.push_cost_to_go(float(scene.world.movables.radii[k]))
+        self._cost_to_go = scene.push_cost_to_go(k)
         step, turn = scene.controller.step, scene.controller.turn
         signs = (1.0, -1.0) if scene.world.robot.min_speed != 0.0 else (1.0,)
         arcs = [
@@ -228,16 +223,13 @@ class _RelocationSearch:
             if side not in sides:
                 chain = state.chain()
                 path = np.concatenate([one.track for one in chain])
-                sides[side] = path, extra, self._moved_before(chain[0].poses)
+                poses = chain[0].poses
+                moved = (poses != self._scene.poses).any(axis=1)
+                ids = self._scene.movables.ids[moved].tolist()
+                sides[side] = path, extra, dict(zip(ids, poses[moved], strict=True))
             if len(sides) == _MOST_SIDES:
                 break
         return list(sides.values())
-
-    def _moved_before(self, poses: FloatArray) -> dict[int, FloatArray]:
-        """Where the route to a start has moved objects to, by id, from their poses (K, 3) there."""
-        moved = (poses != self._scene.poses).any(axis=1)
-        ids = self._scene.world.movables.ids[moved].tolist()
-        return dict(zip(ids, poses[moved], strict=True))
 
     def _arrived(self, state: _State) -> _State | None:
         """A start as the route to it leaves robot and objects; None if there is none."""
@@ -307,14 +299,11 @@ class _RelocationSearch:
 
     def _delivers(self, state: _State, by: FloatArray) -> bool:
         """Whether a push gets the object home from where it is in a state, moved by an error."""
-        scene, k = self._scene, self._k
-        poses = np.array(state.poses)
+        scene, k, poses = self._scene, self._k, np.array(state.poses)
         if poses[k, 0] < 0.5 * REMOVED:
             poses[k] += by * np.array([scene.size, scene.size, 1.0])
         after = scene.with_objects_at(poses)
-        if after.done[k]:
-            return True
-        return can_be_pushed(after, k, self._horizon)
+        return bool(after.done[k]) or can_be_pushed(after, k, self._horizon)
 
     def _side(self, state: _State) -> _Cell:
         """The box of poses that a drive begins in."""
@@ -347,7 +336,7 @@ class _RelocationSearch:
     def _around(self) -> Iterator[FloatArray]:
         """Poses (3,) round the object that touch nothing, evenly spread."""
         scene = self._scene
-        box, radius = scene.poses[self._k], float(scene.world.movables.radii[self._k])
+        box, radius = scene.poses[self._k], float(scene.movables.radii[self._k])
         fraction = np.mod(0.5 + np.outer(np.arange(1, _DRAWS * _STARTS + 1), _SPREAD), 1.0)
         away = 0.3 * radius + scene.size * (0.2 + 1.1 * fraction[:, 0])
         bearing, heading = 2.0 * np.pi * fraction[:, 1], 2.0 * np.pi * fraction[:, 2] - np.pi

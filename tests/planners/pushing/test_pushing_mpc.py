@@ -4,6 +4,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from conftest import quickest
+import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from nonlinear_pushing import NonlinearPushingMpc
@@ -65,7 +66,10 @@ def push(
         noise=rng,
         delay=config.delay,
     )
-    errors = np.array([path.nearest(box[0, :2])[1] for box in episode.object_poses]) / length
+    errors = shapely.distance(
+        shapely.LineString(path.poses[:, :2]), shapely.points(episode.object_poses[:, 0, :2])
+    )
+    errors = errors / length
     state = model.state(episode.robot_poses[-1], episode.object_poses[-1, 0])
     return errors, state.offset / model.bumper.half, episode, mpc
 
@@ -222,7 +226,8 @@ def test_a_path_through_points():
     assert path.length == pytest.approx(7.0 - 2.0 + math.pi / 2, rel=1e-3)
     turns = np.abs(np.diff(path.poses[:, 2]))
     assert turns.max() < 0.2
-    assert path.nearest((2.0, -0.5)) == pytest.approx((2.0, 0.5))
+    assert path.poses[0].tolist() == [0.0, 0.0, 0.0]
+    assert path.poses[-1].tolist() == pytest.approx([4.0, 3.0, 0.5 * math.pi])
     for points in ([(0, 0)], [(1, 1), (1, 1)], [(0, np.nan), (1, 1)]):
         with pytest.raises(InvalidInputError):
             PushPath.through(points)
