@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
+from pathlib import Path
 from typing import Annotated, Any, ClassVar
 
+from pushplan.files.safe_files import read_data
 from pushplan.world import UnknownNameError
 from pushplan.world.checked_fields import (
     CheckedFields,
@@ -55,34 +57,16 @@ class PushPrimitive(CheckedFields):
     field_prefix: ClassVar[str] = "push primitive "
 
 
-_ANY = 1000
+def _shipped() -> tuple[PushPrimitive, ...]:
+    rows = read_data(Path(__file__).with_name("push_primitives.yaml"), "table of pushes")
+    lists = ("leans", "shifts", "gains", "frictions")
+    return tuple(
+        PushPrimitive(**row | {name: tuple(row[name]) for name in lists if name in row})
+        for row in rows
+    )
 
-PRIMITIVES = (
-    PushPrimitive("line", below=_ANY),
-    PushPrimitive("line", leans=(20.0, -20.0, 40.0, -40.0), shifts=(0.0,), below=_ANY),
-    PushPrimitive("path"),
-    PushPrimitive("path", clearance=0.0),
-    PushPrimitive("path", deep=True, shifts=(0.0,), below=_ANY),
-    PushPrimitive("path", partners=4, below=_ANY),
-    *(
-        PushPrimitive(
-            "path",
-            (lean, -lean),
-            gains=(0.5, 1.5),
-            clearance=clearance,
-            frictions=(0.0, 0.4),
-            below=1,
-        )
-        for lean in (20.0, 40.0, 60.0, 80.0)
-        for clearance in (1.08, 0.0)
-    ),
-    PushPrimitive(
-        "arc",
-        leans=(0.0, *(sign * lean for lean in range(15, 151, 15) for sign in (1.0, -1.0))),
-        shifts=(*SHIFTS, 1.1, -1.1, 1.35, -1.35),
-        below=1,
-    ),
-)
+
+PRIMITIVES = _shipped()
 """The table, simplest first."""
 
 

@@ -169,8 +169,8 @@ class _RelocationSearch:
             if math.isfinite(away):
                 self._put(_State(None, start[None], scene.poses, 0, away, now))
         most, best = len(config.margins), math.inf
-        expansions, sides, alike = Counter[bool](), Counter[_Cell](), Counter[_Cell]()
-        while self._open and expansions[True] < config.expansions and sides.total() < _ENOUGH:
+        expansions, sides, alike = 0, Counter[_Cell](), Counter[_Cell]()
+        while self._open and expansions < config.expansions and sides.total() < _ENOUGH:
             if scene.budget.is_over:
                 break
             state = heapq.heappop(self._open)[2]
@@ -194,7 +194,7 @@ class _RelocationSearch:
                 if stands or state.depth == config.depth or alike[place] >= _MOST_ALIKE:
                     continue
                 alike[place] += 1
-            expansions[state.depth > 0] += 1
+            expansions += state.depth > 0
             self._expand(state)
         found = [
             (self._failing[self._place(state)] * scene.size, state)
