@@ -67,6 +67,11 @@ class DiscSpace:
         rows, cols = self.grid.shape
         return min(max(row, 0), rows - 1), min(max(col, 0), cols - 1)
 
+    def number_of(self, point: FloatArray) -> int:
+        """The same cell, counted row by row."""
+        row, col = self.cell_of(point)
+        return row * self.grid.shape[1] + col
+
     def points(self, cells: IntArray) -> FloatArray:
         """(N, 2) middles of cells (N,), counted row by row [m]."""
         rows, cols = np.divmod(cells, self.grid.shape[1])
@@ -140,8 +145,7 @@ class DiscState:
         self, weights: FloatArray, goals: BoolArray
     ) -> tuple[FloatArray, IntArray, IntArray]:
         space = self.space
-        row, col = space.cell_of(self.robot)
-        start = np.array([row * space.grid.shape[1] + col])
+        start = np.array([space.number_of(self.robot)])
         found = grid_dijkstra(weights, start, goals, space.cell, space.stopped)
         go_on(space.stopped)
         return found
@@ -152,9 +156,8 @@ class DiscState:
 
     def path_to(self, point: FloatArray) -> FloatArray:
         """(N, 2) corners of a path from the robot to a point (2,) that it gets to [m]."""
-        row, col = self.space.cell_of(point)
-        at = row * self.space.grid.shape[1] + col
-        return self._corners(self._chain(self._costs[1], at), point)
+        cells = self._chain(self._costs[1], self.space.number_of(point))
+        return self._corners(cells, point)
 
     def path_to_goal(self) -> FloatArray:
         """(N, 2) corners of a path from the robot to the nearest part of the goal [m]."""
@@ -174,16 +177,14 @@ class DiscState:
         weights[space.static <= space.radius] = np.inf
         costs, parents, order = self._dijkstra(weights, space.goal)
         last = int(order[-1])
-        row, col = divmod(last, space.grid.shape[1])
-        if not space.goal[row, col]:
+        if not space.goal.flat[last]:
             return np.inf, []
         cells = self._chain(parents, last)
-        rows, cols = np.divmod(cells, space.grid.shape[1])
         near = np.full((len(self.poses) + 1, len(cells)), np.inf)
         for k, pose in enumerate(self.poses):
-            near[k] = space.object_clearance(k, pose)[rows, cols]
+            near[k] = space.object_clearance(k, pose).flat[cells]
         met = near.argmin(axis=0)[near.min(axis=0) <= space.radius]
-        return float(costs[row, col]), list(dict.fromkeys(met.tolist()))
+        return float(costs.flat[last]), list(dict.fromkeys(met.tolist()))
 
     @staticmethod
     def _chain(parents: IntArray, at: int) -> IntArray:

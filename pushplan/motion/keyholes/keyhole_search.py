@@ -53,42 +53,16 @@ class KeyholeEnd:
         return [self] if self.before is None else [*self.before.chain(), self]
 
 
-@dataclass(frozen=True)
-class LinePush:
-    """Where a push begins.
-
-    Args:
-        object_index: of the object that is pushed.
-        start: (3,) pose of the robot, whose disc touches the face.
-        lead: distance from there to the contact [m].
-    """
-
-    object_index: int
-    start: FloatArray
-    lead: float
-
-    def path(self, length: float, size: float) -> FloatArray:
-        """(N, 3) poses from the start to the contact, which has index `_CONTACT`, and on.
-
-        Args:
-            length: of the push itself [m].
-            size: circumscribed radius of the robot [m].
-        """
-        lead = np.linspace(0.0, self.lead, _CONTACT + 1)
-        on = self.lead + np.arange(1, round(length / (_SPACING * size)) + 1) * _SPACING * size
-        return straight(self.start, np.concatenate([lead, on]))
-
-
-def straight(pose: FloatArray, along: FloatArray) -> FloatArray:
+def _straight(pose: FloatArray, along: FloatArray) -> FloatArray:
     """(N, 3) poses ahead of one (3,), by some distances (N,) [m], negative for behind."""
     heading = np.array([np.cos(pose[2]), np.sin(pose[2])])
     places = pose[:2] + along[:, None] * heading
     return np.column_stack([places, np.full(len(along), pose[2])])
 
 
-def line_pushes(
+def _line_pushes(
     world: World, k: int, pose: FloatArray, clearance: float, offsets: tuple[float, ...]
-) -> Iterator[LinePush]:
+) -> Iterator[tuple[FloatArray, float]]:
     """The pushes of object ``k`` at a pose (3,): at each face, in its middle and beside it.
 
     Args:
@@ -97,6 +71,10 @@ def line_pushes(
         pose: of the object.
         clearance: of the robot's middle from the face at the start [m].
         offsets: how far beside the middle, as fractions of half the face.
+
+    Returns:
+        Pose (3,) of the robot at the start, whose disc touches the face, and distance from there to
+        the contact [m].
     """
     size = world.robot.circumscribed_radius
     front = float(world.robot.vertices[:, 0].max())
@@ -111,7 +89,7 @@ def line_pushes(
         heading = float(np.arctan2(-out[1], -out[0]))
         for beside in offsets:
             place = 0.5 * (a + b) + 0.5 * beside * edge + clearance * out
-            yield LinePush(k, np.array([*place, heading]), clearance - front)
+            yield np.array([*place, heading]), clearance - front
 
 
 def suits_keyholes(world: World, config: KeyholeConfig) -> bool:
@@ -225,7 +203,7 @@ class KeyholeSearch:
         for length in sorted([*steps, *-steps[1:]], key=abs):
             go_on(self._space.stopped)
             along = np.linspace(0.0, length * self._size, 2 + int(abs(length) / _SPACING))
-            path = straight(robot, along)
+            path = _straight(robot, along)
             if not state.is_free(path[-1]) or self._hits_wall(path):
                 continue
             if length < 0.0 or self.interaction.sweep(self.world, path).work == 0.0:
@@ -263,9 +241,10 @@ class KeyholeSearch:
         for k in dict.fromkeys(chosen):
             pose = end.state.poses[k]
             clearance = self._space.radius + self._space.cell
-            for push in line_pushes(self.world, k, pose, clearance, self.config.offsets):
-                if end.state.gets_to(push.start):
-                    yield from self._push(end, push, rank)
+            starts = _line_pushes(self.world, k, pose, clearance, self.config.offsets)
+            for start, lead in starts:
+                if end.state.gets_to(start):
+                    yield from self._push(end, k, self._path(start, lead), rank)
                     go_on(self._space.stopped)
 
     def _is_near(self, end: KeyholeEnd, k: int, on_path: list[int]) -> bool:
@@ -276,11 +255,16 @@ class KeyholeSearch:
         reach = self.world.movables.radii[k] + self.world.movables.radii[on_path[0]]
         return math.dist(here, there) < float(reach) + 2.0 * self._size
 
-    def _push(self, end: KeyholeEnd, push: LinePush, rank: int) -> Iterator[KeyholeEnd]:
-        """The scenes after a push, each ended where it opens something, or in a later rank."""
+    def _path(self, start: FloatArray, lead: float) -> FloatArray:
+        """(N, 3) poses of a push to the contact, which has index `_CONTACT`, and on."""
+        spacing, longest = _SPACING * self._size, self.config.longest * self._size
+        on = lead + np.arange(1, round(longest / spacing) + 1) * _SPACING * self._size
+        return _straight(start, np.concatenate([np.linspace(0.0, lead, _CONTACT + 1), on]))
+
+    def _push(self, end: KeyholeEnd, k: int, path: FloatArray, rank: int) -> Iterator[KeyholeEnd]:
+        """The scenes after a push of object ``k``, ended where it opens one, or in a later rank."""
         self._count[0] += 1
         config, size = self.config, self._size
-        path = push.path(config.longest * size, size)
         free = first_blocked(
             owned(path), len(path), self._shape, self._walls, np.empty_like(self._shape.vertices)
         )
@@ -292,7 +276,7 @@ class KeyholeSearch:
         left = 2  # the first place that is open, and one beyond
         for n in ends:
             go_on(self._space.stopped)
-            new = self._after(end, push, path[: n + 1], swept.object_poses[: n + 1])
+            new = self._after(end, k, path[: n + 1], swept.object_poses[: n + 1])
             if new is None:
                 continue
             if new.state.is_open or self._gain(end, new) > config.gain * size**2:
@@ -304,27 +288,27 @@ class KeyholeSearch:
                 yield new
 
     def _after(
-        self, end: KeyholeEnd, push: LinePush, path: FloatArray, poses: FloatArray
+        self, end: KeyholeEnd, k: int, path: FloatArray, poses: FloatArray
     ) -> KeyholeEnd | None:
-        """The scene after a push (N, 3) with the objects (N, K, 3), the robot backed off."""
+        """The scene after a push (N, 3) of object ``k``, objects (N, K, 3); the robot backs off."""
         config, moved = self.config, poses[-1]
-        if np.array_equal(moved[push.object_index], end.state.poses[push.object_index]):
+        if np.array_equal(moved[k], end.state.poses[k]):
             return None
         cell, driven = self._space.cell, path_length(path)
         state = DiscState(self._space, moved)
         for back in np.arange(cell, driven, cell):
-            away = straight(path[-1], -np.linspace(0.0, back, int(back / cell) + 2)[1:])
+            away = _straight(path[-1], -np.linspace(0.0, back, int(back / cell) + 2)[1:])
             if not state.is_free(away[-1]):
                 continue
             state.robot = away[-1]
             work = float(self.world.movables.masses @ path_lengths(poses))
-            cost = end.cost + end.state.length_to(push.start) + driven + back
+            cost = end.cost + end.state.length_to(path[0]) + driven + back
             cost += config.push_weight * work / self.world.robot.mass
             return KeyholeEnd(
                 state,
                 cost + self._closing_cost(end, state),
                 end,
-                end.state.path_to(push.start[:2]),
+                end.state.path_to(path[0, :2]),
                 np.concatenate([path, away]),
             )
         return None
