@@ -5,20 +5,19 @@ from __future__ import annotations
 from pushplan.world import ClearanceArea, Drive, InvalidInputError, Receptacle, World
 
 
-def check_pusher(world: World, who: str) -> None:
+def check_pusher(world: World) -> None:
     """Refuse a world in which no object can be pushed to a goal.
 
     Args:
         world: the snapshot.
-        who: what an error says that this is for.
 
     Raises:
         InvalidInputError: if the goal is one for the robot, or the robot cannot stop.
     """
     if world.robot.drive is not Drive.DIFFERENTIAL:
-        raise InvalidInputError(f"{who} needs a robot with a differential drive")
+        raise InvalidInputError("pushing objects needs a robot with a differential drive")
     if not isinstance(world.goal, Receptacle | ClearanceArea):
         raise InvalidInputError(
-            f"{who} needs a goal for the objects (Receptacle or ClearanceArea), "
+            "pushing objects needs a goal for the objects (Receptacle or ClearanceArea), "
             f"got {type(world.goal).__name__}"
         )

@@ -18,6 +18,7 @@ from pushplan.motion.keyholes.keyhole_config import KeyholeConfig
 from pushplan.motion.time_slicing import go_on, never
 from pushplan.world import Drive, World
 from pushplan.world.checks import FloatArray
+from pushplan.world.outline import transform
 from pushplan.world.polyline import path_length, path_lengths
 
 _MOST_OBJECTS = 40  # among more, no keyholes are looked for
@@ -78,8 +79,7 @@ def _line_pushes(
     """
     size = world.robot.circumscribed_radius
     front = float(world.robot.vertices[:, 0].max())
-    c, s = np.cos(pose[2]), np.sin(pose[2])
-    corners = world.movables.outline(k) @ np.array([[c, s], [-s, c]]) + pose[:2]
+    corners = transform(pose, world.movables.outline(k))
     for a, b in zip(corners, np.roll(corners, -1, axis=0), strict=True):
         edge = b - a
         length = float(np.hypot(*edge))

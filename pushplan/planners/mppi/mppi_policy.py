@@ -98,7 +98,7 @@ class MppiPolicy:
             InvalidInputError: if objects have a goal and the drive is not differential.
         """
         if not isinstance(world.goal, GoalDisc | GoalLine):
-            check_pusher(world, "pushing objects")
+            check_pusher(world)
         if not self._started:
             self.reset(world, self._rng)
         return self._clock.command_for(world, self._act)

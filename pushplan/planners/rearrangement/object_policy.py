@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from pushplan.control import EpisodeClock
-from pushplan.planners.rearrangement.push_scene import check_world
+from pushplan.planners.arguments import check_pusher
 from pushplan.planners.rearrangement.rearrangement_config import RearrangementConfig
 from pushplan.world import Twist, World
 from pushplan.world.checks import expect
@@ -38,7 +38,7 @@ class ObjectPolicy(ABC):
         Raises:
             InvalidInputError: if the goal is one for the robot, or the robot cannot stop.
         """
-        check_world(world)
+        check_pusher(world)
         return self._clock.command_for(world, self._act)
 
     def _forget(self) -> None:

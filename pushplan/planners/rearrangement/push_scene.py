@@ -55,7 +55,7 @@ from pushplan.world import (
     World,
 )
 from pushplan.world.checks import BoolArray, FloatArray, frozen
-from pushplan.world.outline import outward_normals
+from pushplan.world.outline import outward_normals, transform
 
 # Lengths are in circumscribed radii of the robot.
 _GOAL_SLACK = 0.012
@@ -154,11 +154,6 @@ def _fit_of(
     return footprint(robot, margin), obstacles(static)
 
 
-def check_world(world: World) -> None:
-    """Refuse what no push can be made for; see `check_pusher`."""
-    check_pusher(world, "pushing objects")
-
-
 @functools.lru_cache(maxsize=8)
 def make_object_goal(goal: Goal, static: StaticMap, slack: float) -> ObjectGoal:
     """The goal for kernels. Sides of a receptacle that lie on the bounds do not count."""
@@ -166,10 +161,9 @@ def make_object_goal(goal: Goal, static: StaticMap, slack: float) -> ObjectGoal:
     polygon = goal.polygon
     normals = outward_normals(polygon)
     offsets = (normals * polygon).sum(axis=1)
-    low, high = static.bounds[:2], static.bounds[2:]
-    corners = np.array([[low[0], low[1]], [high[0], low[1]], [high[0], high[1]], [low[0], high[1]]])
+    corners = [[x, y] for x in static.bounds[::2] for y in static.bounds[1::2]]
     # the sides of a receptacle that stand at the walls
-    inner = (corners @ normals.T).max(axis=0) > offsets + 4.0 * slack
+    inner = (np.array(corners) @ normals.T).max(axis=0) > offsets + 4.0 * slack
     edges = np.column_stack([normals, offsets])[inner]
     return ObjectGoal(
         polygon, frozen(np.ascontiguousarray(edges)), isinstance(goal, Receptacle), slack
@@ -228,7 +222,7 @@ class PushScene:
     budget: SearchBudget = field(default_factory=SearchBudget)
 
     def __post_init__(self) -> None:
-        check_world(self.world)
+        check_pusher(self.world)
 
     def changed(self, **values: Any) -> PushScene:
         """The same with other fields, or with other values of what is worked out from them."""
@@ -464,12 +458,11 @@ class PushScene:
     def is_clear(self, pose: FloatArray) -> bool:
         """Whether the robot at a pose (3,) overlaps no object."""
         movables, robot = self.movables, self.world.robot
-        c, s = math.cos(pose[2]), math.sin(pose[2])
         away = np.hypot(*(self.poses[:, :2] - pose[:2]).T)
         for k in np.flatnonzero(away < self.size + movables.radii).tolist():
             outline = np.ascontiguousarray(movables.outline_world(k))
             for part in robot.contact_parts:
-                body = np.ascontiguousarray(part @ np.array([[c, s], [-s, c]]) + pose[:2])
+                body = np.ascontiguousarray(transform(pose, part))
                 if convex_penetration(body, outline)[0] > 0.0:
                     return False
         return True
