@@ -52,8 +52,7 @@ class PushPath(ArrayRecord):
             start: (3,) x, y [m] and direction [rad].
             pieces: length [m] and curvature [1/m], left positive, of each.
         """
-        here = array("start", start, (3,)).copy()
-        poses = [here.copy()]
+        poses: list[FloatArray] = [array("start", start, (3,)).copy()]
         rows = array("pieces", pieces, (None, 2)).tolist()
         for i, (length, curvature) in enumerate(rows):
             length = number(f"pieces[{i}] length", length, low=0.0, open_low=True)
@@ -61,9 +60,8 @@ class PushPath(ArrayRecord):
             count = min(max(_PIECES, math.ceil(turn / _GREATEST_TURN)), 2000)
             for _ in range(count):
                 out = np.empty(3)
-                along_arc(here, length / count, curvature, out)
-                here = out
-                poses.append(out.copy())
+                along_arc(poses[-1], length / count, curvature, out)
+                poses.append(out)
         return cls(np.array(poses))
 
     @classmethod
@@ -84,7 +82,7 @@ class PushPath(ArrayRecord):
         lengths = np.hypot(legs[:, 0], legs[:, 1])
         headings = np.arctan2(legs[:, 1], legs[:, 0])
         cut = np.zeros(len(corners))  # of the legs beside each corner
-        turns = np.array([math.remainder(t, math.tau) for t in np.diff(headings).tolist()])
+        turns = _turns(headings)
         for i, turn in enumerate(turns.tolist(), start=1):
             if radius > 0.0 and 1e-6 < abs(turn) < math.pi - 1e-6:
                 most = 0.5 * min(lengths[i - 1], lengths[i])
@@ -123,13 +121,12 @@ class PushPath(ArrayRecord):
             speed: of the robot [m/s]; its greatest if None.
         """
         expect("robot", robot, RobotModel)
-        speed_limit = (
-            robot.max_speed if speed is None else number("speed", speed, low=0.0, open_low=True)
-        )
-        speed_limit = min(speed_limit, robot.max_speed)
+        speed_limit = robot.max_speed
+        if speed is not None:
+            speed_limit = min(speed_limit, number("speed", speed, low=0.0, open_low=True))
         count = len(self.poses)
         lengths = self.lengths
-        turns = np.array([math.remainder(t, math.tau) for t in np.diff(self.poses[:, 2]).tolist()])
+        turns = _turns(self.poses[:, 2])
         steps = np.maximum(np.diff(lengths), 1e-9)
         curvatures = turns / steps
         fastest = _TURN_FRACTION * robot.max_turn_rate / np.maximum(np.abs(curvatures), 1e-9)
@@ -142,3 +139,8 @@ class PushPath(ArrayRecord):
             travel_cost=robot.mass * float(lengths[-1]),
             subtasks=(SubTask((integer("box_id", box_id),), 0, count - 1),),
         )
+
+
+def _turns(headings: FloatArray) -> FloatArray:
+    """(N - 1,) turns between headings (N,), the shorter way [rad]."""
+    return np.array([math.remainder(turn, math.tau) for turn in np.diff(headings).tolist()])

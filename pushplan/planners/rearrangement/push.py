@@ -134,14 +134,12 @@ def push_plan(world: World, route: Legs | None, push: Push) -> Plan:
     poses = np.concatenate([way, push.poses])
     along, first = arc_lengths(poses), len(way)
     lengths, turns = step_lengths(poses), wrap_angle(np.diff(poses[:, 2]))
-    fastest = np.where(goes_back(poses, robot.circumscribed_radius), -1.0, 1.0) * robot.max_speed
-    on_spot = lengths < _STILL * robot.circumscribed_radius
+    signs = np.where(goes_back(poses, robot.circumscribed_radius), -1.0, 1.0)
     steps = np.maximum(lengths / robot.max_speed, np.abs(turns) / robot.max_turn_rate)
-    moving = steps > 0.0
-    speeds, turn_rates = fastest, np.zeros(len(poses))
-    speeds[:-1][moving] = np.sign(fastest[:-1][moving]) * lengths[moving] / steps[moving]
-    speeds[:-1][on_spot] = 0.0
-    turn_rates[:-1][moving] = turns[moving] / steps[moving]
+    speeds, turn_rates, moving = signs * robot.max_speed, np.zeros(len(poses)), steps > 0.0
+    np.divide(signs[:-1] * lengths, steps, out=speeds[:-1], where=moving)
+    speeds[:-1][lengths < _STILL * robot.circumscribed_radius] = 0.0
+    np.divide(turns, steps, out=turn_rates[:-1], where=moving)
     done = np.maximum(along - along[first], 0.0) / max(float(along[-1] - along[first]), 1e-12)
     start = world.movables.poses
     ends = np.array(push.object_poses)

@@ -127,13 +127,9 @@ def _roll_out(scene: PushScene, attempt: PushAttempt, poses: FloatArray | None) 
     if known is not None:
         return known
     scene.budget.used += 1
-    log = RolloutLog(
-        np.empty((int(scene.longest / scene.controller.step) + 2, 3)),
-        np.zeros(STAGES),
-        np.zeros((STAGES, count, 3)),
-        np.zeros((STAGES, count)),
-        np.zeros(4),
-    )
+    longest = int(scene.longest / scene.controller.step) + 2
+    shapes = ((longest, 3), (STAGES,), (STAGES, count, 3), (STAGES, count), (4,))
+    log = RolloutLog(*(np.zeros(shape) for shape in shapes))
     problem = RolloutProblem(
         target=attempt.target if len(attempt.path) else -1,
         path=attempt.path,
