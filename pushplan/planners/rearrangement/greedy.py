@@ -73,10 +73,8 @@ class GreedyPusher(ObjectPolicy):
 
     def warm_up(self) -> None:
         """Load the kernels that an episode may need."""
-        from pushplan.planners.rearrangement import kernel_warmup
-
         warm_up_recovery()
-        kernel_warmup.drive_in_small_worlds(GreedyPusher)
+        super().warm_up()
 
     def _act(self, world: World) -> Twist:
         command = self._retreat(world) or self._work(PushScene(world, self.config))

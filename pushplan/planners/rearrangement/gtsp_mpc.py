@@ -9,7 +9,11 @@ from typing import Any
 import numpy as np
 
 from pushplan.control import ImmediateExecutor, PoseFollower, Retreat
-from pushplan.planners.rearrangement.object_policy import ObjectPolicy
+from pushplan.planners.rearrangement.object_policy import (
+    ObjectPolicy,
+    warm_up_rearrangement,
+    warm_up_steering,
+)
 from pushplan.planners.rearrangement.push import Push, PushHistory, push_plan, signature
 from pushplan.planners.rearrangement.push_choice import (
     PendingChoice,
@@ -98,11 +102,9 @@ class GtspMpc(ObjectPolicy):
 
     def warm_up(self) -> None:
         """Load the kernels that an episode may need."""
-        from pushplan.planners.rearrangement import kernel_warmup
-
-        kernel_warmup.warm_up_rearrangement()
-        kernel_warmup.warm_up_steering()
-        kernel_warmup.drive_in_small_worlds(GtspMpc)
+        warm_up_rearrangement()
+        warm_up_steering()
+        super().warm_up()
 
     def _act(self, world: World) -> Twist:
         scene = PushScene(world, self.config, self._cache)

@@ -10,7 +10,7 @@ from pushplan.control import LegFollower, Legs, clamp_twist
 from pushplan.geometry import VisibilityGraph
 from pushplan.gtsp import solve_gtsp
 from pushplan.motion.keep_out import keep_out
-from pushplan.planners.rearrangement.object_policy import ObjectPolicy
+from pushplan.planners.rearrangement.object_policy import ObjectPolicy, warm_up_rearrangement
 from pushplan.planners.rearrangement.push_scene import PushScene, open_edges
 from pushplan.world import ClearanceArea, MaxIterations, Receptacle, Twist, World
 from pushplan.world.checks import FloatArray
@@ -34,10 +34,8 @@ class Gtsp(ObjectPolicy):
 
     def warm_up(self) -> None:
         """Load the kernels that an episode may need."""
-        from pushplan.planners.rearrangement import kernel_warmup
-
-        kernel_warmup.warm_up_rearrangement()
-        kernel_warmup.drive_in_small_worlds(Gtsp)
+        warm_up_rearrangement()
+        super().warm_up()
 
     def _act(self, world: World) -> Twist:
         if self._route_follower is None:
