@@ -204,21 +204,12 @@ def _pushing_memory(
     stable = [(model.stable_curvature(), model.reach) for model in models]
     memory = PushingMemory(
         horizon,
-        Weights(  # length and curvature come with the path
-            length=0.0,
+        Weights(
+            length=0.0,  # comes with the path, as the curvature does
             max_speed=robot.max_speed,
             half=models[0].bumper.half,
             curvature=-1.0,
-            heading=config.heading,
-            offset=config.offset,
-            rim=config.rim,
-            safe=config.safe,
-            angle=config.angle,
-            grip=config.grip,
-            turn=config.turn,
-            speed=config.speed,
-            smoothness=config.smoothness,
-            terminal=config.terminal,
+            **{name: getattr(config, name) for name in Weights._fields if hasattr(config, name)},
         ),
         Faces(
             scores,
