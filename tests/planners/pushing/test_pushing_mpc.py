@@ -3,8 +3,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from conftest import quickest
 import shapely
+from conftest import quickest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from nonlinear_pushing import NonlinearPushingMpc
