@@ -8,7 +8,7 @@ from itertools import product
 import numpy as np
 
 from pushplan.geometry import Grid, clearance_field
-from pushplan.motion.polyline import polyline_plan, polyline_status
+from pushplan.motion.polyline_plan import polyline_plan, polyline_status
 from pushplan.world import MaxIterations, PlanResult, PlanStats, PlanStatus
 
 

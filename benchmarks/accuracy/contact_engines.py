@@ -15,7 +15,7 @@ import numpy as np
 from benchmarks.reporting import command_line
 from pushplan.envs import make
 from pushplan.interaction import QuasiStatic
-from pushplan.interaction.ice import IceInteraction
+from pushplan.interaction.ice_interaction import IceInteraction
 from pushplan.scenarios import Scenario
 
 STEPS = 60

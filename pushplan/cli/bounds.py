@@ -6,7 +6,7 @@ import argparse
 from dataclasses import asdict
 
 from pushplan.cli.common import say, say_json
-from pushplan.cli.outputs import check_file
+from pushplan.cli.output_files import check_file
 
 
 def run(options: argparse.Namespace) -> int:

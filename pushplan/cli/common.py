@@ -20,7 +20,7 @@ def check_episode_file(path: str | None) -> None:
         InvalidInputError: as `check_file`.
         MissingDependencyError: if it is to be MCAP and a library for that is missing.
     """
-    from pushplan.cli.outputs import check_file
+    from pushplan.cli.output_files import check_file
     from pushplan.imports.on_demand import need
 
     check_file(path)

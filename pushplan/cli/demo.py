@@ -7,7 +7,7 @@ import os
 import sys
 
 from pushplan.cli.common import has_screen, say
-from pushplan.cli.outputs import check_directory
+from pushplan.cli.output_files import check_directory
 from pushplan.cli.progress import progress_of
 
 EPISODES = {

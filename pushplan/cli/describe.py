@@ -6,7 +6,7 @@ import argparse
 import json
 
 from pushplan.cli.common import say
-from pushplan.cli.outputs import check_file
+from pushplan.cli.output_files import check_file
 from pushplan.cli.scenario_options import scenario_of
 
 

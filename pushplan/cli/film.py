@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from pushplan.cli.outputs import check_figure
+from pushplan.cli.output_files import check_figure
 from pushplan.cli.scoreboard import Scoreboard, closing_lines
 from pushplan.drawing import (
     Entry,
@@ -23,7 +23,7 @@ from pushplan.drawing import (
 )
 from pushplan.drawing.figure import FORMATS
 from pushplan.drawing.files import Frame
-from pushplan.drawing.scene import pushed
+from pushplan.drawing.top_view import pushed
 from pushplan.interaction.path_sweepers import default_interaction
 from pushplan.world import Episode, Plan, Policy, ShowsPlan, World
 

@@ -6,7 +6,7 @@ import argparse
 
 from pushplan.cli.common import milliseconds, say
 from pushplan.cli.kernel_progress import kernel_progress
-from pushplan.cli.outputs import check_file
+from pushplan.cli.output_files import check_file
 
 
 def run(options: argparse.Namespace) -> int:

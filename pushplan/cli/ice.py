@@ -6,7 +6,7 @@ import argparse
 from typing import TYPE_CHECKING
 
 from pushplan.cli.common import say
-from pushplan.cli.outputs import check_file, check_picture
+from pushplan.cli.output_files import check_file, check_picture
 
 if TYPE_CHECKING:
     from pushplan.scenarios import IceField

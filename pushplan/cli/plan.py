@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from pushplan.cli.common import milliseconds, say, say_json
 from pushplan.cli.kernel_progress import kernel_progress
-from pushplan.cli.outputs import check_figure, check_file
+from pushplan.cli.output_files import check_figure, check_file
 
 if TYPE_CHECKING:
     from pushplan.world import PlanResult, Stop

@@ -7,7 +7,7 @@ import sys
 from dataclasses import asdict
 
 from pushplan.cli.common import duration, say, say_json
-from pushplan.cli.outputs import check_directory, check_file
+from pushplan.cli.output_files import check_directory, check_file
 
 _NO_LOSS = "success<-0.0,E_nav<-0.0,I_nav<-0.0,S_manip<-0.0,E_manip<-0.0,I_manip<-0.0"
 """Rules of 'compare' that judge without closing a gate."""

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from pushplan.cli.common import duration, say
-from pushplan.cli.outputs import check_directory
+from pushplan.cli.output_files import check_directory
 from pushplan.cli.progress import progress_of
 
 if TYPE_CHECKING:

@@ -6,7 +6,7 @@ import argparse
 from typing import TYPE_CHECKING, Any
 
 from pushplan.cli.common import say, say_scores
-from pushplan.cli.outputs import check_file
+from pushplan.cli.output_files import check_file
 from pushplan.cli.scenario_options import scenario_of
 
 if TYPE_CHECKING:

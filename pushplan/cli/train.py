@@ -9,7 +9,7 @@ import sys
 from typing import TYPE_CHECKING, Any
 
 from pushplan.cli.common import say
-from pushplan.cli.outputs import check_directory
+from pushplan.cli.output_files import check_directory
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     from pushplan.drawing.figure import Panel, draw_figure, save_figure
     from pushplan.drawing.files import save_animation, save_image
     from pushplan.drawing.legend import Entry, add_strips, legend_of
-    from pushplan.drawing.scene import draw_world
+    from pushplan.drawing.top_view import draw_world
 
 __all__ = [
     "Entry",
@@ -30,6 +30,6 @@ __getattr__, __dir__ = lazy_names(
         "figure": "Panel draw_figure save_figure",
         "files": "save_animation save_image",
         "legend": "Entry add_strips legend_of",
-        "scene": "draw_world",
+        "top_view": "draw_world",
     },
 )

@@ -15,7 +15,7 @@ from pushplan.drawing.canvas import NOMINAL_PX, Canvas
 from pushplan.drawing.ground import draw_ground
 from pushplan.drawing.legend import Entry, legend_of
 from pushplan.drawing.palette import SERIES, Color, palette_of
-from pushplan.drawing.scene import draw_moving, view_bounds
+from pushplan.drawing.top_view import draw_moving, view_bounds
 from pushplan.files.output_files import write_atomic
 from pushplan.imports.on_demand import need
 from pushplan.world import InvalidInputError, Plan, World

@@ -11,7 +11,7 @@ from PIL import Image, ImageDraw
 
 from pushplan.drawing.canvas import SMOOTHING
 from pushplan.drawing.palette import FLOOR_PALETTE, Color, palette_of
-from pushplan.drawing.scene import Font, font_of, pushed
+from pushplan.drawing.top_view import Font, font_of, pushed
 from pushplan.world import GoalDisc, Plan, World
 
 _GREY = "#808080"

@@ -7,7 +7,7 @@ from typing import ClassVar, NoReturn
 import numpy as np
 
 from pushplan.control import LegFollower, Legs, clamp_twist
-from pushplan.envs.actions import ActionMode, Motion
+from pushplan.envs.action_modes import ActionMode, Motion
 from pushplan.envs.tasks.base import Task
 from pushplan.geometry import VisibilityGraph
 from pushplan.world import InvalidInputError, RobotModel, Twist, World

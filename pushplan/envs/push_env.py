@@ -14,7 +14,7 @@ from gymnasium.spaces import Box
 from numpy.typing import ArrayLike, NDArray
 
 from pushplan.control import clamp_twist
-from pushplan.envs.actions import ActionMode, Motion, chosen_action, waiting
+from pushplan.envs.action_modes import ActionMode, Motion, chosen_action, waiting
 from pushplan.envs.registry import ACTIONS, SIMULATORS, TASKS, default_preset
 from pushplan.envs.rendering import Renderer
 from pushplan.envs.simulators.base import Simulator, warm_up_simulator

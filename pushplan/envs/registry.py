@@ -26,11 +26,11 @@ SIMULATORS = Registered(
     },
 )
 ACTIONS: Mapping[str, str] = {
-    "turn_rate": "pushplan.envs.actions:TurnRateAction",
+    "turn_rate": "pushplan.envs.action_modes:TurnRateAction",
     "heading": "pushplan.envs.drive_actions:HeadingAction",
     "waypoint": "pushplan.envs.drive_actions:WaypointAction",
-    "velocity": "pushplan.envs.actions:VelocityAction",
-    "wheels": "pushplan.envs.actions:WheelsAction",
+    "velocity": "pushplan.envs.action_modes:VelocityAction",
+    "wheels": "pushplan.envs.action_modes:WheelsAction",
 }
 GYM_IDS: Mapping[str, str] = {
     f"pushplan/{''.join(word.capitalize() for word in name.split('_'))}-v0": name for name in TASKS

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 from pushplan.envs.registry import SIMULATORS
 from pushplan.envs.simulators.base import Materials, Simulator
 from pushplan.imports.on_demand import look_up
-from pushplan.interaction.model import Interaction
+from pushplan.interaction.interaction_model import Interaction
 from pushplan.world import World
 
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 from typing import Any, Protocol, runtime_checkable
 
 from pushplan.compiled import KernelByType
-from pushplan.interaction.model import InteractionModel
+from pushplan.interaction.interaction_model import InteractionModel
 from pushplan.world import World
 from pushplan.world.checks import FloatArray
 

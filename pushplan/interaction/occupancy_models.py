@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from pushplan.errors import InvalidInputError
-from pushplan.interaction.model import InteractionModel
+from pushplan.interaction.interaction_model import InteractionModel
 from pushplan.interaction.occupancy import OccupancyForecast, PassageBatch, patch_after
 from pushplan.interaction.quasi_static import QuasiStatic
 

@@ -7,11 +7,11 @@ from collections.abc import Callable
 import numpy as np
 
 from pushplan.compiled import kernel, owned
-from pushplan.interaction.ice import IceInteraction
 from pushplan.interaction.ice_bodies import IceBodies, IceSettings, ice_problem, select_bodies
 from pushplan.interaction.ice_contacts import sweep_ice
+from pushplan.interaction.ice_interaction import IceInteraction
+from pushplan.interaction.interaction_model import InteractionModel
 from pushplan.interaction.kernels import sweep_path
-from pushplan.interaction.model import InteractionModel
 from pushplan.interaction.quasi_static import QuasiStatic
 from pushplan.world import World
 from pushplan.world.checks import FloatArray

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 from pushplan.compiled import kernel, owned
 from pushplan.geometry import polygon_inertia
 from pushplan.interaction.advance import advance_objects
+from pushplan.interaction.interaction_model import Interaction, checked_path
 from pushplan.interaction.kernels import (
     Bodies,
     Scratch,
@@ -21,7 +22,6 @@ from pushplan.interaction.kernels import (
     make_scratch,
     sweep_path,
 )
-from pushplan.interaction.model import Interaction, checked_path
 from pushplan.world import Movables, RobotModel, StaticMap, World
 from pushplan.world.checked_fields import (
     CheckedFields,

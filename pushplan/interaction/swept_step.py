@@ -11,7 +11,7 @@ from numba import types
 
 from pushplan.compiled import copy_into, kernel, owned
 from pushplan.interaction.advance import CompiledInteraction, advance_objects
-from pushplan.interaction.model import InteractionModel
+from pushplan.interaction.interaction_model import InteractionModel
 from pushplan.world import World
 from pushplan.world.checks import FloatArray, IntArray
 

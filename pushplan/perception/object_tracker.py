@@ -20,7 +20,7 @@ from pushplan.world.outline import areas_and_centroids, convex_hull, convex_outl
 _SAME_SIZE = 0.2  # relative difference of sizes up to which a jump may be of the same object
 
 
-class Candidate(NamedTuple):
+class NewSighting(NamedTuple):
     """A sighting that belongs to no track yet, since when [s], and how often it was seen."""
 
     sighting: Sighting
@@ -94,7 +94,7 @@ class ObjectTracker:
         self.ignored = self.flat = 0
         self.time: float | None = None
         self._tracks: list[Track] = []
-        self._candidates: list[Candidate] = []
+        self._candidates: list[NewSighting] = []
         self._next = 0
         self.movables = Movables.empty()
         self._shown: dict[int, tuple[int, int]] = {}
@@ -196,10 +196,10 @@ class ObjectTracker:
                 if one.sighting.label == sighting.label
                 and (away := abs(one.sighting.centre - sighting.centre)) <= reach
             ]
-            found = Candidate(sighting, self.time, 1)
+            found = NewSighting(sighting, self.time, 1)
             if near:
                 old = before.pop(min(near)[1])
-                found = Candidate(sighting, old.since, old.times + 1)
+                found = NewSighting(sighting, old.since, old.times + 1)
             if found.times < self.confirm:
                 self._candidates.append(found)
                 continue

@@ -10,7 +10,7 @@ import numpy as np
 from pushplan.control import PurePursuit
 from pushplan.geometry import VisibilityGraph
 from pushplan.motion.keep_out import keep_out
-from pushplan.motion.polyline import polyline_plan, polyline_status
+from pushplan.motion.polyline_plan import polyline_plan, polyline_status
 from pushplan.motion.speed_profile import start_margin
 from pushplan.planners.following.plan_follower import PlanFollower
 from pushplan.world import Planner, PlanResult, PlanStatus, Stop, World

@@ -17,7 +17,7 @@ from pushplan.geometry import VisibilityGraph
 from pushplan.geometry.obstacle_grid import ObstacleGrid, obstacle_grid, sees
 from pushplan.geometry.obstacles import Obstacles, obstacles_of
 from pushplan.motion.keep_out import keep_out
-from pushplan.motion.polyline import polyline_plan, polyline_status
+from pushplan.motion.polyline_plan import polyline_plan, polyline_status
 from pushplan.motion.speed_profile import start_margin
 from pushplan.motion.time_slicing import Stopped, go_on
 from pushplan.planners.following.plan_follower import PlanFollower

@@ -1,9 +1,8 @@
 """ROS 2: its messages, with or without ROS installed, and logs as MCAP."""
 
-from pushplan.ros.episodes import load_episode, save_episode
+from pushplan.ros.mcap_episodes import load_episode, save_episode
 from pushplan.ros.mcap_log import McapLog
 from pushplan.ros.message_types import MessageTypes, RclpyTypes, RosbagsTypes
-from pushplan.ros.messages import Messages
 from pushplan.ros.reading import (
     frame_of,
     path_from,
@@ -14,6 +13,7 @@ from pushplan.ros.reading import (
     time_from,
     twist_from,
 )
+from pushplan.ros.ros_messages import Messages
 
 __all__ = [
     "McapLog",

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from pushplan.ros.messages import Messages
+from pushplan.ros.ros_messages import Messages
 from pushplan.world import ClearanceArea, GoalDisc, Receptacle, World
 from pushplan.world.checks import FloatArray
 

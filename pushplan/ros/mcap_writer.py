@@ -13,7 +13,7 @@ import numpy as np
 from pushplan.imports.on_demand import need
 from pushplan.ros.markers import object_frame, object_markers, scene_markers, transforms
 from pushplan.ros.message_types import RosbagsTypes
-from pushplan.ros.messages import Messages
+from pushplan.ros.ros_messages import Messages
 from pushplan.runtime import Command
 from pushplan.world import InvalidInputError, Plan, World
 from pushplan.world.checks import FloatArray

@@ -10,7 +10,7 @@ import numpy as np
 
 from pushplan.envs.simulators.pymunk_simulator import PymunkSimulator
 from pushplan.envs.tasks.ship_ice import ShipIceTask
-from pushplan.interaction.model import Interaction
+from pushplan.interaction.interaction_model import Interaction
 from pushplan.interaction.occupancy import (
     OccupancyForecast,
     Passage,

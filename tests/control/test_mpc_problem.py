@@ -12,27 +12,27 @@ from scipy.optimize import minimize
 from test_tracking_controllers import FLOOR, arc_plan
 
 from pushplan.control import MpcConfig, MpcTracker
-from pushplan.control.mpc.kernels import (
-    Track,
+from pushplan.control.mpc.quadratic_program import ProgramSolver, quadratic_program
+from pushplan.control.mpc.tracking_kernels import (
+    ReferencePath,
     Tuning,
     assemble,
     assembly_memory,
     errors,
     locate,
 )
-from pushplan.control.mpc.quadratic_program import ProgramSolver, quadratic_program
 
 CURVATURE = 0.4
 CENTRE = np.array([0.0, 1.0 / CURVATURE])
 SIZE, SPEED, TURN = 0.8, 0.3, 0.5
 
 
-def circle_track() -> Track:
+def circle_track() -> ReferencePath:
     """A left turn of radius 1 / CURVATURE from the origin."""
     lengths = np.arange(0.0, 12.0, 0.1)
     angle = lengths * CURVATURE
     poses = np.column_stack([np.sin(angle) / CURVATURE, (1.0 - np.cos(angle)) / CURVATURE, angle])
-    return Track(poses, lengths, np.full(len(lengths), SPEED))
+    return ReferencePath(poses, lengths, np.full(len(lengths), SPEED))
 
 
 def tuning(**changes: object) -> Tuning:

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from pushplan.envs import RolloutInteraction, make
-from pushplan.interaction.model import InteractionModel
+from pushplan.interaction.interaction_model import InteractionModel
 from pushplan.scenarios import Scenario
 from pushplan.world import InvalidInputError
 

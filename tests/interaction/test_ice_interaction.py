@@ -10,7 +10,7 @@ from ice_scenes import channel, straight_path
 from pushplan.envs import RolloutInteraction
 from pushplan.envs.simulators.base import Materials
 from pushplan.interaction import InteractionModel, QuasiStatic
-from pushplan.interaction.ice import IceInteraction
+from pushplan.interaction.ice_interaction import IceInteraction
 from pushplan.world import InvalidInputError, StaticMap
 from pushplan.world.outline import transform
 

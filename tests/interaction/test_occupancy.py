@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from ice_scenes import channel, straight_path
 
 from pushplan.compiled import owned
-from pushplan.interaction.ice import IceInteraction
+from pushplan.interaction.ice_interaction import IceInteraction
 from pushplan.interaction.network import IceNetwork
 from pushplan.interaction.occupancy import (
     NoMotion,

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from pushplan.interaction import Interaction, QuasiStatic
-from pushplan.interaction.ice import IceInteraction
+from pushplan.interaction.ice_interaction import IceInteraction
 from pushplan.planners import make_planner
 from pushplan.world import (
     Drive,

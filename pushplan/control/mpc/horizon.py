@@ -9,12 +9,12 @@ from typing import NamedTuple
 import numpy as np
 
 from pushplan.compiled import copy_into, kernel, owned
-from pushplan.control.mpc.kernels import Track
 from pushplan.control.mpc.quadratic_program import (
     ProgramSolver,
     QuadraticProgram,
     quadratic_program,
 )
+from pushplan.control.mpc.tracking_kernels import ReferencePath
 from pushplan.world import Drive, Plan, RobotModel
 from pushplan.world.checks import FloatArray, IntArray
 
@@ -22,7 +22,7 @@ SENT = 256
 """Commands under way that are remembered; of more than these the oldest count no more."""
 
 
-class Limits(NamedTuple):
+class CommandLimits(NamedTuple):
     """What a robot can do."""
 
     constant: bool  # Whether it always drives at max_speed
@@ -37,7 +37,7 @@ class Limits(NamedTuple):
 class Horizon(NamedTuple):
     """Commands for the next steps, from quadratic programs about the last solution."""
 
-    limits: Limits
+    limits: CommandLimits
     units: FloatArray  # (2,) of speed [m/s] and turn rate [rad/s] in the program
     columns: IntArray  # (C,) what each block of variables is: 0 speed, 1 turn rate
     program: QuadraticProgram  # Over M commands of each, in units
@@ -55,14 +55,14 @@ UNDER_WAY, KNOWN, MISSED, FAILED = range(4)
 """Places in `Horizon.counts`."""
 
 
-def track_of(plan: Plan) -> Track:
+def track_of(plan: Plan) -> ReferencePath:
     """The path of a plan as the kernels read it."""
-    return Track(owned(plan.poses), owned(plan.arc_lengths), owned(plan.speeds))
+    return ReferencePath(owned(plan.poses), owned(plan.arc_lengths), owned(plan.speeds))
 
 
-def limits_of(robot: RobotModel) -> Limits:
+def limits_of(robot: RobotModel) -> CommandLimits:
     """The limits of a robot as the kernels read them."""
-    return Limits(
+    return CommandLimits(
         robot.drive is Drive.CONSTANT_SPEED,
         robot.min_speed,
         robot.max_speed,

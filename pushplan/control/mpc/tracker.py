@@ -11,7 +11,6 @@ from pushplan.compiled import owned
 from pushplan.control.episode_clock import EpisodeClock
 from pushplan.control.limits import driven_twist
 from pushplan.control.mpc.horizon import FAILED, make_horizon, solve_rounds, track_of
-from pushplan.control.mpc.kernels import Tuning, assembly_memory
 from pushplan.control.mpc.mpc_config import MpcConfig
 from pushplan.control.mpc.quadratic_program import ProgramSolver
 from pushplan.control.mpc.tracker_kernels import (
@@ -21,6 +20,7 @@ from pushplan.control.mpc.tracker_kernels import (
     begin_track,
     finish_step,
 )
+from pushplan.control.mpc.tracking_kernels import Tuning, assembly_memory
 from pushplan.control.stage_follower import StageFollower
 from pushplan.world import Drive, Plan, RobotModel, Twist, World
 from pushplan.world.checks import expect

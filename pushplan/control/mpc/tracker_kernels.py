@@ -20,9 +20,9 @@ from pushplan.control.mpc.horizon import (
     set_bounds,
     shift_steps,
 )
-from pushplan.control.mpc.kernels import (
+from pushplan.control.mpc.tracking_kernels import (
     AssemblyMemory,
-    Track,
+    ReferencePath,
     Tuning,
     arc,
     assemble,
@@ -60,7 +60,7 @@ def begin_track(memory: TrackerMemory) -> None:
 @kernel
 def begin_step(
     memory: TrackerMemory,
-    track: Track,
+    track: ReferencePath,
     pose: FloatArray,  # (3,) observed x, y [m], theta [rad]
     time: float,  # of it [s]
     held: float,  # from the last call to this one [s]
@@ -99,7 +99,7 @@ def begin_step(
 
 
 @kernel
-def assemble_step(memory: TrackerMemory, track: Track) -> None:
+def assemble_step(memory: TrackerMemory, track: ReferencePath) -> None:
     """Put up the program about the nominal commands."""
     horizon = memory.horizon
     assemble(
@@ -119,7 +119,7 @@ def assemble_step(memory: TrackerMemory, track: Track) -> None:
 @kernel
 def finish_step(
     memory: TrackerMemory,
-    track: Track,
+    track: ReferencePath,
     pose: FloatArray,
     time: float,
     held: float,
@@ -188,7 +188,7 @@ def _predict(memory: TrackerMemory, pose: FloatArray, time: float) -> None:
 
 @kernel
 def _fall_back(
-    memory: TrackerMemory, track: Track, pose: FloatArray, held: float, out: FloatArray
+    memory: TrackerMemory, track: ReferencePath, pose: FloatArray, held: float, out: FloatArray
 ) -> None:
     """Drive the last solution, moved on; pure pursuit where it has run out."""
     horizon = memory.horizon
@@ -205,7 +205,7 @@ def _fall_back(
 
 
 @kernel
-def pursue(memory: TrackerMemory, track: Track, pose: FloatArray) -> tuple[float, float]:
+def pursue(memory: TrackerMemory, track: ReferencePath, pose: FloatArray) -> tuple[float, float]:
     """Speed and turn rate on the arc to a point R ahead (Coulter, CMU-RI-TR-92-01)."""
     tuning, lengths, poses = memory.tuning, track.lengths, track.poses
     last = lengths.shape[0] - 1

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from pushplan.envs.simulators.water import Water
 from pushplan.envs.trace import Trace
-from pushplan.interaction.model import Interaction
+from pushplan.interaction.interaction_model import Interaction
 from pushplan.world import InvalidInputError, RobotModel, Twist, World
 from pushplan.world.checked_fields import CheckedFields, NonNegativeFloat, PositiveFloat
 from pushplan.world.checks import ArrayRecord, FloatArray, IntArray, array, frozen

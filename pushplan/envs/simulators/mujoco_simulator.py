@@ -15,7 +15,7 @@ from pushplan.envs.simulators.mujoco_camera import MujocoCamera
 from pushplan.envs.simulators.mujoco_follow import follow_path
 from pushplan.envs.simulators.mujoco_options import MujocoOptions
 from pushplan.envs.trace import Trace
-from pushplan.interaction.model import Interaction
+from pushplan.interaction.interaction_model import Interaction
 from pushplan.world import InvalidInputError, Twist, World
 from pushplan.world.checks import FloatArray, frozen, number
 

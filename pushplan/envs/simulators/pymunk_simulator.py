@@ -22,7 +22,7 @@ from pushplan.envs.simulators.pymunk_drive import PymunkDriver, PymunkOptions
 from pushplan.envs.simulators.reach import Shapes, arc_pose, clear_time, struck, within_reach
 from pushplan.envs.trace import Trace
 from pushplan.geometry.obstacles import obstacles_of
-from pushplan.interaction.model import Interaction
+from pushplan.interaction.interaction_model import Interaction
 from pushplan.world import Twist, World
 from pushplan.world.checks import BoolArray, FloatArray, IntArray, frozen, number
 

@@ -10,7 +10,7 @@ import numpy as np
 import shapely
 
 from pushplan.envs.tasks.layout import rectangle, those_inside, walls_around
-from pushplan.envs.tasks.manipulation import (
+from pushplan.envs.tasks.manipulation_task import (
     START_TRIES,
     ManipulationTask,
     ManipulationVariations,

@@ -13,7 +13,7 @@ from pushplan.envs.tasks.base import StepOutcome, Task
 from pushplan.envs.tasks.presets import read_presets
 from pushplan.envs.tasks.variations import TaskVariations
 from pushplan.observation import ImageObservation
-from pushplan.scenarios.ice import FloeSizes, IceField, generate_ice, load_ice
+from pushplan.scenarios import FloeSizes, IceField, generate_ice, load_ice
 from pushplan.world import (
     GoalLine,
     InvalidInputError,

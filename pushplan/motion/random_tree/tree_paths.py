@@ -12,7 +12,7 @@ from pushplan.motion.coarse_path import coarse_path, reachable
 from pushplan.motion.collision import footprint, is_free, obstacles
 from pushplan.motion.keep_out import keep_out
 from pushplan.motion.path_improver import Candidate, PathImprover
-from pushplan.motion.polyline import polyline_plan
+from pushplan.motion.polyline_plan import polyline_plan
 from pushplan.motion.random_tree.kinodynamic_tree import TreeGrowth, TreeLimits
 from pushplan.motion.random_tree.targets import Targets
 from pushplan.motion.room_ahead import gets_away, is_boxed_in

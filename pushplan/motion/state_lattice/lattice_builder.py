@@ -15,7 +15,7 @@ from pushplan.motion.state_lattice.cost_map import FloeCosts
 from pushplan.motion.state_lattice.frame import Frame
 from pushplan.motion.state_lattice.lattice_config import LatticeConfig
 from pushplan.motion.state_lattice.lattice_map import LatticeMap
-from pushplan.motion.state_lattice.place_costs import LEAN, Window, place_costs
+from pushplan.motion.state_lattice.place_costs import LEAN, HullWindow, place_costs
 from pushplan.motion.state_lattice.pose_lattice import PoseLattice
 from pushplan.motion.state_lattice.primitive_set import PrimitiveConfig
 from pushplan.motion.state_lattice.primitives import primitives
@@ -202,7 +202,7 @@ class LatticeBuilder:
         lengths = dubins_to_line(distances[None], self.motions.angles[:, None], self.radius)
         radius = self.world.robot.inscribed_radius / self.cell
         half = max(math.floor(radius - 1.0), 0)
-        window = Window(half, self._hull, 0, 1, 1.0, self.cell, LEAN)
+        window = HullWindow(half, self._hull, 0, 1, 1.0, self.cell, LEAN)
         if self.config.heuristic == "estimate":
             factor = 2.0 * radius / (2 * half + 1)
             window = window._replace(reach=0, along=self._hull, stage=cells, factor=factor)

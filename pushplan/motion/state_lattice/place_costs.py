@@ -32,7 +32,7 @@ def _drift(values: FloatArray, first: int, last: int, cost: float) -> None:
         values[i] = min(values[i], values[i + 1] + cost)
 
 
-class Window(NamedTuple):
+class HullWindow(NamedTuple):
     """What a robot is taken to cover where it crosses a row of cells."""
 
     half: int  # Cells to each side of the one below its origin
@@ -51,7 +51,7 @@ def place_costs(
     goal_cell: int,  # row of the map on which the goal line lies, or one before
     columns: IntArray,  # (V,) columns of the map on which those of the lattice lie
     between: tuple[int, int],  # first and last column of the map where the origin may be
-    window: Window,
+    window: HullWindow,
 ) -> FloatArray:
     """(U, V) cost [m] from each place of a lattice to a goal line, at least or about; 0 beyond."""
     width, rows = sums.shape[0], sums.shape[1] - 1

@@ -16,7 +16,7 @@ from pushplan.control.stopping import stopping_path
 from pushplan.control.tracking import Progress
 from pushplan.interaction import InteractionModel, QuasiStatic
 from pushplan.planners.following.plan_controller import PlanController
-from pushplan.planners.following.recovery import FruitlessCalls, RecoveryRule
+from pushplan.planners.following.recovery_timing import FruitlessCalls, RecoveryRule
 from pushplan.planners.following.replanning import (
     Reason,
     Replanning,

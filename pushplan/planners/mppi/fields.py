@@ -8,7 +8,7 @@ import numpy as np
 
 from pushplan.geometry import GeodesicField, GoalDistances, geodesic_field, goal_distances
 from pushplan.motion.done_places import done_places
-from pushplan.planners.mppi.cost_kernels import Field
+from pushplan.planners.mppi.rollout_cost_kernels import Field
 from pushplan.world import ClearanceArea, Goal, ManipulationGoal, Receptacle, StaticMap
 from pushplan.world.checks import FloatArray, frozen
 

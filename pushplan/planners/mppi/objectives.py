@@ -8,7 +8,9 @@ from typing import NamedTuple
 import numpy as np
 
 from pushplan.compiled import owned
-from pushplan.planners.mppi.cost_kernels import (
+from pushplan.planners.mppi.fields import CLEARANCE, object_field, robot_field
+from pushplan.planners.mppi.mppi_config import MppiConfig
+from pushplan.planners.mppi.rollout_cost_kernels import (
     Approach,
     CostWeights,
     ObjectCosts,
@@ -16,8 +18,6 @@ from pushplan.planners.mppi.cost_kernels import (
     navigation_costs,
     sample,
 )
-from pushplan.planners.mppi.fields import CLEARANCE, object_field, robot_field
-from pushplan.planners.mppi.mppi_config import MppiConfig
 from pushplan.planners.mppi.rollout_kernels import Rollouts
 from pushplan.world import World
 from pushplan.world.checks import FloatArray

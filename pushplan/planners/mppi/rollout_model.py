@@ -10,7 +10,7 @@ from pushplan.compiled import owned
 from pushplan.control.limits import driven_twist
 from pushplan.interaction import InteractionModel, QuasiStatic, SweepsMany
 from pushplan.interaction.advance import CompiledInteraction
-from pushplan.interaction.ice import IceInteraction
+from pushplan.interaction.ice_interaction import IceInteraction
 from pushplan.motion.collision import footprint, is_free, obstacles, static_depth
 from pushplan.motion.goal_region import goal_numbers
 from pushplan.motion.keep_out import keep_out

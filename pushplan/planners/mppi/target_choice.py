@@ -7,10 +7,10 @@ import math
 import numpy as np
 
 from pushplan.geometry import Path
-from pushplan.planners.mppi.approach import approach_to, no_approach, place_behind
-from pushplan.planners.mppi.cost_kernels import Approach
+from pushplan.planners.mppi.approach_grid import approach_to, no_approach, place_behind
 from pushplan.planners.mppi.fields import CLEARANCE, object_ways
 from pushplan.planners.mppi.mppi_config import MppiConfig
+from pushplan.planners.mppi.rollout_cost_kernels import Approach
 from pushplan.world import World
 from pushplan.world.checks import FloatArray
 

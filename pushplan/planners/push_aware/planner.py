@@ -10,8 +10,8 @@ import numpy as np
 from pushplan.interaction import InteractionModel, QuasiStatic
 from pushplan.motion.path_improver import PathImprover
 from pushplan.motion.speed_profile import turning_radius
+from pushplan.planners.push_aware.planning_call import PushAwareSearch
 from pushplan.planners.push_aware.push_aware_config import PushAwareConfig
-from pushplan.planners.push_aware.search import PushAwareSearch
 from pushplan.world import Drive, PlanResult, RobotModel, Stop, World
 from pushplan.world.checks import expect
 from pushplan.world.planning_call import PlanningCall

@@ -5,7 +5,6 @@ a predictive one that keeps the box on the bumper. See docs/pushing.md.
 """
 
 from pushplan.planners.pushing.bumper import Bumper, Face, face_towards
-from pushplan.planners.pushing.model import PushModel, PushState
 from pushplan.planners.pushing.mpc import PushingMpc, warm_up
 from pushplan.planners.pushing.parameters import (
     PushingConfig,
@@ -15,6 +14,7 @@ from pushplan.planners.pushing.parameters import (
     stable_curvature,
 )
 from pushplan.planners.pushing.path import PushPath
+from pushplan.planners.pushing.push_model import PushModel, PushState
 
 __all__ = [
     "Bumper",

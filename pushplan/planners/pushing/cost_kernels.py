@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from pushplan.compiled import kernel
-from pushplan.control.mpc.kernels import Track
+from pushplan.control.mpc.tracking_kernels import ReferencePath
 from pushplan.planners.pushing.contact_kernels import Contact, flush_angle, standoff
 from pushplan.world.checks import FloatArray, IntArray
 
@@ -41,7 +41,7 @@ class PushingProblem(NamedTuple):
     """The pushing problem of one call."""
 
     contact: Contact  # Bumper, face and friction
-    track: Track  # The box's path
+    track: ReferencePath  # The box's path
     weights: Weights
     start: FloatArray  # (6,) state when the first command takes effect
     along: float  # Path length of the box's place [m]

@@ -25,7 +25,6 @@ from pushplan.geometry.obstacles import obstacles_of
 from pushplan.planners.pushing.bumper import faces_of
 from pushplan.planners.pushing.clearance_kernels import clearance_problem
 from pushplan.planners.pushing.cost_kernels import Weights, assembly_memory
-from pushplan.planners.pushing.model import PushModel, PushState
 from pushplan.planners.pushing.parameters import PushingConfig
 from pushplan.planners.pushing.path import PushPath
 from pushplan.planners.pushing.push_kernels import (
@@ -39,6 +38,7 @@ from pushplan.planners.pushing.push_kernels import (
     observe_push,
     send_push,
 )
+from pushplan.planners.pushing.push_model import PushModel, PushState
 from pushplan.planners.warm_up_worlds import warm_up_worlds
 from pushplan.world import Drive, InvalidInputError, Plan, RobotModel, Twist, World
 from pushplan.world.checks import FloatArray, IntArray, expect

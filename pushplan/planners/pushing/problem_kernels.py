@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from pushplan.compiled import copy_into, kernel
-from pushplan.control.mpc.kernels import arc, errors, locate
+from pushplan.control.mpc.tracking_kernels import arc, errors, locate
 from pushplan.planners.pushing.contact_kernels import (
     Contact,
     advance,

@@ -20,7 +20,7 @@ from pushplan.control.mpc.horizon import (
     set_bounds,
     shift_steps,
 )
-from pushplan.control.mpc.kernels import Track, locate
+from pushplan.control.mpc.tracking_kernels import ReferencePath, locate
 from pushplan.geometry.angles import wrap_angle
 from pushplan.geometry.obstacles import Obstacles
 from pushplan.planners.pushing.clearance_kernels import ClearanceProblem, free_fraction
@@ -86,7 +86,12 @@ def contact_now(memory: PushingMemory) -> Contact:
 
 @kernel
 def observe_push(
-    memory: PushingMemory, track: Track, pose: FloatArray, box: FloatArray, time: float, held: float
+    memory: PushingMemory,
+    track: ReferencePath,
+    pose: FloatArray,
+    box: FloatArray,
+    time: float,
+    held: float,
 ) -> bool:
     """Estimate the state from poses (3,), and put up the program for when a command takes effect.
 
@@ -169,7 +174,7 @@ def _predict(memory: PushingMemory, contact: Contact, begin: float, end: float) 
 
 
 @kernel
-def problem_now(memory: PushingMemory, track: Track, held: float) -> PushingProblem:
+def problem_now(memory: PushingMemory, track: ReferencePath, held: float) -> PushingProblem:
     """Lay the steps and the bounds, and put up the problem from the state in effect."""
     horizon, contact, base = memory.horizon, contact_now(memory), memory.weights
     length = contact.front + contact.depth
@@ -225,7 +230,7 @@ def _begin_commands(memory: PushingMemory, held: float) -> None:
 
 
 @kernel
-def assemble_push(memory: PushingMemory, track: Track, held: float) -> None:
+def assemble_push(memory: PushingMemory, track: ReferencePath, held: float) -> None:
     """Put up the program about the nominal commands."""
     problem = problem_now(memory, track, held)
     memory.told[VALUE] = assemble(problem, memory.horizon.nominal, memory.assembly)

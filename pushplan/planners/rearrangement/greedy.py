@@ -12,13 +12,13 @@ from pushplan.control import LegFollower, Legs, Recovery
 from pushplan.control.recovery import warm_up_recovery
 from pushplan.geometry import VisibilityGraph
 from pushplan.planners.pushing import PushPath
-from pushplan.planners.rearrangement.object_policy import ObjectPolicy
 from pushplan.planners.rearrangement.push_execution import GeometricPusher, PathPush
 from pushplan.planners.rearrangement.push_scene import (
     PushScene,
     heading_axes,
     initial_heading,
 )
+from pushplan.planners.rearrangement.rearrangement_policy import RearrangementPolicy
 from pushplan.world import StaticMap, Twist, World
 from pushplan.world.checks import FloatArray
 
@@ -52,7 +52,7 @@ class _Attempt:
     pushing: bool = False
 
 
-class GreedyPusher(ObjectPolicy):
+class GreedyPusher(RearrangementPolicy):
     """Takes the nearest box that is not done, drives behind it and pushes until it is done.
 
     Behind means opposite to the box's shortest path around static things to its goal; where the

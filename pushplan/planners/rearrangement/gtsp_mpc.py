@@ -9,11 +9,6 @@ from typing import Any
 import numpy as np
 
 from pushplan.control import ImmediateExecutor, PoseFollower, Retreat
-from pushplan.planners.rearrangement.object_policy import (
-    ObjectPolicy,
-    warm_up_rearrangement,
-    warm_up_steering,
-)
 from pushplan.planners.rearrangement.push import Push, PushHistory, push_plan, signature
 from pushplan.planners.rearrangement.push_choice import (
     PendingChoice,
@@ -25,6 +20,11 @@ from pushplan.planners.rearrangement.push_execution import ExecutionEnd, PushExe
 from pushplan.planners.rearrangement.push_graph import PushGraph
 from pushplan.planners.rearrangement.push_scene import PushScene
 from pushplan.planners.rearrangement.rearrangement_config import RearrangementConfig
+from pushplan.planners.rearrangement.rearrangement_policy import (
+    RearrangementPolicy,
+    warm_up_rearrangement,
+    warm_up_steering,
+)
 from pushplan.planners.rearrangement.rollout_cache import RolloutCache
 from pushplan.world import InvalidInputError, Plan, PlanningExecutor, Stop, Twist, World
 from pushplan.world.checks import FloatArray, expect
@@ -32,7 +32,7 @@ from pushplan.world.checks import FloatArray, expect
 _RETREAT = 0.3  # how far the robot backs off where it is stuck [circumscribed radii]
 
 
-class GtspMpc(ObjectPolicy):
+class GtspMpc(RearrangementPolicy):
     """Clears or delivers objects: which next, from which side, together with which others.
 
     After every push the push graph is built anew from what is seen, and the order of pushes

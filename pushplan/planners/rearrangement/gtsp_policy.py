@@ -10,13 +10,16 @@ from pushplan.control import LegFollower, Legs, clamp_twist
 from pushplan.geometry import VisibilityGraph
 from pushplan.gtsp import solve_gtsp
 from pushplan.motion.keep_out import keep_out
-from pushplan.planners.rearrangement.object_policy import ObjectPolicy, warm_up_rearrangement
 from pushplan.planners.rearrangement.push_scene import PushScene, open_edges
+from pushplan.planners.rearrangement.rearrangement_policy import (
+    RearrangementPolicy,
+    warm_up_rearrangement,
+)
 from pushplan.world import ClearanceArea, MaxIterations, Receptacle, Twist, World
 from pushplan.world.checks import FloatArray
 
 
-class Gtsp(ObjectPolicy):
+class Gtsp(RearrangementPolicy):
     """Plans once and follows its path, as the policy of the Bench-Push paper does.
 
     Every object is a cluster; a node is a straight push of it across one open edge of the area, or

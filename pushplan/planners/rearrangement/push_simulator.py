@@ -11,14 +11,14 @@ import numpy as np
 from pushplan.interaction.kernels import sweep_path
 from pushplan.planners.rearrangement.goal_kernels import all_done
 from pushplan.planners.rearrangement.push import Push
-from pushplan.planners.rearrangement.push_scene import PushScene, pose_distance
-from pushplan.planners.rearrangement.rollout_cache import Rollout
-from pushplan.planners.rearrangement.rollout_kernels import (
+from pushplan.planners.rearrangement.push_rollout_kernels import (
     STAGES,
+    PushRollout,
     RolloutLog,
-    RolloutProblem,
     roll_out,
 )
+from pushplan.planners.rearrangement.push_scene import PushScene, pose_distance
+from pushplan.planners.rearrangement.rollout_cache import Rollout
 from pushplan.world.checks import BoolArray, FloatArray
 from pushplan.world.polyline import path_length, path_lengths
 
@@ -130,7 +130,7 @@ def _roll_out(scene: PushScene, attempt: PushAttempt, poses: FloatArray | None) 
     longest = int(scene.longest / scene.controller.step) + 2
     shapes = ((longest, 3), (STAGES,), (STAGES, count, 3), (STAGES, count), (4,))
     log = RolloutLog(*(np.zeros(shape) for shape in shapes))
-    problem = RolloutProblem(
+    problem = PushRollout(
         target=attempt.target if len(attempt.path) else -1,
         path=attempt.path,
         shift=attempt.shift,

@@ -26,13 +26,13 @@ from pushplan.planners.rearrangement.approach import (
     find_route,
     simulate_route,
 )
-from pushplan.planners.rearrangement.arc_kernels import sweep_arcs
 from pushplan.planners.rearrangement.candidates import GAIN, can_be_pushed
 from pushplan.planners.rearrangement.goal_kernels import REMOVED
 from pushplan.planners.rearrangement.push import Push
 from pushplan.planners.rearrangement.push_scene import PushScene, initial_heading, pose_distance
 from pushplan.planners.rearrangement.push_simulator import simulate_primitive
 from pushplan.planners.rearrangement.rollout_cache import Asked, Primitive
+from pushplan.planners.rearrangement.short_arc_kernels import sweep_arcs
 from pushplan.world.checks import FloatArray
 
 _Cell = tuple[float, ...]

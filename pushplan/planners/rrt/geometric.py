@@ -11,7 +11,7 @@ from pushplan.compiled import kernel, owned
 from pushplan.geometry import core_distance
 from pushplan.motion.collision import ConvexObstacles, obstacles
 from pushplan.motion.keep_out import keep_out
-from pushplan.motion.polyline import polyline_plan, polyline_status
+from pushplan.motion.polyline_plan import polyline_plan, polyline_status
 from pushplan.motion.random_tree.ompl_lock import ompl_alone, own_state, plane_bounds
 from pushplan.motion.speed_profile import goal_is_outside, start_margin
 from pushplan.world import MaxIterations, NavigationGoal, PlanResult, PlanStatus, Stop, World

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from pushplan.compiled import kernel
-from pushplan.planners.ship_predictive.cost_to_go import CostToGo, cost_to_go, mass_ahead
+from pushplan.planners.ship_predictive.ice_cost_to_go import IceCostToGo, cost_to_go, mass_ahead
 from pushplan.world.checks import FloatArray
 
 
@@ -22,7 +22,7 @@ class Channel(NamedTuple):
 
 @kernel
 def steer_on(
-    costs: CostToGo,
+    costs: IceCostToGo,
     pose: FloatArray,  # (3,) where to begin
     curvatures: FloatArray,  # (B,) to choose from [1/m]
     step: float,  # length of the arcs [m]

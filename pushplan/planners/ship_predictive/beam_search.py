@@ -11,7 +11,7 @@ import numpy as np
 from pushplan.planners.ship_predictive.arc_kernels import arc_ahead, steer_on
 from pushplan.planners.ship_predictive.beam_node import BeamNode, Ice, StatePropagator
 from pushplan.planners.ship_predictive.channel_view import ChannelView
-from pushplan.planners.ship_predictive.cost_to_go import cost_ahead
+from pushplan.planners.ship_predictive.ice_cost_to_go import cost_ahead
 from pushplan.planners.ship_predictive.predictive_config import PredictiveConfig
 from pushplan.world import StopCheck
 from pushplan.world.checks import FloatArray

@@ -7,14 +7,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pushplan.interaction.ice import IceInteraction
 from pushplan.interaction.ice_bodies import IceBodies, IceSettings, select_bodies
+from pushplan.interaction.ice_interaction import IceInteraction
 from pushplan.motion.speed_profile import check_turns
 from pushplan.planners.ship_predictive.arc_kernels import Channel
-from pushplan.planners.ship_predictive.cost_to_go import (
+from pushplan.planners.ship_predictive.ice_cost_to_go import (
     HEADINGS,
-    CostToGo,
     Floes,
+    IceCostToGo,
     fill_field,
     fill_table,
 )
@@ -39,7 +39,7 @@ class ChannelView:
     floes: FloatArray  # (K, 3) their poses
     bodies: IceBodies  # their shapes and the hull's
     settings: IceSettings  # of their motion
-    costs: CostToGo  # costs to go
+    costs: IceCostToGo  # costs to go
     length: float  # of the hull [m]
     radius: float  # least turning radius [m]
     curvatures: FloatArray  # (B,) that the search uses [1/m]
@@ -148,7 +148,7 @@ def _costs_to_go(
     floes: FloatArray,
     channel: Channel,
     radius: float,
-) -> CostToGo:
+) -> IceCostToGo:
     vertices = world.robot.vertices
     length, away = float(np.ptp(vertices[:, 0])), max(channel.goal, 0.0)
     width, ahead = float(channel.high[0] - channel.low[0]), away + length
@@ -159,7 +159,7 @@ def _costs_to_go(
     column = max(width / (columns - 1), 0.1 * config.column * length)
     cell = 0.5 * column
     rows = max(2, math.ceil(ahead / (config.row * coarser)) + 1)
-    costs = CostToGo(
+    costs = IceCostToGo(
         table=np.empty((rows, columns, HEADINGS)),
         field=np.empty((math.ceil((away + 3.0 * length) / cell) + 1, 2 * columns - 1)),
         left=float(channel.low[0]),

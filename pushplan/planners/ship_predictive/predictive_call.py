@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from pushplan.interaction.ice import IceInteraction
+from pushplan.interaction.ice_interaction import IceInteraction
 from pushplan.motion.speed_profile import along_arcs, timed_plan
 from pushplan.motion.state_lattice.lattice_path import bare_path
 from pushplan.planners.ship_predictive.beam_node import BeamNode, StatePropagator

@@ -8,7 +8,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from pushplan.interaction.ice import IceInteraction
+from pushplan.interaction.ice_interaction import IceInteraction
 from pushplan.interaction.network import IceNetwork
 from pushplan.motion.time_slicing import Stopped
 from pushplan.planners.ship_predictive.channel_view import channel_view

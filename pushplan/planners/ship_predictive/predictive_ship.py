@@ -7,7 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from pushplan.interaction.ice import IceInteraction
+from pushplan.interaction.ice_interaction import IceInteraction
 from pushplan.planners.ship_predictive.floe_propagator import FloePropagator
 from pushplan.planners.ship_predictive.predictive_call import plan_call
 from pushplan.planners.ship_predictive.predictive_config import PredictiveConfig

@@ -8,7 +8,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from pushplan.interaction.ice import IceInteraction
+from pushplan.interaction.ice_interaction import IceInteraction
 from pushplan.interaction.network import IceNetwork
 from pushplan.planners.ship_predictive.map_propagator import MapPropagator
 from pushplan.planners.ship_predictive.predictive_call import plan_call

@@ -24,7 +24,7 @@ from pushplan.interaction import QuasiStatic
 from pushplan.motion.collision import footprint, obstacles, static_depth
 from pushplan.planners import make_planner, policy_for
 from pushplan.planners.following.plan_follower import PlanFollower
-from pushplan.planners.following.recovery import RecoveryRule
+from pushplan.planners.following.recovery_timing import RecoveryRule
 from pushplan.scenarios import Scenario
 from pushplan.world import (
     MaxIterations,

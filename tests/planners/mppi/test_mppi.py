@@ -10,7 +10,7 @@ import pytest
 from pushplan.control import SimulatedExecutor
 from pushplan.geometry.transforms import arc_step
 from pushplan.interaction import InteractionModel, QuasiStatic
-from pushplan.interaction.ice import IceInteraction
+from pushplan.interaction.ice_interaction import IceInteraction
 from pushplan.planners import make_policy
 from pushplan.planners.mppi import Mppi, MppiConfig
 from pushplan.planners.mppi.control_sequence import ControlSequence, draw, interpolation

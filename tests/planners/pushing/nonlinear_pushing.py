@@ -10,7 +10,7 @@ from typing import Any
 import casadi
 import numpy as np
 
-from pushplan.control.mpc.kernels import errors, locate
+from pushplan.control.mpc.tracking_kernels import errors, locate
 from pushplan.geometry.obstacles import obstacles_of
 from pushplan.planners.pushing.contact_kernels import FLUSH, Contact, box_pose
 from pushplan.planners.pushing.cost_kernels import SPEED_SMOOTHNESS, PushingProblem, Weights

@@ -12,13 +12,13 @@ from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import dijkstra
 from test_ship_lattice import ship_world
 
-from pushplan.interaction.ice import IceInteraction
+from pushplan.interaction.ice_interaction import IceInteraction
 from pushplan.interaction.path_sweepers import path_sweeper
 from pushplan.motion.speed_profile import turning_radius
 from pushplan.motion.state_lattice.built_lattice import BuiltLattice
 from pushplan.motion.state_lattice.lattice_builder import LatticeBuilder
 from pushplan.motion.state_lattice.lattice_search import open_search
-from pushplan.motion.state_lattice.place_costs import Window, place_costs
+from pushplan.motion.state_lattice.place_costs import HullWindow, place_costs
 from pushplan.motion.state_lattice.pose_lattice import PoseLattice, bound_at, reached, successors
 from pushplan.planners.ship_lattice import ShipLattice, ShipLatticeConfig
 from pushplan.planners.ship_lattice.floe_costs import floe_costs
@@ -160,7 +160,7 @@ def test_the_bound_holds_for_random_walks_over_random_prices(
     rows, columns, cell = 30, 20, 0.5
     grid = rng.exponential(1.0, (rows, columns)) * (rng.random((rows, columns)) < 0.4)
     sums = np.concatenate([np.zeros((columns, 1)), np.cumsum(grid.T, axis=1)], axis=1)
-    window = Window(half, reach, 0, 1, 1.0, cell, 0.3)
+    window = HullWindow(half, reach, 0, 1, 1.0, cell, 0.3)
     places, across = np.array([2, 6, 10]), np.arange(4, 16)
     bounds = place_costs(sums, places, 25, across, (4, 15), window)
     for _ in range(20):

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from ice_scenes import channel, straight_path
 
 from pushplan.envs.tasks.ship_ice import ShipIceTask
-from pushplan.interaction.ice import IceInteraction
+from pushplan.interaction.ice_interaction import IceInteraction
 from pushplan.planners import make_planner, make_policy, warm_up
 from pushplan.planners.ship_predictive import (
     PredictiveConfig,

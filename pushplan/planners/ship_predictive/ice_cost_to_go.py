@@ -25,7 +25,7 @@ _OUTSIDE = 300.0
 interpolated, and the search looks for the way back where it has to start there."""
 
 
-class CostToGo(NamedTuple):
+class IceCostToGo(NamedTuple):
     """Costs to go, and what they were made from; lengths in metres."""
 
     table: FloatArray  # (R, C, H) cost from each row, column and heading to the goal line [kg m]
@@ -54,7 +54,7 @@ class Floes(NamedTuple):
 
 
 @kernel(allocates=True)
-def fill_field(floes: Floes, out: CostToGo) -> None:
+def fill_field(floes: Floes, out: IceCostToGo) -> None:
     """Fill ``out.field``, the mass ahead of a bow at each place, as the module says."""
     field, masses = out.field, floes.masses
     field[:] = 0.0
@@ -89,7 +89,7 @@ def _sample(field: FloatArray, r: float, c: float) -> float:
 
 
 @kernel
-def mass_ahead(costs: CostToGo, x: float, y: float, theta: float) -> float:
+def mass_ahead(costs: IceCostToGo, x: float, y: float, theta: float) -> float:
     """Mass ahead of a ship at a pose [kg]: work of a metre, if no floe had moved before."""
     bx, by = x + costs.bow * math.cos(theta), y + costs.bow * math.sin(theta)
     cell = costs.cell
@@ -97,7 +97,7 @@ def mass_ahead(costs: CostToGo, x: float, y: float, theta: float) -> float:
 
 
 @kernel
-def fill_table(costs: CostToGo) -> None:
+def fill_table(costs: IceCostToGo) -> None:
     """Fill the table of costs to go, from the last row (the goal line) backwards."""
     rows, columns, headings = costs.table.shape
     spread = 2.0 * STEEPEST / (headings - 1)
@@ -120,7 +120,7 @@ def fill_table(costs: CostToGo) -> None:
 
 
 @kernel
-def _look_up(costs: CostToGo, r: int, c: float, h: float) -> float:
+def _look_up(costs: IceCostToGo, r: int, c: float, h: float) -> float:
     """Bilinear value in one row of the table, with a cost of being beside it."""
     layer = costs.table[r]
     columns, headings = layer.shape
@@ -135,7 +135,7 @@ def _look_up(costs: CostToGo, r: int, c: float, h: float) -> float:
 
 
 @kernel
-def cost_to_go(costs: CostToGo, x: float, y: float, theta: float) -> float:
+def cost_to_go(costs: IceCostToGo, x: float, y: float, theta: float) -> float:
     """Estimated cost from a pose to the goal line [kg m]."""
     rows, _, headings = costs.table.shape
     off = theta - 0.5 * math.pi
@@ -152,7 +152,7 @@ def cost_to_go(costs: CostToGo, x: float, y: float, theta: float) -> float:
 
 
 @kernel
-def cost_ahead(costs: CostToGo, arc: FloatArray, step: float) -> tuple[float, float]:
+def cost_ahead(costs: IceCostToGo, arc: FloatArray, step: float) -> tuple[float, float]:
     """Work [kg m] along (N, 4) poses ``step`` [m] apart, if no floe moved, and cost to go after."""
     work = 0.0
     for n in range(1, arc.shape[0]):

@@ -7,9 +7,9 @@ import functools
 import numpy as np
 
 from pushplan.geometry import Grid, clearance_field
-from pushplan.planners.mppi.cost_kernels import Approach, Field
 from pushplan.planners.mppi.fields import finite
 from pushplan.planners.mppi.mppi_config import MppiConfig
+from pushplan.planners.mppi.rollout_cost_kernels import Approach, Field
 from pushplan.search.grid_dijkstra import grid_dijkstra
 from pushplan.world import StaticMap, World
 from pushplan.world.checks import FloatArray

@@ -13,9 +13,9 @@ import numpy as np
 from pushplan.compiled import copy_into, kernel
 from pushplan.geometry.transforms import arc_step
 from pushplan.interaction.kernels import Bodies, Scratch, Settings, make_scratch
-from pushplan.planners.rearrangement.arc_kernels import push_to
 from pushplan.planners.rearrangement.controller_kernels import PushingController, steer_push
 from pushplan.planners.rearrangement.goal_kernels import REMOVED, ObjectGoal, is_done
+from pushplan.planners.rearrangement.short_arc_kernels import push_to
 from pushplan.world.checks import BoolArray, FloatArray
 
 STAGES = 8
@@ -33,7 +33,7 @@ class RolloutLog(NamedTuple):
     """(4,) x_min, y_min, x_max, y_max of all that moved, and of its surroundings [m]."""
 
 
-class RolloutProblem(NamedTuple):
+class PushRollout(NamedTuple):
     """A push to roll out."""
 
     target: int  # Index of the object that follows the path, -1 for a line push
@@ -76,7 +76,7 @@ def _write(log: RolloutLog, stages: int, used: int, poses: FloatArray, lengths: 
 
 
 @kernel
-def _update_done(memory: _Memory, problem: RolloutProblem, box: FloatArray, margin: float) -> bool:
+def _update_done(memory: _Memory, problem: PushRollout, box: FloatArray, margin: float) -> bool:
     """Remove what is delivered after a step; returns whether one more object is done."""
     poses, saved, done, news = memory.poses, memory.saved, memory.done, False
     for k in range(poses.shape[0]):
@@ -101,7 +101,7 @@ def _is_wanting(wanted: BoolArray, done: BoolArray) -> bool:
 
 @kernel(allocates=True)
 def roll_out(
-    start: FloatArray, poses: FloatArray, problem: RolloutProblem, log: RolloutLog
+    start: FloatArray, poses: FloatArray, problem: PushRollout, log: RolloutLog
 ) -> tuple[int, int]:
     """Push until nothing that is wanted can come of it; returns how many stages and poses."""
     memory = _Memory(
@@ -119,7 +119,7 @@ def roll_out(
 
 
 @kernel
-def _roll(memory: _Memory, problem: RolloutProblem, log: RolloutLog) -> tuple[int, int]:
+def _roll(memory: _Memory, problem: PushRollout, log: RolloutLog) -> tuple[int, int]:
     """`roll_out` in memory that is given; the last stage is kept however it ends."""
     here, there, poses, saved, lengths, done, scratch = memory
     controller, bodies = problem.controller, problem.bodies

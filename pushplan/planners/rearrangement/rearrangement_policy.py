@@ -1,4 +1,4 @@
-"""`ObjectPolicy`: what the policies for goals of objects have in common."""
+"""`RearrangementPolicy`: what the policies for goals of objects have in common."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ _STEPS = 150
 _PERIOD = 0.2  # [s]
 
 
-class ObjectPolicy(ABC):
+class RearrangementPolicy(ABC):
     """Refuses what no push can be made for, and chooses one command for each instant.
 
     Args:
@@ -86,7 +86,7 @@ def warm_up_steering() -> None:
 
 
 @functools.cache
-def _drive_in_small_worlds(policy: Callable[[], ObjectPolicy]) -> None:
+def _drive_in_small_worlds(policy: Callable[[], RearrangementPolicy]) -> None:
     """Let a new policy plan and drive for boxes in each kind of task."""
     for world in warm_up_worlds("rearrangement"):
         driven = policy()

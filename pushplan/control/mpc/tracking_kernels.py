@@ -18,7 +18,7 @@ from pushplan.geometry.angles import wrap_angle
 from pushplan.world.checks import FloatArray
 
 
-class Track(NamedTuple):
+class ReferencePath(NamedTuple):
     """A path as the kernels read it."""
 
     poses: FloatArray  # (M, 3) x, y [m], theta [rad]
@@ -57,7 +57,9 @@ def assembly_memory(count: int) -> AssemblyMemory:
 
 
 @kernel
-def locate(track: Track, x: float, y: float, low: float, high: float) -> tuple[float, int, float]:
+def locate(
+    track: ReferencePath, x: float, y: float, low: float, high: float
+) -> tuple[float, int, float]:
     """Path length [m], segment and fraction of it of the nearest point between two lengths [m]."""
     # past the last pose the path goes on straight
     poses, lengths = track.poses, track.lengths
@@ -87,7 +89,7 @@ def locate(track: Track, x: float, y: float, low: float, high: float) -> tuple[f
 
 @kernel
 def errors(
-    track: Track, x: float, y: float, theta: float, index: int, fraction: float
+    track: ReferencePath, x: float, y: float, theta: float, index: int, fraction: float
 ) -> tuple[float, float, float, float]:
     """Offset [m, left positive], heading error, path heading [rad] and curvature [1/m]."""
     # between two poses the path is the arc that their headings ask for, not its chord
@@ -114,7 +116,7 @@ def errors(
 
 
 @kernel
-def _speed_at(track: Track, along: float, index: int, tuning: Tuning, dt: float) -> float:
+def _speed_at(track: ReferencePath, along: float, index: int, tuning: Tuning, dt: float) -> float:
     """Speed [m/s] that the plan has at a place, and that still allows to stop at its end."""
     speed: float = min(track.speeds[index], tuning.max_speed)
     if tuning.stops:
@@ -153,7 +155,7 @@ def arc(
 
 @kernel
 def assemble(
-    track: Track,
+    track: ReferencePath,
     tuning: Tuning,
     pose: FloatArray,  # (3,) where the robot is when the first command takes effect
     along: float,  # path length of its place on the path [m]

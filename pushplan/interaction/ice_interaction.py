@@ -14,7 +14,7 @@ from pushplan.geometry.transforms import transform_points
 from pushplan.interaction.advance import advance_objects
 from pushplan.interaction.ice_bodies import IceBodies, IceProblem, IceSettings, ice_problem
 from pushplan.interaction.ice_contacts import drive_ice, sweep_ice
-from pushplan.interaction.model import Interaction, checked_path
+from pushplan.interaction.interaction_model import Interaction, checked_path
 from pushplan.interaction.quasi_static import QuasiStatic
 from pushplan.world import World
 from pushplan.world.checked_fields import (
